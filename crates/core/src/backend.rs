@@ -1,0 +1,124 @@
+//! The one seam between a real and a simulated gas stand.
+
+use crate::{Channel, SampleBatch};
+use serde::{Deserialize, Serialize};
+
+/// Whether gas flows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RigMode {
+    /// Air off, shaft at rest; for soaks and zeros.
+    Standstill,
+    /// Air on.
+    Running,
+}
+
+/// Everything a rig can be told.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Setpoints {
+    /// Air on or off.
+    pub mode: RigMode,
+    /// Turbine inlet total pressure (station 3), Pa.
+    pub p3_pa: f64,
+    /// Turbine inlet total temperature (station 3), K.
+    pub t3_k: f64,
+    /// Back-pressure valve opening relative to the nominal area, 0..2.5.
+    pub valve_opening_ratio: f64,
+    /// Oil inlet temperature, K.
+    pub oil_temperature_k: f64,
+}
+
+/// What a rig says of itself before it is armed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RigDescription {
+    /// Name of the backend, e.g. `virtual_lab`.
+    pub backend: String,
+    /// Version of the backend.
+    pub version: String,
+    /// Channels it delivers.
+    pub channels: Vec<Channel>,
+    /// Sample rate, Hz.
+    pub sample_rate_hz: f64,
+    /// Whether time is simulated: a simulated rig is never paced by the wall clock.
+    pub simulated_time: bool,
+}
+
+/// A gas stand, real or simulated. It owns its time; all data are owned.
+///
+/// Life cycle: [`describe`](Backend::describe), [`arm`](Backend::arm), then any number of
+/// [`set`](Backend::set) and [`poll`](Backend::poll), then [`disarm`](Backend::disarm).
+/// [`make_safe`](Backend::make_safe) is allowed at any time after arming, also after an error.
+pub trait Backend: Send {
+    /// What the rig is and measures.
+    fn describe(&self) -> RigDescription;
+
+    /// Takes control of the rig; run time 0 starts here.
+    fn arm(&mut self) -> Result<(), BackendError>;
+
+    /// Sends new setpoints, effective from the time of the last poll on.
+    fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError>;
+
+    /// Lets the rig run until `until_s` (seconds since arming) and returns the samples since the last poll.
+    fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError>;
+
+    /// Brings the rig into its safe state: air off, valve open.
+    fn make_safe(&mut self) -> Result<(), BackendError>;
+
+    /// Gives control of the rig back.
+    fn disarm(&mut self) -> Result<(), BackendError>;
+}
+
+/// Why a backend could not do what it was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum BackendError {
+    /// A call came outside its place in the life cycle.
+    #[error("the rig is {state}; `{call}` needs it to be {needed}: a fault of the program that drives it")]
+    OutOfOrder {
+        /// The call.
+        call: &'static str,
+        /// State the rig is in.
+        state: &'static str,
+        /// State the call needs.
+        needed: &'static str,
+    },
+    /// A setpoint outside what the rig can do.
+    #[error("{quantity} = {value} {unit} is outside what the rig can do ({low} to {high} {unit})")]
+    SetpointOutOfRange {
+        /// Which setpoint.
+        quantity: &'static str,
+        /// Value asked for.
+        value: f64,
+        /// Unit of the three values.
+        unit: &'static str,
+        /// Lowest allowed value.
+        low: f64,
+        /// Highest allowed value.
+        high: f64,
+    },
+    /// The backend's own settings in the campaign are wrong.
+    #[error("the settings of backend `{backend}` are wrong at `{path}`: {message}")]
+    Settings {
+        /// Name of the backend.
+        backend: String,
+        /// Key path below `backend.settings`.
+        path: String,
+        /// What is wrong and what would be right.
+        message: String,
+    },
+    /// A simulation could not go on.
+    #[error("the simulation stopped at {t_s:.3} s: {message}")]
+    Simulation {
+        /// Run time, s.
+        t_s: f64,
+        /// Why.
+        message: String,
+    },
+    /// The rig, or what stands for it, went away.
+    #[error("the rig was lost at {t_s:.3} s: {message}")]
+    Lost {
+        /// Run time, s.
+        t_s: f64,
+        /// Why.
+        message: String,
+    },
+}

@@ -1,0 +1,36 @@
+//! What happened during a run, apart from samples.
+
+use serde::{Deserialize, Serialize};
+
+/// Kind of an [`Event`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EventKind {
+    /// The compressor went past its surge line.
+    SurgeEntered,
+    /// The compressor came back from the surge side.
+    SurgeLeft,
+    /// The shaft went above the overspeed limit.
+    OverspeedEntered,
+    /// The shaft came back below the overspeed limit.
+    OverspeedLeft,
+    /// A guard of the runner tripped.
+    GuardTripped,
+    /// The rig was put into its safe state.
+    SafeState,
+    /// The run was stopped by its operator.
+    Interrupted,
+    /// A remark for people.
+    Note,
+}
+
+/// Something that happened at an instant of the run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Event {
+    /// Run time, s.
+    pub t_s: f64,
+    /// What kind of thing happened.
+    pub kind: EventKind,
+    /// One sentence with values and units.
+    pub message: String,
+}

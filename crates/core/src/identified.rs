@@ -1,0 +1,132 @@
+//! What identification says of one point, and how sure it is.
+
+use crate::OperatingPoint;
+use serde::{Deserialize, Serialize};
+
+/// How a point was identified.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Apparent efficiency from the temperature rise at the end of the step (conventional mapping).
+    Steady,
+    /// Efficiency and heat-transfer coefficient from the transient (Burke et al., eqs. 1-3).
+    Dynamic,
+}
+
+impl std::fmt::Display for Method {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Method::Steady => "steady",
+            Method::Dynamic => "dynamic",
+        })
+    }
+}
+
+/// Whether a point's numbers may be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Use it.
+    Good,
+    /// Use it with care: `warnings` say why.
+    Doubtful,
+    /// Do not use it: `warnings` say why. Its numbers are absent or meaningless.
+    Unusable,
+}
+
+/// A reason to doubt a point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Warning {
+    /// Stable key for machines, e.g. `small_gradient`.
+    pub code: String,
+    /// One sentence with values and units.
+    pub message: String,
+}
+
+/// The part of a recording that was used.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Window {
+    /// Start, run time, s.
+    pub start_s: f64,
+    /// End, run time, s.
+    pub end_s: f64,
+}
+
+/// Standard errors of a quantity, by origin: noise averages out with more samples, bias does not.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct EstimateUncertainty {
+    /// One standard error from noise, serial correlation of the residual included; unit of the quantity.
+    pub noise_standard_error: f64,
+    /// One standard error from declared fixed sensor offsets; unit of the quantity.
+    pub bias_standard_error: f64,
+}
+
+impl EstimateUncertainty {
+    /// Both origins in quadrature; unit of the quantity.
+    pub fn combined_standard_error(&self) -> f64 {
+        self.noise_standard_error.hypot(self.bias_standard_error)
+    }
+}
+
+/// The 95 % interval of a normally distributed estimate: value -/+ 1.96 standard errors.
+pub fn confidence_interval_95(value: f64, standard_error: f64) -> (f64, f64) {
+    // 97.5 % quantile of the standard normal distribution.
+    const Z_975: f64 = 1.959_963_984_540_054;
+    (value - Z_975 * standard_error, value + Z_975 * standard_error)
+}
+
+/// One identified point of the map. Absent numbers are `None`, never made up.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct IdentifiedPoint {
+    /// Index of the step.
+    pub step: usize,
+    /// What the plan aimed at; `None` in recordings made by others.
+    pub target: Option<OperatingPoint>,
+    /// Measured shaft speed at the end of the step, rpm.
+    pub speed_rpm: f64,
+    /// Commanded valve opening relative to the nominal area.
+    #[serde(rename = "valve")]
+    pub valve_opening_ratio: f64,
+    /// Compressor mass flow at the end of the step, kg/s.
+    pub flow_kg_s: f64,
+    /// Corrected mass flow at the end of the step, kg/s (reference state stands in the map).
+    pub flow_corrected_kg_s: f64,
+    /// Corrected shaft speed at the end of the step, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Total pressure ratio P2/P1 at the end of the step.
+    pub pressure_ratio: f64,
+    /// Inlet total temperature (station 1) at the end of the step, K.
+    pub t1_k: f64,
+    /// Inlet total pressure (station 1) at the end of the step, Pa.
+    pub p1_pa: f64,
+    /// Isentropic efficiency, total to total, fraction: adiabatic for `dynamic`, apparent for `steady`.
+    pub eta: Option<f64>,
+    /// Lower end of the 95 % interval of `eta`.
+    pub eta_low: Option<f64>,
+    /// Upper end of the 95 % interval of `eta`.
+    pub eta_high: Option<f64>,
+    /// Standard errors of `eta` by origin, fraction.
+    pub eta_uncertainty: Option<EstimateUncertainty>,
+    /// Heat-transfer coefficient between gas and compressor housing, W/(m2 K); `None` for `steady`.
+    pub h_w_m2k: Option<f64>,
+    /// Lower end of the 95 % interval of `h_w_m2k`.
+    pub h_low_w_m2k: Option<f64>,
+    /// Upper end of the 95 % interval of `h_w_m2k`.
+    pub h_high_w_m2k: Option<f64>,
+    /// Standard errors of `h_w_m2k` by origin, W/(m2 K).
+    pub h_uncertainty: Option<EstimateUncertainty>,
+    /// How it was identified.
+    pub method: Method,
+    /// Whether to use it.
+    pub verdict: Verdict,
+    /// Reasons for a verdict other than good, and remarks.
+    pub warnings: Vec<Warning>,
+    /// Part of the recording used.
+    pub window: Option<Window>,
+    /// Root mean square of what the fit leaves of T2, K.
+    pub residual_rms_k: Option<f64>,
+    /// Change of T2 over the window, K.
+    pub dt2_k: Option<f64>,
+    /// Change of the housing temperature over the window, K.
+    pub dtc_k: Option<f64>,
+}

@@ -1,0 +1,36 @@
+//! The data that flows through `mapper`, and the two seams to the world: [`Backend`] and [`Clock`].
+//!
+//! Campaign -> [`Plan`] -> [`Recording`] -> [`IdentifiedPoint`] -> [`CompressorMap`]: every arrow is a function
+//! from data to data. This crate holds the data, names every measured quantity once ([`Channel`]), and does no IO.
+//!
+//! Conventions: SI inside (kelvin, pascal, kg/s) except shaft speed, which is in rpm as every map is; each `f64`
+//! that crosses a boundary carries its unit in its name; pressures and temperatures are total unless a name says
+//! `static`; corrected quantities stand beside the [`ReferenceState`] they were made with.
+
+mod backend;
+mod channel;
+mod clock;
+mod event;
+mod identified;
+mod map;
+mod operating_point;
+mod plan;
+mod recording;
+mod reference_state;
+mod sample;
+mod step_marker;
+
+pub use backend::{Backend, BackendError, RigDescription, RigMode, Setpoints};
+pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
+pub use clock::{Clock, UnpacedClock};
+pub use event::{Event, EventKind};
+pub use identified::{
+    EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
+};
+pub use map::{CompressorMap, MapPoint, SpeedLine};
+pub use operating_point::OperatingPoint;
+pub use plan::{MadeFrom, Plan, PlanFigures, PlanStep, Predicted, StepKind};
+pub use recording::{Recording, RecordingError, Series};
+pub use reference_state::ReferenceState;
+pub use sample::{ChannelColumn, SampleBatch, TruthColumn};
+pub use step_marker::StepMarker;

@@ -1,0 +1,115 @@
+//! The plan as data: what will be done, in which order, and what is expected of it.
+
+use crate::OperatingPoint;
+use serde::{Deserialize, Serialize};
+
+/// Whether a step measures a point for the map or revisits one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StepKind {
+    /// A point of the grid.
+    Point,
+    /// A revisit, to see drift.
+    Repeat,
+}
+
+/// What the nominal model expects of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Predicted {
+    /// Change of T2 over the identification window, K (signed). `None` for the first step, which has no jump.
+    pub dt2_k: Option<f64>,
+    /// Change of the compressor housing temperature over the window, K (signed).
+    pub dtc_k: Option<f64>,
+    /// Standard error of the efficiency (fraction); `None` where it was not forecast.
+    pub sigma_eta: Option<f64>,
+    /// Relative standard error of the heat-transfer coefficient; `None` where it was not forecast.
+    pub sigma_h_rel: Option<f64>,
+    /// Compressor mass flow at the end of the step, kg/s.
+    pub flow_kg_s: f64,
+    /// Pressure ratio P2/P1 at the end of the step.
+    pub pressure_ratio: f64,
+    /// Gas temperature at the compressor outlet at the end of the step, K.
+    pub t2_k: f64,
+    /// Time until the operating point has settled, s; `None` where it never does within the dwell.
+    pub settle_s: Option<f64>,
+    /// Duration of the step, minutes.
+    pub minutes: f64,
+}
+
+/// One step: go to a point and stay there.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlanStep {
+    /// Position in the plan, from 0.
+    pub index: usize,
+    /// Point or repeat.
+    pub kind: StepKind,
+    /// Point before the jump; `None` for the first step.
+    pub from: Option<OperatingPoint>,
+    /// Target speed and valve opening.
+    #[serde(flatten)]
+    pub to: OperatingPoint,
+    /// Turbine inlet total pressure (station 3) that holds the target in steady state, Pa.
+    pub p3_pa: f64,
+    /// Turbine inlet total temperature (station 3), K.
+    pub t3_k: f64,
+    /// Oil inlet temperature, K.
+    pub oil_temperature_k: f64,
+    /// Time at the point, jump included, s.
+    pub dwell_s: f64,
+    /// Start of the step after the start of the run, s (warm-up included).
+    pub start_s: f64,
+    /// What the nominal model expects.
+    pub predicted: Predicted,
+}
+
+/// Hashes of everything the plan was made from; a plan whose hashes no longer match is stale.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MadeFrom {
+    /// SHA-256 of the campaign as the program understood it (defaults filled in, units resolved).
+    pub campaign_sha256: String,
+    /// SHA-256 of the nominal model's parameters and map.
+    pub model_sha256: String,
+    /// SHA-256 of the sequence script, if there was one.
+    pub script_sha256: Option<String>,
+}
+
+/// The plan in four numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PlanFigures {
+    /// Sum over the jumps of the housing's temperature change within the window, K (absolute values).
+    pub sum_gradient_k: f64,
+    /// Smallest of these changes, K; `None` for a plan without jumps.
+    pub worst_gradient_k: Option<f64>,
+    /// Largest predicted standard error of the efficiency (fraction); `None` where it was not forecast.
+    pub worst_sigma_eta: Option<f64>,
+    /// Duration of the run, warm-up and cool-down included, minutes.
+    pub minutes: f64,
+}
+
+/// An ordered, checked list of steps with what is expected of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Name of the campaign.
+    pub campaign: String,
+    /// What the order was chosen by, e.g. `listed`, `greedy_gradient`.
+    pub objective: String,
+    /// Seed of the search (and of simulated rigs).
+    pub seed: u64,
+    /// What the plan was made from.
+    pub made_from: MadeFrom,
+    /// Time at the first point before the first step starts, s.
+    pub warm_up_s: f64,
+    /// Time at standstill conditions after the last step, s.
+    pub cool_down_s: f64,
+    /// The steps in order.
+    pub steps: Vec<PlanStep>,
+    /// The plan in four numbers.
+    pub figures: PlanFigures,
+}
+
+impl Plan {
+    /// Duration of the whole run, warm-up and cool-down included, s.
+    pub fn duration_s(&self) -> f64 {
+        self.warm_up_s + self.steps.iter().map(|step| step.dwell_s).sum::<f64>() + self.cool_down_s
+    }
+}

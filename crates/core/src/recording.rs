@@ -1,0 +1,111 @@
+//! A recording in memory: series per channel, steps, events. Truth is not part of it.
+
+use crate::{Channel, Event, StepMarker};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// One channel over time.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Series {
+    /// Times since the start of the recording, s, strictly increasing.
+    pub t_s: Vec<f64>,
+    /// SI values, as long as `t_s`.
+    pub values: Vec<f64>,
+}
+
+impl Series {
+    /// Value at `t_s` by linear interpolation, held constant beyond both ends. `None` for an empty series.
+    pub fn interpolate(&self, t_s: f64) -> Option<f64> {
+        let after = self.t_s.partition_point(|t| *t < t_s);
+        match (after.checked_sub(1), self.t_s.get(after)) {
+            (_, None) => self.values.last().copied(),
+            (None, Some(_)) => self.values.first().copied(),
+            (Some(before), Some(t_after_s)) => {
+                let (t0, v0, v1) = (self.t_s[before], self.values[before], self.values[after]);
+                Some(v0 + (v1 - v0) * (t_s - t0) / (t_after_s - t0))
+            }
+        }
+    }
+
+    /// Value at `t_s` as a command holds: that of the last change at or before `t_s`, or the first one.
+    pub fn held(&self, t_s: f64) -> Option<f64> {
+        let after = self.t_s.partition_point(|t| *t <= t_s);
+        self.values.get(after.saturating_sub(1)).copied()
+    }
+
+    /// Indices of the samples with `start_s <= t <= end_s`.
+    pub fn range(&self, start_s: f64, end_s: f64) -> std::ops::Range<usize> {
+        let start = self.t_s.partition_point(|t| *t < start_s);
+        let end = self.t_s.partition_point(|t| *t <= end_s);
+        start..end.max(start)
+    }
+
+    /// Times and values with `start_s <= t <= end_s`.
+    pub fn slice(&self, start_s: f64, end_s: f64) -> (&[f64], &[f64]) {
+        let range = self.range(start_s, end_s);
+        (&self.t_s[range.clone()], &self.values[range])
+    }
+}
+
+/// Everything that was recorded of a run, in SI units.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Recording {
+    /// What was measured and commanded.
+    pub series: BTreeMap<Channel, Series>,
+    /// Steps in order; in recordings made by others found from changes of the command channels.
+    pub steps: Vec<StepMarker>,
+    /// Events in order.
+    pub events: Vec<Event>,
+}
+
+/// Why a recording cannot serve.
+#[derive(Debug, Clone, thiserror::Error, PartialEq)]
+pub enum RecordingError {
+    /// A channel that is needed is not there.
+    #[error("the recording has no channel {channel} ({}); name it in the channel map", channel.info().description)]
+    MissingChannel {
+        /// The channel.
+        channel: Channel,
+    },
+}
+
+impl Recording {
+    /// The series of a channel.
+    ///
+    /// # Errors
+    /// [`RecordingError::MissingChannel`] where the recording has none, or an empty one.
+    pub fn require(&self, channel: Channel) -> Result<&Series, RecordingError> {
+        self.series
+            .get(&channel)
+            .filter(|series| !series.t_s.is_empty())
+            .ok_or(RecordingError::MissingChannel { channel })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ramp() -> Series {
+        Series { t_s: vec![0.0, 1.0, 3.0], values: vec![0.0, 10.0, 30.0] }
+    }
+
+    #[test]
+    fn interpolation_is_exact_on_a_ramp_and_constant_beyond_it() {
+        let values = [-1.0, 0.0, 0.5, 2.0, 3.0, 9.0].map(|t| ramp().interpolate(t).unwrap());
+        assert_eq!(values, [0.0, 0.0, 5.0, 20.0, 30.0, 30.0]);
+        assert_eq!(Series::default().interpolate(0.0), None);
+    }
+
+    #[test]
+    fn a_held_value_changes_at_its_own_time() {
+        let values = [-1.0, 0.0, 0.99, 1.0, 2.9, 3.0].map(|t| ramp().held(t).unwrap());
+        assert_eq!(values, [0.0, 0.0, 0.0, 10.0, 10.0, 30.0]);
+    }
+
+    #[test]
+    fn a_slice_keeps_both_ends() {
+        assert_eq!(ramp().slice(1.0, 3.0).1, &[10.0, 30.0]);
+        assert!(ramp().slice(2.0, 1.0).0.is_empty());
+    }
+}

@@ -1,0 +1,51 @@
+//! Samples as a backend hands them over: columns over a common time base.
+
+use crate::{Channel, Event};
+use serde::{Deserialize, Serialize};
+
+/// The samples of one channel in a batch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChannelColumn {
+    /// Which quantity.
+    pub channel: Channel,
+    /// SI values, as long as the batch's `t_s`. NaN where the sensor gave nothing.
+    pub values: Vec<f64>,
+}
+
+/// What only a simulator knows; recorded under `/truth`, read by scoring alone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TruthColumn {
+    /// Name with its unit suffix, e.g. `h_w_m2k`.
+    pub name: String,
+    /// Unit, e.g. `W/(m2 K)`.
+    pub unit: String,
+    /// Values, as long as the batch's `t_s`.
+    pub values: Vec<f64>,
+}
+
+/// All samples between two polls of a backend.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct SampleBatch {
+    /// Sequence number of the first sample; consecutive over the run, so a loss shows as a jump.
+    pub first_sequence: u64,
+    /// Sample times since arming, s, strictly increasing.
+    pub t_s: Vec<f64>,
+    /// One column per channel.
+    pub columns: Vec<ChannelColumn>,
+    /// Truth of a simulated rig; empty for a real one.
+    pub truth: Vec<TruthColumn>,
+    /// Events since the last poll.
+    pub events: Vec<Event>,
+}
+
+impl SampleBatch {
+    /// The values of one channel, if the rig has it.
+    pub fn column(&self, channel: Channel) -> Option<&[f64]> {
+        self.columns.iter().find(|column| column.channel == channel).map(|c| c.values.as_slice())
+    }
+
+    /// The latest value of one channel, if there is any.
+    pub fn last(&self, channel: Channel) -> Option<f64> {
+        self.column(channel).and_then(|values| values.last().copied())
+    }
+}

@@ -1,0 +1,3 @@
+//! The lumped turbocharger model of Burke et al., and the laws it is made of.
+
+pub mod params;

@@ -1,0 +1,183 @@
+//! Every parameter of the lumped turbocharger model, with Appendix A's values as default.
+
+use mapper_core::ReferenceState;
+use serde::{Deserialize, Serialize};
+
+/// The machine: geometry, masses, conductances, probe. Effects and fits change these numbers, never the equations.
+///
+/// Defaults are those of Burke et al., Appendix A, as completed in the model's description (`docs/physics.md`).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Params {
+    /// Compressor side.
+    pub compressor: CompressorParams,
+    /// Turbine side.
+    pub turbine: TurbineParams,
+    /// Bearing housing and oil.
+    pub bearing: BearingParams,
+    /// Shaft inertia, kg m2, > 0.
+    pub shaft_inertia_kgm2: f64,
+    /// Back-pressure valve and the volume before it.
+    pub outlet: OutletParams,
+    /// Diameter of the T2 probe's tip, m; 0 is an ideal probe (eqs. 11-12).
+    pub t2_probe_diameter_m: f64,
+}
+
+/// Compressor housing and wheel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CompressorParams {
+    /// Internal area that exchanges heat with the gas, A_c, m2.
+    pub internal_area_m2: f64,
+    /// Share of `internal_area_m2` before compression, alpha_A, 0..1 (eqs. 1 and 3).
+    pub alpha_area_ratio: f64,
+    /// Outlet pipe diameter: characteristic length of the Nusselt correlation, m.
+    pub outlet_diameter_m: f64,
+    /// Wheel diameter at the exit, m; tip speed of the map.
+    pub wheel_diameter_m: f64,
+    /// Nusselt correlation `Nu = a Re^b Pr^(1/3) (mu/mu_skin)^0.14`: a.
+    pub nusselt_coefficient: f64,
+    /// Nusselt correlation: b.
+    pub nusselt_exponent: f64,
+    /// Mass of the housing, kg.
+    pub housing_mass_kg: f64,
+    /// External area, m2.
+    pub external_area_m2: f64,
+    /// External emissivity, 0..1, ratio to a black body.
+    pub emissivity_ratio: f64,
+}
+
+/// Turbine housing and wheel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TurbineParams {
+    /// Internal area that exchanges heat with the gas, A_t, m2.
+    pub internal_area_m2: f64,
+    /// Inlet pipe diameter: characteristic length of the Nusselt correlation, m.
+    pub inlet_diameter_m: f64,
+    /// Radius of the wheel's inlet, m; blade speed of the blade-speed ratio.
+    pub wheel_radius_m: f64,
+    /// Nusselt correlation `Nu = a Re^b Pr^(1/3) (mu/mu_skin)^0.14`: a.
+    pub nusselt_coefficient: f64,
+    /// Nusselt correlation: b.
+    pub nusselt_exponent: f64,
+    /// Mass of the housing, kg.
+    pub housing_mass_kg: f64,
+    /// External area, m2.
+    pub external_area_m2: f64,
+    /// External emissivity, 0..1, ratio to a black body.
+    pub emissivity_ratio: f64,
+    /// Flow the turbine swallows at large expansion ratio, corrected to 288.15 K and 101.325 kPa, kg/s.
+    pub choked_flow_kg_s: f64,
+    /// Best efficiency of the turbine, 0..1.
+    pub peak_efficiency: f64,
+    /// Blade-speed ratio of the best efficiency.
+    pub peak_blade_speed_ratio: f64,
+}
+
+/// Bearing housing between the two.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BearingParams {
+    /// Thermal conductivity of the bearing housing, W/(m K).
+    pub conductivity_w_mk: f64,
+    /// Section area of the bearing housing, m2.
+    pub section_area_m2: f64,
+    /// Length of the bearing housing, m; half of it lies on each side of the oil.
+    pub length_m: f64,
+    /// Conductance from the bearing housing to the oil, W/K.
+    pub oil_conductance_w_k: f64,
+}
+
+/// Back-pressure valve and the volume between compressor and valve.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutletParams {
+    /// Volume between compressor outlet and valve, m3.
+    pub volume_m3: f64,
+    /// Valve area at opening 1, m2.
+    pub valve_area_m2: f64,
+    /// Discharge coefficient of the valve.
+    pub discharge_coefficient: f64,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Params {
+            compressor: CompressorParams {
+                internal_area_m2: 29e-3,
+                alpha_area_ratio: 0.0,
+                outlet_diameter_m: 35e-3,
+                wheel_diameter_m: 52e-3,
+                nusselt_coefficient: 0.004,
+                nusselt_exponent: 1.13,
+                housing_mass_kg: 0.93,
+                external_area_m2: 79e-3,
+                emissivity_ratio: 0.1,
+            },
+            turbine: TurbineParams {
+                internal_area_m2: 24e-3,
+                inlet_diameter_m: 40e-3,
+                wheel_radius_m: 0.0235,
+                nusselt_coefficient: 0.038,
+                nusselt_exponent: 0.662,
+                housing_mass_kg: 3.15,
+                external_area_m2: 80e-3,
+                emissivity_ratio: 0.6,
+                choked_flow_kg_s: 0.078,
+                peak_efficiency: 0.75,
+                peak_blade_speed_ratio: 0.65,
+            },
+            bearing: BearingParams {
+                conductivity_w_mk: 47.5,
+                section_area_m2: 7e-4,
+                length_m: 45e-3,
+                oil_conductance_w_k: 8.0,
+            },
+            shaft_inertia_kgm2: 16e-6,
+            outlet: OutletParams { volume_m3: 0.78e-3, valve_area_m2: 0.4e-3, discharge_coefficient: 0.6 },
+            t2_probe_diameter_m: 0.0,
+        }
+    }
+}
+
+/// What surrounds the machine and is set by rig or cell.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoundaryConditions {
+    /// Compressor inlet total temperature (station 1), K.
+    pub t1_k: f64,
+    /// Compressor inlet total pressure (station 1), Pa.
+    pub p1_pa: f64,
+    /// Turbine inlet total pressure (station 3), Pa.
+    pub p3_pa: f64,
+    /// Turbine inlet total temperature (station 3), K.
+    pub t3_k: f64,
+    /// Turbine outlet pressure (station 4), Pa.
+    pub p4_pa: f64,
+    /// Oil temperature, K.
+    pub oil_temperature_k: f64,
+    /// Ambient temperature around the housings, K.
+    pub ambient_temperature_k: f64,
+    /// Back-pressure valve opening relative to the nominal area, 0..2.5.
+    pub valve_opening_ratio: f64,
+}
+
+impl Default for BoundaryConditions {
+    /// The nominal boundary conditions, with the turbine at its outlet pressure (no flow) and the valve at 1.
+    fn default() -> Self {
+        BoundaryConditions {
+            t1_k: 298.15,
+            p1_pa: 100_000.0,
+            p3_pa: 110_000.0,
+            t3_k: 773.15,
+            p4_pa: 110_000.0,
+            oil_temperature_k: 323.15,
+            ambient_temperature_k: 298.15,
+            valve_opening_ratio: 1.0,
+        }
+    }
+}
+
+/// The model's own reference state (SAE J922).
+pub const MODEL_REFERENCE: ReferenceState = ReferenceState::SAE;

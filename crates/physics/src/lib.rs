@@ -1,3 +1,22 @@
 //! The lumped turbocharger model of Burke et al., and the laws it is made of.
+//!
+//! One file per law; [`model`] puts them together, [`simulate`] integrates them, [`steady`] finds where they rest.
 
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod air;
+mod bracket;
+pub mod characteristic;
+pub mod closed_form_map;
+pub mod compression;
+pub mod housing;
+pub mod inputs;
+pub mod model;
+pub mod nusselt;
+pub mod orifice;
 pub mod params;
+pub mod rosenbrock;
+pub mod simulate;
+pub mod steady;
+pub mod thermocouple;
+pub mod turbine;

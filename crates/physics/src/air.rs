@@ -1,0 +1,55 @@
+//! Dry air: gas constant, heat capacity, viscosity, conductivity.
+//!
+//! Closed forms of the virtual laboratory, standing for the tables of the paper's reference 12.
+
+/// Specific gas constant of dry air, J/(kg K).
+pub const GAS_CONSTANT_J_KGK: f64 = 287.05;
+
+/// Ratio of specific heats used where the paper's model holds it constant (orifice, filling of the volume).
+pub const HEAT_CAPACITY_RATIO: f64 = 1.4;
+
+/// Isobaric heat capacity `1002.5 + 275e-6 (T - 200)^2`, J/(kg K), for 200..800 K.
+#[inline]
+pub fn heat_capacity_j_kgk(temperature_k: f64) -> f64 {
+    let above_k = temperature_k - 200.0;
+    1002.5 + 275e-6 * above_k * above_k
+}
+
+/// Dynamic viscosity, Pa s (Sutherland: `1.458e-6 T^1.5 / (T + 110.4)`).
+#[inline]
+pub fn viscosity_pa_s(temperature_k: f64) -> f64 {
+    1.458e-6 * temperature_k * temperature_k.sqrt() / (temperature_k + 110.4)
+}
+
+/// Thermal conductivity `0.02624 (T/300)^0.8646`, W/(m K).
+#[inline]
+pub fn conductivity_w_mk(temperature_k: f64) -> f64 {
+    0.02624 * (temperature_k / 300.0).powf(0.8646)
+}
+
+/// Exponent `kappa = R/cp(T)` of the isentropic temperature ratio `PR^kappa`.
+#[inline]
+pub fn isentropic_exponent(temperature_k: f64) -> f64 {
+    GAS_CONSTANT_J_KGK / heat_capacity_j_kgk(temperature_k)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tabulated dry air at 1 atm (Incropera, Fundamentals of Heat and Mass Transfer, table A.4). The closed forms
+    /// are simple on purpose: they follow the table within 1 % (cp), 2 % (mu) and 5 % (k).
+    #[test]
+    fn properties_follow_the_tables() {
+        for (t_k, cp, mu, k) in [
+            (300.0, 1007.0, 184.6e-7, 26.3e-3),
+            (400.0, 1014.0, 230.1e-7, 33.8e-3),
+            (500.0, 1030.0, 270.1e-7, 40.7e-3),
+            (700.0, 1075.0, 338.8e-7, 52.4e-3),
+        ] {
+            assert!((heat_capacity_j_kgk(t_k) / cp - 1.0).abs() < 0.01, "cp at {t_k} K");
+            assert!((viscosity_pa_s(t_k) / mu - 1.0).abs() < 0.02, "mu at {t_k} K");
+            assert!((conductivity_w_mk(t_k) / k - 1.0).abs() < 0.05, "k at {t_k} K");
+        }
+    }
+}

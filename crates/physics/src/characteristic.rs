@@ -1,0 +1,33 @@
+//! The seam between the model and a compressor map: flow and efficiency at a corrected speed and pressure ratio.
+
+use mapper_core::ReferenceState;
+
+/// What a map says at one corrected speed and pressure ratio.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CharacteristicPoint {
+    /// Corrected mass flow, kg/s. Negative where the closed form continues far beyond the surge line.
+    pub flow_corrected_kg_s: f64,
+    /// Isentropic efficiency, total to total, fraction.
+    pub efficiency: f64,
+    /// Position along the speed line: <= 0 choked, 1 on the surge line, > 1 beyond it.
+    pub surge_position_ratio: f64,
+}
+
+/// A compressor map in corrected quantities. Defined for every positive speed and every pressure ratio, so that an
+/// integration never leaves it; `surge_position_ratio` tells where it left the measured part.
+pub trait CompressorCharacteristic: Send + Sync + std::fmt::Debug {
+    /// Reference state of the map's corrected quantities.
+    fn reference(&self) -> ReferenceState;
+
+    /// Flow, efficiency and place on the speed line. `speed_corrected_rpm` > 0.
+    fn evaluate(&self, speed_corrected_rpm: f64, pressure_ratio: f64) -> CharacteristicPoint;
+
+    /// Where the speed line ends on the surge side: corrected flow in kg/s and pressure ratio.
+    fn surge_point(&self, speed_corrected_rpm: f64) -> (f64, f64);
+
+    /// Largest corrected flow of the speed line, kg/s.
+    fn choke_flow_corrected_kg_s(&self, speed_corrected_rpm: f64) -> f64;
+
+    /// Text from which the map can be told apart from any other; goes into the hash of a plan.
+    fn fingerprint(&self) -> String;
+}

@@ -1,0 +1,260 @@
+//! Integrates the model: samples where asked, events where they happen.
+
+use crate::inputs::Inputs;
+use crate::model::{BoundaryError, Model, Outputs, PreparedModel, State};
+use crate::params::BoundaryConditions;
+use crate::rosenbrock::{IntegrationError, Integrator, OdeSystem, Step, Tolerances};
+
+const STATES: usize = 5;
+
+/// What to look out for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Watch {
+    /// Shaft speed of the overspeed event, rpm.
+    pub overspeed_rpm: f64,
+}
+
+impl Default for Watch {
+    fn default() -> Self {
+        Watch { overspeed_rpm: f64::INFINITY }
+    }
+}
+
+/// A line that was crossed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Crossing {
+    /// Past the surge line.
+    SurgeEntered,
+    /// Back from beyond the surge line.
+    SurgeLeft,
+    /// Above the overspeed limit.
+    OverspeedEntered,
+    /// Back below the overspeed limit.
+    OverspeedLeft,
+}
+
+/// A crossing with its time and the state there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModelEvent {
+    /// Time, s.
+    pub t_s: f64,
+    /// What was crossed.
+    pub crossing: Crossing,
+    /// Shaft speed at the crossing, rpm.
+    pub speed_rpm: f64,
+    /// Pressure ratio at the crossing.
+    pub pressure_ratio: f64,
+}
+
+/// Why a simulation could not go on.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SimulationError {
+    /// The boundary conditions have no meaning.
+    #[error("at {t_s:.3} s: {source}")]
+    Boundary {
+        /// Time, s.
+        t_s: f64,
+        /// What is wrong with them.
+        source: BoundaryError,
+    },
+    /// The integration failed.
+    #[error(transparent)]
+    Integration(#[from] IntegrationError),
+}
+
+/// A machine in motion: advance it as far as wanted, as often as wanted.
+#[derive(Debug, Clone)]
+pub struct Simulator<'a> {
+    model: &'a Model,
+    integrator: Integrator<STATES>,
+    watch: Watch,
+    /// Surge position minus 1, and speed minus limit, at the end of the last step; `None` before the first.
+    margins: Option<[f64; 2]>,
+}
+
+/// Local error allowed by default, relative: three orders below the noise of any sensor.
+pub const DEFAULT_RELATIVE_TOLERANCE: f64 = 1e-6;
+
+impl<'a> Simulator<'a> {
+    /// A machine at `state` at `t_s`, integrated to `relative_tolerance` per step.
+    pub fn new(model: &'a Model, t_s: f64, state: State, relative_tolerance: f64, watch: Watch) -> Self {
+        // Absolute parts: a thousandth of each state's usual size.
+        let tolerances = Tolerances {
+            relative_ratio: relative_tolerance,
+            absolute: [1e4, 1e5, 3e2, 5e2, 3e2].map(|size| 1e-3 * size * relative_tolerance),
+        };
+        Simulator {
+            model,
+            integrator: Integrator::new(t_s, state.to_array(), tolerances),
+            watch,
+            margins: None,
+        }
+    }
+
+    /// Current time, s.
+    pub fn t_s(&self) -> f64 {
+        self.integrator.t_s
+    }
+
+    /// Current state.
+    pub fn state(&self) -> State {
+        State::from_array(&self.integrator.y)
+    }
+
+    /// Steps taken so far.
+    pub fn steps(&self) -> usize {
+        self.integrator.steps()
+    }
+
+    /// Forgets the step size; call after a jump of the inputs.
+    pub fn restart(&mut self) {
+        self.integrator.restart();
+    }
+
+    /// Runs to `end_s`. `on_sample` is called with time, state and outputs at each of `sample_times_s` (rising, within
+    /// the interval; the interval's start is allowed), `on_event` at each crossing, in order of time.
+    ///
+    /// # Errors
+    /// [`SimulationError`] where the inputs have no meaning or the tolerance cannot be met.
+    pub fn run_to(
+        &mut self,
+        end_s: f64,
+        inputs: &impl Inputs,
+        sample_times_s: impl IntoIterator<Item = f64>,
+        mut on_sample: impl FnMut(f64, &State, &Outputs),
+        mut on_event: impl FnMut(ModelEvent),
+    ) -> Result<(), SimulationError> {
+        let mut samples = sample_times_s.into_iter().peekable();
+        let mut sample = |t_s: f64, y: &[f64; STATES], prepared: &PreparedModel<'_>| {
+            let state = State::from_array(y);
+            on_sample(t_s, &state, &prepared.evaluate(&state));
+        };
+        while let Some(t_s) = samples.next_if(|t| *t <= self.t_s()) {
+            let boundary = checked(inputs, t_s)?;
+            sample(t_s, &self.integrator.y, &self.model.prepare(&boundary));
+        }
+        while self.t_s() < end_s {
+            let start_s = self.t_s();
+            let kink_s = inputs.next_kink_s(start_s);
+            let stretch_end_s = kink_s.min(end_s);
+            let boundary = checked(inputs, start_s)?;
+            let prepared = self.model.prepare(&boundary);
+            let constant = inputs.is_constant_after(start_s);
+            let mut system = ModelSystem { model: self.model, prepared, inputs, constant };
+            while self.integrator.t_s < stretch_end_s {
+                let step = self.integrator.step(&mut system, stretch_end_s)?;
+                self.report_crossings(&step, &mut system, &mut on_event);
+                while let Some(t_s) = samples.next_if(|t| *t <= step.t1_s) {
+                    system.prepare_for(t_s);
+                    sample(t_s, &step.at(t_s), &system.prepared);
+                }
+            }
+            if kink_s <= end_s {
+                self.integrator.restart();
+            }
+        }
+        Ok(())
+    }
+
+    fn report_crossings(
+        &mut self,
+        step: &Step<STATES>,
+        system: &mut ModelSystem<'_, impl Inputs>,
+        on_event: &mut impl FnMut(ModelEvent),
+    ) {
+        let before = match self.margins {
+            Some(margins) => margins,
+            None => self.margins_at(step.t0_s, &step.y0, system),
+        };
+        let after = self.margins_at(step.t1_s, &step.y1, system);
+        self.margins = Some(after);
+        let mut events: Vec<ModelEvent> = Vec::new();
+        for (which, [entered, left]) in [
+            [Crossing::SurgeEntered, Crossing::SurgeLeft],
+            [Crossing::OverspeedEntered, Crossing::OverspeedLeft],
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let inside = |margin: f64| margin > 0.0;
+            if inside(before[which]) == inside(after[which]) {
+                continue;
+            }
+            // Bisection to a microsecond: the margin is continuous and changes sign once.
+            let (mut low_s, mut high_s) = (step.t0_s, step.t1_s);
+            while high_s - low_s > 1e-6 {
+                let middle_s = 0.5 * (low_s + high_s);
+                if inside(self.margins_at(middle_s, &step.at(middle_s), system)[which]) == inside(before[which]) {
+                    low_s = middle_s;
+                } else {
+                    high_s = middle_s;
+                }
+            }
+            let state = State::from_array(&step.at(high_s));
+            events.push(ModelEvent {
+                t_s: high_s,
+                crossing: if inside(after[which]) { entered } else { left },
+                speed_rpm: state.shaft_speed_rpm(),
+                pressure_ratio: state.p2_pa / system.prepared.boundary().p1_pa,
+            });
+        }
+        events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+        events.into_iter().for_each(on_event);
+    }
+
+    /// Surge position minus 1; shaft speed minus its limit, rpm.
+    fn margins_at(
+        &self,
+        t_s: f64,
+        y: &[f64; STATES],
+        system: &mut ModelSystem<'_, impl Inputs>,
+    ) -> [f64; 2] {
+        system.prepare_for(t_s);
+        let boundary = system.prepared.boundary();
+        let state = State::from_array(y);
+        let speed_rpm = state.shaft_speed_rpm();
+        let corrected_rpm = self.model.map.reference().corrected_speed_rpm(speed_rpm, boundary.t1_k);
+        let on_map = self.model.map.evaluate(corrected_rpm, state.p2_pa / boundary.p1_pa);
+        [on_map.surge_position_ratio - 1.0, speed_rpm - self.watch.overspeed_rpm]
+    }
+}
+
+fn checked(inputs: &impl Inputs, t_s: f64) -> Result<BoundaryConditions, SimulationError> {
+    let boundary = inputs.at(t_s);
+    boundary.check().map_err(|source| SimulationError::Boundary { t_s, source })?;
+    Ok(boundary)
+}
+
+struct ModelSystem<'a, I: Inputs> {
+    model: &'a Model,
+    prepared: PreparedModel<'a>,
+    inputs: &'a I,
+    constant: bool,
+}
+
+impl<I: Inputs> ModelSystem<'_, I> {
+    fn prepare_for(&mut self, t_s: f64) {
+        if !self.constant {
+            self.prepared = self.model.prepare(&self.inputs.at(t_s));
+        }
+    }
+}
+
+impl<I: Inputs> OdeSystem<STATES> for ModelSystem<'_, I> {
+    fn rates(&mut self, t_s: f64, y: &[f64; STATES]) -> [f64; STATES] {
+        self.prepare_for(t_s);
+        let state = State::from_array(y);
+        let outputs = self.prepared.evaluate(&state);
+        self.prepared.derivatives(&state, &outputs)
+    }
+
+    fn time_derivative(&mut self, t_s: f64, y: &[f64; STATES], rates: &[f64; STATES]) -> Option<[f64; STATES]> {
+        if self.constant {
+            return None;
+        }
+        // One-sided, ahead: behind may lie a kink. Inputs are linear or exponential over far longer times.
+        let ahead_s = 1e-6;
+        let moved = self.rates(t_s + ahead_s, y);
+        Some(std::array::from_fn(|i| (moved[i] - rates[i]) / ahead_s))
+    }
+}

@@ -1,0 +1,173 @@
+//! Where the machine rests: the steady state at a wanted speed, and the turbine pressure that holds it.
+
+use crate::bracket::root_between;
+use crate::model::{BoundaryError, Model, Outputs, State, rad_s_of_rpm};
+use crate::params::BoundaryConditions;
+
+/// A steady state with everything the model knows there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteadyState {
+    /// Boundary conditions, with the P3 that holds the speed.
+    pub boundary: BoundaryConditions,
+    /// The state; the probe's tip has the gas temperature.
+    pub state: State,
+    /// Outputs at the state.
+    pub outputs: Outputs,
+}
+
+/// Why no steady state was found.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SteadyError {
+    /// The boundary conditions have no meaning.
+    #[error(transparent)]
+    Boundary(#[from] BoundaryError),
+    /// The valve passes less than the compressor delivers at any pressure, or the other way round.
+    #[error("at {speed_rpm:.0} rpm no outlet pressure makes the compressor deliver what the valve (opening {valve_opening_ratio}) passes")]
+    NoFlowBalance {
+        /// Shaft speed, rpm.
+        speed_rpm: f64,
+        /// Valve opening.
+        valve_opening_ratio: f64,
+    },
+    /// No turbine inlet pressure up to `highest_pa` drives the compressor at this speed.
+    #[error(
+        "no turbine inlet pressure between {lowest_pa:.0} and {highest_pa:.0} Pa gives the {power_w:.0} W that {speed_rpm:.0} rpm takes at valve opening {valve_opening_ratio}"
+    )]
+    NoPowerBalance {
+        /// Shaft speed, rpm.
+        speed_rpm: f64,
+        /// Valve opening.
+        valve_opening_ratio: f64,
+        /// Power the compressor takes, W.
+        power_w: f64,
+        /// Lowest pressure tried, Pa.
+        lowest_pa: f64,
+        /// Highest pressure tried, Pa.
+        highest_pa: f64,
+    },
+    /// The housings' temperatures did not settle.
+    #[error("the housing temperatures at {speed_rpm:.0} rpm, valve opening {valve_opening_ratio}, do not settle")]
+    NoHeatBalance {
+        /// Shaft speed, rpm.
+        speed_rpm: f64,
+        /// Valve opening.
+        valve_opening_ratio: f64,
+    },
+}
+
+/// Highest pressure that is tried, over P4.
+const HIGHEST_EXPANSION_RATIO: f64 = 20.0;
+/// Heat that may be left in a housing, W: far below 1e-6 of any shaft power.
+const HEAT_TOLERANCE_W: f64 = 1e-9;
+
+/// The steady state at `speed_rpm` under `boundary`, whose `p3_pa` is ignored and found.
+///
+/// Nested: outlet pressure from flow balance, P3 from power balance, housing temperatures by Newton's method.
+///
+/// # Errors
+/// [`SteadyError`] naming the balance that cannot be met.
+pub fn hold_speed(model: &Model, speed_rpm: f64, boundary: &BoundaryConditions) -> Result<SteadyState, SteadyError> {
+    let mut boundary = *boundary;
+    boundary.p3_pa = boundary.p4_pa * 1.5;
+    boundary.check()?;
+    if !(speed_rpm.is_finite() && speed_rpm > 0.0) {
+        return Err(BoundaryError::NotPhysical { name: "shaft speed", value: speed_rpm, unit: "rpm" }.into());
+    }
+    let no_heat_balance =
+        SteadyError::NoHeatBalance { speed_rpm, valve_opening_ratio: boundary.valve_opening_ratio };
+    let balance = |temperatures: [f64; 2]| -> Result<([f64; 2], BoundaryConditions, State), SteadyError> {
+        let (boundary, state) = gas_path_at_rest(model, speed_rpm, &boundary, temperatures)?;
+        let prepared = model.prepare(&boundary);
+        let outputs = prepared.evaluate(&state);
+        let heat_w = [
+            prepared.compressor_housing_balance_w(&state, &outputs),
+            prepared.turbine_housing_balance_w(&state, &outputs),
+        ];
+        Ok((heat_w, boundary, state))
+    };
+    let mut temperatures = [boundary.t1_k + 30.0, 0.5 * (boundary.t3_k + boundary.ambient_temperature_k)];
+    let (mut heat_w, mut at_rest, mut state) = balance(temperatures)?;
+    for _ in 0..60 {
+        if heat_w.iter().all(|heat_w| heat_w.abs() < HEAT_TOLERANCE_W) {
+            let outputs = model.prepare(&at_rest).evaluate(&state);
+            state.t2_tip_k = outputs.t2_k;
+            let outputs = model.prepare(&at_rest).evaluate(&state);
+            return Ok(SteadyState { boundary: at_rest, state, outputs });
+        }
+        // Forward differences of the two balances; the balances are smooth in both temperatures.
+        let step_k = 1e-4;
+        let (by_tc, ..) = balance([temperatures[0] + step_k, temperatures[1]])?;
+        let (by_tt, ..) = balance([temperatures[0], temperatures[1] + step_k])?;
+        let [a, c] = [(by_tc[0] - heat_w[0]) / step_k, (by_tc[1] - heat_w[1]) / step_k];
+        let [b, d] = [(by_tt[0] - heat_w[0]) / step_k, (by_tt[1] - heat_w[1]) / step_k];
+        let determinant = a * d - b * c;
+        if !determinant.is_finite() || determinant == 0.0 {
+            return Err(no_heat_balance);
+        }
+        let step = [
+            (-heat_w[0] * d + heat_w[1] * b) / determinant,
+            (-heat_w[1] * a + heat_w[0] * c) / determinant,
+        ];
+        let before = (heat_w, temperatures);
+        let mut share = (80.0 / step[0].abs().max(step[1].abs())).min(1.0);
+        loop {
+            temperatures = std::array::from_fn(|i| (before.1[i] + share * step[i]).clamp(200.0, 1500.0));
+            (heat_w, at_rest, state) = balance(temperatures)?;
+            let size = |heat: [f64; 2]| heat[0].hypot(heat[1]);
+            if size(heat_w) < size(before.0) || share < 1e-3 {
+                break;
+            }
+            share *= 0.5;
+        }
+        if temperatures == before.1 {
+            // The balances cannot be told from rounding any more.
+            if heat_w.iter().all(|heat_w| heat_w.abs() < 1e-6) {
+                heat_w = [0.0; 2];
+                continue;
+            }
+            return Err(no_heat_balance);
+        }
+    }
+    Err(no_heat_balance)
+}
+
+/// P2 from flow balance and P3 from power balance, at given speed and housing temperatures.
+fn gas_path_at_rest(
+    model: &Model,
+    speed_rpm: f64,
+    boundary: &BoundaryConditions,
+    [tc_k, tt_k]: [f64; 2],
+) -> Result<(BoundaryConditions, State), SteadyError> {
+    let valve_opening_ratio = boundary.valve_opening_ratio;
+    let mut boundary = *boundary;
+    let at = |p2_pa: f64| State {
+        shaft_speed_rad_s: rad_s_of_rpm(speed_rpm),
+        p2_pa,
+        tc_k,
+        tt_k,
+        t2_tip_k: boundary.t1_k,
+    };
+    let prepared = model.prepare(&boundary);
+    let corrected_rpm = model.map.reference().corrected_speed_rpm(speed_rpm, boundary.t1_k);
+    let (_, surge_pr) = model.map.surge_point(corrected_rpm);
+    // Far enough beyond the surge line for the flow to have vanished.
+    let highest_pa = boundary.p1_pa * (1.0 + 2.0 * (surge_pr - 1.0).max(1e-3));
+    let p2_pa = root_between(boundary.p1_pa, highest_pa, 0.0, |p2_pa| {
+        let outputs = prepared.evaluate(&at(p2_pa));
+        outputs.flow_kg_s - outputs.valve_flow_kg_s
+    })
+    .ok_or(SteadyError::NoFlowBalance { speed_rpm, valve_opening_ratio })?;
+    let state = at(p2_pa);
+    let power_w = prepared.evaluate(&state).compressor_power_w;
+    let (lowest_pa, highest_pa) = (boundary.p4_pa * (1.0 + 1e-6), boundary.p4_pa * HIGHEST_EXPANSION_RATIO);
+    let p3_pa = root_between(lowest_pa, highest_pa, 0.0, |p3_pa| {
+        let turbine = crate::turbine::TurbineInlet::new(
+            &model.params.turbine,
+            &BoundaryConditions { p3_pa, ..boundary },
+        );
+        turbine.at(tt_k, state.shaft_speed_rad_s).power_w - power_w
+    })
+    .ok_or(SteadyError::NoPowerBalance { speed_rpm, valve_opening_ratio, power_w, lowest_pa, highest_pa })?;
+    boundary.p3_pa = p3_pa;
+    Ok((boundary, state))
+}

@@ -127,7 +127,6 @@ pub struct Integrator<const N: usize> {
     pub y: [f64; N],
     tolerances: Tolerances<N>,
     next_step_s: f64,
-    last_error: f64,
     steps: usize,
 }
 
@@ -141,13 +140,12 @@ where
 {
     /// Starts at `t_s` with `y`.
     pub fn new(t_s: f64, y: [f64; N], tolerances: Tolerances<N>) -> Self {
-        Integrator { t_s, y, tolerances, next_step_s: 0.0, last_error: 1.0, steps: 0 }
+        Integrator { t_s, y, tolerances, next_step_s: 0.0, steps: 0 }
     }
 
     /// Forgets the step size: to be called after a jump of the inputs.
     pub fn restart(&mut self) {
         self.next_step_s = 0.0;
-        self.last_error = 1.0;
     }
 
     /// Steps taken so far.
@@ -181,13 +179,11 @@ where
             let stages = self.stages(system, &jacobian, &f0, time_derivative.as_ref(), tried_s);
             let error = stages.as_ref().map_or(f64::INFINITY, |stages| self.error_norm(&y0, stages));
             if let (Some(stages), true) = (stages, error <= 1.0) {
-                let error = error.max(1e-10);
-                // PI control (Hairer & Wanner IV.8): order 5, error estimate of order 4.
-                let factor = (0.9 * error.powf(-0.7 / 5.0) * self.last_error.powf(0.4 / 5.0)).clamp(0.2, 6.0);
+                // The error estimate is of order 4, so the local error goes with the fifth power of the step.
+                let factor = (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 6.0);
                 let proposed_s = tried_s * if rejected { factor.min(1.0) } else { factor };
                 // A step cut short by `end_s` says little about how long it might have been.
                 self.next_step_s = if tried_s < h { proposed_s.max(h) } else { proposed_s };
-                self.last_error = error.max(1e-4);
                 let t1_s = if ends_here { end_s } else { t0_s + tried_s };
                 self.t_s = t1_s;
                 self.y = stages.y1;

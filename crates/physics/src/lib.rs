@@ -17,6 +17,7 @@ pub mod orifice;
 pub mod params;
 pub mod rosenbrock;
 pub mod simulate;
+pub mod standstill;
 pub mod steady;
 pub mod thermocouple;
 pub mod turbine;

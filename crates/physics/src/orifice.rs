@@ -12,7 +12,7 @@ pub fn flow_kg_s(effective_area_m2: f64, p_up_pa: f64, t_up_k: f64, p_down_pa: f
         return 0.0;
     }
     // (2/(g+1))^(g/(g-1)) for g = 1.4.
-    const CRITICAL_RATIO: f64 = 0.528_281_787_717_174_1;
+    const CRITICAL_RATIO: f64 = 0.528_281_787_717_174;
     let r = (p_down_pa / p_up_pa).max(CRITICAL_RATIO);
     // r^(2/g) and r^((g+1)/g) = r^(2/g) r^((g-1)/g).
     let r_kappa = r.powf((G - 1.0) / G);

@@ -64,8 +64,8 @@ pub enum SimulationError {
 
 /// A machine in motion: advance it as far as wanted, as often as wanted.
 #[derive(Debug, Clone)]
-pub struct Simulator<'a> {
-    model: &'a Model,
+pub struct Simulator {
+    model: Model,
     integrator: Integrator<STATES>,
     watch: Watch,
     /// Surge position minus 1, and speed minus limit, at the end of the last step; `None` before the first.
@@ -75,16 +75,16 @@ pub struct Simulator<'a> {
 /// Local error allowed by default, relative: three orders below the noise of any sensor.
 pub const DEFAULT_RELATIVE_TOLERANCE: f64 = 1e-6;
 
-impl<'a> Simulator<'a> {
+impl Simulator {
     /// A machine at `state` at `t_s`, integrated to `relative_tolerance` per step.
-    pub fn new(model: &'a Model, t_s: f64, state: State, relative_tolerance: f64, watch: Watch) -> Self {
+    pub fn new(model: &Model, t_s: f64, state: State, relative_tolerance: f64, watch: Watch) -> Self {
         // Absolute parts: a thousandth of each state's usual size.
         let tolerances = Tolerances {
             relative_ratio: relative_tolerance,
             absolute: [1e4, 1e5, 3e2, 5e2, 3e2].map(|size| 1e-3 * size * relative_tolerance),
         };
         Simulator {
-            model,
+            model: model.clone(),
             integrator: Integrator::new(t_s, state.to_array(), tolerances),
             watch,
             margins: None,
@@ -124,6 +124,8 @@ impl<'a> Simulator<'a> {
         mut on_sample: impl FnMut(f64, &State, &Outputs),
         mut on_event: impl FnMut(ModelEvent),
     ) -> Result<(), SimulationError> {
+        // A handle of its own, so that the prepared model does not hold `self`.
+        let model = self.model.clone();
         let mut samples = sample_times_s.into_iter().peekable();
         let mut sample = |t_s: f64, y: &[f64; STATES], prepared: &PreparedModel<'_>| {
             let state = State::from_array(y);
@@ -131,16 +133,16 @@ impl<'a> Simulator<'a> {
         };
         while let Some(t_s) = samples.next_if(|t| *t <= self.t_s()) {
             let boundary = checked(inputs, t_s)?;
-            sample(t_s, &self.integrator.y, &self.model.prepare(&boundary));
+            sample(t_s, &self.integrator.y, &model.prepare(&boundary));
         }
         while self.t_s() < end_s {
             let start_s = self.t_s();
             let kink_s = inputs.next_kink_s(start_s);
             let stretch_end_s = kink_s.min(end_s);
             let boundary = checked(inputs, start_s)?;
-            let prepared = self.model.prepare(&boundary);
+            let prepared = model.prepare(&boundary);
             let constant = inputs.is_constant_after(start_s);
-            let mut system = ModelSystem { model: self.model, prepared, inputs, constant };
+            let mut system = ModelSystem { model: &model, prepared, inputs, constant };
             while self.integrator.t_s < stretch_end_s {
                 let step = self.integrator.step(&mut system, stretch_end_s)?;
                 self.report_crossings(&step, &mut system, &mut on_event);

@@ -171,3 +171,35 @@ fn gas_path_at_rest(
     boundary.p3_pa = p3_pa;
     Ok((boundary, state))
 }
+
+/// Speeds between which [`settle_under`] looks, rpm.
+const SETTLE_SPEEDS_RPM: (f64, f64) = (5_000.0, 400_000.0);
+
+/// The steady state that the machine runs up to from below under `boundary`, its `p3_pa` included.
+///
+/// The lowest speed whose own P3 is the given one, found on a geometric grid of 5 % and refined to rounding.
+///
+/// # Errors
+/// [`SteadyError`] where the boundary conditions have no meaning or no speed from 5 to 400 krpm balances them.
+pub fn settle_under(model: &Model, boundary: &BoundaryConditions) -> Result<SteadyState, SteadyError> {
+    boundary.check()?;
+    let excess_pa = |speed_rpm: f64| {
+        hold_speed(model, speed_rpm, boundary).map_or(f64::NAN, |held| held.boundary.p3_pa - boundary.p3_pa)
+    };
+    let mut low_rpm = SETTLE_SPEEDS_RPM.0;
+    while low_rpm < SETTLE_SPEEDS_RPM.1 {
+        let high_rpm = low_rpm * 1.05;
+        if excess_pa(high_rpm) >= 0.0 {
+            let speed_rpm = root_between(low_rpm, high_rpm, 0.0, excess_pa).unwrap_or(low_rpm);
+            return hold_speed(model, speed_rpm, boundary);
+        }
+        low_rpm = high_rpm;
+    }
+    Err(SteadyError::NoPowerBalance {
+        speed_rpm: SETTLE_SPEEDS_RPM.1,
+        valve_opening_ratio: boundary.valve_opening_ratio,
+        power_w: f64::NAN,
+        lowest_pa: boundary.p4_pa,
+        highest_pa: boundary.p3_pa,
+    })
+}

@@ -1,0 +1,49 @@
+//! The lab's boundary conditions: what the cell gives, and what the actuators make of the commands.
+
+use super::actuator::Actuator;
+use mapper_physics::inputs::Inputs;
+use mapper_physics::params::BoundaryConditions;
+
+/// The air supply never falls to P4 while the model runs: it divides by the turbine's flow.
+pub const LOWEST_EXPANSION_RATIO: f64 = 1.0005;
+
+/// Actuators over fixed conditions of the cell.
+#[derive(Debug, Clone, Copy)]
+pub struct LabInputs {
+    /// T1, P1, P4 and the ambient temperature.
+    pub cell: BoundaryConditions,
+    /// Turbine inlet pressure, Pa.
+    pub p3: Actuator,
+    /// Turbine inlet temperature, K.
+    pub t3: Actuator,
+    /// Valve opening.
+    pub valve: Actuator,
+    /// Oil temperature, K.
+    pub oil: Actuator,
+}
+
+impl LabInputs {
+    fn actuators(&self) -> [&Actuator; 4] {
+        [&self.p3, &self.t3, &self.valve, &self.oil]
+    }
+}
+
+impl Inputs for LabInputs {
+    fn at(&self, t_s: f64) -> BoundaryConditions {
+        BoundaryConditions {
+            p3_pa: self.p3.value(t_s).max(self.cell.p4_pa * LOWEST_EXPANSION_RATIO),
+            t3_k: self.t3.value(t_s),
+            valve_opening_ratio: self.valve.value(t_s),
+            oil_temperature_k: self.oil.value(t_s),
+            ..self.cell
+        }
+    }
+
+    fn next_kink_s(&self, t_s: f64) -> f64 {
+        self.actuators().map(|actuator| actuator.next_kink_s(t_s)).into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    fn is_constant_after(&self, t_s: f64) -> bool {
+        self.actuators().iter().all(|actuator| actuator.has_arrived(t_s))
+    }
+}

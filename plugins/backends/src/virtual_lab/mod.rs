@@ -1,0 +1,13 @@
+//! A gas stand that exists in equations only: the lumped model, actuators, sensors, standstill, surge, overspeed.
+
+mod actuator;
+mod inputs;
+mod lab;
+mod sensor;
+mod settings;
+mod truth;
+
+pub use actuator::ActuatorDynamics;
+pub use lab::{NAME, VirtualLab};
+pub use sensor::SensorErrors;
+pub use settings::{LabSettings, Start};

@@ -1,0 +1,67 @@
+//! Settings of the virtual lab, in SI units. They are truth: nothing but the lab reads them.
+
+use super::actuator::ActuatorDynamics;
+use super::sensor::SensorErrors;
+use mapper_core::Channel;
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use std::collections::BTreeMap;
+
+/// How the machine stands when the lab is armed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// At rest, everything at ambient temperature.
+    Standstill,
+    /// Settled at the first setpoints.
+    Settled,
+}
+
+/// Everything a virtual lab is made of.
+#[derive(Debug, Clone)]
+pub struct LabSettings {
+    /// The machine as it truly is; may differ from the one that the campaign declares.
+    pub model: Model,
+    /// T1, P1, P4 and ambient temperature hold throughout; the other values are the state at arming.
+    pub cell: BoundaryConditions,
+    /// Sample rate, Hz.
+    pub sample_rate_hz: f64,
+    /// State at arming.
+    pub start: Start,
+    /// Turbine inlet pressure, Pa.
+    pub p3_actuator: ActuatorDynamics,
+    /// Turbine inlet temperature, K.
+    pub t3_actuator: ActuatorDynamics,
+    /// Valve opening.
+    pub valve_actuator: ActuatorDynamics,
+    /// Oil temperature, K.
+    pub oil_actuator: ActuatorDynamics,
+    /// Errors of the sensors; channels without an entry are ideal.
+    pub sensors: BTreeMap<Channel, SensorErrors>,
+    /// Shaft speed at which the lab cuts the air by itself, rpm.
+    pub trip_speed_rpm: f64,
+    /// Swing of flow and outlet pressure beyond the surge line, ratio of their values.
+    pub surge_swing_ratio: f64,
+    /// Seed of all noise.
+    pub seed: u64,
+}
+
+impl LabSettings {
+    /// A lab without any sensor error whose actuators act at once: the model itself.
+    pub fn ideal(model: Model, cell: BoundaryConditions) -> Self {
+        let at_once = ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY };
+        LabSettings {
+            model,
+            cell,
+            sample_rate_hz: 10.0,
+            start: Start::Settled,
+            p3_actuator: at_once,
+            t3_actuator: at_once,
+            valve_actuator: at_once,
+            oil_actuator: at_once,
+            sensors: BTreeMap::new(),
+            trip_speed_rpm: f64::INFINITY,
+            surge_swing_ratio: 0.0,
+            seed: 0,
+        }
+    }
+}

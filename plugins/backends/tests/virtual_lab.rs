@@ -1,0 +1,152 @@
+//! The virtual lab as a rig: what it delivers when it is set, polled, tripped and stopped.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_backends::virtual_lab::{ActuatorDynamics, LabSettings, SensorErrors, Start, VirtualLab};
+use mapper_core::{Backend, BackendError, Channel, EventKind, RigMode, SampleBatch, Setpoints};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::steady;
+
+fn ideal() -> LabSettings {
+    LabSettings::ideal(Model::nominal(), BoundaryConditions::default())
+}
+
+fn setpoints(p3_pa: f64, valve_opening_ratio: f64) -> Setpoints {
+    Setpoints { mode: RigMode::Running, p3_pa, t3_k: 773.15, valve_opening_ratio, oil_temperature_k: 323.15 }
+}
+
+fn p3_pa(speed_rpm: f64, valve_opening_ratio: f64) -> f64 {
+    let boundary = BoundaryConditions { valve_opening_ratio, ..Default::default() };
+    steady::hold_speed(&Model::nominal(), speed_rpm, &boundary).unwrap().boundary.p3_pa
+}
+
+fn last(batch: &SampleBatch, channel: Channel) -> f64 {
+    batch.last(channel).unwrap()
+}
+
+/// The reference jump 110 -> 50 krpm at opening 0.7, row t = 110 s of the independent implementation.
+#[test]
+fn an_ideal_lab_is_the_model() {
+    let mut lab = VirtualLab::new(ideal());
+    lab.arm().unwrap();
+    lab.set(&setpoints(p3_pa(110e3, 0.7), 0.7)).unwrap();
+    let before = lab.poll(5.0).unwrap();
+    assert!((last(&before, Channel::ShaftSpeed) - 110e3).abs() < 0.1);
+    lab.set(&setpoints(p3_pa(50e3, 0.7), 0.7)).unwrap();
+    for second in 6..=115 {
+        let batch = lab.poll(f64::from(second)).unwrap();
+        if second == 115 {
+            let reference = reference_row();
+            for (channel, expected) in [
+                (Channel::ShaftSpeed, reference[0]),
+                (Channel::P2, reference[1]),
+                (Channel::Tc, reference[2]),
+                (Channel::T2, reference[3]),
+            ] {
+                let found = last(&batch, channel);
+                // The lab integrates to 1e-6 per step.
+                assert!((found / expected - 1.0).abs() < 2e-5, "{channel}: {found} against {expected}");
+            }
+        }
+    }
+}
+
+fn reference_row() -> [f64; 4] {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../crates/physics/tests/reference/transients.csv");
+    let text = std::fs::read_to_string(path).unwrap();
+    let row = text.lines().find(|line| line.starts_with("110000,50000,0.7,110,")).unwrap();
+    let values: Vec<f64> = row.split(',').map(|value| value.parse().unwrap()).collect();
+    [values[4], values[5], values[6], values[13]]
+}
+
+fn noisy() -> LabSettings {
+    let errors = SensorErrors {
+        white_sigma: 0.08,
+        coloured_sigma: 0.06,
+        coloured_time_constant_s: 2.0,
+        offset: 0.3,
+        gain_ratio: 0.0,
+    };
+    LabSettings {
+        sensors: [(Channel::T2, errors), (Channel::T1, errors)].into(),
+        p3_actuator: ActuatorDynamics { lag_s: 0.3, slew_per_s: 50e3 },
+        valve_actuator: ActuatorDynamics { lag_s: 0.2, slew_per_s: 1.0 },
+        seed: 42,
+        ..ideal()
+    }
+}
+
+fn session(settings: LabSettings) -> Vec<SampleBatch> {
+    let mut lab = VirtualLab::new(settings);
+    lab.arm().unwrap();
+    lab.set(&setpoints(150e3, 0.7)).unwrap();
+    let first = lab.poll(3.0).unwrap();
+    lab.set(&setpoints(180e3, 1.0)).unwrap();
+    vec![first, lab.poll(7.25).unwrap(), lab.poll(12.0).unwrap()]
+}
+
+#[test]
+fn equal_seeds_give_equal_samples_and_sequence_and_time_have_no_gaps() {
+    let batches = session(noisy());
+    assert_eq!(batches, session(noisy()));
+    assert_ne!(batches, session(LabSettings { seed: 43, ..noisy() }));
+    let mut next = 0;
+    for batch in &batches {
+        assert_eq!(batch.first_sequence, next);
+        for t_s in &batch.t_s {
+            assert!((t_s - next as f64 * 0.1).abs() < 1e-9);
+            next += 1;
+        }
+    }
+    assert_eq!(next, 121);
+}
+
+#[test]
+fn from_standstill_it_runs_up_to_the_speed_that_was_asked_for_and_back_to_rest() {
+    let mut lab = VirtualLab::new(LabSettings { start: Start::Standstill, ..noisy() });
+    lab.arm().unwrap();
+    let rest = Setpoints { mode: RigMode::Standstill, ..setpoints(110e3, 0.7) };
+    lab.set(&rest).unwrap();
+    let soak = lab.poll(10.0).unwrap();
+    assert_eq!(last(&soak, Channel::ShaftSpeed), 0.0);
+    assert_eq!(last(&soak, Channel::P2), 100e3);
+    lab.set(&setpoints(p3_pa(90e3, 0.7), 0.7)).unwrap();
+    let run = lab.poll(1800.0).unwrap();
+    assert!((last(&run, Channel::ShaftSpeed) - 90e3).abs() < 50.0);
+    lab.set(&rest).unwrap();
+    let stop = lab.poll(2100.0).unwrap();
+    assert_eq!(last(&stop, Channel::ShaftSpeed), 0.0);
+    // The housing is still warm: it was above ambient and has nowhere quick to go.
+    assert!(last(&stop, Channel::Tc) > 305.0);
+}
+
+#[test]
+fn surge_and_overspeed_are_shown_and_overspeed_cuts_the_air() {
+    let mut lab = VirtualLab::new(LabSettings { trip_speed_rpm: 120e3, surge_swing_ratio: 0.1, ..noisy() });
+    lab.arm().unwrap();
+    lab.set(&setpoints(p3_pa(90e3, 0.5), 0.5)).unwrap();
+    lab.poll(5.0).unwrap();
+    lab.set(&setpoints(p3_pa(90e3, 0.5), 0.2)).unwrap();
+    let surged = lab.poll(15.0).unwrap();
+    assert!(surged.events.iter().any(|event| event.kind == EventKind::SurgeEntered));
+    lab.set(&setpoints(p3_pa(150e3, 1.0), 1.0)).unwrap();
+    let tripped = lab.poll(200.0).unwrap();
+    let kinds: Vec<EventKind> = tripped.events.iter().map(|event| event.kind).collect();
+    assert!(kinds.contains(&EventKind::SurgeLeft));
+    assert!(kinds.contains(&EventKind::OverspeedEntered));
+    assert_eq!(last(&lab.poll(300.0).unwrap(), Channel::ShaftSpeed), 0.0);
+}
+
+#[test]
+fn calls_out_of_order_and_impossible_setpoints_are_refused() {
+    let mut lab = VirtualLab::new(ideal());
+    assert!(matches!(lab.poll(1.0), Err(BackendError::OutOfOrder { .. })));
+    lab.arm().unwrap();
+    assert!(matches!(lab.arm(), Err(BackendError::OutOfOrder { .. })));
+    assert!(matches!(lab.poll(1.0), Err(BackendError::OutOfOrder { .. })));
+    let too_much = lab.set(&setpoints(1e9, 0.7));
+    assert!(matches!(too_much, Err(BackendError::SetpointOutOfRange { quantity: "P3", .. })));
+    assert!(lab.set(&setpoints(f64::NAN, 0.7)).is_err());
+    lab.make_safe().unwrap();
+    lab.disarm().unwrap();
+}

@@ -19,5 +19,6 @@ pub mod rosenbrock;
 pub mod simulate;
 pub mod standstill;
 pub mod steady;
+pub mod tabulated_map;
 pub mod thermocouple;
 pub mod turbine;

@@ -1,1 +1,13 @@
-//! placeholder
+//! Executes a plan on any backend: setpoints, samples, guards, safe state.
+//!
+//! The runner knows nothing of identification or files: what it sees goes to a [`RunObserver`].
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod guard;
+mod observer;
+mod run;
+
+pub use guard::{Guard, LimitGuard, SilenceGuard, SurgeGuard, Trip};
+pub use observer::{ObserverError, RunObserver};
+pub use run::{RunEnd, RunError, Runner};

@@ -1,0 +1,72 @@
+//! Who looks on while a plan is run: recorders, progress bars.
+
+use mapper_core::{Event, RigDescription, SampleBatch, StepMarker};
+
+/// What an observer could not do; the run ends in its safe state.
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
+pub struct ObserverError {
+    /// What went wrong, and what to do.
+    pub message: String,
+    /// The cause.
+    #[source]
+    pub source: Option<Box<dyn std::error::Error + Send + Sync>>,
+}
+
+impl ObserverError {
+    /// Wraps the observer's own error.
+    pub fn of(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        ObserverError { message: error.to_string(), source: Some(Box::new(error)) }
+    }
+}
+
+/// Called by the runner in order of run time. Every method does nothing by default.
+pub trait RunObserver {
+    /// The rig is armed.
+    fn on_start(&mut self, _rig: &RigDescription) -> Result<(), ObserverError> {
+        Ok(())
+    }
+
+    /// A step begins; its `end_s` is the planned one.
+    fn on_step_start(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
+        Ok(())
+    }
+
+    /// New samples; also called for warm-up and cool-down.
+    fn on_batch(&mut self, _batch: &SampleBatch) -> Result<(), ObserverError> {
+        Ok(())
+    }
+
+    /// Something happened.
+    fn on_event(&mut self, _event: &Event) -> Result<(), ObserverError> {
+        Ok(())
+    }
+
+    /// A step has ended; its `end_s` is the real one.
+    fn on_step_end(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
+        Ok(())
+    }
+}
+
+/// Observers side by side are an observer; the first error ends the round.
+impl RunObserver for Vec<&mut dyn RunObserver> {
+    fn on_start(&mut self, rig: &RigDescription) -> Result<(), ObserverError> {
+        self.iter_mut().try_for_each(|observer| observer.on_start(rig))
+    }
+
+    fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.iter_mut().try_for_each(|observer| observer.on_step_start(marker))
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        self.iter_mut().try_for_each(|observer| observer.on_batch(batch))
+    }
+
+    fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
+        self.iter_mut().try_for_each(|observer| observer.on_event(event))
+    }
+
+    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.iter_mut().try_for_each(|observer| observer.on_step_end(marker))
+    }
+}

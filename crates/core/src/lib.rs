@@ -7,6 +7,8 @@
 //! that crosses a boundary carries its unit in its name; pressures and temperatures are total unless a name says
 //! `static`; corrected quantities stand beside the [`ReferenceState`] they were made with.
 
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
 mod backend;
 mod channel;
 mod clock;

@@ -21,6 +21,10 @@ pub struct MapPoint {
 pub struct SpeedLine {
     /// Mean corrected speed of the line's points, rpm.
     pub speed_corrected_rpm: f64,
+    /// Largest minus smallest corrected speed of the line's points, rpm.
+    pub speed_spread_rpm: f64,
+    /// Target shaft speed (physical) that the points share, rpm; `None` where they were grouped by measured speed.
+    pub target_speed_rpm: Option<f64>,
     /// Points in order of corrected flow.
     pub points: Vec<MapPoint>,
 }

@@ -1,1 +1,41 @@
-//! placeholder
+//! Recordings: MCAP out and in, and the mapping of other programs' recordings onto the rig's channels.
+//!
+//! A recording is one MCAP file: a message in JSON per device group and sample, units in each channel's metadata and
+//! in its schema, step markers on `/step`, events on `/event`, plan and campaign attached. What only a simulator
+//! knows lies under `/truth`; [`read_recording`] never returns it, [`read_truth`] is for scoring alone.
+//!
+//! Everything read here is treated as hostile: files may be truncated, damaged, or not MCAP at all. What can be
+//! saved is returned beside a list of [`ReadWarning`]s.
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod channel_map;
+mod channel_map_yaml;
+mod chunk;
+mod definitions;
+mod error;
+mod format;
+mod framing;
+mod message;
+mod read;
+mod recording_file;
+mod records;
+mod rig_sink;
+mod scan;
+mod schema;
+mod series_builder;
+mod steps;
+mod truth;
+mod units;
+mod warning;
+mod writer;
+
+pub use channel_map::{ChannelMap, ChannelSource, MachineConstants, SensorUncertainty, WindowLimits};
+pub use channel_map_yaml::{ChannelMapError, ChannelMapIssue};
+pub use error::RecordError;
+pub use format::FormatVersion;
+pub use read::{ReadOptions, ReadReport, read_recording, read_recording_from};
+pub use recording_file::RecordingHeader;
+pub use truth::{Truth, read_truth};
+pub use units::{Kind, Unit, UnitError};
+pub use warning::ReadWarning;
+pub use writer::{RecordingWriter, StepPhase};

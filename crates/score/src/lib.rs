@@ -1,1 +1,123 @@
-//! placeholder
+//! How far identified points are from what the simulator knows: the only reader of /truth.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+use mapper_core::{IdentifiedPoint, StepMarker};
+use mapper_record::{RecordError, Truth, read_truth};
+use serde::Serialize;
+use std::path::Path;
+
+/// True values at the end of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PointTruth {
+    /// Isentropic efficiency, total to total, fraction.
+    pub eta: f64,
+    /// Heat-transfer coefficient between gas and compressor housing, W/(m2 K).
+    pub h_w_m2k: f64,
+}
+
+/// An identified point beside the truth, where there is any.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScoredPoint {
+    /// What was identified.
+    #[serde(flatten)]
+    pub point: IdentifiedPoint,
+    /// What is true; `None` on a real rig.
+    pub truth: Option<PointTruth>,
+}
+
+/// Errors of all points that have both a number and a truth. Efficiencies as fractions, h relative.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ScoreSummary {
+    /// Number of points with both.
+    pub points: usize,
+    /// Median absolute error of the efficiency, fraction.
+    pub eta_median_error: f64,
+    /// Share of the points whose efficiency is within 0.01, ratio.
+    pub eta_within_one_point_ratio: f64,
+    /// Largest absolute error of the efficiency, fraction.
+    pub eta_worst_error: f64,
+    /// Share of the points whose 95 % interval of the efficiency holds the truth, ratio.
+    pub eta_coverage_ratio: f64,
+    /// Median absolute relative error of h; `None` where no point has h.
+    pub h_median_error_ratio: Option<f64>,
+    /// Largest absolute relative error of h; `None` where no point has h.
+    pub h_worst_error_ratio: Option<f64>,
+}
+
+/// Puts the truth of a recording beside its identified points; `truth` is `None` everywhere on a real rig.
+///
+/// # Errors
+/// [`RecordError`] where the recording cannot be read.
+pub fn score(
+    recording: &Path,
+    steps: &[StepMarker],
+    points: Vec<IdentifiedPoint>,
+) -> Result<Vec<ScoredPoint>, RecordError> {
+    let truth = read_truth(recording)?;
+    Ok(points
+        .into_iter()
+        .map(|point| {
+            let marker = steps.iter().find(|marker| marker.index == point.step);
+            let truth = marker.and_then(|marker| truth_at(&truth, marker.end_s));
+            ScoredPoint { point, truth }
+        })
+        .collect())
+}
+
+/// Truth at the last sample at or before `t_s`.
+fn truth_at(truth: &Truth, t_s: f64) -> Option<PointTruth> {
+    let index = truth.t_s.partition_point(|sample_s| *sample_s <= t_s).checked_sub(1)?;
+    let value = |name: &str| truth.column(name)?.get(index).copied().filter(|value| value.is_finite());
+    Some(PointTruth { eta: value("eta")?, h_w_m2k: value("h_w_m2k")? })
+}
+
+/// The errors of all points in a few numbers; `None` where no point has both a number and a truth.
+pub fn summarise(points: &[ScoredPoint]) -> Option<ScoreSummary> {
+    let mut eta_errors = Vec::new();
+    let mut h_errors = Vec::new();
+    let mut covered = 0;
+    for ScoredPoint { point, truth } in points {
+        let (Some(eta), Some(truth)) = (point.eta, truth) else { continue };
+        eta_errors.push((eta - truth.eta).abs());
+        if let (Some(low), Some(high)) = (point.eta_low, point.eta_high) {
+            covered += usize::from((low..=high).contains(&truth.eta));
+        }
+        if let Some(h_w_m2k) = point.h_w_m2k {
+            h_errors.push((h_w_m2k / truth.h_w_m2k - 1.0).abs());
+        }
+    }
+    let count = eta_errors.len();
+    let share = |part: usize| part as f64 / count as f64;
+    Some(ScoreSummary {
+        points: count,
+        eta_median_error: median(&mut eta_errors)?,
+        eta_within_one_point_ratio: share(eta_errors.iter().filter(|error| **error <= 0.01).count()),
+        eta_worst_error: eta_errors.iter().copied().fold(0.0, f64::max),
+        eta_coverage_ratio: share(covered),
+        h_median_error_ratio: median(&mut h_errors),
+        h_worst_error_ratio: h_errors.iter().copied().reduce(f64::max),
+    })
+}
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => None,
+        count if count % 2 == 1 => Some(values[middle]),
+        _ => Some(0.5 * (values[middle - 1] + values[middle])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::median;
+
+    #[test]
+    fn the_median_is_the_middle() {
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&mut [4.0, 1.0, 2.0, 3.0]), Some(2.5));
+        assert_eq!(median(&mut []), None);
+    }
+}

@@ -1,8 +1,8 @@
 //! A recording played back as if it were a rig.
 
 use mapper_core::{
-    Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Group, Recording, RigDescription, RigMode,
-    SampleBatch, Series, Setpoints,
+    Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Group, Recording, RigDescription,
+    RigMode, SampleBatch, Series, Setpoints,
 };
 
 /// Name of the backend, in campaigns and descriptions.
@@ -53,7 +53,15 @@ impl ReplayBackend {
             .collect();
         let mut events = recording.events.clone();
         events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
-        ReplayBackend { t_s, columns, events, armed: false, samples_played: 0, events_played: 0, pending: None }
+        ReplayBackend {
+            t_s,
+            columns,
+            events,
+            armed: false,
+            samples_played: 0,
+            events_played: 0,
+            pending: None,
+        }
     }
 
     /// Time of the last sample, s.
@@ -219,10 +227,12 @@ mod tests {
     #[test]
     fn replaying_gives_the_recorded_samples_however_often_it_is_polled() {
         let recording = recording();
-        for polls_s in [vec![9.0], vec![0.95, 0.96, 1.3, 2.9], (0..31).map(|i| f64::from(i) / 10.0).collect()] {
+        for polls_s in [vec![9.0], vec![0.95, 0.96, 1.3, 2.9], (0..31).map(|i| f64::from(i) / 10.0).collect()]
+        {
             let mut rig = ReplayBackend::new(&recording);
             rig.arm().unwrap();
-            let (mut played, mut commanded, mut events, mut sequence) = (Series::default(), vec![], vec![], 0);
+            let (mut played, mut commanded, mut events, mut sequence) =
+                (Series::default(), vec![], vec![], 0);
             for until_s in polls_s {
                 match rig.poll(until_s) {
                     Ok(batch) => {
@@ -264,7 +274,10 @@ mod tests {
         let events = rig.poll(0.45).unwrap().events;
         assert!(events.is_empty(), "no sample has shown it yet");
         let events = rig.poll(1.0).unwrap().events;
-        assert_eq!(events.iter().map(|e| e.kind).collect::<Vec<_>>(), [EventKind::SurgeEntered, EventKind::Note]);
+        assert_eq!(
+            events.iter().map(|e| e.kind).collect::<Vec<_>>(),
+            [EventKind::SurgeEntered, EventKind::Note]
+        );
         assert!(events[1].message.contains("P3_command is set to 200000 Pa"), "{}", events[1].message);
     }
 

@@ -1,0 +1,81 @@
+//! Points to map.
+
+use crate::grouping::{Group, group};
+use crate::{AssembleError, Grouping};
+use mapper_core::{CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceState, SpeedLine, Verdict};
+
+/// Makes a map of identified points.
+///
+/// Points with a target form a line per target speed; points without one are grouped by gaps in corrected speed
+/// ([`Grouping`]). Lines come in order of mean corrected speed, their points in order of corrected flow (then of
+/// falling pressure ratio, for the vertical part at choke). Repeats of a target stay separate points. A point whose
+/// verdict is unusable keeps flow and pressure ratio and has no `eta`.
+///
+/// `reference` is the state that the points' corrected quantities already refer to; `method` is what all of them
+/// were identified by.
+///
+/// # Errors
+/// [`AssembleError`]: no points; a point whose corrected flow, corrected speed or pressure ratio is not finite;
+/// points of another method; an unusable `grouping`.
+pub fn assemble(
+    points: &[IdentifiedPoint],
+    machine: &str,
+    reference: ReferenceState,
+    method: Method,
+    grouping: Grouping,
+) -> Result<CompressorMap, AssembleError> {
+    let gap = grouping.speed_gap_ratio;
+    if !(gap > 0.0 && gap < 1.0) {
+        return Err(AssembleError::SpeedGap { speed_gap_ratio: gap });
+    }
+    if points.is_empty() {
+        return Err(AssembleError::NoPoints);
+    }
+    points.iter().try_for_each(|point| check(point, method))?;
+    let mut lines: Vec<SpeedLine> = group(points, &grouping).iter().map(line).collect();
+    lines.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
+    Ok(CompressorMap { machine: machine.to_owned(), reference, method, lines })
+}
+
+fn check(point: &IdentifiedPoint, method: Method) -> Result<(), AssembleError> {
+    let step = point.step;
+    if point.method != method {
+        return Err(AssembleError::MixedMethods { step, expected: method, found: point.method });
+    }
+    for (quantity, value, unit) in [
+        ("corrected mass flow", point.flow_corrected_kg_s, "kg/s"),
+        ("pressure ratio", point.pressure_ratio, "(ratio)"),
+        ("corrected speed", point.speed_corrected_rpm, "rpm"),
+    ] {
+        if !value.is_finite() {
+            return Err(AssembleError::NoPlace { step, quantity, value, unit });
+        }
+    }
+    Ok(())
+}
+
+fn line(group: &Group<'_>) -> SpeedLine {
+    let speeds_rpm = || group.points.iter().map(|point| point.speed_corrected_rpm);
+    let lowest_rpm = speeds_rpm().fold(f64::INFINITY, f64::min);
+    let highest_rpm = speeds_rpm().fold(f64::NEG_INFINITY, f64::max);
+    let mut points: Vec<MapPoint> = group.points.iter().map(|point| map_point(point)).collect();
+    points.sort_by(|a, b| {
+        let by_flow = a.flow_corrected_kg_s.total_cmp(&b.flow_corrected_kg_s);
+        by_flow.then(b.pressure_ratio.total_cmp(&a.pressure_ratio))
+    });
+    SpeedLine {
+        speed_corrected_rpm: speeds_rpm().sum::<f64>() / group.points.len() as f64,
+        speed_spread_rpm: highest_rpm - lowest_rpm,
+        target_speed_rpm: group.target_speed_rpm,
+        points,
+    }
+}
+
+fn map_point(point: &IdentifiedPoint) -> MapPoint {
+    MapPoint {
+        flow_corrected_kg_s: point.flow_corrected_kg_s,
+        pressure_ratio: point.pressure_ratio,
+        eta: point.eta.filter(|eta| point.verdict != Verdict::Unusable && eta.is_finite()),
+        identified: point.clone(),
+    }
+}

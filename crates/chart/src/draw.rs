@@ -1,0 +1,279 @@
+//! Drawing a laid-out figure.
+
+use crate::bands::band;
+use crate::clip::{self, Rect};
+use crate::contour_label::{place, without_gap};
+use crate::frame::Frame;
+use crate::items::{Annotation, Dash, Item, Line, LineEnd, Rule, RuleAt, Scatter, Space, TextAnchor};
+use crate::layout::{
+    AXIS_TITLE_PX, MARGIN_PX, PANEL_TITLE_PX, PlacedPanel, SUBTITLE_PX, TICK_PX, TITLE_PX, layout,
+};
+use crate::legend;
+use crate::marching::contour_lines;
+use crate::markers::{MarkerStyle, draw_arrow, draw_marker};
+use crate::palette::{INK, LIGHT_GREY};
+use crate::svg::{Stroke, Svg, TextStyle};
+use crate::text::{cut, width_px};
+use crate::{Contours, Figure};
+
+const LABEL_PX: f64 = 11.0;
+const MAX_LEVELS: usize = 100;
+
+/// Texts drawn after everything else, so that no line crosses them.
+struct LateText {
+    at: (f64, f64),
+    text: String,
+    style: TextStyle,
+}
+
+pub(crate) fn figure(figure: &Figure) -> String {
+    let sheet = layout(figure);
+    let mut svg = Svg::default();
+    let mut y = MARGIN_PX + 10.0;
+    for line in &sheet.title {
+        svg.text((MARGIN_PX, y), line, &TextStyle::new(TITLE_PX, INK, TextAnchor::Start).bold());
+        y += 24.0;
+    }
+    for line in &sheet.subtitle {
+        svg.text((MARGIN_PX, y), line, &TextStyle::new(SUBTITLE_PX, INK, TextAnchor::Start));
+        y += 18.0;
+    }
+    for placed in &sheet.panels {
+        panel(&mut svg, placed);
+    }
+    svg.finish(sheet.width, sheet.height, &figure.title)
+}
+
+fn panel(svg: &mut Svg, placed: &PlacedPanel<'_>) {
+    let frame = &placed.frame;
+    svg.open_group("panel");
+    axes(svg, placed);
+    let mut obstacles = obstacles(frame, &placed.panel.items);
+    let mut late = Vec::new();
+    for item in &placed.panel.items {
+        match item {
+            Item::Line(item) => line(svg, frame, item, &mut late),
+            Item::Scatter(item) => scatter(svg, frame, item),
+            Item::Rule(item) => rule(svg, frame, item),
+            Item::Contours(item) => contours(svg, frame, item, &mut obstacles, &mut late),
+            Item::Polygon(item) => {
+                let points: Vec<_> = item.points.iter().map(|p| frame.px(*p)).collect();
+                svg.areas(&[clip::polygon(&points, &frame.rect)], item.colour, item.opacity);
+            }
+            Item::Annotation(item) => annotation(frame, item, &mut late),
+        }
+    }
+    for text in &late {
+        svg.text(text.at, &text.text, &text.style);
+    }
+    legend::draw(svg, &placed.entries, &placed.legend_places, placed.legend_origin);
+    svg.close_group();
+}
+
+/// What texts on contour lines keep away from: markers and arrow heads.
+fn obstacles(frame: &Frame, items: &[Item]) -> Vec<(f64, f64)> {
+    let mut out = Vec::new();
+    for item in items {
+        match item {
+            Item::Scatter(scatter) => out.extend(scatter.points.iter().map(|p| frame.px((p.x, p.y)))),
+            Item::Line(line) if line.arrows => {
+                let middle =
+                    |pair: &[(f64, f64)]| (0.5 * (pair[0].0 + pair[1].0), 0.5 * (pair[0].1 + pair[1].1));
+                out.extend(line.points.windows(2).map(|pair| frame.px(middle(pair))));
+            }
+            _ => {}
+        }
+    }
+    out
+}
+
+fn axes(svg: &mut Svg, placed: &PlacedPanel<'_>) {
+    let (frame, panel) = (&placed.frame, placed.panel);
+    let Rect { left, top, right, bottom } = frame.rect;
+    let (grid, ink) = (Stroke::solid(LIGHT_GREY, 0.8), Stroke::solid(INK, 1.0));
+    for (value, text) in &frame.x.ticks {
+        let x = frame.px((*value, frame.y.low)).0;
+        svg.line((x, top), (x, bottom), &grid);
+        svg.line((x, bottom), (x, bottom + 5.0), &ink);
+        svg.text((x, bottom + 15.0), text, &TextStyle::new(TICK_PX, INK, TextAnchor::Middle));
+    }
+    for (value, text) in &frame.y.ticks {
+        let y = frame.px((frame.x.low, *value)).1;
+        svg.line((left, y), (right, y), &grid);
+        svg.line((left - 5.0, y), (left, y), &ink);
+        svg.text((left - 8.0, y), text, &TextStyle::new(TICK_PX, INK, TextAnchor::End));
+    }
+    svg.polyline(&[(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], &ink);
+    let title = TextStyle::new(AXIS_TITLE_PX, INK, TextAnchor::Middle);
+    let cut_to = |text: &str, room: f64| cut(text, AXIS_TITLE_PX, room);
+    svg.text(
+        (0.5 * (left + right), bottom + 38.0),
+        &cut_to(&panel.x.title, frame.rect.width() + 40.0),
+        &title,
+    );
+    let tick_width = frame.y.ticks.iter().map(|t| width_px(&t.1, TICK_PX)).fold(0.0, f64::max);
+    svg.text(
+        (left - 16.0 - tick_width - 0.5 * AXIS_TITLE_PX + 4.0, 0.5 * (top + bottom)),
+        &cut_to(&panel.y.title, frame.rect.height() + 40.0),
+        &title.turned(90.0),
+    );
+    let panel_title = cut(&panel.title, PANEL_TITLE_PX, frame.rect.width());
+    svg.text(
+        (left, top - 13.0),
+        &panel_title,
+        &TextStyle::new(PANEL_TITLE_PX, INK, TextAnchor::Start).bold(),
+    );
+}
+
+fn line(svg: &mut Svg, frame: &Frame, line: &Line, late: &mut Vec<LateText>) {
+    let points: Vec<_> = line.points.iter().map(|p| frame.px(*p)).collect();
+    let stroke = Stroke { colour: line.colour, width_px: line.width_px, dash: line.dash };
+    let pieces = clip::polyline(&points, &frame.rect);
+    for piece in &pieces {
+        svg.polyline(piece, &stroke);
+        if line.arrows {
+            for pair in piece.windows(2) {
+                draw_arrow(svg, pair[0], pair[1], line.colour);
+            }
+        }
+    }
+    let Some(label) = &line.end_label else { return };
+    let ends = match label.end {
+        LineEnd::First => pieces.first().map(|p| (p[1], p[0])),
+        LineEnd::Last => pieces.last().map(|p| (p[p.len() - 2], p[p.len() - 1])),
+    };
+    // A line of one visible point still gets its text.
+    let single =
+        points.iter().copied().find(|p| p.0.is_finite() && p.1.is_finite() && frame.rect.contains(*p));
+    let Some((inner, end)) = ends.or(single.map(|p| ((p.0 - 1.0, p.1), p))) else { return };
+    let length = (end.0 - inner.0).hypot(end.1 - inner.1).max(1e-9);
+    let (ux, uy) = ((end.0 - inner.0) / length, (end.1 - inner.1) / length);
+    let half_width = 0.5 * width_px(&label.text, LABEL_PX);
+    // As far out as the text's box needs in this direction, but not over the frame's edge.
+    let centre = (end.0 + ux * (half_width + 8.0), end.1 + uy * 14.0);
+    let y = centre.1.clamp(frame.rect.top + 8.0, frame.rect.bottom - 8.0);
+    // No room above or below: beside the end instead of on it.
+    let x = if y == centre.1 { centre.0 } else { end.0 - half_width - 9.0 };
+    let leftmost = frame.rect.left + half_width + 2.0;
+    let x = x.clamp(leftmost, leftmost.max(frame.rect.right - half_width - 2.0));
+    late.push(LateText {
+        at: (x, y),
+        text: label.text.clone(),
+        style: TextStyle::new(LABEL_PX, line.colour, TextAnchor::Middle).halo().bold(),
+    });
+}
+
+fn scatter(svg: &mut Svg, frame: &Frame, scatter: &Scatter) {
+    let style = MarkerStyle {
+        marker: scatter.marker,
+        colour: scatter.colour,
+        hollow: scatter.hollow,
+        size_px: scatter.size_px,
+    };
+    for point in &scatter.points {
+        for (interval, along_x) in [(point.x_interval, true), (point.y_interval, false)] {
+            let Some((low, high)) = interval else { continue };
+            let end = |v: f64| frame.px(if along_x { (v, point.y) } else { (point.x, v) });
+            error_bar(svg, frame, end(low), end(high), along_x, scatter);
+        }
+    }
+    for point in &scatter.points {
+        let at = frame.px((point.x, point.y));
+        if at.0.is_finite() && at.1.is_finite() && frame.rect.contains(at) {
+            draw_marker(svg, at, &style);
+        }
+    }
+}
+
+/// A bar with caps; an end outside the frame is cut and has no cap.
+fn error_bar(
+    svg: &mut Svg,
+    frame: &Frame,
+    low: (f64, f64),
+    high: (f64, f64),
+    along_x: bool,
+    scatter: &Scatter,
+) {
+    let stroke = Stroke::solid(scatter.colour, 1.1);
+    for piece in clip::polyline(&[low, high], &frame.rect) {
+        svg.polyline(&piece, &stroke);
+        for end in [low, high].into_iter().filter(|end| frame.rect.contains(*end)) {
+            let (dx, dy) = if along_x { (0.0, 3.0) } else { (3.0, 0.0) };
+            svg.line((end.0 - dx, end.1 - dy), (end.0 + dx, end.1 + dy), &stroke);
+        }
+    }
+}
+
+fn rule(svg: &mut Svg, frame: &Frame, rule: &Rule) {
+    let ends = match rule.at {
+        RuleAt::Y(value) => [(frame.x.low, value), (frame.x.high, value)],
+        RuleAt::X(value) => [(value, frame.y.low), (value, frame.y.high)],
+    };
+    let stroke = Stroke { colour: rule.colour, width_px: 1.2, dash: rule.dash };
+    for piece in clip::polyline(&ends.map(|p| frame.px(p)), &frame.rect) {
+        svg.polyline(&piece, &stroke);
+    }
+}
+
+fn contours(
+    svg: &mut Svg,
+    frame: &Frame,
+    contours: &Contours,
+    obstacles: &mut Vec<(f64, f64)>,
+    late: &mut Vec<LateText>,
+) {
+    let levels = &contours.levels[..contours.levels.len().min(MAX_LEVELS)];
+    if let Some(shade) = contours.shade {
+        let mut edges = vec![f64::NEG_INFINITY];
+        edges.extend(levels.iter().map(|level| level.value));
+        edges.push(f64::INFINITY);
+        for (i, pair) in edges.windows(2).enumerate() {
+            let share = i as f64 / (edges.len() - 2).max(1) as f64;
+            let polygons: Vec<_> = band(&contours.grid, pair[0], pair[1])
+                .into_iter()
+                .map(|p| clip::polygon(&p.into_iter().map(|p| frame.px(p)).collect::<Vec<_>>(), &frame.rect))
+                .collect();
+            // Light enough that markers and texts stand out on the darkest.
+            svg.areas(&polygons, shade.tint(0.04 + 0.30 * share), 1.0);
+        }
+    }
+    let stroke = Stroke { colour: contours.colour, width_px: 1.0, dash: Dash::Solid };
+    for level in levels {
+        let width = width_px(&level.label, LABEL_PX);
+        for chain in contour_lines(&contours.grid, level.value) {
+            let points: Vec<_> = chain.into_iter().map(|p| frame.px(p)).collect();
+            for piece in clip::polyline(&points, &frame.rect) {
+                let place = if level.label.is_empty() { None } else { place(&piece, width, obstacles) };
+                let Some(place) = place else {
+                    svg.polyline(&piece, &stroke);
+                    continue;
+                };
+                for part in without_gap(&piece, place.gap) {
+                    svg.polyline(&part, &stroke);
+                }
+                obstacles.push(place.centre);
+                late.push(LateText {
+                    at: place.centre,
+                    text: level.label.clone(),
+                    style: TextStyle::new(LABEL_PX, contours.colour, TextAnchor::Middle)
+                        .turned(place.turn_deg),
+                });
+            }
+        }
+    }
+}
+
+fn annotation(frame: &Frame, item: &Annotation, late: &mut Vec<LateText>) {
+    let at = match item.space {
+        Space::Data => frame.px(item.at),
+        Space::Panel => (
+            frame.rect.left + item.at.0 * frame.rect.width(),
+            frame.rect.bottom - item.at.1 * frame.rect.height(),
+        ),
+    };
+    let at = (at.0 + item.shift_px.0, at.1 - item.shift_px.1);
+    if at.0.is_finite() && at.1.is_finite() && frame.rect.contains(at) {
+        let style = TextStyle::new(LABEL_PX, item.colour, item.anchor).halo();
+        late.push(LateText { at, text: item.text.clone(), style });
+    }
+}

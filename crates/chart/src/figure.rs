@@ -1,0 +1,120 @@
+//! A figure: title, subtitle, panels.
+
+use crate::{Axis, Item};
+
+/// Where the legend stands; never inside the drawing area, so it never covers data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LegendPlace {
+    /// Below the axis title, in rows.
+    #[default]
+    Below,
+    /// To the right, one entry a line.
+    Right,
+    /// Nowhere.
+    None,
+}
+
+/// One pair of axes with what it shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    /// Title, e.g. `(a) 110 to 50 krpm`; empty for none.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// What is shown, in drawing order.
+    pub items: Vec<Item>,
+    /// Where the legend stands.
+    pub legend: LegendPlace,
+}
+
+impl Panel {
+    /// An empty panel.
+    pub fn new(x: Axis, y: Axis) -> Self {
+        Panel { title: String::new(), x, y, items: Vec::new(), legend: LegendPlace::Below }
+    }
+
+    /// Sets the title.
+    pub fn title(mut self, title: impl Into<String>) -> Self {
+        self.title = title.into();
+        self
+    }
+
+    /// Adds something to show.
+    pub fn with(mut self, item: impl Into<Item>) -> Self {
+        self.items.push(item.into());
+        self
+    }
+
+    /// Adds something to show.
+    pub fn add(&mut self, item: impl Into<Item>) {
+        self.items.push(item.into());
+    }
+
+    /// Places the legend.
+    pub fn legend(mut self, place: LegendPlace) -> Self {
+        self.legend = place;
+        self
+    }
+}
+
+/// A whole picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// Title.
+    pub title: String,
+    /// Lines below the title, smaller; each is wrapped where it is too long.
+    pub subtitles: Vec<String>,
+    /// Panels, row after row.
+    pub panels: Vec<Panel>,
+    /// Panels in a row, at least 1.
+    pub columns: usize,
+    /// Width of each drawing area, px, 100..4000.
+    pub panel_width_px: f64,
+    /// Height of each drawing area, px, 100..4000.
+    pub panel_height_px: f64,
+}
+
+impl Figure {
+    /// An empty figure; panels stand side by side, two in a row, each with a drawing area of 520 by 400 px.
+    pub fn new(title: impl Into<String>) -> Self {
+        Figure {
+            title: title.into(),
+            subtitles: Vec::new(),
+            panels: Vec::new(),
+            columns: 2,
+            panel_width_px: 520.0,
+            panel_height_px: 400.0,
+        }
+    }
+
+    /// Adds a line below the title.
+    pub fn subtitle(mut self, subtitle: impl Into<String>) -> Self {
+        self.subtitles.push(subtitle.into());
+        self
+    }
+
+    /// Adds a panel.
+    pub fn panel(mut self, panel: Panel) -> Self {
+        self.panels.push(panel);
+        self
+    }
+
+    /// Sets the number of panels in a row.
+    pub fn columns(mut self, columns: usize) -> Self {
+        self.columns = columns;
+        self
+    }
+
+    /// Sets the size of each drawing area, px.
+    pub fn panel_size_px(mut self, width_px: f64, height_px: f64) -> Self {
+        (self.panel_width_px, self.panel_height_px) = (width_px, height_px);
+        self
+    }
+
+    /// The picture as an SVG document. The same figure gives the same bytes.
+    pub fn to_svg(&self) -> String {
+        crate::draw::figure(self)
+    }
+}

@@ -1,0 +1,112 @@
+//! A field on a structured grid whose nodes may lie anywhere.
+
+/// `rows * columns` nodes with coordinates and a value each, row after row; node (r, c) is at `r * columns + c`.
+///
+/// Neighbours in (r, c) are corners of a cell; the coordinates are free, so speed lines of a map make rows.
+/// A node whose value or coordinate is NaN or infinite is unknown, and so are the cells it touches.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StructuredGrid {
+    rows: usize,
+    columns: usize,
+    x: Vec<f64>,
+    y: Vec<f64>,
+    z: Vec<f64>,
+}
+
+/// Why numbers make no grid.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum GridError {
+    /// A column of numbers has the wrong length.
+    #[error(
+        "a grid of {rows} rows and {columns} columns needs rows * columns values each; x has {x}, y {y}, z {z}"
+    )]
+    Length {
+        /// Rows asked for.
+        rows: usize,
+        /// Columns asked for.
+        columns: usize,
+        /// Number of x values.
+        x: usize,
+        /// Number of y values.
+        y: usize,
+        /// Number of z values.
+        z: usize,
+    },
+}
+
+/// A node: x, y in the axes' units, z in the field's.
+pub(crate) type Node = [f64; 3];
+
+impl StructuredGrid {
+    /// Makes a grid of node coordinates `x`, `y` (units of the axes) and values `z`, each `rows * columns` long.
+    ///
+    /// # Errors
+    /// [`GridError::Length`] where a length is wrong.
+    pub fn new(
+        rows: usize,
+        columns: usize,
+        x: Vec<f64>,
+        y: Vec<f64>,
+        z: Vec<f64>,
+    ) -> Result<Self, GridError> {
+        let wanted = rows.checked_mul(columns);
+        if [x.len(), y.len(), z.len()].iter().any(|len| Some(*len) != wanted) {
+            return Err(GridError::Length { rows, columns, x: x.len(), y: y.len(), z: z.len() });
+        }
+        Ok(StructuredGrid { rows, columns, x, y, z })
+    }
+
+    /// A grid over the lines `x` and `y` with `z(x, y)` at each node; rows run along x.
+    pub fn from_fn(x: &[f64], y: &[f64], z: impl Fn(f64, f64) -> f64) -> Self {
+        let nodes = || y.iter().flat_map(|y| x.iter().map(move |x| (*x, *y)));
+        StructuredGrid {
+            rows: y.len(),
+            columns: x.len(),
+            x: nodes().map(|n| n.0).collect(),
+            y: nodes().map(|n| n.1).collect(),
+            z: nodes().map(|n| z(n.0, n.1)).collect(),
+        }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Node coordinates and value, `None` outside the grid or where the node is unknown.
+    pub fn node(&self, row: usize, column: usize) -> Option<[f64; 3]> {
+        if row >= self.rows || column >= self.columns {
+            return None;
+        }
+        let at = row * self.columns + column;
+        let node = [self.x[at], self.y[at], self.z[at]];
+        node.iter().all(|v| v.is_finite()).then_some(node)
+    }
+
+    /// Smallest and largest known value.
+    pub fn value_range(&self) -> Option<(f64, f64)> {
+        self.known_nodes().fold(None, |range, node| match range {
+            None => Some((node[2], node[2])),
+            Some((low, high)) => Some((f64::min(low, node[2]), f64::max(high, node[2]))),
+        })
+    }
+
+    pub(crate) fn known_nodes(&self) -> impl Iterator<Item = Node> + '_ {
+        (0..self.rows).flat_map(move |r| (0..self.columns).filter_map(move |c| self.node(r, c)))
+    }
+
+    /// The corners (r, c), (r, c+1), (r+1, c+1), (r+1, c) of a cell, if all are known.
+    pub(crate) fn cell(&self, row: usize, column: usize) -> Option<[Node; 4]> {
+        Some([
+            self.node(row, column)?,
+            self.node(row, column + 1)?,
+            self.node(row + 1, column + 1)?,
+            self.node(row + 1, column)?,
+        ])
+    }
+}

@@ -1,0 +1,335 @@
+//! What a panel can show. Coordinates are in the axes' units throughout; lengths on paper are in px.
+
+use crate::palette::{GREY, INK};
+use crate::{Colour, Contours};
+
+/// One thing to show. Things are drawn in the order given, texts last.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Item {
+    /// A line series.
+    Line(Line),
+    /// Points with markers.
+    Scatter(Scatter),
+    /// A reference line across the whole panel.
+    Rule(Rule),
+    /// Contour lines of a field.
+    Contours(Contours),
+    /// A shaded area.
+    Polygon(Polygon),
+    /// A text.
+    Annotation(Annotation),
+}
+
+/// How a line is broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Dash {
+    /// Not at all.
+    #[default]
+    Solid,
+    /// Dashes.
+    Dashed,
+    /// Dots.
+    Dotted,
+    /// Dash and dot in turn.
+    DashDot,
+}
+
+/// A line through points; a point that is NaN or infinite breaks it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// Points (x, y) in drawing order.
+    pub points: Vec<(f64, f64)>,
+    /// Colour.
+    pub colour: Colour,
+    /// Width, px.
+    pub width_px: f64,
+    /// Solid or broken.
+    pub dash: Dash,
+    /// Whether each segment carries an arrow head at its middle (a path through the map).
+    pub arrows: bool,
+    /// Entry in the legend; items with equal text share one entry.
+    pub label: Option<String>,
+    /// Text beside one end.
+    pub end_label: Option<EndLabel>,
+}
+
+/// Which end of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LineEnd {
+    /// Its first visible point.
+    First,
+    /// Its last visible point.
+    Last,
+}
+
+/// A text beside one end of a line, on the line's continuation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EndLabel {
+    /// The text.
+    pub text: String,
+    /// Where.
+    pub end: LineEnd,
+}
+
+impl Line {
+    /// A solid line of 1.8 px.
+    pub fn new(points: Vec<(f64, f64)>, colour: Colour) -> Self {
+        Line { points, colour, width_px: 1.8, dash: Dash::Solid, arrows: false, label: None, end_label: None }
+    }
+
+    /// Sets the legend's text.
+    pub fn label(mut self, label: impl Into<String>) -> Self {
+        self.label = Some(label.into());
+        self
+    }
+
+    /// Breaks the line.
+    pub fn dash(mut self, dash: Dash) -> Self {
+        self.dash = dash;
+        self
+    }
+
+    /// Sets the width, px.
+    pub fn width_px(mut self, width_px: f64) -> Self {
+        self.width_px = width_px;
+        self
+    }
+
+    /// Puts an arrow head at the middle of each segment.
+    pub fn arrows(mut self) -> Self {
+        self.arrows = true;
+        self
+    }
+
+    /// Writes a text beside one end.
+    pub fn end_label(mut self, text: impl Into<String>, end: LineEnd) -> Self {
+        self.end_label = Some(EndLabel { text: text.into(), end });
+        self
+    }
+}
+
+/// Shape of a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Marker {
+    /// Circle.
+    #[default]
+    Circle,
+    /// Square.
+    Square,
+    /// Triangle, tip up.
+    Triangle,
+    /// Diamond.
+    Diamond,
+    /// Upright cross.
+    Plus,
+    /// Slanting cross.
+    Cross,
+}
+
+/// A point with optional intervals (low, high), absolute values in the axes' units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScatterPoint {
+    /// x.
+    pub x: f64,
+    /// y.
+    pub y: f64,
+    /// Ends of the error bar along x.
+    pub x_interval: Option<(f64, f64)>,
+    /// Ends of the error bar along y.
+    pub y_interval: Option<(f64, f64)>,
+}
+
+impl From<(f64, f64)> for ScatterPoint {
+    fn from((x, y): (f64, f64)) -> Self {
+        ScatterPoint { x, y, x_interval: None, y_interval: None }
+    }
+}
+
+/// Points drawn as markers. Error bars widen an axis by at most half the span of the points, beyond that they are cut.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scatter {
+    /// The points; those that are NaN or infinite are left out.
+    pub points: Vec<ScatterPoint>,
+    /// Colour.
+    pub colour: Colour,
+    /// Shape.
+    pub marker: Marker,
+    /// Outline alone.
+    pub hollow: bool,
+    /// Diameter, px.
+    pub size_px: f64,
+    /// Entry in the legend; items with equal text share one entry.
+    pub label: Option<String>,
+}
+
+impl Scatter {
+    /// Filled circles of 7 px.
+    pub fn new<P: Into<ScatterPoint>>(points: Vec<P>, colour: Colour) -> Self {
+        Scatter {
+            points: points.into_iter().map(Into::into).collect(),
+            colour,
+            marker: Marker::Circle,
+            hollow: false,
+            size_px: 7.0,
+            label: None,
+        }
+    }
+
+    /// Sets the shape.
+    pub fn marker(mut self, marker: Marker) -> Self {
+        self.marker = marker;
+        self
+    }
+
+    /// Draws outlines alone.
+    pub fn hollow(mut self) -> Self {
+        self.hollow = true;
+        self
+    }
+
+    /// Sets the diameter, px.
+    pub fn size_px(mut self, size_px: f64) -> Self {
+        self.size_px = size_px;
+        self
+    }
+
+    /// Sets the legend's text.
+    pub fn label(mut self, label: impl Into<String>) -> Self {
+        self.label = Some(label.into());
+        self
+    }
+}
+
+/// Where a [`Rule`] runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RuleAt {
+    /// Along x at this y.
+    Y(f64),
+    /// Along y at this x.
+    X(f64),
+}
+
+/// A straight reference line across the whole panel. It widens the axis so that it is seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rule {
+    /// Where.
+    pub at: RuleAt,
+    /// Colour.
+    pub colour: Colour,
+    /// Solid or broken.
+    pub dash: Dash,
+    /// Entry in the legend.
+    pub label: Option<String>,
+}
+
+impl Rule {
+    /// A dashed grey line.
+    pub fn new(at: RuleAt) -> Self {
+        Rule { at, colour: GREY, dash: Dash::Dashed, label: None }
+    }
+
+    /// Sets the legend's text.
+    pub fn label(mut self, label: impl Into<String>) -> Self {
+        self.label = Some(label.into());
+        self
+    }
+
+    /// Sets the colour.
+    pub fn colour(mut self, colour: Colour) -> Self {
+        self.colour = colour;
+        self
+    }
+}
+
+/// A shaded area, e.g. an extrapolated region.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polygon {
+    /// Corners (x, y); those that are NaN or infinite are left out.
+    pub points: Vec<(f64, f64)>,
+    /// Colour of the fill.
+    pub colour: Colour,
+    /// Opacity of the fill, 0..1.
+    pub opacity: f64,
+    /// Entry in the legend.
+    pub label: Option<String>,
+}
+
+impl Polygon {
+    /// A lightly shaded area.
+    pub fn new(points: Vec<(f64, f64)>, colour: Colour) -> Self {
+        Polygon { points, colour, opacity: 0.2, label: None }
+    }
+
+    /// Sets the legend's text.
+    pub fn label(mut self, label: impl Into<String>) -> Self {
+        self.label = Some(label.into());
+        self
+    }
+}
+
+/// What an [`Annotation`]'s place refers to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Space {
+    /// The axes' units.
+    Data,
+    /// The panel: (0, 0) is its lower left corner, (1, 1) its upper right one.
+    Panel,
+}
+
+/// Which part of a text stands at its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TextAnchor {
+    /// Its beginning.
+    Start,
+    /// Its middle.
+    Middle,
+    /// Its end.
+    End,
+}
+
+/// A text at a place. It does not widen the axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Annotation {
+    /// The text, one line.
+    pub text: String,
+    /// Place (x, y).
+    pub at: (f64, f64),
+    /// What the place refers to.
+    pub space: Space,
+    /// Shift from the place, px, to the right and up.
+    pub shift_px: (f64, f64),
+    /// Which part of the text stands there.
+    pub anchor: TextAnchor,
+    /// Colour.
+    pub colour: Colour,
+}
+
+impl Annotation {
+    /// Text 6 px to the right of a point.
+    pub fn new(text: impl Into<String>, at: (f64, f64)) -> Self {
+        Annotation {
+            text: text.into(),
+            at,
+            space: Space::Data,
+            shift_px: (6.0, 0.0),
+            anchor: TextAnchor::Start,
+            colour: INK,
+        }
+    }
+
+    /// Text in a corner of the panel or anywhere in it, by fractions of its sides.
+    pub fn in_panel(text: impl Into<String>, at: (f64, f64), anchor: TextAnchor) -> Self {
+        Annotation { space: Space::Panel, shift_px: (0.0, 0.0), anchor, ..Annotation::new(text, at) }
+    }
+}
+
+macro_rules! into_item {
+    ($($kind:ident),*) => {
+        $(impl From<$kind> for Item {
+            fn from(item: $kind) -> Item {
+                Item::$kind(item)
+            }
+        })*
+    };
+}
+into_item!(Line, Scatter, Rule, Contours, Polygon, Annotation);

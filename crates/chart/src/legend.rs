@@ -1,0 +1,100 @@
+//! Entries of a legend, and where they stand.
+
+use crate::items::{Dash, Item, TextAnchor};
+use crate::markers::{MarkerStyle, draw_marker};
+use crate::palette::INK;
+use crate::svg::{Stroke, Svg, TextStyle};
+use crate::text::{cut, width_px};
+use crate::{Colour, Panel};
+
+pub(crate) const FONT_PX: f64 = 12.0;
+pub(crate) const ROW_PX: f64 = 20.0;
+const SWATCH_PX: f64 = 28.0;
+const GAP_PX: f64 = 18.0;
+const LONGEST_TEXT_PX: f64 = 420.0;
+
+/// A piece of a swatch.
+#[derive(Debug, Clone, Copy)]
+enum Swatch {
+    Line(Stroke),
+    Marker(MarkerStyle),
+    Area(Colour, f64),
+}
+
+/// A text with what it explains.
+#[derive(Debug, Clone)]
+pub(crate) struct Entry {
+    text: String,
+    swatches: Vec<Swatch>,
+}
+
+impl Entry {
+    pub(crate) fn width_px(&self) -> f64 {
+        SWATCH_PX + 6.0 + width_px(&self.text, FONT_PX) + GAP_PX
+    }
+}
+
+/// One entry per text, in order of first appearance.
+pub(crate) fn entries(panel: &Panel) -> Vec<Entry> {
+    let mut entries: Vec<Entry> = Vec::new();
+    for item in &panel.items {
+        let (label, swatch) = match item {
+            Item::Line(line) => (
+                &line.label,
+                Swatch::Line(Stroke { colour: line.colour, width_px: line.width_px, dash: line.dash }),
+            ),
+            Item::Scatter(scatter) => (
+                &scatter.label,
+                Swatch::Marker(MarkerStyle {
+                    marker: scatter.marker,
+                    colour: scatter.colour,
+                    hollow: scatter.hollow,
+                    size_px: scatter.size_px,
+                }),
+            ),
+            Item::Rule(rule) => {
+                (&rule.label, Swatch::Line(Stroke { colour: rule.colour, width_px: 1.2, dash: rule.dash }))
+            }
+            Item::Contours(contours) => (
+                &contours.label,
+                Swatch::Line(Stroke { colour: contours.colour, width_px: 1.2, dash: Dash::Solid }),
+            ),
+            Item::Polygon(polygon) => (&polygon.label, Swatch::Area(polygon.colour, polygon.opacity)),
+            Item::Annotation(_) => continue,
+        };
+        let Some(label) = label else { continue };
+        let text = cut(label, FONT_PX, LONGEST_TEXT_PX);
+        match entries.iter_mut().find(|entry| entry.text == text) {
+            Some(entry) => entry.swatches.push(swatch),
+            None => entries.push(Entry { text, swatches: vec![swatch] }),
+        }
+    }
+    entries
+}
+
+/// Upper left corners of entries flowing into rows `width` px wide, and the number of rows.
+pub(crate) fn flow(entries: &[Entry], width: f64) -> (Vec<(f64, f64)>, usize) {
+    // Equal columns look calmer than ragged rows.
+    let cell = entries.iter().map(Entry::width_px).fold(1.0, f64::max);
+    let columns = ((width / cell) as usize).max(1);
+    let places =
+        (0..entries.len()).map(|i| ((i % columns) as f64 * cell, (i / columns) as f64 * ROW_PX)).collect();
+    (places, entries.len().div_ceil(columns))
+}
+
+pub(crate) fn draw(svg: &mut Svg, entries: &[Entry], places: &[(f64, f64)], origin: (f64, f64)) {
+    for (entry, place) in entries.iter().zip(places) {
+        let (x, y) = (origin.0 + place.0, origin.1 + place.1 + 0.5 * ROW_PX);
+        for swatch in &entry.swatches {
+            match swatch {
+                Swatch::Line(stroke) => svg.line((x, y), (x + SWATCH_PX, y), stroke),
+                Swatch::Marker(style) => draw_marker(svg, (x + 0.5 * SWATCH_PX, y), style),
+                Swatch::Area(colour, opacity) => {
+                    let (x2, top, bottom) = (x + SWATCH_PX, y - 6.0, y + 6.0);
+                    svg.areas(&[vec![(x, top), (x2, top), (x2, bottom), (x, bottom)]], *colour, *opacity);
+                }
+            }
+        }
+        svg.text((x + SWATCH_PX + 6.0, y), &entry.text, &TextStyle::new(FONT_PX, INK, TextAnchor::Start));
+    }
+}

@@ -1,0 +1,84 @@
+//! Where a recording holds the rig's channels, and what it does not say itself.
+
+use mapper_core::{CHANNELS, Channel, ReferenceState};
+use std::collections::BTreeMap;
+
+/// Maps a recording's topics and fields onto channels. SI inside; written with units in YAML.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ChannelMap {
+    /// Topic, field and unit of each channel.
+    pub channels: BTreeMap<Channel, ChannelSource>,
+    /// Channels that the recording does not hold and that stay at a known value; SI, in the channel's unit.
+    pub constants: BTreeMap<Channel, f64>,
+    /// What identification needs of the machine where there is no campaign.
+    pub machine: Option<MachineConstants>,
+    /// Reference state of corrected quantities.
+    pub reference: Option<ReferenceState>,
+    /// Window of identification within each step.
+    pub window: Option<WindowLimits>,
+    /// Declared uncertainty of the sensors.
+    pub sensors: BTreeMap<Channel, SensorUncertainty>,
+    pub(crate) native: bool,
+}
+
+/// One field of one topic.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChannelSource {
+    /// Topic, e.g. `/rig/compressor`.
+    pub topic: String,
+    /// Field of the topic's messages.
+    pub field: String,
+    /// Unit of the field; `None` to take it from the recording.
+    pub unit: Option<String>,
+}
+
+/// What identification needs of the machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MachineConstants {
+    /// Internal area of the compressor that exchanges heat with the gas, m2, > 0.
+    pub compressor_internal_area_m2: f64,
+    /// Share of that area before compression, alpha_A, 0..1.
+    pub alpha_area_ratio: f64,
+    /// Diameter of the compressor's inlet pipe, m, > 0; only for static taps.
+    pub compressor_inlet_diameter_m: Option<f64>,
+    /// Diameter of the compressor's outlet pipe, m, > 0; only for static taps.
+    pub compressor_outlet_diameter_m: Option<f64>,
+    /// Diameter of the T2 probe's tip, m; 0 is an ideal probe.
+    pub t2_probe_diameter_m: f64,
+}
+
+/// A window after the start of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WindowLimits {
+    /// Start after the start of the step, s, >= 0.
+    pub start_s: f64,
+    /// End after the start of the step, s, > `start_s`.
+    pub end_s: f64,
+}
+
+/// Declared uncertainty of a sensor: one sigma each, in the channel's SI unit (K, Pa, kg/s, rpm, 1).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SensorUncertainty {
+    /// Noise of single samples, one sigma.
+    pub noise_sigma_si: f64,
+    /// Fixed offset after calibration, one sigma.
+    pub offset_sigma_si: f64,
+}
+
+impl ChannelMap {
+    /// The map of this program's own recordings.
+    pub fn native() -> ChannelMap {
+        let source = |row: &mapper_core::ChannelInfo| ChannelSource {
+            topic: row.group.topic().to_owned(),
+            field: row.field.to_owned(),
+            unit: Some(row.dimension.unit().to_owned()),
+        };
+        let channels = CHANNELS.iter().map(|row| (row.channel, source(row))).collect();
+        ChannelMap { channels, native: true, ..ChannelMap::default() }
+    }
+
+    /// Whether this is [`ChannelMap::native`]: channels missing from the recording are then no surprise.
+    pub fn is_native(&self) -> bool {
+        self.native
+    }
+}

@@ -1,0 +1,76 @@
+//! The content of a chunk, decompressed within limits and checked.
+
+use crate::records::Body;
+use std::io::{self, Read};
+use zstd::zstd_safe::{DCtx, ResetDirective, get_error_name};
+
+/// Why a chunk cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum ChunkError {
+    #[error("its header is not whole")]
+    Header,
+    #[error("it claims {claimed} bytes, more than the {limit} that are read")]
+    TooLarge { claimed: u64, limit: u64 },
+    #[error("it is compressed with `{0}`, and only zstd can be read")]
+    Compression(String),
+    #[error("it does not decompress ({0})")]
+    Decompress(std::io::Error),
+    #[error("it holds {found} bytes and claims {claimed}")]
+    Length { claimed: u64, found: u64 },
+    #[error("its checksum is {found:08x} and should be {saved:08x}")]
+    Checksum { saved: u32, found: u32 },
+}
+
+/// Unpacks chunks; keeps what decompression can use again for the next one.
+pub(crate) struct Unpacker {
+    context: DCtx<'static>,
+    content: Vec<u8>,
+}
+
+impl Unpacker {
+    pub(crate) fn new() -> Self {
+        Unpacker { context: DCtx::create(), content: Vec::new() }
+    }
+
+    /// The records of a chunk.
+    pub(crate) fn unpack(&mut self, body: &[u8], limit: u64) -> Result<&[u8], ChunkError> {
+        let (claimed, saved, compression, data) = parse_header(body).ok_or(ChunkError::Header)?;
+        if claimed > limit {
+            return Err(ChunkError::TooLarge { claimed, limit });
+        }
+        self.content.clear();
+        match compression {
+            b"" => self.content.extend_from_slice(data),
+            b"zstd" => self.decompress(data, claimed).map_err(ChunkError::Decompress)?,
+            other => return Err(ChunkError::Compression(String::from_utf8_lossy(other).into_owned())),
+        }
+        let found = self.content.len() as u64;
+        if found != claimed {
+            return Err(ChunkError::Length { claimed, found });
+        }
+        // Zero means that the writer made none.
+        let found = if saved == 0 { 0 } else { crc32fast::hash(&self.content) };
+        if found != saved {
+            return Err(ChunkError::Checksum { saved, found });
+        }
+        Ok(&self.content)
+    }
+
+    fn decompress(&mut self, data: &[u8], claimed: u64) -> io::Result<()> {
+        // A damaged chunk before may have left the context within a frame.
+        self.context
+            .reset(ResetDirective::SessionOnly)
+            .map_err(|code| io::Error::other(get_error_name(code)))?;
+        let decoder = zstd::stream::read::Decoder::with_context(data, &mut self.context);
+        // One byte more than claimed shows a chunk that lies, without unpacking the rest of it.
+        decoder.take(claimed.saturating_add(1)).read_to_end(&mut self.content)?;
+        Ok(())
+    }
+}
+
+/// Uncompressed size, checksum, compression, data.
+fn parse_header(body: &[u8]) -> Option<(u64, u32, &[u8], &[u8])> {
+    let mut body = Body(body);
+    let (_start, _end) = (body.u64()?, body.u64()?);
+    Some((body.u64()?, body.u32()?, body.counted()?, body.long_counted()?))
+}

@@ -1,0 +1,99 @@
+//! Which fields of a topic are which channels, and in which unit.
+
+use crate::records::ChannelDefinition;
+use crate::units::{Kind, Unit};
+use crate::{ChannelMap, ChannelSource, ReadWarning, RecordError};
+use mapper_core::Channel;
+use serde_json::Value;
+use std::path::Path;
+
+/// A mapped topic of a recording.
+#[derive(Debug)]
+pub(crate) struct MappedTopic {
+    pub(crate) topic: String,
+    /// Fields to read, each once.
+    pub(crate) fields: Vec<String>,
+    /// Index of the field, channel, unit of the field.
+    pub(crate) outputs: Vec<(usize, Channel, Unit)>,
+}
+
+/// The channels that the map finds on a topic; `None` where there is none.
+pub(crate) fn map_topic(
+    path: &Path,
+    map: &ChannelMap,
+    definition: &ChannelDefinition,
+    warnings: &mut Vec<ReadWarning>,
+) -> Result<Option<MappedTopic>, RecordError> {
+    let mut mapped = MappedTopic { topic: definition.topic.clone(), fields: Vec::new(), outputs: Vec::new() };
+    let sources = map.channels.iter().filter(|(_, source)| source.topic == definition.topic);
+    let schema: Value = serde_json::from_slice(&definition.schema).unwrap_or(Value::Null);
+    for (channel, source) in sources {
+        if map.is_native() && !definition.metadata.contains_key(&source.field) {
+            // Not measured in this run.
+            continue;
+        }
+        let recorded = recorded_unit(definition, &schema, source, Kind::of(*channel));
+        let unit = resolve(path, *channel, source, recorded, warnings)?;
+        let index = mapped.fields.iter().position(|field| *field == source.field).unwrap_or_else(|| {
+            mapped.fields.push(source.field.clone());
+            mapped.fields.len() - 1
+        });
+        mapped.outputs.push((index, *channel, unit));
+    }
+    Ok((!mapped.outputs.is_empty()).then_some(mapped))
+}
+
+/// Where programs leave a unit: the topic's metadata, `unit` in the schema, or the description in the schema.
+fn recorded_unit(
+    definition: &ChannelDefinition,
+    schema: &Value,
+    source: &ChannelSource,
+    kind: Kind,
+) -> Option<String> {
+    let property = schema.get("properties").and_then(|properties| properties.get(&source.field));
+    let text = |key| property.and_then(|property: &Value| property.get(key)).and_then(Value::as_str);
+    definition
+        .metadata
+        .get(&source.field)
+        .map(String::as_str)
+        .or_else(|| text("unit"))
+        // A description is prose: it counts only where it is a fitting unit and nothing else.
+        .or_else(|| text("description").filter(|description| Unit::parse(description, kind).is_ok()))
+        .map(str::to_owned)
+}
+
+fn resolve(
+    path: &Path,
+    channel: Channel,
+    source: &ChannelSource,
+    recorded: Option<String>,
+    warnings: &mut Vec<ReadWarning>,
+) -> Result<Unit, RecordError> {
+    let kind = Kind::of(channel);
+    let parse = |name: &str| {
+        Unit::parse(name, kind).map_err(|error| RecordError::BadUnit {
+            path: path.to_owned(),
+            channel,
+            topic: source.topic.clone(),
+            field: source.field.clone(),
+            source: Box::new(error),
+        })
+    };
+    match (&source.unit, recorded) {
+        (Some(mapped), recorded) => {
+            let unit = parse(mapped)?;
+            if let Some(recorded) = recorded.filter(|recorded| Unit::parse(recorded, kind) != Ok(unit)) {
+                let mapped = mapped.clone();
+                warnings.push(ReadWarning::UnitContradiction { channel, mapped, recorded });
+            }
+            Ok(unit)
+        }
+        (None, Some(recorded)) => parse(&recorded),
+        (None, None) => Err(RecordError::MissingUnit {
+            path: path.to_owned(),
+            channel,
+            topic: source.topic.clone(),
+            field: source.field.clone(),
+        }),
+    }
+}

@@ -1,0 +1,123 @@
+//! Why a recording could not be written or read.
+
+use crate::{FormatVersion, UnitError};
+use mapper_core::Channel;
+use std::{io, path::PathBuf};
+
+/// Why a recording could not be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// There is a file of this name already.
+    #[error("failed to create the recording `{}`: it exists, and a run never overwrites another; choose another name or move it away", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file could not be created.
+    #[error("failed to create the recording `{}`: {source}", path.display())]
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Writing failed on the way, for example because the disk is full.
+    #[error("failed to write the recording `{}`: {source}; {}; {}", path.display(), saved(*saved_until_s), advice(source))]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Run time up to which all samples are in the file, s; `None` before the first flush.
+        saved_until_s: Option<f64>,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A batch, event or step that cannot be written: a fault of the program that made it.
+    #[error("failed to record into `{}`: {message}; a fault of the program that made it", path.display())]
+    BadInput {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// The file could not be opened or read.
+    #[error("failed to read the recording `{}`: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file is something else.
+    #[error("failed to read `{}`: it is not an MCAP file (it starts with {found}); give the .mcap file of a run", path.display())]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+        /// Its first bytes, as text.
+        found: String,
+    },
+    /// Written by a later version of this program.
+    #[error("failed to read `{}`: it has recording format {found}, this program knows up to {}; use a newer program", path.display(), FormatVersion::CURRENT)]
+    NewerFormat {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        found: FormatVersion,
+    },
+    /// There are topics, but none of the mapped measurements.
+    #[error("failed to read `{}`: none of the measurements looked for is in it; its topics are {}; give a channel map that names its topics and fields", path.display(), list(topics))]
+    NothingMapped {
+        /// The file.
+        path: PathBuf,
+        /// Topics it has.
+        topics: Vec<String>,
+    },
+    /// Neither the map nor the recording says in which unit a field is.
+    #[error("failed to read `{}`: neither the channel map nor the recording gives the unit of {channel} (`{field}` of {topic}); write it in the channel map, e.g. `unit: {}`", path.display(), channel.unit())]
+    MissingUnit {
+        /// The file.
+        path: PathBuf,
+        /// The channel.
+        channel: Channel,
+        /// Its topic.
+        topic: String,
+        /// Its field.
+        field: String,
+    },
+    /// The unit the recording gives is unknown or measures something else.
+    #[error("failed to read `{}`: unit of {channel} (`{field}` of {topic}): {source}; write the unit in the channel map", path.display())]
+    BadUnit {
+        /// The file.
+        path: PathBuf,
+        /// The channel.
+        channel: Channel,
+        /// Its topic.
+        topic: String,
+        /// Its field.
+        field: String,
+        /// What is wrong with the unit.
+        source: Box<UnitError>,
+    },
+}
+
+fn saved(saved_until_s: Option<f64>) -> String {
+    match saved_until_s {
+        Some(t_s) => format!("everything up to {t_s} s of the run is in the file and can be read"),
+        None => "nothing of the run was saved".to_owned(),
+    }
+}
+
+fn advice(source: &io::Error) -> &'static str {
+    match source.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "make room on this disk or record to another one, and run again"
+        }
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            "record to a folder that may be written, and run again"
+        }
+        _ => "check the disk, and run again",
+    }
+}
+
+fn list(topics: &[String]) -> String {
+    if topics.is_empty() { "none".to_owned() } else { topics.join(", ") }
+}

@@ -1,0 +1,38 @@
+//! Names and version of the recording format.
+
+/// Version of the recording format.
+///
+/// Bumped when a reader of the version before would misread a file: a topic, field or unit changes its meaning. New
+/// topics, fields and metadata keys do not bump it, since readers pass over what they do not know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct FormatVersion(pub u32);
+
+impl FormatVersion {
+    /// What this program writes.
+    pub const CURRENT: FormatVersion = FormatVersion(1);
+}
+
+impl std::fmt::Display for FormatVersion {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// Topic of step markers.
+pub(crate) const STEP_TOPIC: &str = "/step";
+/// Topic of events.
+pub(crate) const EVENT_TOPIC: &str = "/event";
+/// Topic of what only a simulator knows.
+pub(crate) const TRUTH_TOPIC: &str = "/truth/model";
+/// Everything below this belongs to scoring.
+pub(crate) const TRUTH_PREFIX: &str = "/truth";
+/// Name of the metadata record that marks a recording of this program.
+pub(crate) const METADATA_NAME: &str = "mapper.recording";
+/// Key of the format version in the metadata record.
+pub(crate) const FORMAT_KEY: &str = "format";
+/// Key of the epoch time of run time 0, in nanoseconds.
+pub(crate) const START_KEY: &str = "start_time_ns";
+/// Name of the attached plan.
+pub(crate) const PLAN_NAME: &str = "plan.json";
+/// Name of the attached campaign.
+pub(crate) const CAMPAIGN_NAME: &str = "campaign.yaml";

@@ -1,0 +1,153 @@
+//! Numbers of a flat JSON message, exactly, without building a tree.
+
+use serde::de::{Deserializer, IgnoredAny, MapAccess, Visitor};
+use serde_json::value::RawValue;
+use std::fmt;
+
+/// What a message holds for a field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum FieldValue {
+    /// The message does not have the field.
+    Absent,
+    /// A number; NaN for null.
+    Number(f64),
+    /// Something else.
+    Other,
+}
+
+/// Reads the named fields into `values`, which is resized to the number of names. Returns false where the message is
+/// no JSON object.
+pub(crate) fn read_fields(message: &[u8], names: &[String], values: &mut Vec<FieldValue>) -> bool {
+    let read = |message: &[u8], values: &mut Vec<FieldValue>| {
+        values.clear();
+        values.resize(names.len(), FieldValue::Absent);
+        let mut deserializer = serde_json::Deserializer::from_slice(message);
+        deserializer.deserialize_map(FieldsVisitor { names, values }).is_ok() && deserializer.end().is_ok()
+    };
+    // Python's json writes NaN and Infinity, which JSON does not have.
+    read(message, values) || null_for_nonfinite(message).is_some_and(|message| read(&message, values))
+}
+
+struct FieldsVisitor<'a> {
+    names: &'a [String],
+    values: &'a mut [FieldValue],
+}
+
+impl<'de> Visitor<'de> for FieldsVisitor<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object of numbers")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        let mut expected = 0;
+        while let Some(index) = map.next_key_seed(KeySeed { names: self.names, expected })? {
+            match index {
+                Some(index) => {
+                    self.values[index] = parse(map.next_value::<&RawValue>()?.get());
+                    expected = index + 1;
+                }
+                None => drop(map.next_value::<IgnoredAny>()?),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The standard library's parser returns the nearest number, which serde_json's own does not always.
+fn parse(raw: &str) -> FieldValue {
+    match raw {
+        "null" => FieldValue::Number(f64::NAN),
+        _ => raw.parse().map_or(FieldValue::Other, FieldValue::Number),
+    }
+}
+
+/// Finds a key among the names; messages mostly keep the order of the names.
+struct KeySeed<'a> {
+    names: &'a [String],
+    expected: usize,
+}
+
+impl<'de> serde::de::DeserializeSeed<'de> for KeySeed<'_> {
+    type Value = Option<usize>;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Option<usize>, D::Error> {
+        deserializer.deserialize_str(self)
+    }
+}
+
+impl Visitor<'_> for KeySeed<'_> {
+    type Value = Option<usize>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a key")
+    }
+
+    fn visit_str<E>(self, key: &str) -> Result<Option<usize>, E> {
+        if self.names.get(self.expected).is_some_and(|name| name == key) {
+            return Ok(Some(self.expected));
+        }
+        Ok(self.names.iter().position(|name| name == key))
+    }
+}
+
+/// The message with null for NaN, Infinity and -Infinity outside strings; `None` where there is none of them.
+fn null_for_nonfinite(message: &[u8]) -> Option<Vec<u8>> {
+    let mut rewritten = Vec::with_capacity(message.len());
+    let (mut in_string, mut escaped, mut changed) = (false, false, false);
+    let mut rest = message;
+    while let Some((&byte, after)) = rest.split_first() {
+        let token =
+            [&b"NaN"[..], b"Infinity", b"-Infinity"].into_iter().find(|token| rest.starts_with(token));
+        if let (false, Some(token)) = (in_string, token) {
+            rewritten.extend_from_slice(b"null");
+            changed = true;
+            rest = &rest[token.len()..];
+            continue;
+        }
+        if byte == b'"' && !escaped {
+            in_string = !in_string;
+        }
+        escaped = in_string && byte == b'\\' && !escaped;
+        rewritten.push(byte);
+        rest = after;
+    }
+    changed.then_some(rewritten)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fields(message: &str, names: &[&str]) -> Option<Vec<FieldValue>> {
+        let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+        let mut values = Vec::new();
+        read_fields(message.as_bytes(), &names, &mut values).then_some(values)
+    }
+
+    #[test]
+    fn numbers_are_the_nearest_ones_and_everything_else_is_told_apart() {
+        use FieldValue::{Absent, Number, Other};
+        let values = fields(
+            r#"{"b":-0.1,"x":{"a":[9]},"a":1.7976931348623157e308,"c":"1","d":7}"#,
+            &["a", "b", "c", "d", "e"],
+        );
+        assert_eq!(values, Some(vec![Number(f64::MAX), Number(-0.1), Other, Number(7.0), Absent]));
+    }
+
+    #[test]
+    fn what_python_writes_for_nan_reads_as_nan() {
+        let values =
+            fields(r#"{"s":"NaN \" NaN","a":NaN,"b":-Infinity,"c":null}"#, &["a", "b", "c", "s"]).unwrap();
+        assert!(values[..3].iter().all(|v| matches!(v, FieldValue::Number(x) if x.is_nan())), "{values:?}");
+        assert_eq!(values[3], FieldValue::Other);
+    }
+
+    #[test]
+    fn what_is_no_object_is_refused() {
+        for message in ["", "[1]", "{", "{\"a\":}", "{\"a\":1} x", "\u{fffd}"] {
+            assert_eq!(fields(message, &["a"]), None, "{message}");
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! Reading a recording, one's own or another program's.
+
+use crate::rig_sink::RigSink;
+use crate::scan::{Scanned, scan};
+use crate::series_builder::{SeriesBuilder, run_time_s};
+use crate::steps::{steps_from_commands, steps_from_markers};
+use crate::{ChannelMap, FormatVersion, ReadWarning, RecordError};
+use mapper_core::{Channel, Group, Recording, Series};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::Path;
+
+/// Bounds on what a file may make the reader do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Chunks that claim to be larger unpacked are left out, bytes.
+    pub max_chunk_bytes: u64,
+    /// Messages beyond these are left out.
+    pub max_messages: u64,
+}
+
+impl Default for ReadOptions {
+    /// 256 MiB; 100 million, which is a month of four groups at 10 Hz.
+    fn default() -> Self {
+        ReadOptions { max_chunk_bytes: 256 << 20, max_messages: 100_000_000 }
+    }
+}
+
+/// A recording with all that is known about how it was read.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ReadReport {
+    /// Samples, steps and events in SI units; no truth.
+    pub recording: Recording,
+    /// What was wrong with the file; empty for a sound one.
+    pub warnings: Vec<ReadWarning>,
+    /// The campaign as attached.
+    pub campaign_text: Option<String>,
+    /// The plan as attached, JSON.
+    pub plan_json: Option<Vec<u8>>,
+    /// Metadata of the run: campaign, seed, program version and so on.
+    pub metadata: BTreeMap<String, String>,
+    /// Format version; `None` for recordings made by others.
+    pub format: Option<FormatVersion>,
+    /// Time of run time 0 in nanoseconds since 1970-01-01 UTC: that of the run's start, or of the first mapped
+    /// message in recordings made by others.
+    pub start_time_ns: u64,
+}
+
+/// Reads a recording; [`ChannelMap::native`] for those of this program.
+///
+/// Steps come from the recording's own markers; where it has none, from changes of the command channels. A file that
+/// is truncated or damaged gives what can be saved, with warnings.
+///
+/// # Errors
+/// [`RecordError`] for a file that cannot be opened, is not MCAP, has a later format, holds none of the mapped
+/// measurements, or holds one whose unit is not known.
+pub fn read_recording(
+    path: &Path,
+    map: &ChannelMap,
+    options: &ReadOptions,
+) -> Result<ReadReport, RecordError> {
+    read(path, map, options, &|| open(path))
+}
+
+/// Reads a recording from memory; `name` stands for the file in messages. Otherwise as [`read_recording`].
+///
+/// # Errors
+/// As [`read_recording`].
+pub fn read_recording_from(
+    bytes: &[u8],
+    name: &Path,
+    map: &ChannelMap,
+    options: &ReadOptions,
+) -> Result<ReadReport, RecordError> {
+    // The pass needs a source it may own; a shared copy costs once what the file has.
+    let shared: std::sync::Arc<[u8]> = bytes.into();
+    read(name, map, options, &|| Ok(Box::new(io::Cursor::new(shared.clone()))))
+}
+
+pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
+    Ok(Box::new(BufReader::with_capacity(1 << 16, File::open(path)?)))
+}
+
+fn read(
+    path: &Path,
+    map: &ChannelMap,
+    options: &ReadOptions,
+    open: &dyn Fn() -> io::Result<Box<dyn Read>>,
+) -> Result<ReadReport, RecordError> {
+    let (mut sink, scanned) = scan(path, open, options, || RigSink::new(path, map))?;
+    if let Some(error) = sink.failure.take() {
+        return Err(error);
+    }
+    // A command alone is a chance likeness of names: nothing can be made of a recording without measurements.
+    let measured = sink.builders.keys().any(|channel| channel.info().group != Group::Command);
+    let has_rig_topics = sink.topic_names.iter().any(|topic| !is_own(topic));
+    if !measured && sink.format.is_none() && has_rig_topics {
+        let topics = sink.topic_names.into_iter().collect();
+        return Err(RecordError::NothingMapped { path: path.to_owned(), topics });
+    }
+    Ok(report(map, sink, scanned))
+}
+
+fn is_own(topic: &str) -> bool {
+    use crate::format::{EVENT_TOPIC, STEP_TOPIC, TRUTH_PREFIX};
+    topic == STEP_TOPIC || topic == EVENT_TOPIC || topic.starts_with(TRUTH_PREFIX)
+}
+
+fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> ReadReport {
+    let mut warnings = scanned.warnings;
+    warnings.append(&mut sink.warnings);
+    warnings.extend(sink.damaged_messages());
+    let missing = map.channels.iter().filter(|(channel, _)| !sink.builders.contains_key(channel));
+    if !map.is_native() {
+        warnings.extend(missing.map(|(channel, source)| ReadWarning::MissingChannel {
+            channel: *channel,
+            topic: source.topic.clone(),
+            field: source.field.clone(),
+        }));
+    }
+    let first_sample_ns = sink.builders.values().filter_map(SeriesBuilder::first_time_ns).min();
+    let zero_ns = sink.start_time_ns.or(first_sample_ns).unwrap_or(0);
+    let mut series: BTreeMap<Channel, Series> = sink
+        .builders
+        .into_iter()
+        .map(|(channel, builder)| (channel, builder.build(channel, zero_ns, &mut warnings)))
+        .filter(|(_, series)| !series.t_s.is_empty())
+        .collect();
+    let span_s = span_s(&series);
+    if let Some((first_s, last_s)) = span_s {
+        for (channel, value) in &map.constants {
+            series.entry(*channel).or_insert_with(|| constant(first_s, last_s, *value));
+        }
+    }
+    let steps = if sink.format.is_some() || !sink.steps.is_empty() {
+        let markers = sink.steps.into_iter().map(|(log_time_ns, mut message)| {
+            if sink.start_time_ns.is_none() {
+                message.t_s = run_time_s(log_time_ns, zero_ns);
+            }
+            message
+        });
+        steps_from_markers(markers, span_s.map_or(0.0, |(_, last_s)| last_s), &mut warnings)
+    } else {
+        steps_from_commands(&series, span_s, &mut warnings)
+    };
+    let events = sink.events.into_iter().map(|(log_time_ns, mut event)| {
+        if sink.start_time_ns.is_none() {
+            event.t_s = run_time_s(log_time_ns, zero_ns);
+        }
+        event
+    });
+    ReadReport {
+        recording: Recording { events: events.collect(), series, steps },
+        warnings,
+        campaign_text: sink.campaign_text,
+        plan_json: sink.plan_json,
+        metadata: sink.metadata,
+        format: sink.format,
+        start_time_ns: zero_ns,
+    }
+}
+
+/// First and last time of all samples, s.
+fn span_s(series: &BTreeMap<Channel, Series>) -> Option<(f64, f64)> {
+    let first = series.values().filter_map(|s| s.t_s.first().copied()).reduce(f64::min)?;
+    let last = series.values().filter_map(|s| s.t_s.last().copied()).reduce(f64::max)?;
+    Some((first, last))
+}
+
+/// A value that holds over the whole recording.
+fn constant(first_s: f64, last_s: f64, value: f64) -> Series {
+    if first_s < last_s {
+        Series { t_s: vec![first_s, last_s], values: vec![value; 2] }
+    } else {
+        Series { t_s: vec![first_s], values: vec![value] }
+    }
+}

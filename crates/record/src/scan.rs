@@ -1,0 +1,182 @@
+//! One pass over a recording: finds what can be saved, and hands it on.
+
+use crate::chunk::Unpacker;
+use crate::framing::{Frame, FrameReader, split_record};
+use crate::records::{
+    ChannelDefinition, MAGIC, op, parse_attachment, parse_channel, parse_message, parse_metadata,
+    parse_schema,
+};
+use crate::{ReadOptions, ReadWarning, RecordError};
+use std::collections::BTreeMap;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Schemas beyond this are not looked at; it bounds what many of them could hold in memory.
+const SCHEMA_LIMIT_BYTES: usize = 1 << 20;
+
+/// Takes what a recording holds.
+pub(crate) trait Sink {
+    /// A topic, before its first message.
+    fn define(&mut self, definition: &ChannelDefinition);
+    /// A message on a defined topic.
+    fn message(&mut self, channel_id: u16, log_time_ns: u64, data: &[u8]);
+    /// A metadata record.
+    fn metadata(&mut self, name: String, pairs: BTreeMap<String, String>);
+    /// An attachment.
+    fn attachment(&mut self, name: String, data: &[u8]);
+}
+
+/// What a pass found apart from what it handed on.
+#[derive(Default)]
+pub(crate) struct Scanned {
+    pub(crate) warnings: Vec<ReadWarning>,
+    /// Every topic the file defines, the index at its end included.
+    definitions: BTreeMap<u16, ChannelDefinition>,
+    schemas: BTreeMap<u16, Vec<u8>>,
+    /// Messages that came before any definition of their topic.
+    undefined: BTreeMap<u16, u64>,
+    messages: u64,
+}
+
+/// Reads a recording into a fresh sink. Where a damaged chunk held the definition of a topic, and the index at the
+/// file's end still has it, a second pass makes use of that.
+pub(crate) fn scan<S: Sink>(
+    path: &Path,
+    open: &dyn Fn() -> io::Result<Box<dyn Read>>,
+    options: &ReadOptions,
+    new_sink: impl Fn() -> S,
+) -> Result<(S, Scanned), RecordError> {
+    let mut sink = new_sink();
+    let first = pass(path, open, options, &BTreeMap::new(), &mut sink)?;
+    if !first.undefined.keys().any(|id| first.definitions.contains_key(id)) {
+        return Ok((sink, first));
+    }
+    let mut sink = new_sink();
+    let second = pass(path, open, options, &first.definitions, &mut sink)?;
+    Ok((sink, second))
+}
+
+fn pass(
+    path: &Path,
+    open: &dyn Fn() -> io::Result<Box<dyn Read>>,
+    options: &ReadOptions,
+    known: &BTreeMap<u16, ChannelDefinition>,
+    sink: &mut dyn Sink,
+) -> Result<Scanned, RecordError> {
+    let failed = |source| RecordError::Read { path: path.to_owned(), source };
+    let mut source = open().map_err(failed)?;
+    let mut magic = Vec::new();
+    source.by_ref().take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(failed)?;
+    if magic != MAGIC {
+        return Err(RecordError::NotMcap { path: path.to_owned(), found: describe(&magic) });
+    }
+    known.values().for_each(|definition| sink.define(definition));
+    let mut scanned = Scanned { definitions: known.clone(), ..Scanned::default() };
+    let mut frames = FrameReader::new(source, MAGIC.len() as u64);
+    let mut unpacker = Unpacker::new();
+    let mut end = MAGIC.len() as u64;
+    loop {
+        match frames.next_frame().map_err(failed)? {
+            Frame::Record { opcode: op::FOOTER, .. } => break,
+            // No record has opcode 0: the file goes on in zeros, as it may after a loss of power.
+            Frame::Record { offset, opcode: 0, .. } | Frame::Truncated { offset } => {
+                scanned.warnings.push(ReadWarning::Truncated { offset });
+                break;
+            }
+            Frame::End => {
+                scanned.warnings.push(ReadWarning::Truncated { offset: end });
+                break;
+            }
+            Frame::Record { offset, opcode: op::CHUNK, body } => {
+                end = offset + 9 + body.len() as u64;
+                scanned.chunk(offset, body, options, &mut unpacker, sink);
+            }
+            Frame::Record { offset, opcode, body } => {
+                end = offset + 9 + body.len() as u64;
+                scanned.record(offset, opcode, body, options, sink);
+            }
+        }
+        if scanned.messages > options.max_messages {
+            scanned.warnings.push(ReadWarning::TooManyMessages { limit: options.max_messages });
+            break;
+        }
+    }
+    let count = scanned.undefined.values().sum();
+    if count > 0 {
+        scanned.warnings.push(ReadWarning::UndefinedChannel { count });
+    }
+    Ok(scanned)
+}
+
+impl Scanned {
+    fn chunk(
+        &mut self,
+        offset: u64,
+        body: &[u8],
+        options: &ReadOptions,
+        unpacker: &mut Unpacker,
+        sink: &mut dyn Sink,
+    ) {
+        let mut rest = match unpacker.unpack(body, options.max_chunk_bytes) {
+            Ok(content) => content,
+            Err(error) => {
+                self.warnings.push(ReadWarning::DamagedChunk { offset, message: error.to_string() });
+                return;
+            }
+        };
+        while !rest.is_empty() {
+            let Some((opcode, body, after)) = split_record(rest) else {
+                let message = "it ends within a record".to_owned();
+                self.warnings.push(ReadWarning::DamagedChunk { offset, message });
+                return;
+            };
+            self.record(offset, opcode, body, options, sink);
+            rest = after;
+        }
+    }
+
+    fn record(&mut self, offset: u64, opcode: u8, body: &[u8], options: &ReadOptions, sink: &mut dyn Sink) {
+        let whole = match opcode {
+            op::MESSAGE => parse_message(body).map(|(id, log_time_ns, data)| {
+                self.messages += 1;
+                if self.messages > options.max_messages {
+                    return;
+                }
+                match self.definitions.contains_key(&id) {
+                    true => sink.message(id, log_time_ns, data),
+                    false => *self.undefined.entry(id).or_default() += 1,
+                }
+            }),
+            op::SCHEMA => parse_schema(body).map(|(id, data)| {
+                if data.len() <= SCHEMA_LIMIT_BYTES {
+                    self.schemas.entry(id).or_insert_with(|| data.to_owned());
+                }
+            }),
+            op::CHANNEL => parse_channel(body).map(|(mut definition, schema_id)| {
+                if self.definitions.contains_key(&definition.id) {
+                    return;
+                }
+                definition.schema = self.schemas.get(&schema_id).cloned().unwrap_or_default();
+                sink.define(&definition);
+                self.definitions.insert(definition.id, definition);
+            }),
+            op::METADATA => parse_metadata(body).map(|(name, pairs)| sink.metadata(name, pairs)),
+            op::ATTACHMENT => parse_attachment(body).map(|(name, data)| sink.attachment(name, data)),
+            _ => Some(()),
+        };
+        if whole.is_none() {
+            let message = match opcode {
+                op::MESSAGE => "a message without its header",
+                op::SCHEMA => "a schema whose lengths do not fit",
+                op::CHANNEL => "a topic whose lengths do not fit",
+                op::METADATA => "metadata whose lengths do not fit",
+                _ => "an attachment whose lengths or checksum do not fit",
+            };
+            self.warnings.push(ReadWarning::DamagedRecord { offset, message: message.to_owned() });
+        }
+    }
+}
+
+fn describe(magic: &[u8]) -> String {
+    if magic.is_empty() { "nothing: it is empty".to_owned() } else { format!("`{}`", magic.escape_ascii()) }
+}

@@ -1,0 +1,48 @@
+//! Samples of one channel in the order of the file, and the series made of them.
+
+use crate::ReadWarning;
+use mapper_core::{Channel, Series};
+
+/// Collects the samples of one channel.
+#[derive(Debug, Default)]
+pub(crate) struct SeriesBuilder {
+    times_ns: Vec<u64>,
+    values: Vec<f64>,
+    pub(crate) not_numbers: u64,
+}
+
+impl SeriesBuilder {
+    pub(crate) fn push(&mut self, time_ns: u64, value: f64) {
+        self.times_ns.push(time_ns);
+        self.values.push(value);
+    }
+
+    pub(crate) fn first_time_ns(&self) -> Option<u64> {
+        self.times_ns.iter().copied().min()
+    }
+
+    /// The series over run time, strictly increasing; of samples at the same time the first one stays.
+    pub(crate) fn build(self, channel: Channel, zero_ns: u64, warnings: &mut Vec<ReadWarning>) -> Series {
+        if self.not_numbers > 0 {
+            warnings.push(ReadWarning::NotANumber { channel, count: self.not_numbers });
+        }
+        let (times_ns, values) = if self.times_ns.is_sorted_by(|a, b| a < b) {
+            (self.times_ns, self.values)
+        } else {
+            let reordered = self.times_ns.windows(2).filter(|pair| pair[1] < pair[0]).count();
+            let mut samples: Vec<(u64, f64)> = self.times_ns.into_iter().zip(self.values).collect();
+            let before = samples.len();
+            samples.sort_by_key(|(time_ns, _)| *time_ns);
+            samples.dedup_by_key(|(time_ns, _)| *time_ns);
+            let repeated = before - samples.len();
+            warnings.push(ReadWarning::OutOfOrder { channel, reordered, repeated });
+            samples.into_iter().unzip()
+        };
+        Series { t_s: times_ns.into_iter().map(|time_ns| run_time_s(time_ns, zero_ns)).collect(), values }
+    }
+}
+
+/// Run time of a log time. Exact to the nanosecond for runs up to 104 days.
+pub(crate) fn run_time_s(time_ns: u64, zero_ns: u64) -> f64 {
+    (time_ns as i128 - zero_ns as i128) as f64 / 1e9
+}

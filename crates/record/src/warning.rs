@@ -1,0 +1,119 @@
+//! What was wrong with a recording that could be read all the same.
+
+use mapper_core::Channel;
+
+/// Something a reader of the recording should know. Each displays as one sentence with values.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ReadWarning {
+    /// The file ends in the middle: the run was killed, or the file was cut.
+    #[error("the file ends in the middle, at byte {offset}: what follows the last flush is lost")]
+    Truncated {
+        /// Byte offset of the first record that is not whole.
+        offset: u64,
+    },
+    /// A chunk could not be used; the others were.
+    #[error("the chunk at byte {offset} was left out: {message}")]
+    DamagedChunk {
+        /// Byte offset of the chunk's record.
+        offset: u64,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// A record other than a message could not be used.
+    #[error("the record at byte {offset} was left out: {message}")]
+    DamagedRecord {
+        /// Byte offset of the record, or of the chunk it is in.
+        offset: u64,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// Messages on a mapped topic that are not JSON objects.
+    #[error("{count} messages on {topic} were left out: they are not JSON objects")]
+    DamagedMessages {
+        /// Topic.
+        topic: String,
+        /// How many.
+        count: u64,
+    },
+    /// Messages whose channel is defined nowhere in the file.
+    #[error("{count} messages were left out: the file does not say what channel they belong to")]
+    UndefinedChannel {
+        /// How many.
+        count: u64,
+    },
+    /// Messages on a mapped topic in an encoding other than JSON.
+    #[error("{topic} was left out: its messages are in encoding `{encoding}`, and only json can be read")]
+    UnknownEncoding {
+        /// Topic.
+        topic: String,
+        /// Its encoding.
+        encoding: String,
+    },
+    /// A field held something other than a number or null.
+    #[error("{count} values of {channel} are not numbers; they count as missing")]
+    NotANumber {
+        /// Channel.
+        channel: Channel,
+        /// How many.
+        count: u64,
+    },
+    /// The map names a field that the recording does not hold.
+    #[error("the recording has no `{field}` on {topic}, which the channel map gives for {channel}")]
+    MissingChannel {
+        /// Channel.
+        channel: Channel,
+        /// Topic of the map.
+        topic: String,
+        /// Field of the map.
+        field: String,
+    },
+    /// The map and the recording disagree about a unit.
+    #[error(
+        "{channel}: the channel map says {mapped}, the recording says {recorded}; the channel map is used"
+    )]
+    UnitContradiction {
+        /// Channel.
+        channel: Channel,
+        /// Unit of the map.
+        mapped: String,
+        /// Unit of the recording.
+        recorded: String,
+    },
+    /// Times went back or stood still.
+    #[error(
+        "{channel}: {reordered} samples came out of order and {repeated} repeated a time; they were sorted and the repeats left out"
+    )]
+    OutOfOrder {
+        /// Channel.
+        channel: Channel,
+        /// Samples earlier than one before them.
+        reordered: usize,
+        /// Samples with the time of another one.
+        repeated: usize,
+    },
+    /// More messages than the reader takes.
+    #[error("only the first {limit} messages were read")]
+    TooManyMessages {
+        /// The limit.
+        limit: u64,
+    },
+    /// Steps could not be found because no command is mapped.
+    #[error(
+        "no steps were found: the recording has neither step markers nor a mapped P3_command or valve_command"
+    )]
+    NoCommands,
+    /// Steps were found, but one command is not there; its value is undefined in the steps.
+    #[error("steps were found without {channel}: it is not in the recording, and undefined in the steps")]
+    MissingCommand {
+        /// The command.
+        channel: Channel,
+    },
+    /// The run ended within a step.
+    #[error("step {index} has no end: the run was cut short at {end_s} s")]
+    UnfinishedStep {
+        /// Index of the step.
+        index: usize,
+        /// Time taken for its end: that of the last sample, s.
+        end_s: f64,
+    },
+}

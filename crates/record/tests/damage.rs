@@ -1,0 +1,222 @@
+//! Damaged, foreign and hostile files: no panic, no hang, what can be saved is saved.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+mod common;
+
+use common::{batch, step, write};
+use mapper_core::{Channel, SampleBatch};
+use mapper_record::{
+    ChannelMap, ReadOptions, ReadReport, ReadWarning, RecordError, read_recording, read_recording_from,
+};
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+fn read(bytes: &[u8]) -> Result<ReadReport, RecordError> {
+    read_recording_from(bytes, Path::new("test.mcap"), &ChannelMap::native(), &ReadOptions::default())
+}
+
+fn recorded(batch: &SampleBatch) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    write(&path, batch, &[step(0, 0.0, 5.0), step(1, 5.0, 20.0)]);
+    std::fs::read(path).unwrap()
+}
+
+/// The records of a file: offset, opcode, length of the body.
+fn records(bytes: &[u8]) -> Vec<(usize, u8, usize)> {
+    let mut found = Vec::new();
+    let mut offset = 8;
+    while offset + 9 < bytes.len() {
+        let length = u64::from_le_bytes(bytes[offset + 1..offset + 9].try_into().unwrap()) as usize;
+        found.push((offset, bytes[offset], length));
+        offset += 9 + length;
+    }
+    found
+}
+
+#[test]
+fn every_truncation_gives_a_prefix() {
+    let batch = batch(200);
+    let bytes = recorded(&batch);
+    let mut longest = 0;
+    for length in (8..bytes.len()).step_by(97) {
+        let report = read(&bytes[..length]).unwrap();
+        assert!(!report.warnings.is_empty(), "{length}");
+        for (channel, series) in &report.recording.series {
+            let whole = batch.column(*channel).unwrap();
+            assert_eq!(series.values, whole[..series.values.len()], "{length}");
+            longest = series.values.len();
+        }
+    }
+    assert_eq!(longest, 200, "an almost whole file has all samples");
+    for length in 0..8 {
+        assert!(matches!(read(&bytes[..length]), Err(RecordError::NotMcap { .. })));
+    }
+}
+
+#[test]
+fn a_damaged_chunk_costs_its_own_second_alone() {
+    let batch = batch(100);
+    let mut bytes = recorded(&batch);
+    // The chunks are the topics of the header, then one per second.
+    let chunks: Vec<_> = records(&bytes).into_iter().filter(|record| record.1 == 6).collect();
+    let (offset, _, length) = chunks[4];
+    bytes[offset + 9 + length - 20] ^= 0x10;
+    let report = read(&bytes).unwrap();
+    assert!(matches!(report.warnings[..], [ReadWarning::DamagedChunk { .. }]), "{:?}", report.warnings);
+    let series = &report.recording.series[&Channel::T2];
+    assert_eq!(series.t_s.len(), 90);
+    assert!(series.t_s.windows(2).all(|pair| pair[0] < pair[1]));
+}
+
+#[test]
+fn topics_lost_in_a_damaged_chunk_are_found_in_the_index() {
+    let mut bytes = recorded(&batch(100));
+    let chunks: Vec<_> = records(&bytes).into_iter().filter(|record| record.1 == 6).collect();
+    for (offset, _, length) in &chunks[..2] {
+        bytes[offset + 9 + length - 20] ^= 0x10;
+    }
+    let report = read(&bytes).unwrap();
+    assert!(report.recording.series[&Channel::T2].t_s.len() >= 80, "{:?}", report.warnings);
+    assert!(!report.warnings.iter().any(|w| matches!(w, ReadWarning::UndefinedChannel { .. })));
+}
+
+#[test]
+fn a_chunk_that_claims_more_than_it_holds_is_left_out_without_allocating_it() {
+    let mut bytes = recorded(&batch(100));
+    let chunks: Vec<_> = records(&bytes).into_iter().filter(|record| record.1 == 6).collect();
+    for (claim, at) in [(u64::MAX, 4), (200 << 20, 5), (1, 6)] {
+        let uncompressed_size = chunks[at].0 + 9 + 16;
+        bytes[uncompressed_size..uncompressed_size + 8].copy_from_slice(&claim.to_le_bytes());
+    }
+    let report = read(&bytes).unwrap();
+    let damaged = report.warnings.iter().filter(|w| matches!(w, ReadWarning::DamagedChunk { .. })).count();
+    assert_eq!((damaged, report.recording.series[&Channel::T2].t_s.len()), (3, 70));
+}
+
+#[test]
+fn a_record_that_claims_more_than_the_file_ends_the_reading() {
+    let mut bytes = recorded(&batch(100));
+    let chunks: Vec<_> = records(&bytes).into_iter().filter(|record| record.1 == 6).collect();
+    let offset = chunks[4].0;
+    bytes[offset + 1..offset + 9].copy_from_slice(&u64::MAX.to_le_bytes());
+    let report = read(&bytes).unwrap();
+    assert!(report.warnings.contains(&ReadWarning::Truncated { offset: offset as u64 }));
+    assert_eq!(report.recording.series[&Channel::T2].t_s.len() % 10, 0);
+}
+
+#[test]
+fn messages_are_bounded() {
+    let bytes = recorded(&batch(100));
+    let options = ReadOptions { max_messages: 100, ..ReadOptions::default() };
+    let report = read_recording_from(&bytes, Path::new("x"), &ChannelMap::native(), &options).unwrap();
+    assert!(report.warnings.contains(&ReadWarning::TooManyMessages { limit: 100 }));
+}
+
+#[test]
+fn what_is_no_mcap_file_is_said_to_be_none() {
+    let error = read(b"time,T2\n0,300\n").unwrap_err();
+    assert!(error.to_string().contains("not an MCAP file"), "{error}");
+    let missing = read_recording(Path::new("/no/such.mcap"), &ChannelMap::native(), &ReadOptions::default());
+    assert!(matches!(missing, Err(RecordError::Read { .. })));
+}
+
+/// A file as another program writes it: `mcap`'s own defaults, uncompressed.
+fn foreign(topic: &str, rows: &[(u64, &str)], metadata: &[(&str, &str)]) -> Vec<u8> {
+    let mut file = std::io::Cursor::new(Vec::new());
+    let mut writer = mcap::WriteOptions::new().compression(None).create(&mut file).unwrap();
+    let metadata: BTreeMap<_, _> = metadata.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    let schema = writer.add_schema("rig", "jsonschema", b"{}").unwrap();
+    let channel_id = writer.add_channel(schema, topic, "json", &metadata).unwrap();
+    for (sequence, (log_time, data)) in rows.iter().enumerate() {
+        let header = mcap::records::MessageHeader {
+            channel_id,
+            sequence: sequence as u32,
+            log_time: *log_time,
+            publish_time: *log_time,
+        };
+        writer.write_to_known_channel(&header, data.as_bytes()).unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    file.into_inner()
+}
+
+fn map(unit: &str) -> ChannelMap {
+    let text = format!("channels:\n  T2: {{topic: /daq, field: tt2{unit}}}\nconstants: {{T_amb: 25 degC}}\n");
+    ChannelMap::from_yaml(&text).unwrap()
+}
+
+fn read_foreign(bytes: &[u8], map: &ChannelMap) -> Result<ReadReport, RecordError> {
+    read_recording_from(bytes, Path::new("test.mcap"), map, &ReadOptions::default())
+}
+
+#[test]
+fn times_out_of_order_are_sorted_and_repeats_left_out() {
+    let second = 1_000_000_000;
+    let rows = [
+        (7 * second, "{\"tt2\": 1}"),
+        (9 * second, "{\"tt2\": 3}"),
+        (8 * second, "{\"tt2\": NaN}"),
+        (9 * second, "{\"tt2\": 4}"),
+        (10 * second, "{\"tt2\": \"hot\"}"),
+        (11 * second, "not json"),
+    ];
+    let report = read_foreign(&foreign("/daq", &rows, &[("tt2", "degC")]), &map("")).unwrap();
+    let series = &report.recording.series[&Channel::T2];
+    assert_eq!(series.t_s, [0.0, 1.0, 2.0, 3.0]);
+    assert_eq!((series.values[0], series.values[2]), (274.15, 276.15));
+    assert!(series.values[1].is_nan() && series.values[3].is_nan());
+    let ambient = &report.recording.series[&Channel::TAmb];
+    assert_eq!((&ambient.t_s[..], &ambient.values[..]), (&[0.0, 3.0][..], &[298.15, 298.15][..]));
+    for expected in [
+        ReadWarning::OutOfOrder { channel: Channel::T2, reordered: 1, repeated: 1 },
+        ReadWarning::NotANumber { channel: Channel::T2, count: 1 },
+        ReadWarning::DamagedMessages { topic: "/daq".to_owned(), count: 1 },
+        ReadWarning::NoCommands,
+    ] {
+        assert!(report.warnings.contains(&expected), "{expected} in {:?}", report.warnings);
+    }
+}
+
+#[test]
+fn a_unit_comes_from_the_map_or_the_recording_and_never_from_a_guess() {
+    let rows = [(0, "{\"tt2\": 1}")];
+    let missing = read_foreign(&foreign("/daq", &rows, &[]), &map(""));
+    assert!(matches!(missing, Err(RecordError::MissingUnit { .. })));
+    let unknown = read_foreign(&foreign("/daq", &rows, &[("tt2", "kPa")]), &map(""));
+    assert!(matches!(unknown, Err(RecordError::BadUnit { .. })));
+    let contradicting = read_foreign(&foreign("/daq", &rows, &[("tt2", "K")]), &map(", unit: degC")).unwrap();
+    assert_eq!(contradicting.recording.series[&Channel::T2].values, [274.15]);
+    assert!(contradicting.warnings.iter().any(|w| matches!(w, ReadWarning::UnitContradiction { .. })));
+}
+
+#[test]
+fn a_foreign_file_needs_a_map() {
+    let error = read(&foreign("/daq", &[(0, "{\"tt2\": 1}")], &[])).unwrap_err();
+    assert!(error.to_string().contains("/daq"), "{error}");
+    // One command of the same name does not make it a recording of this program.
+    let alike = foreign("/rig/command", &[(0, "{\"valve_opening\": 1}")], &[("valve_opening", "1")]);
+    assert!(matches!(read(&alike), Err(RecordError::NothingMapped { .. })));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    #[test]
+    fn no_flipped_bytes_panic(flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8)) {
+        static BYTES: std::sync::OnceLock<[Vec<u8>; 2]> = std::sync::OnceLock::new();
+        let files = BYTES.get_or_init(|| {
+            let rows: Vec<_> = (0..50).map(|i| (i * 1_000_000, "{\"tt2\": 1}")).collect();
+            [recorded(&batch(50)), foreign("/daq", &rows, &[("tt2", "K")])]
+        });
+        for (bytes, map) in files.iter().zip([ChannelMap::native(), map("")]) {
+            let mut bytes = bytes.clone();
+            for (index, value) in &flips {
+                let at = index.index(bytes.len());
+                bytes[at] = *value;
+            }
+            drop(read_foreign(&bytes, &map));
+        }
+    }
+}

@@ -1,1 +1,33 @@
-//! placeholder
+//! What the tests of the whole share: the program as built, campaigns to run, Python to look at the results.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod campaign;
+mod program;
+mod python;
+
+pub use campaign::{CampaignFile, SHIPPED, SHORT_GRID};
+pub use program::{Finished, mapper, mapper_command, mapper_in};
+pub use python::python;
+
+use std::path::{Path, PathBuf};
+
+/// Root of the repository.
+pub fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+}
+
+/// A new directory that goes away with the returned value.
+pub fn scratch() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a temporary directory can be made")
+}
+
+/// The directory of the only run below `parent`.
+pub fn only_run(parent: &Path) -> PathBuf {
+    let mut runs: Vec<PathBuf> = std::fs::read_dir(parent)
+        .unwrap_or_else(|error| panic!("{}: {error}", parent.display()))
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    assert_eq!(runs.len(), 1, "{runs:?}");
+    runs.remove(0)
+}

@@ -1,2 +1,45 @@
-//! placeholder
-fn main() {}
+//! Chores of the repository: `cargo xtask test` and `cargo xtask docs`.
+
+mod docs;
+mod error;
+mod machine;
+mod python_env;
+mod step;
+mod test;
+mod workspace;
+
+use std::process::ExitCode;
+
+const USAGE: &str = "\
+usage: cargo xtask COMMAND
+
+  test           run every test of the repository; installs what they need, skips nothing
+  docs           make the generated documents anew
+  docs --check   fail where a generated document is not what the program makes now
+";
+
+#[allow(clippy::print_stderr)]
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let done = match arguments.as_slice() {
+        ["test"] => test::test(),
+        ["docs"] => docs::docs(docs::Mode::Write),
+        ["docs", "--check"] => docs::docs(docs::Mode::Check),
+        ["--help" | "-h" | "help"] => {
+            step::say(USAGE);
+            return ExitCode::SUCCESS;
+        }
+        _ => {
+            eprint!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("\nxtask: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,2 +1,29 @@
-//! placeholder
-fn main() {}
+//! `mapper`: from one campaign file to a compressor map.
+//!
+//! One file per command in `commands`; `registry` alone names plug-ins; `assembly_line` turns a campaign into what
+//! each crate of the way needs.
+
+mod arguments;
+mod assembly_line;
+mod commands;
+mod exit_code;
+mod failure;
+mod interrupt;
+mod observers;
+mod output;
+mod registry;
+mod results;
+mod run_directory;
+mod table;
+mod test_report;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments = arguments::Arguments::parse();
+    match commands::dispatch(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}

@@ -57,7 +57,8 @@ pub struct Window {
 pub struct EstimateUncertainty {
     /// One standard error from noise, serial correlation of the residual included; unit of the quantity.
     pub noise_standard_error: f64,
-    /// One standard error from declared fixed sensor offsets; unit of the quantity.
+    /// One standard error from declared fixed sensor offsets and gains, and from what is estimated of the method's own
+    /// assumptions (a constant h where the flow still moves); unit of the quantity.
     pub bias_standard_error: f64,
 }
 

@@ -1,1 +1,32 @@
-//! placeholder
+//! From a recording to identified points: efficiency and heat-transfer coefficient, and how sure they are.
+//!
+//! [`identify`] is a function from a [`Recording`](mapper_core::Recording) to points, one for each step.
+//! `dynamic` is the method of Burke et al., section 3; `steady` is conventional mapping. Nothing here knows what a
+//! simulator knows.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod bias;
+mod config;
+mod covariance;
+mod dynamic;
+mod end_state;
+mod error;
+mod findings;
+mod fit;
+mod flow_drift;
+mod identify;
+mod jump;
+mod plausible;
+mod samples;
+mod steady;
+mod taps;
+mod window;
+
+pub use config::{
+    DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Stabilisation, Thresholds, WindowRule,
+};
+pub use error::{IdentifyError, StepError};
+pub use findings::code;
+pub use identify::{identify, identify_each};
+pub use taps::{static_to_total_pa, total_to_static_pa};

@@ -1,6 +1,6 @@
 //! Where a recording holds the rig's channels, and what it does not say itself.
 
-use mapper_core::{CHANNELS, Channel, ReferenceState};
+use mapper_core::{CHANNELS, Channel, DeclaredUncertainty, ReferenceState};
 use std::collections::BTreeMap;
 
 /// Maps a recording's topics and fields onto channels. SI inside; written with units in YAML.
@@ -17,7 +17,9 @@ pub struct ChannelMap {
     /// Window of identification within each step.
     pub window: Option<WindowLimits>,
     /// Declared uncertainty of the sensors.
-    pub sensors: BTreeMap<Channel, SensorUncertainty>,
+    pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
+    /// How the sensors' noise is correlated in time.
+    pub noise_colour: Option<NoiseColour>,
     pub(crate) native: bool,
 }
 
@@ -56,13 +58,13 @@ pub struct WindowLimits {
     pub end_s: f64,
 }
 
-/// Declared uncertainty of a sensor: one sigma each, in the channel's SI unit (K, Pa, kg/s, rpm, 1).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SensorUncertainty {
-    /// Noise of single samples, one sigma.
-    pub noise_sigma_si: f64,
-    /// Fixed offset after calibration, one sigma.
-    pub offset_sigma_si: f64,
+/// Sensor noise as a white and a first-order part in quadrature: shares `sqrt(1 - c^2)` and `c`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseColour {
+    /// Share c of the first-order part in the standard deviation, 0..1.
+    pub first_order_share_ratio: f64,
+    /// Its time constant, s, > 0.
+    pub time_constant_s: f64,
 }
 
 impl ChannelMap {

@@ -1,9 +1,10 @@
 //! Channel maps as people write them: YAML with units.
 
 use crate::format::TRUTH_PREFIX;
-use crate::units::{Kind, Unit, parse_quantity};
-use crate::{ChannelMap, ChannelSource, MachineConstants, SensorUncertainty, WindowLimits};
-use mapper_core::{Channel, ReferenceState};
+use crate::units::{difference, kind_of, parse_quantity, remedy, unit};
+use crate::{ChannelMap, ChannelSource, MachineConstants, NoiseColour, WindowLimits};
+use mapper_core::{Channel, DeclaredUncertainty, ReferenceState};
+use mapper_units::{Kind, UnitError};
 use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor, value::MapAccessDeserializer};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -71,6 +72,7 @@ struct RawMap {
     window: Option<RawWindow>,
     #[serde(default)]
     sensors: ByChannel<RawSensor>,
+    noise_colour: Option<RawNoiseColour>,
 }
 
 #[derive(serde::Deserialize)]
@@ -103,6 +105,14 @@ struct RawWindow {
 struct RawSensor {
     noise: Option<Quantity>,
     offset: Option<Quantity>,
+    gain: Option<Quantity>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawNoiseColour {
+    share: Quantity,
+    time_constant: Quantity,
 }
 
 #[derive(serde::Deserialize)]
@@ -218,7 +228,7 @@ impl Check<'_> {
             if channels.contains_key(&channel) {
                 self.issue(&path, "is also under `channels`; keep one of the two".to_owned());
             }
-            constants.insert(channel, self.quantity(&path, &quantity, Kind::of(channel)));
+            constants.insert(channel, self.quantity(&path, &quantity, kind_of(channel)));
         }
         let sensors =
             raw.sensors.0.into_iter().map(|(channel, sensor)| (channel, self.sensor(channel, &sensor)));
@@ -229,6 +239,7 @@ impl Check<'_> {
             machine: raw.machine.map(|machine| self.machine(&machine)),
             reference: raw.reference.and_then(|reference| self.reference(&reference)),
             window: raw.window.map(|window| self.window(&window)),
+            noise_colour: raw.noise_colour.map(|colour| self.noise_colour(&colour)),
             native: false,
         }
     }
@@ -239,8 +250,8 @@ impl Check<'_> {
             let message = "topics below /truth are for scoring and cannot be mapped".to_owned();
             self.issue(&format!("{path}.topic"), message);
         }
-        if let Some(Err(error)) = raw.unit.as_deref().map(|unit| Unit::parse(unit, Kind::of(channel))) {
-            self.issue(&format!("{path}.unit"), error.to_string());
+        if let Some(Err(error)) = raw.unit.as_deref().map(|name| unit(kind_of(channel), name)) {
+            self.issue(&format!("{path}.unit"), explained(kind_of(channel), &error));
         }
         ChannelSource { topic: raw.topic, field: raw.field, unit: raw.unit }
     }
@@ -256,10 +267,7 @@ impl Check<'_> {
         let compressor_outlet_diameter_m =
             diameter("compressor_outlet_diameter", &raw.compressor_outlet_diameter);
         let alpha_area_ratio =
-            raw.alpha_area.as_ref().map_or(0.0, |raw| self.quantity("machine.alpha_area", raw, Kind::Ratio));
-        if alpha_area_ratio.is_finite() && !(0.0..=1.0).contains(&alpha_area_ratio) {
-            self.issue("machine.alpha_area", format!("is {alpha_area_ratio}; it is a share from 0 to 1"));
-        }
+            raw.alpha_area.as_ref().map_or(0.0, |raw| self.share("machine.alpha_area", raw));
         MachineConstants {
             compressor_internal_area_m2: self.positive(area_path, &raw.compressor_internal_area, Kind::Area),
             alpha_area_ratio,
@@ -289,24 +297,39 @@ impl Check<'_> {
     }
 
     fn window(&mut self, raw: &RawWindow) -> WindowLimits {
-        let start_s = self.not_negative("window.start", Some(&raw.start), Kind::Time);
-        let end_s = self.positive("window.end", &raw.end, Kind::Time);
+        let start_s = self.not_negative("window.start", Some(&raw.start), Kind::Duration);
+        let end_s = self.positive("window.end", &raw.end, Kind::Duration);
         if end_s <= start_s {
             self.issue("window.end", format!("is {end_s} s, not after the start at {start_s} s"));
         }
         WindowLimits { start_s, end_s }
     }
 
-    fn sensor(&mut self, channel: Channel, raw: &RawSensor) -> SensorUncertainty {
-        let kind = Kind::of(channel).difference();
-        SensorUncertainty {
-            noise_sigma_si: self.not_negative(&format!("sensors.{channel}.noise"), raw.noise.as_ref(), kind),
-            offset_sigma_si: self.not_negative(
-                &format!("sensors.{channel}.offset"),
-                raw.offset.as_ref(),
-                kind,
-            ),
+    fn sensor(&mut self, channel: Channel, raw: &RawSensor) -> DeclaredUncertainty {
+        let mut sigma = |key: &str, raw: &Option<Quantity>, kind| {
+            self.not_negative(&format!("sensors.{channel}.{key}"), raw.as_ref(), kind)
+        };
+        let kind = difference(kind_of(channel));
+        DeclaredUncertainty {
+            noise_sigma: sigma("noise", &raw.noise, kind),
+            offset_sigma: sigma("offset", &raw.offset, kind),
+            gain_sigma_ratio: sigma("gain", &raw.gain, Kind::Fraction),
         }
+    }
+
+    fn noise_colour(&mut self, raw: &RawNoiseColour) -> NoiseColour {
+        NoiseColour {
+            first_order_share_ratio: self.share("noise_colour.share", &raw.share),
+            time_constant_s: self.positive("noise_colour.time_constant", &raw.time_constant, Kind::Duration),
+        }
+    }
+
+    fn share(&mut self, path: &str, raw: &Quantity) -> f64 {
+        let ratio = self.quantity(path, raw, Kind::Fraction);
+        if ratio.is_finite() && !(0.0..=1.0).contains(&ratio) {
+            self.issue(path, format!("is {ratio}; it is a share from 0 to 1"));
+        }
+        ratio
     }
 
     fn positive(&mut self, path: &str, raw: &Quantity, kind: Kind) -> f64 {
@@ -328,8 +351,8 @@ impl Check<'_> {
 
     /// NaN, with an issue, for what is no quantity: NaN passes every further check.
     fn quantity(&mut self, path: &str, raw: &Quantity, kind: Kind) -> f64 {
-        parse_quantity(&raw.0, kind).unwrap_or_else(|error| {
-            self.issue(path, error.to_string());
+        parse_quantity(kind, &raw.0).unwrap_or_else(|error| {
+            self.issue(path, explained(kind, &error));
             f64::NAN
         })
     }
@@ -337,6 +360,10 @@ impl Check<'_> {
     fn issue(&mut self, path: &str, message: String) {
         self.issues.push(ChannelMapIssue { line: locate(self.text, path), path: path.to_owned(), message });
     }
+}
+
+fn explained(kind: Kind, error: &UnitError) -> String {
+    format!("{error}; {}", remedy(kind, error))
 }
 
 /// Line of a key path: that of the first mention of each key after the one before it. Values are not parsed, which is

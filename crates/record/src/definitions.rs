@@ -1,9 +1,10 @@
 //! Which fields of a topic are which channels, and in which unit.
 
 use crate::records::ChannelDefinition;
-use crate::units::{Kind, Unit};
+use crate::units::{kind_of, unit};
 use crate::{ChannelMap, ChannelSource, ReadWarning, RecordError};
 use mapper_core::Channel;
+use mapper_units::{Kind, Unit};
 use serde_json::Value;
 use std::path::Path;
 
@@ -14,7 +15,7 @@ pub(crate) struct MappedTopic {
     /// Fields to read, each once.
     pub(crate) fields: Vec<String>,
     /// Index of the field, channel, unit of the field.
-    pub(crate) outputs: Vec<(usize, Channel, Unit)>,
+    pub(crate) outputs: Vec<(usize, Channel, &'static Unit)>,
 }
 
 /// The channels that the map finds on a topic; `None` where there is none.
@@ -32,7 +33,7 @@ pub(crate) fn map_topic(
             // Not measured in this run.
             continue;
         }
-        let recorded = recorded_unit(definition, &schema, source, Kind::of(*channel));
+        let recorded = recorded_unit(definition, &schema, source, kind_of(*channel));
         let unit = resolve(path, *channel, source, recorded, warnings)?;
         let index = mapped.fields.iter().position(|field| *field == source.field).unwrap_or_else(|| {
             mapped.fields.push(source.field.clone());
@@ -58,7 +59,7 @@ fn recorded_unit(
         .map(String::as_str)
         .or_else(|| text("unit"))
         // A description is prose: it counts only where it is a fitting unit and nothing else.
-        .or_else(|| text("description").filter(|description| Unit::parse(description, kind).is_ok()))
+        .or_else(|| text("description").filter(|description| unit(kind, description).is_ok()))
         .map(str::to_owned)
 }
 
@@ -68,10 +69,10 @@ fn resolve(
     source: &ChannelSource,
     recorded: Option<String>,
     warnings: &mut Vec<ReadWarning>,
-) -> Result<Unit, RecordError> {
-    let kind = Kind::of(channel);
+) -> Result<&'static Unit, RecordError> {
+    let kind = kind_of(channel);
     let parse = |name: &str| {
-        Unit::parse(name, kind).map_err(|error| RecordError::BadUnit {
+        unit(kind, name).map_err(|error| RecordError::BadUnit {
             path: path.to_owned(),
             channel,
             topic: source.topic.clone(),
@@ -81,12 +82,13 @@ fn resolve(
     };
     match (&source.unit, recorded) {
         (Some(mapped), recorded) => {
-            let unit = parse(mapped)?;
-            if let Some(recorded) = recorded.filter(|recorded| Unit::parse(recorded, kind) != Ok(unit)) {
+            let used = parse(mapped)?;
+            let agrees = |recorded: &String| unit(kind, recorded).is_ok_and(|unit| unit.converts_like(used));
+            if let Some(recorded) = recorded.filter(|recorded| !agrees(recorded)) {
                 let mapped = mapped.clone();
                 warnings.push(ReadWarning::UnitContradiction { channel, mapped, recorded });
             }
-            Ok(unit)
+            Ok(used)
         }
         (None, Some(recorded)) => parse(&recorded),
         (None, None) => Err(RecordError::MissingUnit {

@@ -1,5 +1,6 @@
 //! Why a recording could not be written or read.
 
+use crate::units::{kind_of, remedy};
 use crate::{FormatVersion, UnitError};
 use mapper_core::Channel;
 use std::{io, path::PathBuf};
@@ -84,7 +85,7 @@ pub enum RecordError {
         field: String,
     },
     /// The unit the recording gives is unknown or measures something else.
-    #[error("failed to read `{}`: unit of {channel} (`{field}` of {topic}): {source}; write the unit in the channel map", path.display())]
+    #[error("failed to read `{}`: unit of {channel} (`{field}` of {topic}): {source}; {}; or write another unit in the channel map", path.display(), remedy(kind_of(*channel), source))]
     BadUnit {
         /// The file.
         path: PathBuf,

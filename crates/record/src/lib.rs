@@ -29,13 +29,13 @@ mod units;
 mod warning;
 mod writer;
 
-pub use channel_map::{ChannelMap, ChannelSource, MachineConstants, SensorUncertainty, WindowLimits};
+pub use channel_map::{ChannelMap, ChannelSource, MachineConstants, NoiseColour, WindowLimits};
 pub use channel_map_yaml::{ChannelMapError, ChannelMapIssue};
 pub use error::RecordError;
 pub use format::FormatVersion;
+pub use mapper_units::{Kind, Unit, UnitError};
 pub use read::{ReadOptions, ReadReport, read_recording, read_recording_from};
 pub use recording_file::RecordingHeader;
 pub use truth::{Truth, read_truth};
-pub use units::{Kind, Unit, UnitError};
 pub use warning::ReadWarning;
 pub use writer::{RecordingWriter, StepPhase};

@@ -1,8 +1,8 @@
 //! Channel maps: the shipped one, and what is refused.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-use mapper_core::{Channel, ReferenceState};
-use mapper_record::{ChannelMap, MachineConstants, SensorUncertainty, WindowLimits};
+use mapper_core::{Channel, DeclaredUncertainty, ReferenceState};
+use mapper_record::{ChannelMap, MachineConstants, NoiseColour, WindowLimits};
 
 #[test]
 fn the_shipped_map_says_what_its_text_says() {
@@ -25,7 +25,46 @@ fn the_shipped_map_says_what_its_text_says() {
             t2_probe_diameter_m: 0.0,
         })
     );
-    assert_eq!(map.sensors[&Channel::P3], SensorUncertainty { noise_sigma_si: 80.0, offset_sigma_si: 150.0 });
+    let p3 = DeclaredUncertainty { noise_sigma: 80.0, offset_sigma: 150.0, gain_sigma_ratio: 0.0 };
+    assert_eq!(map.sensors[&Channel::P3], p3);
+    assert_eq!(map.noise_colour, None);
+}
+
+#[test]
+fn gain_and_colour_of_noise_are_read_with_their_units() {
+    let text = "\
+channels: {m_c: {topic: /a, field: x, unit: kg/hr}}
+sensors: {m_c: {noise: 0.54 kg/h, gain: 0.5 %}}
+noise_colour: {share: 60 %, time_constant: 2 s}
+";
+    let map = ChannelMap::from_yaml(text).unwrap();
+    let flow = map.sensors[&Channel::CompressorFlow];
+    assert_eq!((flow.offset_sigma, flow.gain_sigma_ratio), (0.0, 0.005));
+    // One division: half a unit in the last place.
+    assert!((flow.noise_sigma - 1.5e-4).abs() < 1e-19, "{}", flow.noise_sigma);
+    assert_eq!(map.noise_colour, Some(NoiseColour { first_order_share_ratio: 0.6, time_constant_s: 2.0 }));
+    for (wrong, path) in [
+        ("60 %, time_constant: 0 s", "noise_colour.time_constant"),
+        ("160 %, time_constant: 2 s", "noise_colour.share"),
+        ("60 K, time_constant: 2 s", "noise_colour.share"),
+    ] {
+        let error = ChannelMap::from_yaml(&text.replace("60 %, time_constant: 2 s", wrong)).unwrap_err();
+        assert_eq!((error.issues.len(), error.issues[0].path.as_str()), (1, path), "{error}");
+        assert_eq!(error.issues[0].line, Some(3));
+    }
+}
+
+#[test]
+fn a_wrong_unit_is_answered_with_the_right_ones() {
+    for (channel, unit, advice) in [
+        ("T2", "degc", "did you mean `degC`?"),
+        ("P3", "barg", "all pressures are absolute"),
+        ("valve_command", "K", "a ratio may be written with `1`"),
+    ] {
+        let text = format!("channels: {{{channel}: {{topic: /a, field: x, unit: {unit}}}}}");
+        let error = ChannelMap::from_yaml(&text).unwrap_err().to_string();
+        assert!(error.contains(advice), "{error}");
+    }
 }
 
 #[test]

@@ -190,6 +190,9 @@ fn a_unit_comes_from_the_map_or_the_recording_and_never_from_a_guess() {
     let contradicting = read_foreign(&foreign("/daq", &rows, &[("tt2", "K")]), &map(", unit: degC")).unwrap();
     assert_eq!(contradicting.recording.series[&Channel::T2].values, [274.15]);
     assert!(contradicting.warnings.iter().any(|w| matches!(w, ReadWarning::UnitContradiction { .. })));
+    // Two spellings of one unit are no contradiction.
+    let agreeing = read_foreign(&foreign("/daq", &rows, &[("tt2", "C")]), &map(", unit: degC")).unwrap();
+    assert!(!agreeing.warnings.iter().any(|w| matches!(w, ReadWarning::UnitContradiction { .. })));
 }
 
 #[test]

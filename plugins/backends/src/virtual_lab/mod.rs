@@ -5,9 +5,11 @@ mod inputs;
 mod lab;
 mod sensor;
 mod settings;
+mod settings_file;
 mod truth;
 
 pub use actuator::ActuatorDynamics;
 pub use lab::{NAME, VirtualLab};
 pub use sensor::SensorErrors;
 pub use settings::{LabSettings, Start};
+pub use settings_file::{NominalRig, read_settings};

@@ -1,0 +1,624 @@
+//! Each kind of mistake gives a finding at its place; several give several; nothing makes the reader panic.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_campaign::campaign::MapSource;
+use mapper_campaign::{Campaign, Finding, FindingKind as Kind, Findings, check, check_with};
+use std::io;
+use std::path::Path;
+
+/// A campaign without mistakes, short enough to count lines in.
+const RIGHT: &str = "\
+campaign: short
+machine: {name: a, map: closed_form}
+boundary:
+  inlet_temperature: 25 degC
+  inlet_pressure: 100 kPa
+  turbine_inlet_temperature: 500 degC
+  turbine_outlet_pressure: 110 kPa
+  oil_temperature: 50 degC
+sensors:
+  N: {noise: 30 rpm}
+  m_c: {noise: 1.5e-4 kg/s}
+  P1: {noise: 20 Pa}
+  P2: {noise: 60 Pa}
+  T1: {noise: 0.1 K}
+  T2: {noise: 0.1 K}
+  Tc: {noise: 0.15 K}
+backend: {virtual_lab: {}}
+grid:
+  speeds: [90 krpm, 110 krpm]
+  openings: [0.7, 1.0]
+timing: {dwell: 120 s}
+limits:
+  speed: 180 krpm
+  turbine_inlet_pressure: {min: 110 kPa, max: 500 kPa}
+";
+
+/// Two speed lines that bracket the short campaign's.
+const TABLE: &str = "\
+rpm,kg/s,PR,eta
+80000,0.0190,1.44,0.60
+80000,0.0659,1.32,0.72
+80000,0.0930,1.10,0.50
+120000,0.0330,2.20,0.60
+120000,0.0900,1.90,0.74
+120000,0.1250,1.30,0.50
+";
+
+fn files(path: &Path) -> io::Result<String> {
+    match path.to_str() {
+        Some("dir/maps/there.csv") => Ok(TABLE.into()),
+        Some("dir/maps/bad.csv") => Ok(TABLE.replace("0.0659", "much")),
+        _ => Err(io::ErrorKind::NotFound.into()),
+    }
+}
+
+fn run(text: &str) -> Result<Campaign, Findings> {
+    check(text, Path::new("dir/short.yaml"), &files)
+}
+
+fn mistakes(text: &str) -> Findings {
+    run(text).expect_err("this text has mistakes")
+}
+
+/// The text with one line replaced, and that line's number.
+fn with(old: &str, new: &str) -> (String, usize) {
+    assert_eq!(RIGHT.matches(old).count(), 1, "{old}");
+    let line = 1 + RIGHT[..RIGHT.find(old).unwrap()].matches('\n').count();
+    (RIGHT.replace(old, new), line)
+}
+
+/// One replacement, one finding: of this kind, pointing at `at`, saying this.
+#[track_caller]
+fn one(old: &str, new: &str, kind: Kind, at: &str, message: &str, remedy: &str) {
+    let (text, _) = with(old, new);
+    let findings = mistakes(&text);
+    assert_eq!(findings.list.len(), 1, "{findings}");
+    let finding = &findings.list[0];
+    // The last occurrence in the replaced part: a duplicate is complained about at the second.
+    let part = text.find(new).unwrap();
+    let offset = part + new.rfind(at).unwrap();
+    let line = 1 + text[..offset].matches('\n').count();
+    let column = 1 + text[..offset].rsplit('\n').next().unwrap().chars().count();
+    assert_eq!((finding.kind, finding.line, finding.column), (kind, line, column), "{findings}");
+    assert!(finding.message.contains(message), "{findings}");
+    assert!(finding.remedy.contains(remedy), "{findings}");
+}
+
+#[test]
+fn the_short_campaign_is_right() {
+    let campaign = run(RIGHT).unwrap_or_else(|findings| panic!("{findings}"));
+    let speeds: Vec<_> = campaign.points.iter().map(|p| (p.speed_rpm, p.valve_opening_ratio)).collect();
+    assert_eq!(speeds, [(90e3, 0.7), (110e3, 0.7), (90e3, 1.0), (110e3, 1.0)]);
+    assert_eq!(campaign.boundary.ambient_temperature_k, 298.15);
+}
+
+#[test]
+fn keys() {
+    one(
+        "  inlet_pressure: 100 kPa",
+        "  inlet_presure: 100 kPa",
+        Kind::UnknownKey,
+        "inlet_presure",
+        "no key `inlet_presure` in `boundary`",
+        "did you mean `inlet_pressure`?",
+    );
+    one(
+        "  Tc: {noise: 0.15 K}",
+        "  Tc: {noise: 0.15 K}\n  T9: {noise: 1 K}",
+        Kind::UnknownKey,
+        "T9",
+        "no key `T9` in `sensors`",
+        "T_oil",
+    );
+    one(
+        "  Tc: {noise: 0.15 K}",
+        "  Tc: {noise: 0.15 K, nois: 1 K}",
+        Kind::UnknownKey,
+        "nois",
+        "`sensors.Tc`",
+        "did you mean `noise`?",
+    );
+    one(
+        "  inlet_pressure: 100 kPa",
+        "  inlet_pressure: 100 kPa\n  inlet_pressure: 101 kPa",
+        Kind::DuplicateKey,
+        "inlet_pressure",
+        "second time",
+        "remove one",
+    );
+    one(
+        "campaign: short\n",
+        "name: short\ncampaign: x\n",
+        Kind::UnknownKey,
+        "name",
+        "no key `name` in a campaign",
+        "the keys are",
+    );
+}
+
+#[test]
+fn missing_keys_are_complained_about_at_what_lacks_them() {
+    let (text, _) = with("  oil_temperature: 50 degC\n", "");
+    let findings = mistakes(&text);
+    let finding = &findings.list[0];
+    assert_eq!(
+        (finding.kind, finding.line, finding.column, findings.list.len()),
+        (Kind::MissingKey, 3, 1, 1)
+    );
+    assert!(finding.remedy.contains("write e.g. `oil_temperature: 50 degC`"), "{findings}");
+    let (text, line) = with("  T2: {noise: 0.1 K}", "  T2: {}");
+    let findings = mistakes(&text);
+    assert_eq!(
+        (findings.list[0].kind, findings.list[0].line, findings.list[0].column),
+        (Kind::MissingKey, line, 3)
+    );
+    let (text, _) = with("  Tc: {noise: 0.15 K}\n", "");
+    assert!(mistakes(&text).list[0].remedy.contains("write e.g. `Tc: {noise: 0.1 K}`"));
+    let (text, line) =
+        with("machine: {name: a, map: closed_form}", "machine: {name: a, map: {file: maps/there.csv}}");
+    let findings = mistakes(&text);
+    assert_eq!((findings.list[0].line, findings.list[0].column), (line, 20), "{findings}");
+    for choice in ["SAE (298 K, 100 kPa)", "Garrett (545 degR, 13.95 psia)", "BorgWarner (293 K, 98.1 kPa)"] {
+        assert!(findings.list[0].remedy.contains(choice), "{findings}");
+    }
+}
+
+#[test]
+fn units() {
+    one("dwell: 120 s", "dwell: 120", Kind::Unit, "120", "`120` lacks its unit", "write e.g. `120 s`");
+    one("dwell: 120 s", "dwell: 120 K", Kind::Unit, "120 K", "not a unit of a time", "s, ms, min, h");
+    one(
+        "dwell: 120 s",
+        "dwell: -1 s",
+        Kind::Range,
+        "-1 s",
+        "`-1 s` is too low",
+        "above 0 s and at most 24 h",
+    );
+    one("dwell: 120 s", "dwell:", Kind::WrongType, "dwell", "no value", "e.g. `120 s`, or remove the key");
+    one(
+        "dwell: 120 s",
+        "dwell: [120 s]",
+        Kind::WrongType,
+        "dwell",
+        "a list stands where a time is needed",
+        "e.g. `120 s`",
+    );
+    one(
+        "inlet_temperature: 25 degC\n  inlet_p",
+        "inlet_temperature: 25 kPa\n  inlet_p",
+        Kind::Unit,
+        "25 kPa",
+        "not a unit of a temperature",
+        "K, degC, degF, degR",
+    );
+    one(
+        "inlet_temperature: 25 degC\n  inlet_p",
+        "inlet_temperature: 25 K\n  inlet_p",
+        Kind::Range,
+        "25 K",
+        "too low",
+        "at least 200 K and at most 400 K",
+    );
+    one(
+        "T1: {noise: 0.1 K}",
+        "T1: {noise: 0.1 K, offset: 0.25 degC}",
+        Kind::Unit,
+        "0.25 degC",
+        "`degC` is not a unit of a temperature difference",
+        "not a difference of two",
+    );
+    one("T1: {noise: 0.1 K}", "T1: {noise: -0.1 K}", Kind::Range, "-0.1 K", "too low", "at least 0 K");
+    one("inlet_pressure: 100 kPa", "inlet_pressure: 1 barg", Kind::Unit, "1 barg", "`barg`", "absolute");
+    one("[90 krpm, 110 krpm]", "[90 krpm, 110]", Kind::Unit, "110", "lacks its unit", "`110 krpm`");
+}
+
+#[test]
+fn types_and_names() {
+    one(
+        "campaign: short\n",
+        "campaign: a/b\n",
+        Kind::WrongValue,
+        "a/b",
+        "`a/b` is not of the form",
+        "Letters, digits",
+    );
+    one(
+        "campaign: short\n",
+        "campaign: 7\n",
+        Kind::WrongType,
+        "7",
+        "`7` is a number, but text is needed",
+        "quotes: `\"7\"`",
+    );
+    one(
+        "campaign: short\n",
+        "campaign: short\norder: greddy\n",
+        Kind::WrongValue,
+        "greddy",
+        "none of greedy, listed",
+        "did you mean `greedy`?",
+    );
+    one(
+        "map: closed_form",
+        "map: closedform",
+        Kind::WrongValue,
+        "closedform",
+        "`closedform` is none of closed_form",
+        "did you mean `closed_form`?",
+    );
+    one("map: closed_form", "map: 3", Kind::WrongType, "3", "`3` is none of the forms", "closed_form");
+    one("[0.7, 1.0]", "[0.7, 2.6]", Kind::Range, "2.6", "2.6 is too high", "at most 2.5");
+    one("[0.7, 1.0]", "[0.7, -0.1]", Kind::Range, "-0.1", "-0.1 is too low", "above 0");
+    one("[0.7, 1.0]", "[0.7, .nan]", Kind::WrongValue, ".nan", "not a finite number", "write a number");
+    one(
+        "[0.7, 1.0]",
+        "[0.7, 50 %]",
+        Kind::WrongType,
+        "50 %",
+        "text, but a plain number",
+        "above 0, at most 2.5",
+    );
+    one("backend: {virtual_lab: {}}", "backend: {}", Kind::Range, "backend", "empty", "virtual_lab");
+    one(
+        "backend: {virtual_lab: {}}",
+        "backend: {virtual_lab: {}, replay: {}}",
+        Kind::Range,
+        "backend",
+        "too many",
+        "exactly 1",
+    );
+    one(
+        "campaign: short\n",
+        "campaign: short\nreport: {calibration: {T2: 2026-02-30}}\n",
+        Kind::WrongValue,
+        "2026-02-30",
+        "no day of the calendar",
+        "2026-09-01",
+    );
+    one(
+        "campaign: short\n",
+        "campaign: short\nreport: {calibration: {T2: yesterday}}\n",
+        Kind::WrongValue,
+        "yesterday",
+        "not of the form",
+        "2026-09-01",
+    );
+    one(
+        "campaign: short\n",
+        "campaign: short\nreport: {calibration: {X2: 2026-02-03}}\n",
+        Kind::UnknownKey,
+        "X2",
+        "no key `X2`",
+        "did you mean",
+    );
+    one(
+        "campaign: short\n",
+        "campaign: short\ndisplay: {pressure: kpa}\n",
+        Kind::WrongValue,
+        "kpa",
+        "`kpa` is none of",
+        "did you mean `kPa`?",
+    );
+    one("campaign: short\n", "campaign: short\nseed: -1\n", Kind::Range, "-1", "too low", "at least 0");
+}
+
+#[test]
+fn what_must_fit_together() {
+    one(
+        "[90 krpm, 110 krpm]",
+        "[90 krpm, 90000 rpm]",
+        Kind::Duplicate,
+        "90000 rpm",
+        "second time",
+        "remove one",
+    );
+    one("[0.7, 1.0]", "[0.7, 0.70]", Kind::Duplicate, "0.70", "second time", "remove one");
+    one("  openings: [0.7, 1.0]", "  openings: []", Kind::Range, "openings", "empty", "0.5");
+    one(
+        "[90 krpm, 110 krpm]",
+        "[90 krpm, 190 krpm]",
+        Kind::Range,
+        "190 krpm",
+        "above `limits.speed`, `180 krpm`",
+        "lower it",
+    );
+    one(
+        "  openings: [0.7, 1.0]\n",
+        "  openings: [0.7, 1.0]\n  skip: [{speed: 91 krpm, opening: 0.7}]\n",
+        Kind::Conflict,
+        "{speed",
+        "no point",
+        "name a speed",
+    );
+    one(
+        "  openings: [0.7, 1.0]\n",
+        "  openings: [0.7, 1.0]\n  points: [{speed: 91 krpm, opening: 0.7}]\n",
+        Kind::Conflict,
+        "points",
+        "beside",
+        "`speeds` and `openings`, or `points`",
+    );
+    one(
+        "  speeds: [90 krpm, 110 krpm]\n  openings: [0.7, 1.0]\n",
+        "  points:\n    - {speed: 90 krpm, opening: 1}\n    - {speed: 90000 rpm, opening: 1.0}\n",
+        Kind::Duplicate,
+        "{speed",
+        "second time",
+        "remove one",
+    );
+    one(
+        "  openings: [0.7, 1.0]\n",
+        "  skip: [{speed: 90 krpm, opening: 0.7}, {speed: 110 krpm, opening: 0.7}]\n  openings: [0.7]\n",
+        Kind::Conflict,
+        "skip",
+        "every point",
+        "at least one",
+    );
+    one(
+        "map: closed_form",
+        "map: {file: maps/gone.csv, reference: SAE}",
+        Kind::MissingFile,
+        "maps/gone.csv",
+        "`dir/maps/gone.csv` cannot be read",
+        "relative to the campaign file",
+    );
+    one(
+        "map: closed_form",
+        "map: {file: maps/bad.csv, reference: SAE}",
+        Kind::WrongValue,
+        "maps/bad.csv",
+        "line 3 of the map",
+        "each row needs",
+    );
+    one(
+        "P1: {noise: 20 Pa}",
+        "P1: {noise: 20 Pa, tap: static}",
+        Kind::MissingKey,
+        "static",
+        "inner diameter",
+        "pipe_diameter: 40 mm",
+    );
+    one(
+        "timing: {dwell: 120 s}",
+        "timing: {dwell: 120 s}\nidentification: {window: {start: 10 s, end: 3 min}}",
+        Kind::Conflict,
+        "3 min",
+        "beyond the dwell of `120 s`",
+        "timing.dwell",
+    );
+    one(
+        "timing: {dwell: 120 s}",
+        "timing: {dwell: 120 s}\nidentification: {window: {start: 50 s, end: 20 s}}",
+        Kind::Conflict,
+        "20 s",
+        "not after its start at `50 s`",
+        "after `start`",
+    );
+}
+
+#[test]
+fn limits_that_contradict_each_other() {
+    let (text, line) = with("{min: 110 kPa, max: 500 kPa}", "{min: 300 kPa, max: 2 bar}");
+    let findings = mistakes(&text);
+    assert_eq!(findings.list.len(), 1, "{findings}");
+    assert_eq!(
+        (findings.list[0].kind, findings.list[0].line, findings.list[0].column),
+        (Kind::Conflict, line, 47)
+    );
+    assert!(
+        findings.list[0].message.contains("`2 bar` is not above the lowest pressure, `300 kPa`"),
+        "{findings}"
+    );
+    let (text, _) = with("  speed: 180 krpm\n", "  turbine_inlet_temperature: 450 degC\n  speed: 180 krpm\n");
+    let findings = mistakes(&text);
+    assert_eq!(
+        (findings.list.len(), findings.list[0].line, findings.list[0].column),
+        (1, 6, 30),
+        "{findings}"
+    );
+}
+
+#[test]
+fn a_grid_without_points_says_which_forms_there_are() {
+    let (text, line) = with("grid:\n  speeds: [90 krpm, 110 krpm]\n  openings: [0.7, 1.0]\n", "grid: {}\n");
+    let findings = mistakes(&text);
+    assert_eq!(
+        (findings.list.len(), findings.list[0].line, findings.list[0].column),
+        (1, line, 1),
+        "{findings}"
+    );
+    assert!(findings.list[0].remedy.contains("`speeds` and `openings`, or `points`"), "{findings}");
+}
+
+#[test]
+fn yaml_that_a_campaign_does_not_use() {
+    one("dwell: 120 s", "dwell: &d 120 s", Kind::Unsupported, "&d", "anchors", "write the value out");
+    one("dwell: 120 s", "dwell: *d", Kind::Syntax, "*d", "", "");
+    one("campaign: short\n", "campaign: !!str short\n", Kind::Unsupported, "!!str", "tags", "remove the tag");
+    let findings = mistakes(&format!("{RIGHT}---\na: b\n"));
+    assert_eq!((findings.list[0].kind, findings.list[0].line), (Kind::Unsupported, 25), "{findings}");
+    let (text, _) = with("timing: {dwell: 120 s}", "timing: &t {dwell: 120 s}\nidentification: {<<: *t}");
+    let kinds: Vec<_> = mistakes(&text).list.iter().map(|finding| finding.kind).collect();
+    assert_eq!(kinds, [Kind::Unsupported, Kind::Unsupported, Kind::Unsupported]);
+}
+
+#[test]
+fn malformed_text_has_a_place() {
+    for (text, line) in
+        [("a: [1, 2\n", 2), ("a: b\n\tc: d\n", 2), ("a: 'x\n", 1), ("a: b: c\n", 1), ("{a: b}}\n", 1)]
+    {
+        let findings = mistakes(text);
+        assert_eq!(findings.list[0].kind, Kind::Syntax, "{text:?} {findings}");
+        assert!(findings.list[0].line.abs_diff(line) <= 1, "{text:?} {findings}");
+    }
+    assert_eq!(mistakes("").list[0].message, "the file is empty");
+    assert_eq!(mistakes("just text").list[0].kind, Kind::WrongType);
+    assert_eq!(mistakes(&"- ".repeat(5000)).list[0].kind, Kind::TooLarge);
+    assert_eq!(mistakes(&format!("{}{}", "[".repeat(50), "]".repeat(50))).list[0].kind, Kind::TooLarge);
+    assert_eq!(mistakes(&"[".repeat(5000)).list.len(), 1);
+    assert_eq!(mistakes(&"a: ".repeat(5000)).list[0].kind, Kind::Syntax);
+    assert_eq!(mistakes(&"a".repeat(2 << 20)).list[0].kind, Kind::TooLarge);
+}
+
+#[test]
+fn all_mistakes_come_in_one_go_and_in_the_order_of_the_text() {
+    let text = RIGHT
+        .replace("campaign: short", "campaign: short\nordre: greedy")
+        .replace("25 degC", "25")
+        .replace("100 kPa", "14.5 psi")
+        .replace("  Tc: {noise: 0.15 K}\n", "")
+        .replace("[90 krpm, 110 krpm]", "[90 krpm, 90 krpm, 200 krpm]")
+        .replace("120 s", "120");
+    let findings = mistakes(&text);
+    let found: Vec<(Kind, usize, &str)> =
+        findings.list.iter().map(|f| (f.kind, f.line, f.path.as_str())).collect();
+    assert_eq!(
+        found,
+        [
+            (Kind::UnknownKey, 2, "ordre"),
+            (Kind::Unit, 5, "boundary.inlet_temperature"),
+            (Kind::Unit, 6, "boundary.inlet_pressure"),
+            (Kind::MissingKey, 10, "sensors"),
+            (Kind::Duplicate, 19, "grid.speeds[1]"),
+            (Kind::Range, 19, "grid.speeds[2]"),
+            (Kind::Unit, 21, "timing.dwell"),
+        ],
+        "{findings}"
+    );
+}
+
+#[test]
+fn a_finding_is_shown_with_file_line_source_and_carets() {
+    let (text, line) = with("dwell: 120 s", "dwell: 120 K");
+    let shown = mistakes(&text).to_string();
+    assert!(shown.contains(&format!("dir/short.yaml:{line}:17")), "{shown}");
+    assert!(shown.contains("timing: {dwell: 120 K}"), "{shown}");
+    assert!(shown.contains("^^^^^"), "{shown}");
+    assert!(shown.contains("timing.dwell: `K` is not a unit of a time"), "{shown}");
+    assert!(shown.ends_with("dir/short.yaml: 1 mistake\n"), "{shown}");
+    assert!(!shown.contains('\u{1b}'), "{shown}");
+    assert!(mistakes(&text).render(true).contains('\u{1b}'));
+}
+
+#[test]
+fn carets_stand_under_the_value_after_letters_of_several_bytes_and_with_other_line_ends() {
+    let (text, line) = with(
+        "campaign: short\n",
+        "description: Prüfstand №3 – größer\ncampaign: short\nx: {ä: °, order: 1}\n",
+    );
+    let findings = mistakes(&text.replace('\n', "\r\n"));
+    let finding: &Finding = &findings.list[0];
+    assert_eq!((finding.line, finding.column, finding.path.as_str()), (line + 2, 1, "x"), "{findings}");
+    let (text, _) = with("T2: {noise: 0.1 K}", "T2: {probe_diameter: 5 µm, noise: 0.1 °C}");
+    let findings = mistakes(&format!("\u{feff}{}", text.replace('\n', "\r\n")));
+    assert_eq!(
+        (findings.list.len(), findings.list[0].line, findings.list[0].column),
+        (1, 15, 37),
+        "{findings}"
+    );
+}
+
+#[test]
+fn unreachable_points_are_complained_about_at_their_entry() {
+    let (text, line) = with("max: 500 kPa", "max: 180 kPa");
+    let findings = mistakes(&text);
+    assert!(findings.list.iter().all(|finding| finding.kind == Kind::Unreachable), "{findings}");
+    // A second implementation of the model holds 110 krpm with 173.7 kPa at opening 0.7 and 185.4 kPa at opening 1,
+    // 90 krpm with 152.4 and 160.4 kPa.
+    assert_eq!(findings.list.len(), 1, "{findings}");
+    assert_eq!(findings.list[0].path, "grid.speeds[1]", "{findings}");
+    assert_eq!((findings.list[0].line, findings.list[0].column), (19, 21), "{findings}");
+    assert!(findings.list[0].message.contains("110 krpm at opening 1 needs P3 = 185.4 kPa"), "{findings}");
+    assert!(
+        findings.list[0].message.contains("above `limits.turbine_inlet_pressure.max` = 180 kPa"),
+        "{findings}"
+    );
+    assert_eq!(line, 24);
+    // A caller that knows better decides itself.
+    assert!(check_with(&text, Path::new("dir/short.yaml"), &files, &|_| Vec::new()).is_ok());
+}
+
+#[test]
+fn a_table_is_read_with_its_reference_state_and_its_points_are_judged() {
+    let (text, _) = with(
+        "map: closed_form",
+        "map: {file: maps/there.csv, reference: {temperature: 20 degC, pressure: 1 bar}}",
+    );
+    let campaign = run(&text).unwrap_or_else(|findings| panic!("{findings}"));
+    let MapSource::Table { path, text: table, reference } = &campaign.machine.map else { panic!("a table") };
+    assert_eq!((path.as_path(), table.as_str()), (Path::new("dir/maps/there.csv"), TABLE));
+    assert_eq!((reference.t_ref_k, reference.p_ref_pa), (293.15, 100_000.0));
+    let findings = mistakes(&text.replace("max: 500 kPa", "max: 115 kPa"));
+    assert!(findings.list.iter().all(|finding| finding.kind == Kind::Unreachable), "{findings}");
+    assert_eq!(findings.list.len(), 4, "{findings}");
+}
+
+#[test]
+fn named_reference_states_are_those_the_makers_print() {
+    for (name, t_ref_k, p_ref_pa) in
+        [("SAE", 298.0, 100e3), ("Garrett", 302.778, 96_182.0), ("BorgWarner", 293.0, 98_100.0)]
+    {
+        let campaign = run(&format!("{RIGHT}reference: {name}\n")).unwrap();
+        // 545 degR and 13.95 psia in K and Pa, to the digits written here.
+        assert!((campaign.reference.t_ref_k - t_ref_k).abs() < 1e-3, "{name}");
+        assert!((campaign.reference.p_ref_pa - p_ref_pa).abs() < 1.0, "{name}");
+    }
+}
+
+#[test]
+fn where_the_schema_is_wider_than_the_reader_the_reader_complains() {
+    // For a JSON schema 1.0 is a whole number.
+    let findings = mistakes(&format!("{RIGHT}seed: 1.0\n"));
+    assert_eq!((findings.list.len(), findings.list[0].kind), (1, Kind::WrongValue), "{findings}");
+}
+
+#[test]
+fn a_hostile_file_is_refused_in_time_and_in_few_words() {
+    let keys: String = (0..60_000).map(|i| format!("k{i}: 1\n")).collect();
+    let aliases = format!("a: &a 1\nb: [{}]", "*a,".repeat(200_000));
+    let items = format!("grid: {{speeds: [{}]}}", "1,".repeat(300_000));
+    let bomb = "a: &a [x,x]\nb: &b [*a,*a]\nc: &c [*b,*b]\n";
+    for text in [keys.as_str(), &aliases, &items, bomb] {
+        let findings = mistakes(text);
+        assert!(!findings.list.is_empty() && findings.list.len() <= Findings::LIMIT);
+        assert!(findings.to_string().len() < 1 << 20);
+    }
+    assert!(!mistakes("a: \u{7}\u{1b}[31m").to_string().contains('\u{1b}'));
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn any_text_gives_an_answer(text in "\\PC{0,200}") {
+        let _ = run(&text).map_err(|findings| findings.to_string());
+    }
+
+    #[test]
+    fn any_bytes_give_an_answer(bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..300)) {
+        let _ = run(&String::from_utf8_lossy(&bytes)).map_err(|findings| findings.to_string());
+    }
+
+    #[test]
+    fn any_piece_of_yaml_gives_an_answer(text in "([a-c?&*!|>%@`#'\"-]|: |- |\\[|\\]|\\{|\\}|, |\n|\n  |\t|<<: |---|1|µ){0,60}") {
+        let _ = run(&text).map_err(|findings| findings.to_string());
+    }
+
+    #[test]
+    fn a_campaign_with_a_hole_gives_an_answer(from in 0usize..RIGHT.len(), length in 0usize..40, put in "[ -~\n]{0,6}") {
+        let mut text = RIGHT.to_owned();
+        text.replace_range(from..(from + length).min(RIGHT.len()), &put);
+        match run(&text) {
+            Ok(campaign) => proptest::prop_assert!(!campaign.points.is_empty()),
+            Err(findings) => {
+                proptest::prop_assert!(!findings.list.is_empty());
+                let lines = text.matches('\n').count() + 1;
+                proptest::prop_assert!(findings.list.iter().all(|f| f.line >= 1 && f.line <= lines));
+                let _ = findings.to_string();
+            }
+        }
+    }
+}

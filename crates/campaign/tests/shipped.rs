@@ -1,0 +1,67 @@
+//! The campaigns that come with the program are right, and say what they are meant to say.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_campaign::campaign::{MapSource, Order, WindowChoice};
+use mapper_campaign::{CampaignError, load};
+use mapper_core::{Channel, ReferenceState};
+use mapper_physics::params::{BoundaryConditions, Params};
+use std::path::{Path, PathBuf};
+
+fn directory() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns")
+}
+
+#[test]
+fn every_shipped_campaign_is_right() {
+    let mut count = 0;
+    for entry in std::fs::read_dir(directory()).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "yaml") {
+            load(&path).unwrap_or_else(|error| panic!("{error}"));
+            count += 1;
+        }
+    }
+    assert!(count > 0);
+}
+
+#[test]
+fn turbo_a_is_the_machine_of_appendix_a() {
+    let campaign = load(&directory().join("turbo_a.yaml")).unwrap();
+    assert_eq!(campaign.machine.params, Params::default());
+    assert_eq!(campaign.boundary, BoundaryConditions::default());
+    assert_eq!(campaign.machine.map, MapSource::ClosedForm);
+    assert_eq!(campaign.reference, ReferenceState::SAE);
+    assert_eq!(campaign.order, Order::Greedy);
+    assert_eq!(campaign.identification.window, WindowChoice::Auto);
+    assert_eq!((campaign.timing.warm_up_s, campaign.timing.dwell_s, campaign.seed), (600.0, 120.0, 1));
+    assert!(campaign.points.len() >= 30);
+    let mut speeds: Vec<f64> = campaign.points.iter().map(|point| point.speed_rpm).collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds.dedup();
+    assert!(speeds.len() >= 8);
+    let t2 = campaign.sensors[&Channel::T2];
+    assert_eq!((t2.declared.noise_sigma, t2.declared.offset_sigma, t2.probe_diameter_m), (0.1, 0.25, 0.0));
+    assert_eq!(campaign.sensors[&Channel::CompressorFlow].declared.gain_sigma_ratio, 0.005);
+    assert_eq!(campaign.report.humidity_ratio, Some(0.5));
+    assert_eq!(campaign.report.calibration[&Channel::T2], "2026-09-01");
+}
+
+#[test]
+fn leaving_the_geometry_out_changes_nothing() {
+    let text = std::fs::read_to_string(directory().join("turbo_a.yaml")).unwrap();
+    let start = text.find("  # What is left out below").unwrap();
+    let end = text.find("  # The nominal compressor map").unwrap();
+    let short = format!("{}{}", &text[..start], &text[end..]);
+    let none = |_: &Path| Err(std::io::ErrorKind::NotFound.into());
+    let full = mapper_campaign::check(&text, Path::new("a.yaml"), &none).unwrap();
+    let short = mapper_campaign::check(&short, Path::new("a.yaml"), &none).unwrap();
+    assert_eq!(serde_json::to_string(&full).unwrap(), serde_json::to_string(&short).unwrap());
+}
+
+#[test]
+fn a_file_that_is_not_there_or_not_text_is_refused() {
+    assert!(matches!(load(Path::new("no/such.yaml")), Err(CampaignError::Read { .. })));
+    let here = std::env::temp_dir();
+    assert!(matches!(load(&here), Err(CampaignError::Read { .. })));
+}

@@ -1,0 +1,109 @@
+//! The command line.
+
+use crate::exit_code;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use mapper_core::Method;
+use std::path::PathBuf;
+
+/// From a campaign file to a complete turbocharger-compressor map, efficiency and heat transfer included.
+#[derive(Debug, Parser)]
+#[command(name = "mapper", version, after_help = exit_code::HELP, arg_required_else_help = true)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// One variant a command.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Check a campaign file and print all its mistakes, each with its line and what would be right
+    Check(CheckArguments),
+    /// Print the JSON schema of campaign files, for editors
+    Schema,
+    /// Show the steps of a campaign: order, turbine pressure, what each is expected to give, how long it takes
+    Plan(PlanArguments),
+    /// Run a campaign: plan, drive the rig, record, identify, assemble the map, report
+    Run(RunArguments),
+    /// Identify efficiency and heat transfer from a run directory or any MCAP recording
+    Identify(IdentifyArguments),
+}
+
+/// `mapper check`.
+#[derive(Debug, Args)]
+pub struct CheckArguments {
+    /// Campaign file (YAML)
+    pub campaign: PathBuf,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mapper plan`.
+#[derive(Debug, Args)]
+pub struct PlanArguments {
+    /// Campaign file (YAML)
+    pub campaign: PathBuf,
+    /// Print the plan as one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+    /// Also store the plan in this new file, for `mapper run --plan`
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// `mapper run`.
+#[derive(Debug, Args)]
+pub struct RunArguments {
+    /// Campaign file (YAML)
+    pub campaign: PathBuf,
+    /// Run this stored plan instead of making one; refused when campaign or model have changed since
+    #[arg(long, value_name = "FILE")]
+    pub plan: Option<PathBuf>,
+    /// Show the plan and what would be written, and touch nothing
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Directory for the run's own directory, instead of the campaign's `outputs.directory`
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mapper identify`.
+#[derive(Debug, Args)]
+pub struct IdentifyArguments {
+    /// Run directory, or MCAP file
+    pub recording: PathBuf,
+    /// Where a recording made by another program holds the rig's channels (YAML)
+    #[arg(long, value_name = "FILE")]
+    pub channels: Option<PathBuf>,
+    /// Campaign that says machine, sensors and window, instead of the one attached to the recording
+    #[arg(long, value_name = "FILE")]
+    pub campaign: Option<PathBuf>,
+    /// How to identify [default: the campaign's method, or dynamic]
+    #[arg(long, value_enum)]
+    pub method: Option<MethodArgument>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Methods as written on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodArgument {
+    /// Conventional: apparent efficiency from the temperature rise
+    Steady,
+    /// Efficiency and heat-transfer coefficient from the transient (Burke et al.)
+    Dynamic,
+}
+
+impl From<MethodArgument> for Method {
+    fn from(argument: MethodArgument) -> Self {
+        match argument {
+            MethodArgument::Steady => Method::Steady,
+            MethodArgument::Dynamic => Method::Dynamic,
+        }
+    }
+}

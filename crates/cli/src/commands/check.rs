@@ -1,0 +1,36 @@
+//! `mapper check`.
+
+use crate::arguments::CheckArguments;
+use crate::failure::Failure;
+use crate::registry::{BackendContext, make_backend};
+use crate::{assembly_line, output, table};
+use crate::exit_code::Code;
+use serde_json::json;
+
+/// Checks a campaign and says in a line what it is.
+pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
+    let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
+    let model = assembly_line::nominal_model(&campaign)?;
+    // The backend reads its settings now, so that a mistake in them does not wait for the night.
+    make_backend(&BackendContext { campaign: &campaign, model: &model })
+        .map_err(|error| Failure::new(Code::BadInput, error))?;
+    let timing = &campaign.timing;
+    let duration_s =
+        timing.warm_up_s + campaign.points.len() as f64 * timing.dwell_s + timing.cool_down_s;
+    if arguments.json {
+        return output::print_json(&json!({
+            "campaign": campaign.name,
+            "points": campaign.points.len(),
+            "minutes": duration_s / 60.0,
+            "backend": campaign.backend.name,
+            "findings": [],
+        }));
+    }
+    output::print(&format!(
+        "{}: no mistakes. {} points on `{}` in {} of the rig's time.\n",
+        arguments.campaign.display(),
+        campaign.points.len(),
+        campaign.backend.name,
+        table::duration(duration_s),
+    ))
+}

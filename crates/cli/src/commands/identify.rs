@@ -1,0 +1,97 @@
+//! `mapper identify`: from a recording to points, without a rig.
+
+use crate::arguments::IdentifyArguments;
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::results;
+use crate::{assembly_line, output, run_directory};
+use mapper_campaign::campaign::DisplayUnits;
+use mapper_core::ReferenceState;
+use mapper_identify::{IdentifyConfig, WindowRule};
+use mapper_record::{ChannelMap, ReadOptions, ReadReport, RecordError, read_recording};
+use serde_json::json;
+use std::path::Path;
+
+/// Identifies all steps of a recording.
+pub fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
+    let path = run_directory::recording_of(&arguments.recording);
+    let map = match &arguments.channels {
+        Some(file) => channel_map(file)?,
+        None => ChannelMap::native(),
+    };
+    let report = read_recording(&path, &map, &ReadOptions::default()).map_err(bad_recording)?;
+    let (mut config, display) = config(arguments, &map, &report)?;
+    if let Some(method) = arguments.method {
+        config.method = method.into();
+    }
+    let points = mapper_identify::identify(&report.recording, &config)
+        .map_err(|error| Failure::new(Code::BadRecording, error))?;
+    let points =
+        mapper_score::score(&path, &report.recording.steps, points).map_err(bad_recording)?;
+    if arguments.json {
+        return output::print_json(&json!({
+            "recording": path,
+            "reference": config.reference,
+            "points": points,
+            "score": mapper_score::summarise(&points),
+            "recording_warnings": report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        }));
+    }
+    let mut text = results::points_text(&points, &display);
+    for warning in &report.warnings {
+        text.push_str(&format!("recording: {warning}\n"));
+    }
+    output::print(&text)
+}
+
+fn bad_recording(error: RecordError) -> Failure {
+    let code = match error {
+        RecordError::Read { .. } => Code::Failure,
+        _ => Code::BadRecording,
+    };
+    Failure::new(code, error)
+}
+
+fn channel_map(file: &Path) -> Result<ChannelMap, Failure> {
+    let text = std::fs::read_to_string(file)
+        .map_err(|error| Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display())))?;
+    ChannelMap::from_yaml(&text)
+        .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", file.display())))
+}
+
+/// Machine, sensors and window: from the campaign given, the channel map, or the campaign in the recording.
+fn config(
+    arguments: &IdentifyArguments,
+    map: &ChannelMap,
+    report: &ReadReport,
+) -> Result<(IdentifyConfig, DisplayUnits), Failure> {
+    if let Some(path) = &arguments.campaign {
+        let campaign = mapper_campaign::load(path).map_err(Failure::of_campaign)?;
+        return Ok((assembly_line::identification(&campaign), campaign.display));
+    }
+    if let Some(machine) = &map.machine {
+        let config = IdentifyConfig {
+            alpha_area_ratio: machine.alpha_area_ratio,
+            internal_area_m2: machine.compressor_internal_area_m2,
+            reference: map.reference.unwrap_or(ReferenceState::SAE),
+            window: map.window.map_or_else(WindowRule::default, |window| WindowRule::Fixed {
+                start_s: window.start_s,
+                end_s: window.end_s,
+            }),
+            declared: map.sensors.clone(),
+            ..IdentifyConfig::default()
+        };
+        return Ok((config, DisplayUnits::default()));
+    }
+    if let Some(text) = &report.campaign_text {
+        let origin = arguments.recording.join(run_directory::CAMPAIGN);
+        let campaign = mapper_campaign::check(text, &origin, &|path| std::fs::read_to_string(path))
+            .map_err(|findings| Failure::of_campaign(mapper_campaign::CampaignError::Mistakes(Box::new(findings))))?;
+        return Ok((assembly_line::identification(&campaign), campaign.display));
+    }
+    Err(Failure::new(
+        Code::BadInput,
+        "the machine is not known: the recording carries no campaign. Give `--campaign FILE`, or `machine:` with \
+         `compressor_internal_area` in the channel map",
+    ))
+}

@@ -1,0 +1,21 @@
+//! One file a command.
+
+mod check;
+mod identify;
+mod plan;
+mod run;
+mod schema;
+
+use crate::arguments::{Arguments, Command};
+use crate::failure::Failure;
+
+/// Runs the command that was asked for.
+pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
+    match &arguments.command {
+        Command::Check(arguments) => check::check(arguments),
+        Command::Schema => schema::schema(),
+        Command::Plan(arguments) => plan::plan(arguments),
+        Command::Run(arguments) => run::run(arguments),
+        Command::Identify(arguments) => identify::identify(arguments),
+    }
+}

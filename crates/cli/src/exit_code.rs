@@ -1,0 +1,32 @@
+//! What the process returns.
+
+/// Exit codes, stable for scripts; `mapper --help` lists them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Code {
+    /// A file could not be read or written, or the program is at fault.
+    Failure = 1,
+    // 2 is clap's: wrong arguments.
+    /// The campaign or another input file has mistakes; all of them were printed.
+    BadInput = 3,
+    /// There is no plan, or the plan given is stale.
+    NoPlan = 4,
+    /// The rig failed or a guard tripped; the rig is safe and what was recorded is kept.
+    Rig = 5,
+    /// The recording does not hold what identification needs.
+    BadRecording = 6,
+    /// Stopped by the operator; the rig is safe and what was recorded is kept.
+    Interrupted = 130,
+}
+
+/// The table of exit codes for `--help`.
+pub const HELP: &str = "\
+Exit codes:
+  0    done
+  1    a file could not be read or written, or the program is at fault
+  2    wrong arguments
+  3    the campaign or another input file has mistakes (all are printed)
+  4    there is no plan, or the plan given is stale
+  5    the rig failed or a guard tripped; the rig is safe, the recording is kept
+  6    the recording does not hold what identification needs
+  130  stopped by the operator; the rig is safe, the recording is kept";

@@ -1,0 +1,220 @@
+//! What a run gives: points, map, report; the same for people and for machines.
+
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::table::{self, Display, number};
+use crate::test_report;
+use crate::{assembly_line, output, run_directory};
+use mapper_assemble::{Grouping, assemble};
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::{DisplayUnits, OutputFormat};
+use mapper_core::{IdentifiedPoint, Plan, Verdict};
+use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_runner::RunEnd;
+use mapper_score::{ScoreSummary, ScoredPoint};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Everything that came of a run, with the files it was written to.
+pub struct Results {
+    run: PathBuf,
+    recording: PathBuf,
+    report: PathBuf,
+    /// Paths of the map by format.
+    map: BTreeMap<String, PathBuf>,
+    points: Vec<ScoredPoint>,
+    score: Option<ScoreSummary>,
+    remarks: Vec<String>,
+}
+
+/// Reads the recording back, identifies, assembles, exports and reports.
+pub fn make(
+    campaign: &Campaign,
+    plan: &Plan,
+    end: &RunEnd,
+    directory: &Path,
+    recording: &Path,
+) -> Result<Results, Failure> {
+    let read = read_recording(recording, &ChannelMap::native(), &ReadOptions::default())
+        .map_err(|error| Failure::new(Code::BadRecording, error))?;
+    let mut remarks: Vec<String> = read.warnings.iter().map(ToString::to_string).collect();
+    let mut config = assembly_line::identification(campaign);
+    config.method = campaign.identification.method;
+    let points = mapper_identify::identify(&read.recording, &config)
+        .map_err(|error| Failure::new(Code::BadRecording, error))?;
+
+    let mut map = BTreeMap::new();
+    let placed: Vec<IdentifiedPoint> = points.iter().filter(|point| has_place(point)).cloned().collect();
+    match assemble(&placed, &campaign.machine.name, config.reference, config.method, Grouping::default()) {
+        Ok(assembled) => {
+            for format in &campaign.outputs.formats {
+                let name = match format {
+                    OutputFormat::Csv => "csv",
+                    OutputFormat::Json => "json",
+                    OutputFormat::Svg => "svg",
+                };
+                let Some(exporter) = mapper_exporters::find(name) else { continue };
+                let bytes =
+                    (exporter.export)(&assembled).map_err(|error| Failure::new(Code::Failure, error))?;
+                let path = directory.join(format!("map.{}", exporter.extension));
+                output::write_new(&path, &bytes)?;
+                map.insert(name.to_owned(), path);
+            }
+        }
+        Err(error) => remarks.push(format!("there is no map: {error}")),
+    }
+    let points = mapper_score::score(recording, &read.recording.steps, points)
+        .map_err(|error| Failure::new(Code::BadRecording, error))?;
+    let score = mapper_score::summarise(&points);
+    output::write_new(
+        &directory.join(run_directory::POINTS),
+        (output::to_json(&json!({"reference": config.reference, "points": points}))? + "\n").as_bytes(),
+    )?;
+    let report = directory.join(run_directory::REPORT);
+    let text = test_report::markdown(campaign, plan, end, &read.recording.events, &points, score.as_ref(), &map);
+    output::write_new(&report, text.as_bytes())?;
+    Ok(Results {
+        run: directory.to_owned(),
+        recording: recording.to_owned(),
+        report,
+        map,
+        points,
+        score,
+        remarks,
+    })
+}
+
+fn has_place(point: &IdentifiedPoint) -> bool {
+    [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm].iter().all(|v| v.is_finite())
+}
+
+impl Results {
+    /// One object for machines.
+    pub fn json(&self) -> serde_json::Value {
+        json!({
+            "run": self.run,
+            "recording": self.recording,
+            "points": self.points,
+            "map": self.map,
+            "report": self.report,
+            "score": self.score,
+            "remarks": self.remarks,
+        })
+    }
+
+    /// A table with what to know below it.
+    pub fn text(&self, campaign: &Campaign) -> String {
+        let mut text = points_text(&self.points, &campaign.display);
+        for remark in &self.remarks {
+            let _ = writeln!(text, "{remark}");
+        }
+        for path in self.map.values() {
+            let _ = writeln!(text, "map        {}", path.display());
+        }
+        let _ = writeln!(text, "report     {}", self.report.display());
+        let _ = writeln!(text, "recording  {}", self.recording.display());
+        text
+    }
+}
+
+/// Identified points as a table, their doubts below, and how far they are from the truth where it is known.
+pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits) -> String {
+    let mut text = format!("{}\n\n", points_table(points, units));
+    for ScoredPoint { point, .. } in points.iter().filter(|scored| scored.point.verdict != Verdict::Good) {
+        for warning in &point.warnings {
+            let _ = writeln!(text, "step {}: {}", point.step + 1, warning.message);
+        }
+    }
+    let count = |verdict| points.iter().filter(|scored| scored.point.verdict == verdict).count();
+    let _ = writeln!(
+        text,
+        "{} points: {} good, {} doubtful, {} unusable.",
+        points.len(),
+        count(Verdict::Good),
+        count(Verdict::Doubtful),
+        count(Verdict::Unusable),
+    );
+    if let Some(score) = mapper_score::summarise(points) {
+        text.push_str(&score_text(&score));
+    }
+    text
+}
+
+/// How far the points are from what the simulator knows.
+pub fn score_text(score: &ScoreSummary) -> String {
+    let mut text = format!(
+        "Against the simulator's truth ({} points): efficiency off by {:.2} points in the median, {:.2} at worst, {:.0} % \
+         within 1 point; the 95 % interval holds it at {:.0} %.\n",
+        score.points,
+        100.0 * score.eta_median_error,
+        100.0 * score.eta_worst_error,
+        100.0 * score.eta_within_one_point_ratio,
+        100.0 * score.eta_coverage_ratio,
+    );
+    if let (Some(median), Some(worst)) = (score.h_median_error_ratio, score.h_worst_error_ratio) {
+        let _ = writeln!(
+            text,
+            "Heat-transfer coefficient off by {:.1} % in the median, {:.1} % at worst.",
+            100.0 * median,
+            100.0 * worst
+        );
+    }
+    text
+}
+
+fn points_table(points: &[ScoredPoint], units: &DisplayUnits) -> comfy_table::Table {
+    let display = Display::new(units);
+    let with_truth = points.iter().any(|scored| scored.truth.is_some());
+    let mut heads = vec![
+        "step".to_owned(),
+        display.speed_head("speed"),
+        "opening 1".to_owned(),
+        display.flow_head("corr. flow"),
+        "PR 1".to_owned(),
+        "eta %".to_owned(),
+        "+/- points".to_owned(),
+        "h W/(m2 K)".to_owned(),
+        "+/- W/(m2 K)".to_owned(),
+        "dT2 K".to_owned(),
+        "verdict".to_owned(),
+    ];
+    if with_truth {
+        heads.push("true eta %".to_owned());
+        heads.push("true h".to_owned());
+    }
+    let mut table = table::with_heads(&heads);
+    for ScoredPoint { point, truth } in points {
+        let half = |low: Option<f64>, high: Option<f64>| Some(0.5 * (high? - low?));
+        let percent = |value: Option<f64>| value.map(|value| 100.0 * value);
+        let mut row = vec![
+            (point.step + 1).to_string(),
+            display.speed(point.speed_rpm),
+            format!("{}", point.valve_opening_ratio),
+            display.flow(point.flow_corrected_kg_s),
+            format!("{:.4}", point.pressure_ratio),
+            number(percent(point.eta), 2),
+            number(percent(half(point.eta_low, point.eta_high)), 2),
+            number(point.h_w_m2k, 0),
+            number(half(point.h_low_w_m2k, point.h_high_w_m2k), 0),
+            number(point.dt2_k, 1),
+            verdict_word(point.verdict).to_owned(),
+        ];
+        if with_truth {
+            row.push(number(truth.map(|truth| 100.0 * truth.eta), 2));
+            row.push(number(truth.map(|truth| truth.h_w_m2k), 0));
+        }
+        table.add_row(row);
+    }
+    table
+}
+
+/// A verdict in a word.
+pub fn verdict_word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Good => "good",
+        Verdict::Doubtful => "doubtful",
+        Verdict::Unusable => "unusable",
+    }
+}

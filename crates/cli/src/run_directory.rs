@@ -1,0 +1,40 @@
+//! Where a run's files go: one new directory each, never an old one.
+
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// The file names within a run directory.
+pub const RECORDING: &str = "recording.mcap";
+/// The plan that was run.
+pub const PLAN: &str = "plan.json";
+/// The campaign as it was read.
+pub const CAMPAIGN: &str = "campaign.yaml";
+/// Identified points.
+pub const POINTS: &str = "points.json";
+/// The test report.
+pub const REPORT: &str = "report.md";
+
+/// Creates `<parent>/<campaign>-<time>`, with `-2`, `-3`, ... behind it where that exists already.
+pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, Failure> {
+    let fail = |path: &Path, error: std::io::Error| {
+        Failure::new(Code::Failure, format!("failed to create {}: {error}", path.display()))
+    };
+    std::fs::create_dir_all(parent).map_err(|error| fail(parent, error))?;
+    for attempt in 1..=999 {
+        let suffix = if attempt == 1 { String::new() } else { format!("-{attempt}") };
+        let path = parent.join(format!("{campaign}-{time}{suffix}"));
+        match std::fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(fail(&path, error)),
+        }
+    }
+    Err(Failure::new(Code::Failure, format!("{} holds 999 runs of this second already", parent.display())))
+}
+
+/// The recording of a run directory, or the file itself.
+pub fn recording_of(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join(RECORDING) } else { path.to_owned() }
+}

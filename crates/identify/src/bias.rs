@@ -1,0 +1,94 @@
+//! What the declared uncertainty of each sensor makes of T2, and of the fitted parameters.
+//!
+//! Linearised: an offset of a sensor changes the fitted T2 by its sensitivity; the parameters answer as they would to
+//! that change of the measured T2, with the sign turned. Sensors are independent, so squares add.
+
+use crate::IdentifyConfig;
+use crate::fit::{Fit, Geometry, Row, rows, t2_k};
+use crate::samples::Samples;
+use mapper_core::Channel;
+use mapper_physics::compression::isentropic_rise_ratio;
+
+/// The channels that enter eqs. 1-3.
+const ENTERING: [Channel; 6] =
+    [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
+
+/// Effect of the declared uncertainties.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct DeclaredEffect {
+    /// Standard errors of eta and h from fixed offsets and gains.
+    pub(crate) bias_standard_errors: [f64; 2],
+    /// Variance of (measured less fitted T2) from sample noise, K2.
+    pub(crate) noise_k2: f64,
+}
+
+/// Sums over all declared sensors.
+pub(crate) fn declared_effect(
+    fit: &Fit,
+    samples: &Samples,
+    geometry: Geometry,
+    config: &IdentifyConfig,
+) -> DeclaredEffect {
+    let mut effect = DeclaredEffect::default();
+    let mut squares = [0.0; 2];
+    for channel in ENTERING {
+        let Some(declared) = config.declared.get(&channel) else { continue };
+        let values = column(samples, channel);
+        let sensitivity = sensitivity(fit, samples, geometry, channel);
+        let responses = [
+            fit.response(sensitivity.iter().map(|s| s * declared.offset_sigma)),
+            fit.response(sensitivity.iter().zip(values).map(|(s, v)| s * v * declared.gain_sigma_ratio)),
+        ];
+        for response in responses {
+            squares[0] += response[0] * response[0];
+            squares[1] += response[1] * response[1];
+        }
+        let mean_square = sensitivity.iter().map(|s| s * s).sum::<f64>() / samples.len().max(1) as f64;
+        effect.noise_k2 += mean_square * declared.noise_sigma * declared.noise_sigma;
+    }
+    effect.bias_standard_errors = squares.map(f64::sqrt);
+    effect
+}
+
+fn column(samples: &Samples, channel: Channel) -> &[f64] {
+    match channel {
+        Channel::T1 => &samples.t1_k,
+        Channel::Tc => &samples.tc_k,
+        Channel::P1 => &samples.p1_pa,
+        Channel::P2 => &samples.p2_pa,
+        Channel::CompressorFlow => &samples.flow_kg_s,
+        _ => &samples.t2_k,
+    }
+}
+
+/// Derivative of (measured less fitted T2) by the reading of a channel, per row.
+fn sensitivity(fit: &Fit, samples: &Samples, geometry: Geometry, channel: Channel) -> Vec<f64> {
+    if channel == Channel::T2 {
+        return vec![1.0; samples.len()];
+    }
+    let fitted_k = |row: Row| t2_k(geometry, row, fit.eta, fit.h_w_m2k);
+    rows(samples)
+        .enumerate()
+        .map(|(i, row)| {
+            let reading = column(samples, channel)[i];
+            let step = 1e-5 * reading;
+            let moved = |by: f64| {
+                let pressures = match channel {
+                    Channel::P1 => samples.p2_pa[i] / (samples.p1_pa[i] + by),
+                    Channel::P2 => (samples.p2_pa[i] + by) / samples.p1_pa[i],
+                    _ => samples.p2_pa[i] / samples.p1_pa[i],
+                };
+                match channel {
+                    Channel::Tc => Row { tc_k: row.tc_k + by, ..row },
+                    Channel::CompressorFlow => Row { flow_kg_s: row.flow_kg_s + by, ..row },
+                    Channel::T1 => {
+                        let t1_k = row.t1_k + by;
+                        Row { t1_k, rise_ratio: isentropic_rise_ratio(pressures, t1_k), ..row }
+                    }
+                    _ => Row { rise_ratio: isentropic_rise_ratio(pressures, row.t1_k), ..row },
+                }
+            };
+            -(fitted_k(moved(step)) - fitted_k(moved(-step))) / (2.0 * step)
+        })
+        .collect()
+}

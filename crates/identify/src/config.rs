@@ -1,0 +1,178 @@
+//! What identification is told: method, window, geometry, declared uncertainty, thresholds.
+
+pub use mapper_core::DeclaredUncertainty;
+use mapper_core::{Channel, Method, ReferenceState};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// How a recording is to be identified.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct IdentifyConfig {
+    /// Conventional or dynamic.
+    pub method: Method,
+    /// Which part of each step is used by the dynamic method.
+    pub window: WindowRule,
+    /// Assumed share of the internal area before compression, alpha_A, 0..1.
+    pub alpha_area_ratio: f64,
+    /// Internal area of the compressor housing A_c, m2, > 0.
+    pub internal_area_m2: f64,
+    /// Reference state of corrected quantities.
+    pub reference: ReferenceState,
+    /// What the tap of P1 reads.
+    pub inlet_tap: PressureTap,
+    /// What the tap of P2 reads.
+    pub outlet_tap: PressureTap,
+    /// Declared uncertainty of the sensors, SI units. Channels that are left out count as exact.
+    pub declared: BTreeMap<Channel, DeclaredUncertainty>,
+    /// How sensor noise is correlated in time.
+    pub noise_colour: NoiseColour,
+    /// When a point is doubted.
+    pub thresholds: Thresholds,
+}
+
+impl Default for IdentifyConfig {
+    /// The dynamic method on the nominal machine (Appendix A of the paper), total-pressure taps, nothing declared.
+    fn default() -> Self {
+        IdentifyConfig {
+            method: Method::Dynamic,
+            window: WindowRule::default(),
+            alpha_area_ratio: 0.0,
+            internal_area_m2: 29e-3,
+            reference: ReferenceState::SAE,
+            inlet_tap: PressureTap::Total,
+            outlet_tap: PressureTap::Total,
+            declared: BTreeMap::new(),
+            noise_colour: NoiseColour::default(),
+            thresholds: Thresholds::default(),
+        }
+    }
+}
+
+/// Which part of a step is used by the dynamic method.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WindowRule {
+    /// From `start_s` to `end_s` after the jump; cut at the step's end.
+    Fixed {
+        /// Start after the jump, s.
+        start_s: f64,
+        /// End after the jump, s.
+        end_s: f64,
+    },
+    /// From where speed, flow and pressure ratio have stabilised to the step's end.
+    Auto(Stabilisation),
+}
+
+impl Default for WindowRule {
+    fn default() -> Self {
+        WindowRule::Auto(Stabilisation::default())
+    }
+}
+
+/// When the operating point counts as stabilised: each quantity varies (largest minus smallest value, noise
+/// discounted) by at most its ratio from the window's start to its end.
+///
+/// Default: the typical variations of section 3 of the paper, 0.8 % in speed, 2 % in pressure ratio, 1.5 % in flow.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stabilisation {
+    /// Allowed variation of the shaft speed over its mean.
+    pub speed_ratio: f64,
+    /// Allowed variation of the compressor flow over its mean.
+    pub flow_ratio: f64,
+    /// Allowed variation of the pressure ratio over its mean.
+    pub pressure_ratio_ratio: f64,
+    /// The window starts at the earliest this long after the last change of a command, s: what the paper typically
+    /// needs, and what probes of 1.5 mm need to follow.
+    pub earliest_s: f64,
+    /// Shortest useful window, s. A step that stabilises later gives its last `shortest_s` and is doubtful.
+    pub shortest_s: f64,
+}
+
+impl Default for Stabilisation {
+    fn default() -> Self {
+        Stabilisation {
+            speed_ratio: 0.008,
+            flow_ratio: 0.015,
+            pressure_ratio_ratio: 0.02,
+            earliest_s: 10.0,
+            shortest_s: 30.0,
+        }
+    }
+}
+
+/// What a pressure tap reads.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PressureTap {
+    /// Total pressure (or the channel was converted before).
+    #[default]
+    Total,
+    /// Static pressure at the wall of a pipe.
+    Static {
+        /// Inner diameter of the pipe at the tap, m, > 0.
+        pipe_diameter_m: f64,
+    },
+}
+
+/// Sensor noise as a white and a first-order part in quadrature: shares `sqrt(1 - c^2)` and `c`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseColour {
+    /// Share c of the first-order part in the standard deviation, 0..1.
+    pub first_order_share_ratio: f64,
+    /// Its time constant, s, > 0.
+    pub time_constant_s: f64,
+}
+
+impl Default for NoiseColour {
+    fn default() -> Self {
+        NoiseColour { first_order_share_ratio: 0.6, time_constant_s: 2.0 }
+    }
+}
+
+/// When a point is doubted or refused.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Thresholds {
+    /// Fewest complete samples in the window; fewer make the point unusable.
+    pub fewest_samples: usize,
+    /// Largest share of lost samples in the window that passes without doubt.
+    pub lost_samples_ratio: f64,
+    /// Standard error of eta (fraction) above which the gradient counts as too small.
+    pub sigma_eta: f64,
+    /// Standard error of eta (fraction) above which the point is unusable.
+    pub unusable_sigma_eta: f64,
+    /// Smallest change of T2 over the window that passes without doubt, K.
+    pub dt2_k: f64,
+    /// Estimated error of eta (fraction) from flow that moves within the window, above which the point is doubtful.
+    pub flow_drift_eta: f64,
+    /// Residual over what the declared noise explains, above which the fit is poor.
+    pub residual_over_noise_ratio: f64,
+    /// Slow part of the residual (10 s means) over the change of T2, above which the fit is poor.
+    pub structure_ratio: f64,
+    /// `steady`: mean over this last part of the step, s.
+    pub steady_mean_s: f64,
+    /// `steady`: drift of T2 or Tc above which the step has not settled, K/min.
+    pub steady_drift_k_min: f64,
+    /// State of the point: mean over this last part of the step, s.
+    pub end_mean_s: f64,
+}
+
+impl Default for Thresholds {
+    fn default() -> Self {
+        Thresholds {
+            fewest_samples: 20,
+            lost_samples_ratio: 0.05,
+            sigma_eta: 0.02,
+            unusable_sigma_eta: 0.2,
+            dt2_k: 0.5,
+            flow_drift_eta: 0.005,
+            residual_over_noise_ratio: 1.5,
+            structure_ratio: 0.02,
+            steady_mean_s: 10.0,
+            steady_drift_k_min: 0.5,
+            end_mean_s: 2.0,
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! Standard errors of the fit under noise that is correlated in time.
+//!
+//! The residual is taken for the sum of a white and a first-order process. Their variances come from two quadratic
+//! forms of the residual, corrected for what the fit has taken out of it (Rao's MINQUE, which is unbiased), and the
+//! parameters' covariance is `(J'J)^-1 J' Omega J (J'J)^-1`: least squares as done, noise as it is. The noise of the
+//! regressors (T1, Tc, flow, pressures) is in the residual and thus in the result.
+
+use crate::NoiseColour;
+use crate::fit::Fit;
+
+/// Variances of the residual's two parts, K2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NoiseVariances {
+    pub(crate) white_k2: f64,
+    pub(crate) first_order_k2: f64,
+}
+
+impl NoiseVariances {
+    /// A total variance, K2, split as declared.
+    pub(crate) fn split(total_k2: f64, colour: NoiseColour) -> Self {
+        let share = colour.first_order_share_ratio * colour.first_order_share_ratio;
+        NoiseVariances { white_k2: (1.0 - share) * total_k2, first_order_k2: share * total_k2 }
+    }
+}
+
+/// The correlation matrix of the first-order part, by what it does to the fit's columns.
+pub(crate) struct Correlation {
+    /// `J' R J`.
+    jrj: [[f64; 2]; 2],
+    inverse_normal: [[f64; 2]; 2],
+    variances: NoiseVariances,
+}
+
+impl Correlation {
+    /// Works out the noise of a fit whose samples lie at `t_s`.
+    pub(crate) fn of(fit: &Fit, t_s: &[f64], colour: NoiseColour) -> Self {
+        let (g, jacobian) = (&fit.inverse_normal, &fit.jacobian);
+        let smoothed = [
+            correlate(t_s, &jacobian[0], colour.time_constant_s),
+            correlate(t_s, &jacobian[1], colour.time_constant_s),
+        ];
+        let jrj = products(jacobian, &smoothed);
+        let jrrj = products(&smoothed, &smoothed);
+        let n = t_s.len() as f64;
+        let g_jrj = multiply(g, &jrj);
+        // Sum of squared correlations: a first-order correlation squared is one of half the time constant.
+        let ones = vec![1.0; t_s.len()];
+        let squares: f64 = correlate(t_s, &ones, 0.5 * colour.time_constant_s).iter().sum();
+        // Traces of M, M R and M R M R with M = 1 - J (J'J)^-1 J'.
+        let trace_m = n - 2.0;
+        let trace_mr = n - trace(&g_jrj);
+        let trace_mrmr = squares - 2.0 * trace(&multiply(g, &jrrj)) + trace(&multiply(&g_jrj, &g_jrj));
+        let residual = &fit.residual_k;
+        let white_form: f64 = residual.iter().map(|r| r * r).sum();
+        let smoothed_residual = correlate(t_s, residual, colour.time_constant_s);
+        let correlated_form: f64 = residual.iter().zip(&smoothed_residual).map(|(a, b)| a * b).sum();
+        let determinant = trace_m * trace_mrmr - trace_mr * trace_mr;
+        let white_k2 = (white_form * trace_mrmr - correlated_form * trace_mr) / determinant;
+        let first_order_k2 = (trace_m * correlated_form - trace_mr * white_form) / determinant;
+        let alone = |form: f64, trace: f64| if trace > 0.0 { form / trace } else { 0.0 };
+        let variances = if determinant <= 0.0 || !first_order_k2.is_finite() || first_order_k2 <= 0.0 {
+            NoiseVariances { white_k2: alone(white_form, trace_m), first_order_k2: 0.0 }
+        } else if white_k2 <= 0.0 {
+            NoiseVariances { white_k2: 0.0, first_order_k2: alone(correlated_form, trace_mrmr) }
+        } else {
+            NoiseVariances { white_k2, first_order_k2 }
+        };
+        Correlation { jrj, inverse_normal: *g, variances }
+    }
+
+    /// Standard errors of eta and h from the residual.
+    pub(crate) fn standard_errors(&self) -> [f64; 2] {
+        self.standard_errors_for(self.variances)
+    }
+
+    /// Standard errors of eta and h under given noise of T2.
+    pub(crate) fn standard_errors_for(&self, variances: NoiseVariances) -> [f64; 2] {
+        let g = &self.inverse_normal;
+        let correlated = multiply(&multiply(g, &self.jrj), g);
+        [0, 1].map(|i| {
+            (variances.white_k2 * g[i][i] + variances.first_order_k2 * correlated[i][i]).max(0.0).sqrt()
+        })
+    }
+}
+
+/// `R x` with `R_ij = exp(-|t_i - t_j|/tau)`, in one pass forwards and one backwards.
+fn correlate(t_s: &[f64], x: &[f64], time_constant_s: f64) -> Vec<f64> {
+    let decay = |i: usize| ((t_s[i - 1] - t_s[i]) / time_constant_s).exp();
+    let mut sums = x.to_vec();
+    let mut carried = 0.0;
+    for i in 0..x.len() {
+        if i > 0 {
+            carried = (carried + x[i - 1]) * decay(i);
+        }
+        sums[i] += carried;
+    }
+    carried = 0.0;
+    for i in (0..x.len()).rev() {
+        if i + 1 < x.len() {
+            carried = (carried + x[i + 1]) * decay(i + 1);
+        }
+        sums[i] += carried;
+    }
+    sums
+}
+
+fn products(a: &[Vec<f64>; 2], b: &[Vec<f64>; 2]) -> [[f64; 2]; 2] {
+    [0, 1].map(|i| [0, 1].map(|j| a[i].iter().zip(&b[j]).map(|(x, y)| x * y).sum()))
+}
+
+fn multiply(a: &[[f64; 2]; 2], b: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    [0, 1].map(|i| [0, 1].map(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
+}
+
+fn trace(m: &[[f64; 2]; 2]) -> f64 {
+    m[0][0] + m[1][1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_passes_make_the_full_product() {
+        let t_s = [0.0, 0.1, 0.4, 1.5, 1.6];
+        let x = [1.0, -2.0, 0.5, 3.0, 1.0];
+        let found = correlate(&t_s, &x, 0.7);
+        for i in 0..5 {
+            let full: f64 = (0..5).map(|j| (-(t_s[i] - t_s[j]).abs() / 0.7).exp() * x[j]).sum();
+            assert!((found[i] - full).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! The dynamic method (Burke et al., section 3): efficiency and heat-transfer coefficient from the transient.
+
+use crate::bias::{DeclaredEffect, declared_effect};
+use crate::covariance::{Correlation, NoiseVariances};
+use crate::findings::{Findings, code};
+use crate::fit::{Fit, Geometry, fit};
+use crate::flow_drift::{FlowDrift, flow_drift};
+use crate::samples::{Samples, mean};
+use crate::window::{self, median};
+use crate::{IdentifyConfig, jump};
+use mapper_core::{EstimateUncertainty, Recording, Window};
+
+/// Isentropic temperature rise over inlet temperature below which there is nothing to compress.
+const SMALLEST_RISE_RATIO: f64 = 1e-3;
+/// A residual this many robust standard deviations, and [`OUTLIER_K`], off those around it is not noise.
+const OUTLIER_SIGMAS: f64 = 8.0;
+/// How many samples on either side are looked at: a lag of the probe moves them all, a spike a few.
+const OUTLIER_NEIGHBOURS: usize = 10;
+/// Distance below which a sample is never taken for an outlier, K.
+const OUTLIER_K: f64 = 1.0;
+/// Blocks over which the residual is averaged to see whether it has a shape, s.
+const STRUCTURE_BLOCK_S: f64 = 10.0;
+
+/// Means over such a block keep about this much of the noise at most (first-order part, 2 s): four tenths of 0.6, twice.
+const STRUCTURE_OVER_NOISE_RATIO: f64 = 0.75;
+
+/// What a method makes of one step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Estimate {
+    pub(crate) eta: Option<(f64, Option<EstimateUncertainty>)>,
+    pub(crate) h_w_m2k: Option<(f64, Option<EstimateUncertainty>)>,
+    pub(crate) window: Option<Window>,
+    pub(crate) residual_rms_k: Option<f64>,
+    pub(crate) dt2_k: Option<f64>,
+    pub(crate) dtc_k: Option<f64>,
+}
+
+/// Identifies the step at `position`.
+pub(crate) fn estimate(
+    recording: &Recording,
+    position: usize,
+    config: &IdentifyConfig,
+    findings: &mut Findings,
+) -> Estimate {
+    let mut estimate = Estimate::default();
+    let Some(step) = recording.steps.get(position) else { return estimate };
+    let limits = &config.thresholds;
+    if !jump::begins_with_jump(&recording.steps, position) {
+        let message =
+            "no jump leads to this step, so it has no transient; the dynamic method needs one".to_owned();
+        findings.refuse(code::NO_TRANSIENT, message);
+        return estimate;
+    }
+    let Some(window) = window::choose(recording, step, &config.window, findings) else {
+        let seconds = step.end_s - step.start_s;
+        let message =
+            format!("the step lasts {seconds:.1} s, which leaves no room for a window after its jump");
+        findings.refuse(code::TOO_FEW_SAMPLES, message);
+        return estimate;
+    };
+    estimate.window = Some(window);
+    let samples = Samples::of(recording, window, config, true);
+    if !enough(&samples, config, findings) {
+        return estimate;
+    }
+    estimate.dt2_k = samples.change(&samples.t2_k, limits.end_mean_s);
+    estimate.dtc_k = samples.change(&samples.tc_k, limits.end_mean_s);
+    let rise_ratio = mean(&samples.rise_ratio).unwrap_or(0.0);
+    if rise_ratio < SMALLEST_RISE_RATIO {
+        let message =
+            "the pressure ratio is 1 or less: nothing is compressed, efficiency has no meaning".to_owned();
+        findings.refuse(code::NO_COMPRESSION, message);
+        return estimate;
+    }
+    let geometry =
+        Geometry { alpha_area_ratio: config.alpha_area_ratio, internal_area_m2: config.internal_area_m2 };
+    let Some((samples, fit)) = fit_without_outliers(samples, geometry, findings) else {
+        let message = "least squares for efficiency and heat-transfer coefficient came to no end".to_owned();
+        findings.refuse(code::FIT_FAILED, message);
+        return estimate;
+    };
+    estimate.residual_rms_k = Some(fit.residual_rms_k());
+    if let Some(which) = fit.at_bound() {
+        findings.refuse(
+            code::AT_BOUND,
+            format!("the best fit puts {which}, a bound of the search; no number is given"),
+        );
+        return estimate;
+    }
+    let declared = declared_effect(&fit, &samples, geometry, config);
+    let drift = flow_drift(&fit, &samples, limits.end_mean_s);
+    let [eta, h] = uncertainties(&fit, &samples, config, &declared, drift);
+    let sensors = EstimateUncertainty { bias_standard_error: declared.bias_standard_errors[0], ..eta };
+    estimate.eta = Some((fit.eta, Some(eta)));
+    estimate.h_w_m2k = Some((fit.h_w_m2k, Some(h)));
+    let view = View { fit: &fit, samples: &samples, config, noise_k: declared.noise_k2.sqrt() };
+    judge_gradient(&view, sensors.combined_standard_error(), estimate.dt2_k, findings);
+    judge_flow(drift, config, findings);
+    judge_residual(&view, estimate.dt2_k, findings);
+    estimate
+}
+
+/// Whether the window holds enough complete samples; says so where it does not.
+pub(crate) fn enough(samples: &Samples, config: &IdentifyConfig, findings: &mut Findings) -> bool {
+    let limits = &config.thresholds;
+    let (kept, lost) = (samples.len(), samples.lost);
+    if kept < limits.fewest_samples.max(3) {
+        let message = format!(
+            "{kept} complete samples in the window ({lost} lost); at least {} are needed",
+            limits.fewest_samples.max(3)
+        );
+        findings.refuse(code::TOO_FEW_SAMPLES, message);
+        return false;
+    }
+    if lost > 0 {
+        let message = format!("{lost} of {} samples in the window were lost and are left out", kept + lost);
+        if lost as f64 > limits.lost_samples_ratio * (kept + lost) as f64 {
+            findings.doubt(code::LOST_SAMPLES, message);
+        } else {
+            findings.remark(code::LOST_SAMPLES, message);
+        }
+    }
+    true
+}
+
+/// Fits; leaves out what lies far off the fit, if it is little, and fits again.
+fn fit_without_outliers(
+    samples: Samples,
+    geometry: Geometry,
+    findings: &mut Findings,
+) -> Option<(Samples, Fit)> {
+    let first = fit(&samples, geometry)?;
+    let mut sizes: Vec<f64> = first.residual_k.iter().map(|r| r.abs()).collect();
+    let limit_k = (OUTLIER_SIGMAS * median(&mut sizes)? / 0.6745).max(OUTLIER_K);
+    let last = samples.len().saturating_sub(1);
+    let mut around = Vec::with_capacity(2 * OUTLIER_NEIGHBOURS + 1);
+    let kept: Vec<bool> = (0..samples.len())
+        .map(|i| {
+            let residual_k = first.residual_k[i];
+            if residual_k.abs() <= limit_k {
+                return true;
+            }
+            around.clear();
+            let nearby = i.saturating_sub(OUTLIER_NEIGHBOURS)..=(i + OUTLIER_NEIGHBOURS).min(last);
+            around.extend_from_slice(&first.residual_k[nearby]);
+            median(&mut around).is_some_and(|middle_k| (residual_k - middle_k).abs() <= limit_k)
+        })
+        .collect();
+    let inlier = |i: usize| kept.get(i).copied().unwrap_or(false);
+    let outliers = (0..samples.len()).filter(|i| !inlier(*i)).count();
+    // More than a few are no accidents: then the fit is poor, and says so.
+    if outliers == 0 || outliers * 20 > samples.len() {
+        return Some((samples, first));
+    }
+    let samples = samples.filtered(inlier);
+    let second = fit(&samples, geometry)?;
+    let message = format!(
+        "{outliers} samples more than {limit_k:.1} K off the fit and off those around them are left out"
+    );
+    findings.remark(code::OUTLIERS, message);
+    Some((samples, second))
+}
+
+fn uncertainties(
+    fit: &Fit,
+    samples: &Samples,
+    config: &IdentifyConfig,
+    declared: &DeclaredEffect,
+    drift: Option<FlowDrift>,
+) -> [EstimateUncertainty; 2] {
+    let correlation = Correlation::of(fit, &samples.t_s, config.noise_colour);
+    let found = correlation.standard_errors();
+    // A short residual may look quieter than the sensors are.
+    let expected =
+        correlation.standard_errors_for(NoiseVariances::split(declared.noise_k2, config.noise_colour));
+    let assumed = drift.map_or([0.0; 2], |drift| [drift.eta, drift.h_w_m2k]);
+    [0, 1].map(|i| EstimateUncertainty {
+        noise_standard_error: found[i].max(expected[i]),
+        bias_standard_error: declared.bias_standard_errors[i].hypot(assumed[i]),
+    })
+}
+
+/// A fit with what it was made from.
+struct View<'a> {
+    fit: &'a Fit,
+    samples: &'a Samples,
+    config: &'a IdentifyConfig,
+    /// Standard deviation of (measured less fitted T2) that the declared noise explains, K.
+    noise_k: f64,
+}
+
+/// Whether enough happens in the window. `sigma_eta`: from noise and declared offsets.
+fn judge_gradient(view: &View<'_>, sigma_eta: f64, dt2_k: Option<f64>, findings: &mut Findings) {
+    let limits = &view.config.thresholds;
+    let dt2_k = dt2_k.unwrap_or(0.0);
+    if sigma_eta <= limits.sigma_eta && dt2_k.abs() >= limits.dt2_k {
+        return;
+    }
+    let message = format!(
+        "T2 moves by {dt2_k:.2} K in the window; noise and declared offsets leave eta uncertain by {:.1} points (1 sigma)",
+        100.0 * sigma_eta
+    );
+    if sigma_eta > limits.unusable_sigma_eta {
+        findings.refuse(code::SMALL_GRADIENT, message);
+    } else {
+        findings.doubt(code::SMALL_GRADIENT, message);
+    }
+}
+
+/// Whether the flow held still enough for a constant h.
+fn judge_flow(drift: Option<FlowDrift>, config: &IdentifyConfig, findings: &mut Findings) {
+    let Some(drift) = drift.filter(|drift| drift.eta.abs() > config.thresholds.flow_drift_eta) else {
+        return;
+    };
+    let message = format!(
+        "the flow moved by {:+.1} % in the window and h with it, which the method takes for constant: eta is some {:+.1} points off, h some {:+.0} W/(m2 K)",
+        100.0 * drift.flow_ratio,
+        100.0 * drift.eta,
+        drift.h_w_m2k
+    );
+    findings.doubt(code::FLOW_MOVED, message);
+}
+
+/// Whether the fit leaves more than noise.
+fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) {
+    let (fit, noise_k) = (view.fit, view.noise_k);
+    let limits = &view.config.thresholds;
+    let dt2_k = dt2_k.unwrap_or(0.0);
+    if fit.eta > 1.0 {
+        let message = format!(
+            "the fitted efficiency is {:.3}, above 1: something that the method does not know is at work",
+            fit.eta
+        );
+        findings.refuse(code::POOR_FIT, message);
+    }
+    let (rms_k, slow_k) = (fit.residual_rms_k(), slow_rms_k(fit, view.samples));
+    if noise_k > 0.0 && rms_k > limits.residual_over_noise_ratio * noise_k {
+        let message =
+            format!("the fit leaves {rms_k:.3} K rms of T2; the declared noise explains {noise_k:.3} K");
+        findings.doubt(code::POOR_FIT, message);
+    } else if slow_k > (limits.structure_ratio * dt2_k.abs()).max(STRUCTURE_OVER_NOISE_RATIO * noise_k) {
+        let message = format!(
+            "what the fit leaves of T2 has a shape: {slow_k:.3} K rms in {STRUCTURE_BLOCK_S:.0} s means, of {dt2_k:.1} K that T2 moves"
+        );
+        findings.doubt(code::POOR_FIT, message);
+    }
+    if view.config.declared.is_empty() {
+        let message = "no sensor uncertainty was declared: the interval holds noise alone".to_owned();
+        findings.remark(code::NOTHING_DECLARED, message);
+    }
+}
+
+/// Root mean square of the residual's means over blocks, K.
+fn slow_rms_k(fit: &Fit, samples: &Samples) -> f64 {
+    let (mut start, mut sum, mut blocks) = (0, 0.0, 0.0);
+    while start < samples.len() {
+        let end_s = samples.t_s[start] + STRUCTURE_BLOCK_S;
+        // At least one sample, so that the loop ends whatever the times are.
+        let end = samples.t_s.partition_point(|t| *t < end_s).max(start + 1);
+        let block = mean(&fit.residual_k[start..end]).unwrap_or(0.0);
+        (start, sum, blocks) = (end, sum + block * block, blocks + 1.0);
+    }
+    if blocks > 0.0 { (sum / blocks).sqrt() } else { 0.0 }
+}

@@ -1,0 +1,70 @@
+//! Where on the map a step ended: means over its last seconds.
+
+use crate::findings::{Findings, code};
+use crate::plausible::plausible;
+use crate::samples::mean;
+use crate::{IdentifyConfig, StepError, taps};
+use mapper_core::{Channel, Recording, Series, StepMarker};
+
+/// The operating point at the end of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct EndState {
+    pub(crate) speed_rpm: f64,
+    pub(crate) flow_kg_s: f64,
+    pub(crate) t1_k: f64,
+    pub(crate) p1_pa: f64,
+    pub(crate) pressure_ratio: f64,
+}
+
+/// Means over the last seconds of the step; where a channel gave nothing then, over the last stretch in which it did.
+pub(crate) fn end_state(
+    recording: &Recording,
+    step: &StepMarker,
+    config: &IdentifyConfig,
+    findings: &mut Findings,
+) -> Result<EndState, StepError> {
+    let mut at = |channel: Channel| -> Result<f64, StepError> {
+        let series = recording.series.get(&channel);
+        let seconds = config.thresholds.end_mean_s;
+        let (value, last_s) = series.and_then(|series| last_mean(channel, series, step, seconds)).ok_or(
+            StepError::NoState { step: step.index, start_s: step.start_s, end_s: step.end_s, channel },
+        )?;
+        if last_s < step.end_s - 2.0 * seconds {
+            let message = format!(
+                "{channel} was lost {:.1} s before the step's end; its last values stand for it",
+                step.end_s - last_s
+            );
+            findings.doubt(code::END_STATE, message);
+        }
+        Ok(value)
+    };
+    let (speed_rpm, flow_kg_s) = (at(Channel::ShaftSpeed)?, at(Channel::CompressorFlow)?);
+    let (t1_k, t2_k) = (at(Channel::T1)?, at(Channel::T2)?);
+    let p1_pa = taps::total_pa(config.inlet_tap, at(Channel::P1)?, flow_kg_s, t1_k);
+    let p2_pa = taps::total_pa(config.outlet_tap, at(Channel::P2)?, flow_kg_s, t2_k);
+    let state = EndState { speed_rpm, flow_kg_s, t1_k, p1_pa, pressure_ratio: p2_pa / p1_pa };
+    // A static tap's correction has no bound of its own.
+    for (channel, value) in [(Channel::P1, p1_pa), (Channel::P2, p2_pa)] {
+        if !plausible(channel, value) {
+            return Err(StepError::NoState {
+                step: step.index,
+                start_s: step.start_s,
+                end_s: step.end_s,
+                channel,
+            });
+        }
+    }
+    Ok(state)
+}
+
+/// Mean of the usable values in the last `seconds` up to the last one in the step, and that one's time.
+fn last_mean(channel: Channel, series: &Series, step: &StepMarker, seconds: f64) -> Option<(f64, f64)> {
+    let range = series.range(step.start_s, step.end_s);
+    let (t_s, values) = (&series.t_s[range.clone()], &series.values[range]);
+    let last = values.iter().rposition(|value| plausible(channel, *value))?;
+    let last_s = t_s[last];
+    let first = t_s.partition_point(|t| *t < last_s - seconds);
+    let finite: Vec<f64> =
+        values[first..=last].iter().copied().filter(|value| plausible(channel, *value)).collect();
+    Some((mean(&finite)?, last_s))
+}

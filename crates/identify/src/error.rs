@@ -1,0 +1,68 @@
+//! What stops identification altogether, and what stops a single step.
+
+use mapper_core::{Channel, Method};
+
+/// Why a recording cannot be identified.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum IdentifyError {
+    /// Channels that the method needs are not there.
+    #[error(
+        "the {method} method needs {}; the recording has none of them. Name their fields in the channel map",
+        list(missing)
+    )]
+    MissingChannels {
+        /// The method asked for.
+        method: Method,
+        /// What is missing.
+        missing: Vec<Channel>,
+    },
+    /// There is nothing to identify.
+    #[error(
+        "the recording has no steps: it has no step markers, and its command channels never change. Map P3_command and valve_command"
+    )]
+    NoSteps,
+    /// A number of the configuration is out of its range.
+    #[error("{name} = {value} is not usable: {expected}")]
+    Config {
+        /// Which number.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would be.
+        expected: &'static str,
+    },
+}
+
+/// Why a single step gives no point at all.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// The step has no duration.
+    #[error("step {step} runs from {start_s} s to {end_s} s, which is no stretch of time")]
+    NoDuration {
+        /// Index of the step.
+        step: usize,
+        /// Start of the step, s.
+        start_s: f64,
+        /// End of the step, s.
+        end_s: f64,
+    },
+    /// A quantity that every point has was never measured in the step.
+    #[error(
+        "step {step} ({start_s:.1} s to {end_s:.1} s) has no usable sample of {channel}, so its place on the map is unknown"
+    )]
+    NoState {
+        /// Index of the step.
+        step: usize,
+        /// Start of the step, s.
+        start_s: f64,
+        /// End of the step, s.
+        end_s: f64,
+        /// What is missing.
+        channel: Channel,
+    },
+}
+
+fn list(channels: &[Channel]) -> String {
+    let named: Vec<String> = channels.iter().map(|c| format!("{c} ({})", c.info().description)).collect();
+    named.join(", ")
+}

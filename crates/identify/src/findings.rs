@@ -1,0 +1,69 @@
+//! Remarks and doubts about a point while it is made.
+
+use mapper_core::{Verdict, Warning};
+
+/// Stable codes of the warnings.
+pub mod code {
+    /// The step has no jump before it.
+    pub const NO_TRANSIENT: &str = "no_transient";
+    /// The window holds too few complete samples.
+    pub const TOO_FEW_SAMPLES: &str = "too_few_samples";
+    /// Samples were lost (NaN, gaps).
+    pub const LOST_SAMPLES: &str = "lost_samples";
+    /// Samples far off the fit were left out.
+    pub const OUTLIERS: &str = "outliers";
+    /// Speed, flow or pressure ratio did not stabilise in time.
+    pub const NOT_STABILISED: &str = "not_stabilised";
+    /// The window asked for does not fit into the step.
+    pub const WINDOW_CUT: &str = "window_cut";
+    /// Too little happens in the window to tell efficiency from heat transfer.
+    pub const SMALL_GRADIENT: &str = "small_gradient";
+    /// The fit leaves more than noise.
+    pub const POOR_FIT: &str = "poor_fit";
+    /// The flow, and h with it, moved within the window.
+    pub const FLOW_MOVED: &str = "flow_moved";
+    /// The best fit lies on a bound.
+    pub const AT_BOUND: &str = "at_bound";
+    /// The fit came to no end.
+    pub const FIT_FAILED: &str = "fit_failed";
+    /// Temperatures still drift (steady method).
+    pub const NOT_SETTLED: &str = "not_settled";
+    /// The efficiency includes heat transfer (steady method).
+    pub const APPARENT: &str = "apparent";
+    /// No compression: efficiency has no meaning.
+    pub const NO_COMPRESSION: &str = "no_compression";
+    /// No sensor uncertainty was declared.
+    pub const NOTHING_DECLARED: &str = "nothing_declared";
+    /// Part of the state at the step's end is not from its last seconds.
+    pub const END_STATE: &str = "end_state";
+}
+
+/// Warnings with the verdict they amount to.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Findings {
+    pub(crate) verdict: Verdict,
+    pub(crate) warnings: Vec<Warning>,
+}
+
+impl Findings {
+    pub(crate) fn new() -> Self {
+        Findings { verdict: Verdict::Good, warnings: Vec::new() }
+    }
+
+    /// Something to know that is no reason to doubt.
+    pub(crate) fn remark(&mut self, code: &str, message: String) {
+        self.warnings.push(Warning { code: code.to_owned(), message });
+    }
+
+    pub(crate) fn doubt(&mut self, code: &str, message: String) {
+        self.remark(code, message);
+        if self.verdict == Verdict::Good {
+            self.verdict = Verdict::Doubtful;
+        }
+    }
+
+    pub(crate) fn refuse(&mut self, code: &str, message: String) {
+        self.remark(code, message);
+        self.verdict = Verdict::Unusable;
+    }
+}

@@ -1,0 +1,146 @@
+//! From a recording to points: one for each step.
+
+use crate::dynamic::Estimate;
+use crate::end_state::end_state;
+use crate::findings::Findings;
+use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, WindowRule, dynamic, steady};
+use mapper_core::{Channel, EstimateUncertainty, IdentifiedPoint, Method, Recording, confidence_interval_95};
+
+/// Identifies every step of a recording, in order. Steps of which not even the place on the map is known are left
+/// out; [`identify_each`] says which and why.
+///
+/// The state of a point (speed, flow, pressure ratio, T1, P1) is the mean over the last
+/// [`end_mean_s`](crate::Thresholds::end_mean_s) of its step.
+///
+/// # Errors
+/// [`IdentifyError`] where a channel that the method needs is missing, there are no steps, or the configuration is out
+/// of range.
+pub fn identify(
+    recording: &Recording,
+    config: &IdentifyConfig,
+) -> Result<Vec<IdentifiedPoint>, IdentifyError> {
+    Ok(identify_each(recording, config)?.into_iter().filter_map(Result::ok).collect())
+}
+
+/// As [`identify`], with the reason for every step that gives no point.
+///
+/// # Errors
+/// As [`identify`].
+pub fn identify_each(
+    recording: &Recording,
+    config: &IdentifyConfig,
+) -> Result<Vec<Result<IdentifiedPoint, StepError>>, IdentifyError> {
+    check(config)?;
+    let mut needed = vec![
+        Channel::ShaftSpeed,
+        Channel::CompressorFlow,
+        Channel::P1,
+        Channel::T1,
+        Channel::P2,
+        Channel::T2,
+    ];
+    if config.method == Method::Dynamic {
+        needed.push(Channel::Tc);
+    }
+    needed.retain(|channel| recording.require(*channel).is_err());
+    if !needed.is_empty() {
+        return Err(IdentifyError::MissingChannels { method: config.method, missing: needed });
+    }
+    if recording.steps.is_empty() {
+        return Err(IdentifyError::NoSteps);
+    }
+    Ok((0..recording.steps.len()).map(|position| point(recording, position, config)).collect())
+}
+
+fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {
+    let mut checks = vec![
+        (
+            "alpha_area_ratio",
+            config.alpha_area_ratio,
+            (0.0..=1.0).contains(&config.alpha_area_ratio),
+            "a share from 0 to 1",
+        ),
+        (
+            "internal_area_m2",
+            config.internal_area_m2,
+            config.internal_area_m2.is_finite() && config.internal_area_m2 > 0.0,
+            "a positive area, m2",
+        ),
+        (
+            "time_constant_s",
+            config.noise_colour.time_constant_s,
+            config.noise_colour.time_constant_s.is_finite() && config.noise_colour.time_constant_s > 0.0,
+            "a positive time, s",
+        ),
+        (
+            "first_order_share_ratio",
+            config.noise_colour.first_order_share_ratio,
+            (0.0..=1.0).contains(&config.noise_colour.first_order_share_ratio),
+            "a share from 0 to 1",
+        ),
+    ];
+    for tap in [config.inlet_tap, config.outlet_tap] {
+        if let PressureTap::Static { pipe_diameter_m } = tap {
+            let usable = pipe_diameter_m.is_finite() && pipe_diameter_m > 0.0;
+            checks.push(("pipe_diameter_m", pipe_diameter_m, usable, "a positive diameter, m"));
+        }
+    }
+    if let WindowRule::Fixed { start_s, end_s } = config.window {
+        checks.push(("start_s", start_s, start_s >= 0.0, "0 s or more after the jump"));
+        checks.push(("end_s", end_s, end_s > start_s, "later than the window's start"));
+    }
+    match checks.into_iter().find(|(_, _, usable, _)| !usable) {
+        Some((name, value, _, expected)) => Err(IdentifyError::Config { name, value, expected }),
+        None => Ok(()),
+    }
+}
+
+fn point(
+    recording: &Recording,
+    position: usize,
+    config: &IdentifyConfig,
+) -> Result<IdentifiedPoint, StepError> {
+    let step = &recording.steps[position];
+    let (start_s, end_s) = (step.start_s, step.end_s);
+    if !(start_s.is_finite() && end_s.is_finite() && start_s < end_s) {
+        return Err(StepError::NoDuration { step: step.index, start_s, end_s });
+    }
+    let mut findings = Findings::new();
+    let state = end_state(recording, step, config, &mut findings)?;
+    let estimate: Estimate = match config.method {
+        Method::Dynamic => dynamic::estimate(recording, position, config, &mut findings),
+        Method::Steady => steady::estimate(recording, position, config, &mut findings),
+    };
+    let interval = |quantity: Option<(f64, Option<EstimateUncertainty>)>| {
+        let (value, uncertainty) = quantity?;
+        Some(confidence_interval_95(value, uncertainty?.combined_standard_error()))
+    };
+    let (eta_interval, h_interval) = (interval(estimate.eta), interval(estimate.h_w_m2k));
+    Ok(IdentifiedPoint {
+        step: step.index,
+        target: step.to,
+        speed_rpm: state.speed_rpm,
+        valve_opening_ratio: step.valve_opening_ratio,
+        flow_kg_s: state.flow_kg_s,
+        flow_corrected_kg_s: config.reference.corrected_flow_kg_s(state.flow_kg_s, state.t1_k, state.p1_pa),
+        speed_corrected_rpm: config.reference.corrected_speed_rpm(state.speed_rpm, state.t1_k),
+        pressure_ratio: state.pressure_ratio,
+        t1_k: state.t1_k,
+        p1_pa: state.p1_pa,
+        eta: estimate.eta.map(|(value, _)| value),
+        eta_low: eta_interval.map(|(low, _)| low),
+        eta_high: eta_interval.map(|(_, high)| high),
+        eta_uncertainty: estimate.eta.and_then(|(_, uncertainty)| uncertainty),
+        h_w_m2k: estimate.h_w_m2k.map(|(value, _)| value),
+        h_low_w_m2k: h_interval.map(|(low, _)| low),
+        h_high_w_m2k: h_interval.map(|(_, high)| high),
+        h_uncertainty: estimate.h_w_m2k.and_then(|(_, uncertainty)| uncertainty),
+        method: config.method,
+        verdict: findings.verdict,
+        warnings: findings.warnings,
+        window: estimate.window,
+        residual_rms_k: estimate.residual_rms_k,
+        dt2_k: estimate.dt2_k,
+        dtc_k: estimate.dtc_k,
+    })
+}

@@ -1,0 +1,144 @@
+//! Conventional mapping: the apparent efficiency from the temperature rise at the end of the step.
+//!
+//! Whatever heat flows between gas and housing counts as work here; the error against the adiabatic efficiency is what
+//! the dynamic method is for (fig. 5 of the paper).
+
+use crate::IdentifyConfig;
+use crate::dynamic::{Estimate, enough};
+use crate::findings::{Findings, code};
+use crate::samples::{Samples, mean};
+use mapper_core::{Channel, EstimateUncertainty, Recording, Window};
+use mapper_physics::compression::isentropic_rise_ratio;
+
+/// Means over the end of a step.
+#[derive(Debug, Clone, Copy)]
+struct Means {
+    t1_k: f64,
+    t2_k: f64,
+    p1_pa: f64,
+    p2_pa: f64,
+}
+
+impl Means {
+    /// `T1 (PR^kappa - 1)/(T2 - T1)` with `kappa = R/cp(T1)`.
+    fn apparent_eta(&self) -> f64 {
+        self.t1_k * isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k) / (self.t2_k - self.t1_k)
+    }
+
+    fn moved(self, channel: Channel, by: f64) -> Self {
+        let mut moved = self;
+        match channel {
+            Channel::T1 => moved.t1_k += by,
+            Channel::T2 => moved.t2_k += by,
+            Channel::P1 => moved.p1_pa += by,
+            _ => moved.p2_pa += by,
+        }
+        moved
+    }
+
+    fn value(&self, channel: Channel) -> f64 {
+        match channel {
+            Channel::T1 => self.t1_k,
+            Channel::T2 => self.t2_k,
+            Channel::P1 => self.p1_pa,
+            _ => self.p2_pa,
+        }
+    }
+}
+
+/// Identifies the step at `position`.
+pub(crate) fn estimate(
+    recording: &Recording,
+    position: usize,
+    config: &IdentifyConfig,
+    findings: &mut Findings,
+) -> Estimate {
+    let mut estimate = Estimate::default();
+    let Some(step) = recording.steps.get(position) else { return estimate };
+    let limits = &config.thresholds;
+    let start_s = (step.end_s - limits.steady_mean_s).max(step.start_s);
+    let window = Window { start_s, end_s: step.end_s };
+    estimate.window = Some(window);
+    let samples = Samples::of(recording, window, config, false);
+    if !enough(&samples, config, findings) {
+        return estimate;
+    }
+    estimate.dt2_k = samples.change(&samples.t2_k, limits.end_mean_s);
+    estimate.dtc_k = samples.change(&samples.tc_k, limits.end_mean_s);
+    let of = |column: &[f64]| mean(column).unwrap_or(f64::NAN);
+    let means = Means {
+        t1_k: of(&samples.t1_k),
+        t2_k: of(&samples.t2_k),
+        p1_pa: of(&samples.p1_pa),
+        p2_pa: of(&samples.p2_pa),
+    };
+    let eta = means.apparent_eta();
+    if !(eta.is_finite() && eta > 0.0) {
+        let message = format!(
+            "T2 - T1 is {:.2} K at a pressure ratio of {:.4}: no efficiency comes of it",
+            means.t2_k - means.t1_k,
+            means.p2_pa / means.p1_pa
+        );
+        findings.refuse(code::NO_COMPRESSION, message);
+        return estimate;
+    }
+    let uncertainty = uncertainty(&means, &samples, config);
+    for (name, change_k) in [("T2", estimate.dt2_k), ("Tc", estimate.dtc_k)] {
+        let seconds = window.end_s - window.start_s - limits.end_mean_s;
+        let Some(change_k) = change_k.filter(|_| seconds > 0.0) else { continue };
+        let drift_k_min = 60.0 * change_k / seconds;
+        if drift_k_min.abs() > limits.steady_drift_k_min {
+            let message = format!(
+                "{name} still drifts by {drift_k_min:+.2} K/min at the step's end (limit {:.2}): the temperatures have not settled",
+                limits.steady_drift_k_min
+            );
+            findings.doubt(code::NOT_SETTLED, message);
+        }
+    }
+    if uncertainty.combined_standard_error() > limits.sigma_eta {
+        let message = format!(
+            "the temperature rise of {:.2} K gives eta with a standard error of {:.1} points",
+            means.t2_k - means.t1_k,
+            100.0 * uncertainty.combined_standard_error()
+        );
+        findings.doubt(code::SMALL_GRADIENT, message);
+    }
+    let message = "apparent efficiency: heat exchanged with the housing counts as work".to_owned();
+    findings.remark(code::APPARENT, message);
+    if config.declared.is_empty() {
+        let message = "no sensor uncertainty was declared: the interval holds noise alone".to_owned();
+        findings.remark(code::NOTHING_DECLARED, message);
+    }
+    estimate.eta = Some((eta, Some(uncertainty)));
+    estimate
+}
+
+/// Noise from the scatter of the samples' own efficiencies (or the declared noise where that is more), offsets and
+/// gains one sensor at a time.
+fn uncertainty(means: &Means, samples: &Samples, config: &IdentifyConfig) -> EstimateUncertainty {
+    let (mut bias_square, mut declared_square) = (0.0, 0.0);
+    for channel in [Channel::T1, Channel::T2, Channel::P1, Channel::P2] {
+        let Some(declared) = config.declared.get(&channel) else { continue };
+        let value = means.value(channel);
+        let step = 1e-5 * value;
+        let slope = (means.moved(channel, step).apparent_eta() - means.moved(channel, -step).apparent_eta())
+            / (2.0 * step);
+        bias_square +=
+            (slope * declared.offset_sigma).powi(2) + (slope * value * declared.gain_sigma_ratio).powi(2);
+        declared_square += (slope * declared.noise_sigma).powi(2);
+    }
+    let etas: Vec<f64> = (0..samples.len())
+        .map(|i| samples.t1_k[i] * samples.rise_ratio[i] / (samples.t2_k[i] - samples.t1_k[i]))
+        .filter(|eta| eta.is_finite())
+        .collect();
+    let n = etas.len() as f64;
+    let centre = mean(&etas).unwrap_or(0.0);
+    let scatter = etas.iter().map(|eta| (eta - centre).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    let share = config.noise_colour.first_order_share_ratio.powi(2);
+    let span_s = samples.t_s.last().copied().unwrap_or(0.0) - samples.t_s.first().copied().unwrap_or(0.0);
+    // Variance of a mean: white noise averages over samples, first-order noise over twice its time constant.
+    let independent = (span_s / (2.0 * config.noise_colour.time_constant_s)).max(1.0);
+    let averaging = (1.0 - share) / n.max(1.0) + share / independent;
+    let noise_square = scatter.max(declared_square) * averaging;
+    EstimateUncertainty { noise_standard_error: noise_square.sqrt(), bias_standard_error: bias_square.sqrt() }
+}

@@ -1,0 +1,25 @@
+//! What can stop the reproduction.
+
+use mapper_identify::{IdentifyError, StepError};
+use mapper_physics::simulate::SimulationError;
+use mapper_physics::steady::SteadyError;
+
+/// Why a figure could not be redone.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ReproduceError {
+    /// A steady state does not exist.
+    #[error(transparent)]
+    Steady(#[from] SteadyError),
+    /// The model could not be integrated.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// The recording could not be identified.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// A step gave no point.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// A run holds no step or no sample in the window.
+    #[error("a simulated run holds nothing to identify")]
+    NoStep,
+}

@@ -1,0 +1,318 @@
+//! The table of quantities and their units.
+
+/// What a value written with a unit measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// Absolute temperature, K inside.
+    Temperature,
+    /// Difference of temperatures (noise, offset), K inside.
+    TemperatureDifference,
+    /// Absolute pressure, Pa inside.
+    Pressure,
+    /// Difference of pressures (noise, offset), Pa inside.
+    PressureDifference,
+    /// Shaft speed, rpm inside.
+    Speed,
+    /// Mass flow, kg/s inside.
+    MassFlow,
+    /// Time, s inside.
+    Duration,
+    /// Length, m inside.
+    Length,
+    /// Area, m2 inside.
+    Area,
+    /// Volume, m3 inside.
+    Volume,
+    /// Mass, kg inside.
+    Mass,
+    /// Moment of inertia, kg m2 inside.
+    Inertia,
+    /// Thermal conductance, W/K inside.
+    Conductance,
+    /// Thermal conductivity, W/(m K) inside.
+    Conductivity,
+    /// Share of a whole, a ratio inside.
+    Fraction,
+    /// Frequency, Hz inside.
+    Frequency,
+    /// Rate of a pressure, Pa/s inside.
+    PressureRate,
+    /// Rate of a temperature, K/s inside.
+    TemperatureRate,
+    /// Rate of a ratio such as a valve opening, 1/s inside.
+    RatioRate,
+}
+
+/// One unit: `inside = (value + zero) * numerator / denominator * 10^decade`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unit {
+    /// Spellings; the first is the one shown to people.
+    pub spellings: &'static [&'static str],
+    /// What is added to a written value before scaling; not 0 for degC and degF alone.
+    pub zero: f64,
+    /// Numerator of the exact factor.
+    pub numerator: f64,
+    /// Denominator of the exact factor.
+    pub denominator: f64,
+    /// Decimal part of the factor; the parser adds it to the written exponent, so that it costs no rounding.
+    pub decade: i32,
+}
+
+impl Unit {
+    /// The spelling shown to people.
+    pub fn symbol(&self) -> &'static str {
+        self.spellings.first().copied().unwrap_or_default()
+    }
+
+    /// A value in this unit, in the unit used inside (SI; rpm for shaft speed).
+    pub fn to_inside(&self, value: f64) -> f64 {
+        // Adding nothing would turn -0 into 0, and a value in the unit used inside has to stay as it is to the bit.
+        let shifted = if self.zero == 0.0 { value } else { value + self.zero };
+        let scaled = shifted * self.numerator / self.denominator;
+        if self.decade < 0 { scaled / 10f64.powi(-self.decade) } else { scaled * 10f64.powi(self.decade) }
+    }
+
+    /// Whether both are the same unit under whatever spelling: `mbar` and `hPa` are.
+    pub fn converts_like(&self, other: &Unit) -> bool {
+        let factors = |unit: &Unit| (unit.zero, unit.numerator, unit.denominator, unit.decade);
+        factors(self) == factors(other)
+    }
+
+    /// A value in the unit used inside, in this unit.
+    pub fn from_inside(&self, inside: f64) -> f64 {
+        let scaled = if self.decade < 0 {
+            inside * 10f64.powi(-self.decade)
+        } else {
+            inside / 10f64.powi(self.decade)
+        };
+        scaled * self.denominator / self.numerator - self.zero
+    }
+}
+
+const fn unit(spellings: &'static [&'static str], numerator: f64, denominator: f64) -> Unit {
+    Unit { spellings, zero: 0.0, numerator, denominator, decade: 0 }
+}
+
+const fn decimal(spellings: &'static [&'static str], decade: i32) -> Unit {
+    Unit { spellings, zero: 0.0, numerator: 1.0, denominator: 1.0, decade }
+}
+
+const TEMPERATURE: &[Unit] = &[
+    decimal(&["K"], 0),
+    Unit { spellings: &["degC", "°C", "℃"], zero: 273.15, numerator: 1.0, denominator: 1.0, decade: 0 },
+    Unit { spellings: &["degF", "°F"], zero: 459.67, numerator: 5.0, denominator: 9.0, decade: 0 },
+    unit(&["degR", "°R"], 5.0, 9.0),
+];
+const TEMPERATURE_DIFFERENCE: &[Unit] = &[decimal(&["K"], 0), decimal(&["mK"], -3)];
+// psi = lb * g / in^2 = 0.45359237 * 9.80665 / 0.0254^2 Pa.
+const PSI_NUMERATOR: f64 = 4.448_221_615_260_5;
+const PSI_DENOMINATOR: f64 = 0.000_645_16;
+const PRESSURE: &[Unit] = &[
+    decimal(&["Pa"], 0),
+    decimal(&["kPa"], 3),
+    decimal(&["hPa"], 2),
+    decimal(&["MPa"], 6),
+    decimal(&["bar"], 5),
+    decimal(&["mbar"], 2),
+    unit(&["atm"], 101_325.0, 1.0),
+    unit(&["psia"], PSI_NUMERATOR, PSI_DENOMINATOR),
+];
+const PRESSURE_DIFFERENCE: &[Unit] = &[
+    decimal(&["Pa"], 0),
+    decimal(&["kPa"], 3),
+    decimal(&["hPa"], 2),
+    decimal(&["bar"], 5),
+    decimal(&["mbar"], 2),
+    unit(&["psi"], PSI_NUMERATOR, PSI_DENOMINATOR),
+];
+const SPEED: &[Unit] = &[
+    decimal(&["rpm", "1/min", "min^-1", "rev/min"], 0),
+    decimal(&["krpm"], 3),
+    unit(&["Hz", "1/s", "rev/s"], 60.0, 1.0),
+    unit(&["rad/s"], 30.0, std::f64::consts::PI),
+];
+const MASS_FLOW: &[Unit] = &[
+    decimal(&["kg/s"], 0),
+    decimal(&["g/s"], -3),
+    unit(&["kg/min"], 1.0, 60.0),
+    unit(&["kg/h", "kg/hr"], 1.0, 3600.0),
+    unit(&["lb/s"], 0.453_592_37, 1.0),
+    unit(&["lb/min"], 0.453_592_37, 60.0),
+];
+const DURATION: &[Unit] =
+    &[decimal(&["s"], 0), decimal(&["ms"], -3), unit(&["min"], 60.0, 1.0), unit(&["h"], 3600.0, 1.0)];
+const LENGTH: &[Unit] = &[
+    decimal(&["m"], 0),
+    decimal(&["mm"], -3),
+    decimal(&["cm"], -2),
+    decimal(&["um", "µm", "μm"], -6),
+    unit(&["in"], 0.0254, 1.0),
+];
+const AREA: &[Unit] = &[
+    decimal(&["m^2", "m2", "m²"], 0),
+    decimal(&["cm^2", "cm2", "cm²"], -4),
+    decimal(&["mm^2", "mm2", "mm²"], -6),
+];
+const VOLUME: &[Unit] =
+    &[decimal(&["m^3", "m3", "m³"], 0), decimal(&["cm^3", "cm3", "cm³"], -6), decimal(&["L", "l"], -3)];
+const MASS: &[Unit] = &[decimal(&["kg"], 0), decimal(&["g"], -3), unit(&["lb"], 0.453_592_37, 1.0)];
+const INERTIA: &[Unit] = &[
+    decimal(&["kg m^2", "kg m2", "kg m²", "kg*m^2"], 0),
+    decimal(&["kg mm^2", "kg mm2", "kg mm²", "kg*mm^2"], -6),
+    decimal(&["g cm^2", "g cm2", "g cm²", "g*cm^2"], -7),
+];
+const CONDUCTANCE: &[Unit] = &[decimal(&["W/K"], 0)];
+const CONDUCTIVITY: &[Unit] = &[decimal(&["W/(m K)", "W/(m*K)", "W/m/K", "W/(K m)"], 0)];
+const FRACTION: &[Unit] = &[decimal(&["%"], -2), decimal(&["ppm"], -6)];
+const FREQUENCY: &[Unit] = &[decimal(&["Hz", "1/s"], 0), decimal(&["kHz"], 3)];
+const PRESSURE_RATE: &[Unit] = &[decimal(&["Pa/s"], 0), decimal(&["kPa/s"], 3), decimal(&["bar/s"], 5)];
+const TEMPERATURE_RATE: &[Unit] = &[decimal(&["K/s"], 0), unit(&["K/min"], 1.0, 60.0)];
+const RATIO_RATE: &[Unit] = &[decimal(&["1/s"], 0), decimal(&["%/s"], -2)];
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Kind; 19] = [
+        Kind::Temperature,
+        Kind::TemperatureDifference,
+        Kind::Pressure,
+        Kind::PressureDifference,
+        Kind::Speed,
+        Kind::MassFlow,
+        Kind::Duration,
+        Kind::Length,
+        Kind::Area,
+        Kind::Volume,
+        Kind::Mass,
+        Kind::Inertia,
+        Kind::Conductance,
+        Kind::Conductivity,
+        Kind::Fraction,
+        Kind::Frequency,
+        Kind::PressureRate,
+        Kind::TemperatureRate,
+        Kind::RatioRate,
+    ];
+
+    /// Stable key, as it stands in the schema's `x-quantity`.
+    pub fn key(self) -> &'static str {
+        self.row().0
+    }
+
+    /// The kind with that key.
+    pub fn from_key(key: &str) -> Option<Kind> {
+        Kind::ALL.into_iter().find(|kind| kind.key() == key)
+    }
+
+    /// Name with its article, for messages.
+    pub fn name(self) -> &'static str {
+        self.row().1
+    }
+
+    /// A value as one would write it.
+    pub fn example(self) -> &'static str {
+        self.row().2
+    }
+
+    /// The units that may be written; the first of them is the unit used inside, but for fractions.
+    pub fn units(self) -> &'static [Unit] {
+        self.row().3
+    }
+
+    /// The unit with that spelling. Runs of blanks count as one.
+    pub fn unit(self, spelling: &str) -> Option<&'static Unit> {
+        let spelling = spelling.split_whitespace().collect::<Vec<_>>().join(" ");
+        self.units().iter().find(|unit| unit.spellings.contains(&spelling.as_str()))
+    }
+
+    /// The symbols of all units, for messages.
+    pub fn unit_list(self) -> String {
+        self.units().iter().map(Unit::symbol).collect::<Vec<_>>().join(", ")
+    }
+
+    fn row(self) -> (&'static str, &'static str, &'static str, &'static [Unit]) {
+        match self {
+            Kind::Temperature => ("temperature", "a temperature", "25 degC", TEMPERATURE),
+            Kind::TemperatureDifference => {
+                ("temperature_difference", "a temperature difference", "0.25 K", TEMPERATURE_DIFFERENCE)
+            }
+            Kind::Pressure => ("pressure", "an absolute pressure", "100 kPa", PRESSURE),
+            Kind::PressureDifference => {
+                ("pressure_difference", "a pressure difference", "50 Pa", PRESSURE_DIFFERENCE)
+            }
+            Kind::Speed => ("speed", "a shaft speed", "110 krpm", SPEED),
+            Kind::MassFlow => ("mass_flow", "a mass flow", "1.5e-4 kg/s", MASS_FLOW),
+            Kind::Duration => ("duration", "a time", "10 s", DURATION),
+            Kind::Length => ("length", "a length", "35 mm", LENGTH),
+            Kind::Area => ("area", "an area", "29e-3 m^2", AREA),
+            Kind::Volume => ("volume", "a volume", "0.78e-3 m^3", VOLUME),
+            Kind::Mass => ("mass", "a mass", "0.93 kg", MASS),
+            Kind::Inertia => ("inertia", "a moment of inertia", "16e-6 kg m^2", INERTIA),
+            Kind::Conductance => ("conductance", "a thermal conductance", "8 W/K", CONDUCTANCE),
+            Kind::Conductivity => ("conductivity", "a thermal conductivity", "47.5 W/(m K)", CONDUCTIVITY),
+            Kind::Fraction => ("fraction", "a share", "0.5 %", FRACTION),
+            Kind::Frequency => ("frequency", "a frequency", "10 Hz", FREQUENCY),
+            Kind::PressureRate => ("pressure_rate", "a rate of pressure", "100 kPa/s", PRESSURE_RATE),
+            Kind::TemperatureRate => ("temperature_rate", "a rate of temperature", "5 K/s", TEMPERATURE_RATE),
+            Kind::RatioRate => ("ratio_rate", "a rate of opening", "1 1/s", RATIO_RATE),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_and_spellings_are_unambiguous_and_examples_parse() {
+        for kind in Kind::ALL {
+            assert_eq!(Kind::from_key(kind.key()), Some(kind));
+            assert!(crate::parse(kind, kind.example()).is_ok(), "{}", kind.example());
+            let spellings: Vec<_> = kind.units().iter().flat_map(|unit| unit.spellings).collect();
+            let distinct: std::collections::BTreeSet<_> = spellings.iter().collect();
+            assert_eq!(spellings.len(), distinct.len(), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn conversion_to_a_unit_and_back_is_the_identity() {
+        for unit in Kind::ALL.iter().flat_map(|kind| kind.units()) {
+            for value in [0.0, 1.0, 13.95, 545.0] {
+                // Three roundings each way; degF adds 460 to a value near 0.
+                assert!((unit.from_inside(unit.to_inside(value)) - value).abs() < 1e-12 * (500.0 + value));
+            }
+        }
+    }
+
+    #[test]
+    fn the_unit_used_inside_leaves_every_bit_as_it_is() {
+        for unit in Kind::ALL.iter().flat_map(|kind| kind.units()) {
+            if unit.converts_like(&decimal(&[], 0)) {
+                for value in [-0.0, 0.1, 98_100.123_456_789, 5e-324, f64::MAX] {
+                    assert_eq!(unit.to_inside(value).to_bits(), value.to_bits(), "{} {value}", unit.symbol());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn factors_agree_with_the_definitions_of_the_units() {
+        // NIST SP 811, appendix B.8, as printed there (6 or 7 digits, hence the tolerance).
+        let printed = [
+            (Kind::Pressure, "psia", 6_894.757),
+            (Kind::Pressure, "atm", 101_325.0),
+            (Kind::MassFlow, "lb/min", 7.559_873e-3),
+            (Kind::Length, "in", 2.54e-2),
+            (Kind::Mass, "lb", 4.535_924e-1),
+            (Kind::Speed, "rad/s", 1.0 / 1.047_198e-1),
+        ];
+        for (kind, symbol, factor) in printed {
+            let ours = kind.unit(symbol).unwrap().to_inside(1.0);
+            assert!((ours / factor - 1.0).abs() < 5e-7, "{symbol}: {ours} against {factor}");
+        }
+        // Water boils at 212 degF = 671.67 degR = 100 degC = 373.15 K.
+        for (symbol, value) in [("degF", 212.0), ("degR", 671.67), ("degC", 100.0), ("K", 373.15)] {
+            let ours = Kind::Temperature.unit(symbol).unwrap().to_inside(value);
+            assert!((ours - 373.15).abs() < 1e-10, "{symbol}: {ours}");
+        }
+    }
+}

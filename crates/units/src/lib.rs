@@ -1,0 +1,20 @@
+//! Values written with units: the one table of what may be written, its parsing, and [`Quantity`].
+//!
+//! Decimal prefixes are added to the written exponent, so that `1.1 bar` is the `f64` nearest to 110000 and
+//! `52 mm` equals `52e-3`; the few other factors are exact definitions. A units library multiplies by a rounded
+//! factor, has no name for `krpm`, and parses only its own spellings; this table is short enough to be read against
+//! the definitions of its units.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod kind;
+mod parse;
+mod quantity;
+
+pub use kind::{Kind, Unit};
+pub use parse::{UnitError, parse, parse_with};
+pub use quantity::{
+    Area, Conductance, Conductivity, Dimension, Duration, Fraction, Frequency, Inertia, Length, Mass,
+    MassFlow, Pressure, PressureDifference, PressureRate, Quantity, RatioRate, Speed, Temperature,
+    TemperatureDifference, TemperatureRate, Volume,
+};

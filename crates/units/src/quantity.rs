@@ -1,0 +1,129 @@
+//! A value of a known kind, as it stands in the YAML.
+
+use super::{Kind, parse};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Deserializer, de};
+use std::{borrow::Cow, marker::PhantomData};
+
+/// Ties a type to its row in the table of units.
+pub trait Dimension {
+    /// The row.
+    const KIND: Kind;
+}
+
+macro_rules! dimensions {
+    ($($(#[$doc:meta])* $name:ident),+ $(,)?) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub enum $name {}
+        impl Dimension for $name {
+            const KIND: Kind = Kind::$name;
+        }
+    )+};
+}
+
+dimensions! {
+    /// Absolute temperature.
+    Temperature,
+    /// Difference of temperatures.
+    TemperatureDifference,
+    /// Absolute pressure.
+    Pressure,
+    /// Difference of pressures.
+    PressureDifference,
+    /// Shaft speed.
+    Speed,
+    /// Mass flow.
+    MassFlow,
+    /// Time.
+    Duration,
+    /// Length.
+    Length,
+    /// Area.
+    Area,
+    /// Volume.
+    Volume,
+    /// Mass.
+    Mass,
+    /// Moment of inertia.
+    Inertia,
+    /// Thermal conductance.
+    Conductance,
+    /// Thermal conductivity.
+    Conductivity,
+    /// Share of a whole.
+    Fraction,
+    /// Frequency.
+    Frequency,
+    /// Rate of a pressure.
+    PressureRate,
+    /// Rate of a temperature.
+    TemperatureRate,
+    /// Rate of a ratio.
+    RatioRate,
+}
+
+/// A value written with its unit, e.g. `110 krpm`.
+///
+/// In the schema it is a string with a pattern, an example and `x-quantity`, the kind's key. A field narrows its
+/// range with `x-min`, `x-max` (both inclusive) and `x-above` (exclusive), written with units as well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantity<D> {
+    /// The value in the unit used inside: SI, but rpm for shaft speed.
+    pub inside: f64,
+    dimension: PhantomData<D>,
+}
+
+impl<D: Dimension> Quantity<D> {
+    /// From a value in the unit used inside.
+    pub fn from_inside(inside: f64) -> Self {
+        Quantity { inside, dimension: PhantomData }
+    }
+}
+
+impl<'de, D: Dimension> Deserialize<'de> for Quantity<D> {
+    fn deserialize<S: Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
+        let text = String::deserialize(deserializer)?;
+        parse(D::KIND, &text)
+            .map(Self::from_inside)
+            .map_err(|error| de::Error::custom(format!("{error}; {}", error.remedy(D::KIND))))
+    }
+}
+
+impl<D: Dimension> JsonSchema for Quantity<D> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        D::KIND.key().into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "type": "string",
+            "pattern": pattern(D::KIND),
+            "examples": [D::KIND.example()],
+            "x-quantity": D::KIND.key(),
+        })
+    }
+}
+
+/// A regular expression for editors; the parser decides.
+fn pattern(kind: Kind) -> String {
+    let units: Vec<String> =
+        kind.units().iter().flat_map(|unit| unit.spellings).map(|spelling| escape(spelling)).collect();
+    format!(r"^\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*({})\s*$", units.join("|"))
+}
+
+fn escape(spelling: &str) -> String {
+    let mut escaped = String::new();
+    for c in spelling.chars() {
+        match c {
+            ' ' => escaped.push_str(r"\s+"),
+            '^' | '*' | '(' | ')' | '/' => escaped.extend(['\\', c]),
+            _ => escaped.push(c),
+        }
+    }
+    escaped
+}

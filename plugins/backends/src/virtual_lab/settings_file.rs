@@ -1,0 +1,310 @@
+//! The lab's settings as a campaign writes them below `backend: {virtual_lab: ...}`.
+
+use super::actuator::ActuatorDynamics;
+use super::lab::NAME;
+use super::sensor::SensorErrors;
+use super::settings::{LabSettings, Start};
+use mapper_core::{BackendError, Channel, DeclaredUncertainty};
+use mapper_physics::model::Model;
+use mapper_physics::params::{BoundaryConditions, Params};
+use mapper_units::{
+    Conductance, Dimension, Duration, Fraction, Frequency, Kind, Length, PressureRate, Quantity, RatioRate,
+    Speed, TemperatureRate,
+};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// What the campaign declares; the lab deviates from it as its settings say.
+#[derive(Debug, Clone)]
+pub struct NominalRig {
+    /// The machine as declared.
+    pub model: Model,
+    /// Boundary conditions as declared.
+    pub boundary: BoundaryConditions,
+    /// The campaign's speed limit, rpm.
+    pub speed_max_rpm: f64,
+    /// Declared one-sigma uncertainty of each sensor.
+    pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
+    /// Seed of all noise and of the offsets that are drawn.
+    pub seed: u64,
+}
+
+/// The keys below `virtual_lab`. Everything may be left out.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct SettingsFile {
+    /// Samples per second; 10 Hz where left out.
+    sample_rate: Option<Quantity<Frequency>>,
+    /// `standstill` (cold, the default) or `settled` (long at the first setpoints).
+    start: StartName,
+    /// `declared` (the default) or `none`.
+    noise: NoiseName,
+    /// `drawn` from the declared uncertainty (the default), or `none`.
+    offsets: OffsetsName,
+    /// Offsets of single channels, in their own units, instead of drawn ones.
+    offset_of: BTreeMap<Channel, String>,
+    /// How the actuators follow.
+    actuators: ActuatorsFile,
+    /// Where the true machine differs from the declared one.
+    machine: MachineFile,
+    /// Shaft speed at which the lab cuts its own air; 1.1 times the campaign's limit where left out.
+    trip_speed: Option<Quantity<Speed>>,
+    /// Swing of the flow in surge; 8 % where left out.
+    surge_swing: Option<Quantity<Fraction>>,
+}
+
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum StartName {
+    #[default]
+    Standstill,
+    Settled,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum NoiseName {
+    #[default]
+    Declared,
+    None,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum OffsetsName {
+    #[default]
+    Drawn,
+    None,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct ActuatorsFile {
+    turbine_inlet_pressure: ActuatorFile<PressureRate>,
+    turbine_inlet_temperature: ActuatorFile<TemperatureRate>,
+    valve: ActuatorFile<RatioRate>,
+    oil_temperature: ActuatorFile<TemperatureRate>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, default, bound(deserialize = ""))]
+struct ActuatorFile<Rate: Dimension> {
+    lag: Option<Quantity<Duration>>,
+    slew: Option<Quantity<Rate>>,
+}
+
+impl<Rate: Dimension> Default for ActuatorFile<Rate> {
+    fn default() -> Self {
+        ActuatorFile { lag: None, slew: None }
+    }
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct MachineFile {
+    /// True share of the internal area before compression, alpha_A.
+    alpha_area: Option<f64>,
+    /// True diameter of the T2 probe.
+    probe_diameter: Option<Quantity<Length>>,
+    /// True conductance to the oil.
+    oil_conductance: Option<Quantity<Conductance>>,
+}
+
+/// Shares of white and of first-order noise (2 s) in the declared standard deviation: 0.8 and 0.6 in quadrature.
+const WHITE_SHARE: f64 = 0.8;
+const COLOURED_SHARE: f64 = 0.6;
+const COLOURED_TIME_CONSTANT_S: f64 = 2.0;
+
+/// Reads a campaign's settings for the virtual lab.
+///
+/// # Errors
+/// [`BackendError::Settings`] with the key that is wrong and what would be right.
+pub fn read_settings(settings: &serde_json::Value, nominal: NominalRig) -> Result<LabSettings, BackendError> {
+    let file: SettingsFile = match settings {
+        serde_json::Value::Null => SettingsFile::default(),
+        settings => SettingsFile::deserialize(settings).map_err(|error| wrong("", error.to_string()))?,
+    };
+    let params = &nominal.model.params;
+    let model = Model { params: true_params(*params, &file.machine)?, map: nominal.model.map.clone() };
+    let sample_rate_hz = file.sample_rate.map_or(10.0, |rate| rate.inside);
+    if !(0.1..=1000.0).contains(&sample_rate_hz) {
+        let message = format!("{sample_rate_hz} Hz is not between 0.1 and 1000 Hz");
+        return Err(wrong("sample_rate", message));
+    }
+    let surge_swing_ratio = file.surge_swing.map_or(0.08, |swing| swing.inside);
+    if !(0.0..=1.0).contains(&surge_swing_ratio) {
+        return Err(wrong("surge_swing", "write a share between 0 % and 100 %".to_owned()));
+    }
+    let actuators = &file.actuators;
+    Ok(LabSettings {
+        model,
+        cell: nominal.boundary,
+        sample_rate_hz,
+        start: match file.start {
+            StartName::Standstill => Start::Standstill,
+            StartName::Settled => Start::Settled,
+        },
+        p3_actuator: actuators.turbine_inlet_pressure.dynamics("turbine_inlet_pressure", 0.3, 200e3)?,
+        t3_actuator: actuators.turbine_inlet_temperature.dynamics("turbine_inlet_temperature", 20.0, 10.0)?,
+        valve_actuator: actuators.valve.dynamics("valve", 0.2, 1.0)?,
+        oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", 30.0, 1.0)?,
+        sensors: sensors(&file, &nominal)?,
+        trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.inside),
+        surge_swing_ratio,
+        seed: nominal.seed,
+    })
+}
+
+impl<Rate: Dimension> ActuatorFile<Rate> {
+    fn dynamics(&self, name: &str, lag_s: f64, slew_per_s: f64) -> Result<ActuatorDynamics, BackendError> {
+        let lag_s = self.lag.map_or(lag_s, |lag| lag.inside);
+        let slew_per_s = self.slew.as_ref().map_or(slew_per_s, |slew| slew.inside);
+        if !(0.0..=3600.0).contains(&lag_s) {
+            return Err(wrong(&format!("actuators.{name}.lag"), format!("{lag_s} s is not between 0 s and 1 h")));
+        }
+        if slew_per_s <= 0.0 {
+            return Err(wrong(&format!("actuators.{name}.slew"), "the rate must be above 0".to_owned()));
+        }
+        Ok(ActuatorDynamics { lag_s, slew_per_s })
+    }
+}
+
+fn true_params(mut params: Params, file: &MachineFile) -> Result<Params, BackendError> {
+    if let Some(alpha) = file.alpha_area {
+        if !(0.0..=1.0).contains(&alpha) {
+            return Err(wrong("machine.alpha_area", format!("{alpha} is not between 0 and 1")));
+        }
+        params.compressor.alpha_area_ratio = alpha;
+    }
+    if let Some(diameter) = file.probe_diameter {
+        if !(0.0..=0.02).contains(&diameter.inside) {
+            return Err(wrong("machine.probe_diameter", "write a diameter between 0 mm and 20 mm".to_owned()));
+        }
+        params.t2_probe_diameter_m = diameter.inside;
+    }
+    if let Some(conductance) = file.oil_conductance {
+        if conductance.inside < 0.0 {
+            return Err(wrong("machine.oil_conductance", "the conductance must not be negative".to_owned()));
+        }
+        params.bearing.oil_conductance_w_k = conductance.inside;
+    }
+    Ok(params)
+}
+
+fn sensors(
+    file: &SettingsFile,
+    nominal: &NominalRig,
+) -> Result<BTreeMap<Channel, SensorErrors>, BackendError> {
+    let noise = if file.noise == NoiseName::Declared { 1.0 } else { 0.0 };
+    let mut sensors: BTreeMap<Channel, SensorErrors> = nominal
+        .sensors
+        .iter()
+        .map(|(channel, declared)| {
+            let (offset, gain) = match file.offsets {
+                OffsetsName::Drawn => draw(nominal.seed, *channel),
+                OffsetsName::None => (0.0, 0.0),
+            };
+            let errors = SensorErrors {
+                white_sigma: noise * WHITE_SHARE * declared.noise_sigma,
+                coloured_sigma: noise * COLOURED_SHARE * declared.noise_sigma,
+                coloured_time_constant_s: COLOURED_TIME_CONSTANT_S,
+                offset: offset * declared.offset_sigma,
+                gain_ratio: gain * declared.gain_sigma_ratio,
+            };
+            (*channel, errors)
+        })
+        .collect();
+    for (channel, text) in &file.offset_of {
+        let offset = mapper_units::parse(offset_kind(*channel), text)
+            .map_err(|error| wrong(&format!("offset_of.{channel}"), error.to_string()))?;
+        sensors.entry(*channel).or_default().offset = offset;
+    }
+    Ok(sensors)
+}
+
+/// Two standard normal numbers that belong to one sensor of one seed: for its offset and for its gain.
+fn draw(seed: u64, channel: Channel) -> (f64, f64) {
+    // Another stream than the sensor's noise: that one starts from the same seed with other multipliers.
+    let mixed = seed.wrapping_mul(0xA24B_AED4_963E_E407) ^ (channel as u64 + 1).wrapping_mul(0x9FB2_1C65_1E98_DF25);
+    let mut random = Pcg64::seed_from_u64(mixed);
+    (StandardNormal.sample(&mut random), StandardNormal.sample(&mut random))
+}
+
+fn offset_kind(channel: Channel) -> Kind {
+    match channel.info().dimension {
+        mapper_core::Dimension::RotationalSpeed => Kind::Speed,
+        mapper_core::Dimension::MassFlow => Kind::MassFlow,
+        mapper_core::Dimension::Pressure => Kind::PressureDifference,
+        mapper_core::Dimension::Temperature => Kind::TemperatureDifference,
+        mapper_core::Dimension::Ratio => Kind::Fraction,
+    }
+}
+
+fn wrong(path: &str, message: String) -> BackendError {
+    BackendError::Settings { backend: NAME.to_owned(), path: path.to_owned(), message }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn nominal() -> NominalRig {
+        let declared = DeclaredUncertainty { noise_sigma: 0.1, offset_sigma: 0.25, gain_sigma_ratio: 0.0 };
+        NominalRig {
+            model: Model::nominal(),
+            boundary: BoundaryConditions::default(),
+            speed_max_rpm: 180e3,
+            sensors: [(Channel::T1, declared), (Channel::T2, declared)].into(),
+            seed: 5,
+        }
+    }
+
+    #[test]
+    fn settings_say_how_the_lab_differs_from_the_declared_rig() {
+        let settings = json!({
+            "sample_rate": "20 Hz", "start": "settled", "noise": "none", "offset_of": {"T2": "0.3 K"},
+            "actuators": {"turbine_inlet_pressure": {"lag": "0.5 s", "slew": "20 kPa/s"}},
+            "machine": {"alpha_area": 0.2, "probe_diameter": "1.5 mm"},
+        });
+        let lab = read_settings(&settings, nominal()).unwrap();
+        assert_eq!(lab.sample_rate_hz, 20.0);
+        assert_eq!(lab.p3_actuator, ActuatorDynamics { lag_s: 0.5, slew_per_s: 20e3 });
+        assert_eq!(lab.model.params.compressor.alpha_area_ratio, 0.2);
+        assert_eq!(lab.model.params.t2_probe_diameter_m, 1.5e-3);
+        assert_eq!(lab.sensors[&Channel::T2].offset, 0.3);
+        assert_eq!(lab.sensors[&Channel::T2].white_sigma, 0.0);
+    }
+
+    #[test]
+    fn drawn_offsets_scatter_as_declared_and_belong_to_seed_and_channel() {
+        let offsets: Vec<f64> = (0..2000)
+            .map(|seed| {
+                let lab = read_settings(&json!({}), NominalRig { seed, ..nominal() }).unwrap();
+                assert_ne!(lab.sensors[&Channel::T1].offset, lab.sensors[&Channel::T2].offset);
+                lab.sensors[&Channel::T2].offset
+            })
+            .collect();
+        let rms = (offsets.iter().map(|offset| offset * offset).sum::<f64>() / 2000.0).sqrt();
+        // A standard deviation from 2000 draws is known to 1.6 %.
+        assert!((rms / 0.25 - 1.0).abs() < 0.06, "{rms}");
+    }
+
+    #[test]
+    fn mistakes_name_their_key() {
+        for (settings, expected) in [
+            (json!({"sampel_rate": "10 Hz"}), "sampel_rate"),
+            (json!({"sample_rate": "10"}), "lacks its unit"),
+            (json!({"sample_rate": "0 Hz"}), "sample_rate"),
+            (json!({"machine": {"alpha_area": 2}}), "machine.alpha_area"),
+            (json!({"offset_of": {"T2": "1 kPa"}}), "offset_of.T2"),
+            (json!({"actuators": {"valve": {"slew": "0 1/s"}}}), "actuators.valve.slew"),
+        ] {
+            let error = read_settings(&settings, nominal()).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

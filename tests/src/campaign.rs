@@ -1,0 +1,62 @@
+//! Campaign files: the shipped one, and shorter or longer ones made from it.
+
+use crate::repository;
+use std::path::{Path, PathBuf};
+
+/// The shipped campaign, as a user names it in the root of the repository.
+pub const SHIPPED: &str = "campaigns/turbo_a.yaml";
+
+/// Four points instead of all: parts of the shipped campaign and what to put in their place.
+pub const SHORT_GRID: &[(&str, &str)] = &[
+    (
+        "speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]",
+        "speeds: [80 krpm, 125 krpm]",
+    ),
+    ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.4]"),
+    ("warm_up: 10 min ", "warm_up: 60 s "),
+];
+
+/// A campaign file in a directory of its own.
+#[derive(Debug)]
+pub struct CampaignFile {
+    /// The file.
+    pub path: PathBuf,
+    /// What is in it.
+    pub text: String,
+    directory: tempfile::TempDir,
+}
+
+impl CampaignFile {
+    /// The shipped campaign with parts replaced, each of which must be in it once.
+    pub fn shipped_with(replacements: &[(&str, &str)]) -> Self {
+        let mut text = std::fs::read_to_string(repository().join(SHIPPED)).unwrap();
+        for (old, new) in replacements {
+            assert_eq!(text.matches(old).count(), 1, "`{old}` in the shipped campaign");
+            text = text.replace(old, new);
+        }
+        Self::of(text)
+    }
+
+    /// A campaign file with this text.
+    pub fn of(text: String) -> Self {
+        let directory = crate::scratch();
+        let path = directory.path().join("campaign.yaml");
+        std::fs::write(&path, &text).unwrap();
+        CampaignFile { path, text, directory }
+    }
+
+    /// A directory for runs of this campaign, beside it; not made yet.
+    pub fn runs(&self) -> PathBuf {
+        self.directory.path().join("runs")
+    }
+
+    /// The number of the line, from 1, that holds `part`.
+    pub fn line_of(&self, part: &str) -> usize {
+        1 + self.text.lines().position(|line| line.contains(part)).expect(part)
+    }
+
+    /// The file's directory.
+    pub fn directory(&self) -> &Path {
+        self.directory.path()
+    }
+}

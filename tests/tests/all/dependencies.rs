@@ -1,0 +1,149 @@
+//! Dependencies point down only.
+
+use cargo_metadata::{DependencyKind, MetadataCommand, Package};
+use std::collections::BTreeMap;
+
+/// What each package of this workspace may use of the others. A package that is not here fails the test: a new one
+/// gets its row. The order is that of the layers, lowest first.
+#[rustfmt::skip]
+const ALLOWED: &[(&str, &[&str])] = &[
+    ("mapper-units",     &[]),
+    ("mapper-core",      &[]),
+    ("mapper-chart",     &[]),
+    ("mapper-physics",   &["core"]),
+    ("mapper-campaign",  &["core", "physics", "units"]),
+    ("mapper-planner",   &["core", "physics"]),
+    ("mapper-runner",    &["core"]),
+    ("mapper-record",    &["core", "units"]),
+    ("mapper-identify",  &["core", "physics"]),
+    ("mapper-assemble",  &["core", "identify"]),
+    ("mapper-score",     &["core", "record"]),
+    ("mapper-reproduce", &["core", "physics", "identify", "chart"]),
+    // Plug-ins never see each other.
+    ("mapper-backends",  &["core", "physics", "units"]),
+    ("mapper-exporters", &["core", "physics", "chart"]),
+    // The program sees all; nothing sees the program.
+    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "record", "identify", "assemble", "score", "reproduce", "backends", "exporters"]),
+    // Tests run the program and read its files; chores know nothing of it.
+    ("mapper-tests",     &["core", "record"]),
+    ("xtask",            &[]),
+];
+
+/// Tests may use more than what they test, but what works from recordings alone is tested from recordings alone.
+const NEVER_IN_TESTS: &[(&str, &[&str])] = &[
+    ("mapper-identify", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
+    ("mapper-assemble", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
+    ("mapper-drift", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
+];
+
+/// Libraries that only some packages may use.
+const RESTRICTED: &[(&str, &[&str], &str)] = &[(
+    "serde_yaml",
+    &["mapper-campaign", "mapper-record"],
+    "it is archived, so that it must stay easy to replace",
+)];
+
+/// One edge: who uses whom, and whether in tests alone.
+#[derive(Clone, Copy)]
+struct Edge<'a> {
+    from: &'a str,
+    to: &'a str,
+    in_tests_alone: bool,
+}
+
+/// What is wrong with an edge; `None` for a right one.
+fn complaint(edge: Edge<'_>) -> Option<String> {
+    let Edge { from, to, in_tests_alone } = edge;
+    if let Some((_, users, why)) = RESTRICTED.iter().find(|(name, ..)| *name == to) {
+        let right = users.contains(&from);
+        return (!right).then(|| format!("{from} -> {to}: only {} may use {to}: {why}", users.join(" and ")));
+    }
+    let row = |table: &'static [(&str, &'static [&'static str])]| {
+        table.iter().find(|(name, _)| *name == from).map(|(_, others)| *others)
+    };
+    let own = |name: &str| name.starts_with("mapper-") || name == "xtask";
+    if !own(to) {
+        return None;
+    }
+    if in_tests_alone && from != "mapper-tests" {
+        let never = row(NEVER_IN_TESTS).unwrap_or_default();
+        return never.contains(&to).then(|| {
+            format!("{from} -> {to} (in tests): {from} works from recordings alone, its tests too; write test data without {to}")
+        });
+    }
+    let short = to.strip_prefix("mapper-").unwrap_or(to);
+    let allowed = row(ALLOWED)?;
+    (!allowed.contains(&short)).then(|| {
+        let list = if allowed.is_empty() { "no other package".to_owned() } else { allowed.join(", ") };
+        format!("{from} -> {to}: dependencies point down only; {from} may use {list}")
+    })
+}
+
+fn edges(packages: &[Package]) -> impl Iterator<Item = Edge<'_>> {
+    packages.iter().flat_map(|package| {
+        package.dependencies.iter().map(|dependency| Edge {
+            from: &package.name,
+            to: &dependency.name,
+            in_tests_alone: dependency.kind == DependencyKind::Development,
+        })
+    })
+}
+
+fn workspace_packages() -> Vec<Package> {
+    let manifest = mapper_tests::repository().join("Cargo.toml");
+    // Without dependencies of dependencies: nothing has to be downloaded, and the rule is about direct edges.
+    let metadata = MetadataCommand::new().manifest_path(manifest).no_deps().exec().unwrap();
+    metadata.packages
+}
+
+#[test]
+fn dependencies_point_down_only() {
+    let packages = workspace_packages();
+    let wrong: Vec<String> = edges(&packages).filter_map(complaint).collect();
+    assert!(wrong.is_empty(), "\n{}\nThe table is in {}.", wrong.join("\n"), file!());
+}
+
+#[test]
+fn every_package_has_its_row() {
+    let packages = workspace_packages();
+    assert!(packages.len() > 10, "only {} packages were found", packages.len());
+    for package in &packages {
+        let rows = ALLOWED.iter().filter(|(name, _)| *name == package.name.as_str()).count();
+        assert_eq!(rows, 1, "{} needs one row in the table of {}", package.name, file!());
+    }
+}
+
+#[test]
+fn the_table_itself_has_no_circle() {
+    let allowed: BTreeMap<&str, &[&str]> =
+        ALLOWED.iter().map(|(name, others)| (name.strip_prefix("mapper-").unwrap_or(name), *others)).collect();
+    let mut done: Vec<&str> = Vec::new();
+    // Packages whose own packages are all done, until none is left.
+    while done.len() < allowed.len() {
+        let next = allowed
+            .iter()
+            .find(|(name, others)| !done.contains(name) && others.iter().all(|other| done.contains(other)))
+            .map(|(name, _)| *name);
+        done.push(next.expect("a circle, or a name without a row"));
+    }
+}
+
+#[test]
+fn wrong_edges_are_seen_and_named() {
+    let edge = |from, to, in_tests_alone| complaint(Edge { from, to, in_tests_alone });
+    let upward = edge("mapper-core", "mapper-physics", false).unwrap();
+    assert!(upward.contains("mapper-core -> mapper-physics") && upward.contains("point down"), "{upward}");
+    for (from, to) in [
+        ("mapper-identify", "mapper-backends"),
+        ("mapper-runner", "mapper-cli"),
+        ("mapper-exporters", "mapper-backends"),
+        ("mapper-physics", "serde_yaml"),
+        ("mapper-tests", "mapper-cli"),
+    ] {
+        assert!(edge(from, to, false).is_some(), "{from} -> {to}");
+    }
+    assert!(edge("mapper-identify", "mapper-backends", true).is_some());
+    assert!(edge("mapper-tests", "mapper-physics", true).is_some());
+    assert!(edge("mapper-runner", "mapper-backends", true).is_none());
+    assert!(edge("mapper-core", "serde", false).is_none());
+}

@@ -1,0 +1,15 @@
+//! The program as a user runs it, and the rules of the source tree.
+//!
+//! Tests that need Python are marked ignored, and shown so, where `cargo xtask test` has not prepared it.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod dependencies;
+mod full_disk;
+mod help;
+mod interrupted;
+mod mistakes;
+mod pipes;
+mod recordings;
+mod shipped_campaign;
+mod sources;

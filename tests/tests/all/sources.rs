@@ -1,0 +1,72 @@
+//! Rules of the source tree that the compiler does not know.
+
+use std::path::{Path, PathBuf};
+
+/// A word, and where it may be written.
+struct Rule {
+    /// In two parts, so that this file does not hold it.
+    word: (&'static str, &'static str),
+    places: &'static [&'static str],
+    why: &'static str,
+}
+
+const RULES: &[Rule] = &[
+    Rule {
+        word: ("read_", "truth"),
+        places: &["crates/record/", "crates/score/"],
+        why: "what only a simulator knows is read by scoring alone",
+    },
+    Rule {
+        word: ("serde_", "yaml"),
+        places: &[
+            "crates/campaign/src/deserialise.rs",
+            "crates/record/src/channel_map_yaml.rs",
+            "tests/tests/all/dependencies.rs",
+        ],
+        why: "one file a crate knows the YAML library, so that it can be replaced",
+    },
+];
+
+fn rust_files(directory: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(directory).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if path.is_dir() {
+            if name != "target" && !name.starts_with('.') {
+                rust_files(&path, found);
+            }
+        } else if name.ends_with(".rs") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn words_stay_in_their_places() {
+    let root = mapper_tests::repository();
+    let mut files = Vec::new();
+    for folder in ["crates", "plugins", "tests", "xtask", "examples"] {
+        let folder = root.join(folder);
+        if folder.is_dir() {
+            rust_files(&folder, &mut files);
+        }
+    }
+    assert!(files.len() > 50, "only {} files were found", files.len());
+    let mut wrong = Vec::new();
+    let mut seen = vec![0; RULES.len()];
+    for file in &files {
+        let text = std::fs::read_to_string(file).unwrap();
+        let place = file.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+        for (rule, seen) in RULES.iter().zip(&mut seen) {
+            let word = format!("{}{}", rule.word.0, rule.word.1);
+            let Some(line) = text.lines().position(|line| line.contains(&word)) else { continue };
+            *seen += 1;
+            if !rule.places.iter().any(|allowed| place.starts_with(allowed)) {
+                wrong.push(format!("{place}:{}: `{word}`: {}", line + 1, rule.why));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+    // A rule about a word that nobody writes any more would hold for ever.
+    assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
+}

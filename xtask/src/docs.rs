@@ -1,0 +1,89 @@
+//! `cargo xtask docs`: documents that the program itself writes.
+
+use crate::error::Error;
+use crate::step::{command, run, say};
+use crate::workspace;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Whether documents are written or compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    /// Write them.
+    Write,
+    /// Compare them with what would be written.
+    Check,
+}
+
+/// What is generated below docs: files, and folders with all that is in them.
+const GENERATED: &[&str] = &["reproduction.md", "reproduction"];
+
+/// Writes or checks everything that is generated.
+pub fn docs(mode: Mode) -> Result<(), Error> {
+    // Made beside the real ones, and compared by content: whether there is a git, and what it knows, does not matter.
+    let made = workspace::target_dir().join("xtask-docs");
+    let docs = workspace::root().join("docs");
+    if made.exists() {
+        fs::remove_dir_all(&made).map_err(at(&made))?;
+    }
+    let arguments = ["run", "--release", "--quiet", "-p", "mapper-cli", "--", "reproduce", "--out"];
+    run(command(workspace::cargo(), &[&arguments[..], &[&*made.to_string_lossy()]].concat()))?;
+
+    let (new, old) = (contents(&made)?, contents(&docs)?);
+    let names: BTreeSet<&PathBuf> = new.keys().chain(old.keys()).collect();
+    let mut differences = Vec::new();
+    for name in names {
+        let what = match (new.get(name), old.get(name)) {
+            (Some(new), Some(old)) if new == old => continue,
+            (Some(_), Some(_)) => "differs",
+            (Some(_), None) => "is new",
+            (None, _) => "is made no more",
+        };
+        differences.push(format!("docs/{} {what}", name.display()));
+        let path = docs.join(name);
+        match (mode, new.get(name)) {
+            (Mode::Check, _) => {}
+            (Mode::Write, Some(content)) => write(&path, content)?,
+            (Mode::Write, None) => fs::remove_file(&path).map_err(at(&path))?,
+        }
+    }
+    if differences.is_empty() {
+        say("generated documents are up to date\n");
+        return Ok(());
+    }
+    if mode == Mode::Check {
+        return Err(Error::Stale { differences });
+    }
+    say(&format!("{}\n", differences.join("\n")));
+    Ok(())
+}
+
+fn write(path: &Path, content: &[u8]) -> Result<(), Error> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(at(folder))?;
+    }
+    fs::write(path, content).map_err(at(path))
+}
+
+/// All generated files below a folder, by their path in it.
+fn contents(root: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>, Error> {
+    let mut files = BTreeMap::new();
+    let mut open: Vec<PathBuf> = GENERATED.iter().map(|name| root.join(name)).filter(|path| path.exists()).collect();
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            for entry in fs::read_dir(&path).map_err(at(&path))? {
+                open.push(entry.map_err(at(&path))?.path());
+            }
+        } else {
+            let content = fs::read(&path).map_err(at(&path))?;
+            files.insert(path.strip_prefix(root).unwrap_or(&path).to_owned(), content);
+        }
+    }
+    Ok(files)
+}
+
+fn at(path: &Path) -> impl FnOnce(std::io::Error) -> Error {
+    let path = path.to_owned();
+    |source| Error::File { path, source }
+}

@@ -1,0 +1,51 @@
+//! Why a chore could not be done.
+
+use std::path::PathBuf;
+
+/// Why a chore could not be done.
+#[derive(Debug)]
+pub enum Error {
+    /// A program could not be started.
+    Start { command: String, source: std::io::Error },
+    /// A program ended with an error; it has said why.
+    Failed { command: String },
+    /// A program that the tests need is missing, and this process may not install it.
+    Missing { what: &'static str, used_for: &'static str, install: String },
+    /// The Python that was found is too old for the packages.
+    OldPython { found: String, needed: &'static str },
+    /// A file could not be read or written.
+    File { path: PathBuf, source: std::io::Error },
+    /// Some steps failed; each has said why.
+    Steps { failed: Vec<&'static str> },
+    /// Tests were left out that had to run.
+    LeftOut { count: usize },
+    /// Generated documents are not what the program makes now.
+    Stale { differences: Vec<String> },
+}
+
+impl std::fmt::Display for Error {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Error::Start { command, source } => write!(f, "failed to start `{command}`: {source}"),
+            Error::Failed { command } => write!(f, "`{command}` failed"),
+            Error::Missing { what, used_for, install } => {
+                write!(f, "{what} is missing ({used_for}). Install it, then try again: {install}")
+            }
+            Error::OldPython { found, needed } => {
+                write!(f, "python3 is {found}; the packages of tests/python/requirements.txt need {needed} or newer")
+            }
+            Error::File { path, source } => write!(f, "failed to use {}: {source}", path.display()),
+            Error::Steps { failed } => write!(f, "failed: {}", failed.join(", ")),
+            Error::LeftOut { count } => {
+                write!(f, "{count} tests were left out; `cargo xtask test` must run all (look for `ignored` above)")
+            }
+            Error::Stale { differences } => write!(
+                f,
+                "generated documents are out of date; run `cargo xtask docs` and look at what changed:\n  {}",
+                differences.join("\n  ")
+            ),
+        }
+    }
+}
+
+impl std::error::Error for Error {}

@@ -1,0 +1,99 @@
+//! Programs that the tests need beside Rust's own, and how a machine comes by them.
+
+use crate::error::Error;
+use crate::step::{self, say};
+use crate::workspace;
+
+/// A program that the tests need.
+struct Tool {
+    name: &'static str,
+    used_for: &'static str,
+    /// Ends well where the program is there and works.
+    probe: &'static [&'static str],
+    source: Source,
+}
+
+/// Where a program comes from.
+enum Source {
+    /// Debian packages; installed where this process is root.
+    Debian(&'static [&'static str]),
+    /// Components of the Rust toolchain.
+    Rustup(&'static [&'static str]),
+}
+
+/// Every program that the tests need: one line each.
+#[rustfmt::skip]
+const TOOLS: &[Tool] = &[
+    Tool { name: "rustfmt", used_for: "checks the formatting", probe: &["cargo", "fmt", "--version"], source: Source::Rustup(&["rustfmt"]) },
+    Tool { name: "clippy", used_for: "lints", probe: &["cargo", "clippy", "--version"], source: Source::Rustup(&["clippy"]) },
+    Tool { name: "python3 with venv", used_for: "reads recordings independently", probe: &["python3", "-c", "import venv, ensurepip"], source: Source::Debian(&["python3", "python3-venv"]) },
+    Tool { name: "unshare", used_for: "gives the test of a full disk a file system of its own", probe: &["unshare", "--version"], source: Source::Debian(&["util-linux", "mount"]) },
+];
+
+/// Makes sure that every tool is there, installing what is missing.
+pub fn prepare() -> Result<(), Error> {
+    let missing: Vec<&Tool> = TOOLS.iter().filter(|tool| !works(tool)).collect();
+    if missing.is_empty() {
+        say("all there\n");
+        return Ok(());
+    }
+    let mut packages_listed = false;
+    for tool in missing {
+        say(&format!("{} is missing\n", tool.name));
+        match tool.source {
+            Source::Debian(packages) => install_debian(tool, packages, &mut packages_listed)?,
+            Source::Rustup(components) => {
+                let arguments = [&["component", "add"], components].concat();
+                let install = format!("rustup {}", arguments.join(" "));
+                step::run(step::command("rustup", &arguments)).map_err(|_| missing_tool(tool, install))?;
+            }
+        }
+        if !works(tool) {
+            return Err(missing_tool(tool, by_hand(&tool.source)));
+        }
+    }
+    Ok(())
+}
+
+/// Whether a file system of limited size can be made here: the test of a full disk needs one.
+pub fn can_mount() -> bool {
+    let target = workspace::target_dir();
+    let target = target.to_string_lossy();
+    step::succeeds("unshare", &["--mount", "mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", &target])
+}
+
+fn works(tool: &Tool) -> bool {
+    match tool.probe {
+        ["cargo", arguments @ ..] => step::succeeds(&workspace::cargo(), arguments),
+        [program, arguments @ ..] => step::succeeds(program, arguments),
+        [] => true,
+    }
+}
+
+fn install_debian(tool: &Tool, packages: &[&str], listed: &mut bool) -> Result<(), Error> {
+    let root = step::output(step::command("id", &["-u"])).is_ok_and(|id| id == "0");
+    if !root || !step::succeeds("apt-get", &["--version"]) {
+        return Err(missing_tool(tool, by_hand(&tool.source)));
+    }
+    let apt_get = |arguments: &[&str]| {
+        let mut command = step::command("apt-get", arguments);
+        command.env("DEBIAN_FRONTEND", "noninteractive");
+        step::run(command)
+    };
+    if !*listed {
+        apt_get(&["update", "--quiet"])?;
+        *listed = true;
+    }
+    apt_get(&[&["install", "--yes", "--quiet", "--no-install-recommends"], packages].concat())
+}
+
+fn by_hand(source: &Source) -> String {
+    match source {
+        Source::Debian(packages) => format!("sudo apt-get install {}", packages.join(" ")),
+        Source::Rustup(components) => format!("rustup component add {}", components.join(" ")),
+    }
+}
+
+fn missing_tool(tool: &Tool, install: String) -> Error {
+    Error::Missing { what: tool.name, used_for: tool.used_for, install }
+}

@@ -1,0 +1,48 @@
+//! A Python of the tests' own, with the packages of tests/python/requirements.txt and no others.
+
+use crate::error::Error;
+use crate::step::{self, command, run, say};
+use crate::workspace;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What the pinned numpy and scipy ask for.
+const OLDEST: (&str, &str) = ("3.11", "(3, 11)");
+
+/// Makes the environment, or keeps the one that is there where it was made from the same list. Returns its Python.
+pub fn prepare() -> Result<PathBuf, Error> {
+    let wanted = read(&workspace::root().join("tests/python/requirements.txt"))?;
+    let home = workspace::target_dir().join("python-env");
+    let python = home.join("bin/python");
+    // Written last: an environment without it was left half made.
+    let stamp = home.join("made-from.txt");
+    let made_from = fs::read_to_string(&stamp).unwrap_or_default();
+    if made_from == wanted && step::succeeds(&python.to_string_lossy(), &["-c", "import mcap"]) {
+        say(&format!("{} is up to date\n", home.display()));
+        return Ok(python);
+    }
+    check_version()?;
+    if home.exists() {
+        fs::remove_dir_all(&home).map_err(|source| Error::File { path: home.clone(), source })?;
+    }
+    run(command("python3", &["-m", "venv", &home.to_string_lossy()]))?;
+    // Wheels alone: building scipy from source would need a Fortran compiler and half an hour.
+    let arguments = ["-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--quiet"];
+    let list = ["--only-binary", ":all:", "--requirement", "tests/python/requirements.txt"];
+    run(command(&python, &[&arguments[..], &list].concat()))?;
+    fs::write(&stamp, wanted).map_err(|source| Error::File { path: stamp.clone(), source })?;
+    Ok(python)
+}
+
+fn check_version() -> Result<(), Error> {
+    let script = format!("import sys; print(sys.version.split()[0], sys.version_info[:2] >= {})", OLDEST.1);
+    let answer = step::output(command("python3", &["-c", &script]))?;
+    match answer.split_once(' ') {
+        Some((_, "True")) => Ok(()),
+        _ => Err(Error::OldPython { found: answer, needed: OLDEST.0 }),
+    }
+}
+
+fn read(path: &Path) -> Result<String, Error> {
+    fs::read_to_string(path).map_err(|source| Error::File { path: path.to_owned(), source })
+}

@@ -1,0 +1,99 @@
+//! Programs run under a heading, with the time they took.
+
+use crate::error::Error;
+use crate::workspace;
+use std::ffi::OsStr;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Steps that were run, for the summary.
+#[derive(Default)]
+pub struct Steps {
+    done: Vec<(&'static str, Duration, bool)>,
+}
+
+impl Steps {
+    /// Runs one step. A failure is kept for the end, so that one run shows all that is wrong.
+    pub fn run(&mut self, name: &'static str, work: impl FnOnce() -> Result<(), Error>) {
+        say(&format!("\n==> {name}\n"));
+        let started = Instant::now();
+        let result = work();
+        let took = started.elapsed();
+        match &result {
+            Ok(()) => say(&format!("==> {name}: ok, {:.1} s\n", took.as_secs_f64())),
+            Err(error) => say(&format!("==> {name}: FAILED, {:.1} s: {error}\n", took.as_secs_f64())),
+        }
+        self.done.push((name, took, result.is_ok()));
+    }
+
+    /// Whether every step so far ended well.
+    pub fn all_well(&self) -> bool {
+        self.done.iter().all(|(.., well)| *well)
+    }
+
+    /// Prints times and verdicts; an error where a step failed.
+    pub fn finish(self) -> Result<(), Error> {
+        say("\n");
+        for (name, took, well) in &self.done {
+            let verdict = if *well { "ok" } else { "FAILED" };
+            say(&format!("{:>8.1} s  {verdict:6}  {name}\n", took.as_secs_f64()));
+        }
+        let total: Duration = self.done.iter().map(|(_, took, _)| *took).sum();
+        say(&format!("{:>8.1} s  in all\n", total.as_secs_f64()));
+        let failed: Vec<_> = self.done.into_iter().filter(|(.., well)| !well).map(|(name, ..)| name).collect();
+        if failed.is_empty() { Ok(()) } else { Err(Error::Steps { failed }) }
+    }
+}
+
+/// A command in the root of the repository.
+pub fn command(program: impl AsRef<OsStr>, arguments: &[&str]) -> Command {
+    let mut command = Command::new(program);
+    command.args(arguments).current_dir(workspace::root());
+    command
+}
+
+/// Runs a command with its output shown.
+pub fn run(mut command: Command) -> Result<(), Error> {
+    let text = line(&command);
+    say(&format!("$ {text}\n"));
+    match command.status() {
+        Err(source) => Err(Error::Start { command: text, source }),
+        Ok(status) if status.success() => Ok(()),
+        Ok(_) => Err(Error::Failed { command: text }),
+    }
+}
+
+/// Whether a command ends well; its output goes nowhere.
+pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
+    let mut command = command(program, arguments);
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.status().is_ok_and(|status| status.success())
+}
+
+/// What a command prints, without the white space around it.
+pub fn output(mut command: Command) -> Result<String, Error> {
+    let text = line(&command);
+    let output = command.stderr(Stdio::inherit()).output();
+    let output = output.map_err(|source| Error::Start { command: text.clone(), source })?;
+    if !output.status.success() {
+        return Err(Error::Failed { command: text });
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+/// A command as one would type it.
+pub fn line(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    let words: Vec<_> = words
+        .map(|word| word.to_string_lossy())
+        .map(|word| if word.contains([' ', '(', '"', '\'']) { format!("'{word}'") } else { word.into_owned() })
+        .collect();
+    words.join(" ")
+}
+
+/// Standard output, without a panic where its reader went away.
+pub fn say(text: &str) {
+    use std::io::Write;
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+}

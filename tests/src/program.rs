@@ -66,7 +66,13 @@ impl Finished {
     /// Asserts the exit code, showing what was said where it is another.
     #[track_caller]
     pub fn exits(self, code: i32) -> Self {
-        assert_eq!(self.code, Some(code), "standard error:\n{}\nstandard output:\n{}", self.stderr, self.stdout);
+        assert_eq!(
+            self.code,
+            Some(code),
+            "standard error:\n{}\nstandard output:\n{}",
+            self.stderr,
+            self.stdout
+        );
         assert!(!self.stderr.contains("panicked"), "{}", self.stderr);
         self
     }
@@ -74,8 +80,9 @@ impl Finished {
     /// Standard output as the one JSON object that it must be.
     #[track_caller]
     pub fn json(&self) -> Value {
-        let value: Value = serde_json::from_str(&self.stdout)
-            .unwrap_or_else(|error| panic!("standard output is not one JSON object: {error}\n{}", self.stdout));
+        let value: Value = serde_json::from_str(&self.stdout).unwrap_or_else(|error| {
+            panic!("standard output is not one JSON object: {error}\n{}", self.stdout)
+        });
         assert!(value.is_object(), "{value}");
         value
     }

@@ -69,7 +69,8 @@ fn write(path: &Path, content: &[u8]) -> Result<(), Error> {
 /// All generated files below a folder, by their path in it.
 fn contents(root: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>, Error> {
     let mut files = BTreeMap::new();
-    let mut open: Vec<PathBuf> = GENERATED.iter().map(|name| root.join(name)).filter(|path| path.exists()).collect();
+    let mut open: Vec<PathBuf> =
+        GENERATED.iter().map(|name| root.join(name)).filter(|path| path.exists()).collect();
     while let Some(path) = open.pop() {
         if path.is_dir() {
             for entry in fs::read_dir(&path).map_err(at(&path))? {

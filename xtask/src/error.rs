@@ -32,12 +32,18 @@ impl std::fmt::Display for Error {
                 write!(f, "{what} is missing ({used_for}). Install it, then try again: {install}")
             }
             Error::OldPython { found, needed } => {
-                write!(f, "python3 is {found}; the packages of tests/python/requirements.txt need {needed} or newer")
+                write!(
+                    f,
+                    "python3 is {found}; the packages of tests/python/requirements.txt need {needed} or newer"
+                )
             }
             Error::File { path, source } => write!(f, "failed to use {}: {source}", path.display()),
             Error::Steps { failed } => write!(f, "failed: {}", failed.join(", ")),
             Error::LeftOut { count } => {
-                write!(f, "{count} tests were left out; `cargo xtask test` must run all (look for `ignored` above)")
+                write!(
+                    f,
+                    "{count} tests were left out; `cargo xtask test` must run all (look for `ignored` above)"
+                )
             }
             Error::Stale { differences } => write!(
                 f,

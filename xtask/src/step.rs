@@ -40,7 +40,8 @@ impl Steps {
         }
         let total: Duration = self.done.iter().map(|(_, took, _)| *took).sum();
         say(&format!("{:>8.1} s  in all\n", total.as_secs_f64()));
-        let failed: Vec<_> = self.done.into_iter().filter(|(.., well)| !well).map(|(name, ..)| name).collect();
+        let failed: Vec<_> =
+            self.done.into_iter().filter(|(.., well)| !well).map(|(name, ..)| name).collect();
         if failed.is_empty() { Ok(()) } else { Err(Error::Steps { failed }) }
     }
 }
@@ -86,7 +87,9 @@ pub fn line(command: &Command) -> String {
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     let words: Vec<_> = words
         .map(|word| word.to_string_lossy())
-        .map(|word| if word.contains([' ', '(', '"', '\'']) { format!("'{word}'") } else { word.into_owned() })
+        .map(
+            |word| if word.contains([' ', '(', '"', '\'']) { format!("'{word}'") } else { word.into_owned() },
+        )
         .collect();
     words.join(" ")
 }

@@ -32,7 +32,9 @@ pub fn test() -> Result<(), Error> {
     steps.run("tests", || tests(&python, mountable));
     let result = steps.finish();
     if !mountable {
-        say("\nLEFT OUT: the test of a full disk. It mounts a small tmpfs: run `cargo xtask test` as root.\n");
+        say(
+            "\nLEFT OUT: the test of a full disk. It mounts a small tmpfs: run `cargo xtask test` as root.\n",
+        );
     }
     result
 }
@@ -66,7 +68,9 @@ fn tests(python: &Path, mountable: bool) -> Result<(), Error> {
     let status = child.wait().map_err(|source| Error::Start { command: text.clone(), source })?;
     let verdict = if status.success() { "ok" } else { "FAILED" };
     let Tally { passed, failed, ignored } = tally;
-    say(&format!("test result: {verdict}. {passed} passed; {failed} failed; {ignored} ignored (all test programs)\n"));
+    say(&format!(
+        "test result: {verdict}. {passed} passed; {failed} failed; {ignored} ignored (all test programs)\n"
+    ));
     if !status.success() {
         return Err(Error::Failed { command: text });
     }

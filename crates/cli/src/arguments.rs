@@ -27,6 +27,8 @@ pub enum Command {
     Run(RunArguments),
     /// Identify efficiency and heat transfer from a run directory or any MCAP recording
     Identify(IdentifyArguments),
+    /// Redo the paper's figures 5 to 10 and 12 on the nominal model, beside what the paper states
+    Reproduce(ReproduceArguments),
 }
 
 /// `mapper check`.
@@ -86,6 +88,17 @@ pub struct IdentifyArguments {
     #[arg(long, value_enum)]
     pub method: Option<MethodArgument>,
     /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mapper reproduce`.
+#[derive(Debug, Args)]
+pub struct ReproduceArguments {
+    /// Directory for `reproduction.md` and the pictures; files of an earlier reproduction there are replaced
+    #[arg(long, value_name = "DIR", default_value = "reproduction")]
+    pub out: PathBuf,
+    /// Print what the paper states beside what came out as one JSON object on standard output
     #[arg(long)]
     pub json: bool,
 }

@@ -115,8 +115,10 @@ fn every_package_has_its_row() {
 
 #[test]
 fn the_table_itself_has_no_circle() {
-    let allowed: BTreeMap<&str, &[&str]> =
-        ALLOWED.iter().map(|(name, others)| (name.strip_prefix("mapper-").unwrap_or(name), *others)).collect();
+    let allowed: BTreeMap<&str, &[&str]> = ALLOWED
+        .iter()
+        .map(|(name, others)| (name.strip_prefix("mapper-").unwrap_or(name), *others))
+        .collect();
     let mut done: Vec<&str> = Vec::new();
     // Packages whose own packages are all done, until none is left.
     while done.len() < allowed.len() {

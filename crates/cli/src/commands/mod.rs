@@ -3,6 +3,7 @@
 mod check;
 mod identify;
 mod plan;
+mod reproduce;
 mod run;
 mod schema;
 
@@ -17,5 +18,6 @@ pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
         Command::Plan(arguments) => plan::plan(arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Identify(arguments) => identify::identify(arguments),
+        Command::Reproduce(arguments) => reproduce::reproduce(arguments),
     }
 }

@@ -1,0 +1,43 @@
+//! A disk that fills up in the middle of a run: a small tmpfs in a mount name space of its own, gone with the process.
+
+use mapper_tests::{CampaignFile, Finished, SHORT_GRID, mapper, mapper_command, only_run};
+use std::process::Command;
+
+/// Mounts 2 MB on $1, runs the rest there, and keeps what was written in $2.
+const SCRIPT: &str = r#"
+disk="$1"; kept="$2"; shift 2
+mount -t tmpfs -o size=2m tmpfs "$disk" || exit 99
+"$@"; code=$?
+cp -r "$disk"/. "$kept" || exit 98
+exit $code
+"#;
+
+#[test]
+#[cfg_attr(not(with_tmpfs), ignore = "mounts a small tmpfs: run `cargo xtask test` as root")]
+fn a_full_disk_is_said_and_what_was_flushed_can_be_read() {
+    let campaign = CampaignFile::shipped_with(SHORT_GRID);
+    let (disk, kept) = (campaign.directory().join("disk"), campaign.directory().join("kept"));
+    std::fs::create_dir(&disk).unwrap();
+    std::fs::create_dir(&kept).unwrap();
+    let run = mapper_command(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), disk.as_os_str()]);
+    let output = Command::new("unshare")
+        .args(["--mount", "sh", "-c", SCRIPT, "sh"])
+        .args([&disk, &kept])
+        .arg(run.get_program())
+        .args(run.get_args())
+        .current_dir(mapper_tests::repository())
+        .output()
+        .unwrap();
+    let finished = Finished::from(output).exits(1);
+    let written_to = disk.join(only_run(&kept).file_name().unwrap()).join("recording.mcap");
+    assert!(finished.stderr.contains(written_to.to_str().unwrap()), "{}", finished.stderr);
+    assert!(finished.stderr.contains("No space left on device"), "{}", finished.stderr);
+    assert_eq!(finished.stdout, "");
+
+    // 2 MB hold some 400 s: three of the four steps.
+    let run = only_run(&kept);
+    let result = mapper(["identify".as_ref(), run.as_os_str(), "--json".as_ref()]).exits(0).json();
+    let points = result["points"].as_array().unwrap();
+    assert!(points.len() >= 2, "{} points", points.len());
+    assert!(points[1]["eta"].is_f64(), "{}", points[1]);
+}

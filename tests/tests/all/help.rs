@@ -1,0 +1,57 @@
+//! What a new user asks first.
+
+use mapper_tests::{SHIPPED, mapper};
+
+/// Commands as the top level lists them.
+fn commands(help: &str) -> Vec<String> {
+    help.lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| !line.trim().is_empty())
+        // Descriptions go on in deeper lines.
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn every_command_explains_itself() {
+    let top = mapper(["--help"]).exits(0);
+    let commands = commands(&top.stdout);
+    for expected in ["check", "schema", "plan", "run", "identify"] {
+        assert!(commands.iter().any(|command| command == expected), "{expected} in {commands:?}");
+    }
+    for command in commands.iter().filter(|command| *command != "help") {
+        let help = mapper([command, "--help"]).exits(0);
+        assert!(help.stdout.contains(&format!("Usage: mapper {command}")), "{}", help.stdout);
+        assert_eq!(help.stderr, "");
+    }
+}
+
+#[test]
+fn the_exit_codes_are_listed() {
+    let top = mapper(["--help"]).exits(0);
+    let (_, codes) = top.stdout.split_once("Exit codes:").expect("a list of exit codes");
+    let listed: Vec<i32> =
+        codes.lines().filter_map(|line| line.split_whitespace().next()?.parse().ok()).collect();
+    assert_eq!(listed, [0, 1, 2, 3, 4, 5, 6, 130]);
+    // Wrong arguments are the one code that needs nothing else.
+    mapper(["plan", "--no-such-option", SHIPPED]).exits(2);
+}
+
+#[test]
+fn the_schema_describes_the_shipped_campaign() {
+    let schema = mapper(["schema"]).exits(0).json();
+    let properties = schema["properties"].as_object().expect("properties of a campaign");
+    let text = std::fs::read_to_string(mapper_tests::repository().join(SHIPPED)).unwrap();
+    let keys: Vec<&str> = text
+        .lines()
+        .filter(|line| line.starts_with(|first: char| first.is_ascii_alphabetic()))
+        .filter_map(|line| line.split_once(':').map(|(key, _)| key))
+        .collect();
+    assert!(keys.len() > 10, "{keys:?}");
+    for key in keys {
+        assert!(properties.contains_key(key), "{key}");
+    }
+}

@@ -1,0 +1,147 @@
+//! Runs that end early: killed, and stopped by Ctrl-C.
+#![cfg(unix)]
+
+use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
+use mapper_tests::{CampaignFile, Finished, mapper, mapper_command, only_run, python};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+/// A day of the rig's time: far from over when the recording holds a few steps.
+const LONG: &[(&str, &str)] = &[("warm_up: 10 min ", "warm_up: 60 s "), ("dwell: 120 s ", "dwell: 30 min ")];
+/// About an hour and a quarter of the rig's time, two steps of half an hour.
+const SOME_STEPS_BYTES: u64 = 20_000_000;
+/// Looks at the file before giving up: ten minutes, which no machine needs; a run takes seconds.
+const LOOKS: usize = 60_000;
+const BETWEEN_LOOKS: Duration = Duration::from_millis(10);
+
+/// A run that is killed where the test ends before it does.
+struct Running {
+    child: Option<Child>,
+    runs: PathBuf,
+}
+
+impl Running {
+    fn start(campaign: &CampaignFile) -> Self {
+        let child = mapper_command(["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref()])
+            .arg("--out")
+            .arg(campaign.runs())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        Running { child: Some(child), runs: campaign.runs() }
+    }
+
+    /// Waits until the recording has grown to `bytes`; the run must still be going on.
+    fn recorded(&mut self, bytes: u64) -> PathBuf {
+        for _ in 0..LOOKS {
+            let ended = self.child.as_mut().unwrap().try_wait().unwrap();
+            assert_eq!(ended, None, "the run was over before it could be stopped");
+            let run = self.runs.read_dir().ok().and_then(|mut runs| runs.next()).and_then(Result::ok);
+            let recording = run.map(|run| run.path().join("recording.mcap"));
+            if let Some(recording) =
+                recording.filter(|path| path.metadata().is_ok_and(|file| file.len() >= bytes))
+            {
+                return recording;
+            }
+            sleep(BETWEEN_LOOKS);
+        }
+        panic!("the recording did not grow to {bytes} bytes");
+    }
+
+    fn interrupt(&self) {
+        let id = self.child.as_ref().unwrap().id().to_string();
+        assert!(Command::new("sh").args(["-c", "kill -INT \"$1\"", "sh", &id]).status().unwrap().success());
+    }
+
+    fn kill(mut self) {
+        let mut child = self.child.take().unwrap();
+        child.kill().unwrap();
+        let status = child.wait().unwrap();
+        assert_eq!(status.code(), None, "the run ended by itself: {status}");
+    }
+
+    fn finished(mut self) -> Finished {
+        self.child.take().unwrap().wait_with_output().unwrap().into()
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Some(mut child) = self.child.take() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+fn read(recording: &Path) -> ReadReport {
+    read_recording(recording, &ChannelMap::native(), &ReadOptions::default()).unwrap()
+}
+
+fn killed_run() -> (CampaignFile, PathBuf) {
+    let campaign = CampaignFile::shipped_with(LONG);
+    let mut running = Running::start(&campaign);
+    let recording = running.recorded(SOME_STEPS_BYTES);
+    running.kill();
+    (campaign, recording)
+}
+
+#[test]
+fn what_a_killed_run_has_recorded_can_be_identified() {
+    let (_campaign, recording) = killed_run();
+    let report = read(&recording);
+    let finished_steps = report.recording.steps.len();
+    // Half an hour each after a minute of warm-up; the last one was under way.
+    let samples = report.recording.series.values().map(|series| series.t_s.len()).min().unwrap();
+    let seconds = samples as f64 / 10.0;
+    assert!(seconds > 3000.0, "{seconds} s were saved");
+    assert_eq!(finished_steps, 1 + ((seconds - 60.0) / 1800.0).floor() as usize);
+    let run = recording.parent().unwrap();
+    let result = mapper(["identify".as_ref(), run.as_os_str(), "--json".as_ref()]).exits(0).json();
+    let points = result["points"].as_array().unwrap();
+    assert_eq!(points.len(), finished_steps);
+    assert!(points[1]["eta"].is_f64(), "{}", points[1]);
+    assert!(!result["recording_warnings"].as_array().unwrap().is_empty(), "the cut is not mentioned");
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn what_a_killed_run_has_recorded_can_be_read_by_others() {
+    let (_campaign, recording) = killed_run();
+    let seen = python("read_recording.py", [&recording]);
+    assert_eq!(seen["complete"], false);
+    let report = read(&recording);
+    let ours = report.recording.series.values().map(|series| series.t_s.len()).max().unwrap();
+    assert_eq!(seen["topics"]["/rig/compressor"]["messages"], ours);
+    assert!(ours > 30_000, "{ours} samples");
+}
+
+#[test]
+fn one_interrupt_makes_the_rig_safe_and_keeps_what_is_done() {
+    let campaign = CampaignFile::shipped_with(LONG);
+    let mut running = Running::start(&campaign);
+    let recording = running.recorded(SOME_STEPS_BYTES);
+    running.interrupt();
+    let finished = running.finished().exits(130);
+    assert!(finished.stderr.contains("stopped by the operator"), "{}", finished.stderr);
+    let result = finished.json();
+    let points = result["points"].as_array().unwrap();
+    assert!(points.len() >= 2 && points.len() < 48, "{} points", points.len());
+    assert!(points[1]["eta"].is_f64(), "{}", points[1]);
+
+    let report = read(&recording);
+    assert_eq!(report.warnings, [], "the file was not ended well");
+    let events: Vec<String> = report
+        .recording
+        .events
+        .iter()
+        .map(|event| serde_json::to_value(event.kind).unwrap().as_str().unwrap().to_owned())
+        .collect();
+    let place = |kind: &str| events.iter().position(|event| event == kind);
+    let (interrupted, safe) = (place("interrupted"), place("safe_state"));
+    assert!(interrupted.is_some() && safe.is_some(), "{events:?}");
+    assert!(only_run(&campaign.runs()).join("points.json").is_file());
+}

@@ -1,0 +1,41 @@
+//! Output whose reader goes away, and output that is no terminal.
+
+use mapper_tests::{SHIPPED, mapper, mapper_command};
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let commands: [&[&str]; 4] =
+        [&["plan", SHIPPED], &["plan", SHIPPED, "--json"], &["schema"], &["check", SHIPPED]];
+    for arguments in commands {
+        let mut child =
+            mapper_command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        // Closed before anything is written: a program that fills the pipe meets the same later.
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(stderr, "", "{arguments:?}");
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}");
+    }
+}
+
+#[test]
+fn the_first_line_can_be_read_and_the_rest_left() {
+    let mut child =
+        mapper_command(["plan", SHIPPED]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut first = String::new();
+    let mut reader = BufReader::with_capacity(16, child.stdout.take().unwrap());
+    reader.read_line(&mut first).unwrap();
+    drop(reader);
+    assert!(first.contains("step"), "{first}");
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), output.stderr), (Some(0), Vec::new()));
+}
+
+#[test]
+fn a_pipe_gets_no_colours_and_no_progress() {
+    let finished = mapper(["plan", SHIPPED]).exits(0);
+    assert!(!finished.stdout.contains('\u{1b}') && !finished.stdout.contains('\r'), "{}", finished.stdout);
+    assert_eq!(finished.stderr, "");
+}

@@ -1,0 +1,213 @@
+//! What a run records: the same bytes for the same seed, one directory a run, readable by others.
+
+use mapper_core::{CHANNELS, Group};
+use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_tests::{CampaignFile, SHORT_GRID, mapper, mapper_command, only_run, python, scratch};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+
+/// Runs the campaign into `out`; gives what it printed.
+fn run_into(campaign: &Path, out: &Path) -> Value {
+    let arguments =
+        ["run".as_ref(), campaign.as_os_str(), "--json".as_ref(), "--out".as_ref(), out.as_os_str()];
+    mapper(arguments).exits(0).json()
+}
+
+fn recording_of(result: &Value) -> PathBuf {
+    PathBuf::from(result["recording"].as_str().unwrap())
+}
+
+fn points_of(recording: &Path) -> Vec<Value> {
+    let result = mapper(["identify".as_ref(), recording.as_os_str(), "--json".as_ref()]).exits(0).json();
+    result["points"].as_array().unwrap().clone()
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
+    let scratch = scratch();
+    let campaign = CampaignFile::shipped_with(SHORT_GRID);
+    let bytes = |campaign: &Path, out: &str| {
+        let result = run_into(campaign, &scratch.path().join(out));
+        std::fs::read(recording_of(&result)).unwrap()
+    };
+    let first = bytes(&campaign.path, "first");
+    assert!(first == bytes(&campaign.path, "second"), "two runs of one campaign differ");
+    let mut replacements = SHORT_GRID.to_vec();
+    replacements.push(("seed: 1 ", "seed: 2 "));
+    let other = CampaignFile::shipped_with(&replacements);
+    assert!(first != bytes(&other.path, "third"), "the seed has no effect");
+}
+
+#[test]
+fn runs_at_the_same_time_go_to_directories_of_their_own() {
+    let scratch = scratch();
+    let campaign = CampaignFile::shipped_with(SHORT_GRID);
+    let out = scratch.path();
+    let before = run_into(&campaign.path, out);
+    let earlier = std::fs::read(recording_of(&before)).unwrap();
+    // Started together: at least two of them begin within one second.
+    let started: Vec<_> = (0..4)
+        .map(|_| {
+            mapper_command(["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref()])
+                .arg("--out")
+                .arg(out)
+                .stdout(Stdio::piped())
+                .stderr(Stdio::piped())
+                .spawn()
+                .unwrap()
+        })
+        .collect();
+    let mut runs: BTreeSet<String> = started
+        .into_iter()
+        .map(|child| {
+            let finished = mapper_tests::Finished::from(child.wait_with_output().unwrap()).exits(0);
+            finished.json()["run"].as_str().unwrap().to_owned()
+        })
+        .collect();
+    runs.insert(before["run"].as_str().unwrap().to_owned());
+    assert_eq!(runs.len(), 5, "{runs:?}");
+    for run in &runs {
+        let recording = std::fs::read(Path::new(run).join("recording.mcap")).unwrap();
+        assert!(recording == earlier, "{run} is not whole");
+    }
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn an_independent_reader_finds_what_the_run_recorded() {
+    let scratch = scratch();
+    let campaign = CampaignFile::shipped_with(SHORT_GRID);
+    let recording = recording_of(&run_into(&campaign.path, scratch.path()));
+    let seen = python("read_recording.py", [&recording]);
+    assert_eq!(seen["complete"], true);
+
+    // Warm-up 60 s and four steps of 120 s at 10 Hz. The lab may or may not give the sample at time 0.
+    let samples = seen["topics"]["/rig/compressor"]["messages"].as_u64().unwrap();
+    assert!((5400..=5401).contains(&samples), "{samples} samples");
+    for group in Group::ALL {
+        let topic = &seen["topics"][group.topic()];
+        assert_eq!(topic["messages"], samples, "{}", group.topic());
+        assert_eq!([&topic["message_encoding"], &topic["schema_encoding"]], ["json", "jsonschema"]);
+        for row in CHANNELS.iter().filter(|row| row.group == group) {
+            assert_eq!(topic["schema_units"][row.field], row.channel.unit(), "{}", row.symbol);
+        }
+    }
+    assert_eq!(seen["topics"]["/truth/model"]["messages"], samples);
+    // A start and an end for each step.
+    assert_eq!(seen["topics"]["/step"]["messages"], 8);
+
+    let attached = |name: &str| seen["attachments"][name]["text"].as_str().unwrap().to_owned();
+    assert_eq!(attached("campaign.yaml"), campaign.text);
+    let plan: Value = serde_json::from_str(&attached("plan.json")).unwrap();
+    assert_eq!(plan["steps"].as_array().unwrap().len(), 4);
+    let run = recording.parent().unwrap();
+    assert_eq!(attached("plan.json"), std::fs::read_to_string(run.join("plan.json")).unwrap());
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn an_independent_reader_sees_the_same_values() {
+    let scratch = scratch();
+    let campaign = CampaignFile::shipped_with(SHORT_GRID);
+    let recording = recording_of(&run_into(&campaign.path, scratch.path()));
+    let theirs = python("columns.py", [&recording]);
+    let ours = read_recording(&recording, &ChannelMap::native(), &ReadOptions::default()).unwrap();
+    assert_eq!(ours.warnings, []);
+    assert_eq!(ours.recording.series.len(), CHANNELS.len());
+    for (channel, series) in &ours.recording.series {
+        let info = channel.info();
+        let column = |field: &str| theirs[info.group.topic()][field].as_array().unwrap();
+        let values: Vec<f64> = column(info.field).iter().map(|value| value.as_f64().unwrap()).collect();
+        // To the last bit: both read the shortest text of a number.
+        assert_eq!(series.values, values, "{channel}");
+        let times: Vec<f64> =
+            column("log_time_ns").iter().map(|ns| ns.as_u64().unwrap() as f64 / 1e9).collect();
+        assert_eq!(series.t_s.len(), times.len());
+        // Times are kept in whole nanoseconds.
+        assert!(series.t_s.iter().zip(&times).all(|(a, b)| (a - b).abs() < 1e-9), "{channel}");
+        let sequence: Vec<u64> = column("sequence").iter().map(|value| value.as_u64().unwrap()).collect();
+        assert!(sequence.windows(2).all(|pair| pair[1] == pair[0] + 1), "{channel}: samples are missing");
+    }
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn without_truth_identification_finds_the_same() {
+    let scratch = scratch();
+    let campaign = CampaignFile::shipped_with(SHORT_GRID);
+    let recording = recording_of(&run_into(&campaign.path, &scratch.path().join("runs")));
+    let stripped = scratch.path().join("stripped.mcap");
+    let copied = python("strip_truth.py", [&recording, &stripped]);
+    assert!(copied["left_out"].as_u64().unwrap() > 5000, "{copied}");
+
+    let mut with_truth = points_of(&recording);
+    let without_truth = points_of(&stripped);
+    assert_eq!(with_truth.len(), 4);
+    for point in &mut with_truth {
+        assert!(point["truth"].is_object(), "{point}");
+        point["truth"] = Value::Null;
+    }
+    assert_eq!(with_truth, without_truth);
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn scipy_finds_the_same_efficiency_and_heat_transfer() {
+    let scratch = scratch();
+    // Once as shipped, once with a share of the area before the wheel, so that eq. 1 counts.
+    for (number, alpha) in ["alpha_area: 0  ", "alpha_area: 0.2"].into_iter().enumerate() {
+        let mut replacements = SHORT_GRID.to_vec();
+        replacements.push(("  alpha_area: 0       #", ""));
+        let line = format!("  {alpha}     #");
+        replacements.last_mut().unwrap().1 = &line;
+        let campaign = CampaignFile::shipped_with(&replacements);
+        let result = run_into(&campaign.path, &scratch.path().join(number.to_string()));
+        let points: Vec<&Value> =
+            result["points"].as_array().unwrap().iter().filter(|point| point["verdict"] == "good").collect();
+        assert!(points.len() >= 2, "{} good points", points.len());
+        let mut arguments = vec![recording_of(&result).to_str().unwrap().to_owned(), "29e-3".to_owned()];
+        arguments.push(alpha.trim().rsplit(' ').next().unwrap().to_owned());
+        for point in &points {
+            arguments.push(point["window"]["start_s"].to_string());
+            arguments.push(point["window"]["end_s"].to_string());
+        }
+        let fits = python("fit_steps.py", &arguments);
+        for (point, fit) in points.iter().zip(fits.as_array().unwrap()) {
+            let value = |object: &Value, key: &str| object[key].as_f64().unwrap();
+            let [eta, scipy_eta] = [value(point, "eta"), value(fit, "eta")];
+            assert!(fit["samples"].as_u64().unwrap() > 100, "{fit}");
+            // Both find the minimum of one function: 1e-4 leaves room for how they stop, not for another model.
+            assert!((eta - scipy_eta).abs() < 1e-4, "step {}: eta {eta}, scipy {scipy_eta}", point["step"]);
+            let [h, scipy_h] = [value(point, "h_w_m2k"), value(fit, "h_w_m2k")];
+            assert!((h / scipy_h - 1.0).abs() < 1e-3, "step {}: h {h}, scipy {scipy_h}", point["step"]);
+            let [rms, scipy_rms] = [value(point, "residual_rms_k"), value(fit, "residual_rms_k")];
+            assert!((rms / scipy_rms - 1.0).abs() < 1e-6, "residual {rms} K, scipy {scipy_rms} K");
+        }
+    }
+}
+
+#[test]
+fn a_stored_plan_is_run_and_a_stale_one_refused() {
+    let scratch = scratch();
+    let campaign = CampaignFile::shipped_with(SHORT_GRID);
+    let plan = scratch.path().join("plan.json");
+    mapper(["plan".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), plan.as_os_str()]).exits(0);
+    let run = |campaign: &CampaignFile| {
+        let arguments = ["run".as_ref(), campaign.path.as_os_str(), "--plan".as_ref(), plan.as_os_str()];
+        let out = campaign.runs();
+        mapper(arguments.into_iter().chain(["--json".as_ref(), "--out".as_ref(), out.as_os_str()]))
+    };
+    run(&campaign).exits(0);
+    let stored = std::fs::read_to_string(&plan).unwrap();
+    assert_eq!(std::fs::read_to_string(only_run(&campaign.runs()).join("plan.json")).unwrap(), stored);
+
+    let mut replacements = SHORT_GRID.to_vec();
+    replacements.push(("dwell: 120 s ", "dwell: 110 s "));
+    let changed = CampaignFile::shipped_with(&replacements);
+    let refused = run(&changed).exits(4);
+    assert!(refused.stderr.contains("stale") && refused.stderr.contains("campaign"), "{}", refused.stderr);
+    assert_eq!(refused.stdout, "");
+    assert!(!changed.runs().exists(), "a refused run made a directory");
+}

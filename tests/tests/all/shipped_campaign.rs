@@ -1,0 +1,108 @@
+//! The main job: the shipped campaign, from the file to the map.
+
+use mapper_tests::{Finished, SHIPPED, mapper, only_run, scratch};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+fn run_into(out: &Path) -> Finished {
+    mapper(["run".as_ref(), SHIPPED.as_ref(), "--json".as_ref(), "--out".as_ref(), out.as_os_str()]).exits(0)
+}
+
+/// Keys that scripts rely on, of the one object that `mapper run --json` prints.
+const RUN_KEYS: &[&str] = &["run", "recording", "points", "map"];
+const POINT_KEYS: &[&str] = &[
+    "speed_rpm",
+    "valve",
+    "flow_corrected_kg_s",
+    "speed_corrected_rpm",
+    "pressure_ratio",
+    "eta",
+    "eta_low",
+    "eta_high",
+    "h_w_m2k",
+    "h_low_w_m2k",
+    "h_high_w_m2k",
+    "method",
+    "verdict",
+    "truth",
+];
+
+#[test]
+fn the_shipped_campaign_gives_a_map() {
+    let scratch = scratch();
+    let out = scratch.path().join("runs");
+    let finished = run_into(&out);
+    assert_eq!(finished.stderr, "", "a run into a pipe is quiet");
+    let result = finished.json();
+    for key in RUN_KEYS {
+        assert!(!result[key].is_null(), "{key}");
+    }
+    let run = only_run(&out);
+    assert_eq!(result["run"], run.to_str().unwrap());
+    assert!(Path::new(result["recording"].as_str().unwrap()).is_file());
+    for format in ["csv", "json", "svg"] {
+        let path = Path::new(result["map"][format].as_str().unwrap_or_else(|| panic!("no {format} map")));
+        assert!(path.starts_with(&run) && path.metadata().unwrap().len() > 0, "{}", path.display());
+    }
+    points_are_a_map(result["points"].as_array().unwrap());
+}
+
+fn points_are_a_map(points: &[Value]) {
+    assert!(points.len() >= 30, "{} points", points.len());
+    for point in points {
+        for key in POINT_KEYS {
+            assert!(point.get(key).is_some(), "{key} in {point}");
+        }
+        assert!(["good", "doubtful", "unusable"].contains(&point["verdict"].as_str().unwrap()));
+        if point["verdict"] == "good" {
+            let [low, eta, high] = ["eta_low", "eta", "eta_high"].map(|key| point[key].as_f64().unwrap());
+            assert!(0.0 < low && low < eta && eta < high && high < 1.0, "{point}");
+            let [low, h, high] =
+                ["h_low_w_m2k", "h_w_m2k", "h_high_w_m2k"].map(|key| point[key].as_f64().unwrap());
+            assert!(low < h && h < high, "{point}");
+        }
+        let truth = &point["truth"];
+        assert!(truth["eta"].is_f64() && truth["h_w_m2k"].is_f64(), "{point}");
+    }
+    let lines: BTreeSet<i64> =
+        points.iter().map(|point| point["target"]["speed_rpm"].as_f64().unwrap() as i64).collect();
+    assert!(lines.len() >= 6, "speed lines {lines:?}");
+    // All but a few: the first point of a campaign has no transient, and the smallest gradients say little.
+    let good = points.iter().filter(|point| point["verdict"] == "good").count();
+    assert!(10 * good >= 8 * points.len(), "{good} of {} points are good", points.len());
+    each_line_goes_from_surge_to_choke(points, &lines);
+}
+
+/// Wider open means more flow at less pressure; by MODEL.md's map, choke has at least 1.7 times the flow of surge.
+fn each_line_goes_from_surge_to_choke(points: &[Value], lines: &BTreeSet<i64>) {
+    for line in lines {
+        let mut of_line: Vec<[f64; 3]> = points
+            .iter()
+            .filter(|point| point["target"]["speed_rpm"].as_f64().unwrap() as i64 == *line)
+            .map(|point| {
+                ["valve", "flow_corrected_kg_s", "pressure_ratio"].map(|key| point[key].as_f64().unwrap())
+            })
+            .collect();
+        of_line.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        assert!(of_line.len() >= 5, "{line} rpm has {} points", of_line.len());
+        for pair in of_line.windows(2) {
+            assert!(pair[0][1] < pair[1][1] && pair[0][2] > pair[1][2], "{line} rpm: {pair:?}");
+        }
+        let (first, last) = (of_line.first().unwrap(), of_line.last().unwrap());
+        assert!(last[1] > 1.5 * first[1], "{line} rpm: flow from {} to {} kg/s", first[1], last[1]);
+    }
+}
+
+#[test]
+fn identification_of_the_run_directory_gives_the_points_of_the_run() {
+    let scratch = scratch();
+    let out = scratch.path().join("runs");
+    let of_run = run_into(&out).json();
+    let run = only_run(&out);
+    let of_directory = mapper(["identify".as_ref(), run.as_os_str(), "--json".as_ref()]).exits(0).json();
+    assert_eq!(of_directory["points"], of_run["points"]);
+    let file = run.join("recording.mcap");
+    let of_file = mapper(["identify".as_ref(), file.as_os_str(), "--json".as_ref()]).exits(0).json();
+    assert_eq!(of_file["points"], of_run["points"]);
+}

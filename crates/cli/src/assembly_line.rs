@@ -108,11 +108,7 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         reference: campaign.reference,
         inlet_tap: tap(Channel::P1),
         outlet_tap: tap(Channel::P2),
-        declared: campaign
-            .sensors
-            .iter()
-            .map(|(channel, sensor)| (*channel, sensor.declared))
-            .collect(),
+        declared: campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
         ..IdentifyConfig::default()
     }
 }

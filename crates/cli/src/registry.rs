@@ -33,7 +33,11 @@ pub fn make_backend(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, Ba
         Some((_, _, make)) => make(context),
         None => {
             let known: Vec<&str> = BACKENDS.iter().map(|(name, ..)| *name).collect();
-            Err(settings_error(wanted, "", format!("there is no such backend; there are {}", known.join(", "))))
+            Err(settings_error(
+                wanted,
+                "",
+                format!("there is no such backend; there are {}", known.join(", ")),
+            ))
         }
     }
 }
@@ -44,10 +48,11 @@ fn make_virtual_lab(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, Ba
         model: context.model.clone(),
         boundary: campaign.boundary,
         speed_max_rpm: campaign.limits.speed_max_rpm,
-        sensors: campaign
+        sensors: campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
+        static_tap_pipe_diameters_m: campaign
             .sensors
             .iter()
-            .map(|(channel, sensor)| (*channel, sensor.declared))
+            .filter_map(|(channel, sensor)| Some((*channel, sensor.static_tap_pipe_diameter_m?)))
             .collect(),
         seed: campaign.seed,
     };

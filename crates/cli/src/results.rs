@@ -73,7 +73,8 @@ pub fn make(
         (output::to_json(&json!({"reference": config.reference, "points": points}))? + "\n").as_bytes(),
     )?;
     let report = directory.join(run_directory::REPORT);
-    let text = test_report::markdown(campaign, plan, end, &read.recording.events, &points, score.as_ref(), &map);
+    let text =
+        test_report::markdown(campaign, plan, end, &read.recording.events, &points, score.as_ref(), &map);
     output::write_new(&report, text.as_bytes())?;
     Ok(Results {
         run: directory.to_owned(),

@@ -16,7 +16,9 @@ pub fn with_heads(heads: &[String]) -> Table {
 
 /// A number, or a dash where there is none: a silent number helps nobody.
 pub fn number(value: Option<f64>, decimals: usize) -> String {
-    value.filter(|value| value.is_finite()).map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+    value
+        .filter(|value| value.is_finite())
+        .map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
 }
 
 /// Values as the campaign wants them shown.
@@ -69,7 +71,12 @@ impl Display {
 
     /// A mass flow.
     pub fn flow(&self, flow_kg_s: f64) -> String {
-        Self::shown(Kind::MassFlow, &self.units.flow, flow_kg_s, if self.units.flow == "kg/s" { 5 } else { 2 })
+        Self::shown(
+            Kind::MassFlow,
+            &self.units.flow,
+            flow_kg_s,
+            if self.units.flow == "kg/s" { 5 } else { 2 },
+        )
     }
 
     /// Column head: what, and the unit of temperatures.

@@ -24,7 +24,9 @@ pub fn markdown(
     let mut text = format!("# Compressor map of {}\n\n", campaign.machine.name);
     let outcome = match end {
         RunEnd::Completed => "Completed.".to_owned(),
-        RunEnd::Interrupted { t_s } => format!("Stopped by the operator at {t_s:.0} s: the map is not complete."),
+        RunEnd::Interrupted { t_s } => {
+            format!("Stopped by the operator at {t_s:.0} s: the map is not complete.")
+        }
         RunEnd::Tripped(trip) => {
             format!("Stopped by a guard at {:.1} s ({}): the map is not complete.", trip.t_s, trip.reason)
         }
@@ -72,13 +74,22 @@ fn head_rows(campaign: &Campaign, plan: &Plan) -> Vec<(&'static str, String)> {
         ("test cell", report.test_cell.clone().unwrap_or_else(missing)),
         ("rig", campaign.backend.name.clone()),
         ("barometer", report.barometer_pa.map_or_else(missing, pressure)),
-        ("relative humidity", report.humidity_ratio.map_or_else(missing, |ratio| format!("{:.0} %", 100.0 * ratio))),
+        (
+            "relative humidity",
+            report.humidity_ratio.map_or_else(missing, |ratio| format!("{:.0} %", 100.0 * ratio)),
+        ),
         ("inlet (total)", format!("{}, {}", temperature(boundary.t1_k), pressure(boundary.p1_pa))),
         ("turbine inlet temperature (total)", temperature(boundary.t3_k)),
         ("turbine outlet pressure", pressure(boundary.p4_pa)),
         ("oil temperature", temperature(boundary.oil_temperature_k)),
         ("reference state of corrected quantities", reference.to_string()),
-        ("identification", format!("{}, alpha_A = {}", campaign.identification.method, campaign.identification.alpha_area_ratio)),
+        (
+            "identification",
+            format!(
+                "{}, alpha_A = {}",
+                campaign.identification.method, campaign.identification.alpha_area_ratio
+            ),
+        ),
         ("duration", table::duration(plan.duration_s())),
         ("order", plan.objective.clone()),
         ("seed", plan.seed.to_string()),

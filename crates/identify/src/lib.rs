@@ -29,4 +29,3 @@ pub use config::{
 pub use error::{IdentifyError, StepError};
 pub use findings::code;
 pub use identify::{identify, identify_each};
-pub use taps::{static_to_total_pa, total_to_static_pa};

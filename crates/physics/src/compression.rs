@@ -75,16 +75,26 @@ mod tests {
     use proptest::prelude::*;
 
     fn inputs() -> impl Strategy<Value = CompressionInputs> {
-        (280.0..320.0f64, 290.0..420.0f64, 0.01..0.2f64, 1.0..4.0f64, 0.3..1.0f64, 0.0..4000.0f64, 0.0..1.0f64)
-            .prop_map(|(t1_k, tc_k, flow_kg_s, pr, efficiency, h_w_m2k, alpha_area_ratio)| CompressionInputs {
-                t1_k,
-                tc_k,
-                flow_kg_s,
-                isentropic_rise_ratio: isentropic_rise_ratio(pr, t1_k),
-                efficiency,
-                h_w_m2k,
-                alpha_area_ratio,
-                internal_area_m2: 29e-3,
+        (
+            280.0..320.0f64,
+            290.0..420.0f64,
+            0.01..0.2f64,
+            1.0..4.0f64,
+            0.3..1.0f64,
+            0.0..4000.0f64,
+            0.0..1.0f64,
+        )
+            .prop_map(|(t1_k, tc_k, flow_kg_s, pr, efficiency, h_w_m2k, alpha_area_ratio)| {
+                CompressionInputs {
+                    t1_k,
+                    tc_k,
+                    flow_kg_s,
+                    isentropic_rise_ratio: isentropic_rise_ratio(pr, t1_k),
+                    efficiency,
+                    h_w_m2k,
+                    alpha_area_ratio,
+                    internal_area_m2: 29e-3,
+                }
             })
     }
 

@@ -15,7 +15,13 @@ pub fn bearing_conductance_w_k(bearing: &BearingParams) -> f64 {
 
 /// Temperature of the massless bearing node between both housings and the oil, K.
 #[inline]
-pub fn bearing_k(bearing_conductance_w_k: f64, oil_conductance_w_k: f64, tc_k: f64, tt_k: f64, oil_k: f64) -> f64 {
+pub fn bearing_k(
+    bearing_conductance_w_k: f64,
+    oil_conductance_w_k: f64,
+    tc_k: f64,
+    tt_k: f64,
+    oil_k: f64,
+) -> f64 {
     (bearing_conductance_w_k * (tt_k + tc_k) + oil_conductance_w_k * oil_k)
         / (2.0 * bearing_conductance_w_k + oil_conductance_w_k)
 }

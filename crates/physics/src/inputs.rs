@@ -39,7 +39,9 @@ pub struct InterpolatedInputs {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum InputsError {
     /// No rows, or more or fewer rows than times.
-    #[error("{times} times and {rows} rows of boundary conditions; as many of each are needed, and at least one")]
+    #[error(
+        "{times} times and {rows} rows of boundary conditions; as many of each are needed, and at least one"
+    )]
     Lengths {
         /// Number of times.
         times: usize,

@@ -15,6 +15,7 @@ pub mod model;
 pub mod nusselt;
 pub mod orifice;
 pub mod params;
+pub mod pressure_tap;
 pub mod rosenbrock;
 pub mod simulate;
 pub mod standstill;

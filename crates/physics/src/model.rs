@@ -168,7 +168,8 @@ impl Model {
     /// Appendix A's machine with the closed-form map.
     pub fn nominal() -> Self {
         let params = Params::default();
-        let map = crate::closed_form_map::ClosedFormMap { wheel_diameter_m: params.compressor.wheel_diameter_m };
+        let map =
+            crate::closed_form_map::ClosedFormMap { wheel_diameter_m: params.compressor.wheel_diameter_m };
         Model { params, map: Arc::new(map) }
     }
 
@@ -262,7 +263,9 @@ impl PreparedModel<'_> {
                 boundary.ambient_temperature_k,
             ),
             valve_flow_kg_s: orifice::flow_kg_s(
-                boundary.valve_opening_ratio * params.outlet.discharge_coefficient * params.outlet.valve_area_m2,
+                boundary.valve_opening_ratio
+                    * params.outlet.discharge_coefficient
+                    * params.outlet.valve_area_m2,
                 state.p2_pa,
                 gas.t2_k,
                 boundary.p1_pa,
@@ -306,7 +309,8 @@ impl PreparedModel<'_> {
                 * (outputs.flow_kg_s - outputs.valve_flow_kg_s),
             self.compressor_housing_balance_w(state, outputs)
                 / housing::compressor_capacity_j_k(params, state.tc_k),
-            self.turbine_housing_balance_w(state, outputs) / housing::turbine_capacity_j_k(params, state.tt_k),
+            self.turbine_housing_balance_w(state, outputs)
+                / housing::turbine_capacity_j_k(params, state.tt_k),
             if tau_s > 0.0 { (outputs.t2_k - state.t2_tip_k) / tau_s } else { 0.0 },
         ]
     }

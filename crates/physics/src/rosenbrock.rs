@@ -101,7 +101,9 @@ impl<const N: usize> Step<N> {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum IntegrationError {
     /// The error control asks for ever smaller steps.
-    #[error("the integration needs steps below {step_s:.1e} s at {t_s:.6} s; the inputs or parameters there are beyond the model")]
+    #[error(
+        "the integration needs steps below {step_s:.1e} s at {t_s:.6} s; the inputs or parameters there are beyond the model"
+    )]
     StepTooSmall {
         /// Time, s.
         t_s: f64,
@@ -109,7 +111,9 @@ pub enum IntegrationError {
         step_s: f64,
     },
     /// The bound on the number of steps was reached.
-    #[error("the integration took more than {steps} steps and stands at {t_s:.6} s; loosen the tolerance or shorten the run")]
+    #[error(
+        "the integration took more than {steps} steps and stands at {t_s:.6} s; loosen the tolerance or shorten the run"
+    )]
     TooManySteps {
         /// Time, s.
         t_s: f64,
@@ -172,7 +176,13 @@ where
         loop {
             // Two equal steps rather than a long one and a sliver.
             let ends_here = h >= left_s * (1.0 - 1e-9);
-            let tried_s = if ends_here { left_s } else if h > 0.5 * left_s { 0.5 * left_s } else { h };
+            let tried_s = if ends_here {
+                left_s
+            } else if h > 0.5 * left_s {
+                0.5 * left_s
+            } else {
+                h
+            };
             if tried_s <= 1e-14 * t0_s.abs().max(1.0) && !ends_here {
                 return Err(IntegrationError::StepTooSmall { t_s: t0_s, step_s: tried_s });
             }
@@ -328,11 +338,17 @@ mod tests {
                     }
                 }
                 // Local errors of some hundred steps may add.
-                assert!(worst_end < 100.0 * relative_ratio, "L = {stiffness}, rtol = {relative_ratio}: {worst_end:e}");
+                assert!(
+                    worst_end < 100.0 * relative_ratio,
+                    "L = {stiffness}, rtol = {relative_ratio}: {worst_end:e}"
+                );
                 // The interpolant is one order lower, and where the equation is infinitely stiff the error estimate
                 // sees only the ends of a step.
                 if stiffness == 1.0 {
-                    assert!(worst_within < 100.0 * relative_ratio, "rtol = {relative_ratio}: {worst_within:e}");
+                    assert!(
+                        worst_within < 100.0 * relative_ratio,
+                        "rtol = {relative_ratio}: {worst_within:e}"
+                    );
                 }
             }
         }

@@ -186,7 +186,9 @@ impl Simulator {
             let (mut low_s, mut high_s) = (step.t0_s, step.t1_s);
             while high_s - low_s > 1e-6 {
                 let middle_s = 0.5 * (low_s + high_s);
-                if inside(self.margins_at(middle_s, &step.at(middle_s), system)[which]) == inside(before[which]) {
+                if inside(self.margins_at(middle_s, &step.at(middle_s), system)[which])
+                    == inside(before[which])
+                {
                     low_s = middle_s;
                 } else {
                     high_s = middle_s;
@@ -205,12 +207,7 @@ impl Simulator {
     }
 
     /// Surge position minus 1; shaft speed minus its limit, rpm.
-    fn margins_at(
-        &self,
-        t_s: f64,
-        y: &[f64; STATES],
-        system: &mut ModelSystem<'_, impl Inputs>,
-    ) -> [f64; 2] {
+    fn margins_at(&self, t_s: f64, y: &[f64; STATES], system: &mut ModelSystem<'_, impl Inputs>) -> [f64; 2] {
         system.prepare_for(t_s);
         let boundary = system.prepared.boundary();
         let state = State::from_array(y);
@@ -250,7 +247,12 @@ impl<I: Inputs> OdeSystem<STATES> for ModelSystem<'_, I> {
         self.prepared.derivatives(&state, &outputs)
     }
 
-    fn time_derivative(&mut self, t_s: f64, y: &[f64; STATES], rates: &[f64; STATES]) -> Option<[f64; STATES]> {
+    fn time_derivative(
+        &mut self,
+        t_s: f64,
+        y: &[f64; STATES],
+        rates: &[f64; STATES],
+    ) -> Option<[f64; STATES]> {
         if self.constant {
             return None;
         }

@@ -45,8 +45,7 @@ pub fn relax(
 fn rates_k_s(params: &Params, tc_k: f64, tt_k: f64, oil_k: f64, ambient_k: f64) -> [f64; 2] {
     let (compressor, turbine) = (&params.compressor, &params.turbine);
     let bearing_w_k = housing::bearing_conductance_w_k(&params.bearing);
-    let bearing_k =
-        housing::bearing_k(bearing_w_k, params.bearing.oil_conductance_w_k, tc_k, tt_k, oil_k);
+    let bearing_k = housing::bearing_k(bearing_w_k, params.bearing.oil_conductance_w_k, tc_k, tt_k, oil_k);
     let external_w = |area_m2, emissivity_ratio, wall_k| {
         housing::external_heat_w(area_m2, emissivity_ratio, wall_k, ambient_k)
     };

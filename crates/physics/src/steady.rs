@@ -22,7 +22,9 @@ pub enum SteadyError {
     #[error(transparent)]
     Boundary(#[from] BoundaryError),
     /// The valve passes less than the compressor delivers at any pressure, or the other way round.
-    #[error("at {speed_rpm:.0} rpm no outlet pressure makes the compressor deliver what the valve (opening {valve_opening_ratio}) passes")]
+    #[error(
+        "at {speed_rpm:.0} rpm no outlet pressure makes the compressor deliver what the valve (opening {valve_opening_ratio}) passes"
+    )]
     NoFlowBalance {
         /// Shaft speed, rpm.
         speed_rpm: f64,
@@ -46,7 +48,9 @@ pub enum SteadyError {
         highest_pa: f64,
     },
     /// The housings' temperatures did not settle.
-    #[error("the housing temperatures at {speed_rpm:.0} rpm, valve opening {valve_opening_ratio}, do not settle")]
+    #[error(
+        "the housing temperatures at {speed_rpm:.0} rpm, valve opening {valve_opening_ratio}, do not settle"
+    )]
     NoHeatBalance {
         /// Shaft speed, rpm.
         speed_rpm: f64,
@@ -66,7 +70,11 @@ const HEAT_TOLERANCE_W: f64 = 1e-9;
 ///
 /// # Errors
 /// [`SteadyError`] naming the balance that cannot be met.
-pub fn hold_speed(model: &Model, speed_rpm: f64, boundary: &BoundaryConditions) -> Result<SteadyState, SteadyError> {
+pub fn hold_speed(
+    model: &Model,
+    speed_rpm: f64,
+    boundary: &BoundaryConditions,
+) -> Result<SteadyState, SteadyError> {
     let mut boundary = *boundary;
     boundary.p3_pa = boundary.p4_pa * 1.5;
     boundary.check()?;
@@ -104,10 +112,8 @@ pub fn hold_speed(model: &Model, speed_rpm: f64, boundary: &BoundaryConditions) 
         if !determinant.is_finite() || determinant == 0.0 {
             return Err(no_heat_balance);
         }
-        let step = [
-            (-heat_w[0] * d + heat_w[1] * b) / determinant,
-            (-heat_w[1] * a + heat_w[0] * c) / determinant,
-        ];
+        let step =
+            [(-heat_w[0] * d + heat_w[1] * b) / determinant, (-heat_w[1] * a + heat_w[0] * c) / determinant];
         let before = (heat_w, temperatures);
         let mut share = (80.0 / step[0].abs().max(step[1].abs())).min(1.0);
         loop {
@@ -167,7 +173,13 @@ fn gas_path_at_rest(
         );
         turbine.at(tt_k, state.shaft_speed_rad_s).power_w - power_w
     })
-    .ok_or(SteadyError::NoPowerBalance { speed_rpm, valve_opening_ratio, power_w, lowest_pa, highest_pa })?;
+    .ok_or(SteadyError::NoPowerBalance {
+        speed_rpm,
+        valve_opening_ratio,
+        power_w,
+        lowest_pa,
+        highest_pa,
+    })?;
     boundary.p3_pa = p3_pa;
     Ok((boundary, state))
 }

@@ -25,7 +25,9 @@ pub struct MapRow {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MapError {
     /// A value without physical meaning.
-    #[error("row {row} of the map: {quantity} = {value} {unit} has no physical meaning (it must be {needed})")]
+    #[error(
+        "row {row} of the map: {quantity} = {value} {unit} has no physical meaning (it must be {needed})"
+    )]
     Value {
         /// Row, from 1, header not counted.
         row: usize,
@@ -45,7 +47,9 @@ pub enum MapError {
         lines: usize,
     },
     /// A line with too few points.
-    #[error("the speed line at {speed_corrected_rpm} rpm has {points} usable point(s) between choke and its highest pressure ratio; at least 3 are needed")]
+    #[error(
+        "the speed line at {speed_corrected_rpm} rpm has {points} usable point(s) between choke and its highest pressure ratio; at least 3 are needed"
+    )]
     TooFewPoints {
         /// The line's corrected speed, rpm.
         speed_corrected_rpm: f64,
@@ -53,7 +57,9 @@ pub enum MapError {
         points: usize,
     },
     /// A line below another of lower speed.
-    #[error("the speed line at {speed_corrected_rpm} rpm ends on the surge side at a pressure ratio of {pressure_ratio}, below that of the next slower line ({slower_pressure_ratio}): the lines cross")]
+    #[error(
+        "the speed line at {speed_corrected_rpm} rpm ends on the surge side at a pressure ratio of {pressure_ratio}, below that of the next slower line ({slower_pressure_ratio}): the lines cross"
+    )]
     Crossing {
         /// The line's corrected speed, rpm.
         speed_corrected_rpm: f64,
@@ -63,7 +69,9 @@ pub enum MapError {
         slower_pressure_ratio: f64,
     },
     /// The text is not a table.
-    #[error("line {line} of the map: `{text}` is not four numbers (corrected rpm, corrected kg/s, pressure ratio, efficiency)")]
+    #[error(
+        "line {line} of the map: `{text}` is not four numbers (corrected rpm, corrected kg/s, pressure ratio, efficiency)"
+    )]
     Syntax {
         /// Line of the file, from 1.
         line: usize,
@@ -127,7 +135,13 @@ impl TabulatedMap {
                 ("speed", row.speed_corrected_rpm, "rpm", row.speed_corrected_rpm > 0.0, positive),
                 ("flow", row.flow_corrected_kg_s, "kg/s", row.flow_corrected_kg_s > 0.0, positive),
                 ("pressure ratio", row.pressure_ratio, "1", row.pressure_ratio > 0.0, positive),
-                ("efficiency", row.efficiency, "1", row.efficiency > 0.0 && row.efficiency <= 1.0, "a fraction above 0, at most 1"),
+                (
+                    "efficiency",
+                    row.efficiency,
+                    "1",
+                    row.efficiency > 0.0 && row.efficiency <= 1.0,
+                    "a fraction above 0, at most 1",
+                ),
             ] {
                 if !(value.is_finite() && good) {
                     return Err(MapError::Value { row: index + 1, quantity, value, unit, needed });
@@ -177,10 +191,20 @@ impl TabulatedMap {
                 content.split([',', ';', '\t']).map(|field| field.trim().parse().ok()).collect();
             match numbers.as_deref() {
                 Some(&[speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, efficiency]) => {
-                    rows.push(MapRow { speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, efficiency });
+                    rows.push(MapRow {
+                        speed_corrected_rpm,
+                        flow_corrected_kg_s,
+                        pressure_ratio,
+                        efficiency,
+                    });
                 }
                 _ if header_allowed => {}
-                _ => return Err(MapError::Syntax { line: index + 1, text: content.chars().take(60).collect() }),
+                _ => {
+                    return Err(MapError::Syntax {
+                        line: index + 1,
+                        text: content.chars().take(60).collect(),
+                    });
+                }
             }
             header_allowed = false;
         }
@@ -203,7 +227,8 @@ impl TabulatedMap {
         };
         let (low, high) = (&self.lines[low], &self.lines[high]);
         let span_rpm = high.speed_corrected_rpm - low.speed_corrected_rpm;
-        let share = if span_rpm > 0.0 { (speed_corrected_rpm - low.speed_corrected_rpm) / span_rpm } else { 0.0 };
+        let share =
+            if span_rpm > 0.0 { (speed_corrected_rpm - low.speed_corrected_rpm) / span_rpm } else { 0.0 };
         (low, high, share)
     }
 
@@ -218,9 +243,8 @@ impl TabulatedMap {
     fn ends(&self, speed_corrected_rpm: f64) -> (f64, f64) {
         let (low, high, share) = self.neighbours(speed_corrected_rpm);
         let ratio = self.similarity_ratio(speed_corrected_rpm);
-        let blend = |a: f64, b: f64| {
-            pressure_ratio_of_head((head(a) + (head(b) - head(a)) * share) * ratio * ratio)
-        };
+        let blend =
+            |a: f64, b: f64| pressure_ratio_of_head((head(a) + (head(b) - head(a)) * share) * ratio * ratio);
         (
             blend(low.choke_pressure_ratio, high.choke_pressure_ratio),
             blend(low.surge_pressure_ratio, high.surge_pressure_ratio),
@@ -264,7 +288,8 @@ impl Line {
         let nodes = rising
             .iter()
             .map(|row| Node {
-                x: (row.pressure_ratio - choke_pressure_ratio) / (surge_pressure_ratio - choke_pressure_ratio),
+                x: (row.pressure_ratio - choke_pressure_ratio)
+                    / (surge_pressure_ratio - choke_pressure_ratio),
                 flow_kg_s: row.flow_corrected_kg_s,
                 efficiency: row.efficiency,
             })
@@ -354,7 +379,10 @@ mod tests {
             for i in 1..19 {
                 let pr = choke_pr + (surge_pr - choke_pr) * f64::from(i) / 20.0;
                 let (a, b) = (table.evaluate(speed, pr), exact.evaluate(speed, pr));
-                assert!((a.flow_corrected_kg_s / b.flow_corrected_kg_s - 1.0).abs() < tolerance, "{speed} {pr}");
+                assert!(
+                    (a.flow_corrected_kg_s / b.flow_corrected_kg_s - 1.0).abs() < tolerance,
+                    "{speed} {pr}"
+                );
                 assert!((a.efficiency - b.efficiency).abs() < tolerance, "{speed} {pr}");
             }
         }

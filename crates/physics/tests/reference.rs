@@ -98,7 +98,8 @@ fn the_gas_path_agrees_at_every_point() {
         };
         let outputs = model.prepare(&boundary).evaluate(&state);
         // Ten digits are printed; near the ends of the line the root amplifies the last one.
-        let _ = worst(&row, &["N_rpm", "P2_Pa", "Tc_K", "alpha_A"], &state, &outputs, &boundary, &model, 1e-6);
+        let _ =
+            worst(&row, &["N_rpm", "P2_Pa", "Tc_K", "alpha_A"], &state, &outputs, &boundary, &model, 1e-6);
     }
 }
 
@@ -147,7 +148,13 @@ fn transients_agree_in_every_column() {
         let (from, to, valve) = (jump[0]["from_rpm"], jump[0]["to_rpm"], jump[0]["valve"]);
         let rows: Vec<&Row> = jump.iter().collect();
         let start = held(&model, from, valve).state;
-        follow(&model, &start, &held(&model, to, valve).boundary, &rows, &["from_rpm", "to_rpm", "valve", "t_s"]);
+        follow(
+            &model,
+            &start,
+            &held(&model, to, valve).boundary,
+            &rows,
+            &["from_rpm", "to_rpm", "valve", "t_s"],
+        );
     }
 }
 

@@ -13,4 +13,6 @@ mod request;
 
 pub use fingerprint::sha256_hex;
 pub use plan::make_plan;
-pub use request::{PlanError, PlanLimits, PlanRequest, PlanTiming, SettleBands, UnreachablePoint, VisitOrder};
+pub use request::{
+    PlanError, PlanLimits, PlanRequest, PlanTiming, SettleBands, UnreachablePoint, VisitOrder,
+};

@@ -186,7 +186,9 @@ mod tests {
         let (model, points) = (Model::nominal(), grid());
         let mut strict = request(&model, &points, VisitOrder::Listed);
         strict.limits.p3_max_pa = 200e3;
-        let Err(PlanError::Unreachable(culprits)) = make_plan(&strict) else { panic!("must not be reachable") };
+        let Err(PlanError::Unreachable(culprits)) = make_plan(&strict) else {
+            panic!("must not be reachable")
+        };
         // Of the reference table: 150 krpm needs 219 to 259 kPa at all three openings, 130 krpm 201 and 217 at two.
         assert_eq!(culprits.len(), 5);
         assert!(culprits[2].reason.contains("218.6 kPa"), "{}", culprits[2].reason);

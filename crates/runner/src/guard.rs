@@ -114,7 +114,10 @@ impl Guard for SilenceGuard {
             && batch.first_sequence != expected
         {
             let lost = batch.first_sequence.wrapping_sub(expected);
-            return Some(Trip { t_s: now_s, reason: format!("{lost} samples were lost before {now_s:.1} s") });
+            return Some(Trip {
+                t_s: now_s,
+                reason: format!("{lost} samples were lost before {now_s:.1} s"),
+            });
         }
         self.next_sequence = Some(batch.first_sequence + batch.t_s.len() as u64);
         for (channel, last_seen_s) in self.watched.iter().zip(&mut self.last_seen_s) {

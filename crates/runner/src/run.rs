@@ -164,7 +164,13 @@ impl Runner<'_> {
         Ok(end)
     }
 
-    fn tell_the_end(&mut self, now_s: f64, kind: EventKind, message: String, safe: bool) -> Result<(), RunError> {
+    fn tell_the_end(
+        &mut self,
+        now_s: f64,
+        kind: EventKind,
+        message: String,
+        safe: bool,
+    ) -> Result<(), RunError> {
         self.observer.on_event(&Event { t_s: now_s, kind, message })?;
         if safe {
             let message = "air off, valve open".to_owned();

@@ -150,3 +150,25 @@ fn calls_out_of_order_and_impossible_setpoints_are_refused() {
     lab.make_safe().unwrap();
     lab.disarm().unwrap();
 }
+
+/// What a wall tap reads, brought back to total pressure, is what a total probe reads.
+#[test]
+fn static_taps_read_less_by_the_dynamic_pressure() {
+    let taps = [(Channel::P1, 0.040), (Channel::P2, 0.035)];
+    let at = |static_tap_pipe_diameters_m| {
+        let mut lab = VirtualLab::new(LabSettings { static_tap_pipe_diameters_m, ..ideal() });
+        lab.arm().unwrap();
+        lab.set(&setpoints(p3_pa(110e3, 1.0), 1.0)).unwrap();
+        lab.poll(1.0).unwrap()
+    };
+    let (total, tapped) = (at([].into()), at(taps.into()));
+    for (channel, temperature, diameter_m) in
+        [(Channel::P1, Channel::T1, 0.040), (Channel::P2, Channel::T2, 0.035)]
+    {
+        let (flow_kg_s, t_k) = (last(&tapped, Channel::CompressorFlow), last(&tapped, temperature));
+        let read_pa = last(&tapped, channel);
+        let total_pa = mapper_physics::pressure_tap::static_to_total_pa(read_pa, flow_kg_s, t_k, diameter_m);
+        assert!(read_pa < last(&total, channel) - 500.0, "{channel}: {read_pa}");
+        assert!((total_pa / last(&total, channel) - 1.0).abs() < 1e-9);
+    }
+}

@@ -1,10 +1,10 @@
 //! `mapper check`.
 
 use crate::arguments::CheckArguments;
+use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::registry::{BackendContext, make_backend};
 use crate::{assembly_line, output, table};
-use crate::exit_code::Code;
 use serde_json::json;
 
 /// Checks a campaign and says in a line what it is.
@@ -15,8 +15,7 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     make_backend(&BackendContext { campaign: &campaign, model: &model })
         .map_err(|error| Failure::new(Code::BadInput, error))?;
     let timing = &campaign.timing;
-    let duration_s =
-        timing.warm_up_s + campaign.points.len() as f64 * timing.dwell_s + timing.cool_down_s;
+    let duration_s = timing.warm_up_s + campaign.points.len() as f64 * timing.dwell_s + timing.cool_down_s;
     if arguments.json {
         return output::print_json(&json!({
             "campaign": campaign.name,

@@ -26,8 +26,7 @@ pub fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
     }
     let points = mapper_identify::identify(&report.recording, &config)
         .map_err(|error| Failure::new(Code::BadRecording, error))?;
-    let points =
-        mapper_score::score(&path, &report.recording.steps, points).map_err(bad_recording)?;
+    let points = mapper_score::score(&path, &report.recording.steps, points).map_err(bad_recording)?;
     if arguments.json {
         return output::print_json(&json!({
             "recording": path,
@@ -53,8 +52,9 @@ fn bad_recording(error: RecordError) -> Failure {
 }
 
 fn channel_map(file: &Path) -> Result<ChannelMap, Failure> {
-    let text = std::fs::read_to_string(file)
-        .map_err(|error| Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display())))?;
+    let text = std::fs::read_to_string(file).map_err(|error| {
+        Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display()))
+    })?;
     ChannelMap::from_yaml(&text)
         .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", file.display())))
 }
@@ -85,8 +85,9 @@ fn config(
     }
     if let Some(text) = &report.campaign_text {
         let origin = arguments.recording.join(run_directory::CAMPAIGN);
-        let campaign = mapper_campaign::check(text, &origin, &|path| std::fs::read_to_string(path))
-            .map_err(|findings| Failure::of_campaign(mapper_campaign::CampaignError::Mistakes(Box::new(findings))))?;
+        let campaign = mapper_campaign::check(text, &origin, &|path| std::fs::read_to_string(path)).map_err(
+            |findings| Failure::of_campaign(mapper_campaign::CampaignError::Mistakes(Box::new(findings))),
+        )?;
         return Ok((assembly_line::identification(&campaign), campaign.display));
     }
     Err(Failure::new(

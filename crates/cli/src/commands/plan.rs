@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::table::{self, Display, number};
 use crate::{assembly_line, output};
 use mapper_campaign::Campaign;
-use mapper_core::Plan;
+use mapper_core::{OperatingPoint, Plan};
 use std::fmt::Write;
 
 /// Makes the plan of a campaign and prints it.
@@ -22,14 +22,17 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
     output::print(&text(&campaign, &plan))
 }
 
+fn place(display: &Display, point: OperatingPoint) -> String {
+    format!("{} @ {}", display.speed(point.speed_rpm), point.valve_opening_ratio)
+}
+
 /// The plan as a table with its figures below.
 pub fn text(campaign: &Campaign, plan: &Plan) -> String {
     let display = Display::new(&campaign.display);
     let mut steps = table::with_heads(&[
         "step".to_owned(),
-        display.speed_head("from"),
-        display.speed_head("to"),
-        "opening 1".to_owned(),
+        format!("from {} @ opening", campaign.display.speed),
+        format!("to {} @ opening", campaign.display.speed),
         display.pressure_head("P3"),
         display.flow_head("flow"),
         "PR 1".to_owned(),
@@ -44,9 +47,8 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
         let predicted = &step.predicted;
         steps.add_row([
             (step.index + 1).to_string(),
-            step.from.map_or_else(|| "-".to_owned(), |from| display.speed(from.speed_rpm)),
-            display.speed(step.to.speed_rpm),
-            format!("{}", step.to.valve_opening_ratio),
+            step.from.map_or_else(|| "-".to_owned(), |from| place(&display, from)),
+            place(&display, step.to),
             display.pressure(step.p3_pa),
             display.flow(predicted.flow_kg_s),
             format!("{:.3}", predicted.pressure_ratio),

@@ -14,7 +14,11 @@ use std::path::Path;
 pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
     let bar = ProgressBar::with_draw_target(
         Some(FIGURES.len() as u64),
-        if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() },
+        if std::io::stderr().is_terminal() {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        },
     );
     if let Ok(style) = ProgressStyle::with_template("{msg:12} [{wide_bar}] {pos}/{len} figures") {
         bar.set_style(style.progress_chars("=> "));
@@ -40,7 +44,12 @@ pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
     for result in &results {
         text.push_str(&format!("Figure {}: {}\n", result.number, result.title));
         for statement in &result.statements {
-            text.push_str(&format!("  {:8} {}\n           {}\n", statement.verdict.to_string(), statement.paper, statement.here));
+            text.push_str(&format!(
+                "  {:8} {}\n           {}\n",
+                statement.verdict.to_string(),
+                statement.paper,
+                statement.here
+            ));
         }
     }
     output::print(&format!("{text}\n{}\n", page.display()))

@@ -52,8 +52,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         plan_json: Some(plan_json.into_bytes()),
         campaign_yaml: Some(campaign_text),
     };
-    let writer = RecordingWriter::create(&recording, &header)
-        .map_err(|error| Failure::new(Code::Failure, error))?;
+    let writer =
+        RecordingWriter::create(&recording, &header).map_err(|error| Failure::new(Code::Failure, error))?;
     let (end, recorder) = drive(&campaign, &plan, backend.as_mut(), Recorder::new(writer))?;
     let finished = recorder.finish();
     if let Err(error) = &end {
@@ -83,7 +83,10 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         )),
         RunEnd::Tripped(trip) => Err(Failure::new(
             Code::Rig,
-            format!("stopped at {:.1} s: {}; the rig is safe and the recording is kept", trip.t_s, trip.reason),
+            format!(
+                "stopped at {:.1} s: {}; the rig is safe and the recording is kept",
+                trip.t_s, trip.reason
+            ),
         )),
     }
 }
@@ -118,8 +121,9 @@ fn drive(
 
 /// A plan from a file, refused when what it was made from has changed.
 fn stored_plan(path: &Path, made: &Plan) -> Result<Plan, Failure> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| Failure::new(Code::Failure, format!("failed to read {}: {error}", path.display())))?;
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        Failure::new(Code::Failure, format!("failed to read {}: {error}", path.display()))
+    })?;
     let stored: Plan = serde_json::from_str(&text)
         .map_err(|error| Failure::new(Code::NoPlan, format!("{} is no plan: {error}", path.display())))?;
     let (then, now) = (&stored.made_from, &made.made_from);

@@ -87,8 +87,7 @@ mod tests {
 
     #[test]
     fn a_pure_lag_is_an_exponential() {
-        let mut actuator =
-            Actuator::at_rest(ActuatorDynamics { lag_s: 0.3, slew_per_s: f64::INFINITY }, 1.0);
+        let mut actuator = Actuator::at_rest(ActuatorDynamics { lag_s: 0.3, slew_per_s: f64::INFINITY }, 1.0);
         actuator.set(10.0, 3.0);
         for after_s in [0.0f64, 0.1, 0.3, 2.0] {
             let expected = 3.0 - 2.0 * (-after_s / 0.3).exp();
@@ -116,8 +115,7 @@ mod tests {
 
     #[test]
     fn without_lag_it_jumps() {
-        let mut actuator =
-            Actuator::at_rest(ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY }, 1.0);
+        let mut actuator = Actuator::at_rest(ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY }, 1.0);
         actuator.set(5.0, 2.0);
         assert_eq!(actuator.value(5.0), 2.0);
         assert_eq!(actuator.next_kink_s(5.0), f64::INFINITY);

@@ -12,6 +12,7 @@ use mapper_core::{
 use mapper_physics::inputs::Inputs;
 use mapper_physics::model::{Outputs, State, rad_s_of_rpm};
 use mapper_physics::params::BoundaryConditions;
+use mapper_physics::pressure_tap;
 use mapper_physics::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, Simulator, Watch};
 use mapper_physics::standstill::{self, StandstillState};
 use mapper_physics::steady;
@@ -319,7 +320,8 @@ impl Armed {
                 for crossing in crossings {
                     self.report(settings, crossing, end_s);
                 }
-                result.map_err(|error| BackendError::Simulation { t_s: start_s, message: error.to_string() })?;
+                result
+                    .map_err(|error| BackendError::Simulation { t_s: start_s, message: error.to_string() })?;
                 Ok(end_s)
             }
             Some(Machine::Standstill { state, t_s: state_s }) => {
@@ -421,7 +423,11 @@ impl BatchBuilder {
             0.0
         };
         for (row, column) in CHANNELS.iter().zip(&mut self.columns) {
-            let truth = true_value(row.channel, instant, commands, swing);
+            let total = true_value(row.channel, instant, commands, swing);
+            let truth = match settings.static_tap_pipe_diameters_m.get(&row.channel) {
+                Some(pipe_diameter_m) => at_the_wall_pa(row.channel, total, *pipe_diameter_m, instant),
+                None => total,
+            };
             let sensor = sensors.iter_mut().find(|(channel, _)| *channel == row.channel);
             column.push(sensor.map_or(truth, |(_, sensor)| sensor.read(truth)));
         }
@@ -438,6 +444,19 @@ impl BatchBuilder {
             events: self.events,
         }
     }
+}
+
+/// Static pressure at the wall of the pipe of one of the four stations; the total one where the pipe would choke.
+fn at_the_wall_pa(channel: Channel, total_pa: f64, pipe_diameter_m: f64, instant: &Instant<'_>) -> f64 {
+    let Some(outputs) = instant.outputs else { return total_pa };
+    let (flow_kg_s, temperature_k) = match channel {
+        Channel::P1 => (outputs.flow_kg_s, instant.boundary.t1_k),
+        Channel::P2 => (outputs.flow_kg_s, outputs.t2_k),
+        Channel::P3 => (outputs.turbine_flow_kg_s, instant.boundary.t3_k),
+        Channel::P4 => (outputs.turbine_flow_kg_s, outputs.turbine.t4_k),
+        _ => return total_pa,
+    };
+    pressure_tap::total_to_static_pa(total_pa, flow_kg_s, temperature_k, pipe_diameter_m).unwrap_or(total_pa)
 }
 
 fn true_value(channel: Channel, instant: &Instant<'_>, commands: Option<&Setpoints>, swing: f64) -> f64 {

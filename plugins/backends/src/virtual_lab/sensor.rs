@@ -49,8 +49,10 @@ impl Sensor {
     pub fn read(&mut self, truth: f64) -> f64 {
         let white: f64 = StandardNormal.sample(&mut self.random);
         let kick: f64 = StandardNormal.sample(&mut self.random);
-        let reading =
-            truth * (1.0 + self.errors.gain_ratio) + self.errors.offset + self.errors.white_sigma * white + self.coloured;
+        let reading = truth * (1.0 + self.errors.gain_ratio)
+            + self.errors.offset
+            + self.errors.white_sigma * white
+            + self.coloured;
         let fresh_ratio = (1.0 - self.memory_ratio * self.memory_ratio).sqrt();
         self.coloured = self.memory_ratio * self.coloured + self.errors.coloured_sigma * fresh_ratio * kick;
         reading

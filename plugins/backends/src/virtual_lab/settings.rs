@@ -37,6 +37,8 @@ pub struct LabSettings {
     pub oil_actuator: ActuatorDynamics,
     /// Errors of the sensors; channels without an entry are ideal.
     pub sensors: BTreeMap<Channel, SensorErrors>,
+    /// Pressures that are tapped at the wall of a pipe, with its inner diameter, m; the others are total.
+    pub static_tap_pipe_diameters_m: BTreeMap<Channel, f64>,
     /// Shaft speed at which the lab cuts the air by itself, rpm.
     pub trip_speed_rpm: f64,
     /// Swing of flow and outlet pressure beyond the surge line, ratio of their values.
@@ -59,6 +61,7 @@ impl LabSettings {
             valve_actuator: at_once,
             oil_actuator: at_once,
             sensors: BTreeMap::new(),
+            static_tap_pipe_diameters_m: BTreeMap::new(),
             trip_speed_rpm: f64::INFINITY,
             surge_swing_ratio: 0.0,
             seed: 0,

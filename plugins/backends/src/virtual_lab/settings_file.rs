@@ -28,6 +28,8 @@ pub struct NominalRig {
     pub speed_max_rpm: f64,
     /// Declared one-sigma uncertainty of each sensor.
     pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
+    /// Declared static taps with the inner diameters of their pipes, m.
+    pub static_tap_pipe_diameters_m: BTreeMap<Channel, f64>,
     /// Seed of all noise and of the offsets that are drawn.
     pub seed: u64,
 }
@@ -152,6 +154,7 @@ pub fn read_settings(settings: &serde_json::Value, nominal: NominalRig) -> Resul
         valve_actuator: actuators.valve.dynamics("valve", 0.2, 1.0)?,
         oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", 30.0, 1.0)?,
         sensors: sensors(&file, &nominal)?,
+        static_tap_pipe_diameters_m: nominal.static_tap_pipe_diameters_m,
         trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.inside),
         surge_swing_ratio,
         seed: nominal.seed,
@@ -163,7 +166,10 @@ impl<Rate: Dimension> ActuatorFile<Rate> {
         let lag_s = self.lag.map_or(lag_s, |lag| lag.inside);
         let slew_per_s = self.slew.as_ref().map_or(slew_per_s, |slew| slew.inside);
         if !(0.0..=3600.0).contains(&lag_s) {
-            return Err(wrong(&format!("actuators.{name}.lag"), format!("{lag_s} s is not between 0 s and 1 h")));
+            return Err(wrong(
+                &format!("actuators.{name}.lag"),
+                format!("{lag_s} s is not between 0 s and 1 h"),
+            ));
         }
         if slew_per_s <= 0.0 {
             return Err(wrong(&format!("actuators.{name}.slew"), "the rate must be above 0".to_owned()));
@@ -181,7 +187,10 @@ fn true_params(mut params: Params, file: &MachineFile) -> Result<Params, Backend
     }
     if let Some(diameter) = file.probe_diameter {
         if !(0.0..=0.02).contains(&diameter.inside) {
-            return Err(wrong("machine.probe_diameter", "write a diameter between 0 mm and 20 mm".to_owned()));
+            return Err(wrong(
+                "machine.probe_diameter",
+                "write a diameter between 0 mm and 20 mm".to_owned(),
+            ));
         }
         params.t2_probe_diameter_m = diameter.inside;
     }
@@ -228,7 +237,8 @@ fn sensors(
 /// Two standard normal numbers that belong to one sensor of one seed: for its offset and for its gain.
 fn draw(seed: u64, channel: Channel) -> (f64, f64) {
     // Another stream than the sensor's noise: that one starts from the same seed with other multipliers.
-    let mixed = seed.wrapping_mul(0xA24B_AED4_963E_E407) ^ (channel as u64 + 1).wrapping_mul(0x9FB2_1C65_1E98_DF25);
+    let mixed =
+        seed.wrapping_mul(0xA24B_AED4_963E_E407) ^ (channel as u64 + 1).wrapping_mul(0x9FB2_1C65_1E98_DF25);
     let mut random = Pcg64::seed_from_u64(mixed);
     (StandardNormal.sample(&mut random), StandardNormal.sample(&mut random))
 }
@@ -259,6 +269,7 @@ mod tests {
             boundary: BoundaryConditions::default(),
             speed_max_rpm: 180e3,
             sensors: [(Channel::T1, declared), (Channel::T2, declared)].into(),
+            static_tap_pipe_diameters_m: BTreeMap::new(),
             seed: 5,
         }
     }

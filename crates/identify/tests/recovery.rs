@@ -7,8 +7,8 @@ use common::{STEP_S, Transient};
 use mapper_core::{Channel, EstimateUncertainty, Method, Verdict};
 use mapper_identify::{
     DeclaredUncertainty, IdentifyConfig, IdentifyError, PressureTap, WindowRule, code, identify,
-    total_to_static_pa,
 };
+use mapper_physics::pressure_tap::total_to_static_pa;
 use proptest::prelude::*;
 
 fn config(alpha_area_ratio: f64) -> IdentifyConfig {

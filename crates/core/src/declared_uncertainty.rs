@@ -13,3 +13,19 @@ pub struct DeclaredUncertainty {
     /// Fixed gain error, ratio to the value.
     pub gain_sigma_ratio: f64,
 }
+
+/// Sensor noise as a white and a first-order part in quadrature: shares `sqrt(1 - c^2)` and `c`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseColour {
+    /// Share c of the first-order part in the standard deviation, 0..1.
+    pub first_order_share_ratio: f64,
+    /// Its time constant, s, > 0.
+    pub time_constant_s: f64,
+}
+
+impl Default for NoiseColour {
+    fn default() -> Self {
+        NoiseColour { first_order_share_ratio: 0.6, time_constant_s: 2.0 }
+    }
+}

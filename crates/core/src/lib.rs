@@ -26,7 +26,7 @@ mod step_marker;
 pub use backend::{Backend, BackendError, RigDescription, RigMode, Setpoints};
 pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
 pub use clock::{Clock, UnpacedClock};
-pub use declared_uncertainty::DeclaredUncertainty;
+pub use declared_uncertainty::{DeclaredUncertainty, NoiseColour};
 pub use event::{Event, EventKind};
 pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,

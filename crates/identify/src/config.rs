@@ -1,7 +1,7 @@
 //! What identification is told: method, window, geometry, declared uncertainty, thresholds.
 
-pub use mapper_core::DeclaredUncertainty;
 use mapper_core::{Channel, Method, ReferenceState};
+pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -113,22 +113,6 @@ pub enum PressureTap {
         /// Inner diameter of the pipe at the tap, m, > 0.
         pipe_diameter_m: f64,
     },
-}
-
-/// Sensor noise as a white and a first-order part in quadrature: shares `sqrt(1 - c^2)` and `c`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct NoiseColour {
-    /// Share c of the first-order part in the standard deviation, 0..1.
-    pub first_order_share_ratio: f64,
-    /// Its time constant, s, > 0.
-    pub time_constant_s: f64,
-}
-
-impl Default for NoiseColour {
-    fn default() -> Self {
-        NoiseColour { first_order_share_ratio: 0.6, time_constant_s: 2.0 }
-    }
 }
 
 /// When a point is doubted or refused.

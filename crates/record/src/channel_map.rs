@@ -1,6 +1,6 @@
 //! Where a recording holds the rig's channels, and what it does not say itself.
 
-use mapper_core::{CHANNELS, Channel, DeclaredUncertainty, ReferenceState};
+use mapper_core::{CHANNELS, Channel, DeclaredUncertainty, NoiseColour, ReferenceState};
 use std::collections::BTreeMap;
 
 /// Maps a recording's topics and fields onto channels. SI inside; written with units in YAML.
@@ -56,15 +56,6 @@ pub struct WindowLimits {
     pub start_s: f64,
     /// End after the start of the step, s, > `start_s`.
     pub end_s: f64,
-}
-
-/// Sensor noise as a white and a first-order part in quadrature: shares `sqrt(1 - c^2)` and `c`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NoiseColour {
-    /// Share c of the first-order part in the standard deviation, 0..1.
-    pub first_order_share_ratio: f64,
-    /// Its time constant, s, > 0.
-    pub time_constant_s: f64,
 }
 
 impl ChannelMap {

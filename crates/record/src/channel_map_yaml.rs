@@ -2,8 +2,8 @@
 
 use crate::format::TRUTH_PREFIX;
 use crate::units::{difference, kind_of, parse_quantity, remedy, unit};
-use crate::{ChannelMap, ChannelSource, MachineConstants, NoiseColour, WindowLimits};
-use mapper_core::{Channel, DeclaredUncertainty, ReferenceState};
+use crate::{ChannelMap, ChannelSource, MachineConstants, WindowLimits};
+use mapper_core::{Channel, DeclaredUncertainty, NoiseColour, ReferenceState};
 use mapper_units::{Kind, UnitError};
 use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor, value::MapAccessDeserializer};
 use std::collections::BTreeMap;

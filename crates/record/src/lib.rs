@@ -29,7 +29,7 @@ mod units;
 mod warning;
 mod writer;
 
-pub use channel_map::{ChannelMap, ChannelSource, MachineConstants, NoiseColour, WindowLimits};
+pub use channel_map::{ChannelMap, ChannelSource, MachineConstants, WindowLimits};
 pub use channel_map_yaml::{ChannelMapError, ChannelMapIssue};
 pub use error::RecordError;
 pub use format::FormatVersion;

@@ -1,8 +1,8 @@
 //! Channel maps: the shipped one, and what is refused.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-use mapper_core::{Channel, DeclaredUncertainty, ReferenceState};
-use mapper_record::{ChannelMap, MachineConstants, NoiseColour, WindowLimits};
+use mapper_core::{Channel, DeclaredUncertainty, NoiseColour, ReferenceState};
+use mapper_record::{ChannelMap, MachineConstants, WindowLimits};
 
 #[test]
 fn the_shipped_map_says_what_its_text_says() {

@@ -79,6 +79,7 @@ fn config(
                 end_s: window.end_s,
             }),
             declared: map.sensors.clone(),
+            noise_colour: map.noise_colour.unwrap_or_default(),
             ..IdentifyConfig::default()
         };
         return Ok((config, DisplayUnits::default()));

@@ -15,6 +15,15 @@ pub struct SteadyState {
     pub outputs: Outputs,
 }
 
+impl SteadyState {
+    /// Corrected flow over the surge flow at equal corrected speed, minus one; negative beyond the surge line.
+    pub fn surge_margin_ratio(&self, model: &Model) -> f64 {
+        let speed_rpm = self.state.shaft_speed_rpm();
+        let corrected_rpm = model.map.reference().corrected_speed_rpm(speed_rpm, self.boundary.t1_k);
+        self.outputs.flow_corrected_kg_s / model.map.surge_point(corrected_rpm).0 - 1.0
+    }
+}
+
 /// Why no steady state was found.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SteadyError {

@@ -10,16 +10,26 @@ use std::process::ExitCode;
 pub struct Failure {
     code: Code,
     message: String,
-    /// The message says everything, in its own layout (a rendered list of mistakes).
-    rendered: bool,
-    /// The reader of standard output went away; there is nobody to tell.
-    silent: bool,
+    manner: Manner,
+}
+
+/// How a failure is told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Manner {
+    /// In a sentence behind "mapper: ".
+    Sentence,
+    /// The message has its own layout (a rendered list of mistakes).
+    Rendered,
+    /// It has been told already; the exit code is left.
+    Told,
+    /// The reader of standard output went away: a normal end, there is nobody to tell.
+    ClosedPipe,
 }
 
 impl Failure {
     /// A failure with a message that completes "mapper: ".
     pub fn new(code: Code, message: impl std::fmt::Display) -> Self {
-        Failure { code, message: message.to_string(), rendered: false, silent: false }
+        Failure { code, message: message.to_string(), manner: Manner::Sentence }
     }
 
     /// All mistakes of a campaign, or that it cannot be read.
@@ -28,8 +38,7 @@ impl Failure {
             CampaignError::Mistakes(findings) => Failure {
                 code: Code::BadInput,
                 message: findings.render(std::io::stderr().is_terminal()),
-                rendered: true,
-                silent: false,
+                manner: Manner::Rendered,
             },
             error => Failure::new(Code::Failure, error),
         }
@@ -37,19 +46,22 @@ impl Failure {
 
     /// Standard output was closed by its reader: a normal end of a pipe.
     pub fn closed_pipe() -> Self {
-        Failure { silent: true, ..Failure::new(Code::Failure, "") }
+        Failure { manner: Manner::ClosedPipe, ..Failure::new(Code::Failure, "") }
+    }
+
+    /// What went wrong stands in the JSON on standard output.
+    pub fn told(code: Code) -> Self {
+        Failure { manner: Manner::Told, ..Failure::new(code, "") }
     }
 
     /// Prints the message and gives the exit code.
     #[allow(clippy::print_stderr)]
     pub fn report(&self) -> ExitCode {
-        if self.silent {
-            return ExitCode::SUCCESS;
-        }
-        if self.rendered {
-            eprint!("{}", self.message);
-        } else {
-            eprintln!("mapper: {}", self.message);
+        match self.manner {
+            Manner::ClosedPipe => return ExitCode::SUCCESS,
+            Manner::Told => {}
+            Manner::Rendered => eprint!("{}", self.message),
+            Manner::Sentence => eprintln!("mapper: {}", self.message),
         }
         ExitCode::from(self.code as u8)
     }

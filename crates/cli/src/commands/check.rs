@@ -5,11 +5,21 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::registry::{BackendContext, make_backend};
 use crate::{assembly_line, output, table};
+use mapper_campaign::CampaignError;
 use serde_json::json;
 
 /// Checks a campaign and says in a line what it is.
 pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
-    let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
+    let campaign = match mapper_campaign::load(&arguments.campaign) {
+        Ok(campaign) => campaign,
+        Err(CampaignError::Mistakes(findings)) if arguments.json => {
+            output::print_json(
+                &json!({"campaign": null, "findings": findings.list, "omitted": findings.omitted}),
+            )?;
+            return Err(Failure::told(Code::BadInput));
+        }
+        Err(error) => return Err(Failure::of_campaign(error)),
+    };
     let model = assembly_line::nominal_model(&campaign)?;
     // The backend reads its settings now, so that a mistake in them does not wait for the night.
     make_backend(&BackendContext { campaign: &campaign, model: &model })
@@ -23,6 +33,7 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
             "minutes": duration_s / 60.0,
             "backend": campaign.backend.name,
             "findings": [],
+            "omitted": 0,
         }));
     }
     output::print(&format!(

@@ -11,7 +11,9 @@ use std::process::Command;
 /// Where there is no such Python: a test that calls this is marked ignored then, with the reason.
 #[track_caller]
 pub fn python<S: AsRef<OsStr>>(script: &str, arguments: impl IntoIterator<Item = S>) -> Value {
-    let python = option_env!("MAPPER_TEST_PYTHON").expect("needs Python packages: run `cargo xtask test`");
+    let Some(python) = option_env!("MAPPER_TEST_PYTHON") else {
+        panic!("needs Python packages: run `cargo xtask test`")
+    };
     let output = Command::new(python)
         .arg(repository().join("tests/python").join(script))
         .args(arguments)

@@ -23,7 +23,7 @@ mod tree;
 
 pub use campaign::Campaign;
 pub use finding::{Finding, FindingKind, Findings};
-pub use load::{CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, check, check_with, load};
+pub use load::{CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, load};
 pub use mapper_units as units;
 pub use reach::{Unreachable, nominal_model, unreachable_points};
 pub use schema::json_schema;

@@ -8,7 +8,7 @@ use crate::file::CampaignFile;
 use crate::finding::{FindingKind, Findings, Notes, Source};
 use crate::reach::{self, Unreachable};
 use crate::structure;
-use crate::tree::{self, Node, path_text};
+use crate::tree::{self, Node, Step, path_text};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -106,6 +106,23 @@ pub fn check_with(
         }
     }
     Err(Findings::new(source, notes))
+}
+
+/// A mistake in the settings of a backend, which only the backend can judge, at its place in the campaign's text.
+///
+/// `setting` is the path below the backend's name, e.g. `machine.alpha_area`; a path that the text does not have
+/// points at what there is of it.
+pub fn backend_mistake(text: &str, origin: &Path, backend: &str, setting: &str, message: &str) -> Findings {
+    let source = Source::new(origin, text);
+    let mut notes = Notes::default();
+    let root = tree::read(&source, &mut notes);
+    let mut steps = tree::steps!["backend", backend].to_vec();
+    steps.extend(setting.split('.').filter(|key| !key.is_empty()).map(Step::from));
+    let span = root.map_or(0..0, |root| root.place(&steps));
+    let remedy = "the settings of each backend are listed in docs/tour.md".to_owned();
+    let kind = FindingKind::WrongValue;
+    notes.push(source.finding(kind, path_text(&steps), span, message.to_owned(), remedy));
+    Findings::new(source, notes)
 }
 
 /// Deserialises a text without known mistakes. `None` with at least one finding.

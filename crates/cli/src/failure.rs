@@ -2,7 +2,9 @@
 
 use crate::exit_code::Code;
 use mapper_campaign::CampaignError;
+use mapper_core::BackendError;
 use std::io::IsTerminal;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// A command's error: a message for people and an exit code for scripts.
@@ -41,6 +43,20 @@ impl Failure {
                 manner: Manner::Rendered,
             },
             error => Failure::new(Code::Failure, error),
+        }
+    }
+
+    /// A backend that could not be made: a mistake in its settings is shown in the campaign's text.
+    pub fn of_backend(error: &BackendError, campaign: &Path) -> Self {
+        let BackendError::Settings { backend, path, message } = error else {
+            return Failure::new(Code::BadInput, error);
+        };
+        match std::fs::read_to_string(campaign) {
+            Ok(text) => {
+                let findings = mapper_campaign::backend_mistake(&text, campaign, backend, path, message);
+                Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
+            }
+            Err(_) => Failure::new(Code::BadInput, error),
         }
     }
 

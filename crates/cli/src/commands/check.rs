@@ -23,7 +23,7 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     let model = assembly_line::nominal_model(&campaign)?;
     // The backend reads its settings now, so that a mistake in them does not wait for the night.
     make_backend(&BackendContext { campaign: &campaign, model: &model })
-        .map_err(|error| Failure::new(Code::BadInput, error))?;
+        .map_err(|error| Failure::of_backend(&error, &arguments.campaign))?;
     let timing = &campaign.timing;
     let duration_s = timing.warm_up_s + campaign.points.len() as f64 * timing.dwell_s + timing.cool_down_s;
     if arguments.json {

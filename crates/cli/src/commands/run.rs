@@ -26,7 +26,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(path) => stored_plan(path, &made)?,
     };
     let mut backend = make_backend(&BackendContext { campaign: &campaign, model: &model })
-        .map_err(|error| Failure::new(Code::BadInput, error))?;
+        .map_err(|error| Failure::of_backend(&error, &arguments.campaign))?;
     let parent = arguments.out.clone().unwrap_or_else(|| PathBuf::from(&campaign.outputs.directory));
     if arguments.dry_run {
         return dry_run(arguments, &campaign, &plan, backend.as_ref(), &parent);

@@ -127,7 +127,10 @@ const COLOURED_TIME_CONSTANT_S: f64 = 2.0;
 pub fn read_settings(settings: &serde_json::Value, nominal: NominalRig) -> Result<LabSettings, BackendError> {
     let file: SettingsFile = match settings {
         serde_json::Value::Null => SettingsFile::default(),
-        settings => SettingsFile::deserialize(settings).map_err(|error| wrong("", error.to_string()))?,
+        settings => serde_path_to_error::deserialize(settings).map_err(|error| {
+            let path = error.path().to_string();
+            wrong(path.trim_start_matches('.'), error.into_inner().to_string())
+        })?,
     };
     let params = &nominal.model.params;
     let model = Model { params: true_params(*params, &file.machine)?, map: nominal.model.map.clone() };
@@ -307,7 +310,8 @@ mod tests {
     #[test]
     fn mistakes_name_their_key() {
         for (settings, expected) in [
-            (json!({"sampel_rate": "10 Hz"}), "sampel_rate"),
+            (json!({"sampel_rate": "10 Hz"}), "`sampel_rate`"),
+            (json!({"actuators": {"valve": {"lag": "1 K"}}}), "actuators.valve.lag"),
             (json!({"sample_rate": "10"}), "lacks its unit"),
             (json!({"sample_rate": "0 Hz"}), "sample_rate"),
             (json!({"machine": {"alpha_area": 2}}), "machine.alpha_area"),

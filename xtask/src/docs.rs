@@ -17,7 +17,7 @@ pub enum Mode {
 }
 
 /// What is generated below docs: files, and folders with all that is in them.
-const GENERATED: &[&str] = &["reproduction.md", "reproduction"];
+const GENERATED: &[&str] = &["reproduction.md", "reproduction", "turbo_a.svg"];
 
 /// Writes or checks everything that is generated.
 pub fn docs(mode: Mode) -> Result<(), Error> {
@@ -29,6 +29,19 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
     }
     let arguments = ["run", "--release", "--quiet", "-p", "mapper-cli", "--", "reproduce", "--out"];
     run(command(workspace::cargo(), &[&arguments[..], &[&*made.to_string_lossy()]].concat()))?;
+
+    // The README's picture is the map of the shipped campaign.
+    let runs = workspace::target_dir().join("xtask-docs-runs");
+    if runs.exists() {
+        fs::remove_dir_all(&runs).map_err(at(&runs))?;
+    }
+    let arguments =
+        ["run", "--release", "--quiet", "-p", "mapper-cli", "--", "run", "campaigns/turbo_a.yaml", "--out"];
+    run(command(workspace::cargo(), &[&arguments[..], &[&*runs.to_string_lossy()]].concat()))?;
+    for run in fs::read_dir(&runs).map_err(at(&runs))? {
+        let map = run.map_err(at(&runs))?.path().join("map.svg");
+        write(&made.join("turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
+    }
 
     let (new, old) = (contents(&made)?, contents(&docs)?);
     let names: BTreeSet<&PathBuf> = new.keys().chain(old.keys()).collect();

@@ -1,8 +1,9 @@
-//! Chores of the repository: `cargo xtask test` and `cargo xtask docs`.
+//! Chores of the repository: `cargo xtask test`, `docs` and `performance`.
 
 mod docs;
 mod error;
 mod machine;
+mod performance;
 mod python_env;
 mod step;
 mod test;
@@ -16,6 +17,7 @@ usage: cargo xtask COMMAND
   test           run every test of the repository; installs what they need, skips nothing
   docs           make the generated documents anew
   docs --check   fail where a generated document is not what the program makes now
+  performance    measure, beside peers where they can be built, and write docs/performance.md
 ";
 
 #[allow(clippy::print_stderr)]
@@ -26,6 +28,7 @@ fn main() -> ExitCode {
         ["test"] => test::test(),
         ["docs"] => docs::docs(docs::Mode::Write),
         ["docs", "--check"] => docs::docs(docs::Mode::Check),
+        ["performance"] => performance::performance(),
         ["--help" | "-h" | "help"] => {
             step::say(USAGE);
             return ExitCode::SUCCESS;

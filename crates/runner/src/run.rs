@@ -127,9 +127,6 @@ impl Runner<'_> {
             let batch = self.backend.poll(next_s)?;
             *now_s = next_s;
             let trip = self.guards.iter_mut().find_map(|guard| guard.check(&batch));
-            for event in &batch.events {
-                self.observer.on_event(event)?;
-            }
             self.observer.on_batch(&batch)?;
             if let Some(trip) = trip {
                 return Err(Halt::Tripped(trip));

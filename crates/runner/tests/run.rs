@@ -1,0 +1,191 @@
+//! Runs on the virtual lab: the way through, and each way out.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_backends::virtual_lab::{LabSettings, VirtualLab};
+use mapper_core::{
+    Backend, BackendError, Channel, Event, EventKind, MadeFrom, OperatingPoint, Plan, PlanFigures, PlanStep,
+    Predicted, RigDescription, SampleBatch, Setpoints, StepKind, StepMarker, UnpacedClock,
+};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_runner::{Guard, LimitGuard, ObserverError, RunEnd, RunError, RunObserver, Runner};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Two steps of 20 s after 10 s of warm-up and before 5 s of cool-down.
+fn plan() -> Plan {
+    let step = |index: usize, p3_pa: f64, speed_rpm: f64| PlanStep {
+        index,
+        kind: StepKind::Point,
+        from: None,
+        to: OperatingPoint { speed_rpm, valve_opening_ratio: 0.7 },
+        p3_pa,
+        t3_k: 773.15,
+        oil_temperature_k: 323.15,
+        dwell_s: 20.0,
+        start_s: 10.0 + 20.0 * index as f64,
+        predicted: Predicted {
+            dt2_k: None,
+            dtc_k: None,
+            sigma_eta: None,
+            sigma_h_rel: None,
+            flow_kg_s: 0.0,
+            pressure_ratio: 1.0,
+            t2_k: 300.0,
+            settle_s: None,
+            minutes: 20.0 / 60.0,
+        },
+    };
+    Plan {
+        campaign: "test".to_owned(),
+        objective: "listed".to_owned(),
+        seed: 1,
+        made_from: MadeFrom {
+            campaign_sha256: String::new(),
+            model_sha256: String::new(),
+            script_sha256: None,
+        },
+        warm_up_s: 10.0,
+        cool_down_s: 5.0,
+        // 50 and 110 krpm by the reference table of steady states.
+        steps: vec![step(0, 123_527.6, 50e3), step(1, 173_717.1, 110e3)],
+        figures: PlanFigures {
+            sum_gradient_k: 0.0,
+            worst_gradient_k: None,
+            worst_sigma_eta: None,
+            minutes: 1.0,
+        },
+    }
+}
+
+#[derive(Default)]
+struct Notebook {
+    samples: Vec<(f64, f64)>,
+    events: Vec<EventKind>,
+    starts: Vec<StepMarker>,
+    ends: Vec<StepMarker>,
+    /// Raised when this much run time was seen.
+    stop_at_s: Option<(f64, &'static AtomicBool)>,
+    /// Writing fails from this run time on.
+    fail_at_s: Option<f64>,
+}
+
+impl RunObserver for Notebook {
+    fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.starts.push(*marker);
+        Ok(())
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        let speeds = batch.column(Channel::ShaftSpeed).unwrap();
+        self.samples.extend(batch.t_s.iter().copied().zip(speeds.iter().copied()));
+        let now_s = self.samples.last().unwrap().0;
+        if let Some((stop_s, stop)) = self.stop_at_s {
+            stop.store(now_s >= stop_s, Ordering::Relaxed);
+        }
+        match self.fail_at_s {
+            Some(fail_s) if now_s >= fail_s => {
+                Err(ObserverError { message: "the disk is full".to_owned(), source: None })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
+        self.events.push(event.kind);
+        Ok(())
+    }
+
+    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.ends.push(*marker);
+        Ok(())
+    }
+}
+
+/// The lab, with a record of whether it was made safe and let go.
+struct Watched {
+    lab: VirtualLab,
+    made_safe: bool,
+    disarmed: bool,
+}
+
+impl Watched {
+    fn new() -> Self {
+        let settings = LabSettings::ideal(Model::nominal(), BoundaryConditions::default());
+        Watched { lab: VirtualLab::new(settings), made_safe: false, disarmed: false }
+    }
+}
+
+impl Backend for Watched {
+    fn describe(&self) -> RigDescription {
+        self.lab.describe()
+    }
+    fn arm(&mut self) -> Result<(), BackendError> {
+        self.lab.arm()
+    }
+    fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
+        self.lab.set(setpoints)
+    }
+    fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+        self.lab.poll(until_s)
+    }
+    fn make_safe(&mut self) -> Result<(), BackendError> {
+        self.made_safe = true;
+        self.lab.make_safe()
+    }
+    fn disarm(&mut self) -> Result<(), BackendError> {
+        self.disarmed = true;
+        self.lab.disarm()
+    }
+}
+
+fn run(notebook: &mut Notebook, guards: Vec<Box<dyn Guard>>, stop: &AtomicBool) -> Result<RunEnd, RunError> {
+    let (plan, mut rig) = (plan(), Watched::new());
+    let end =
+        Runner { plan: &plan, backend: &mut rig, clock: &mut UnpacedClock, guards, observer: notebook, stop }
+            .run();
+    assert!(rig.made_safe && rig.disarmed, "whatever happens, the rig ends safe and free");
+    end
+}
+
+#[test]
+fn a_plan_is_run_in_time_and_without_gaps() {
+    let mut notebook = Notebook::default();
+    assert_eq!(run(&mut notebook, Vec::new(), &AtomicBool::new(false)).unwrap(), RunEnd::Completed);
+    assert_eq!(notebook.samples.len(), 551);
+    let times: Vec<(f64, f64)> = notebook.ends.iter().map(|marker| (marker.start_s, marker.end_s)).collect();
+    assert_eq!(times, [(10.0, 30.0), (30.0, 50.0)]);
+    assert_eq!(notebook.starts.len(), 2);
+    let speed_at = |t_s: f64| notebook.samples.iter().find(|(t, _)| *t >= t_s).unwrap().1;
+    assert!((speed_at(29.9) - 50e3).abs() < 100.0 && (speed_at(49.9) - 110e3).abs() < 1000.0);
+    assert!(notebook.events.is_empty());
+}
+
+#[test]
+fn a_tripped_guard_makes_the_rig_safe_and_says_so() {
+    let mut notebook = Notebook::default();
+    let guard = LimitGuard::new(Channel::ShaftSpeed, 80e3);
+    let end = run(&mut notebook, vec![Box::new(guard)], &AtomicBool::new(false)).unwrap();
+    let RunEnd::Tripped(trip) = end else { panic!("{end:?}") };
+    assert!((30.0..32.0).contains(&trip.t_s), "{trip:?}");
+    assert_eq!(notebook.events, [EventKind::GuardTripped, EventKind::SafeState]);
+    // The unfinished step ends where it was stopped, and the shaft is seen to slow down.
+    assert!(notebook.ends[1].end_s < 33.0);
+    let fastest = notebook.samples.iter().map(|sample| sample.1).fold(0.0, f64::max);
+    assert!(notebook.samples.last().unwrap().1 < 0.8 * fastest);
+}
+
+#[test]
+fn the_operator_stops_at_the_next_poll() {
+    static STOP: AtomicBool = AtomicBool::new(false);
+    let mut notebook = Notebook { stop_at_s: Some((15.0, &STOP)), ..Notebook::default() };
+    let end = run(&mut notebook, Vec::new(), &STOP).unwrap();
+    assert_eq!(end, RunEnd::Interrupted { t_s: 15.0 });
+    assert_eq!(notebook.events, [EventKind::Interrupted, EventKind::SafeState]);
+}
+
+#[test]
+fn a_recorder_that_fails_ends_the_run_with_its_own_words() {
+    let mut notebook = Notebook { fail_at_s: Some(15.0), ..Notebook::default() };
+    let error = run(&mut notebook, Vec::new(), &AtomicBool::new(false)).unwrap_err();
+    assert_eq!(error.to_string(), "the disk is full");
+}

@@ -10,15 +10,18 @@ use std::sync::OnceLock;
 /// The built program.
 ///
 /// A test of one package is not told where the binary of another lies, and it may not be built yet: Cargo is asked to
-/// build it and says where. That costs a fraction of a second where there is nothing to do.
+/// build it and says where. `cargo xtask test` has built it with everything else, and says where.
 fn binary() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {
+        if let Some(built) = std::env::var_os("MAPPER_TEST_PROGRAM") {
+            return built.into();
+        }
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let mut command = Command::new(cargo);
         command.args(["build", "--package", "mapper-cli", "--bin", "mapper"]);
         command.arg("--message-format=json-render-diagnostics").current_dir(repository());
-        // Optimised where the tests are, so that dependencies are not built twice.
+        // Optimised where the tests are.
         if !cfg!(debug_assertions) {
             command.arg("--release");
         }

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::step::{self, Steps, command, run, say};
 use crate::{machine, python_env, workspace};
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 /// Formatting, lints, tests, documentation. All are run even where one fails; only preparations end it early.
@@ -29,7 +29,13 @@ pub fn test() -> Result<(), Error> {
         command.env("RUSTDOCFLAGS", "-D warnings");
         run(command)
     });
-    steps.run("tests", || tests(&python, mountable));
+    let offered = Offered { python, mountable };
+    steps.run("building", || {
+        // The program in one go with all tests: alone it would have other features of some libraries, and they
+        // would be built twice.
+        run(offered.to(cargo(&["build", "--workspace", "--bins", "--tests", "--quiet"])))
+    });
+    steps.run("tests", || tests(&offered));
     let result = steps.finish();
     if !mountable {
         say(
@@ -43,13 +49,28 @@ fn cargo(arguments: &[&str]) -> Command {
     command(workspace::cargo(), arguments)
 }
 
-/// All tests and documentation tests. `cargo test` on any machine, so that all see the same; none may be ignored.
-fn tests(python: &Path, mountable: bool) -> Result<(), Error> {
-    let mut command = cargo(&["test", "--workspace", "--no-fail-fast"]);
-    command.env("MAPPER_TEST_PYTHON", python);
-    if mountable {
-        command.env("MAPPER_TEST_TMPFS", "1");
+/// What this machine offers to tests that need more than Rust.
+struct Offered {
+    python: PathBuf,
+    mountable: bool,
+}
+
+impl Offered {
+    /// A command that knows of it. All commands that build get the same, so that nothing is built again.
+    fn to(&self, mut command: Command) -> Command {
+        command.env("MAPPER_TEST_PYTHON", &self.python);
+        if self.mountable {
+            command.env("MAPPER_TEST_TMPFS", "1");
+        }
+        command
     }
+}
+
+/// All tests and documentation tests. `cargo test` on any machine, so that all see the same; none may be ignored.
+fn tests(offered: &Offered) -> Result<(), Error> {
+    let mountable = offered.mountable;
+    let mut command = offered.to(cargo(&["test", "--workspace", "--no-fail-fast"]));
+    command.env("MAPPER_TEST_PROGRAM", workspace::target_dir().join("debug/mapper"));
     let text = step::line(&command);
     say(&format!("$ {text}\n"));
     let mut child = command

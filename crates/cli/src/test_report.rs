@@ -102,7 +102,7 @@ fn points_section(text: &mut String, campaign: &Campaign, points: &[ScoredPoint]
     let (display, units) = (Display::new(&campaign.display), &campaign.display);
     let _ = writeln!(
         text,
-        "## Points\n\nIntervals are 95 %: noise and declared sensor offsets together.\n\n\
+        "## Points\n\nIntervals are 95 %: noise, declared sensor offsets, and what moving flow is estimated to cost the method.\n\n\
          | step | speed {} | opening | corrected flow {} | PR | eta % | eta interval % | h W/(m2 K) | h interval | verdict |\n\
          |---|---|---|---|---|---|---|---|---|---|",
         units.speed, units.flow

@@ -211,3 +211,33 @@ fn a_stored_plan_is_run_and_a_stale_one_refused() {
     assert_eq!(refused.stdout, "");
     assert!(!changed.runs().exists(), "a refused run made a directory");
 }
+
+/// Other topics' fields, degC and kPa, no step markers, no campaign: the channel map makes up for all of it.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_recording_of_another_program_gives_the_same_points() {
+    let scratch = scratch();
+    let mut replacements = SHORT_GRID.to_vec();
+    // The window that the shipped channel map names.
+    replacements.push(("window: auto ", "window: {start: 10 s, end: 110 s} "));
+    let campaign = CampaignFile::shipped_with(&replacements);
+    let own = recording_of(&run_into(&campaign.path, scratch.path()));
+    let foreign = scratch.path().join("foreign.mcap");
+    python("as_another_program.py", [&own, &foreign]);
+    let map = mapper_tests::repository().join("examples/channels/gap_rig.yaml");
+    let arguments = ["identify".as_ref(), foreign.as_os_str(), "--channels".as_ref(), map.as_os_str()];
+    let flags = ["--method".as_ref(), "dynamic".as_ref(), "--json".as_ref()];
+    let result = mapper(arguments.into_iter().chain(flags)).exits(0).json();
+    let (ours, theirs) = (points_of(&own), result["points"].as_array().unwrap());
+    assert_eq!(ours.len(), theirs.len());
+    for (a, b) in ours.iter().zip(theirs) {
+        assert!(b["truth"].is_null() && b["target"].is_null());
+        assert_eq!(a["eta"].is_null(), b["eta"].is_null());
+        for key in ["eta", "h_w_m2k", "speed_corrected_rpm", "flow_corrected_kg_s", "pressure_ratio"] {
+            if let (Some(a), Some(b)) = (a[key].as_f64(), b[key].as_f64()) {
+                // Conversion to degC and kPa and back rounds; a fit over a thousand samples amplifies little.
+                assert!((b / a - 1.0).abs() < 1e-6, "{key}: {a} and {b}");
+            }
+        }
+    }
+}

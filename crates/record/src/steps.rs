@@ -1,7 +1,7 @@
 //! The steps of a recording: from its markers, or from changes of the commands.
 
 use crate::ReadWarning;
-use mapper_core::{Channel, OperatingPoint, Series, StepKind, StepMarker};
+use mapper_core::{Channel, Group, OperatingPoint, Series, StepKind, StepMarker};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -104,7 +104,7 @@ pub(crate) fn steps_from_commands(
         }
         last_change_s = change_s;
     }
-    let ends_s = jumps_s.iter().skip(1).map(|(start_s, _)| *start_s).chain([last_s]);
+    let ends_s = jumps_s.iter().skip(1).map(|(start_s, _)| last_before_s(series, *start_s)).chain([last_s]);
     jumps_s
         .iter()
         .zip(ends_s)
@@ -123,6 +123,19 @@ pub(crate) fn steps_from_commands(
             }
         })
         .collect()
+}
+
+/// Time of the last measured sample before `change_s`, or `change_s` where nothing was measured before.
+///
+/// A command is seen at a sample: whether that sample was taken before or after the change, the recording does not say,
+/// so it belongs to neither step's end.
+fn last_before_s(series: &BTreeMap<Channel, Series>, change_s: f64) -> f64 {
+    let measured = series.iter().filter(|(channel, _)| channel.info().group != Group::Command);
+    let before_s = |series: &Series| {
+        let before = series.t_s.partition_point(|t_s| *t_s < change_s);
+        before.checked_sub(1).map(|index| series.t_s[index])
+    };
+    measured.filter_map(|(_, series)| before_s(series)).reduce(f64::max).unwrap_or(change_s)
 }
 
 /// Times at which a command takes a new value.

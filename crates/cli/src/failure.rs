@@ -40,6 +40,11 @@ impl Failure {
         Failure { silent: true, ..Failure::new(Code::Failure, "") }
     }
 
+    /// What went wrong.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
     /// Prints the message and gives the exit code.
     #[allow(clippy::print_stderr)]
     pub fn report(&self) -> ExitCode {

@@ -1,5 +1,7 @@
 //! Campaigns whose steps come from a script.
 
+use mapper_core::Channel;
+use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_tests::{CampaignFile, Finished, SHORT_GRID, mapper, only_run, scratch};
 use serde_json::Value;
 use std::path::Path;
@@ -18,7 +20,12 @@ fn scripted(script: &str, more: &[(&str, &str)]) -> CampaignFile {
 }
 
 fn speeds(points: &Value) -> Vec<f64> {
-    points.as_array().unwrap().iter().map(|point| (point["speed_rpm"].as_f64().unwrap() / 1e3).round()).collect()
+    points
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|point| (point["speed_rpm"].as_f64().unwrap() / 1e3).round())
+        .collect()
 }
 
 #[test]
@@ -80,15 +87,54 @@ fn same_seed_same_bytes() {
     assert!(recordings[0] == recordings[1]);
 }
 
-/// In the lab the compressor is another than the nominal one, so that the rehearsal passes and the run does not.
 #[test]
-fn a_script_that_throws_in_mid_run_leaves_the_recording() {
-    let script = "for p in grid() {\n    let r = jump(p);\n    if elapsed_s() > 500.0 { throw \"enough\"; }\n}\n";
+fn what_fails_in_the_rehearsal_never_touches_the_rig() {
+    let script =
+        "for p in grid() {\n    let r = jump(p);\n    if elapsed_s() > 400.0 { throw \"enough\"; }\n}\n";
     let campaign = scripted(script, &[]);
     let failed = run_into(&campaign.path, &campaign.runs()).exits(3);
-    assert!(failed.stderr.contains("steps.rhai:3:30") && failed.stderr.contains("enough"), "{}", failed.stderr);
-    // It fails in the rehearsal, so nothing was touched.
+    assert!(
+        failed.stderr.contains("steps.rhai:3:30") && failed.stderr.contains("enough"),
+        "{}",
+        failed.stderr
+    );
     assert!(!campaign.runs().exists());
+}
+
+/// The lab's T2 probe is off by 30 K, which the nominal machine of the rehearsal knows nothing of.
+#[test]
+fn a_script_that_throws_in_mid_run_leaves_a_safe_rig_and_the_recording() {
+    let script = "for p in grid() {\n    let r = jump(p);\n    if r.has_eta && r.eta < 0.55 { throw \"too low\"; }\n}\n";
+    let campaign = scripted(script, &[("virtual_lab: {}", "virtual_lab: {offset_of: {T2: 30 K}}")]);
+    let failed = run_into(&campaign.path, &campaign.runs()).exits(3);
+    assert!(
+        failed.stderr.contains("steps.rhai:3:36") && failed.stderr.contains("too low"),
+        "{}",
+        failed.stderr
+    );
+    let run = only_run(&campaign.runs());
+    let again = mapper(["identify".as_ref(), run.as_os_str(), "--json".as_ref()]).exits(0).json();
+    let points = again["points"].as_array().unwrap();
+    assert!((2..4).contains(&points.len()), "{} steps were recorded", points.len());
+    // After the last step the rig was made safe and watched for 5 s: no more is blown into the turbine.
+    let read =
+        read_recording(&run.join("recording.mcap"), &ChannelMap::native(), &ReadOptions::default()).unwrap();
+    let last_s = read.recording.steps.last().unwrap().end_s;
+    let pressure = &read.recording.series[&Channel::P3];
+    let (end_s, end_pa) = (pressure.t_s.last().unwrap(), pressure.values.last().unwrap());
+    assert!(*end_s >= last_s + 4.5, "{end_s} {last_s}");
+    assert!(*end_pa < pressure.held(last_s).unwrap(), "{end_pa} Pa");
+}
+
+/// The lab's T2 probe reads 220 K too high: at the fast points beyond the limit that the guard watches.
+#[test]
+fn guards_watch_a_script_as_they_watch_a_plan() {
+    let campaign = scripted(
+        "for p in grid() { jump(p); }",
+        &[("virtual_lab: {}", "virtual_lab: {offset_of: {T2: 220 K}}")],
+    );
+    let failed = run_into(&campaign.path, &campaign.runs()).exits(5);
+    assert!(failed.stderr.contains("T2") && failed.stderr.contains("the rig is safe"), "{}", failed.stderr);
 }
 
 #[test]
@@ -96,7 +142,8 @@ fn a_step_beyond_the_limits_is_refused_at_its_line() {
     let campaign = scripted("jump(grid()[0]);\njump(point(\"190 krpm\", 1.0));\n", &[]);
     for command in ["plan", "run"] {
         let failed = mapper([command.as_ref(), campaign.path.as_os_str()]).exits(3);
-        let expected = ["steps.rhai:2:1", "190 krpm", "speed limit of 180 krpm", "2 | jump(point(\"190 krpm\", 1.0));"];
+        let expected =
+            ["steps.rhai:2:1", "190 krpm", "speed limit of 180 krpm", "2 | jump(point(\"190 krpm\", 1.0));"];
         assert!(expected.iter().all(|part| failed.stderr.contains(part)), "{}", failed.stderr);
     }
 }

@@ -9,16 +9,12 @@ use std::io::IsTerminal;
 /// Writes everything into the run's recording.
 pub struct Recorder {
     writer: RecordingWriter,
-    /// Markers of the steps run so far.
-    pub steps: Vec<StepMarker>,
-    /// Events so far.
-    pub events: Vec<Event>,
 }
 
 impl Recorder {
     /// Records into `writer`.
     pub fn new(writer: RecordingWriter) -> Self {
-        Recorder { writer, steps: Vec::new(), events: Vec::new() }
+        Recorder { writer }
     }
 
     /// Ends the file.
@@ -38,12 +34,10 @@ impl RunObserver for Recorder {
     }
 
     fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
-        self.events.push(event.clone());
-        Ok(())
+        self.writer.write_event(event).map_err(ObserverError::of)
     }
 
     fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.steps.push(*marker);
         self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::of)
     }
 }
@@ -89,7 +83,7 @@ impl RunObserver for Progress {
         if let Some(t_s) = batch.t_s.last() {
             self.bar.set_position(*t_s as u64);
         }
-        Ok(())
+        batch.events.iter().try_for_each(|event| self.on_event(event))
     }
 
     fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {

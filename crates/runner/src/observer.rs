@@ -32,12 +32,12 @@ pub trait RunObserver {
         Ok(())
     }
 
-    /// New samples; also called for warm-up and cool-down.
+    /// New samples with the rig's own events; also called for warm-up and cool-down.
     fn on_batch(&mut self, _batch: &SampleBatch) -> Result<(), ObserverError> {
         Ok(())
     }
 
-    /// Something happened.
+    /// The runner has something to tell: a guard that tripped, a stop, the safe state.
     fn on_event(&mut self, _event: &Event) -> Result<(), ObserverError> {
         Ok(())
     }

@@ -3,9 +3,7 @@
 use crate::guard::{Guard, Trip};
 use crate::observer::{ObserverError, RunObserver};
 use crate::source::{StepSource, StepSourceError};
-use mapper_core::{
-    Backend, BackendError, Clock, Event, EventKind, PlanStep, RigMode, SampleBatch, Setpoints, StepMarker,
-};
+use mapper_core::{Backend, BackendError, Clock, Event, EventKind, PlanStep, RigMode, Setpoints, StepMarker};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How often the backend is asked for samples, s of run time.
@@ -124,15 +122,10 @@ impl Runner<'_> {
         self.watch(now_s, end_s, false)
     }
 
-    /// Hands the source's notes to the observer, as events of a batch without samples: those are recorded.
+    /// Hands the source's notes to the observer.
     fn pass_notes(&mut self, t_s: f64) -> Result<(), ObserverError> {
-        let note = |message| Event { t_s, kind: EventKind::Note, message };
-        let events: Vec<Event> = self.steps.take_notes().into_iter().map(note).collect();
-        if events.is_empty() {
-            return Ok(());
-        }
-        events.iter().try_for_each(|event| self.observer.on_event(event))?;
-        self.observer.on_batch(&SampleBatch { events, ..SampleBatch::default() })
+        let mut notes = self.steps.take_notes().into_iter();
+        notes.try_for_each(|message| self.observer.on_event(&Event { t_s, kind: EventKind::Note, message }))
     }
 
     /// Lets the rig run to `until_s` under the eyes of guards, observer and source, which may end a step early.
@@ -146,9 +139,6 @@ impl Runner<'_> {
             let batch = self.backend.poll(next_s)?;
             *now_s = next_s;
             let trip = self.guards.iter_mut().find_map(|guard| guard.check(&batch));
-            for event in &batch.events {
-                self.observer.on_event(event)?;
-            }
             self.observer.on_batch(&batch)?;
             if let Some(trip) = trip {
                 return Err(Halt::Tripped(trip));

@@ -1,7 +1,7 @@
 //! `cargo xtask docs`: documents that the program itself writes.
 
 use crate::error::Error;
-use crate::step::{command, run, say};
+use crate::step::{command, output, run, say};
 use crate::workspace;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -17,7 +17,7 @@ pub enum Mode {
 }
 
 /// What is generated below docs: files, and folders with all that is in them.
-const GENERATED: &[&str] = &["reproduction.md", "reproduction", "turbo_a.svg"];
+const GENERATED: &[&str] = &["reproduction.md", "reproduction", "sequences.md", "turbo_a.svg"];
 
 /// Writes or checks everything that is generated.
 pub fn docs(mode: Mode) -> Result<(), Error> {
@@ -29,6 +29,9 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
     }
     let arguments = ["run", "--release", "--quiet", "-p", "mapper-cli", "--", "reproduce", "--out"];
     run(command(workspace::cargo(), &[&arguments[..], &[&*made.to_string_lossy()]].concat()))?;
+    let arguments = ["run", "--quiet", "-p", "mapper-sequence", "--example", "sequence_docs"];
+    let page = output(command(workspace::cargo(), &arguments))? + "\n";
+    write(&made.join("sequences.md"), page.as_bytes())?;
 
     // The README's picture is the map of the shipped campaign.
     let runs = workspace::target_dir().join("xtask-docs-runs");

@@ -2,7 +2,7 @@
 
 use crate::campaign::{
     BackendChoice, Campaign, DisplayUnits, Identification, Limits, Machine, MapSource, Order, OutputFormat,
-    Outputs, Report, SensorDeclaration, Stabilisation, Timing, WindowChoice,
+    Outputs, Report, SensorDeclaration, SequenceSource, Stabilisation, Timing, WindowChoice,
 };
 use crate::consistency::{beside, rounded};
 use crate::file::{
@@ -27,7 +27,7 @@ pub(crate) struct Built {
 /// Builds the campaign of a file without mistakes.
 ///
 /// # Errors
-/// Only where the map file can no longer be read.
+/// Only where the map file or the sequence script can no longer be read.
 pub(crate) fn build(
     file: CampaignFile,
     origin: &Path,
@@ -37,6 +37,14 @@ pub(crate) fn build(
     let (points, point_paths) = points(&file.grid);
     let probe_diameter_m = or(file.sensors.t2.probe_diameter, 0.0);
     let machine = machine(file.machine, probe_diameter_m, origin, files)?;
+    let sequence = match file.sequence {
+        None => None,
+        Some(name) => {
+            let path = beside(origin, &name);
+            let text = files(&path)?;
+            Some(SequenceSource { path, text })
+        }
+    };
     let (name, settings) = file.backend.into_iter().next().unwrap_or_default();
     let campaign = Campaign {
         name: file.campaign,
@@ -54,6 +62,7 @@ pub(crate) fn build(
             Some(OrderName::Listed) => Order::Listed,
             Some(OrderName::Greedy) | None => Order::Greedy,
         },
+        sequence,
         seed: file.seed.unwrap_or(1),
         limits: limits(&file.limits),
         reference,

@@ -31,6 +31,9 @@ pub struct Campaign {
     pub identification: Identification,
     /// Order of the points.
     pub order: Order,
+    /// The script that says which step comes next, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sequence: Option<SequenceSource>,
     /// Seed of the search and of simulated rigs.
     pub seed: u64,
     /// What the run must never leave.
@@ -161,6 +164,16 @@ pub enum Order {
     Greedy,
     /// As in the grid.
     Listed,
+}
+
+/// A sequence script.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SequenceSource {
+    /// Path as resolved from the campaign file. Not part of the canonical JSON: the text is what counts.
+    #[serde(skip)]
+    pub path: std::path::PathBuf,
+    /// The script.
+    pub text: String,
 }
 
 /// What the run must never leave.

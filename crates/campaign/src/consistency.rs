@@ -26,6 +26,7 @@ pub(crate) fn check(source: &Source, root: &Node, files: Files<'_>, notes: &mut 
     check.static_taps();
     check.calibration_dates();
     check.map_file(files);
+    check.sequence_file(files);
     check.grid();
 }
 
@@ -167,6 +168,17 @@ impl<'a> Check<'a> {
                     self.note(FindingKind::WrongValue, &steps, message, remedy);
                 }
             }
+        }
+    }
+
+    fn sequence_file(&mut self, files: Files<'_>) {
+        let steps = steps!["sequence"];
+        let Some(name) = self.text(&steps).filter(|name| name.ends_with(".rhai")) else { return };
+        let path = beside(&self.source.origin, name);
+        if let Err(error) = files(&path) {
+            let message = format!("the sequence script `{}` cannot be read: {error}", path.display());
+            let remedy = "write its path relative to the campaign file, or leave `sequence` out";
+            self.note(FindingKind::MissingFile, &steps, message, remedy);
         }
     }
 

@@ -146,11 +146,14 @@ fn finish(
     let Built { campaign, point_paths } = match build::build(file, &source.origin, files) {
         Ok(built) => built,
         Err(error) => {
-            let steps = tree::steps!["machine", "map", "file"];
-            let message = format!("the map file cannot be read: {error}");
+            // Both were there a moment ago; the map is the usual one.
+            let map = tree::steps!["machine", "map", "file"];
+            let sequence = tree::steps!["sequence"];
+            let steps: &[tree::Step] = if root.get(&map).is_some() { &map } else { &sequence };
+            let message = format!("a file of the campaign cannot be read any more: {error}");
             let remedy = "write its path relative to the campaign file".to_owned();
             let kind = FindingKind::MissingFile;
-            notes.push(source.finding(kind, path_text(&steps), root.place(&steps), message, remedy));
+            notes.push(source.finding(kind, path_text(steps), root.place(steps), message, remedy));
             return None;
         }
     };

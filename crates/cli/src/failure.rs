@@ -70,6 +70,11 @@ impl Failure {
         Failure { manner: Manner::Told, ..Failure::new(code, "") }
     }
 
+    /// What went wrong.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
     /// Prints the message and gives the exit code.
     #[allow(clippy::print_stderr)]
     pub fn report(&self) -> ExitCode {

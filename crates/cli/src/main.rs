@@ -14,6 +14,7 @@ mod output;
 mod registry;
 mod results;
 mod run_directory;
+mod sequence_run;
 mod table;
 mod test_report;
 

@@ -11,6 +11,8 @@ pub const RECORDING: &str = "recording.mcap";
 pub const PLAN: &str = "plan.json";
 /// The campaign as it was read.
 pub const CAMPAIGN: &str = "campaign.yaml";
+/// The sequence script, where there is one.
+pub const SEQUENCE: &str = "sequence.rhai";
 /// Identified points.
 pub const POINTS: &str = "points.json";
 /// The test report.

@@ -1,4 +1,4 @@
-//! Executes a plan on any backend: setpoints, samples, guards, safe state.
+//! Executes the steps of a plan, or of whatever yields steps, on any backend: setpoints, samples, guards, safe state.
 //!
 //! The runner knows nothing of identification or files: what it sees goes to a [`RunObserver`].
 
@@ -7,7 +7,9 @@
 mod guard;
 mod observer;
 mod run;
+mod source;
 
 pub use guard::{Guard, LimitGuard, SilenceGuard, SurgeGuard, Trip};
 pub use observer::{ObserverError, RunObserver};
 pub use run::{RunEnd, RunError, Runner};
+pub use source::{PlanSteps, StepSource, StepSourceError};

@@ -2,9 +2,8 @@
 
 use crate::guard::{Guard, Trip};
 use crate::observer::{ObserverError, RunObserver};
-use mapper_core::{
-    Backend, BackendError, Clock, Event, EventKind, Plan, PlanStep, RigMode, Setpoints, StepMarker,
-};
+use crate::source::{StepSource, StepSourceError};
+use mapper_core::{Backend, BackendError, Clock, Event, EventKind, PlanStep, RigMode, Setpoints, StepMarker};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How often the backend is asked for samples, s of run time.
@@ -35,12 +34,15 @@ pub enum RunError {
     /// Recording or another observer failed.
     #[error("{0}")]
     Observer(#[from] ObserverError),
+    /// What yields the steps failed.
+    #[error("{0}")]
+    Source(#[from] StepSourceError),
 }
 
-/// A plan, a rig and everything around them.
+/// Steps, a rig and everything around them.
 pub struct Runner<'a> {
-    /// What to do.
-    pub plan: &'a Plan,
+    /// What to do: [`PlanSteps`](crate::PlanSteps) for a plan.
+    pub steps: &'a mut dyn StepSource,
     /// Where to do it.
     pub backend: &'a mut dyn Backend,
     /// Paces the polls; see [`mapper_core::UnpacedClock`].
@@ -67,7 +69,7 @@ impl<E: Into<RunError>> From<E> for Halt {
 }
 
 impl Runner<'_> {
-    /// Runs the plan from arming to disarming.
+    /// Runs all steps from arming to disarming.
     ///
     /// Whatever ends it, the rig has been told to become safe and has been disarmed when this returns.
     ///
@@ -88,12 +90,13 @@ impl Runner<'_> {
 
     fn forward(&mut self, now_s: &mut f64) -> Result<(), Halt> {
         self.observer.on_start(&self.backend.describe())?;
-        let plan = self.plan;
-        if let Some(first) = plan.steps.first() {
+        let mut next = self.steps.next_step()?;
+        self.pass_notes(*now_s)?;
+        if let Some(first) = &next {
             self.backend.set(&setpoints(first))?;
-            self.watch(now_s, plan.warm_up_s)?;
+            self.watch(now_s, self.steps.warm_up_s(), false)?;
         }
-        for step in &plan.steps {
+        while let Some(step) = next {
             let mut marker = StepMarker {
                 index: step.index,
                 kind: step.kind,
@@ -104,20 +107,29 @@ impl Runner<'_> {
                 p3_pa: step.p3_pa,
                 valve_opening_ratio: step.to.valve_opening_ratio,
             };
-            self.backend.set(&setpoints(step))?;
+            self.backend.set(&setpoints(&step))?;
             self.observer.on_step_start(&marker)?;
-            let watched = self.watch(now_s, marker.end_s);
+            let watched = self.watch(now_s, marker.end_s, true);
             marker.end_s = *now_s;
             self.observer.on_step_end(&marker)?;
             watched?;
+            self.steps.after_step(&marker)?;
+            next = self.steps.next_step()?;
+            self.pass_notes(*now_s)?;
         }
         self.backend.make_safe()?;
-        let end_s = *now_s + plan.cool_down_s;
-        self.watch(now_s, end_s)
+        let end_s = *now_s + self.steps.cool_down_s();
+        self.watch(now_s, end_s, false)
     }
 
-    /// Lets the rig run to `until_s` under the eyes of guards and observer.
-    fn watch(&mut self, now_s: &mut f64, until_s: f64) -> Result<(), Halt> {
+    /// Hands the source's notes to the observer.
+    fn pass_notes(&mut self, t_s: f64) -> Result<(), ObserverError> {
+        let mut notes = self.steps.take_notes().into_iter();
+        notes.try_for_each(|message| self.observer.on_event(&Event { t_s, kind: EventKind::Note, message }))
+    }
+
+    /// Lets the rig run to `until_s` under the eyes of guards, observer and source, which may end a step early.
+    fn watch(&mut self, now_s: &mut f64, until_s: f64, may_end_early: bool) -> Result<(), Halt> {
         while *now_s < until_s {
             if self.stop.load(Ordering::Relaxed) {
                 return Err(Halt::Interrupted);
@@ -130,6 +142,10 @@ impl Runner<'_> {
             self.observer.on_batch(&batch)?;
             if let Some(trip) = trip {
                 return Err(Halt::Tripped(trip));
+            }
+            let ends = self.steps.on_batch(&batch);
+            if ends && may_end_early {
+                break;
             }
         }
         Ok(())
@@ -169,6 +185,7 @@ impl Runner<'_> {
         safe: bool,
     ) -> Result<(), RunError> {
         self.observer.on_event(&Event { t_s: now_s, kind, message })?;
+        self.pass_notes(now_s)?;
         if safe {
             let message = "air off, valve open".to_owned();
             self.observer.on_event(&Event { t_s: now_s, kind: EventKind::SafeState, message })?;

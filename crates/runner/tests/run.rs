@@ -8,7 +8,7 @@ use mapper_core::{
 };
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
-use mapper_runner::{Guard, LimitGuard, ObserverError, RunEnd, RunError, RunObserver, Runner};
+use mapper_runner::{Guard, LimitGuard, ObserverError, PlanSteps, RunEnd, RunError, RunObserver, Runner};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Two steps of 20 s after 10 s of warm-up and before 5 s of cool-down.

@@ -14,6 +14,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-campaign",  &["core", "physics", "units"]),
     ("mapper-planner",   &["core", "physics"]),
     ("mapper-runner",    &["core"]),
+    ("mapper-sequence",  &["core", "physics", "units"]),
     ("mapper-record",    &["core", "units"]),
     ("mapper-identify",  &["core", "physics"]),
     ("mapper-assemble",  &["core", "identify"]),
@@ -23,7 +24,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-backends",  &["core", "physics", "units"]),
     ("mapper-exporters", &["core", "physics", "chart"]),
     // The program sees all; nothing sees the program.
-    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "record", "identify", "assemble", "score", "reproduce", "backends", "exporters"]),
+    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "reproduce", "backends", "exporters"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

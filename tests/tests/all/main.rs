@@ -11,5 +11,6 @@ mod interrupted;
 mod mistakes;
 mod pipes;
 mod recordings;
+mod sequences;
 mod shipped_campaign;
 mod sources;

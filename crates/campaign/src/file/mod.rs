@@ -48,6 +48,9 @@ pub(crate) struct CampaignFile {
     pub identification: Option<IdentificationFile>,
     /// Order of the points: `greedy` seeks large thermal gradients from step to step, `listed` keeps the order of the grid.
     pub order: Option<OrderName>,
+    /// A rhai script that says which step comes next, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/sequences.md says what it may call.
+    #[schemars(regex(pattern = r"\.rhai$"), example = &"scripts/zigzag.rhai")]
+    pub sequence: Option<String>,
     /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.
     #[schemars(example = 1)]
     pub seed: Option<u64>,

@@ -6,6 +6,7 @@ use crate::failure::Failure;
 use crate::registry::{BackendContext, make_backend};
 use crate::{assembly_line, output, table};
 use mapper_campaign::CampaignError;
+use mapper_sequence::Script;
 use serde_json::json;
 
 /// Checks a campaign and says in a line what it is.
@@ -24,6 +25,10 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     // The backend reads its settings now, so that a mistake in them does not wait for the night.
     make_backend(&BackendContext { campaign: &campaign, model: &model })
         .map_err(|error| Failure::of_backend(&error, &arguments.campaign))?;
+    if let Some(source) = &campaign.sequence {
+        let script = Script { path: source.path.clone(), text: source.text.clone() };
+        mapper_sequence::check(&script).map_err(|error| Failure::new(Code::BadInput, error))?;
+    }
     let timing = &campaign.timing;
     let duration_s = timing.warm_up_s + campaign.points.len() as f64 * timing.dwell_s + timing.cool_down_s;
     if arguments.json {

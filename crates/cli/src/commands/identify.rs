@@ -43,6 +43,16 @@ pub fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
     output::print(&text)
 }
 
+/// A file named by the campaign of a recording. The sequence script, which identification does not need, may be missing.
+fn read_beside(path: &Path) -> std::io::Result<String> {
+    let text = std::fs::read_to_string(path);
+    if path.extension().is_some_and(|extension| extension == "rhai") {
+        Ok(text.unwrap_or_default())
+    } else {
+        text
+    }
+}
+
 fn bad_recording(error: RecordError) -> Failure {
     let code = match error {
         RecordError::Read { .. } => Code::Failure,
@@ -86,9 +96,9 @@ fn config(
     }
     if let Some(text) = &report.campaign_text {
         let origin = arguments.recording.join(run_directory::CAMPAIGN);
-        let campaign = mapper_campaign::check(text, &origin, &|path| std::fs::read_to_string(path)).map_err(
-            |findings| Failure::of_campaign(mapper_campaign::CampaignError::Mistakes(Box::new(findings))),
-        )?;
+        let campaign = mapper_campaign::check(text, &origin, &read_beside).map_err(|findings| {
+            Failure::of_campaign(mapper_campaign::CampaignError::Mistakes(Box::new(findings)))
+        })?;
         return Ok((assembly_line::identification(&campaign), campaign.display));
     }
     Err(Failure::new(

@@ -6,6 +6,7 @@ mod plan;
 mod reproduce;
 mod run;
 mod schema;
+mod scripted;
 
 use crate::arguments::{Arguments, Command};
 use crate::failure::Failure;

@@ -1,6 +1,7 @@
 //! `mapper plan`.
 
 use crate::arguments::PlanArguments;
+use crate::commands::scripted;
 use crate::failure::Failure;
 use crate::table::{self, Display, number};
 use crate::{assembly_line, output};
@@ -12,6 +13,9 @@ use std::fmt::Write;
 pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
     let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
     let model = assembly_line::nominal_model(&campaign)?;
+    if let Some(source) = &campaign.sequence {
+        return scripted::plan(arguments, &campaign, &model, source);
+    }
     let plan = assembly_line::plan(&campaign, &model)?;
     if let Some(path) = &arguments.out {
         output::write_new(path, (output::to_json(&plan)? + "\n").as_bytes())?;

@@ -7,11 +7,12 @@ use crate::failure::Failure;
 use crate::observers::{Progress, Recorder};
 use crate::registry::{BackendContext, make_backend};
 use crate::results;
+use crate::sequence_run::{ScriptedSteps, rehearse};
 use crate::{assembly_line, interrupt, output, run_directory};
 use mapper_campaign::Campaign;
 use mapper_core::{Backend, Plan, UnpacedClock};
 use mapper_record::{RecordingHeader, RecordingWriter};
-use mapper_runner::{RunEnd, RunError, RunObserver, Runner};
+use mapper_runner::{PlanSteps, RunEnd, RunError, RunObserver, Runner, StepSource};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,10 +21,18 @@ use std::path::{Path, PathBuf};
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
     let model = assembly_line::nominal_model(&campaign)?;
-    let made = assembly_line::plan(&campaign, &model)?;
+    // A script is rehearsed first: what fails on the nominal machine never touches the rig.
+    let made = match &campaign.sequence {
+        None => assembly_line::plan(&campaign, &model)?,
+        Some(source) => rehearse(&campaign, &model, source)?.plan,
+    };
     let plan = match &arguments.plan {
-        None => made,
+        None => made.clone(),
         Some(path) => stored_plan(path, &made)?,
+    };
+    let mut scripted = match &campaign.sequence {
+        Some(source) if arguments.plan.is_none() => Some(ScriptedSteps::new(&campaign, &model, source)?),
+        _ => None,
     };
     let mut backend = make_backend(&BackendContext { campaign: &campaign, model: &model })
         .map_err(|error| Failure::of_backend(&error, &arguments.campaign))?;
@@ -40,6 +49,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let plan_json = output::to_json(&plan)? + "\n";
     output::write_new(&directory.join(run_directory::CAMPAIGN), &campaign_text)?;
     output::write_new(&directory.join(run_directory::PLAN), plan_json.as_bytes())?;
+    if let Some(source) = &campaign.sequence {
+        output::write_new(&directory.join(run_directory::SEQUENCE), source.text.as_bytes())?;
+    }
 
     let recording = directory.join(run_directory::RECORDING);
     let simulated = backend.describe().simulated_time;
@@ -54,13 +66,19 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     };
     let writer =
         RecordingWriter::create(&recording, &header).map_err(|error| Failure::new(Code::Failure, error))?;
-    let (end, recorder) = drive(&campaign, &plan, backend.as_mut(), Recorder::new(writer))?;
+    let mut planned = PlanSteps::new(&plan);
+    let steps: &mut dyn StepSource = match &mut scripted {
+        Some(scripted) => scripted,
+        None => &mut planned,
+    };
+    let (end, recorder) = drive(&campaign, &plan, steps, backend.as_mut(), Recorder::new(writer))?;
     let finished = recorder.finish();
     if let Err(error) = &end {
         // What was recorded before is still there; say what went wrong first.
         return Err(Failure::new(
             match error {
                 RunError::Backend(_) => Code::Rig,
+                RunError::Source(_) => Code::BadInput,
                 RunError::Observer(_) => Code::Failure,
             },
             format!("{error}\nThe recording up to then is {}.", recording.display()),
@@ -69,6 +87,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     finished.map_err(|error| Failure::new(Code::Failure, error))?;
 
     let end = end.unwrap_or(RunEnd::Completed);
+    let plan = scripted.map_or(plan, |steps| steps.executed(&made));
     let results = results::make(&campaign, &plan, &end, &directory, &recording)?;
     if arguments.json {
         output::print_json(&results.json())?;
@@ -96,6 +115,7 @@ type Driven = (Result<RunEnd, RunError>, Recorder);
 fn drive(
     campaign: &Campaign,
     plan: &Plan,
+    steps: &mut dyn StepSource,
     backend: &mut dyn Backend,
     mut recorder: Recorder,
 ) -> Result<Driven, Failure> {
@@ -105,7 +125,7 @@ fn drive(
     let end = {
         let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut progress];
         Runner {
-            plan,
+            steps,
             backend,
             // Every backend so far has simulated time.
             clock: &mut UnpacedClock,
@@ -164,6 +184,8 @@ fn metadata(campaign: &Campaign, plan: &Plan) -> BTreeMap<String, String> {
     .map(|(key, value)| (key.to_owned(), value))
     .collect();
     let serial_number = campaign.machine.serial_number.clone();
+    let script_sha256 = plan.made_from.script_sha256.clone();
+    metadata.extend(script_sha256.map(|sha256| ("script_sha256".to_owned(), sha256)));
     metadata.extend(serial_number.map(|serial_number| ("serial_number".to_owned(), serial_number)));
     metadata.extend(campaign.report.operator.clone().map(|operator| ("operator".to_owned(), operator)));
     metadata

@@ -1,0 +1,285 @@
+//! A sequence script at work: its steps for the runner, and for the script what each has given.
+
+use crate::assembly_line;
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::registry::{BackendContext, make_backend};
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::{BackendChoice, Order, SequenceSource, WindowChoice};
+use mapper_core::{Plan, PlanStep, Recording, SampleBatch, StepKind, StepMarker, UnpacedClock};
+use mapper_identify::{IdentifyConfig, identify_each};
+use mapper_physics::model::Model;
+use mapper_runner::{RunEnd, RunError, RunObserver, Runner, StepSource, StepSourceError};
+use mapper_sequence::{
+    Bench, Hold, Script, SequenceRunner, SettleBands, SettleWatch, StepLimits, StepResult,
+};
+use std::sync::atomic::AtomicBool;
+
+/// What the plan of a script says of its objective.
+pub const OBJECTIVE: &str = "sequence";
+
+/// The steps of a script, each identified as soon as it has ended.
+pub struct ScriptedSteps {
+    script: SequenceRunner,
+    config: IdentifyConfig,
+    warm_up_s: f64,
+    cool_down_s: f64,
+    /// The last two steps and their samples: all that identifying the last one needs.
+    recent: Recording,
+    now: Option<PlanStep>,
+    settling: Option<SettleWatch>,
+    finished: Option<StepResult>,
+    /// Steps that have ended, with their real times.
+    pub done: Vec<PlanStep>,
+}
+
+impl ScriptedSteps {
+    /// The steps of a campaign's script.
+    pub fn new(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<Self, Failure> {
+        let script = Script { path: source.path.clone(), text: source.text.clone() };
+        let script = SequenceRunner::start(script, bench(campaign, model))
+            .map_err(|error| Failure::new(Code::Failure, error))?;
+        Ok(ScriptedSteps {
+            script,
+            config: assembly_line::identification(campaign),
+            warm_up_s: campaign.timing.warm_up_s,
+            cool_down_s: campaign.timing.cool_down_s,
+            recent: Recording::default(),
+            now: None,
+            settling: None,
+            finished: None,
+            done: Vec::new(),
+        })
+    }
+
+    /// The steps that were run as a plan, with the rest of a plan from `base`.
+    pub fn executed(&self, base: &Plan) -> Plan {
+        with_steps(base.clone(), self.done.clone())
+    }
+
+    fn forget_before(&mut self, start_s: f64) {
+        for series in self.recent.series.values_mut() {
+            let kept = series.t_s.partition_point(|t_s| *t_s < start_s);
+            series.t_s.drain(..kept);
+            series.values.drain(..kept);
+        }
+    }
+}
+
+impl StepSource for ScriptedSteps {
+    fn warm_up_s(&self) -> f64 {
+        self.warm_up_s
+    }
+
+    fn cool_down_s(&self) -> f64 {
+        self.cool_down_s
+    }
+
+    fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
+        let next = self.script.next_step(self.finished.take()).map_err(source_error)?;
+        let Some(next) = next else { return Ok(None) };
+        self.settling = match next.hold {
+            Hold::Dwell => None,
+            Hold::UntilSettled(rule) => Some(SettleWatch::new(rule, next.step.start_s)),
+        };
+        self.now = Some(next.step.clone());
+        Ok(Some(next.step))
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> bool {
+        for column in &batch.columns {
+            let series = self.recent.series.entry(column.channel).or_default();
+            // As a recording is read back: what the sensor did not give is not there.
+            for (t_s, value) in batch.t_s.iter().zip(&column.values).filter(|(_, value)| value.is_finite()) {
+                series.t_s.push(*t_s);
+                series.values.push(*value);
+            }
+        }
+        self.settling.as_mut().is_some_and(|watch| watch.has_settled(batch))
+    }
+
+    fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        let Some(mut step) = self.now.take() else { return Ok(()) };
+        if self.recent.steps.len() > 1 {
+            self.recent.steps.remove(0);
+        }
+        if let Some(before) = self.recent.steps.first().copied() {
+            self.forget_before(before.start_s);
+        }
+        self.recent.steps.push(*marker);
+        let identified = identify_each(&self.recent, &self.config).map_err(source_error)?.pop();
+        self.finished = Some(StepResult {
+            number: step.index + 1,
+            target: step.to,
+            from: step.from,
+            start_s: marker.start_s,
+            end_s: marker.end_s,
+            identified: identified.and_then(Result::ok),
+        });
+        (step.start_s, step.dwell_s) = (marker.start_s, marker.end_s - marker.start_s);
+        step.predicted.minutes = step.dwell_s / 60.0;
+        self.done.push(step);
+        Ok(())
+    }
+
+    fn take_notes(&mut self) -> Vec<String> {
+        self.script.take_notes()
+    }
+}
+
+fn source_error(error: impl std::error::Error + Send + Sync + 'static) -> StepSourceError {
+    StepSourceError { message: error.to_string(), source: Some(Box::new(error)) }
+}
+
+/// What a script made of the nominal machine.
+pub struct Rehearsal {
+    /// The steps in the order they came, with the standard errors found.
+    pub plan: Plan,
+    /// The script's notes.
+    pub notes: Vec<String>,
+}
+
+/// Runs the script on the virtual lab of the nominal machine, where nothing is recorded.
+pub fn rehearse(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<Rehearsal, Failure> {
+    let base = base_plan(campaign, model, source)?;
+    let choice = BackendChoice { name: "virtual_lab".to_owned(), settings: serde_json::json!({}) };
+    let nominal = Campaign { backend: choice, ..campaign.clone() };
+    let mut backend = make_backend(&BackendContext { campaign: &nominal, model })
+        .map_err(|error| Failure::new(Code::Failure, error))?;
+    let mut steps = Rehearsing { steps: ScriptedSteps::new(campaign, model, source)?, notes: Vec::new() };
+    let guards = assembly_line::guards(campaign, &backend.describe().channels);
+    let end = Runner {
+        steps: &mut steps,
+        backend: backend.as_mut(),
+        clock: &mut UnpacedClock,
+        guards,
+        observer: &mut Nobody,
+        stop: &AtomicBool::new(false),
+    }
+    .run();
+    match end {
+        Ok(RunEnd::Completed) => {}
+        Ok(RunEnd::Tripped(trip)) => {
+            let message =
+                format!("in the rehearsal on the nominal machine at {:.1} s {}", trip.t_s, trip.reason);
+            return Err(Failure::new(Code::NoPlan, message));
+        }
+        Ok(RunEnd::Interrupted { .. }) => return Err(Failure::new(Code::Interrupted, "stopped")),
+        Err(RunError::Source(error)) => return Err(Failure::new(Code::BadInput, error)),
+        Err(error) => return Err(Failure::new(Code::Failure, format!("the rehearsal failed: {error}"))),
+    }
+    let plan = steps.steps.executed(&base);
+    if plan.steps.is_empty() {
+        let message = format!("the sequence script {} makes no step", source.path.display());
+        return Err(Failure::new(Code::NoPlan, message));
+    }
+    Ok(Rehearsal { plan, notes: steps.notes })
+}
+
+struct Nobody;
+
+impl RunObserver for Nobody {}
+
+/// Steps on the nominal machine: what is identified there is the forecast.
+struct Rehearsing {
+    steps: ScriptedSteps,
+    notes: Vec<String>,
+}
+
+impl StepSource for Rehearsing {
+    fn warm_up_s(&self) -> f64 {
+        self.steps.warm_up_s()
+    }
+
+    fn cool_down_s(&self) -> f64 {
+        self.steps.cool_down_s()
+    }
+
+    fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
+        self.steps.next_step()
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> bool {
+        self.steps.on_batch(batch)
+    }
+
+    fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        self.steps.after_step(marker)?;
+        if let (Some(step), Some(result)) = (self.steps.done.last_mut(), &self.steps.finished) {
+            step.predicted.sigma_eta = Some(result.sigma_eta()).filter(|sigma| sigma.is_finite());
+            step.predicted.sigma_h_rel =
+                result.h_w_m2k().map(|h| result.sigma_h_w_m2k() / h).filter(|ratio| ratio.is_finite());
+        }
+        Ok(())
+    }
+
+    fn take_notes(&mut self) -> Vec<String> {
+        let notes = self.steps.take_notes();
+        self.notes.extend(notes.iter().cloned());
+        notes
+    }
+}
+
+/// A plan without the script's steps: hashes and times.
+fn base_plan(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<Plan, Failure> {
+    let without_script = Campaign { sequence: None, ..campaign.clone() };
+    let canonical =
+        serde_json::to_string(&without_script).map_err(|error| Failure::new(Code::Failure, error))?;
+    // The planner plans one point alone: the script has the say over the others.
+    let points = campaign.points.iter().copied().take(1).collect();
+    let mut plan = assembly_line::plan(&Campaign { points, order: Order::Listed, ..without_script }, model)?;
+    plan.objective = OBJECTIVE.to_owned();
+    plan.made_from.campaign_sha256 = mapper_planner::sha256_hex(&canonical);
+    plan.made_from.script_sha256 = Some(mapper_planner::sha256_hex(&source.text));
+    Ok(plan)
+}
+
+fn with_steps(mut plan: Plan, steps: Vec<PlanStep>) -> Plan {
+    plan.steps = steps;
+    let gradients = || plan.steps.iter().filter_map(|step| step.predicted.dtc_k).map(f64::abs);
+    let (sum_k, worst_k) = (gradients().sum(), gradients().min_by(f64::total_cmp));
+    plan.figures.sum_gradient_k = sum_k;
+    plan.figures.worst_gradient_k = worst_k;
+    plan.figures.worst_sigma_eta =
+        plan.steps.iter().filter_map(|step| step.predicted.sigma_eta).max_by(f64::total_cmp);
+    plan.figures.minutes = plan.duration_s() / 60.0;
+    plan
+}
+
+/// What a script sees of the campaign.
+fn bench(campaign: &Campaign, model: &Model) -> Bench {
+    let (limits, stabilisation) = (&campaign.limits, &campaign.identification.stabilisation);
+    let (planned, machine) = (campaign.clone(), model.clone());
+    Bench {
+        points: campaign.points.clone(),
+        dwell_s: campaign.timing.dwell_s,
+        warm_up_s: campaign.timing.warm_up_s,
+        window_s: match campaign.identification.window {
+            WindowChoice::Auto => None,
+            WindowChoice::Fixed { start_s, end_s } => Some((start_s, end_s)),
+        },
+        settle_bands: SettleBands {
+            speed_ratio: stabilisation.speed_ratio,
+            flow_ratio: stabilisation.flow_ratio,
+            pressure_ratio_ratio: stabilisation.pressure_ratio_ratio,
+        },
+        model: model.clone(),
+        boundary: campaign.boundary,
+        limits: StepLimits {
+            speed_max_rpm: limits.speed_max_rpm,
+            p3_min_pa: limits.p3_min_pa,
+            p3_max_pa: limits.p3_max_pa,
+            t2_max_k: limits.t2_max_k,
+            t3_max_k: limits.t3_max_k,
+            surge_margin_min_ratio: limits.surge_margin_min_ratio,
+        },
+        order: Box::new(move |points| {
+            let subset = Campaign { points: points.to_vec(), sequence: None, ..planned.clone() };
+            let plan =
+                assembly_line::plan(&subset, &machine).map_err(|failure| failure.message().to_owned())?;
+            // Repeats are the script's own business.
+            let points = plan.steps.into_iter().filter(|step| step.kind == StepKind::Point);
+            Ok(points.map(|step| step.to).collect())
+        }),
+    }
+}

@@ -1,0 +1,258 @@
+//! Everything a script may call: one row a function, from which registration and documentation are made.
+
+use crate::error::throw;
+use crate::result::StepResult;
+use crate::runner::{Hold, lock};
+use crate::session::{Session, Thrown};
+use mapper_core::{IdentifiedPoint, OperatingPoint};
+use mapper_units::Kind;
+use rhai::{Array, Dynamic, Engine, FLOAT, INT, ImmutableString};
+use std::sync::{Arc, Mutex};
+
+pub(crate) type Shared = Arc<Mutex<Session>>;
+
+/// One function or property.
+pub(crate) struct Entry {
+    pub group: &'static str,
+    /// As a script writes it.
+    pub signature: &'static str,
+    /// One or two sentences.
+    pub doc: &'static str,
+    register: fn(&mut Engine, &Shared),
+}
+
+/// A point as scripts hold it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Point(OperatingPoint);
+
+/// Drift of T2 and Tc at which a point counts as settled where the script does not say, K/s: 1 K in a minute.
+const SETTLED_RATE_K_S: f64 = 1.0 / 60.0;
+
+/// Standard errors of which nothing is known, as scripts see them. Not infinite: rhai compares by relative differences,
+/// and infinity is greater than nothing there. An efficiency lies between 0 and 1.
+const SIGMA_ETA_MAX: f64 = 1.0;
+const SIGMA_H_MAX_W_M2K: f64 = 1e6;
+
+macro_rules! table {
+    ($($group:literal { $($signature:literal, $doc:literal => $register:expr;)+ })+) => {
+        /// Every row, in the order of the documentation.
+        pub(crate) const TABLE: &[Entry] = &[$($(
+            Entry { group: $group, signature: $signature, doc: $doc, register: $register },
+        )+)+];
+    };
+}
+
+/// Registers everything of [`TABLE`], and how points and results are shown.
+pub(crate) fn register(engine: &mut Engine, session: &Shared) {
+    engine.register_type_with_name::<Point>("Point").register_type_with_name::<StepResult>("Result");
+    engine.register_fn("==", |a: Point, b: Point| a == b).register_fn("!=", |a: Point, b: Point| a != b);
+    for name in ["to_string", "to_debug"] {
+        engine.register_fn(name, |point: &mut Point| point.0.to_string());
+        engine.register_fn(name, |result: &mut StepResult| shown(result));
+    }
+    let notes = session.clone();
+    engine.on_print(move |text| lock(&notes).note(text));
+    let notes = session.clone();
+    engine.on_debug(move |text, _, _| lock(&notes).note(text));
+    for entry in TABLE {
+        (entry.register)(engine, session);
+    }
+}
+
+table! {
+    "Points" {
+        "grid()", "All points of the campaign's grid, in its order." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("grid", move || points_array(&lock(&session).bench.points));
+        };
+        "point(speed, opening)", "A point, e.g. `point(\"110 krpm\", 0.7)`; it need not be one of the grid." => |engine, _| {
+            engine.register_fn("point", |speed: &str, opening: FLOAT| point(speed, opening));
+            engine.register_fn("point", |speed: &str, opening: INT| point(speed, opening as FLOAT));
+        };
+        "p.speed_rpm", "Shaft speed, rpm." => |engine, _| {
+            engine.register_get("speed_rpm", |point: &mut Point| point.0.speed_rpm);
+        };
+        "p.opening", "Valve opening relative to the nominal area." => |engine, _| {
+            engine.register_get("opening", |point: &mut Point| point.0.valve_opening_ratio);
+        };
+        "midpoint(a, b)", "The point halfway in speed and in opening." => |engine, _| {
+            engine.register_fn("midpoint", |a: Point, b: Point| Point(OperatingPoint {
+                speed_rpm: 0.5 * (a.0.speed_rpm + b.0.speed_rpm),
+                valve_opening_ratio: 0.5 * (a.0.valve_opening_ratio + b.0.valve_opening_ratio),
+            }));
+        };
+        "reachable(p)", "Whether a step may go to `p`: within all limits, and held by the nominal machine." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("reachable", move |point: Point| lock(&session).reachable(point.0));
+        };
+        "order(points)", "The points in the order the planner gives them under the campaign's `order`." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("order", move |points: Array| -> Result<Array, Thrown> {
+                let points = points_of(points)?;
+                Ok(points_array(&lock(&session).order(&points)?))
+            });
+        };
+    }
+    "Steps" {
+        "dwell(time)", "Time at each point from now on, jump included; the campaign's `timing.dwell` until then." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("dwell", move |time: &str| -> Result<(), Thrown> {
+                lock(&session).dwell_s = quantity(Kind::Duration, time)?;
+                Ok(())
+            });
+        };
+        "jump(p)", "Goes to `p`, stays there, and returns the step's result. A point that was visited before counts as a repeat." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("jump", move |point: Point| {
+                let mut session = lock(&session);
+                let dwell_s = session.dwell_s;
+                session.step(point.0, dwell_s, Hold::Dwell)
+            });
+        };
+        "jump(p, time)", "The same with a time of its own." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("jump", move |point: Point, time: &str| {
+                let dwell_s = quantity(Kind::Duration, time)?;
+                lock(&session).step(point.0, dwell_s, Hold::Dwell)
+            });
+        };
+        "settle(p, longest)", "Goes to `p` and holds until it has settled, at most `longest`: over the last 30 s, T2 and Tc drift by less than 1 K in a minute, and speed, flow and pressure ratio stay within the campaign's `stabilisation`." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("settle", move |point: Point, longest: &str| {
+                let max_s = quantity(Kind::Duration, longest)?;
+                lock(&session).settle(point.0, max_s, SETTLED_RATE_K_S)
+            });
+        };
+        "settle(p, longest, rate)", "The same with a drift of its own, e.g. `\"0.005 K/s\"`." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("settle", move |point: Point, longest: &str, rate: &str| {
+                let (max_s, rate_k_s) = (quantity(Kind::Duration, longest)?, quantity(Kind::TemperatureRate, rate)?);
+                lock(&session).settle(point.0, max_s, rate_k_s)
+            });
+        };
+        "repeat(n)", "Does step `n` once more by the same jump, so that the two compare: goes to where it came from, unless there already, and jumps as it did. Returns the result of the jump." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("repeat", move |number: INT| lock(&session).repeat(number));
+        };
+    }
+    "Results" {
+        "result(n)", "The result of step `n`, counted from 1." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("result", move |number: INT| lock(&session).result(number));
+        };
+        "results()", "The results of all steps so far." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("results", move || -> Array {
+                lock(&session).results.iter().cloned().map(Dynamic::from).collect()
+            });
+        };
+        "r.step", "Number of the step, from 1." => |engine, _| {
+            engine.register_get("step", |result: &mut StepResult| result.number as INT);
+        };
+        "r.point", "Where it aimed." => |engine, _| {
+            engine.register_get("point", |result: &mut StepResult| Point(result.target));
+        };
+        "r.verdict", "`\"good\"`, `\"doubtful\"` or `\"unusable\"`." => |engine, _| {
+            engine.register_get("verdict", |result: &mut StepResult| ImmutableString::from(result.verdict()));
+        };
+        "r.warnings", "Codes of the reasons for the verdict, e.g. `small_gradient`." => |engine, _| {
+            engine.register_get("warnings", |result: &mut StepResult| warnings(result));
+        };
+        "r.has_eta", "Whether there is an efficiency. The first step of a run has no jump and thus none." => |engine, _| {
+            engine.register_get("has_eta", |result: &mut StepResult| result.eta().is_some());
+        };
+        "r.eta", "Efficiency, fraction." => |engine, _| {
+            engine.register_get("eta", |result: &mut StepResult| number(result.eta()));
+        };
+        "r.sigma_eta", "Its standard error, fraction; 1 where there is no efficiency, so that `r.sigma_eta > 0.005` holds." => |engine, _| {
+            engine.register_get("sigma_eta", |result: &mut StepResult| result.sigma_eta().min(SIGMA_ETA_MAX));
+        };
+        "r.h_w_m2k", "Heat-transfer coefficient, W/(m2 K)." => |engine, _| {
+            engine.register_get("h_w_m2k", |result: &mut StepResult| number(result.h_w_m2k()));
+        };
+        "r.sigma_h_w_m2k", "Its standard error, W/(m2 K); 1e6 where there is no coefficient." => |engine, _| {
+            engine.register_get("sigma_h_w_m2k", |result: &mut StepResult| result.sigma_h_w_m2k().min(SIGMA_H_MAX_W_M2K));
+        };
+        "r.speed_rpm", "Measured shaft speed at the end of the step, rpm." => |engine, _| {
+            measured(engine, "speed_rpm", |point| Some(point.speed_rpm));
+        };
+        "r.flow_kg_s", "Compressor mass flow at the end of the step, kg/s." => |engine, _| {
+            measured(engine, "flow_kg_s", |point| Some(point.flow_kg_s));
+        };
+        "r.pressure_ratio", "Total pressure ratio at the end of the step." => |engine, _| {
+            measured(engine, "pressure_ratio", |point| Some(point.pressure_ratio));
+        };
+        "r.dt2_k", "Change of T2 over the window, K." => |engine, _| {
+            measured(engine, "dt2_k", |point| point.dt2_k);
+        };
+        "r.dtc_k", "Change of the housing temperature over the window, K." => |engine, _| {
+            measured(engine, "dtc_k", |point| point.dtc_k);
+        };
+        "r.duration_s", "How long the step took, s." => |engine, _| {
+            engine.register_get("duration_s", |result: &mut StepResult| result.end_s - result.start_s);
+        };
+    }
+    "Other" {
+        "elapsed_s()", "Time since the run began, warm-up included, s." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("elapsed_s", move || lock(&session).now_s());
+        };
+        "note(text)", "Puts a note into the recording and the report. `print(..)` does the same." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("note", move |text: &str| lock(&session).note(text));
+        };
+    }
+}
+
+/// Registers a property of a result's point.
+fn measured(engine: &mut Engine, name: &'static str, value: fn(&IdentifiedPoint) -> Option<f64>) {
+    engine.register_get(name, move |result: &mut StepResult| {
+        number(result.identified.as_ref().and_then(value).filter(|value| value.is_finite()))
+    });
+}
+
+fn number(value: Option<f64>) -> Dynamic {
+    value.map_or(Dynamic::UNIT, Dynamic::from_float)
+}
+
+fn points_array(points: &[OperatingPoint]) -> Array {
+    points.iter().map(|point| Dynamic::from(Point(*point))).collect()
+}
+
+fn quantity(kind: Kind, text: &str) -> Result<f64, Thrown> {
+    mapper_units::parse(kind, text).map_err(|error| throw(error.to_string(), &error.remedy(kind)))
+}
+
+fn point(speed: &str, opening: FLOAT) -> Result<Point, Thrown> {
+    let speed_rpm = quantity(Kind::Speed, speed)?;
+    Ok(Point(OperatingPoint { speed_rpm, valve_opening_ratio: opening }))
+}
+
+fn points_of(array: Array) -> Result<Vec<OperatingPoint>, Thrown> {
+    let one = |item: Dynamic| {
+        let kind = item.type_name();
+        item.try_cast::<Point>().map(|point| point.0).ok_or_else(|| {
+            throw(format!("order() takes an array of points; this one holds a {kind}"), "e.g. order(grid())")
+        })
+    };
+    array.into_iter().map(one).collect()
+}
+
+fn warnings(result: &StepResult) -> Array {
+    let all = result.identified.iter().flat_map(|point| &point.warnings);
+    all.map(|warning| Dynamic::from(ImmutableString::from(warning.code.as_str()))).collect()
+}
+
+fn shown(result: &StepResult) -> String {
+    match result.eta() {
+        Some(eta) => format!(
+            "step {} at {}: eta {:.2} +/- {:.2} % ({})",
+            result.number,
+            result.target,
+            100.0 * eta,
+            100.0 * result.sigma_eta(),
+            result.verdict()
+        ),
+        None => format!("step {} at {}: no efficiency", result.number, result.target),
+    }
+}

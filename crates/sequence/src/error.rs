@@ -1,0 +1,172 @@
+//! What stops a script, with its place in the script.
+
+use rhai::{Dynamic, EvalAltResult, ParseError, Position};
+use std::fmt;
+use std::path::PathBuf;
+
+/// Longest source line that is shown, characters.
+const LINE_LIMIT: usize = 200;
+/// Longest message that is kept, characters: a script may throw anything.
+const MESSAGE_LIMIT: usize = 1000;
+
+/// Why a sequence could not go on.
+#[derive(Debug, thiserror::Error)]
+pub enum SequenceError {
+    /// The script has a mistake, or was refused a step.
+    #[error("{0}")]
+    Script(Box<ScriptError>),
+    /// The script's thread could not be started.
+    #[error("the thread of the sequence script could not be started: {0}")]
+    Thread(#[source] std::io::Error),
+    /// The script's thread is gone: a fault of the program.
+    #[error("the sequence script ended without a word: a fault of the program")]
+    Lost,
+}
+
+/// An error of a script; [`Display`](fmt::Display) shows the line with a caret.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScriptError {
+    /// The script's file.
+    pub path: PathBuf,
+    /// Line, from 1; `None` where the whole script is meant.
+    pub line: Option<usize>,
+    /// Column, from 1, in characters.
+    pub column: Option<usize>,
+    /// The line itself, without control characters.
+    pub source_line: String,
+    /// What is wrong, with values and units.
+    pub message: String,
+    /// What to do; empty where the message says it.
+    pub remedy: String,
+    /// Lines from which the function with the error was called, innermost first.
+    pub called_from: Vec<usize>,
+}
+
+impl std::error::Error for ScriptError {}
+
+impl fmt::Display for ScriptError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.message)?;
+        let path = self.path.display();
+        let Some(line) = self.line else {
+            write!(f, "  --> {path}")?;
+            return self.tail(f, 2);
+        };
+        let column = self.column.unwrap_or(1);
+        let number = line.to_string();
+        let margin = " ".repeat(number.len());
+        writeln!(f, "{margin}--> {path}:{line}:{column}")?;
+        writeln!(f, "{margin} |")?;
+        writeln!(f, "{number} | {}", self.source_line)?;
+        write!(f, "{margin} | {}^", " ".repeat(column.saturating_sub(1).min(LINE_LIMIT)))?;
+        self.tail(f, number.len())
+    }
+}
+
+impl ScriptError {
+    fn tail(&self, f: &mut fmt::Formatter<'_>, margin: usize) -> fmt::Result {
+        let margin = " ".repeat(margin);
+        for line in &self.called_from {
+            write!(f, "\n{margin} = called from line {line}")?;
+        }
+        if !self.remedy.is_empty() {
+            write!(f, "\n{margin} = help: {}", self.remedy)?;
+        }
+        Ok(())
+    }
+
+    fn new(path: PathBuf, text: &str, at: Position, message: String, remedy: String) -> Self {
+        // One character for one, so that the column still fits; terminals obey control characters.
+        let harmless = |c: char| match c {
+            '\t' => ' ',
+            c if c.is_control() => '?',
+            c => c,
+        };
+        let line = at.line();
+        let source_line = line.and_then(|line| text.lines().nth(line.saturating_sub(1))).unwrap_or_default();
+        ScriptError {
+            path,
+            line,
+            column: at.position(),
+            source_line: source_line.chars().take(LINE_LIMIT).map(harmless).collect(),
+            message: message
+                .chars()
+                .take(MESSAGE_LIMIT)
+                .map(|c| if c == '\n' { c } else { harmless(c) })
+                .collect(),
+            remedy,
+            called_from: Vec::new(),
+        }
+    }
+
+    pub(crate) fn parsing(path: PathBuf, text: &str, error: &ParseError) -> Self {
+        let message = format!("the sequence script cannot be read: {}", error.err_type());
+        Self::new(path, text, error.position(), message, String::new())
+    }
+
+    pub(crate) fn running(path: PathBuf, text: &str, error: EvalAltResult) -> Self {
+        let mut called_from = Vec::new();
+        let mut error = error;
+        while let EvalAltResult::ErrorInFunctionCall(_, _, inner, at) = error {
+            called_from.extend(at.line());
+            error = *inner;
+        }
+        called_from.reverse();
+        let at = error.position();
+        let (message, remedy) = words(error);
+        let mut made = Self::new(path, text, at, message, remedy);
+        // A deep recursion is told by its ends.
+        called_from.truncate(5);
+        made.called_from = called_from;
+        made
+    }
+}
+
+/// A refusal as it travels through the script: thrown, so that the script may catch it and choose another step.
+pub(crate) fn throw(message: String, remedy: &str) -> Box<EvalAltResult> {
+    let thrown = if remedy.is_empty() { message } else { format!("{message}{REMEDY_MARK}{remedy}") };
+    Box::new(EvalAltResult::ErrorRuntime(thrown.into(), Position::NONE))
+}
+
+/// Separates message and remedy in what is thrown; a script that shows the text shows a line end.
+const REMEDY_MARK: char = '\n';
+
+fn words(error: EvalAltResult) -> (String, String) {
+    use crate::sandbox::{CALL_DEPTH_LIMIT, OPERATION_LIMIT};
+    match error {
+        EvalAltResult::ErrorRuntime(thrown, _) => thrown_words(thrown),
+        EvalAltResult::ErrorTooManyOperations(_) => (
+            format!("the sequence script took more than {OPERATION_LIMIT} operations and was stopped"),
+            "look for a loop that does not end, or that goes through all points for each point".to_owned(),
+        ),
+        EvalAltResult::ErrorStackOverflow(_) => (
+            format!("functions of the sequence script call each other more than {CALL_DEPTH_LIMIT} deep"),
+            "use a loop instead of a function that calls itself".to_owned(),
+        ),
+        EvalAltResult::ErrorTooManyVariables(_) => (
+            "the sequence script has too many variables at once".to_owned(),
+            "keep values in an array or a map".to_owned(),
+        ),
+        EvalAltResult::ErrorDataTooLarge(what, _) => {
+            (format!("a value of the sequence script grew too large ({what})"), String::new())
+        }
+        EvalAltResult::ErrorFunctionNotFound(signature, _) => (
+            format!("there is no function `{signature}` for a sequence script"),
+            "docs/sequences.md lists the functions and what they take".to_owned(),
+        ),
+        other => {
+            let mut other = other;
+            other.set_position(Position::NONE);
+            (other.to_string(), String::new())
+        }
+    }
+}
+
+fn thrown_words(thrown: Dynamic) -> (String, String) {
+    let text = thrown.to_string();
+    match text.split_once(REMEDY_MARK) {
+        Some((message, remedy)) => (message.to_owned(), remedy.to_owned()),
+        None if text.is_empty() => ("the sequence script stopped itself".to_owned(), String::new()),
+        None => (text, String::new()),
+    }
+}

@@ -1,0 +1,84 @@
+//! The rhai engine of a script: what it lacks, and how much it may use.
+
+use rhai::packages::{
+    ArithmeticPackage, BasicArrayPackage, BasicFnPackage, BasicIteratorPackage, BasicMapPackage,
+    BasicMathPackage, BasicStringPackage, LogicPackage, MoreStringPackage, Package,
+};
+use rhai::{Dynamic, Engine, EvalAltResult, Position};
+
+/// Operations of a whole script. The order of a second for plain ones; time is bounded without a clock, so that a
+/// script does the same on every machine.
+pub(crate) const OPERATION_LIMIT: u64 = 5_000_000;
+/// Depth of calls.
+pub(crate) const CALL_DEPTH_LIMIT: usize = 32;
+/// Depth of expressions.
+const EXPRESSION_DEPTH_LIMIT: usize = 64;
+/// Length of a string, bytes. `replace` may make this squared before it is measured.
+const STRING_LIMIT: usize = 4096;
+/// Elements of an array, those of arrays within included; at least twice the grid.
+const ARRAY_LIMIT: usize = 4096;
+/// Entries of a map.
+const MAP_LIMIT: usize = 1024;
+/// Variables at once.
+const VARIABLE_LIMIT: usize = 128;
+/// Functions of a script.
+const FUNCTION_LIMIT: usize = 128;
+/// Length of a script, bytes.
+pub(crate) const SCRIPT_LIMIT: usize = 256 << 10;
+/// Stack of a script's thread, bytes: room for values nested as deeply as an array is long.
+pub(crate) const STACK_BYTES: usize = 256 << 20;
+
+/// An engine with arithmetic, strings, arrays and maps, and nothing else: no modules, no `eval`, no clock, no `sleep`.
+pub(crate) fn engine(grid_points: usize) -> Engine {
+    let mut engine = Engine::new_raw();
+    ArithmeticPackage::new().register_into_engine(&mut engine);
+    LogicPackage::new().register_into_engine(&mut engine);
+    BasicMathPackage::new().register_into_engine(&mut engine);
+    BasicIteratorPackage::new().register_into_engine(&mut engine);
+    BasicFnPackage::new().register_into_engine(&mut engine);
+    BasicStringPackage::new().register_into_engine(&mut engine);
+    MoreStringPackage::new().register_into_engine(&mut engine);
+    BasicArrayPackage::new().register_into_engine(&mut engine);
+    BasicMapPackage::new().register_into_engine(&mut engine);
+    engine.disable_symbol("eval");
+    // A value reached through `this` would escape the measuring of variables below.
+    engine.disable_symbol("this");
+    let element_limit = ARRAY_LIMIT.max(2 * grid_points);
+    // The engine measures what functions and operators give, but not what `a[i] = b` makes of `a`, and arrays in arrays
+    // would multiply. So each variable is measured whenever it is used.
+    #[allow(deprecated, reason = "not deprecated but marked as open to change")]
+    engine.on_var(move |name, _, context| {
+        let room = context.scope().get(name).and_then(|value| room_after(value, element_limit));
+        match room {
+            None if context.scope().contains(name) => {
+                Err(EvalAltResult::ErrorDataTooLarge("Size of array/map".to_owned(), Position::NONE).into())
+            }
+            _ => Ok(None),
+        }
+    });
+    engine
+        .set_max_operations(OPERATION_LIMIT)
+        .set_max_call_levels(CALL_DEPTH_LIMIT)
+        .set_max_expr_depths(EXPRESSION_DEPTH_LIMIT, EXPRESSION_DEPTH_LIMIT)
+        .set_max_string_size(STRING_LIMIT)
+        .set_max_array_size(element_limit)
+        .set_max_map_size(MAP_LIMIT)
+        .set_max_variables(VARIABLE_LIMIT)
+        .set_max_functions(FUNCTION_LIMIT)
+        .set_strict_variables(true)
+        .set_fail_on_invalid_map_property(true);
+    engine
+}
+
+/// What is left of `room` elements after those of a value, arrays and maps within included; `None` where they do not fit.
+fn room_after(value: &Dynamic, room: usize) -> Option<usize> {
+    if let Ok(array) = value.as_array_ref() {
+        let room = room.checked_sub(array.len())?;
+        return array.iter().try_fold(room, |room, item| room_after(item, room));
+    }
+    if let Ok(map) = value.as_map_ref() {
+        let room = room.checked_sub(map.len())?;
+        return map.values().try_fold(room, |room, item| room_after(item, room));
+    }
+    Some(room)
+}

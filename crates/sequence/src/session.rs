@@ -1,0 +1,203 @@
+//! The script's side of a sequence: what its functions do.
+
+use crate::bench::{Bench, Refusal, same_place};
+use crate::error::throw;
+use crate::forecast::Nominal;
+use crate::result::StepResult;
+use crate::runner::{FromScript, Hold, SequenceStep};
+use crate::settle::SettleRule;
+use mapper_core::{OperatingPoint, PlanStep, StepKind};
+use rhai::{EvalAltResult, Position};
+use std::sync::mpsc::{Receiver, SyncSender};
+
+pub(crate) type Thrown = Box<EvalAltResult>;
+
+/// Steps of a sequence at most.
+const STEP_LIMIT: usize = 20_000;
+/// Longest step, s: a day.
+const DWELL_LIMIT_S: f64 = 86_400.0;
+/// Longest sequence, s: four weeks.
+const DURATION_LIMIT_S: f64 = 28.0 * 86_400.0;
+/// Points that are judged at most; each takes the time of some thousand operations.
+const CHECK_LIMIT: usize = 50_000;
+/// Notes that are kept, and characters of each.
+const NOTE_LIMIT: usize = 1000;
+const NOTE_LENGTH_LIMIT: usize = 500;
+
+/// Everything the functions of a script share.
+pub(crate) struct Session {
+    pub bench: Bench,
+    /// Time at the points that follow, s.
+    pub dwell_s: f64,
+    pub results: Vec<StepResult>,
+    nominal: Nominal,
+    checks: usize,
+    /// Points given to the planner so far.
+    ordered: usize,
+    notes: Vec<String>,
+    noted: usize,
+    to_caller: SyncSender<FromScript>,
+    from_caller: Receiver<Option<StepResult>>,
+}
+
+impl Session {
+    pub fn new(
+        bench: Bench,
+        to_caller: SyncSender<FromScript>,
+        from_caller: Receiver<Option<StepResult>>,
+    ) -> Self {
+        Session {
+            dwell_s: bench.dwell_s,
+            bench,
+            results: Vec::new(),
+            nominal: Nominal::new(),
+            checks: 0,
+            ordered: 0,
+            notes: Vec::new(),
+            noted: 0,
+            to_caller,
+            from_caller,
+        }
+    }
+
+    /// Waits until the caller asks for the next step.
+    pub fn wait(&mut self) -> Result<Option<StepResult>, Thrown> {
+        self.from_caller.recv().map_err(|_| stopped())
+    }
+
+    /// Tells how the script ended. A caller that has gone need not know.
+    pub fn end(&mut self, end: impl FnOnce(Vec<String>) -> FromScript) {
+        let message = end(std::mem::take(&mut self.notes));
+        let _ = self.to_caller.send(message);
+    }
+
+    /// Run time at which the next step starts, s.
+    pub fn now_s(&self) -> f64 {
+        self.results.last().map_or(self.bench.warm_up_s, |result| result.end_s)
+    }
+
+    pub fn note(&mut self, text: &str) {
+        self.noted += 1;
+        if self.noted < NOTE_LIMIT {
+            let harmless = |c: char| if c.is_control() { ' ' } else { c };
+            self.notes.push(text.chars().take(NOTE_LENGTH_LIMIT).map(harmless).collect());
+        } else if self.noted == NOTE_LIMIT {
+            self.notes.push(format!("the script has made {NOTE_LIMIT} notes; further ones are left out"));
+        }
+    }
+
+    fn check(&mut self, point: OperatingPoint) -> Result<mapper_physics::steady::SteadyState, Thrown> {
+        self.checks += 1;
+        if self.checks > CHECK_LIMIT {
+            return Err(throw(
+                format!("the script has had {CHECK_LIMIT} points judged"),
+                "judge fewer points",
+            ));
+        }
+        self.bench.check(point).map_err(|Refusal { message, remedy }| throw(message, &remedy))
+    }
+
+    /// Whether a step may go to a point.
+    pub fn reachable(&mut self, point: OperatingPoint) -> Result<bool, Thrown> {
+        if self.checks >= CHECK_LIMIT {
+            self.check(point)?;
+        }
+        Ok(self.check(point).is_ok())
+    }
+
+    /// The planner's order of a set.
+    pub fn order(&mut self, points: &[OperatingPoint]) -> Result<Vec<OperatingPoint>, Thrown> {
+        let limit = 1000 + 4 * self.bench.points.len();
+        self.ordered += points.len();
+        if self.ordered > limit {
+            let message = format!("the planner has been asked to order more than {limit} points in all");
+            return Err(throw(message, "order a set once and keep the result"));
+        }
+        if points.is_empty() {
+            return Ok(Vec::new());
+        }
+        (self.bench.order)(points)
+            .map_err(|message| throw(format!("the planner cannot order the points: {message}"), ""))
+    }
+
+    /// The result of a step by its number, from 1.
+    pub fn result(&self, number: i64) -> Result<StepResult, Thrown> {
+        let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
+        index.and_then(|index| self.results.get(index)).cloned().ok_or_else(|| {
+            let message =
+                format!("there is no result of step {number}: {} have been run", self.results.len());
+            throw(message, "steps are counted from 1; jump() returns its own result")
+        })
+    }
+
+    /// Goes to a point and comes back when the step has been run.
+    pub fn step(&mut self, to: OperatingPoint, dwell_s: f64, hold: Hold) -> Result<StepResult, Thrown> {
+        let (index, start_s) = (self.results.len(), self.now_s());
+        if index >= STEP_LIMIT {
+            return Err(throw(format!("a sequence may have {STEP_LIMIT} steps"), "end the sequence earlier"));
+        }
+        if !(dwell_s > 0.0 && dwell_s <= DWELL_LIMIT_S) {
+            let message =
+                format!("a step may last more than 0 s and at most {DWELL_LIMIT_S} s, not {dwell_s} s");
+            return Err(throw(message, "give a time such as \"120 s\" or \"10 min\""));
+        }
+        if start_s + dwell_s > DURATION_LIMIT_S {
+            return Err(throw("the sequence would last longer than four weeks".into(), "end it earlier"));
+        }
+        let target = self.check(to)?;
+        let from = self.results.last().map(|result| result.target);
+        let fail = |error| throw(format!("the forecast of the step to {to} failed: {error}"), "");
+        let predicted = self.nominal.forecast(&self.bench, &target, dwell_s, from.is_some()).map_err(fail)?;
+        let visited = self.results.iter().any(|result| same_place(result.target, to));
+        let step = PlanStep {
+            index,
+            kind: if visited { StepKind::Repeat } else { StepKind::Point },
+            from,
+            to,
+            p3_pa: target.boundary.p3_pa,
+            t3_k: self.bench.boundary.t3_k,
+            oil_temperature_k: self.bench.boundary.oil_temperature_k,
+            dwell_s,
+            start_s,
+            predicted,
+        };
+        let notes = std::mem::take(&mut self.notes);
+        let step = Box::new(SequenceStep { step, hold });
+        self.to_caller.send(FromScript::Step(step, notes)).map_err(|_| stopped())?;
+        let result = self.wait()?.ok_or_else(stopped)?;
+        let duration_s = result.end_s - result.start_s;
+        self.nominal.finish(&self.bench, &target.boundary, duration_s).map_err(fail)?;
+        self.results.push(result.clone());
+        Ok(result)
+    }
+
+    /// Does a step once more by the same jump.
+    pub fn repeat(&mut self, number: i64) -> Result<StepResult, Thrown> {
+        let before = self.result(number)?;
+        let Some(from) = before.from else {
+            let message = format!("step {number} has no jump that could be repeated: the run began there");
+            return Err(throw(message, "repeat a later step, or jump to its point"));
+        };
+        let now = self.results.last().map(|result| result.target);
+        if now.is_none_or(|now| !same_place(now, from)) {
+            self.step(from, self.dwell_s, Hold::Dwell)?;
+        }
+        self.step(before.target, before.end_s - before.start_s, Hold::Dwell)
+    }
+
+    /// Stays at a point until it has settled.
+    pub fn settle(
+        &mut self,
+        to: OperatingPoint,
+        max_s: f64,
+        rate_max_k_s: f64,
+    ) -> Result<StepResult, Thrown> {
+        let rule = SettleRule { rate_max_k_s, bands: self.bench.settle_bands };
+        self.step(to, max_s, Hold::UntilSettled(rule))
+    }
+}
+
+/// The caller has gone: the script ends, and cannot catch it.
+fn stopped() -> Thrown {
+    Box::new(EvalAltResult::ErrorTerminated(().into(), Position::NONE))
+}

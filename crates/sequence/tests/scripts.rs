@@ -1,0 +1,280 @@
+//! Scripts against a caller that answers without a rig: what they may, what they may not, and what they are told.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_core::{IdentifiedPoint, Method, OperatingPoint, StepKind, Verdict};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_sequence::{
+    Bench, Hold, Script, ScriptError, SequenceError, SequenceRunner, SequenceStep, SettleBands, StepLimits,
+    StepResult, api_markdown, check,
+};
+
+fn bench() -> Bench {
+    let points = [50e3, 110e3, 150e3].into_iter().flat_map(|speed_rpm| {
+        [0.7, 1.0].map(|valve_opening_ratio| OperatingPoint { speed_rpm, valve_opening_ratio })
+    });
+    Bench {
+        points: points.collect(),
+        dwell_s: 120.0,
+        warm_up_s: 60.0,
+        window_s: Some((10.0, 110.0)),
+        settle_bands: SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 },
+        model: Model::nominal(),
+        boundary: BoundaryConditions::default(),
+        limits: StepLimits {
+            speed_max_rpm: 180e3,
+            p3_min_pa: 120e3,
+            p3_max_pa: 500e3,
+            t2_max_k: Some(573.0),
+            t3_max_k: None,
+            surge_margin_min_ratio: None,
+        },
+        order: Box::new(|points| Ok(points.iter().rev().copied().collect())),
+    }
+}
+
+fn start(text: &str) -> SequenceRunner {
+    let script = Script { path: "test.rhai".into(), text: text.to_owned() };
+    SequenceRunner::start(script, bench()).unwrap()
+}
+
+/// What a step gives here: an efficiency that grows with each step.
+fn answer(step: &SequenceStep) -> StepResult {
+    let step = &step.step;
+    let point = IdentifiedPoint {
+        step: step.index,
+        target: Some(step.to),
+        speed_rpm: step.to.speed_rpm,
+        valve_opening_ratio: step.to.valve_opening_ratio,
+        flow_kg_s: 0.05,
+        flow_corrected_kg_s: 0.05,
+        speed_corrected_rpm: step.to.speed_rpm,
+        pressure_ratio: 1.5,
+        t1_k: 298.0,
+        p1_pa: 100e3,
+        eta: Some(0.5 + 0.01 * step.index as f64),
+        eta_low: None,
+        eta_high: None,
+        eta_uncertainty: None,
+        h_w_m2k: None,
+        h_low_w_m2k: None,
+        h_high_w_m2k: None,
+        h_uncertainty: None,
+        method: Method::Dynamic,
+        verdict: if step.index == 0 { Verdict::Unusable } else { Verdict::Good },
+        warnings: Vec::new(),
+        window: None,
+        residual_rms_k: None,
+        dt2_k: None,
+        dtc_k: None,
+    };
+    StepResult {
+        number: step.index + 1,
+        target: step.to,
+        from: step.from,
+        start_s: step.start_s,
+        end_s: step.start_s + step.dwell_s,
+        identified: Some(point),
+    }
+}
+
+type Played = (Vec<SequenceStep>, Vec<String>, Result<(), SequenceError>);
+
+fn play(text: &str) -> Played {
+    let mut runner = start(text);
+    let (mut steps, mut finished): (Vec<SequenceStep>, _) = (Vec::new(), None);
+    let end = loop {
+        match runner.next_step(finished.take()) {
+            Ok(Some(step)) => {
+                finished = Some(answer(&step));
+                steps.push(step);
+            }
+            Ok(None) => break Ok(()),
+            Err(error) => break Err(error),
+        }
+    };
+    assert!(matches!(runner.next_step(None), Ok(None)), "an ended script stays ended");
+    (steps, runner.take_notes(), end)
+}
+
+fn steps_of(text: &str) -> Vec<SequenceStep> {
+    let (steps, _, end) = play(text);
+    end.unwrap_or_else(|error| panic!("{error}"));
+    steps
+}
+
+fn error_of(text: &str) -> ScriptError {
+    match play(text).2 {
+        Err(SequenceError::Script(error)) => *error,
+        other => panic!("{text:.200}: {other:?}"),
+    }
+}
+
+#[test]
+fn a_script_yields_its_steps_in_order_and_sees_their_results() {
+    let text = r#"
+        dwell("90 s");
+        let a = jump(point("50 krpm", 1));
+        let b = jump(point("110 krpm", 0.7), "2 min");
+        let again = repeat(b.step);
+        settle(midpoint(a.point, b.point), "10 min");
+        note(`${a.has_eta} ${a.sigma_eta > 0.005} ${b.eta} ${again.eta} ${results().len()} ${result(2).step}`);
+    "#;
+    let (steps, notes, end) = play(text);
+    end.unwrap();
+    // The repeat of step 2 goes back to where step 2 came from.
+    let speeds: Vec<f64> = steps.iter().map(|step| step.step.to.speed_rpm).collect();
+    assert_eq!(speeds, [50e3, 110e3, 50e3, 110e3, 80e3]);
+    let dwells: Vec<f64> = steps.iter().map(|step| step.step.dwell_s).collect();
+    assert_eq!(dwells, [90.0, 120.0, 90.0, 120.0, 600.0]);
+    let starts: Vec<f64> = steps.iter().map(|step| step.step.start_s).collect();
+    assert_eq!(starts, [60.0, 150.0, 270.0, 360.0, 480.0]);
+    let kinds: Vec<StepKind> = steps.iter().map(|step| step.step.kind).collect();
+    use StepKind::{Point, Repeat};
+    assert_eq!(kinds, [Point, Point, Repeat, Repeat, Point]);
+    assert_eq!(steps[1].step.from, Some(steps[0].step.to));
+    assert!(matches!(steps[4].hold, Hold::UntilSettled(_)) && steps[3].hold == Hold::Dwell);
+    assert_eq!(notes, ["false true 0.51 0.53 5 2"]);
+}
+
+/// The reference table of the model: P3 at 110 krpm and 150 krpm; and a jump up warms the housing.
+#[test]
+fn steps_carry_what_the_nominal_machine_expects() {
+    let steps = steps_of(r#"jump(point("50 krpm", 0.5)); jump(point("150 krpm", 0.5));"#);
+    assert_eq!(steps[0].step.predicted.dtc_k, None);
+    assert!(steps[1].step.predicted.dtc_k.unwrap() > 20.0, "{:?}", steps[1].step.predicted);
+    assert!((steps[1].step.p3_pa / 1e3 - 218.6).abs() < 0.1, "{}", steps[1].step.p3_pa);
+}
+
+#[test]
+fn the_planner_orders_what_it_is_given() {
+    let steps = steps_of("for p in order(grid()) { jump(p); }");
+    let expected: Vec<OperatingPoint> = bench().points.into_iter().rev().collect();
+    assert_eq!(steps.iter().map(|step| step.step.to).collect::<Vec<_>>(), expected);
+    let error = error_of("let x = 1;\norder([x]);");
+    assert!(error.line == Some(2) && error.message.contains("points"), "{error}");
+}
+
+#[test]
+fn no_step_leaves_the_limits() {
+    for (step, word) in [
+        (r#"jump(point("250 krpm", 1.0))"#, "speed limit of 180 krpm"),
+        (r#"jump(point("110 krpm", 2.6))"#, "valve's range"),
+        (r#"jump(point("110 krpm", 0.0))"#, "valve's range"),
+        (r#"jump(point("110 krpm", 0.0/0.0))"#, "valve's range"),
+        (r#"jump(point("-5 krpm", 1.0))"#, "no positive speed"),
+        (r#"jump(point("10 krpm", 1.0))"#, "outside the limits of 120.0 to 500.0 kPa"),
+        (r#"settle(point("250 krpm", 1.0), "60 s")"#, "speed limit of 180 krpm"),
+        (r#"jump(point("110 krpm", 0.2))"#, "surge margin"),
+        (r#"jump(point("110 krpm", 1.0), "25 h")"#, "86400 s"),
+        (r#"jump(point("110 krpm", 1.0), "-5 s")"#, "more than 0 s"),
+        (r#"jump(point("110", 1.0))"#, "lacks its unit"),
+        ("repeat(1)", "no result of step 1"),
+    ] {
+        let error = error_of(&format!("// first line\n  {step};\n"));
+        assert_eq!(error.line, Some(2), "{error}");
+        assert!(error.message.contains(word), "{error}");
+        assert!(!error.remedy.is_empty(), "{error}");
+    }
+    // What is refused may be caught, and leads nowhere.
+    let steps = steps_of(r#"try { jump(point("250 krpm", 1.0)); } catch { jump(grid()[0]); }"#);
+    assert_eq!(steps.len(), 1);
+    let steps =
+        steps_of(r#"if !reachable(point("250 krpm", 1.0)) && reachable(grid()[0]) { jump(grid()[0]); }"#);
+    assert_eq!(steps.len(), 1);
+}
+
+#[test]
+fn an_error_shows_its_line_with_a_caret() {
+    let shown = error_of("let p = grid()[0];\njump(p);\n    throw \"enough\";\n").to_string();
+    let expected = "enough\n --> test.rhai:3:5\n  |\n3 |     throw \"enough\";\n  |     ^";
+    assert_eq!(shown, expected);
+    let called = error_of("fn far(n) {\n  jump(point(\"999 krpm\", n));\n}\n\nfar(1);\n");
+    assert_eq!((called.line, called.called_from.as_slice()), (Some(2), &[5][..]), "{called}");
+    let unreadable = error_of("let a = ;");
+    assert!(unreadable.line == Some(1) && unreadable.message.contains("cannot be read"), "{unreadable}");
+    let script = Script { path: "t.rhai".into(), text: "let a = ;".into() };
+    assert!(matches!(check(&script), Err(SequenceError::Script(_))));
+}
+
+#[test]
+fn hostile_scripts_end_with_an_error() {
+    for (text, word) in [
+        ("loop { }", "operations"),
+        ("while true { let x = 1; }", "operations"),
+        ("for i in 0..9_000_000_000_000 { let x = i; }", "operations"),
+        ("loop { try { loop { } } catch { } }", "operations"),
+        ("fn f(n) { f(n + 1) }\nf(0);", "deep"),
+        ("fn f(n) { try { f(n + 1) } catch { f(n + 1) } }\nf(0);", ""),
+        ("let s = \"x\"; loop { s += s; }", "too large"),
+        ("let a = []; loop { a.push(a); }", "too large"),
+        ("let a = []; loop { a = [a]; }", "too large"),
+        ("let a = [0]; loop { a += a; }", "too large"),
+        ("let m = #{}; let i = 0; loop { m[i.to_string()] = i; i += 1; }", "too large"),
+        (
+            "let b = []; b.pad(4000, 0); let a = []; a.pad(4000, 0); for i in 0..4000 { a[i] = b; }",
+            "too large",
+        ),
+        (
+            "let b = []; b.pad(4000, 0); let a = [0]; a[0] = b; let c = [0, 0]; c[0] = a; c[1] = a; c[0] = c;",
+            "too large",
+        ),
+        ("fn f(b) { this[0] = b; } let a = [0]; a.f([1]);", "cannot be read"),
+        ("let a = []; a.pad(1_000_000_000, 0);", "too large"),
+        ("let s = \"x\"; s.pad(1_000_000_000, \"x\");", "too large"),
+        ("let s = \"\"; s.pad(4000, \"x\"); s.replace(\"x\", s);", "too large"),
+        ("eval(\"jump(grid()[0])\");", ""),
+        ("import \"x\" as x;", ""),
+        ("sleep(1000);", "no function"),
+        ("timestamp();", "no function"),
+        ("open_file(\"/etc/passwd\");", "no function"),
+        ("let f = Fn(\"f\"); fn f(g) { g.call(g) }\nf.call(f);", ""),
+        ("throw;", "stopped itself"),
+        ("throw \"\\u001b[2J\";", "?[2J"),
+        ("loop { order(grid()); }", "more than"),
+        ("loop { reachable(point(\"250 krpm\", 1.0)); }", "judged"),
+    ] {
+        let error = error_of(text);
+        assert!(error.message.contains(word), "{text}: {error}");
+        assert!(!error.to_string().contains('\u{1b}'), "{text}");
+    }
+    let deep = format!("let a = {}1{};", "(".repeat(100_000), ")".repeat(100_000));
+    assert!(error_of(&deep).to_string().len() < 2000);
+    let long = format!("let a = \"{}\";", "x".repeat(1 << 20));
+    assert!(error_of(&long).message.contains("bytes"));
+}
+
+/// A value as deep as an array may be long is shown and dropped without the stack running out.
+#[test]
+fn deep_values_do_no_harm() {
+    let (_, notes, end) =
+        play("let a = []; for i in 0..4000 { a = [a]; }\nprint(a); print(a == a); jump(grid()[0]);");
+    if let Err(error) = end {
+        assert!(error.to_string().contains("too large"), "{error}");
+    }
+    assert!(notes.iter().all(|note| note.chars().count() <= 500));
+}
+
+#[test]
+fn notes_are_bounded() {
+    let (_, notes, end) = play("for i in 0..5000 { print(i); }");
+    end.unwrap();
+    assert_eq!(notes.len(), 1000);
+    assert!(notes[999].contains("left out"));
+}
+
+/// A runner that goes away in mid-run takes its script along, whatever the script catches.
+#[test]
+fn a_script_whose_caller_goes_ends() {
+    let mut runner = start("loop { try { jump(grid()[0]); } catch { } }");
+    let step = runner.next_step(None).unwrap().unwrap();
+    runner.next_step(Some(answer(&step))).unwrap().unwrap();
+    drop(runner);
+}
+
+#[test]
+fn the_documentation_is_what_the_functions_say() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/sequences.md");
+    let written = std::fs::read_to_string(path).unwrap();
+    assert!(written == api_markdown(), "docs/sequences.md is stale: run `cargo xtask docs`");
+}

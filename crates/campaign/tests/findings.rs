@@ -238,7 +238,7 @@ fn types_and_names() {
         "campaign: short\norder: greddy\n",
         Kind::WrongValue,
         "greddy",
-        "none of greedy, listed",
+        "none of sum_gradient, worst_gradient, information, time, greedy, listed",
         "did you mean `greedy`?",
     );
     one(

@@ -74,8 +74,10 @@ fn panel(
     path: &[OperatingPoint],
     place: &impl Fn(OperatingPoint) -> (f64, f64),
 ) -> Panel {
-    let mut panel =
-        Panel::new(Axis::new("corrected flow, g/s"), Axis::new("pressure ratio P2/P1")).title(title);
+    // Room for the names of the speed lines at their ends.
+    let widest = campaign.points.iter().map(|point| place(*point).0).fold(0.0, f64::max);
+    let flow = Axis::new("corrected flow, g/s").range(0.0, 1.15 * widest);
+    let mut panel = Panel::new(flow, Axis::new("pressure ratio P2/P1")).title(title);
     let mut speeds: Vec<f64> = campaign.points.iter().map(|point| point.speed_rpm).collect();
     speeds.sort_by(f64::total_cmp);
     speeds.dedup();

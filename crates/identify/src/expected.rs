@@ -5,6 +5,7 @@ use crate::bias::declared_effect;
 use crate::covariance::{Correlation, NoiseVariances};
 use crate::fit::{Geometry, fit};
 use crate::samples::Samples;
+use crate::steady::{Means, uncertainty};
 use mapper_physics::compression::isentropic_rise_ratio;
 
 /// Interval of the samples whose noise a campaign declares, s.
@@ -74,4 +75,13 @@ pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) 
         sigma_h_w_m2k: h.hypot(offset_h),
     };
     (found.eta.is_finite() && found.sigma_eta.is_finite() && found.sigma_h_w_m2k.is_finite()).then_some(found)
+}
+
+/// Apparent efficiency of a settled point (conventional mapping), and its standard error from declared offsets and gains,
+/// fractions. `None` where the temperature rise gives no efficiency.
+pub fn expected_steady(row: &ExpectedRow, config: &IdentifyConfig) -> Option<(f64, f64)> {
+    let means = Means { t1_k: row.t1_k, t2_k: row.t2_k, p1_pa: row.p1_pa, p2_pa: row.p2_pa };
+    let eta = means.apparent_eta();
+    let sigma = uncertainty(&means, &Samples::default(), config).bias_standard_error;
+    (eta.is_finite() && eta > 0.0 && sigma.is_finite()).then_some((eta, sigma))
 }

@@ -28,6 +28,6 @@ pub use config::{
     DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Stabilisation, Thresholds, WindowRule,
 };
 pub use error::{IdentifyError, StepError};
-pub use expected::{Expected, ExpectedRow, expected};
+pub use expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use findings::code;
 pub use identify::{identify, identify_each};

@@ -1,10 +1,10 @@
 //! What the plan is better than: conventional mapping with its waits, and the same points along speed lines.
 
 use crate::forecast::{forecast, hold};
+use crate::method::ForecastRow;
 use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest, VisitOrder};
 use mapper_core::{OperatingPoint, Plan};
-use mapper_physics::compression::isentropic_rise_ratio;
 use mapper_physics::model::{Outputs, State};
 use mapper_physics::steady::SteadyState;
 
@@ -35,7 +35,7 @@ pub struct Comparison {
     /// The plan.
     pub proposed: WayOfMapping,
     /// Along speed lines, at each point until T2 and the housing drift by less than [`STABLE_DRIFT_K_MIN`], efficiency
-    /// from the temperature rise. Its error is that of heat transfer alone, without noise.
+    /// from the temperature rise. Its error is that of heat transfer and of declared offsets.
     pub conventional: WayOfMapping,
     /// Along speed lines, with the plan's method and dwell.
     pub along_speed_lines: WayOfMapping,
@@ -122,10 +122,21 @@ fn conventional(
             }
         }
         seconds += waited_s;
-        errors.push(outputs.map(|outputs| {
-            let t1_k = target.boundary.t1_k;
-            let rise = isentropic_rise_ratio(outputs.pressure_ratio, t1_k);
-            (t1_k * rise / (outputs.t2_probe_k - t1_k) - outputs.efficiency).abs()
+        errors.push(outputs.zip(request.method).and_then(|(outputs, method)| {
+            let row = ForecastRow {
+                t_s: waited_s,
+                speed_rpm: state.shaft_speed_rpm(),
+                flow_kg_s: outputs.flow_kg_s,
+                t1_k: target.boundary.t1_k,
+                p1_pa: target.boundary.p1_pa,
+                p2_pa: state.p2_pa,
+                t2_k: outputs.t2_probe_k,
+                tc_k: state.tc_k,
+                efficiency: outputs.efficiency,
+                h_w_m2k: outputs.h_w_m2k,
+            };
+            let (eta, sigma) = method.predict_settled(&row)?;
+            error(Some(sigma), Some(eta - outputs.efficiency))
         }));
     }
     Ok(way(order.to_vec(), seconds, errors.into_iter()))

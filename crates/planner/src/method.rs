@@ -44,4 +44,7 @@ pub struct MethodResult {
 pub trait PredictedMethod: std::fmt::Debug + Sync {
     /// What it makes of the rows of a window, which lie `interval_s` apart; `None` where it finds nothing.
     fn predict(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult>;
+
+    /// What conventional mapping makes of a settled point: apparent efficiency and its standard error, fractions.
+    fn predict_settled(&self, row: &ForecastRow) -> Option<(f64, f64)>;
 }

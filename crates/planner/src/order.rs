@@ -12,7 +12,7 @@ use mapper_core::OperatingPoint;
 use mapper_physics::model::State;
 
 /// Softness of the smallest gradient in two rounds of the search, K: first the lowest ones together, then the lowest.
-const SOFTNESS_K: [f64; 2] = [2.0, 0.5];
+const SOFTNESS_K: [f64; 2] = [4.0, 1.0];
 /// An order is called the best when none is better by more than this.
 pub(crate) const PROOF_TOLERANCE_RATIO: f64 = 1e-3;
 /// Partial orders that a proof may look at: a fraction of a second.
@@ -39,7 +39,8 @@ pub(crate) fn objective(order: VisitOrder) -> Objective {
 pub(crate) fn order_on(housing: &Housing, given: &[usize], request: &PlanRequest<'_>) -> Ordered {
     let effort = Effort::usual(given.len(), request.effort);
     let settled = |from: usize| housing.settled(from);
-    let search = |given: &[usize], objective| search(housing, given, objective, effort, request.seed);
+    let within = |effort, given: &[usize], objective| search(housing, given, objective, effort, request.seed);
+    let search = |given: &[usize], objective| within(effort, given, objective);
     let (order, figure) = match request.order {
         VisitOrder::Listed => return Ordered { order: given.to_vec(), proven: false },
         VisitOrder::GreedyGradient => {
@@ -56,8 +57,10 @@ pub(crate) fn order_on(housing: &Housing, given: &[usize], request: &PlanRequest
             (search(&start, Objective::Sum), Figure::Sum)
         }
         VisitOrder::WorstGradient => {
-            let wide = search(given, Objective::Worst { softness_k: SOFTNESS_K[0] });
-            (search(&wide, Objective::Worst { softness_k: SOFTNESS_K[1] }), Figure::Worst)
+            let order = SOFTNESS_K.iter().fold(given.to_vec(), |order, &softness_k| {
+                within(effort.halved(), &order, Objective::Worst { softness_k })
+            });
+            (order, Figure::Worst)
         }
         VisitOrder::Information | VisitOrder::Time => {
             return Ordered { order: search(given, Objective::Information), proven: false };

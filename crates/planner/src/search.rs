@@ -21,13 +21,19 @@ pub struct Effort {
 }
 
 impl Effort {
+    /// The same with half the moves, for a search in two rounds.
+    pub fn halved(self) -> Self {
+        Effort { moves: self.moves / 2, ..self }
+    }
+
     /// Tuned so that 18 points take a fraction of a second, 200 some seconds, 2000 well below a minute; `factor` scales
     /// it.
     pub fn usual(points: usize, factor: f64) -> Self {
         let (moves, starts) = match points {
-            0..=40 => (250_000.0, 4),
-            41..=500 => (30_000.0 * points as f64, 2),
-            _ => (15_000.0 * points as f64, 1),
+            // Few points: many short starts find more than few long ones.
+            0..=40 => (60_000.0, 16),
+            41..=500 => (20_000.0 * points as f64, 2),
+            _ => (10_000.0 * points as f64, 1),
         };
         Effort { moves: (moves * factor.clamp(0.0, 1e4)) as u64, starts }
     }
@@ -50,7 +56,7 @@ pub fn search<C: Chain>(
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     for start in 0..effort.starts.max(1) {
         let mut annealing = Annealing::new(chain, if start == 0 { &greedy } else { &best }, objective);
-        annealing.run(effort.moves, start > 0, &mut random, &mut best, &mut best_figure);
+        annealing.run(effort.moves, start % 2 == 1, &mut random, &mut best, &mut best_figure);
     }
     best
 }

@@ -88,7 +88,7 @@ fn comparison_text(comparison: &Comparison) -> String {
     }
     let _ = writeln!(
         text,
-        "Conventional: T2 and housing must drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is that of heat transfer alone."
+        "Conventional: T2 and housing must drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is that of heat transfer and of declared offsets."
     );
     text
 }

@@ -8,8 +8,8 @@ use crate::consistency::{beside, rounded};
 use crate::file::{
     BoundaryFile, CampaignFile, DisplayFile, FormatName, GeometryFile, GridFile, IdentificationFile,
     LimitsFile, MachineFile, MapFile, MethodName, NamedReference, NamedRepeats, NusseltFile, OrderName,
-    OutputsFile, PointFile, ReferenceFile, RepeatedJumpFile, RepeatsFile, ReportFile, SensorsFile, TapName,
-    TimingFile, WindowFile,
+    OutputsFile, PointFile, ReferenceFile, RepeatsFile, ReportFile, SensorsFile, TapName, TimingFile,
+    WindowFile,
 };
 use crate::tree::{Step, steps};
 use crate::units::{Dimension, Fraction, Quantity};
@@ -300,18 +300,12 @@ fn identification(file: &IdentificationFile, alpha_area_ratio: f64) -> Identific
     }
 }
 
-/// Fewest points that are worth repeats of their own accord.
-const REPEATED_POINTS: usize = 12;
-
+/// None where the file is silent, as long as assembly takes a repeat for a point of the map.
 fn repeats(file: Option<RepeatsFile>, points: &[OperatingPoint]) -> Option<Repeats> {
-    let (file, asked) = match file {
-        Some(RepeatsFile::Named(NamedRepeats::Off)) => return None,
-        Some(RepeatsFile::Jump(file)) => (file, true),
-        None => (RepeatedJumpFile::default(), false),
+    let file = match file {
+        Some(RepeatsFile::Jump(file)) => file,
+        Some(RepeatsFile::Named(NamedRepeats::Off)) | None => return None,
     };
-    if !asked && points.len() < REPEATED_POINTS {
-        return None;
-    }
     let point = |file: PointFile| OperatingPoint {
         speed_rpm: file.speed.0.inside,
         valve_opening_ratio: file.opening.0,

@@ -2,13 +2,14 @@
 
 use crate::campaign::{
     BackendChoice, Campaign, DisplayUnits, Identification, Limits, Machine, MapSource, Order, OutputFormat,
-    Outputs, Report, SensorDeclaration, SequenceSource, Stabilisation, Timing, WindowChoice,
+    Outputs, Repeats, Report, SensorDeclaration, SequenceSource, Stabilisation, Timing, WindowChoice,
 };
 use crate::consistency::{beside, rounded};
 use crate::file::{
     BoundaryFile, CampaignFile, DisplayFile, FormatName, GeometryFile, GridFile, IdentificationFile,
-    LimitsFile, MachineFile, MapFile, MethodName, NamedReference, NusseltFile, OrderName, OutputsFile,
-    ReferenceFile, ReportFile, SensorsFile, TapName, TimingFile, WindowFile,
+    LimitsFile, MachineFile, MapFile, MethodName, NamedReference, NamedRepeats, NusseltFile, OrderName,
+    OutputsFile, PointFile, ReferenceFile, RepeatsFile, ReportFile, SensorsFile, TapName, TimingFile,
+    WindowFile,
 };
 use crate::tree::{Step, steps};
 use crate::units::{Dimension, Fraction, Quantity};
@@ -52,17 +53,23 @@ pub(crate) fn build(
         boundary: boundary(&file.boundary),
         sensors: sensors(&file.sensors),
         backend: BackendChoice { name, settings },
-        points,
         timing: timing(&file.timing),
         identification: identification(
             &file.identification.unwrap_or_default(),
             machine.params.compressor.alpha_area_ratio,
         ),
         order: match file.order {
+            Some(OrderName::SumGradient) | None => Order::SumGradient,
+            Some(OrderName::WorstGradient) => Order::WorstGradient,
+            Some(OrderName::Information) => Order::Information,
+            Some(OrderName::Time) => Order::Time,
+            Some(OrderName::Greedy) => Order::Greedy,
             Some(OrderName::Listed) => Order::Listed,
-            Some(OrderName::Greedy) | None => Order::Greedy,
         },
         sequence,
+        required_sigma_eta: file.required_sigma_eta.map(|quantity| quantity.inside),
+        repeats: repeats(file.repeats, &points),
+        points,
         seed: file.seed.unwrap_or(1),
         limits: limits(&file.limits),
         reference,
@@ -302,6 +309,34 @@ fn identification(file: &IdentificationFile, alpha_area_ratio: f64) -> Identific
     }
 }
 
+/// None where the file is silent, as long as assembly takes a repeat for a point of the map.
+fn repeats(file: Option<RepeatsFile>, points: &[OperatingPoint]) -> Option<Repeats> {
+    let file = match file {
+        Some(RepeatsFile::Jump(file)) => file,
+        Some(RepeatsFile::Named(NamedRepeats::Off)) | None => return None,
+    };
+    let point = |file: PointFile| OperatingPoint {
+        speed_rpm: file.speed.0.inside,
+        valve_opening_ratio: file.opening.0,
+    };
+    let (from, to) = match file.jump {
+        Some(jump) => (point(jump.from), point(jump.to)),
+        None => usual_jump(points)?,
+    };
+    Some(Repeats { from, to, every_steps: file.every.unwrap_or(12), at_least: file.at_least.unwrap_or(2) })
+}
+
+/// From the slowest to the fastest point of the middle opening that has both.
+fn usual_jump(points: &[OperatingPoint]) -> Option<(OperatingPoint, OperatingPoint)> {
+    let mut openings: Vec<f64> = points.iter().map(|point| point.valve_opening_ratio).collect();
+    openings.sort_by(f64::total_cmp);
+    let middle = *openings.get(openings.len() / 2)?;
+    let at_middle = || points.iter().filter(|point| point.valve_opening_ratio == middle);
+    let by_speed = |a: &&OperatingPoint, b: &&OperatingPoint| a.speed_rpm.total_cmp(&b.speed_rpm);
+    let (from, to) = (at_middle().min_by(by_speed)?, at_middle().max_by(by_speed)?);
+    (from != to).then_some((*from, *to))
+}
+
 fn limits(file: &LimitsFile) -> Limits {
     Limits {
         speed_max_rpm: file.speed.inside,
@@ -310,6 +345,8 @@ fn limits(file: &LimitsFile) -> Limits {
         t3_max_k: file.turbine_inlet_temperature.map(|limit| limit.inside),
         t2_max_k: file.compressor_outlet_temperature.map(|limit| limit.inside),
         surge_margin_min_ratio: file.surge_margin.map(|limit| limit.inside),
+        housing_gradient_max_k: file.housing_gradient.map(|limit| limit.inside),
+        p3_stroke_s: file.turbine_inlet_pressure.stroke.map(|stroke| stroke.inside),
     }
 }
 

@@ -34,6 +34,10 @@ pub struct Campaign {
     /// The script that says which step comes next, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sequence: Option<SequenceSource>,
+    /// Error of the efficiency that `order: time` has to reach, fraction.
+    pub required_sigma_eta: Option<f64>,
+    /// The jump that is repeated, if any.
+    pub repeats: Option<Repeats>,
     /// Seed of the search and of simulated rigs.
     pub seed: u64,
     /// What the run must never leave.
@@ -160,6 +164,14 @@ impl Default for Stabilisation {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Order {
+    /// Largest sum of thermal gradients.
+    SumGradient,
+    /// Largest smallest gradient.
+    WorstGradient,
+    /// Smallest predicted error of the efficiency.
+    Information,
+    /// Shortest campaign that reaches [`Campaign::required_sigma_eta`]; each dwell is chosen.
+    Time,
     /// By predicted thermal gradient from step to step.
     Greedy,
     /// As in the grid.
@@ -174,6 +186,19 @@ pub struct SequenceSource {
     pub path: std::path::PathBuf,
     /// The script.
     pub text: String,
+}
+
+/// A jump that is made again and again, so that drift shows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Repeats {
+    /// The point before the jump.
+    pub from: OperatingPoint,
+    /// The point after it.
+    pub to: OperatingPoint,
+    /// Steps between two of them at most, >= 2.
+    pub every_steps: usize,
+    /// Fewest of them, >= 1.
+    pub at_least: usize,
 }
 
 /// What the run must never leave.
@@ -191,6 +216,10 @@ pub struct Limits {
     pub t2_max_k: Option<f64>,
     /// Smallest surge margin: flow over the surge flow at equal corrected speed, minus one.
     pub surge_margin_min_ratio: Option<f64>,
+    /// Largest change of the compressor housing within a window, K.
+    pub housing_gradient_max_k: Option<f64>,
+    /// Time the rig takes from the lowest to the highest turbine inlet pressure, s.
+    pub p3_stroke_s: Option<f64>,
 }
 
 /// What is written.

@@ -23,6 +23,8 @@ pub(crate) fn check(source: &Source, root: &Node, files: Files<'_>, notes: &mut 
     let mut check = Check { source, root, notes };
     check.limits();
     check.window();
+    check.order();
+    check.repeated_jump();
     check.static_taps();
     check.calibration_dates();
     check.map_file(files);
@@ -110,6 +112,37 @@ impl<'a> Check<'a> {
                 message,
                 "end it earlier, or lengthen `timing.dwell`",
             );
+        }
+    }
+
+    fn order(&mut self) {
+        let path = steps!["order"];
+        let Some(order) = self.text(&path) else { return };
+        if order == "time" && self.root.get(&steps!["required_sigma_eta"]).is_none() {
+            let message = "the shortest campaign needs the error that it has to reach".to_owned();
+            self.note(FindingKind::MissingKey, &path, message, "add e.g. `required_sigma_eta: 1 %`");
+        }
+        let steady = self.text(&steps!["identification", "method"]) == Some("steady");
+        if steady && (order == "time" || order == "information") {
+            let message =
+                format!("`{order}` orders by what the dynamic method will find; the method is `steady`");
+            let remedy = "write `identification.method: dynamic`, or another order";
+            self.note(FindingKind::Conflict, &path, message, remedy);
+        }
+    }
+
+    fn repeated_jump(&mut self) {
+        let point = |end: &str| {
+            let (speed, _) = self.quantity(Kind::Speed, &steps!["repeats", "jump", end, "speed"])?;
+            let opening = number(self.root.get(&steps!["repeats", "jump", end, "opening"])?)?;
+            Some((speed, opening))
+        };
+        if let (Some(from), Some(to)) = (point("from"), point("to"))
+            && from == to
+        {
+            let message = "the repeated jump ends where it starts: nothing moves".to_owned();
+            let remedy = "let it lead to another speed, e.g. from the slowest to the fastest";
+            self.note(FindingKind::Conflict, &steps!["repeats", "jump", "to"], message, remedy);
         }
     }
 

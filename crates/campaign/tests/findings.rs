@@ -95,6 +95,26 @@ fn the_short_campaign_is_right() {
 }
 
 #[test]
+fn orders_and_repeats_fit_the_rest() {
+    one(
+        "campaign: short\n",
+        "campaign: short\norder: time\n",
+        Kind::MissingKey,
+        "time",
+        "the error that it has to reach",
+        "required_sigma_eta",
+    );
+    let (text, _) = with(
+        "campaign: short\n",
+        "campaign: short\nrepeats: {jump: {from: {speed: 90 krpm, opening: 0.7}, to: {speed: 90000 rpm, opening: 0.7}}}\n",
+    );
+    let findings = mistakes(&text);
+    assert!(findings.to_string().contains("ends where it starts"), "{findings}");
+    let (text, _) = with("campaign: short\n", "campaign: short\nrepeats: off\norder: worst_gradient\n");
+    assert_eq!(run(&text).unwrap_or_else(|findings| panic!("{findings}")).repeats, None);
+}
+
+#[test]
 fn keys() {
     one(
         "  inlet_pressure: 100 kPa",
@@ -238,7 +258,7 @@ fn types_and_names() {
         "campaign: short\norder: greddy\n",
         Kind::WrongValue,
         "greddy",
-        "none of greedy, listed",
+        "none of sum_gradient, worst_gradient, information, time, greedy, listed",
         "did you mean `greedy`?",
     );
     one(

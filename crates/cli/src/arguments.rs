@@ -2,7 +2,8 @@
 
 use crate::exit_code;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use mapper_core::Method;
+use mapper_campaign::units::{Kind, parse};
+use mapper_core::{Method, OperatingPoint};
 use std::path::PathBuf;
 
 /// From a campaign file to a complete turbocharger-compressor map, efficiency and heat transfer included.
@@ -52,6 +53,33 @@ pub struct PlanArguments {
     /// Also store the plan in this new file, for `mapper run --plan`
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Draw the path on the map beside the conventional one, in this new SVG file
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+    /// Also compare with conventional mapping and with the same points along speed lines
+    #[arg(long)]
+    pub compare: bool,
+    /// Say what the jump between two points gives and what forbids it, e.g. 110krpm@0.5 50krpm@0.7
+    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], value_parser = operating_point)]
+    pub why: Vec<OperatingPoint>,
+    /// Work of the search: 1 is the usual, 100 takes a hundred times as long
+    #[arg(long, value_name = "FACTOR", hide_short_help = true)]
+    pub effort: Option<f64>,
+}
+
+/// A point as `speed@opening`; the speed carries its unit.
+fn operating_point(text: &str) -> Result<OperatingPoint, String> {
+    let form = || format!("`{text}` is no point; write speed@opening, e.g. 110krpm@0.5");
+    let (speed, opening) = text.split_once('@').ok_or_else(form)?;
+    let opening: f64 = opening.trim().parse().map_err(|_| form())?;
+    let digits = speed.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(speed.len());
+    // Units are written apart from their value elsewhere; here a blank would need quotes.
+    let spaced = format!("{} {}", speed[..digits].trim(), speed[digits..].trim());
+    let speed_rpm = parse(Kind::Speed, spaced.trim()).map_err(|error| error.to_string())?;
+    if !(opening > 0.0 && opening <= 2.5 && speed_rpm > 0.0) {
+        return Err(form());
+    }
+    Ok(OperatingPoint { speed_rpm, valve_opening_ratio: opening })
 }
 
 /// `mapper run`.

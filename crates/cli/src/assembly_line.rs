@@ -2,12 +2,13 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
+use crate::predicted_method::Dynamic;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{Order, WindowChoice};
-use mapper_core::{Channel, Plan};
+use mapper_core::{Channel, Method, Plan};
 use mapper_identify::{IdentifyConfig, PressureTap, Stabilisation, WindowRule};
 use mapper_physics::model::Model;
-use mapper_planner::{PlanLimits, PlanRequest, PlanTiming, SettleBands, VisitOrder, make_plan};
+use mapper_planner::{PlanLimits, PlanRequest, PlanTiming, Repeats, SettleBands, VisitOrder, make_plan};
 use mapper_runner::{Guard, LimitGuard, SilenceGuard, SurgeGuard};
 
 /// Surge longer than this ends a run, s: a jump may touch the line, a point may not stay beyond it.
@@ -22,19 +23,36 @@ pub fn nominal_model(campaign: &Campaign) -> Result<Model, Failure> {
 
 /// The plan of a campaign.
 pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, Failure> {
+    with_plan_request(campaign, model, |request| {
+        make_plan(request).map_err(|error| Failure::new(Code::NoPlan, error))
+    })
+}
+
+/// Does something with what the plan of a campaign is made from.
+pub fn with_plan_request<T>(
+    campaign: &Campaign,
+    model: &Model,
+    then: impl FnOnce(&PlanRequest<'_>) -> Result<T, Failure>,
+) -> Result<T, Failure> {
     let canonical = serde_json::to_string(campaign).map_err(|error| Failure::new(Code::Failure, error))?;
+    let dynamic = Dynamic::of(identification(campaign));
     let (window_start_s, window_end_s) = match campaign.identification.window {
         WindowChoice::Auto => (None, None),
         WindowChoice::Fixed { start_s, end_s } => (Some(start_s), Some(end_s)),
     };
     let stabilisation = &campaign.identification.stabilisation;
-    make_plan(&PlanRequest {
+    let limits = &campaign.limits;
+    then(&PlanRequest {
         campaign_name: &campaign.name,
         campaign_canonical: &canonical,
         model,
         boundary: campaign.boundary,
         points: &campaign.points,
         order: match campaign.order {
+            Order::SumGradient => VisitOrder::SumGradient,
+            Order::WorstGradient => VisitOrder::WorstGradient,
+            Order::Information => VisitOrder::Information,
+            Order::Time => VisitOrder::Time,
             Order::Greedy => VisitOrder::GreedyGradient,
             Order::Listed => VisitOrder::Listed,
         },
@@ -51,13 +69,32 @@ pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, Failure> {
             pressure_ratio_ratio: stabilisation.pressure_ratio_ratio,
         },
         limits: PlanLimits {
-            speed_max_rpm: campaign.limits.speed_max_rpm,
-            p3_min_pa: campaign.limits.p3_min_pa,
-            p3_max_pa: campaign.limits.p3_max_pa,
+            speed_max_rpm: limits.speed_max_rpm,
+            p3_min_pa: limits.p3_min_pa,
+            p3_max_pa: limits.p3_max_pa,
+            t3_max_k: limits.t3_max_k,
+            t2_max_k: limits.t2_max_k,
+            surge_margin_min_ratio: limits.surge_margin_min_ratio,
+            surge_allowed_s: SURGE_ALLOWED_S,
+            housing_gradient_max_k: limits.housing_gradient_max_k,
+            p3_slew_max_pa_s: limits
+                .p3_stroke_s
+                .map(|stroke_s| (limits.p3_max_pa - limits.p3_min_pa) / stroke_s),
         },
+        repeats: campaign.repeats.map(|repeats| Repeats {
+            from: repeats.from,
+            to: repeats.to,
+            every_steps: repeats.every_steps,
+            at_least: repeats.at_least,
+        }),
+        required_sigma_eta: campaign.required_sigma_eta,
+        method: match campaign.identification.method {
+            Method::Dynamic => Some(&dynamic),
+            Method::Steady => None,
+        },
+        effort: 1.0,
         seed: campaign.seed,
     })
-    .map_err(|error| Failure::new(Code::NoPlan, error))
 }
 
 /// What ends a run of this campaign before harm is done.

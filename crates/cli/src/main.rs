@@ -11,6 +11,8 @@ mod failure;
 mod interrupt;
 mod observers;
 mod output;
+mod plan_picture;
+mod predicted_method;
 mod registry;
 mod results;
 mod run_directory;

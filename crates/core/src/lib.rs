@@ -33,7 +33,7 @@ pub use identified::{
 };
 pub use map::{CompressorMap, MapPoint, SpeedLine};
 pub use operating_point::OperatingPoint;
-pub use plan::{MadeFrom, Plan, PlanFigures, PlanStep, Predicted, StepKind};
+pub use plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
 pub use recording::{Recording, RecordingError, Series};
 pub use reference_state::ReferenceState;
 pub use sample::{ChannelColumn, SampleBatch, TruthColumn};

@@ -24,6 +24,13 @@ pub struct Predicted {
     pub sigma_eta: Option<f64>,
     /// Relative standard error of the heat-transfer coefficient; `None` where it was not forecast.
     pub sigma_h_rel: Option<f64>,
+    /// Error that the identification method itself makes of the efficiency, without noise (fraction, signed): its
+    /// result less the model's own mean over the window. `None` where it was not forecast.
+    #[serde(default)]
+    pub bias_eta: Option<f64>,
+    /// The same of the heat-transfer coefficient, relative.
+    #[serde(default)]
+    pub bias_h_rel: Option<f64>,
     /// Compressor mass flow at the end of the step, kg/s.
     pub flow_kg_s: f64,
     /// Pressure ratio P2/P1 at the end of the step.
@@ -82,8 +89,31 @@ pub struct PlanFigures {
     pub worst_gradient_k: Option<f64>,
     /// Largest predicted standard error of the efficiency (fraction); `None` where it was not forecast.
     pub worst_sigma_eta: Option<f64>,
+    /// Root of the mean square of predicted standard error and bias of the efficiency (fraction).
+    #[serde(default)]
+    pub rms_error_eta: Option<f64>,
+    /// Largest predicted error of the efficiency, standard error and bias in quadrature (fraction).
+    #[serde(default)]
+    pub worst_error_eta: Option<f64>,
     /// Duration of the run, warm-up and cool-down included, minutes.
     pub minutes: f64,
+}
+
+/// How good the best order can be at all, by the housing model of the search.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PlanBound {
+    /// No order has a larger sum of housing gradients, K.
+    pub sum_gradient_k: f64,
+    /// No order has a larger smallest gradient, K.
+    pub worst_gradient_k: f64,
+    /// How far the figure that was optimised lies below its bound, % of the bound; `None` where none is known for it.
+    pub gap_percent: Option<f64>,
+    /// Whether the order was shown to be the best within `proof_tolerance_percent`, by branch and bound.
+    pub proven: bool,
+    /// Tolerance of the proof, %; `None` without one.
+    pub proof_tolerance_percent: Option<f64>,
+    /// Largest deviation of the search's housing model from the full simulation along this plan, K of gradient.
+    pub model_error_k: f64,
 }
 
 /// An ordered, checked list of steps with what is expected of them.
@@ -105,6 +135,12 @@ pub struct Plan {
     pub steps: Vec<PlanStep>,
     /// The plan in four numbers.
     pub figures: PlanFigures,
+    /// How good the best order can be; `None` where the order was not searched for.
+    #[serde(default)]
+    pub bound: Option<PlanBound>,
+    /// What whoever runs the plan should know.
+    #[serde(default)]
+    pub remarks: Vec<String>,
 }
 
 impl Plan {

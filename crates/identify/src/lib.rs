@@ -12,6 +12,7 @@ mod covariance;
 mod dynamic;
 mod end_state;
 mod error;
+mod expected;
 mod findings;
 mod fit;
 mod flow_drift;
@@ -27,5 +28,6 @@ pub use config::{
     DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Stabilisation, Thresholds, WindowRule,
 };
 pub use error::{IdentifyError, StepError};
+pub use expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use findings::code;
 pub use identify::{identify, identify_each};

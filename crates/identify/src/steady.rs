@@ -12,16 +12,16 @@ use mapper_physics::compression::isentropic_rise_ratio;
 
 /// Means over the end of a step.
 #[derive(Debug, Clone, Copy)]
-struct Means {
-    t1_k: f64,
-    t2_k: f64,
-    p1_pa: f64,
-    p2_pa: f64,
+pub(crate) struct Means {
+    pub(crate) t1_k: f64,
+    pub(crate) t2_k: f64,
+    pub(crate) p1_pa: f64,
+    pub(crate) p2_pa: f64,
 }
 
 impl Means {
     /// `T1 (PR^kappa - 1)/(T2 - T1)` with `kappa = R/cp(T1)`.
-    fn apparent_eta(&self) -> f64 {
+    pub(crate) fn apparent_eta(&self) -> f64 {
         self.t1_k * isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k) / (self.t2_k - self.t1_k)
     }
 
@@ -115,7 +115,7 @@ pub(crate) fn estimate(
 
 /// Noise from the scatter of the samples' own efficiencies (or the declared noise where that is more), offsets and
 /// gains one sensor at a time.
-fn uncertainty(means: &Means, samples: &Samples, config: &IdentifyConfig) -> EstimateUncertainty {
+pub(crate) fn uncertainty(means: &Means, samples: &Samples, config: &IdentifyConfig) -> EstimateUncertainty {
     let (mut bias_square, mut declared_square) = (0.0, 0.0);
     for channel in [Channel::T1, Channel::T2, Channel::P1, Channel::P2] {
         let Some(declared) = config.declared.get(&channel) else { continue };

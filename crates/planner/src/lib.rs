@@ -1,18 +1,37 @@
 //! Orders the points of a campaign and says what each step is expected to give.
 //!
-//! The housing does not settle within a dwell, so what a jump yields depends on what came before: every plan is
-//! forecast by simulating the nominal machine along it.
+//! The housing does not settle within a dwell, so what a jump yields depends on what came before: an order is judged by
+//! going through it with the housing's memory, reduced to short sums while searching (`housing`), simulated in full for
+//! the plan itself (`forecast`).
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod assignment;
+mod bound;
+pub mod chain;
+mod comparison;
+pub mod exact;
 mod fingerprint;
 mod forecast;
-mod greedy;
+mod graph;
+mod housing;
+mod method;
+mod objective;
+mod order;
 mod plan;
+mod reach;
+mod repeats;
 mod request;
+mod search;
 
+pub use comparison::{Comparison, STABLE_DRIFT_K_MIN, WayOfMapping, along_speed_lines, compare};
 pub use fingerprint::sha256_hex;
+pub use graph::{Jump, Rejection, explain_jump, jump_graph};
+pub use method::{ForecastRow, MethodResult, PredictedMethod};
+pub use objective::Objective;
+pub use order::order_points;
 pub use plan::make_plan;
 pub use request::{
-    PlanError, PlanLimits, PlanRequest, PlanTiming, SettleBands, UnreachablePoint, VisitOrder,
+    PlanError, PlanLimits, PlanRequest, PlanTiming, Repeats, SettleBands, UnreachablePoint, VisitOrder,
 };
+pub use search::{Effort, search};

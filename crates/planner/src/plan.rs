@@ -1,77 +1,164 @@
 //! From a request to a plan.
 
+use crate::bound::Optimistic;
 use crate::fingerprint::made_from;
-use crate::forecast::{forecast, hold};
-use crate::greedy;
-use crate::request::{PlanError, PlanLimits, PlanRequest, UnreachablePoint, VisitOrder};
-use mapper_core::{OperatingPoint, Plan, PlanFigures, PlanStep, StepKind};
+use crate::forecast::{Forecast, forecast, hold};
+use crate::graph::rejections;
+use crate::housing::Housing;
+use crate::order::{Ordered, PROOF_TOLERANCE_RATIO, objective, order_on};
+use crate::reach::reachable;
+use crate::repeats::{RepeatedJump, Visit, plain, with_repeats};
+use crate::request::{PlanError, PlanRequest, VisitOrder};
+use mapper_core::{OperatingPoint, Plan, PlanBound, PlanFigures, PlanStep, StepKind};
 use mapper_physics::model::State;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::steady::{self, SteadyState};
+use mapper_physics::steady::SteadyState;
 
-/// Window that ranks jumps where the campaign leaves it open, s after the jump (the paper's).
-const RANKING_WINDOW_START_S: f64 = 10.0;
+/// How often jumps that turn out not to be allowed are taken out and the rest is ordered anew.
+const ROUNDS: usize = 25;
+/// Dwells tried for the shortest campaign lie this far apart, s.
+const DWELL_STEP_S: f64 = 5.0;
+/// Shortest of them, s: the earliest window with the shortest useful length.
+const SHORTEST_DWELL_S: f64 = 40.0;
 
 /// Orders the points and forecasts every step.
 ///
 /// # Errors
-/// [`PlanError`] with all unreachable points, or the step whose forecast failed.
+/// [`PlanError`] with all unreachable points, all limits in their way, or the step whose forecast failed.
 pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
-    let targets = reachable(request)?;
-    let first = targets.first().ok_or(PlanError::NoPoints)?;
-    let mut remaining: Vec<usize> = (0..targets.len()).collect();
-    let mut steps: Vec<PlanStep> = Vec::with_capacity(targets.len());
-    let mut start_s = request.timing.warm_up_s;
-    let mut now: Option<(State, OperatingPoint)> = None;
-    while !remaining.is_empty() {
-        let next = match (&now, request.order) {
-            (Some((state, _)), VisitOrder::GreedyGradient) => {
-                let window_s = (
-                    request.timing.window_start_s.unwrap_or(RANKING_WINDOW_START_S),
-                    request.timing.window_end_s.unwrap_or(request.timing.dwell_s),
-                );
-                greedy::next_point(request.model, &targets, &remaining, state.tc_k, window_s)
-                    .unwrap_or(remaining[0])
-            }
-            _ => remaining[0],
+    if request.points.is_empty() {
+        return Err(PlanError::NoPoints);
+    }
+    let needs_method = matches!(request.order, VisitOrder::Information | VisitOrder::Time);
+    if needs_method && request.method.is_none() {
+        return Err(PlanError::NeedsMethod { order: request.order.name() });
+    }
+    if request.order == VisitOrder::Time && request.required_sigma_eta.is_none() {
+        return Err(PlanError::NeedsRequiredError);
+    }
+    let mut points = request.points.to_vec();
+    let repeated = request.repeats.map(|repeats| {
+        let mut place = |point: OperatingPoint| {
+            points.iter().position(|other| *other == point).unwrap_or_else(|| {
+                points.push(point);
+                points.len() - 1
+            })
         };
-        remaining.retain(|index| *index != next);
-        let (to, target) = (request.points[next], &targets[next]);
+        RepeatedJump {
+            from: place(repeats.from),
+            to: place(repeats.to),
+            every_steps: repeats.every_steps,
+            at_least: repeats.at_least,
+        }
+    });
+    let targets = reachable(request, &points)?;
+    // Only the search for information needs the method at every start of the reduced housing.
+    let without_method = PlanRequest { method: request.method.filter(|_| needs_method), ..request.clone() };
+    let mut housing = Housing::of(&without_method, &points, &targets, None)?;
+    let given: Vec<usize> = (0..request.points.len()).collect();
+    let mut barred: Vec<String> = Vec::new();
+    for _ in 0..ROUNDS {
+        let ordered = order_on(&housing, &given, request);
+        let visits = match repeated {
+            Some(jump) => with_repeats(&housing, &ordered.order, jump, objective(request.order)),
+            None => plain(&ordered.order),
+        };
+        let (steps, forbidden) = walk(request, &points, &targets, &visits)?;
+        if forbidden.is_empty() {
+            return Ok(finished(request, &housing, &ordered, &visits, repeated, steps));
+        }
+        let before = barred.len();
+        for Forbidden { from, to, reasons } in forbidden {
+            let text = format!("{} to {}: {reasons}", points[from], points[to]);
+            if !barred.contains(&text) {
+                barred.push(text);
+            }
+            housing.forbid(from, to);
+        }
+        let searched = !matches!(request.order, VisitOrder::Listed);
+        if barred.len() == before || !searched {
+            break;
+        }
+    }
+    Err(PlanError::NoAdmissibleOrder(barred))
+}
+
+/// A jump of a plan that is not allowed.
+struct Forbidden {
+    from: usize,
+    to: usize,
+    reasons: String,
+}
+
+/// The steps in full, and the jumps among them that are not allowed.
+fn walk(
+    request: &PlanRequest<'_>,
+    points: &[OperatingPoint],
+    targets: &[SteadyState],
+    visits: &[Visit],
+) -> Result<(Vec<PlanStep>, Vec<Forbidden>), PlanError> {
+    let mut steps: Vec<PlanStep> = Vec::with_capacity(visits.len());
+    let mut forbidden = Vec::new();
+    let mut start_s = request.timing.warm_up_s;
+    let mut now: Option<(State, usize)> = None;
+    for visit in visits {
+        let (to, target) = (points[visit.index], &targets[visit.index]);
         let fail = |source| PlanError::Forecast { to, source };
         let state = match now {
             Some((state, _)) => state,
-            None => warmed_up(request, first).map_err(fail)?,
+            None => warmed_up(request, target).map_err(fail)?,
         };
-        let (predicted, end) = forecast(request, state, &target.boundary, now.is_some()).map_err(fail)?;
+        let (dwell_s, forecast) = step(request, state, target, now.is_some()).map_err(fail)?;
+        if let Some((_, from)) = now {
+            let p3_change_pa = target.boundary.p3_pa - targets[from].boundary.p3_pa;
+            let reasons = rejections(request, &forecast, p3_change_pa, target.boundary.t3_k);
+            if !reasons.is_empty() {
+                let reasons = reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ");
+                forbidden.push(Forbidden { from, to: visit.index, reasons });
+            }
+        }
         steps.push(PlanStep {
             index: steps.len(),
-            kind: StepKind::Point,
-            from: now.map(|(_, from)| from),
+            kind: visit.kind,
+            from: now.map(|(_, from)| points[from]),
             to,
             p3_pa: target.boundary.p3_pa,
             t3_k: request.boundary.t3_k,
             oil_temperature_k: request.boundary.oil_temperature_k,
-            dwell_s: request.timing.dwell_s,
+            dwell_s,
             start_s,
-            predicted,
+            predicted: forecast.predicted,
         });
-        start_s += request.timing.dwell_s;
-        now = Some((end, to));
+        start_s += dwell_s;
+        now = Some((forecast.end, visit.index));
     }
-    let objective = match request.order {
-        VisitOrder::Listed => "listed",
-        VisitOrder::GreedyGradient => "greedy_gradient",
-    };
-    Ok(Plan {
-        campaign: request.campaign_name.to_owned(),
-        objective: objective.to_owned(),
-        seed: request.seed,
-        made_from: made_from(request),
-        warm_up_s: request.timing.warm_up_s,
-        cool_down_s: request.timing.cool_down_s,
-        figures: figures(&steps, start_s + request.timing.cool_down_s),
-        steps,
-    })
+    Ok((steps, forbidden))
+}
+
+/// A step with its dwell: the request's, or the shortest that reaches the required error.
+fn step(
+    request: &PlanRequest<'_>,
+    state: State,
+    target: &SteadyState,
+    has_jump: bool,
+) -> Result<(f64, Forecast), mapper_physics::simulate::SimulationError> {
+    let longest_s = request.timing.dwell_s;
+    let at = |dwell_s: f64| forecast(request, state, &target.boundary, dwell_s, has_jump);
+    if let (VisitOrder::Time, Some(required), true) = (request.order, request.required_sigma_eta, has_jump) {
+        let mut dwell_s = SHORTEST_DWELL_S;
+        while dwell_s < longest_s {
+            let forecast = at(dwell_s)?;
+            if error_eta(&forecast.predicted).is_some_and(|error| error <= required) {
+                return Ok((dwell_s, forecast));
+            }
+            dwell_s += DWELL_STEP_S;
+        }
+    }
+    Ok((longest_s, at(longest_s)?))
+}
+
+/// Standard error and bias of the efficiency in quadrature.
+fn error_eta(predicted: &mapper_core::Predicted) -> Option<f64> {
+    Some(predicted.sigma_eta?.hypot(predicted.bias_eta.unwrap_or(0.0)))
 }
 
 /// The first point after its warm-up, from housings at ambient temperature.
@@ -84,113 +171,126 @@ fn warmed_up(
     hold(request, cold, &first.boundary, request.timing.warm_up_s)
 }
 
-/// Steady states of all points, or all that have none.
-fn reachable(request: &PlanRequest<'_>) -> Result<Vec<SteadyState>, PlanError> {
-    let mut unreachable = Vec::new();
-    let mut targets = Vec::with_capacity(request.points.len());
-    for &point in request.points {
-        let boundary =
-            BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..request.boundary };
-        match steady::hold_speed(request.model, point.speed_rpm, &boundary) {
-            Ok(target) => match violated_limit(&request.limits, point, &target) {
-                None => targets.push(target),
-                Some(reason) => unreachable.push(UnreachablePoint { point, reason }),
-            },
-            Err(error) => unreachable.push(UnreachablePoint { point, reason: error.to_string() }),
+fn finished(
+    request: &PlanRequest<'_>,
+    housing: &Housing,
+    ordered: &Ordered,
+    visits: &[Visit],
+    repeated: Option<RepeatedJump>,
+    steps: Vec<PlanStep>,
+) -> Plan {
+    let duration_s = request.timing.warm_up_s
+        + steps.iter().map(|step| step.dwell_s).sum::<f64>()
+        + request.timing.cool_down_s;
+    let figures = figures(&steps, duration_s / 60.0);
+    let searched = !matches!(request.order, VisitOrder::Listed | VisitOrder::GreedyGradient);
+    let bound =
+        searched.then(|| bound(request, housing, ordered, visits, repeated, &steps, &figures)).flatten();
+    Plan {
+        campaign: request.campaign_name.to_owned(),
+        objective: request.order.name().to_owned(),
+        seed: request.seed,
+        made_from: made_from(request),
+        warm_up_s: request.timing.warm_up_s,
+        cool_down_s: request.timing.cool_down_s,
+        remarks: remarks(request, &steps),
+        figures,
+        bound,
+        steps,
+    }
+}
+
+fn remarks(request: &PlanRequest<'_>, steps: &[PlanStep]) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if let Some(first) = steps.first() {
+        let again = steps[1..].iter().any(|step| step.to == first.to);
+        if !again {
+            remarks.push(format!(
+                "no jump leads to the first point, {}: it has no transient to identify",
+                first.to
+            ));
         }
     }
-    if unreachable.is_empty() { Ok(targets) } else { Err(PlanError::Unreachable(unreachable)) }
+    if let (VisitOrder::Time, Some(required)) = (request.order, request.required_sigma_eta) {
+        let short: Vec<String> = steps
+            .iter()
+            .filter(|step| error_eta(&step.predicted).is_some_and(|error| error > required))
+            .map(|step| step.to.to_string())
+            .collect();
+        if !short.is_empty() {
+            remarks.push(format!(
+                "{} of the steps do not reach an error of {:.2} points of efficiency within {:.0} s: {}",
+                short.len(),
+                100.0 * required,
+                request.timing.dwell_s,
+                short.join(", ")
+            ));
+        }
+    }
+    remarks
 }
 
-fn violated_limit(limits: &PlanLimits, point: OperatingPoint, target: &SteadyState) -> Option<String> {
-    let p3_pa = target.boundary.p3_pa;
-    if point.speed_rpm > limits.speed_max_rpm {
-        return Some(format!("above the speed limit of {:.0} rpm", limits.speed_max_rpm));
+fn bound(
+    request: &PlanRequest<'_>,
+    housing: &Housing,
+    ordered: &Ordered,
+    visits: &[Visit],
+    repeated: Option<RepeatedJump>,
+    steps: &[PlanStep],
+    figures: &PlanFigures,
+) -> Option<PlanBound> {
+    // A dwell of its own for each step is another problem than the one the housing was reduced for.
+    if request.order == VisitOrder::Time {
+        return None;
     }
-    if !(limits.p3_min_pa..=limits.p3_max_pa).contains(&p3_pa) {
-        return Some(format!(
-            "needs P3 = {:.1} kPa, the limits are {:.1} to {:.1} kPa",
-            p3_pa / 1e3,
-            limits.p3_min_pa / 1e3,
-            limits.p3_max_pa / 1e3
-        ));
+    let mut nodes: Vec<usize> = ordered.order.clone();
+    let copies = visits.len() - nodes.len();
+    let place = repeated.map(|jump| {
+        nodes.iter().position(|node| *node == jump.to).unwrap_or_else(|| {
+            nodes.push(jump.to);
+            nodes.len() - 1
+        })
+    });
+    let bound = Optimistic::of(housing, &nodes)?.bound(place.map(|place| (place, copies)));
+    let order: Vec<usize> = visits.iter().map(|visit| visit.index).collect();
+    let reduced_k = crate::chain::gradients_k(housing, &order);
+    let full_k = steps.iter().skip(1).map(|step| step.predicted.dtc_k.unwrap_or(0.0).abs());
+    let (mut sum_k, mut error_k) = (0.0, 0.0f64);
+    for (full_k, reduced_k) in full_k.zip(&reduced_k) {
+        sum_k += full_k - reduced_k;
+        error_k = error_k.max((full_k - reduced_k).abs());
     }
-    None
+    // The bound is one of the reduced housing; what the full model gives more along this plan is added to it.
+    let (sum_bound_k, worst_bound_k) = (bound.sum_k + f64::max(sum_k, 0.0), bound.worst_k + error_k);
+    let below = |figure: f64, bound: f64| (bound > 0.0).then(|| 100.0 * (1.0 - figure / bound));
+    let gap_percent = match request.order {
+        VisitOrder::SumGradient => below(figures.sum_gradient_k, sum_bound_k),
+        VisitOrder::WorstGradient => figures.worst_gradient_k.and_then(|worst| below(worst, worst_bound_k)),
+        _ => None,
+    };
+    Some(PlanBound {
+        sum_gradient_k: sum_bound_k,
+        worst_gradient_k: worst_bound_k,
+        gap_percent,
+        proven: ordered.proven,
+        proof_tolerance_percent: ordered.proven.then_some(100.0 * PROOF_TOLERANCE_RATIO),
+        model_error_k: error_k,
+    })
 }
 
-fn figures(steps: &[PlanStep], duration_s: f64) -> PlanFigures {
-    let gradients = || steps.iter().filter_map(|step| step.predicted.dtc_k).map(f64::abs);
+/// The four figures, of the points alone: a repeat is there to compare, not to measure.
+fn figures(steps: &[PlanStep], minutes: f64) -> PlanFigures {
+    let points = || steps.iter().filter(|step| step.kind == StepKind::Point).map(|step| &step.predicted);
+    let gradients = || points().filter_map(|predicted| predicted.dtc_k).map(f64::abs);
+    let errors: Vec<f64> = points().filter_map(error_eta).collect();
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.max_by(f64::total_cmp);
     PlanFigures {
         sum_gradient_k: gradients().sum(),
         worst_gradient_k: gradients().min_by(f64::total_cmp),
-        worst_sigma_eta: None,
-        minutes: duration_s / 60.0,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::request::{PlanTiming, SettleBands};
-    use mapper_physics::model::Model;
-
-    fn grid() -> Vec<OperatingPoint> {
-        // Along speed lines, as conventional mapping goes.
-        [50e3, 70e3, 90e3, 110e3, 130e3, 150e3]
-            .iter()
-            .flat_map(|speed| [0.5, 0.7, 1.0].map(|valve| (*speed, valve)))
-            .map(|(speed_rpm, valve_opening_ratio)| OperatingPoint { speed_rpm, valve_opening_ratio })
-            .collect()
-    }
-
-    fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitOrder) -> PlanRequest<'a> {
-        PlanRequest {
-            campaign_name: "test",
-            campaign_canonical: "{}",
-            model,
-            boundary: BoundaryConditions::default(),
-            points,
-            order,
-            timing: PlanTiming {
-                warm_up_s: 600.0,
-                dwell_s: 120.0,
-                cool_down_s: 0.0,
-                window_start_s: Some(10.0),
-                window_end_s: Some(110.0),
-            },
-            settle_bands: SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 },
-            limits: PlanLimits { speed_max_rpm: 180e3, p3_min_pa: 110e3, p3_max_pa: 400e3 },
-            seed: 1,
-        }
-    }
-
-    /// On this grid the order along speed lines gives 129 K of housing gradient on a one-time-constant housing and a
-    /// hand-made zigzag 640 K; the greedy order must be of the zigzag's kind, and visit each point once.
-    #[test]
-    fn greedy_jumps_far_and_visits_every_point_once() {
-        let (model, points) = (Model::nominal(), grid());
-        let listed = make_plan(&request(&model, &points, VisitOrder::Listed)).unwrap();
-        let greedy = make_plan(&request(&model, &points, VisitOrder::GreedyGradient)).unwrap();
-        assert!(listed.figures.sum_gradient_k < 0.4 * greedy.figures.sum_gradient_k);
-        assert!(greedy.figures.sum_gradient_k > 500.0, "{}", greedy.figures.sum_gradient_k);
-        for point in &points {
-            assert_eq!(greedy.steps.iter().filter(|step| step.to == *point).count(), 1);
-        }
-        assert_eq!(greedy.steps[0].predicted.dtc_k, None);
-        assert_eq!(greedy.duration_s(), 600.0 + 18.0 * 120.0);
-        assert_eq!(greedy, make_plan(&request(&model, &points, VisitOrder::GreedyGradient)).unwrap());
-    }
-
-    #[test]
-    fn all_unreachable_points_are_named_at_once() {
-        let (model, points) = (Model::nominal(), grid());
-        let mut strict = request(&model, &points, VisitOrder::Listed);
-        strict.limits.p3_max_pa = 200e3;
-        let Err(PlanError::Unreachable(culprits)) = make_plan(&strict) else {
-            panic!("must not be reachable")
-        };
-        // Of the reference table: 150 krpm needs 219 to 259 kPa at all three openings, 130 krpm 201 and 217 at two.
-        assert_eq!(culprits.len(), 5);
-        assert!(culprits[2].reason.contains("218.6 kPa"), "{}", culprits[2].reason);
+        worst_sigma_eta: largest(&mut points().filter_map(|predicted| predicted.sigma_eta)),
+        rms_error_eta: (!errors.is_empty())
+            .then(|| (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()),
+        worst_error_eta: largest(&mut errors.iter().copied()),
+        minutes,
     }
 }

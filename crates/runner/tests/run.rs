@@ -28,6 +28,8 @@ fn plan() -> Plan {
             dtc_k: None,
             sigma_eta: None,
             sigma_h_rel: None,
+            bias_eta: None,
+            bias_h_rel: None,
             flow_kg_s: 0.0,
             pressure_ratio: 1.0,
             t2_k: 300.0,
@@ -52,8 +54,12 @@ fn plan() -> Plan {
             sum_gradient_k: 0.0,
             worst_gradient_k: None,
             worst_sigma_eta: None,
+            rms_error_eta: None,
+            worst_error_eta: None,
             minutes: 1.0,
         },
+        bound: None,
+        remarks: Vec::new(),
     }
 }
 
@@ -140,9 +146,15 @@ impl Backend for Watched {
 
 fn run(notebook: &mut Notebook, guards: Vec<Box<dyn Guard>>, stop: &AtomicBool) -> Result<RunEnd, RunError> {
     let (plan, mut rig) = (plan(), Watched::new());
-    let end =
-        Runner { plan: &plan, backend: &mut rig, clock: &mut UnpacedClock, guards, observer: notebook, stop }
-            .run();
+    let end = Runner {
+        steps: &mut PlanSteps::new(&plan),
+        backend: &mut rig,
+        clock: &mut UnpacedClock,
+        guards,
+        observer: notebook,
+        stop,
+    }
+    .run();
     assert!(rig.made_safe && rig.disarmed, "whatever happens, the rig ends safe and free");
     end
 }

@@ -120,6 +120,8 @@ fn predicted(bench: &Bench, samples: &[Sample], dwell_s: f64, has_jump: bool) ->
         dtc_k: gradient(|sample| sample.tc_k),
         sigma_eta: None,
         sigma_h_rel: None,
+        bias_eta: None,
+        bias_h_rel: None,
         flow_kg_s: end.map_or(0.0, |sample| sample.flow_kg_s),
         pressure_ratio: end.map_or(1.0, |sample| sample.pressure_ratio),
         t2_k: end.map_or(0.0, |sample| sample.t2_k),

@@ -1,5 +1,6 @@
-//! `identification:`, `order:`, `outputs:`, `report:` and `display:`.
+//! `identification:`, `order:`, `repeats:`, `outputs:`, `report:` and `display:`.
 
+use super::grid::PointFile;
 use crate::units::{Duration, Fraction, Kind, Pressure, Quantity, Temperature, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -73,8 +74,50 @@ pub(crate) struct StabilisationFile {
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum OrderName {
+    SumGradient,
+    WorstGradient,
+    Information,
+    Time,
     Greedy,
     Listed,
+}
+
+// Untagged: which of the two it is shows in the YAML's own form, and the schema is checked before.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(crate) enum RepeatsFile {
+    Named(NamedRepeats),
+    Jump(RepeatedJumpFile),
+}
+
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum NamedRepeats {
+    Off,
+}
+
+/// A jump that is made again and again.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RepeatedJumpFile {
+    /// The jump; from the slowest to the fastest point of the middle opening where none is given.
+    pub jump: Option<JumpFile>,
+    /// Steps between two repeats, at most; 12 where none is given.
+    #[schemars(range(min = 2, max = 20000), example = 12)]
+    pub every: Option<usize>,
+    /// Fewest repeats; 2 where none is given.
+    #[schemars(range(min = 1, max = 1000), example = 2)]
+    pub at_least: Option<usize>,
+}
+
+/// From where to where.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct JumpFile {
+    /// The point before the jump.
+    pub from: PointFile,
+    /// The point after it.
+    pub to: PointFile,
 }
 
 /// What is written, and where.

@@ -1,6 +1,6 @@
 //! `boundary:`, `timing:`, `limits:` and reference states.
 
-use crate::units::{Duration, Fraction, Pressure, Quantity, Speed, Temperature};
+use crate::units::{Duration, Fraction, Pressure, Quantity, Speed, Temperature, TemperatureDifference};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -61,6 +61,9 @@ pub(crate) struct LimitsFile {
     /// Smallest surge margin: flow over the surge flow at equal corrected speed, minus one.
     #[schemars(extend("x-min" = "-50 %", "x-max" = "200 %"), example = &"2 %")]
     pub surge_margin: Option<Quantity<Fraction>>,
+    /// Largest change of the compressor housing within an identification window.
+    #[schemars(extend("x-above" = "0 K", "x-max" = "500 K"), example = &"30 K")]
+    pub housing_gradient: Option<Quantity<TemperatureDifference>>,
 }
 
 /// Lowest and highest pressure.
@@ -73,6 +76,9 @@ pub(crate) struct PressureRangeFile {
     /// Highest pressure.
     #[schemars(extend("x-above" = "0 kPa", "x-max" = "2 MPa"), example = &"400 kPa")]
     pub max: Quantity<Pressure>,
+    /// Time the rig takes from the lowest to the highest pressure; where none is given it plays no part in the plan.
+    #[schemars(extend("x-above" = "0 s", "x-max" = "24 h"), example = &"10 s")]
+    pub stroke: Option<Quantity<Duration>>,
 }
 
 // Untagged: which of the two it is shows in the YAML's own form, and the schema is checked before.

@@ -10,13 +10,15 @@ mod machine;
 mod sensors;
 
 pub(crate) use choices::{
-    DisplayFile, FormatName, IdentificationFile, MethodName, OrderName, OutputsFile, ReportFile, WindowFile,
+    DisplayFile, FormatName, IdentificationFile, MethodName, NamedRepeats, OrderName, OutputsFile,
+    RepeatsFile, ReportFile, WindowFile,
 };
 pub(crate) use conditions::{BoundaryFile, LimitsFile, NamedReference, ReferenceFile, TimingFile};
-pub(crate) use grid::GridFile;
+pub(crate) use grid::{GridFile, PointFile};
 pub(crate) use machine::{GeometryFile, MachineFile, MapFile, NusseltFile};
 pub(crate) use sensors::{CALIBRATED, SensorsFile, TapName};
 
+use crate::units::{Fraction, Quantity};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -46,11 +48,17 @@ pub(crate) struct CampaignFile {
     pub timing: TimingFile,
     /// How efficiency and heat-transfer coefficient are found.
     pub identification: Option<IdentificationFile>,
-    /// Order of the points: `greedy` seeks large thermal gradients from step to step, `listed` keeps the order of the grid.
+    /// Order of the points. `sum_gradient`, the default, makes the thermal gradients large in all, `worst_gradient` the smallest of them; `information` makes the predicted error of the efficiency small; `time` makes the campaign short and chooses each dwell; `greedy` looks one step ahead; `listed` keeps the order of the grid.
     pub order: Option<OrderName>,
     /// A rhai script that says which step comes next, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/sequences.md says what it may call.
     #[schemars(regex(pattern = r"\.rhai$"), example = &"scripts/zigzag.rhai")]
     pub sequence: Option<String>,
+    /// Error of the efficiency (standard error and bias of the method, one standard deviation) that `order: time` has to reach at each point.
+    #[schemars(extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.5 %")]
+    pub required_sigma_eta: Option<Quantity<Fraction>>,
+    /// A jump that is repeated, so that drift shows; `off`, the default, for none.
+    #[schemars(example = &"off")]
+    pub repeats: Option<RepeatsFile>,
     /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.
     #[schemars(example = 1)]
     pub seed: Option<u64>,

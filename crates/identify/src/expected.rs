@@ -1,0 +1,87 @@
+//! What the dynamic method will make of a step that was only forecast: for planning, before anything is measured.
+
+use crate::IdentifyConfig;
+use crate::bias::declared_effect;
+use crate::covariance::{Correlation, NoiseVariances};
+use crate::fit::{Geometry, fit};
+use crate::samples::Samples;
+use crate::steady::{Means, uncertainty};
+use mapper_physics::compression::isentropic_rise_ratio;
+
+/// Interval of the samples whose noise a campaign declares, s.
+const DECLARED_INTERVAL_S: f64 = 0.1;
+
+/// One instant of a forecast, total values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExpectedRow {
+    /// Time, s, rising.
+    pub t_s: f64,
+    /// Inlet temperature, K.
+    pub t1_k: f64,
+    /// Reading of the outlet probe, K.
+    pub t2_k: f64,
+    /// Housing temperature, K.
+    pub tc_k: f64,
+    /// Inlet pressure, Pa.
+    pub p1_pa: f64,
+    /// Outlet pressure, Pa.
+    pub p2_pa: f64,
+    /// Flow, kg/s.
+    pub flow_kg_s: f64,
+}
+
+/// What the dynamic method makes of a forecast window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Expected {
+    /// Efficiency it will find without noise, fraction.
+    pub eta: f64,
+    /// Standard error of it from declared noise, fixed offsets and gains, fraction.
+    pub sigma_eta: f64,
+    /// Heat-transfer coefficient it will find without noise, W/(m2 K).
+    pub h_w_m2k: f64,
+    /// Standard error of it, W/(m2 K).
+    pub sigma_h_w_m2k: f64,
+}
+
+/// Fits noise-free rows as a recording is fitted, and says what the declared uncertainties will do to the result.
+///
+/// `interval_s` is that of the rows. Rows sparser than a recording's 10 Hz stand for the means of its samples: the white
+/// part of the noise averages out among them, the first-order part does not. `None` where the fit comes to no end.
+pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) -> Option<Expected> {
+    let column = |value: fn(&ExpectedRow) -> f64| rows.iter().map(value).collect::<Vec<f64>>();
+    let samples = Samples {
+        t_s: column(|row| row.t_s),
+        t1_k: column(|row| row.t1_k),
+        t2_k: column(|row| row.t2_k),
+        tc_k: column(|row| row.tc_k),
+        p1_pa: column(|row| row.p1_pa),
+        p2_pa: column(|row| row.p2_pa),
+        flow_kg_s: column(|row| row.flow_kg_s),
+        rise_ratio: column(|row| isentropic_rise_ratio(row.p2_pa / row.p1_pa, row.t1_k)),
+        lost: 0,
+    };
+    let geometry =
+        Geometry { alpha_area_ratio: config.alpha_area_ratio, internal_area_m2: config.internal_area_m2 };
+    let fit = fit(&samples, geometry)?;
+    let declared = declared_effect(&fit, &samples, geometry, config);
+    let mut noise = NoiseVariances::split(declared.noise_k2, config.noise_colour);
+    noise.white_k2 *= (DECLARED_INTERVAL_S / interval_s).min(1.0);
+    let [eta, h] = Correlation::of(&fit, &samples.t_s, config.noise_colour).standard_errors_for(noise);
+    let [offset_eta, offset_h] = declared.bias_standard_errors;
+    let found = Expected {
+        eta: fit.eta,
+        sigma_eta: eta.hypot(offset_eta),
+        h_w_m2k: fit.h_w_m2k,
+        sigma_h_w_m2k: h.hypot(offset_h),
+    };
+    (found.eta.is_finite() && found.sigma_eta.is_finite() && found.sigma_h_w_m2k.is_finite()).then_some(found)
+}
+
+/// Apparent efficiency of a settled point (conventional mapping), and its standard error from declared offsets and gains,
+/// fractions. `None` where the temperature rise gives no efficiency.
+pub fn expected_steady(row: &ExpectedRow, config: &IdentifyConfig) -> Option<(f64, f64)> {
+    let means = Means { t1_k: row.t1_k, t2_k: row.t2_k, p1_pa: row.p1_pa, p2_pa: row.p2_pa };
+    let eta = means.apparent_eta();
+    let sigma = uncertainty(&means, &Samples::default(), config).bias_standard_error;
+    (eta.is_finite() && eta > 0.0 && sigma.is_finite()).then_some((eta, sigma))
+}

@@ -1,0 +1,143 @@
+//! The assignment problem: each row one column, largest total weight. The method of successive shortest paths (Kuhn,
+//! Munkres; in the form of Jonker and Volgenant, Computing 38:325, 1987), O(n^3) at worst and far less as a rule.
+
+/// Largest total weight of a complete assignment of rows to columns; `weight(row, column)` is finite.
+pub fn largest_assignment(n: usize, weight: impl Fn(usize, usize) -> f64) -> f64 {
+    // Potentials of rows and columns, and the row of each column; index 0 stands for none.
+    let (mut u, mut v) = (vec![0.0; n + 1], vec![0.0; n + 1]);
+    let (mut row_of, mut way) = (vec![0usize; n + 1], vec![0usize; n + 1]);
+    for row in 1..=n {
+        row_of[0] = row;
+        let mut column = 0;
+        let mut least = vec![f64::INFINITY; n + 1];
+        let mut used = vec![false; n + 1];
+        loop {
+            used[column] = true;
+            let (current, mut delta, mut next) = (row_of[column], f64::INFINITY, 0);
+            for j in 1..=n {
+                if used[j] {
+                    continue;
+                }
+                let reduced = -weight(current - 1, j - 1) - u[current] - v[j];
+                if reduced < least[j] {
+                    (least[j], way[j]) = (reduced, column);
+                }
+                if least[j] < delta {
+                    (delta, next) = (least[j], j);
+                }
+            }
+            for j in 0..=n {
+                if used[j] {
+                    u[row_of[j]] += delta;
+                    v[j] -= delta;
+                } else {
+                    least[j] -= delta;
+                }
+            }
+            column = next;
+            if row_of[column] == 0 {
+                break;
+            }
+        }
+        while column != 0 {
+            let before = way[column];
+            row_of[column] = row_of[before];
+            column = before;
+        }
+    }
+    (1..=n).map(|j| weight(row_of[j] - 1, j - 1)).sum()
+}
+
+/// Largest threshold at which all rows but one still find columns of their own with at least that weight.
+pub fn bottleneck(rows: usize, columns: usize, weight: impl Fn(usize, usize) -> f64) -> f64 {
+    let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
+    let mut thresholds: Vec<f64> = places.map(|(i, j)| weight(i, j)).collect();
+    thresholds.retain(|w| w.is_finite());
+    thresholds.sort_by(f64::total_cmp);
+    thresholds.dedup();
+    let enough = |threshold: f64| {
+        let mut row_of = vec![None; columns];
+        let missing = (0..rows)
+            .filter(|&row| {
+                let mut seen = vec![false; columns];
+                !augment(row, &|i, j| weight(i, j) >= threshold, &mut seen, &mut row_of)
+            })
+            .take(2)
+            .count();
+        missing < 2
+    };
+    let (mut low, mut high) = (0, thresholds.len());
+    // Invariant: the threshold at `low` is met (or low is 0), that at `high` is not.
+    while high - low > 1 {
+        let middle = (low + high) / 2;
+        if enough(thresholds[middle]) { low = middle } else { high = middle }
+    }
+    thresholds.get(low).copied().unwrap_or(f64::INFINITY)
+}
+
+fn augment(
+    row: usize,
+    edge: &impl Fn(usize, usize) -> bool,
+    seen: &mut [bool],
+    row_of: &mut [Option<usize>],
+) -> bool {
+    for column in 0..seen.len() {
+        if seen[column] || !edge(row, column) {
+            continue;
+        }
+        seen[column] = true;
+        let free = match row_of[column] {
+            None => true,
+            Some(other) => augment(other, edge, seen, row_of),
+        };
+        if free {
+            row_of[column] = Some(row);
+            return true;
+        }
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn permutations(n: usize) -> Vec<Vec<usize>> {
+        if n == 0 {
+            return vec![Vec::new()];
+        }
+        permutations(n - 1)
+            .into_iter()
+            .flat_map(|shorter| {
+                (0..n).map(move |place| {
+                    let mut longer = shorter.clone();
+                    longer.insert(place, n - 1);
+                    longer
+                })
+            })
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn agrees_with_all_permutations(weights in prop::collection::vec(-10.0..10.0f64, 36), n in 1usize..=6) {
+            let weight = |i: usize, j: usize| weights[6 * i + j];
+            let all = permutations(n);
+            let total = |p: &Vec<usize>| p.iter().enumerate().map(|(i, j)| weight(i, *j)).sum::<f64>();
+            let best = all.iter().map(total).fold(f64::NEG_INFINITY, f64::max);
+            // Sums of at most six numbers below 10.
+            prop_assert!((largest_assignment(n, weight) - best).abs() < 1e-12);
+            // All rows but the worst one.
+            let second = |p: &Vec<usize>| {
+                let mut row: Vec<f64> = p.iter().enumerate().map(|(i, j)| weight(i, *j)).collect();
+                row.sort_by(f64::total_cmp);
+                row.get(1).copied().unwrap_or(f64::INFINITY)
+            };
+            let widest = all.iter().map(second).fold(f64::NEG_INFINITY, f64::max);
+            if n > 1 {
+                prop_assert_eq!(bottleneck(n, n, weight), widest);
+            }
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! An order as a chain of steps, each judged by the state the one before has left.
+
+/// A machine with memory, reduced to what ordering needs.
+pub trait Chain {
+    /// What a step leaves to the next.
+    type State: Copy;
+
+    /// Number of points.
+    fn len(&self) -> usize;
+
+    /// Whether there is no point.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The first step: its gradient, K, where a jump leads to it, and what it leaves.
+    fn first(&self, to: usize) -> (Option<f64>, Self::State);
+
+    /// The step `from` -> `to` from `state`: gradient of the housing within the window, K (signed), and what it leaves.
+    fn step(&self, from: usize, to: usize, state: Self::State) -> (f64, Self::State);
+
+    /// Whether two states are so close that what follows no longer tells them apart.
+    fn alike(&self, a: Self::State, b: Self::State) -> bool;
+
+    /// Whether the jump is allowed.
+    fn admissible(&self, _from: usize, _to: usize) -> bool {
+        true
+    }
+
+    /// Expected mean square error of the efficiency at `to` after a gradient.
+    fn mean_square_error(&self, _to: usize, _gradient_k: f64) -> f64 {
+        0.0
+    }
+
+    /// Largest allowed gradient, K.
+    fn gradient_max_k(&self) -> f64 {
+        f64::INFINITY
+    }
+}
+
+/// The gradients of an order, K (absolute values), one for each step that has a jump.
+pub fn gradients_k<C: Chain>(chain: &C, order: &[usize]) -> Vec<f64> {
+    let mut gradients = Vec::with_capacity(order.len());
+    let Some(&first) = order.first() else { return gradients };
+    let (gradient_k, mut state) = chain.first(first);
+    gradients.extend(gradient_k.map(f64::abs));
+    for pair in order.windows(2) {
+        let (gradient_k, next) = chain.step(pair[0], pair[1], state);
+        gradients.push(gradient_k.abs());
+        state = next;
+    }
+    gradients
+}

@@ -1,0 +1,247 @@
+//! Exact orders: dynamic programming for fixed weights, branch and bound under thermal memory.
+
+use crate::bound::Optimistic;
+use crate::chain::Chain;
+
+/// Most points of [`best_path`]: its table has `n 2^n` entries.
+pub const HELD_KARP_POINTS: usize = 14;
+
+/// The path through all points with the largest sum of fixed weights (Held and Karp, J. SIAM 10:196, 1962), any start.
+///
+/// `None` above [`HELD_KARP_POINTS`], for no points, and where every path has a jump of weight minus infinity.
+pub fn best_path(n: usize, weight: impl Fn(usize, usize) -> f64) -> Option<(f64, Vec<usize>)> {
+    if n == 0 || n > HELD_KARP_POINTS {
+        return None;
+    }
+    let sets = 1usize << n;
+    let mut best = vec![f64::NEG_INFINITY; sets * n];
+    let mut before = vec![usize::MAX; sets * n];
+    for last in 0..n {
+        best[(1 << last) * n + last] = 0.0;
+    }
+    for set in 1..sets {
+        for last in (0..n).filter(|last| set >> last & 1 == 1) {
+            let so_far = best[set * n + last];
+            if so_far == f64::NEG_INFINITY {
+                continue;
+            }
+            for next in (0..n).filter(|next| set >> next & 1 == 0) {
+                let (place, sum) = ((set | 1 << next) * n + next, so_far + weight(last, next));
+                if sum > best[place] {
+                    (best[place], before[place]) = (sum, last);
+                }
+            }
+        }
+    }
+    let mut set = sets - 1;
+    let mut last = (0..n).max_by(|a, b| best[set * n + a].total_cmp(&best[set * n + b]))?;
+    let sum = best[set * n + last];
+    if sum == f64::NEG_INFINITY {
+        return None;
+    }
+    let mut path = vec![last];
+    while before[set * n + last] != usize::MAX {
+        let previous = before[set * n + last];
+        (set, last) = (set & !(1 << last), previous);
+        path.push(last);
+    }
+    path.reverse();
+    Some((sum, path))
+}
+
+/// Outcome of a branch and bound.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Proof {
+    /// The best order that was found; at least the given one.
+    pub(crate) order: Vec<usize>,
+    /// Whether no order is better by more than the tolerance.
+    pub(crate) proven: bool,
+}
+
+/// Which figure is proven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Figure {
+    Sum,
+    Worst,
+}
+
+/// Improves `given` or proves that no order of its points beats it by more than `tolerance_ratio`, within `nodes` partial
+/// orders.
+pub(crate) fn branch_and_bound<C: Chain>(
+    chain: &C,
+    given: &[usize],
+    optimistic: &Optimistic,
+    figure: Figure,
+    tolerance_ratio: f64,
+    nodes: u64,
+) -> Proof {
+    let n = given.len();
+    // The most that any jump to a point can give.
+    let best_into: Vec<f64> = (0..n)
+        .map(|j| (0..n).filter(|i| *i != j).map(|i| optimistic.weight_k(i, j)).fold(0.0, f64::max))
+        .collect();
+    let mut walk = Walk {
+        chain,
+        points: given,
+        optimistic,
+        best_into,
+        figure,
+        keep_ratio: 1.0 + tolerance_ratio,
+        left: nodes,
+        best: value_of(chain, given, figure),
+        best_order: given.to_vec(),
+        path: Vec::with_capacity(n),
+        used: vec![false; n],
+    };
+    for (first, &point) in given.iter().enumerate() {
+        let (gradient_k, state) = chain.first(point);
+        let so_far = match figure {
+            Figure::Sum => gradient_k.map_or(0.0, f64::abs),
+            Figure::Worst => gradient_k.map_or(f64::INFINITY, f64::abs),
+        };
+        walk.enter(first, state, so_far);
+    }
+    Proof { proven: walk.left > 0, order: walk.best_order }
+}
+
+fn value_of<C: Chain>(chain: &C, order: &[usize], figure: Figure) -> f64 {
+    let gradients = crate::chain::gradients_k(chain, order);
+    let barred = order.windows(2).any(|pair| !chain.admissible(pair[0], pair[1]))
+        || gradients.iter().any(|gradient_k| *gradient_k > chain.gradient_max_k());
+    match figure {
+        _ if barred => f64::NEG_INFINITY,
+        Figure::Sum => gradients.iter().sum(),
+        Figure::Worst => gradients.iter().copied().fold(f64::INFINITY, f64::min),
+    }
+}
+
+struct Walk<'a, C: Chain> {
+    chain: &'a C,
+    points: &'a [usize],
+    optimistic: &'a Optimistic,
+    best_into: Vec<f64>,
+    figure: Figure,
+    keep_ratio: f64,
+    left: u64,
+    best: f64,
+    best_order: Vec<usize>,
+    path: Vec<usize>,
+    used: Vec<bool>,
+}
+
+impl<C: Chain> Walk<'_, C> {
+    fn enter(&mut self, place: usize, state: C::State, so_far: f64) {
+        if self.left == 0 {
+            return;
+        }
+        self.left -= 1;
+        self.path.push(place);
+        self.used[place] = true;
+        if self.path.len() == self.points.len() {
+            if so_far > self.best {
+                self.best = so_far;
+                self.best_order = self.path.iter().map(|place| self.points[*place]).collect();
+            }
+        } else if self.possible(place, so_far) > self.best * self.keep_ratio {
+            let from = self.points[place];
+            let mut next: Vec<(f64, usize, C::State)> = (0..self.points.len())
+                .filter(|next| !self.used[*next] && self.chain.admissible(from, self.points[*next]))
+                .map(|next| {
+                    let (gradient_k, state) = self.chain.step(from, self.points[next], state);
+                    (gradient_k.abs(), next, state)
+                })
+                .filter(|(gradient_k, ..)| *gradient_k <= self.chain.gradient_max_k())
+                .collect();
+            next.sort_by(|a, b| b.0.total_cmp(&a.0));
+            for (gradient_k, next, state) in next {
+                let so_far = match self.figure {
+                    Figure::Sum => so_far + gradient_k,
+                    Figure::Worst => so_far.min(gradient_k),
+                };
+                self.enter(next, state, so_far);
+            }
+        }
+        self.used[place] = false;
+        self.path.pop();
+    }
+
+    /// What this partial order can come to at most.
+    fn possible(&self, last: usize, so_far: f64) -> f64 {
+        let remaining = || (0..self.points.len()).filter(|place| !self.used[*place]);
+        let into = |to: usize| {
+            let inner = remaining().filter(|from| *from != to).map(|from| self.optimistic.weight_k(from, to));
+            inner.fold(self.optimistic.weight_k(last, to), f64::max)
+        };
+        match self.figure {
+            // The tighter of two: what each point can be reached with from what is left, or from anywhere.
+            Figure::Sum => so_far + remaining().map(|to| into(to).min(self.best_into[to])).sum::<f64>(),
+            Figure::Worst => remaining().map(into).fold(so_far, f64::min),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::objective::Objective;
+    use crate::search::{Effort, search};
+    use proptest::prelude::*;
+
+    /// Fixed weights: a machine without memory.
+    struct Fixed(Vec<f64>, usize);
+
+    impl Chain for Fixed {
+        type State = ();
+        fn len(&self) -> usize {
+            self.1
+        }
+        fn first(&self, _: usize) -> (Option<f64>, ()) {
+            (None, ())
+        }
+        fn step(&self, from: usize, to: usize, (): ()) -> (f64, ()) {
+            (self.0[from * self.1 + to], ())
+        }
+        fn alike(&self, (): (), (): ()) -> bool {
+            true
+        }
+    }
+
+    fn best_of_all(chain: &Fixed, path: &mut Vec<usize>) -> f64 {
+        if path.len() == chain.1 {
+            return crate::chain::gradients_k(chain, path).iter().sum();
+        }
+        let mut best = f64::NEG_INFINITY;
+        for next in 0..chain.1 {
+            if !path.contains(&next) {
+                path.push(next);
+                best = best.max(best_of_all(chain, path));
+                path.pop();
+            }
+        }
+        best
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn brute_force_agrees(weights in prop::collection::vec(0.0..30.0f64, 49), n in 2usize..=7) {
+            let chain = Fixed(weights[..n * n].to_vec(), n);
+            let best = best_of_all(&chain, &mut Vec::new());
+            let (sum, path) = best_path(n, |i, j| chain.step(i, j, ()).0).unwrap();
+            // Sums of at most six numbers, in another order.
+            prop_assert!((sum - best).abs() < 1e-9);
+            prop_assert!((crate::chain::gradients_k(&chain, &path).iter().sum::<f64>() - best).abs() < 1e-9);
+            // So small that the search has no excuse.
+            let given: Vec<usize> = (0..n).collect();
+            let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7);
+            prop_assert!((Objective::Sum.figure(&chain, &found) - best).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn too_many_points_are_refused() {
+        assert_eq!(best_path(HELD_KARP_POINTS + 1, |_, _| 1.0), None);
+        assert_eq!(best_path(0, |_, _| 1.0), None);
+        assert_eq!(best_path(1, |_, _| 1.0), Some((0.0, vec![0])));
+    }
+}

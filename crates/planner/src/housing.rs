@@ -1,0 +1,308 @@
+//! The housing reduced to what ordering needs: what each point does to the two housing temperatures within a dwell.
+//!
+//! From point to point the temperatures (Tc, Tt) and the speed the shaft comes from answer almost linearly. Six
+//! simulations of the full model per point, from states spread over what a campaign reaches, fix
+//! `1, c, t, w, c^2` (c, t, w: Tc, Tt and the from-speed scaled to -1..1) for the gradient in the window and for both
+//! temperatures at the step's end. A step of the search is then three short sums. How far that is from the full
+//! simulation is measured on every plan and printed with it.
+
+use crate::chain::Chain;
+use crate::forecast::{forecast, hold};
+use crate::request::{PlanError, PlanRequest};
+use mapper_core::OperatingPoint;
+use mapper_physics::model::State;
+use mapper_physics::steady::SteadyState;
+use std::collections::HashSet;
+
+/// States that differ by less, K, lead to gradients that differ by less than any sensor sees.
+const ALIKE_K: f64 = 0.01;
+
+/// Scaled (c, t, w) of three of the six starts; the other three are their mirror images.
+const DESIGN: [[f64; 3]; 3] = [[-1.0, -1.0, -1.0], [0.2, -0.6, -1.0], [0.6, 0.0, 1.0]];
+
+/// `k[0] + k[1] c + k[2] t + k[3] w + k[4] c^2`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Surface(pub(crate) [f64; 5]);
+
+impl Surface {
+    #[inline]
+    fn at(&self, c: f64, t: f64, w: f64) -> f64 {
+        let k = &self.0;
+        k[0] + (k[1] + k[4] * c) * c + k[2] * t + k[3] * w
+    }
+
+    /// Through values at the design's starts and their mirror images: the odd part is exact, the even part a line in c^2
+    /// by least squares.
+    fn through(values: [[f64; 2]; 3]) -> Self {
+        let odd = values.map(|[a, b]| 0.5 * (a - b));
+        let even = values.map(|[a, b]| 0.5 * (a + b));
+        let [k1, k2, k3] = solve3(DESIGN, odd);
+        let squares = DESIGN.map(|[c, ..]| c * c);
+        let mean = |x: [f64; 3]| (x[0] + x[1] + x[2]) / 3.0;
+        let (mean_x, mean_y) = (mean(squares), mean(even));
+        let slope = (0..3).map(|i| (squares[i] - mean_x) * (even[i] - mean_y)).sum::<f64>()
+            / squares.iter().map(|x| (x - mean_x).powi(2)).sum::<f64>();
+        Surface([mean_y - slope * mean_x, k1, k2, k3, slope])
+    }
+
+    /// Smallest and largest value over a box of c and t at one w.
+    pub(crate) fn range(&self, c: (f64, f64), t: (f64, f64), w: f64) -> (f64, f64) {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        let bend = -self.0[1] / (2.0 * self.0[4]);
+        let inside = (bend > c.0 && bend < c.1).then_some(bend);
+        for c in [Some(c.0), Some(c.1), inside].into_iter().flatten() {
+            for t in [t.0, t.1] {
+                let value = self.at(c, t, w);
+                (low, high) = (low.min(value), high.max(value));
+            }
+        }
+        (low, high)
+    }
+}
+
+/// Cramer's rule; the design's determinant is fixed and not 0.
+fn solve3(m: [[f64; 3]; 3], y: [f64; 3]) -> [f64; 3] {
+    let det = |m: [[f64; 3]; 3]| {
+        m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+            + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
+    };
+    let whole = det(m);
+    std::array::from_fn(|column| {
+        let mut replaced = m;
+        for row in 0..3 {
+            replaced[row][column] = y[row];
+        }
+        det(replaced) / whole
+    })
+}
+
+/// What a dwell at one point does.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Response {
+    pub(crate) gradient_k: Surface,
+    /// Scaled Tc and Tt at the end.
+    pub(crate) end: [Surface; 2],
+    /// Scaled speed that the next step comes from.
+    pub(crate) speed: f64,
+    /// The steady state, scaled.
+    settled: [f64; 2],
+    /// What the first step of a campaign leaves, scaled.
+    first: [f64; 2],
+    /// Mean square error of eta times the gradient squared, over the gradient, rising.
+    error: Vec<(f64, f64)>,
+}
+
+/// The reduced machine.
+#[derive(Debug, Clone)]
+pub(crate) struct Housing {
+    pub(crate) responses: Vec<Response>,
+    /// Scaled (Tc, Tt) and scaled speed before a first step that begins with a jump.
+    start: Option<[f64; 3]>,
+    forbidden: HashSet<(usize, usize)>,
+    gradient_max_k: f64,
+    alike: [f64; 2],
+}
+
+/// Middle and half width of what is reached.
+#[derive(Debug, Clone, Copy)]
+struct Scale {
+    middle: [f64; 3],
+    half: [f64; 3],
+}
+
+impl Scale {
+    fn of(targets: &[SteadyState], also: Option<State>) -> Self {
+        let mut low = [f64::INFINITY; 3];
+        let mut high = [f64::NEG_INFINITY; 3];
+        for state in targets.iter().map(|target| target.state).chain(also) {
+            for (i, value) in [state.tc_k, state.tt_k, state.shaft_speed_rad_s].into_iter().enumerate() {
+                (low[i], high[i]) = (low[i].min(value), high[i].max(value));
+            }
+        }
+        Scale {
+            middle: [0, 1, 2].map(|i| 0.5 * (low[i] + high[i])),
+            // A grid of one point still needs a width.
+            half: [0, 1, 2].map(|i| (0.5 * (high[i] - low[i])).max(1.0)),
+        }
+    }
+
+    fn scaled(&self, state: &State) -> [f64; 3] {
+        let values = [state.tc_k, state.tt_k, state.shaft_speed_rad_s];
+        std::array::from_fn(|i| (values[i] - self.middle[i]) / self.half[i])
+    }
+}
+
+impl Housing {
+    /// Simulates the starts of all points. `start`: the machine's state, where the first step begins with a jump.
+    pub(crate) fn of(
+        request: &PlanRequest<'_>,
+        points: &[OperatingPoint],
+        targets: &[SteadyState],
+        start: Option<State>,
+    ) -> Result<Self, PlanError> {
+        let scale = Scale::of(targets, start);
+        let by_speed = |a: &&SteadyState, b: &&SteadyState| {
+            a.state.shaft_speed_rad_s.total_cmp(&b.state.shaft_speed_rad_s)
+        };
+        let slowest = targets.iter().min_by(by_speed).ok_or(PlanError::NoPoints)?;
+        let fastest = targets.iter().max_by(by_speed).ok_or(PlanError::NoPoints)?;
+        let one = |index: usize| -> Result<Response, PlanError> {
+            let (target, to) = (&targets[index], points[index]);
+            response(request, target, &scale, [slowest, fastest], start.is_none())
+                .map_err(|source| PlanError::Forecast { to, source })
+        };
+        Ok(Housing {
+            responses: in_parallel(targets.len(), &one)?,
+            start: start.map(|state| scale.scaled(&state)),
+            forbidden: HashSet::new(),
+            gradient_max_k: request.limits.housing_gradient_max_k.unwrap_or(f64::INFINITY),
+            alike: [ALIKE_K / scale.half[0], ALIKE_K / scale.half[1]],
+        })
+    }
+
+    /// Takes a jump out of the search.
+    pub(crate) fn forbid(&mut self, from: usize, to: usize) {
+        self.forbidden.insert((from, to));
+    }
+
+    /// Scaled temperatures that a long stay ends in.
+    pub(crate) fn settled(&self, at: usize) -> [f64; 2] {
+        self.responses[at].settled
+    }
+
+    /// Largest allowed gradient, K.
+    pub(crate) fn gradient_max_k(&self) -> f64 {
+        self.gradient_max_k
+    }
+
+    /// Scaled state after a first step.
+    pub(crate) fn first_state(&self, to: usize) -> [f64; 2] {
+        match self.start {
+            Some([c, t, w]) => self.responses[to].end.map(|end| end.at(c, t, w)),
+            None => self.responses[to].first,
+        }
+    }
+}
+
+/// Shares the points among the processor's cores; the result does not depend on how many there are.
+fn in_parallel<T: Send>(
+    count: usize,
+    one: &(impl Fn(usize) -> Result<T, PlanError> + Sync),
+) -> Result<Vec<T>, PlanError> {
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(8).min(count.max(1));
+    let size = count.div_ceil(threads).max(1);
+    let parts = std::thread::scope(|scope| {
+        let handles: Vec<_> = (0..threads)
+            .map(|part| {
+                let range = (part * size).min(count)..((part + 1) * size).min(count);
+                scope.spawn(move || range.map(one).collect::<Result<Vec<T>, PlanError>>())
+            })
+            .collect();
+        handles
+            .into_iter()
+            .map(|handle| match handle.join() {
+                Ok(part) => part,
+                Err(panic) => std::panic::resume_unwind(panic),
+            })
+            .collect::<Result<Vec<Vec<T>>, PlanError>>()
+    })?;
+    Ok(parts.into_iter().flatten().collect())
+}
+
+fn response(
+    request: &PlanRequest<'_>,
+    target: &SteadyState,
+    scale: &Scale,
+    [slowest, fastest]: [&SteadyState; 2],
+    warmed_up: bool,
+) -> Result<Response, mapper_physics::simulate::SimulationError> {
+    let dwell_s = request.timing.dwell_s;
+    let mut gradient_k = [[0.0; 2]; 3];
+    let mut end = [[[0.0; 2]; 3]; 2];
+    let mut error = Vec::new();
+    for (i, design) in DESIGN.iter().enumerate() {
+        for (j, sign) in [1.0, -1.0].into_iter().enumerate() {
+            let [c, t, w] = design.map(|x| sign * x);
+            let gas = if w < 0.0 { slowest } else { fastest };
+            let state = State {
+                tc_k: scale.middle[0] + c * scale.half[0],
+                tt_k: scale.middle[1] + t * scale.half[1],
+                ..gas.state
+            };
+            let forecast = forecast(request, state, &target.boundary, dwell_s, true)?;
+            let predicted = &forecast.predicted;
+            let dtc_k = predicted.dtc_k.unwrap_or(0.0);
+            gradient_k[i][j] = dtc_k;
+            let left = scale.scaled(&forecast.end);
+            end[0][i][j] = left[0];
+            end[1][i][j] = left[1];
+            if let (Some(sigma), Some(bias)) = (predicted.sigma_eta, predicted.bias_eta) {
+                error.push((dtc_k, (sigma * sigma + bias * bias) * dtc_k * dtc_k));
+            }
+        }
+    }
+    error.sort_by(|a: &(f64, f64), b| a.0.total_cmp(&b.0));
+    let first = if warmed_up {
+        let ambient_k = request.boundary.ambient_temperature_k;
+        let cold = State { tc_k: ambient_k, tt_k: ambient_k, ..target.state };
+        let [c, t, _] =
+            scale.scaled(&hold(request, cold, &target.boundary, request.timing.warm_up_s + dwell_s)?);
+        [c, t]
+    } else {
+        [0.0; 2]
+    };
+    let settled = scale.scaled(&target.state);
+    Ok(Response {
+        gradient_k: Surface::through(gradient_k),
+        end: end.map(Surface::through),
+        speed: settled[2],
+        settled: [settled[0], settled[1]],
+        first,
+        error,
+    })
+}
+
+impl Chain for Housing {
+    type State = [f64; 2];
+
+    fn len(&self) -> usize {
+        self.responses.len()
+    }
+
+    fn first(&self, to: usize) -> (Option<f64>, [f64; 2]) {
+        let gradient_k = self.start.map(|[c, t, w]| self.responses[to].gradient_k.at(c, t, w));
+        (gradient_k, self.first_state(to))
+    }
+
+    #[inline]
+    fn step(&self, from: usize, to: usize, [c, t]: [f64; 2]) -> (f64, [f64; 2]) {
+        let (response, w) = (&self.responses[to], self.responses[from].speed);
+        (response.gradient_k.at(c, t, w), [response.end[0].at(c, t, w), response.end[1].at(c, t, w)])
+    }
+
+    #[inline]
+    fn alike(&self, a: [f64; 2], b: [f64; 2]) -> bool {
+        (a[0] - b[0]).abs() < self.alike[0] && (a[1] - b[1]).abs() < self.alike[1]
+    }
+
+    #[inline]
+    fn admissible(&self, from: usize, to: usize) -> bool {
+        self.forbidden.is_empty() || !self.forbidden.contains(&(from, to))
+    }
+
+    fn mean_square_error(&self, to: usize, gradient_k: f64) -> f64 {
+        let table = &self.responses[to].error;
+        let after = table.partition_point(|(g, _)| *g < gradient_k);
+        let times_square = match (after.checked_sub(1).and_then(|i| table.get(i)), table.get(after)) {
+            (Some((g0, e0)), Some((g1, e1))) => e0 + (e1 - e0) * (gradient_k - g0) / (g1 - g0).max(1e-12),
+            (Some((_, e)), None) | (None, Some((_, e))) => *e,
+            (None, None) => 1.0,
+        };
+        // Below a tenth of a kelvin nothing is identified.
+        times_square / (gradient_k * gradient_k).max(0.01)
+    }
+
+    fn gradient_max_k(&self) -> f64 {
+        self.gradient_max_k
+    }
+}

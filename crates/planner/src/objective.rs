@@ -1,0 +1,70 @@
+//! What an order is judged by. Every objective is a sum over steps, so that a change of the order is judged by the few
+//! steps it touches.
+
+use crate::chain::Chain;
+
+/// What is made large.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Objective {
+    /// Sum of the gradients.
+    Sum,
+    /// Smallest gradient: the sum of `-exp(-gradient/softness_k)`, which for a small softness is ruled by the smallest.
+    Worst {
+        /// Softness, K, > 0.
+        softness_k: f64,
+    },
+    /// Minus the mean square error of the efficiency, %^2.
+    Information,
+}
+
+/// A step that is not allowed costs this much: more than any order can make up for.
+const NOT_ALLOWED: f64 = 1e6;
+
+impl Objective {
+    /// Value of one step.
+    #[inline]
+    pub fn value<C: Chain>(self, chain: &C, from: usize, to: usize, gradient_k: f64) -> f64 {
+        let size_k = gradient_k.abs();
+        let value = match self {
+            Objective::Sum => size_k,
+            Objective::Worst { softness_k } => -(-size_k / softness_k).exp(),
+            Objective::Information => -1e4 * chain.mean_square_error(to, gradient_k),
+        };
+        if size_k > chain.gradient_max_k() || !chain.admissible(from, to) {
+            value - NOT_ALLOWED
+        } else {
+            value
+        }
+    }
+
+    /// Value of the first step.
+    #[inline]
+    pub fn first_value<C: Chain>(self, chain: &C, to: usize, gradient_k: Option<f64>) -> f64 {
+        // Without a jump the first point is the same burden wherever the order begins.
+        gradient_k.map_or(0.0, |gradient_k| self.value(chain, to, to, gradient_k))
+    }
+
+    /// The figure itself of an order: sum, smallest gradient, minus mean square error; what is not allowed counts as in
+    /// the search.
+    pub fn figure<C: Chain>(self, chain: &C, order: &[usize]) -> f64 {
+        let Some(&first) = order.first() else { return 0.0 };
+        let (gradient_k, mut state) = chain.first(first);
+        let mut sum = self.first_value(chain, first, gradient_k);
+        let mut smallest_k = gradient_k.map_or(f64::INFINITY, f64::abs);
+        let mut barred = 0.0;
+        for pair in order.windows(2) {
+            let (gradient_k, next) = chain.step(pair[0], pair[1], state);
+            let size_k = gradient_k.abs();
+            smallest_k = smallest_k.min(size_k);
+            sum += self.value(chain, pair[0], pair[1], gradient_k);
+            if size_k > chain.gradient_max_k() || !chain.admissible(pair[0], pair[1]) {
+                barred += NOT_ALLOWED;
+            }
+            state = next;
+        }
+        match self {
+            Objective::Worst { .. } => smallest_k.min(1e9) - barred,
+            Objective::Sum | Objective::Information => sum,
+        }
+    }
+}

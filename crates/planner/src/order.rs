@@ -1,0 +1,101 @@
+//! The order of a set of points.
+
+use crate::bound::Optimistic;
+use crate::chain::{Chain, gradients_k};
+use crate::exact::{self, Figure, branch_and_bound};
+use crate::housing::Housing;
+use crate::objective::Objective;
+use crate::reach::reachable;
+use crate::request::{PlanError, PlanRequest, VisitOrder};
+use crate::search::{Effort, greedy, search};
+use mapper_core::OperatingPoint;
+use mapper_physics::model::State;
+
+/// Softness of the smallest gradient in two rounds of the search, K: first the lowest ones together, then the lowest.
+const SOFTNESS_K: [f64; 2] = [4.0, 1.0];
+/// An order is called the best when none is better by more than this.
+pub(crate) const PROOF_TOLERANCE_RATIO: f64 = 1e-3;
+/// Partial orders that a proof may look at: a fraction of a second.
+const PROOF_NODES: u64 = 300_000;
+
+/// An order with what is known of it.
+#[derive(Debug, Clone)]
+pub(crate) struct Ordered {
+    pub(crate) order: Vec<usize>,
+    /// Whether it is the best within [`PROOF_TOLERANCE_RATIO`] on the reduced housing.
+    pub(crate) proven: bool,
+}
+
+/// What the search makes large for this order.
+pub(crate) fn objective(order: VisitOrder) -> Objective {
+    match order {
+        VisitOrder::WorstGradient => Objective::Worst { softness_k: SOFTNESS_K[1] },
+        VisitOrder::Information | VisitOrder::Time => Objective::Information,
+        VisitOrder::Listed | VisitOrder::GreedyGradient | VisitOrder::SumGradient => Objective::Sum,
+    }
+}
+
+/// Orders `given` points of the housing.
+pub(crate) fn order_on(housing: &Housing, given: &[usize], request: &PlanRequest<'_>) -> Ordered {
+    let effort = Effort::usual(given.len(), request.effort);
+    let settled = |from: usize| housing.settled(from);
+    let within = |effort, given: &[usize], objective| search(housing, given, objective, effort, request.seed);
+    let search = |given: &[usize], objective| within(effort, given, objective);
+    let (order, figure) = match request.order {
+        VisitOrder::Listed => return Ordered { order: given.to_vec(), proven: false },
+        VisitOrder::GreedyGradient => {
+            return Ordered { order: greedy(housing, given, Objective::Sum), proven: false };
+        }
+        VisitOrder::SumGradient => {
+            // Few points: begin with the best order as if the housing settled at each.
+            let fixed = exact::best_path(given.len(), |i, j| {
+                let (from, to) = (given[i], given[j]);
+                let gradient_k = housing.step(from, to, settled(from)).0;
+                Objective::Sum.value(housing, from, to, gradient_k)
+            });
+            let start = fixed.map_or(given.to_vec(), |(_, path)| path.iter().map(|i| given[*i]).collect());
+            (search(&start, Objective::Sum), Figure::Sum)
+        }
+        VisitOrder::WorstGradient => {
+            let order = SOFTNESS_K.iter().fold(given.to_vec(), |order, &softness_k| {
+                within(effort.halved(), &order, Objective::Worst { softness_k })
+            });
+            (order, Figure::Worst)
+        }
+        VisitOrder::Information | VisitOrder::Time => {
+            return Ordered { order: search(given, Objective::Information), proven: false };
+        }
+    };
+    let optimistic =
+        (order.len() <= exact::HELD_KARP_POINTS).then(|| Optimistic::of(housing, &order)).flatten();
+    match optimistic {
+        Some(optimistic) => {
+            let proof =
+                branch_and_bound(housing, &order, &optimistic, figure, PROOF_TOLERANCE_RATIO, PROOF_NODES);
+            Ordered { order: proof.order, proven: proof.proven }
+        }
+        None => Ordered { order, proven: false },
+    }
+}
+
+/// A set of points in the order of `request.order`, and the gradient expected of each step, K (absolute), by the reduced
+/// housing. The points of the request itself play no part. `from_state`: where the machine is now; the first step is
+/// then a jump as any other and has a gradient too. Without it the first point comes after the warm-up and has none.
+///
+/// # Errors
+/// [`PlanError`] with all points that cannot be reached.
+pub fn order_points(
+    request: &PlanRequest<'_>,
+    subset: &[OperatingPoint],
+    from_state: Option<State>,
+) -> Result<(Vec<OperatingPoint>, Vec<f64>), PlanError> {
+    if subset.is_empty() {
+        return Ok((Vec::new(), Vec::new()));
+    }
+    let targets = reachable(request, subset)?;
+    let housing = Housing::of(request, subset, &targets, from_state)?;
+    let given: Vec<usize> = (0..subset.len()).collect();
+    let order = order_on(&housing, &given, request).order;
+    let gradients = gradients_k(&housing, &order);
+    Ok((order.into_iter().map(|index| subset[index]).collect(), gradients))
+}

@@ -1,0 +1,107 @@
+//! The grid of docs/planner.md, a request, and a housing with one time constant per point.
+
+use mapper_core::OperatingPoint;
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::{air, housing, steady};
+use mapper_planner::chain::Chain;
+use mapper_planner::{PlanLimits, PlanRequest, PlanTiming, SettleBands, VisitOrder};
+
+/// Along speed lines, as conventional mapping goes.
+pub fn grid() -> Vec<OperatingPoint> {
+    [50e3, 70e3, 90e3, 110e3, 130e3, 150e3]
+        .iter()
+        .flat_map(|speed| [0.5, 0.7, 1.0].map(|valve| (*speed, valve)))
+        .map(|(speed_rpm, valve_opening_ratio)| OperatingPoint { speed_rpm, valve_opening_ratio })
+        .collect()
+}
+
+pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitOrder) -> PlanRequest<'a> {
+    PlanRequest {
+        campaign_name: "test",
+        campaign_canonical: "{}",
+        model,
+        boundary: BoundaryConditions::default(),
+        points,
+        order,
+        timing: PlanTiming {
+            warm_up_s: 3600.0,
+            dwell_s: 120.0,
+            cool_down_s: 0.0,
+            window_start_s: Some(10.0),
+            window_end_s: Some(110.0),
+        },
+        settle_bands: SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 },
+        limits: PlanLimits {
+            speed_max_rpm: 180e3,
+            p3_min_pa: 110e3,
+            p3_max_pa: 400e3,
+            t3_max_k: None,
+            t2_max_k: None,
+            surge_margin_min_ratio: None,
+            surge_allowed_s: 5.0,
+            housing_gradient_max_k: None,
+            p3_slew_max_pa_s: None,
+        },
+        repeats: None,
+        required_sigma_eta: None,
+        method: None,
+        effort: 0.3,
+        seed: 1,
+    }
+}
+
+/// Compressor housing alone: from where it is towards the point's steady temperature with the point's time constant,
+/// `C/(h A/(1 + NTU) + G_bearing)`.
+pub struct SimpleHousing {
+    settled_k: Vec<f64>,
+    time_constant_s: Vec<f64>,
+}
+
+impl SimpleHousing {
+    pub fn of(model: &Model, points: &[OperatingPoint]) -> Self {
+        let params = &model.params;
+        let rows: Vec<(f64, f64)> = points
+            .iter()
+            .map(|point| {
+                let boundary = BoundaryConditions {
+                    valve_opening_ratio: point.valve_opening_ratio,
+                    ..BoundaryConditions::default()
+                };
+                let steady = steady::hold_speed(model, point.speed_rpm, &boundary).unwrap();
+                let (outputs, tc_k) = (&steady.outputs, steady.state.tc_k);
+                let gas_w_k = outputs.h_w_m2k * params.compressor.internal_area_m2;
+                let cp = air::heat_capacity_j_kgk(outputs.t2_prime_k);
+                let conductance_w_k = gas_w_k / (1.0 + gas_w_k / (outputs.flow_kg_s * cp))
+                    + housing::bearing_conductance_w_k(&params.bearing);
+                (tc_k, housing::compressor_capacity_j_k(params, tc_k) / conductance_w_k)
+            })
+            .collect();
+        SimpleHousing {
+            settled_k: rows.iter().map(|row| row.0).collect(),
+            time_constant_s: rows.iter().map(|row| row.1).collect(),
+        }
+    }
+}
+
+impl Chain for SimpleHousing {
+    type State = f64;
+
+    fn len(&self) -> usize {
+        self.settled_k.len()
+    }
+
+    fn first(&self, to: usize) -> (Option<f64>, f64) {
+        (None, self.settled_k[to])
+    }
+
+    fn step(&self, _from: usize, to: usize, tc_k: f64) -> (f64, f64) {
+        let (distance_k, tau_s) = (tc_k - self.settled_k[to], self.time_constant_s[to]);
+        let left_k = |t_s: f64| distance_k * (-t_s / tau_s).exp();
+        (left_k(110.0) - left_k(10.0), self.settled_k[to] + left_k(120.0))
+    }
+
+    fn alike(&self, a: f64, b: f64) -> bool {
+        (a - b).abs() < 0.01
+    }
+}

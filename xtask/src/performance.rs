@@ -151,11 +151,11 @@ fn watched(mut command: Command) -> Result<(Duration, u64), Error> {
 
 /// Identification of one step, from divan's own table.
 fn identification(page: &mut String) -> Result<(), Error> {
-    let table = output(cargo(&["bench", "--quiet", "-p", "mapper-identify"]))?;
+    let table = output(cargo(&["bench", "--quiet", "-p", "mapper-identify", "--bench", "identify"]))?;
     let _ = writeln!(
         page,
         "## Identification of one step of 1000 samples\n\nFit, standard errors, checks and verdict. \
-         `cargo bench -p mapper-identify`:\n\n```\n{table}\n```"
+         `cargo bench -p mapper-identify --bench identify`:\n\n```\n{table}\n```"
     );
     Ok(())
 }

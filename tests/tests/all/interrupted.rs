@@ -1,6 +1,7 @@
 //! Runs that end early: killed, and stopped by Ctrl-C.
 #![cfg(unix)]
 
+use mapper_core::EventKind;
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use mapper_tests::{CampaignFile, Finished, mapper, mapper_command, only_run, python};
 use std::path::{Path, PathBuf};
@@ -144,4 +145,18 @@ fn one_interrupt_makes_the_rig_safe_and_keeps_what_is_done() {
     let (interrupted, safe) = (place("interrupted"), place("safe_state"));
     assert!(interrupted.is_some() && safe.is_some(), "{events:?}");
     assert!(only_run(&campaign.runs()).join("points.json").is_file());
+}
+
+/// A T2 sensor that reads 400 K too much is above its limit from the first samples on, in the warm-up.
+#[test]
+fn a_guard_that_trips_before_the_first_step_says_so() {
+    let campaign =
+        CampaignFile::shipped_with(&[("  virtual_lab: {}", "  virtual_lab: {offset_of: {T2: 400 K}}")]);
+    let arguments = ["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref()];
+    let out = campaign.runs();
+    let finished = mapper(arguments.into_iter().chain(["--out".as_ref(), out.as_os_str()])).exits(5);
+    assert_eq!(finished.json()["points"].as_array().unwrap().len(), 0);
+    let recording = only_run(&campaign.runs()).join("recording.mcap");
+    let kinds: Vec<EventKind> = read(&recording).recording.events.iter().map(|event| event.kind).collect();
+    assert_eq!(kinds, [EventKind::GuardTripped, EventKind::SafeState]);
 }

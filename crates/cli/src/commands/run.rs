@@ -88,11 +88,15 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
 
     let end = end.unwrap_or(RunEnd::Completed);
     let plan = scripted.map_or(plan, |steps| steps.executed(&made));
-    let results = results::make(&campaign, &plan, &end, &directory, &recording)?;
-    if arguments.json {
-        output::print_json(&results.json())?;
-    } else {
-        output::print(&results.text(&campaign))?;
+    match results::make(&campaign, &plan, &end, &directory, &recording) {
+        Ok(results) if arguments.json => output::print_json(&results.json())?,
+        Ok(results) => output::print(&results.text(&campaign))?,
+        Err(failure) if end == RunEnd::Completed => return Err(failure),
+        // Stopped before there was anything to identify: why it was stopped is what counts.
+        Err(_) if arguments.json => {
+            output::print_json(&json!({"run": directory, "recording": recording, "points": [], "map": {}}))?;
+        }
+        Err(_) => {}
     }
     match end {
         RunEnd::Completed => Ok(()),

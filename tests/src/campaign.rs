@@ -14,6 +14,7 @@ pub const SHORT_GRID: &[(&str, &str)] = &[
     ),
     ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.4]"),
     ("warm_up: 10 min ", "warm_up: 60 s "),
+    ("seed: 1 ", "repeats: off\nseed: 1 "),
 ];
 
 /// A campaign file in a directory of its own.

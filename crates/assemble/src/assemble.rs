@@ -1,6 +1,7 @@
 //! Points to map.
 
 use crate::grouping::{Group, group};
+use crate::repeats::points_for_map;
 use crate::{AssembleError, Grouping};
 use mapper_core::{CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceState, SpeedLine, Verdict};
 
@@ -8,7 +9,8 @@ use mapper_core::{CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceSta
 ///
 /// Points with a target form a line per target speed; points without one are grouped by gaps in corrected speed
 /// ([`Grouping`]). Lines come in order of mean corrected speed, their points in order of corrected flow (then of
-/// falling pressure ratio, for the vertical part at choke). Repeats of a target stay separate points. A point whose
+/// falling pressure ratio, for the vertical part at choke). Steps that were repeats to see drift
+/// are left out, but where the point itself has no efficiency ([`points_for_map`](crate::points_for_map)). A point whose
 /// verdict is unusable keeps flow and pressure ratio and has no `eta`.
 ///
 /// `reference` is the state that the points' corrected quantities already refer to; `method` is what all of them
@@ -28,6 +30,7 @@ pub fn assemble(
     if !(gap > 0.0 && gap < 1.0) {
         return Err(AssembleError::SpeedGap { speed_gap_ratio: gap });
     }
+    let points = &points_for_map(points);
     if points.is_empty() {
         return Err(AssembleError::NoPoints);
     }

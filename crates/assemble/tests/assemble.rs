@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_assemble::{AssembleError, Grouping, assemble};
-use mapper_core::{IdentifiedPoint, Method, OperatingPoint, ReferenceState, Verdict};
+use mapper_core::{IdentifiedPoint, Method, OperatingPoint, ReferenceState, StepKind, Verdict};
 use proptest::prelude::*;
 
 fn point(
@@ -14,6 +14,7 @@ fn point(
 ) -> IdentifiedPoint {
     IdentifiedPoint {
         step,
+        kind: StepKind::Point,
         target: target_speed_rpm.map(|speed_rpm| OperatingPoint { speed_rpm, valve_opening_ratio: 1.0 }),
         speed_rpm: speed_corrected_rpm,
         valve_opening_ratio: 1.0,
@@ -104,9 +105,23 @@ fn a_target_holds_its_points_together_however_far_the_speed_was_off() {
 }
 
 #[test]
-fn repeats_stay_separate_points() {
-    let points = [point(0, Some(5e4), 5e4, 0.03), point(7, Some(5e4), 5e4, 0.03)];
-    assert_eq!(make(&points).unwrap().lines[0].points.len(), 2);
+fn repeats_are_kept_out_of_the_lines() {
+    let repeat = |step| IdentifiedPoint { kind: StepKind::Repeat, ..point(step, Some(5e4), 5e4, 0.03) };
+    let steps = |points: &[IdentifiedPoint]| -> Vec<usize> {
+        make(points).unwrap().lines[0].points.iter().map(|point| point.identified.step).collect()
+    };
+    let measured = point(0, Some(5e4), 5e4, 0.03);
+    assert_eq!(steps(&[measured.clone(), repeat(7), repeat(9)]), [0]);
+    // Where the point itself has no efficiency, the surest repeat of the same target stands for it.
+    let lost = IdentifiedPoint { eta: None, verdict: Verdict::Unusable, ..measured };
+    let sure = IdentifiedPoint { eta_low: Some(0.699), eta_high: Some(0.701), ..repeat(9) };
+    let doubtful = IdentifiedPoint { verdict: Verdict::Doubtful, ..sure.clone() };
+    assert_eq!(steps(&[lost.clone(), repeat(7), sure, repeat(11)]), [9]);
+    assert_eq!(steps(&[lost.clone(), repeat(7), doubtful]), [7]);
+    let elsewhere = OperatingPoint { speed_rpm: 5e4, valve_opening_ratio: 0.5 };
+    assert_eq!(steps(&[lost, IdentifiedPoint { target: Some(elsewhere), ..repeat(7) }]), [0]);
+    // A campaign of repeats alone has no points.
+    assert_eq!(make(&[repeat(3)]), Err(AssembleError::NoPoints));
 }
 
 #[test]

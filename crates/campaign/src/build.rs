@@ -1,15 +1,16 @@
 //! The file as written -> the campaign: units resolved, defaults filled in.
 
 use crate::campaign::{
-    BackendChoice, Campaign, DisplayUnits, Identification, Limits, Machine, MapSource, Order, OutputFormat,
-    Outputs, Repeats, Report, SensorDeclaration, SequenceSource, Stabilisation, Timing, WindowChoice,
+    BackendChoice, Campaign, DisplayUnits, Identification, Jump, Limits, Machine, MapSource, Order,
+    OutputFormat, Outputs, Repeats, Report, SensorDeclaration, SequenceSource, Stabilisation, Timing,
+    WindowChoice,
 };
 use crate::consistency::{beside, rounded};
 use crate::file::{
     BoundaryFile, CampaignFile, DisplayFile, FormatName, GeometryFile, GridFile, IdentificationFile,
     LimitsFile, MachineFile, MapFile, MethodName, NamedReference, NamedRepeats, NusseltFile, OrderName,
-    OutputsFile, PointFile, ReferenceFile, RepeatsFile, ReportFile, SensorsFile, TapName, TimingFile,
-    WindowFile,
+    OutputsFile, PointFile, ReferenceFile, RepeatedJumpFile, RepeatsFile, ReportFile, SensorsFile, TapName,
+    TimingFile, WindowFile,
 };
 use crate::tree::{Step, steps};
 use crate::units::{Dimension, Fraction, Quantity};
@@ -68,7 +69,7 @@ pub(crate) fn build(
         },
         sequence,
         required_sigma_eta: file.required_sigma_eta.map(|quantity| quantity.inside),
-        repeats: repeats(file.repeats, &points),
+        repeats: repeats(file.repeats),
         points,
         seed: file.seed.unwrap_or(1),
         limits: limits(&file.limits),
@@ -309,32 +310,22 @@ fn identification(file: &IdentificationFile, alpha_area_ratio: f64) -> Identific
     }
 }
 
-/// None where the file is silent, as long as assembly takes a repeat for a point of the map.
-fn repeats(file: Option<RepeatsFile>, points: &[OperatingPoint]) -> Option<Repeats> {
+/// Repeats unless the file switches them off.
+fn repeats(file: Option<RepeatsFile>) -> Option<Repeats> {
     let file = match file {
         Some(RepeatsFile::Jump(file)) => file,
-        Some(RepeatsFile::Named(NamedRepeats::Off)) | None => return None,
+        Some(RepeatsFile::Named(NamedRepeats::Off)) => return None,
+        None => RepeatedJumpFile::default(),
     };
     let point = |file: PointFile| OperatingPoint {
         speed_rpm: file.speed.0.inside,
         valve_opening_ratio: file.opening.0,
     };
-    let (from, to) = match file.jump {
-        Some(jump) => (point(jump.from), point(jump.to)),
-        None => usual_jump(points)?,
-    };
-    Some(Repeats { from, to, every_steps: file.every.unwrap_or(12), at_least: file.at_least.unwrap_or(2) })
-}
-
-/// From the slowest to the fastest point of the middle opening that has both.
-fn usual_jump(points: &[OperatingPoint]) -> Option<(OperatingPoint, OperatingPoint)> {
-    let mut openings: Vec<f64> = points.iter().map(|point| point.valve_opening_ratio).collect();
-    openings.sort_by(f64::total_cmp);
-    let middle = *openings.get(openings.len() / 2)?;
-    let at_middle = || points.iter().filter(|point| point.valve_opening_ratio == middle);
-    let by_speed = |a: &&OperatingPoint, b: &&OperatingPoint| a.speed_rpm.total_cmp(&b.speed_rpm);
-    let (from, to) = (at_middle().min_by(by_speed)?, at_middle().max_by(by_speed)?);
-    (from != to).then_some((*from, *to))
+    Some(Repeats {
+        jump: file.jump.map(|jump| Jump { from: point(jump.from), to: point(jump.to) }),
+        every_steps: file.every.unwrap_or(12),
+        at_least: file.at_least.unwrap_or(2),
+    })
 }
 
 fn limits(file: &LimitsFile) -> Limits {

@@ -188,13 +188,20 @@ pub struct SequenceSource {
     pub text: String,
 }
 
-/// A jump that is made again and again, so that drift shows.
+/// From where to where.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Repeats {
+pub struct Jump {
     /// The point before the jump.
     pub from: OperatingPoint,
     /// The point after it.
     pub to: OperatingPoint,
+}
+
+/// A jump that is made again and again, so that drift shows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Repeats {
+    /// The jump; `None` where the planner is to choose it.
+    pub jump: Option<Jump>,
     /// Steps between two of them at most, >= 2.
     pub every_steps: usize,
     /// Fewest of them, >= 1.

@@ -112,6 +112,9 @@ fn orders_and_repeats_fit_the_rest() {
     assert!(findings.to_string().contains("ends where it starts"), "{findings}");
     let (text, _) = with("campaign: short\n", "campaign: short\nrepeats: off\norder: worst_gradient\n");
     assert_eq!(run(&text).unwrap_or_else(|findings| panic!("{findings}")).repeats, None);
+    // Silence switches nothing off.
+    let silent = run(RIGHT).unwrap_or_else(|findings| panic!("{findings}")).repeats.unwrap();
+    assert_eq!((silent.jump, silent.at_least), (None, 2));
 }
 
 #[test]

@@ -82,8 +82,7 @@ pub fn with_plan_request<T>(
                 .map(|stroke_s| (limits.p3_max_pa - limits.p3_min_pa) / stroke_s),
         },
         repeats: campaign.repeats.map(|repeats| Repeats {
-            from: repeats.from,
-            to: repeats.to,
+            jump: repeats.jump.map(|jump| (jump.from, jump.to)),
             every_steps: repeats.every_steps,
             at_least: repeats.at_least,
         }),

@@ -6,6 +6,7 @@
 mod arguments;
 mod assembly_line;
 mod commands;
+mod drift;
 mod exit_code;
 mod failure;
 mod interrupt;

@@ -1,5 +1,6 @@
 //! What a run gives: points, map, report; the same for people and for machines.
 
+use crate::drift::{self, RepeatedJump};
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::table::{self, Display, number};
@@ -8,7 +9,7 @@ use crate::{assembly_line, output, run_directory};
 use mapper_assemble::{Grouping, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{DisplayUnits, OutputFormat};
-use mapper_core::{IdentifiedPoint, Plan, Verdict};
+use mapper_core::{IdentifiedPoint, Plan, StepKind, Verdict};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_runner::RunEnd;
 use mapper_score::{ScoreSummary, ScoredPoint};
@@ -26,6 +27,7 @@ pub struct Results {
     map: BTreeMap<String, PathBuf>,
     points: Vec<ScoredPoint>,
     score: Option<ScoreSummary>,
+    repeats: Vec<RepeatedJump>,
     remarks: Vec<String>,
 }
 
@@ -73,8 +75,17 @@ pub fn make(
         (output::to_json(&json!({"reference": config.reference, "points": points}))? + "\n").as_bytes(),
     )?;
     let report = directory.join(run_directory::REPORT);
-    let text =
-        test_report::markdown(campaign, plan, end, &read.recording.events, &points, score.as_ref(), &map);
+    let repeats = drift::repeated_jumps(&read.recording.steps, &points);
+    let text = test_report::markdown(
+        campaign,
+        plan,
+        end,
+        &read.recording.events,
+        &points,
+        &repeats,
+        score.as_ref(),
+        &map,
+    );
     output::write_new(&report, text.as_bytes())?;
     Ok(Results {
         run: directory.to_owned(),
@@ -83,6 +94,7 @@ pub fn make(
         map,
         points,
         score,
+        repeats,
         remarks,
     })
 }
@@ -101,6 +113,7 @@ impl Results {
             "map": self.map,
             "report": self.report,
             "score": self.score,
+            "repeats": self.repeats,
             "remarks": self.remarks,
         })
     }
@@ -108,6 +121,7 @@ impl Results {
     /// A table with what to know below it.
     pub fn text(&self, campaign: &Campaign) -> String {
         let mut text = points_text(&self.points, &campaign.display);
+        text.push_str(&drift::sentences(&self.repeats, &Display::new(&campaign.display)));
         for remark in &self.remarks {
             let _ = writeln!(text, "{remark}");
         }
@@ -190,7 +204,7 @@ fn points_table(points: &[ScoredPoint], units: &DisplayUnits) -> comfy_table::Ta
         let half = |low: Option<f64>, high: Option<f64>| Some(0.5 * (high? - low?));
         let percent = |value: Option<f64>| value.map(|value| 100.0 * value);
         let mut row = vec![
-            (point.step + 1).to_string(),
+            step_name(point),
             display.speed(point.speed_rpm),
             format!("{}", point.valve_opening_ratio),
             display.flow(point.flow_corrected_kg_s),
@@ -209,6 +223,14 @@ fn points_table(points: &[ScoredPoint], units: &DisplayUnits) -> comfy_table::Ta
         table.add_row(row);
     }
     table
+}
+
+/// The number of a point's step, from 1, and whether it is a repeat.
+pub fn step_name(point: &IdentifiedPoint) -> String {
+    match point.kind {
+        StepKind::Point => (point.step + 1).to_string(),
+        StepKind::Repeat => format!("{} repeat", point.step + 1),
+    }
 }
 
 /// A verdict in a word.

@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::registry::{BackendContext, make_backend};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{BackendChoice, Order, SequenceSource, WindowChoice};
-use mapper_core::{Plan, PlanStep, Recording, SampleBatch, StepKind, StepMarker, UnpacedClock};
+use mapper_core::{Plan, PlanStep, Recording, SampleBatch, StepMarker, UnpacedClock};
 use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_physics::model::Model;
 use mapper_runner::{RunEnd, RunError, RunObserver, Runner, StepSource, StepSourceError};
@@ -222,7 +222,7 @@ impl StepSource for Rehearsing {
 
 /// A plan without the script's steps: hashes and times.
 fn base_plan(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<Plan, Failure> {
-    let without_script = Campaign { sequence: None, ..campaign.clone() };
+    let without_script = Campaign { sequence: None, repeats: None, ..campaign.clone() };
     let canonical =
         serde_json::to_string(&without_script).map_err(|error| Failure::new(Code::Failure, error))?;
     // The planner plans one point alone: the script has the say over the others.
@@ -274,12 +274,12 @@ fn bench(campaign: &Campaign, model: &Model) -> Bench {
             surge_margin_min_ratio: limits.surge_margin_min_ratio,
         },
         order: Box::new(move |points| {
-            let subset = Campaign { points: points.to_vec(), sequence: None, ..planned.clone() };
+            // Repeats are the script's own business.
+            let subset =
+                Campaign { points: points.to_vec(), sequence: None, repeats: None, ..planned.clone() };
             let plan =
                 assembly_line::plan(&subset, &machine).map_err(|failure| failure.message().to_owned())?;
-            // Repeats are the script's own business.
-            let points = plan.steps.into_iter().filter(|step| step.kind == StepKind::Point);
-            Ok(points.map(|step| step.to).collect())
+            Ok(plan.steps.into_iter().map(|step| step.to).collect())
         }),
     }
 }

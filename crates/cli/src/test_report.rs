@@ -1,6 +1,7 @@
 //! The test report of a run, as Markdown.
 
-use crate::results::{score_text, verdict_word};
+use crate::drift::{self, RepeatedJump};
+use crate::results::{score_text, step_name, verdict_word};
 use crate::table::{self, Display, number};
 use mapper_campaign::Campaign;
 use mapper_core::{Event, Plan};
@@ -11,12 +12,14 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 /// Everything a test report needs: machine, rig, conditions, calibration, map, points with their doubts, events.
+#[allow(clippy::too_many_arguments, reason = "one place, and each is another part of the page")]
 pub fn markdown(
     campaign: &Campaign,
     plan: &Plan,
     end: &RunEnd,
     events: &[Event],
     points: &[ScoredPoint],
+    repeats: &[RepeatedJump],
     score: Option<&ScoreSummary>,
     map: &BTreeMap<String, PathBuf>,
 ) -> String {
@@ -51,6 +54,14 @@ pub fn markdown(
         let _ = writeln!(text, "{}", score_text(score));
     }
     points_section(&mut text, campaign, points);
+    if !repeats.is_empty() {
+        let sentences = drift::sentences(repeats, &Display::new(&campaign.display));
+        let _ = write!(
+            text,
+            "\n## Drift\n\nRepeats are kept out of the map. Fixed offsets cancel in what changes between them.\n\n{}",
+            sentences.lines().map(|line| format!("- {line}\n")).collect::<String>()
+        );
+    }
     text.push_str("\n## Events\n\n");
     if events.is_empty() {
         text.push_str("None.\n");
@@ -112,7 +123,7 @@ fn points_section(text: &mut String, campaign: &Campaign, points: &[ScoredPoint]
         let _ = writeln!(
             text,
             "| {} | {} | {} | {} | {:.4} | {} | {} .. {} | {} | {} .. {} | {} |",
-            point.step + 1,
+            step_name(point),
             display.speed(point.speed_rpm),
             point.valve_opening_ratio,
             display.flow(point.flow_corrected_kg_s),

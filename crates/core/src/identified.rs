@@ -1,6 +1,6 @@
 //! What identification says of one point, and how sure it is.
 
-use crate::OperatingPoint;
+use crate::{OperatingPoint, StepKind};
 use serde::{Deserialize, Serialize};
 
 /// How a point was identified.
@@ -81,6 +81,9 @@ pub fn confidence_interval_95(value: f64, standard_error: f64) -> (f64, f64) {
 pub struct IdentifiedPoint {
     /// Index of the step.
     pub step: usize,
+    /// Whether the step was made for the map, or to see drift.
+    #[serde(default)]
+    pub kind: StepKind,
     /// What the plan aimed at; `None` in recordings made by others.
     pub target: Option<OperatingPoint>,
     /// Measured shaft speed at the end of the step, rpm.

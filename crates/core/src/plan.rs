@@ -4,10 +4,11 @@ use crate::OperatingPoint;
 use serde::{Deserialize, Serialize};
 
 /// Whether a step measures a point for the map or revisits one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StepKind {
     /// A point of the grid.
+    #[default]
     Point,
     /// A revisit, to see drift.
     Repeat,

@@ -118,6 +118,7 @@ fn point(
     let (eta_interval, h_interval) = (interval(estimate.eta), interval(estimate.h_w_m2k));
     Ok(IdentifiedPoint {
         step: step.index,
+        kind: step.kind,
         target: step.to,
         speed_rpm: state.speed_rpm,
         valve_opening_ratio: step.valve_opening_ratio,

@@ -55,9 +55,10 @@ impl Optimistic {
         self.weight_k[self.n * from + to]
     }
 
-    /// The bounds for orders of all points. `repeats`: the place of the point that a repeated jump ends at, and how
-    /// often it is made in between; its own gradients do not count.
-    pub(crate) fn bound(&self, repeats: Option<(usize, usize)>) -> Bound {
+    /// The bounds for orders of the first `counted` places; what lies beyond them is visited by repeats alone.
+    /// `repeats`: the place of the point that a repeated jump ends at, and how many steps the repeats take in all; their
+    /// own gradients do not count.
+    pub(crate) fn bound(&self, counted: usize, repeats: Option<(usize, usize)>) -> Bound {
         let n = self.n;
         let (repeated, copies) = repeats.unwrap_or((0, 0));
         let real = |i: usize| if i < n { i } else { repeated };
@@ -66,18 +67,19 @@ impl Optimistic {
         let sum_k = largest_assignment(end + 1, |i, j| {
             if i == end {
                 if j < n { self.first_k[j] } else { -1e9 }
-            } else if j >= n {
+            } else if j >= counted {
+                // A repeat, or the way back to the start.
                 0.0
             } else {
                 self.weight_k(real(i), j).max(-1e9)
             }
         });
         let worst_k = if n <= MATCHING_POINTS {
-            bottleneck(n, end, |j, i| self.weight_k(real(i), j))
+            bottleneck(counted, end, |j, i| self.weight_k(real(i), j))
         } else {
             // All points but the first have a step that leads to them.
             let into = |j: usize| (0..n).map(|i| self.weight_k(i, j)).fold(f64::NEG_INFINITY, f64::max);
-            let mut best: Vec<f64> = (0..n).map(into).collect();
+            let mut best: Vec<f64> = (0..counted).map(into).collect();
             best.sort_by(f64::total_cmp);
             best.get(1).copied().unwrap_or(f64::INFINITY)
         };

@@ -4,7 +4,7 @@ use crate::forecast::{forecast, hold};
 use crate::method::ForecastRow;
 use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest, VisitOrder};
-use mapper_core::{OperatingPoint, Plan};
+use mapper_core::{OperatingPoint, Plan, StepKind};
 use mapper_physics::model::{Outputs, State};
 use mapper_physics::steady::SteadyState;
 
@@ -62,7 +62,11 @@ pub fn compare(request: &PlanRequest<'_>, plan: &Plan) -> Result<Comparison, Pla
         proposed: way(
             plan.steps.iter().map(|step| step.to).collect(),
             plan.steps.iter().map(|step| step.dwell_s).sum(),
-            plan.steps.iter().map(|step| error(step.predicted.sigma_eta, step.predicted.bias_eta)),
+            // A repeat measures no point.
+            plan.steps
+                .iter()
+                .filter(|step| step.kind == StepKind::Point)
+                .map(|step| error(step.predicted.sigma_eta, step.predicted.bias_eta)),
         ),
         conventional: conventional(request, &order, &targets)?,
         along_speed_lines: dynamic(&listed, &order, &targets)?,

@@ -127,7 +127,7 @@ pub(crate) fn rejections(
     found
 }
 
-fn jump(
+pub(crate) fn jump(
     request: &PlanRequest<'_>,
     (from, start): (OperatingPoint, &SteadyState),
     (to, target): (OperatingPoint, &SteadyState),

@@ -7,14 +7,16 @@ use crate::graph::rejections;
 use crate::housing::Housing;
 use crate::order::{Ordered, PROOF_TOLERANCE_RATIO, objective, order_on};
 use crate::reach::reachable;
-use crate::repeats::{RepeatedJump, Visit, plain, with_repeats};
-use crate::request::{PlanError, PlanRequest, VisitOrder};
+use crate::repeats::{RepeatedJump, Visit, plain, usual_jumps, with_repeats};
+use crate::request::{PlanError, PlanRequest, Repeats, VisitOrder};
 use mapper_core::{OperatingPoint, Plan, PlanBound, PlanFigures, PlanStep, StepKind};
 use mapper_physics::model::State;
 use mapper_physics::steady::SteadyState;
 
 /// How often jumps that turn out not to be allowed are taken out and the rest is ordered anew.
 const ROUNDS: usize = 25;
+/// Jumps tried for repeats where the request names none.
+const USUAL_JUMPS: usize = 3;
 /// Dwells tried for the shortest campaign lie this far apart, s.
 const DWELL_STEP_S: f64 = 5.0;
 /// Shortest of them, s: the earliest window with the shortest useful length.
@@ -35,22 +37,46 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
     if request.order == VisitOrder::Time && request.required_sigma_eta.is_none() {
         return Err(PlanError::NeedsRequiredError);
     }
-    let mut points = request.points.to_vec();
-    let repeated = request.repeats.map(|repeats| {
-        let mut place = |point: OperatingPoint| {
-            points.iter().position(|other| *other == point).unwrap_or_else(|| {
-                points.push(point);
-                points.len() - 1
-            })
-        };
-        RepeatedJump {
-            from: place(repeats.from),
-            to: place(repeats.to),
-            every_steps: repeats.every_steps,
-            at_least: repeats.at_least,
+    let targets = reachable(request, request.points)?;
+    let Some(repeats) = request.repeats else { return plan_with(request, &targets, None) };
+    if let Some(jump) = repeats.jump {
+        return plan_with(request, &targets, Some((repeats, jump)));
+    }
+    let mut barred = None;
+    for jump in usual_jumps(request, &targets)?.into_iter().take(USUAL_JUMPS) {
+        match plan_with(request, &targets, Some((repeats, jump))) {
+            // It may be the repeated jump itself that is not allowed from where the machine comes to it.
+            Err(error @ PlanError::NoAdmissibleOrder(_)) => barred = Some(error),
+            made => return made,
         }
-    });
-    let targets = reachable(request, &points)?;
+    }
+    let mut plan = plan_with(request, &targets, None).map_err(|error| barred.unwrap_or(error))?;
+    plan.remarks.push("no jump between the points can be repeated, so that drift would not show".to_owned());
+    Ok(plan)
+}
+
+/// The plan with one jump repeated, or none. `reached`: the steady states of the request's points.
+fn plan_with(
+    request: &PlanRequest<'_>,
+    reached: &[SteadyState],
+    repeats: Option<(Repeats, (OperatingPoint, OperatingPoint))>,
+) -> Result<Plan, PlanError> {
+    let needs_method = matches!(request.order, VisitOrder::Information | VisitOrder::Time);
+    let (mut points, mut targets) = (request.points.to_vec(), reached.to_vec());
+    let mut repeated = None;
+    if let Some((repeats, (from, to))) = repeats {
+        let mut place = |point: OperatingPoint| -> Result<usize, PlanError> {
+            if let Some(known) = points.iter().position(|other| *other == point) {
+                return Ok(known);
+            }
+            targets.extend(reachable(request, &[point])?);
+            points.push(point);
+            Ok(points.len() - 1)
+        };
+        let (from, to) = (place(from)?, place(to)?);
+        repeated =
+            Some(RepeatedJump { from, to, every_steps: repeats.every_steps, at_least: repeats.at_least });
+    }
     // Only the search for information needs the method at every start of the reduced housing.
     let without_method = PlanRequest { method: request.method.filter(|_| needs_method), ..request.clone() };
     let mut housing = Housing::of(&without_method, &points, &targets, None)?;
@@ -62,7 +88,7 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
             Some(jump) => with_repeats(&housing, &ordered.order, jump, objective(request.order)),
             None => plain(&ordered.order),
         };
-        let (steps, forbidden) = walk(request, &points, &targets, &visits)?;
+        let (steps, forbidden) = walk(request, &points, &targets, &visits, repeated.map(|jump| jump.to))?;
         if forbidden.is_empty() {
             return Ok(finished(request, &housing, &ordered, &visits, repeated, steps));
         }
@@ -95,7 +121,10 @@ fn walk(
     points: &[OperatingPoint],
     targets: &[SteadyState],
     visits: &[Visit],
+    repeated: Option<usize>,
 ) -> Result<(Vec<PlanStep>, Vec<Forbidden>), PlanError> {
+    // Repeats compare when they last equally long: the first one's dwell holds for all.
+    let mut repeat_dwell_s = None;
     let mut steps: Vec<PlanStep> = Vec::with_capacity(visits.len());
     let mut forbidden = Vec::new();
     let mut start_s = request.timing.warm_up_s;
@@ -107,7 +136,16 @@ fn walk(
             Some((state, _)) => state,
             None => warmed_up(request, target).map_err(fail)?,
         };
-        let (dwell_s, forecast) = step(request, state, target, now.is_some()).map_err(fail)?;
+        let is_repeat = visit.kind == StepKind::Repeat && Some(visit.index) == repeated;
+        let (dwell_s, forecast) = match repeat_dwell_s.filter(|_| is_repeat) {
+            Some(dwell_s) => {
+                (dwell_s, forecast(request, state, &target.boundary, dwell_s, now.is_some()).map_err(fail)?)
+            }
+            None => step(request, state, target, now.is_some()).map_err(fail)?,
+        };
+        if is_repeat {
+            repeat_dwell_s = Some(dwell_s);
+        }
         if let Some((_, from)) = now {
             let p3_change_pa = target.boundary.p3_pa - targets[from].boundary.p3_pa;
             let reasons = rejections(request, &forecast, p3_change_pa, target.boundary.t3_k);
@@ -179,6 +217,11 @@ fn finished(
     repeated: Option<RepeatedJump>,
     steps: Vec<PlanStep>,
 ) -> Plan {
+    let repeated_to = visits
+        .iter()
+        .zip(&steps)
+        .find(|(visit, _)| Some(visit.index) == repeated.map(|jump| jump.to))
+        .map(|(_, step)| step.to);
     let duration_s = request.timing.warm_up_s
         + steps.iter().map(|step| step.dwell_s).sum::<f64>()
         + request.timing.cool_down_s;
@@ -193,15 +236,20 @@ fn finished(
         made_from: made_from(request),
         warm_up_s: request.timing.warm_up_s,
         cool_down_s: request.timing.cool_down_s,
-        remarks: remarks(request, &steps),
+        remarks: remarks(request, &steps, repeated_to),
         figures,
         bound,
         steps,
     }
 }
 
-fn remarks(request: &PlanRequest<'_>, steps: &[PlanStep]) -> Vec<String> {
+fn remarks(request: &PlanRequest<'_>, steps: &[PlanStep], repeated: Option<OperatingPoint>) -> Vec<String> {
     let mut remarks = Vec::new();
+    let repeats: Vec<&PlanStep> =
+        steps.iter().filter(|step| step.kind == StepKind::Repeat && Some(step.to) == repeated).collect();
+    if let Some(PlanStep { from: Some(from), to, .. }) = repeats.first() {
+        remarks.push(format!("the jump from {from} to {to} is made {} times to show drift", repeats.len()));
+    }
     if let Some(first) = steps.first() {
         let again = steps[1..].iter().any(|step| step.to == first.to);
         if !again {
@@ -245,13 +293,19 @@ fn bound(
     }
     let mut nodes: Vec<usize> = ordered.order.clone();
     let copies = visits.len() - nodes.len();
+    let counted = nodes.len();
     let place = repeated.map(|jump| {
-        nodes.iter().position(|node| *node == jump.to).unwrap_or_else(|| {
-            nodes.push(jump.to);
-            nodes.len() - 1
-        })
+        // Both ends of the jump, where they are no points of the grid: the housing comes by there too.
+        let mut place = 0;
+        for end in [jump.from, jump.to] {
+            place = nodes.iter().position(|node| *node == end).unwrap_or_else(|| {
+                nodes.push(end);
+                nodes.len() - 1
+            });
+        }
+        place
     });
-    let bound = Optimistic::of(housing, &nodes)?.bound(place.map(|place| (place, copies)));
+    let bound = Optimistic::of(housing, &nodes)?.bound(counted, place.map(|place| (place, copies)));
     let order: Vec<usize> = visits.iter().map(|visit| visit.index).collect();
     let reduced_k = crate::chain::gradients_k(housing, &order);
     let full_k = steps.iter().skip(1).map(|step| step.predicted.dtc_k.unwrap_or(0.0).abs());

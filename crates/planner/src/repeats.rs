@@ -1,8 +1,14 @@
 //! Repeats for drift: one jump, made again at a spacing, where it costs least.
 
 use crate::chain::Chain;
+use crate::graph::jump;
 use crate::objective::Objective;
-use mapper_core::StepKind;
+use crate::request::{PlanError, PlanRequest};
+use mapper_core::{OperatingPoint, StepKind};
+use mapper_physics::steady::SteadyState;
+
+/// Jumps that are looked at for one that may be repeated; each takes a simulation.
+const LOOKED_AT: usize = 24;
 
 /// A visit of the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,6 +31,49 @@ impl RepeatedJump {
     pub(crate) fn count(&self, points: usize) -> usize {
         (points.div_ceil(self.every_steps.max(1)) + 1).max(self.at_least).min(points.max(1))
     }
+}
+
+/// Jumps that suit for repeats, best first, those alone that are allowed: far in speed at an opening in the middle, up
+/// to the faster point, where the efficiency is sure.
+pub(crate) fn usual_jumps(
+    request: &PlanRequest<'_>,
+    targets: &[SteadyState],
+) -> Result<Vec<(OperatingPoint, OperatingPoint)>, PlanError> {
+    let points = request.points;
+    let mut openings: Vec<f64> = points.iter().map(|point| point.valve_opening_ratio).collect();
+    openings.sort_by(f64::total_cmp);
+    let Some(&middle) = openings.get(openings.len() / 2) else { return Ok(Vec::new()) };
+    // Of each opening the slowest and the faster ones; a pair of openings where no opening has two speeds.
+    let mut found: Vec<(usize, usize)> = Vec::new();
+    openings.dedup();
+    for opening in &openings {
+        let of_opening = |i: &usize| points[*i].valve_opening_ratio == *opening;
+        found.extend(from_slowest(points, (0..points.len()).filter(of_opening).collect()));
+    }
+    if found.is_empty() {
+        found = from_slowest(points, (0..points.len()).collect());
+    }
+    let off_middle = |i: usize| (points[i].valve_opening_ratio - middle).abs();
+    found.sort_by(|a, b| {
+        let by_opening = off_middle(a.1).total_cmp(&off_middle(b.1));
+        by_opening.then(points[b.1].speed_rpm.total_cmp(&points[a.1].speed_rpm)).then(a.cmp(b))
+    });
+    let mut allowed = Vec::new();
+    for (from, to) in found.into_iter().take(LOOKED_AT) {
+        let made = jump(request, (points[from], &targets[from]), (points[to], &targets[to]))?;
+        if made.rejections.is_empty() {
+            allowed.push((made.from, made.to));
+        }
+    }
+    Ok(allowed)
+}
+
+/// From the slowest of some points to each faster one.
+fn from_slowest(points: &[OperatingPoint], of: Vec<usize>) -> Vec<(usize, usize)> {
+    let by_speed = |a: &usize, b: &usize| points[*a].speed_rpm.total_cmp(&points[*b].speed_rpm);
+    let Some(slowest) = of.iter().copied().min_by(by_speed) else { return Vec::new() };
+    let faster = |to: &usize| points[*to].speed_rpm > points[slowest].speed_rpm;
+    of.into_iter().filter(faster).map(|to| (slowest, to)).collect()
 }
 
 /// An order without repeats.

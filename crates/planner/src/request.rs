@@ -89,10 +89,9 @@ pub struct PlanLimits {
 /// A jump that is made again and again, so that drift shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repeats {
-    /// Where it starts.
-    pub from: OperatingPoint,
-    /// Where it goes.
-    pub to: OperatingPoint,
+    /// Where it starts and where it goes; `None`: from the slowest to the fastest point of the middle opening, or the
+    /// next best jump that is allowed.
+    pub jump: Option<(OperatingPoint, OperatingPoint)>,
     /// Steps between two of them, > 0.
     pub every_steps: usize,
     /// Fewest of them.

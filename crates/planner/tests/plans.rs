@@ -9,8 +9,8 @@ use mapper_core::{OperatingPoint, StepKind};
 use mapper_physics::model::Model;
 use mapper_planner::chain::gradients_k;
 use mapper_planner::{
-    Effort, Objective, PlanError, Rejection, Repeats, VisitOrder, explain_jump, jump_graph, make_plan,
-    order_points, search,
+    Effort, Objective, PlanError, PlanRequest, Rejection, Repeats, VisitOrder, explain_jump, jump_graph,
+    make_plan, order_points, search,
 };
 
 #[test]
@@ -106,7 +106,7 @@ fn repeats_are_the_same_jump_and_leave_every_point_in() {
     let mut repeating = request(&model, &points, VisitOrder::SumGradient);
     repeating.effort = 0.1;
     let (from, to) = (points[2], points[17]);
-    repeating.repeats = Some(Repeats { from, to, every_steps: 12, at_least: 2 });
+    repeating.repeats = Some(Repeats { jump: Some((from, to)), every_steps: 12, at_least: 2 });
     let plan = make_plan(&repeating).unwrap();
     let repeat = |step: &&mapper_core::PlanStep| step.kind == StepKind::Repeat && step.to == to;
     let repeats: Vec<_> = plan.steps.iter().filter(repeat).map(|step| step.from).collect();
@@ -117,6 +117,35 @@ fn repeats_are_the_same_jump_and_leave_every_point_in() {
         assert_eq!(plan.steps.iter().filter(visit).count(), 1);
     }
     assert!(plan.figures.sum_gradient_k <= plan.bound.unwrap().sum_gradient_k);
+}
+
+#[test]
+fn the_usual_repeat_is_a_jump_that_is_allowed() {
+    let (model, points) = (Model::nominal(), grid());
+    let mut repeating = request(&model, &points, VisitOrder::GreedyGradient);
+    repeating.repeats = Some(Repeats { jump: None, every_steps: 12, at_least: 2 });
+    let jumps = |request: &PlanRequest<'_>| {
+        let steps = make_plan(request).unwrap().steps;
+        let last = steps
+            .iter()
+            .rfind(|step| step.kind == StepKind::Repeat)
+            .map(|step| (step.from.unwrap(), step.to));
+        let count = steps
+            .iter()
+            .filter(|step| step.kind == StepKind::Repeat && step.from.map(|from| (from, step.to)) == last);
+        (last, count.count())
+    };
+    let (jump, count) = jumps(&repeating);
+    assert_eq!(jump.map(|(from, to)| (from.speed_rpm, to.speed_rpm)), Some((50e3, 150e3)));
+    assert!(count >= 2);
+    // Such a jump moves the housing by 27 K: under a limit of 15 K a shorter one is repeated.
+    repeating.limits.housing_gradient_max_k = Some(15.0);
+    let (jump, count) = jumps(&repeating);
+    let (from, to) = jump.unwrap();
+    assert!(from.speed_rpm == 50e3 && to.speed_rpm < 150e3 && count >= 2, "{from} {to} {count}");
+    // One point has no jump.
+    let alone = PlanRequest { points: &points[..1], ..repeating };
+    assert_eq!(jumps(&alone), (None, 0));
 }
 
 #[test]

@@ -43,6 +43,7 @@ fn answer(step: &SequenceStep) -> StepResult {
     let step = &step.step;
     let point = IdentifiedPoint {
         step: step.index,
+        kind: step.kind,
         target: Some(step.to),
         speed_rpm: step.to.speed_rpm,
         valve_opening_ratio: step.to.valve_opening_ratio,

@@ -100,7 +100,7 @@ pub(crate) enum NamedRepeats {
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RepeatedJumpFile {
-    /// The jump; from the slowest to the fastest point of the middle opening where none is given.
+    /// The jump; where none is given, from the slowest to the fastest point of the middle opening, or the next best jump that is allowed.
     pub jump: Option<JumpFile>,
     /// Steps between two repeats, at most; 12 where none is given.
     #[schemars(range(min = 2, max = 20000), example = 12)]

@@ -11,7 +11,7 @@ mod sensors;
 
 pub(crate) use choices::{
     DisplayFile, FormatName, IdentificationFile, MethodName, NamedRepeats, OrderName, OutputsFile,
-    RepeatsFile, ReportFile, WindowFile,
+    RepeatedJumpFile, RepeatsFile, ReportFile, WindowFile,
 };
 pub(crate) use conditions::{BoundaryFile, LimitsFile, NamedReference, ReferenceFile, TimingFile};
 pub(crate) use grid::{GridFile, PointFile};
@@ -56,7 +56,7 @@ pub(crate) struct CampaignFile {
     /// Error of the efficiency (standard error and bias of the method, one standard deviation) that `order: time` has to reach at each point.
     #[schemars(extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.5 %")]
     pub required_sigma_eta: Option<Quantity<Fraction>>,
-    /// A jump that is repeated, so that drift shows; `off`, the default, for none.
+    /// A jump that is repeated, so that drift shows: at least twice, and every 12 steps where nothing else is said; `off` for none. A sequence script makes its own repeats.
     #[schemars(example = &"off")]
     pub repeats: Option<RepeatsFile>,
     /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.

@@ -3,7 +3,7 @@
 
 use mapper_core::{
     CompressorMap, EstimateUncertainty, IdentifiedPoint, MapPoint, Method, OperatingPoint, ReferenceState,
-    SpeedLine, Verdict, Warning, confidence_interval_95,
+    SpeedLine, StepKind, Verdict, Warning, confidence_interval_95,
 };
 
 /// Flow (kg/s), pressure ratio, efficiency at corrected speed (rpm) and x, 1 at surge, 0 at choke, below 0 beyond.
@@ -72,6 +72,7 @@ fn point(step: usize, speed_rpm: f64, x: f64, valve_opening_ratio: f64) -> MapPo
     let h = eta.map(|_| 40.0 + 900.0 * flow_kg_s);
     let identified = IdentifiedPoint {
         step,
+        kind: StepKind::Point,
         target: Some(OperatingPoint { speed_rpm, valve_opening_ratio }),
         speed_rpm,
         valve_opening_ratio,

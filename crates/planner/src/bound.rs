@@ -5,11 +5,17 @@
 //! jump that no order exceeds, and the best assignment of successors under these weights a sum that no order exceeds.
 
 use crate::assignment::{bottleneck, largest_assignment};
+use crate::auction::prices;
 use crate::chain::Chain;
 use crate::housing::Housing;
 
 /// Rounds of narrowing: each multiplies what is left to gain by what the housing remembers of a dwell.
 const ROUNDS: usize = 12;
+/// Above this many points the sum is bounded by prices that are off by the last of these increments, K.
+const EXACT_POINTS: usize = 500;
+const INCREMENTS_K: (f64, f64) = (5.0, 0.01);
+/// Above this many points there is no bound: its table grows with the square.
+pub(crate) const MOST_POINTS: usize = 4000;
 /// Above this many points the smallest gradient is bounded without a matching.
 const MATCHING_POINTS: usize = 400;
 
@@ -30,10 +36,13 @@ pub(crate) struct Optimistic {
 type Interval = (f64, f64);
 
 impl Optimistic {
-    /// `None` where the reduced housing does not stay within any bounds.
+    /// `None` for too many points, and where the reduced housing does not stay within any bounds.
     pub(crate) fn of(housing: &Housing, points: &[usize]) -> Option<Self> {
-        let boxes = reachable(housing, points)?;
         let n = points.len();
+        if n > MOST_POINTS {
+            return None;
+        }
+        let boxes = reachable(housing, points)?;
         let mut weight_k = vec![f64::NEG_INFINITY; n * n];
         let mut first_k = vec![0.0; n];
         for (i, &from) in points.iter().enumerate() {
@@ -64,7 +73,7 @@ impl Optimistic {
         let real = |i: usize| if i < n { i } else { repeated };
         // One more node closes the path to a circle: the first point follows it, and it follows the last.
         let end = n + copies;
-        let sum_k = largest_assignment(end + 1, |i, j| {
+        let weight = |i: usize, j: usize| {
             if i == end {
                 if j < n { self.first_k[j] } else { -1e9 }
             } else if j >= counted {
@@ -73,7 +82,14 @@ impl Optimistic {
             } else {
                 self.weight_k(real(i), j).max(-1e9)
             }
-        });
+        };
+        let sum_k = if end <= EXACT_POINTS {
+            largest_assignment(end + 1, weight)
+        } else {
+            let size = end + 1;
+            let table: Vec<f64> = (0..size * size).map(|place| weight(place / size, place % size)).collect();
+            prices(size, &table, INCREMENTS_K).bound
+        };
         let worst_k = if n <= MATCHING_POINTS {
             bottleneck(counted, end, |j, i| self.weight_k(real(i), j))
         } else {

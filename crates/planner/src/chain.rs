@@ -19,6 +19,9 @@ pub trait Chain {
     /// The step `from` -> `to` from `state`: gradient of the housing within the window, K (signed), and what it leaves.
     fn step(&self, from: usize, to: usize, state: Self::State) -> (f64, Self::State);
 
+    /// What a long stay at a point leaves.
+    fn settled(&self, at: usize) -> Self::State;
+
     /// Whether two states are so close that what follows no longer tells them apart.
     fn alike(&self, a: Self::State, b: Self::State) -> bool;
 

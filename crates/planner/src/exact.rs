@@ -201,6 +201,7 @@ mod tests {
         fn step(&self, from: usize, to: usize, (): ()) -> (f64, ()) {
             (self.0[from * self.1 + to], ())
         }
+        fn settled(&self, _: usize) {}
         fn alike(&self, (): (), (): ()) -> bool {
             true
         }

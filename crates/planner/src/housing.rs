@@ -165,11 +165,6 @@ impl Housing {
         self.forbidden.insert((from, to));
     }
 
-    /// Scaled temperatures that a long stay ends in.
-    pub(crate) fn settled(&self, at: usize) -> [f64; 2] {
-        self.responses[at].settled
-    }
-
     /// Largest allowed gradient, K.
     pub(crate) fn gradient_max_k(&self) -> f64 {
         self.gradient_max_k
@@ -278,6 +273,10 @@ impl Chain for Housing {
     fn step(&self, from: usize, to: usize, [c, t]: [f64; 2]) -> (f64, [f64; 2]) {
         let (response, w) = (&self.responses[to], self.responses[from].speed);
         (response.gradient_k.at(c, t, w), [response.end[0].at(c, t, w), response.end[1].at(c, t, w)])
+    }
+
+    fn settled(&self, at: usize) -> [f64; 2] {
+        self.responses[at].settled
     }
 
     #[inline]

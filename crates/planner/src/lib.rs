@@ -7,7 +7,9 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod assignment;
+mod auction;
 mod bound;
+mod candidates;
 pub mod chain;
 mod comparison;
 pub mod exact;
@@ -34,4 +36,4 @@ pub use plan::make_plan;
 pub use request::{
     PlanError, PlanLimits, PlanRequest, PlanTiming, Repeats, SettleBands, UnreachablePoint, VisitOrder,
 };
-pub use search::{Effort, search};
+pub use search::{Effort, search, search_worst};

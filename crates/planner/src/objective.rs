@@ -8,17 +8,18 @@ use crate::chain::Chain;
 pub enum Objective {
     /// Sum of the gradients.
     Sum,
-    /// Smallest gradient: the sum of `-exp(-gradient/softness_k)`, which for a small softness is ruled by the smallest.
+    /// Smallest gradient: minus the sum of the squares by which gradients fall short of a target, K^2. It is 0 where no
+    /// gradient is smaller than the target.
     Worst {
-        /// Softness, K, > 0.
-        softness_k: f64,
+        /// Target, K.
+        target_k: f64,
     },
     /// Minus the mean square error of the efficiency, %^2.
     Information,
 }
 
 /// A step that is not allowed costs this much: more than any order can make up for.
-const NOT_ALLOWED: f64 = 1e6;
+pub(crate) const NOT_ALLOWED: f64 = 1e6;
 
 impl Objective {
     /// Value of one step.
@@ -27,7 +28,10 @@ impl Objective {
         let size_k = gradient_k.abs();
         let value = match self {
             Objective::Sum => size_k,
-            Objective::Worst { softness_k } => -(-size_k / softness_k).exp(),
+            Objective::Worst { target_k } => {
+                let missing_k = (target_k - size_k).max(0.0);
+                -missing_k * missing_k
+            }
             Objective::Information => -1e4 * chain.mean_square_error(to, gradient_k),
         };
         if size_k > chain.gradient_max_k() || !chain.admissible(from, to) {

@@ -7,12 +7,12 @@ use crate::housing::Housing;
 use crate::objective::Objective;
 use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest, VisitOrder};
-use crate::search::{Effort, greedy, search};
+use crate::search::{Effort, greedy, search, search_worst};
 use mapper_core::OperatingPoint;
 use mapper_physics::model::State;
 
-/// Softness of the smallest gradient in two rounds of the search, K: first the lowest ones together, then the lowest.
-const SOFTNESS_K: [f64; 2] = [4.0, 1.0];
+/// Repeats are put where no gradient falls below this, K, if that can be.
+const REPEATS_KEEP_K: f64 = 30.0;
 /// An order is called the best when none is better by more than this.
 pub(crate) const PROOF_TOLERANCE_RATIO: f64 = 1e-3;
 /// Partial orders that a proof may look at: a fraction of a second.
@@ -29,7 +29,7 @@ pub(crate) struct Ordered {
 /// What the search makes large for this order.
 pub(crate) fn objective(order: VisitOrder) -> Objective {
     match order {
-        VisitOrder::WorstGradient => Objective::Worst { softness_k: SOFTNESS_K[1] },
+        VisitOrder::WorstGradient => Objective::Worst { target_k: REPEATS_KEEP_K },
         VisitOrder::Information | VisitOrder::Time => Objective::Information,
         VisitOrder::Listed | VisitOrder::GreedyGradient | VisitOrder::SumGradient => Objective::Sum,
     }
@@ -57,9 +57,7 @@ pub(crate) fn order_on(housing: &Housing, given: &[usize], request: &PlanRequest
             (search(&start, Objective::Sum), Figure::Sum)
         }
         VisitOrder::WorstGradient => {
-            let order = SOFTNESS_K.iter().fold(given.to_vec(), |order, &softness_k| {
-                within(effort.halved(), &order, Objective::Worst { softness_k })
-            });
+            let order = search_worst(housing, given, effort, request.seed);
             (order, Figure::Worst)
         }
         VisitOrder::Information | VisitOrder::Time => {

@@ -2,13 +2,16 @@
 
 use crate::chain::Chain;
 use crate::graph::jump;
-use crate::objective::Objective;
+use crate::objective::{NOT_ALLOWED, Objective};
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::{OperatingPoint, StepKind};
 use mapper_physics::steady::SteadyState;
 
 /// Jumps that are looked at for one that may be repeated; each takes a simulation.
 const LOOKED_AT: usize = 24;
+
+/// Up to this many points a repeat may go anywhere where no place near its own is allowed.
+const FEW_POINTS: usize = 200;
 
 /// A visit of the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,16 +100,29 @@ pub(crate) fn with_repeats<C: Chain>(
     for repeat in 0..count {
         // Counted in points of the order; at least one step comes before.
         let ideal = ((repeat as f64 * spacing).round() as usize).clamp(1, points);
-        let candidates = ideal.saturating_sub(slack).max(1)..=(ideal + slack).min(points);
-        let best = candidates
-            .map(|place| {
-                let at = place + inserted;
-                let trial = put(&visits, at, jump);
-                // Fewer steps first.
-                let steps = trial.len() as f64;
-                (steps, -value(chain, &trial, objective), place.abs_diff(ideal), trial)
-            })
-            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        let before = value(chain, &visits, objective);
+        let best_of = |places: std::ops::RangeInclusive<usize>| {
+            // Not between the two ends of another repeat.
+            let free =
+                |place: &usize| visits.get(place + inserted).is_none_or(|next| next.kind == StepKind::Point);
+            places
+                .filter(free)
+                .map(|place| {
+                    let at = place + inserted;
+                    let trial = put(&visits, at, jump);
+                    let value = value(chain, &trial, objective);
+                    // What is allowed first, then fewer steps.
+                    let barred = value < before - 0.5 * NOT_ALLOWED;
+                    ((barred, trial.len()), -value, place.abs_diff(ideal), trial)
+                })
+                .min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)))
+        };
+        let near = best_of(ideal.saturating_sub(slack).max(1)..=(ideal + slack).min(points));
+        let best = match near {
+            // Farther off rather than not at all; behind the repeats before, which keep their order.
+            Some(((true, _), ..)) if points <= FEW_POINTS => best_of(1..=points),
+            near => near,
+        };
         if let Some((.., trial)) = best {
             inserted += trial.len() - visits.len();
             visits = trial;
@@ -133,7 +149,9 @@ fn value<C: Chain>(chain: &C, visits: &[Visit], objective: Objective) -> f64 {
     for pair in visits.windows(2) {
         let (gradient_k, next) = chain.step(pair[0].index, pair[1].index, state);
         let value = objective.value(chain, pair[0].index, pair[1].index, gradient_k);
-        if pair[1].kind == StepKind::Point || !chain.admissible(pair[0].index, pair[1].index) {
+        let allowed =
+            chain.admissible(pair[0].index, pair[1].index) && gradient_k.abs() <= chain.gradient_max_k();
+        if pair[1].kind == StepKind::Point || !allowed {
             sum += value;
         }
         state = next;

@@ -1,15 +1,24 @@
 //! Search for a good order under thermal memory: annealing with restarts, seeded, bounded by its number of moves.
 //!
-//! A move swaps two points, reverses a stretch, or shifts one to three points. It is judged by going through the steps
-//! it touches and on until the housing no longer remembers: a few steps, however long the order is.
+//! A move swaps two points, reverses a short stretch, or puts a stretch elsewhere, near or far. Half of the moves are
+//! random; the others make a jump that the assignment of successors (`candidates`) thinks well of. A move is judged by
+//! going through the steps it touches and on until the housing no longer remembers: a few steps, however long the order
+//! is.
 
-use crate::chain::Chain;
+use crate::candidates::Candidates;
+use crate::chain::{Chain, gradients_k};
 use crate::objective::Objective;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 /// Longest stretch that is reversed or shifted over: longer ones cost as much as they rarely gain.
 const LONGEST_STRETCH: usize = 50;
+
+/// Targets that a search for the largest smallest gradient sets itself.
+const TARGETS: u64 = 10;
+/// How much the second target lies above what the first has given, over the mean gradient of a greedy order; a target that
+/// is not met halves the next rise.
+const FIRST_RISE_RATIO: f64 = 0.1;
 
 /// How much work a search does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,11 +30,6 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// The same with half the moves, for a search in two rounds.
-    pub fn halved(self) -> Self {
-        Effort { moves: self.moves / 2, ..self }
-    }
-
     /// Tuned so that 18 points take a fraction of a second, 200 some seconds, 2000 well below a minute; `factor` scales
     /// it.
     pub fn usual(points: usize, factor: f64) -> Self {
@@ -47,6 +51,17 @@ pub fn search<C: Chain>(
     effort: Effort,
     seed: u64,
 ) -> Vec<usize> {
+    search_among(chain, &Candidates::of(chain, given, objective), given, objective, effort, seed)
+}
+
+fn search_among<C: Chain>(
+    chain: &C,
+    candidates: &Candidates,
+    given: &[usize],
+    objective: Objective,
+    effort: Effort,
+    seed: u64,
+) -> Vec<usize> {
     let mut best = given.to_vec();
     if given.len() < 2 {
         return best;
@@ -55,10 +70,37 @@ pub fn search<C: Chain>(
     let greedy = greedy(chain, given, objective);
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     for start in 0..effort.starts.max(1) {
-        let mut annealing = Annealing::new(chain, if start == 0 { &greedy } else { &best }, objective);
+        let mut annealing =
+            Annealing::new(chain, candidates, if start == 0 { &greedy } else { &best }, objective);
         annealing.run(effort.moves, start % 2 == 1, &mut random, &mut best, &mut best_figure);
     }
     best
+}
+
+/// The order with the largest smallest gradient found from `given`: targets that rise as they are met.
+pub fn search_worst<C: Chain>(chain: &C, given: &[usize], effort: Effort, seed: u64) -> Vec<usize> {
+    let worst_k = |order: &[usize]| Objective::Worst { target_k: 0.0 }.figure(chain, order);
+    let mut order = greedy(chain, given, Objective::Sum);
+    let mean_k = gradients_k(chain, &order).iter().sum::<f64>() / (given.len() as f64 - 1.0).max(1.0);
+    let mean_k = mean_k.min(chain.gradient_max_k());
+    let candidates = Candidates::of(chain, given, Objective::Worst { target_k: mean_k });
+    let (mut best_k, mut rise_k) = (worst_k(&order), mean_k);
+    let each = Effort { moves: effort.moves * u64::from(effort.starts.max(1)) / TARGETS, starts: 1 };
+    for round in 0..TARGETS {
+        let objective = Objective::Worst { target_k: best_k.max(0.0) + rise_k };
+        let found = search_among(chain, &candidates, &order, objective, each, seed.wrapping_add(round));
+        let found_k = worst_k(&found);
+        let risen_k = found_k - best_k;
+        if risen_k > 0.0 {
+            (order, best_k) = (found, found_k);
+        }
+        if round == 0 {
+            rise_k = FIRST_RISE_RATIO * mean_k;
+        } else if risen_k < 0.5 * rise_k {
+            rise_k *= 0.5;
+        }
+    }
+    order
 }
 
 /// Each time the point whose step is worth most.
@@ -92,39 +134,55 @@ pub(crate) fn greedy<C: Chain>(chain: &C, given: &[usize], objective: Objective)
     order
 }
 
-/// Positions `start..start + points.len()` of an order get other points.
+/// Positions `start..end` of an order, as part of a new one.
 #[derive(Debug, Clone, Copy)]
-struct Change {
+struct Piece {
     start: usize,
     end: usize,
-    /// Where its points begin in the scratch.
-    scratch: usize,
+    reversed: bool,
 }
+
+fn forward(start: usize, end: usize) -> Piece {
+    Piece { start, end, reversed: false }
+}
+
+/// State before a step, and the step's value.
+type Known<S> = (Option<S>, f64);
 
 struct Annealing<'a, C: Chain> {
     chain: &'a C,
+    candidates: &'a Candidates,
     objective: Objective,
     order: Vec<usize>,
-    /// State before each position's step; at 0 unused.
-    before: Vec<Option<C::State>>,
-    value: Vec<f64>,
-    scratch: Vec<usize>,
-    changes: Vec<Change>,
-    log: Vec<(usize, Option<C::State>, f64)>,
+    /// Position of each point of the chain; of no meaning for points that are not in the order.
+    place: Vec<usize>,
+    /// What is known of each position's step; no state at 0, and behind the last position what its step leaves.
+    known: Vec<Known<C::State>>,
+    /// The order that is proposed from the first piece's place on; what follows the pieces stays as it is.
+    pieces: Vec<Piece>,
+    begin: usize,
+    /// New positions whose step changes.
+    log: Vec<(usize, Known<C::State>)>,
+    scratch: Vec<(usize, Known<C::State>)>,
 }
 
 impl<'a, C: Chain> Annealing<'a, C> {
-    fn new(chain: &'a C, order: &[usize], objective: Objective) -> Self {
+    fn new(chain: &'a C, candidates: &'a Candidates, order: &[usize], objective: Objective) -> Self {
         let mut annealing = Annealing {
             chain,
+            candidates,
             objective,
             order: order.to_vec(),
-            before: vec![None; order.len()],
-            value: vec![0.0; order.len()],
-            scratch: Vec::new(),
-            changes: Vec::new(),
+            place: vec![0; chain.len()],
+            known: vec![(None, 0.0); order.len() + 1],
+            pieces: Vec::new(),
+            begin: 0,
             log: Vec::new(),
+            scratch: Vec::new(),
         };
+        for (position, point) in order.iter().enumerate() {
+            annealing.place[*point] = position;
+        }
         annealing.refresh();
         annealing
     }
@@ -134,9 +192,10 @@ impl<'a, C: Chain> Annealing<'a, C> {
         let mut state = None;
         for k in 0..self.order.len() {
             let (value, next) = self.at(k.checked_sub(1).map(|p| self.order[p]), self.order[k], state);
-            (self.before[k], self.value[k]) = (state, value);
+            self.known[k] = (state, value);
             state = Some(next);
         }
+        self.known[self.order.len()] = (state, 0.0);
     }
 
     #[inline]
@@ -153,90 +212,165 @@ impl<'a, C: Chain> Annealing<'a, C> {
         }
     }
 
-    /// What the prepared changes would gain; leaves the new states and values in the log.
+    /// What the proposed pieces would gain; leaves the new states and values in the log.
     fn gain(&mut self) -> f64 {
         self.log.clear();
         let n = self.order.len();
-        let Some(first) = self.changes.first().copied() else { return 0.0 };
-        let (mut k, mut which, mut gain) = (first.start, 0, 0.0);
-        let mut state = self.before[k];
-        let mut from = k.checked_sub(1).map(|p| self.order[p]);
-        while k < n {
-            while which < self.changes.len() && k >= self.changes[which].end {
-                which += 1;
-            }
-            let change = self.changes.get(which).filter(|change| k >= change.start);
-            if change.is_none()
-                && from == k.checked_sub(1).map(|p| self.order[p])
-                && let (Some(new), Some(old)) = (state, self.before[k])
-                && self.chain.alike(new, old)
-            {
-                // The housing has forgotten; on to the next change.
-                let Some(next) = self.changes.get(which) else { break };
-                k = next.start;
-                state = self.before[k];
-                from = k.checked_sub(1).map(|p| self.order[p]);
-                continue;
-            }
-            let to = change.map_or(self.order[k], |change| self.scratch[change.scratch + k - change.start]);
-            let (value, next) = self.at(from, to, state);
-            gain += value - self.value[k];
-            self.log.push((k, state, value));
-            (state, from) = (Some(next), Some(to));
-            k += 1;
+        if self.pieces.is_empty() {
+            return 0.0;
         }
+        let mut gain = 0.0;
+        let mut state = self.known[self.begin].0;
+        let mut from = self.begin.checked_sub(1).map(|p| self.order[p]);
+        let mut position = self.begin;
+        let rest = self.pieces.iter().map(|piece| piece.end).max().unwrap_or(n);
+        for which in 0..=self.pieces.len() {
+            let piece = self.pieces.get(which).copied().unwrap_or_else(|| forward(rest, n));
+            let mut done = 0;
+            while done < piece.end - piece.start {
+                let k = if piece.reversed { piece.end - 1 - done } else { piece.start + done };
+                let (old_state, old_value) = self.known[k];
+                if !piece.reversed
+                    && let (Some(new), Some(old), Some(p)) = (state, old_state, k.checked_sub(1))
+                    && from == Some(self.order[p])
+                    && self.chain.alike(new, old)
+                {
+                    // The housing has forgotten: the rest of the piece goes as before.
+                    position += piece.end - k;
+                    state = self.known[piece.end].0;
+                    from = Some(self.order[piece.end - 1]);
+                    break;
+                }
+                let to = self.order[k];
+                let (value, next) = self.at(from, to, state);
+                gain += value - old_value;
+                self.log.push((position, (state, value)));
+                (state, from) = (Some(next), Some(to));
+                position += 1;
+                done += 1;
+            }
+        }
+        self.log.push((n, (state, 0.0)));
         gain
     }
 
     fn accept(&mut self) {
-        for change in &self.changes {
-            let points = &self.scratch[change.scratch..change.scratch + change.end - change.start];
-            self.order[change.start..change.end].copy_from_slice(points);
+        // What stays in its place is not moved; the far ends of a swap lie far apart.
+        self.scratch.clear();
+        let mut position = self.begin;
+        for piece in &self.pieces {
+            let length = piece.end - piece.start;
+            if piece.reversed || piece.start != position {
+                for done in 0..length {
+                    let k = if piece.reversed { piece.end - 1 - done } else { piece.start + done };
+                    self.scratch.push((self.order[k], self.known[k]));
+                }
+            }
+            position += length;
         }
-        for &(k, state, value) in &self.log {
-            (self.before[k], self.value[k]) = (state, value);
+        let (mut position, mut next) = (self.begin, 0);
+        for piece in &self.pieces {
+            let length = piece.end - piece.start;
+            if piece.reversed || piece.start != position {
+                for k in position..position + length {
+                    let (point, known) = self.scratch[next];
+                    (self.order[k], self.known[k], self.place[point]) = (point, known, k);
+                    next += 1;
+                }
+            }
+            position += length;
+        }
+        for &(k, known) in &self.log {
+            self.known[k] = known;
         }
     }
 
-    /// Prepares a random move.
+    fn set(&mut self, begin: usize, pieces: &[Piece]) {
+        self.begin = begin;
+        self.pieces.clear();
+        self.pieces.extend(pieces.iter().filter(|piece| piece.start < piece.end));
+    }
+
+    fn swap(&mut self, a: usize, b: usize) {
+        let (low, high) = (a.min(b), a.max(b));
+        if low < high {
+            let ends = [forward(high, high + 1), forward(low + 1, high), forward(low, low + 1)];
+            self.set(low, &ends);
+        }
+    }
+
+    /// Puts the stretch `start..end` before position `to`, which lies outside of it.
+    fn shift(&mut self, start: usize, end: usize, to: usize, reversed: bool) {
+        let stretch = Piece { start, end, reversed };
+        if to < start {
+            self.set(to, &[stretch, forward(to, start)]);
+        } else if to > end {
+            self.set(start, &[forward(end, to), stretch]);
+        } else if reversed {
+            self.set(start, &[stretch]);
+        }
+    }
+
+    /// Prepares a move; nothing where what was drawn changes nothing.
     fn propose(&mut self, random: &mut Pcg64Mcg) {
-        self.scratch.clear();
-        self.changes.clear();
+        self.pieces.clear();
         let n = self.order.len();
         let i = random.random_range(0..n);
-        let kind: u32 = random.random_range(0..10);
-        if kind < 4 {
-            let mut j = random.random_range(0..n - 1);
-            j += usize::from(j >= i);
-            let (low, high) = (i.min(j), i.max(j));
-            self.scratch.extend([self.order[high], self.order[low]]);
-            self.changes.push(Change { start: low, end: low + 1, scratch: 0 });
-            self.changes.push(Change { start: high, end: high + 1, scratch: 1 });
+        let kind: u32 = random.random_range(0..20);
+        if kind < 10 && self.guided(i, kind, random) {
             return;
         }
-        let reach = LONGEST_STRETCH.min(n - 1);
-        let j = (i + random.random_range(1..=reach)) % n;
-        let (low, high) = (i.min(j), i.max(j));
-        let high = high.min(low + LONGEST_STRETCH);
-        self.scratch.extend_from_slice(&self.order[low..=high]);
-        let length = high - low + 1;
-        if kind < 6 {
-            self.scratch.reverse();
-        } else {
-            let shifted = random.random_range(1..=3usize).min(length - 1);
-            if random.random::<bool>() {
-                self.scratch.rotate_left(shifted);
-                if kind == 9 {
-                    self.scratch[length - shifted..].reverse();
-                }
-            } else {
-                self.scratch.rotate_right(shifted);
-                if kind == 9 {
-                    self.scratch[..shifted].reverse();
+        match kind % 10 {
+            0..4 => {
+                let j = random.random_range(0..n);
+                self.swap(i, j);
+            }
+            4..6 => {
+                let end = (i + 2 + random.random_range(0..LONGEST_STRETCH)).min(n);
+                self.set(i, &[Piece { start: i, end, reversed: true }]);
+            }
+            _ => {
+                let end = (i + random.random_range(1..=3usize)).min(n);
+                let reach = LONGEST_STRETCH.min(n);
+                let to = if random.random::<bool>() {
+                    random.random_range(0..=n)
+                } else {
+                    (i + random.random_range(0..=2 * reach)).saturating_sub(reach).min(n)
+                };
+                if !(i..=end).contains(&to) {
+                    self.shift(i, end, to, kind.is_multiple_of(4));
                 }
             }
         }
-        self.changes.push(Change { start: low, end: high + 1, scratch: 0 });
+    }
+
+    /// A move after which the point at `i` is followed by one of its candidates.
+    fn guided(&mut self, i: usize, kind: u32, random: &mut Pcg64Mcg) -> bool {
+        let n = self.order.len();
+        let Some(to) = self.candidates.draw(self.order[i], random) else { return false };
+        let q = self.place[to];
+        if q == i + 1 || q == i {
+            return false;
+        }
+        // Mostly a few points, at times a long stretch: three cuts, no step reversed.
+        let length = match random.random_range(0..4u32) {
+            0 => random.random_range(1..=n),
+            _ => random.random_range(1..=3usize),
+        };
+        match kind % 3 {
+            0 if i + 1 < n => self.swap(i + 1, q),
+            // The stretch that begins with the candidate comes behind.
+            1 => {
+                let end = (q + length).min(if q < i { i } else { n });
+                self.shift(q, end, i + 1, false);
+            }
+            // The stretch that ends with this point goes before the candidate.
+            _ => {
+                let start = (i + 1).saturating_sub(length).max(if q < i { q + 1 } else { 0 });
+                self.shift(start, i + 1, q, false);
+            }
+        }
+        !self.pieces.is_empty()
     }
 
     fn run(

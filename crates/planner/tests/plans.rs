@@ -10,7 +10,7 @@ use mapper_physics::model::Model;
 use mapper_planner::chain::gradients_k;
 use mapper_planner::{
     Effort, Objective, PlanError, PlanRequest, Rejection, Repeats, VisitOrder, explain_jump, jump_graph,
-    make_plan, order_points, search,
+    make_plan, order_points, search, search_worst,
 };
 
 #[test]
@@ -55,8 +55,7 @@ fn known_figures_are_reached_on_the_simple_housing() {
     assert!((sum_of(&zigzag) - 640.0).abs() < 2.0 && (worst_of(&zigzag) - 14.6).abs() < 0.06);
     let effort = Effort::usual(points.len(), 0.3);
     let sum_k = sum_of(&search(&housing, &given, Objective::Sum, effort, 1));
-    let order = search(&housing, &given, Objective::Worst { softness_k: 4.0 }, effort, 1);
-    let worst_k = worst_of(&search(&housing, &order, Objective::Worst { softness_k: 1.0 }, effort, 1));
+    let worst_k = worst_of(&search_worst(&housing, &given, effort, 1));
     assert!(sum_k > 0.98 * 677.0 && worst_k > 0.98 * 25.6, "{sum_k} {worst_k}");
 }
 
@@ -122,7 +121,8 @@ fn repeats_are_the_same_jump_and_leave_every_point_in() {
 #[test]
 fn the_usual_repeat_is_a_jump_that_is_allowed() {
     let (model, points) = (Model::nominal(), grid());
-    let mut repeating = request(&model, &points, VisitOrder::GreedyGradient);
+    let mut repeating = request(&model, &points, VisitOrder::SumGradient);
+    repeating.effort = 0.1;
     repeating.repeats = Some(Repeats { jump: None, every_steps: 12, at_least: 2 });
     let jumps = |request: &PlanRequest<'_>| {
         let steps = make_plan(request).unwrap().steps;
@@ -138,8 +138,8 @@ fn the_usual_repeat_is_a_jump_that_is_allowed() {
     let (jump, count) = jumps(&repeating);
     assert_eq!(jump.map(|(from, to)| (from.speed_rpm, to.speed_rpm)), Some((50e3, 150e3)));
     assert!(count >= 2);
-    // Such a jump moves the housing by 27 K: under a limit of 15 K a shorter one is repeated.
-    repeating.limits.housing_gradient_max_k = Some(15.0);
+    // Such a jump moves the housing by more than 25 K: under that limit a shorter one is repeated.
+    repeating.limits.housing_gradient_max_k = Some(25.0);
     let (jump, count) = jumps(&repeating);
     let (from, to) = jump.unwrap();
     assert!(from.speed_rpm == 50e3 && to.speed_rpm < 150e3 && count >= 2, "{from} {to} {count}");

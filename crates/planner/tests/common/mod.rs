@@ -101,6 +101,10 @@ impl Chain for SimpleHousing {
         (left_k(110.0) - left_k(10.0), self.settled_k[to] + left_k(120.0))
     }
 
+    fn settled(&self, at: usize) -> f64 {
+        self.settled_k[at]
+    }
+
     fn alike(&self, a: f64, b: f64) -> bool {
         (a - b).abs() < 0.01
     }

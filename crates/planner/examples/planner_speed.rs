@@ -1,0 +1,93 @@
+//! Orders grids of any size on the nominal machine and says what that gives and takes.
+//!
+//! `planner_speed POINTS [ORDER] [EFFORT] [SEED]`: 18 is the grid of docs/planner.md, others are rectangular grids from
+//! 50 to 150 krpm and opening 0.5 to 2.5. Prints one line: points, order, effort, seed, sum, smallest, bounds, seconds.
+
+use mapper_core::OperatingPoint;
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_planner::{PlanLimits, PlanRequest, PlanTiming, SettleBands, VisitOrder, make_plan};
+use std::time::Instant;
+
+fn grid(points: usize) -> Vec<OperatingPoint> {
+    let (speeds, openings, widest) = match points {
+        18 => (6, vec![0.5, 0.7, 1.0], 1.0),
+        _ => {
+            let openings = ((points as f64).sqrt() * 0.7).round().max(1.0) as usize;
+            (points.div_ceil(openings), Vec::new(), 2.5)
+        }
+    };
+    let openings = if openings.is_empty() {
+        let count = points.div_ceil(speeds);
+        (0..count).map(|i| 0.5 + (widest - 0.5) * i as f64 / (count - 1).max(1) as f64).collect()
+    } else {
+        openings
+    };
+    let speed_rpm = |i: usize| 50e3 + 100e3 * i as f64 / (speeds - 1).max(1) as f64;
+    (0..speeds)
+        .flat_map(|i| {
+            openings
+                .iter()
+                .map(move |valve| OperatingPoint { speed_rpm: speed_rpm(i), valve_opening_ratio: *valve })
+        })
+        .take(points)
+        .collect()
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let count: usize = arguments.next().map_or(Ok(18), |text| text.parse())?;
+    let order = match arguments.next().as_deref() {
+        Some("worst_gradient") => VisitOrder::WorstGradient,
+        _ => VisitOrder::SumGradient,
+    };
+    let effort: f64 = arguments.next().map_or(Ok(1.0), |text| text.parse())?;
+    let seed: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    let (model, points) = (Model::nominal(), grid(count));
+    let request = PlanRequest {
+        campaign_name: "speed",
+        campaign_canonical: "{}",
+        model: &model,
+        boundary: BoundaryConditions::default(),
+        points: &points,
+        order,
+        timing: PlanTiming {
+            warm_up_s: 3600.0,
+            dwell_s: 120.0,
+            cool_down_s: 0.0,
+            window_start_s: Some(10.0),
+            window_end_s: Some(110.0),
+        },
+        settle_bands: SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 },
+        limits: PlanLimits {
+            speed_max_rpm: 180e3,
+            p3_min_pa: 110e3,
+            p3_max_pa: 500e3,
+            t3_max_k: None,
+            t2_max_k: None,
+            surge_margin_min_ratio: None,
+            surge_allowed_s: 5.0,
+            housing_gradient_max_k: None,
+            p3_slew_max_pa_s: None,
+        },
+        repeats: None,
+        required_sigma_eta: None,
+        method: None,
+        effort,
+        seed,
+    };
+    let started = Instant::now();
+    let plan = make_plan(&request)?;
+    let seconds = started.elapsed().as_secs_f64();
+    let bound =
+        plan.bound.map_or((f64::NAN, f64::NAN), |bound| (bound.sum_gradient_k, bound.worst_gradient_k));
+    println!(
+        "{count} points, {}, effort {effort}, seed {seed}: {:.1} K in all (bound {:.1}), {:.2} K at the least (bound {:.2}), {seconds:.2} s",
+        plan.objective,
+        plan.figures.sum_gradient_k,
+        bound.0,
+        plan.figures.worst_gradient_k.unwrap_or(f64::NAN),
+        bound.1,
+    );
+    Ok(())
+}

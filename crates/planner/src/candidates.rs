@@ -1,0 +1,75 @@
+//! Which successors of a point are worth a try.
+//!
+//! A nearly best assignment of successors, as if the housing settled at each point, prices points: what a jump is worth beyond
+//! the prices of both ends says how well it fits into a good order, where its bare worth would always name the same few
+//! extreme points.
+
+use crate::auction::prices;
+use crate::chain::Chain;
+use crate::objective::Objective;
+use rand::RngExt;
+use rand_pcg::Pcg64Mcg;
+
+/// Successors that are kept of each point.
+const KEPT: usize = 10;
+/// Above this many points there are no candidates: the table of weights grows with the square.
+pub(crate) const MOST_POINTS: usize = 4000;
+/// A jump that is not allowed is no worse than this many times the usual: the assignment needs finite weights.
+const LEAST_VALUE: f64 = -1e9;
+
+/// The best successors of each point of a chain.
+pub(crate) struct Candidates {
+    successors: Vec<Vec<usize>>,
+}
+
+impl Candidates {
+    pub(crate) fn of<C: Chain>(chain: &C, given: &[usize], objective: Objective) -> Self {
+        let n = given.len();
+        let mut successors = vec![Vec::new(); chain.len()];
+        if !(4..=MOST_POINTS).contains(&n) {
+            return Candidates { successors };
+        }
+        let mut weight = Vec::with_capacity(n * n);
+        for &from in given {
+            let state = chain.settled(from);
+            weight.extend(given.iter().map(|&to| {
+                if from == to {
+                    return LEAST_VALUE;
+                }
+                objective.value(chain, from, to, chain.step(from, to, state).0).max(LEAST_VALUE)
+            }));
+        }
+        let mut sizes: Vec<f64> =
+            weight.iter().copied().filter(|weight| *weight > 0.5 * LEAST_VALUE).collect();
+        let (smallest, largest) = (quantile(&mut sizes, 0.02), quantile(&mut sizes, 0.98));
+        let spread = (largest - smallest).max(1e-9);
+        let prices = prices(n, &weight, (0.2 * spread, 2e-3 * spread));
+        for (i, &from) in given.iter().enumerate() {
+            let mut rated: Vec<(f64, usize)> = (0..n)
+                .filter(|j| *j != i)
+                .map(|j| (prices.profit[i] + prices.price[j] - weight[n * i + j], given[j]))
+                .collect();
+            if rated.len() > KEPT {
+                rated.select_nth_unstable_by(KEPT, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                rated.truncate(KEPT);
+            }
+            rated.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            successors[from] = rated.into_iter().map(|(_, to)| to).collect();
+        }
+        Candidates { successors }
+    }
+
+    /// A successor of `from`; `None` where there are no candidates.
+    pub(crate) fn draw(&self, from: usize, random: &mut Pcg64Mcg) -> Option<usize> {
+        let successors = &self.successors[from];
+        (!successors.is_empty()).then(|| successors[random.random_range(0..successors.len())])
+    }
+}
+
+fn quantile(values: &mut [f64], share: f64) -> f64 {
+    let place = (share * values.len().saturating_sub(1) as f64).round() as usize;
+    if values.is_empty() {
+        return 0.0;
+    }
+    *values.select_nth_unstable_by(place, f64::total_cmp).1
+}

@@ -7,7 +7,7 @@ use crate::campaign::{
 };
 use crate::consistency::{beside, rounded};
 use crate::file::{
-    BoundaryFile, CampaignFile, DisplayFile, FormatName, GeometryFile, GridFile, IdentificationFile,
+    BoundaryFile, CampaignFile, DisplayFile, FollowerName, FormatName, GeometryFile, GridFile, IdentificationFile,
     LimitsFile, MachineFile, MapFile, MethodName, NamedReference, NamedRepeats, NusseltFile, OrderName,
     OutputsFile, PointFile, ReferenceFile, RepeatedJumpFile, RepeatsFile, ReportFile, SensorsFile, TapName,
     TimingFile, WindowFile,
@@ -15,6 +15,7 @@ use crate::file::{
 use crate::tree::{Step, steps};
 use crate::units::{Dimension, Fraction, Quantity};
 use mapper_core::{Channel, DeclaredUncertainty, Method, OperatingPoint, ReferenceState};
+use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::params::{BoundaryConditions, Params};
 use std::collections::{BTreeMap, HashSet};
 use std::io;
@@ -52,6 +53,7 @@ pub(crate) fn build(
         name: file.campaign,
         description: file.description,
         boundary: boundary(&file.boundary),
+        follow_outlet: follow_outlet(file.boundary.follow_outlet.as_deref().unwrap_or_default()),
         sensors: sensors(&file.sensors),
         backend: BackendChoice { name, settings },
         timing: timing(&file.timing),
@@ -187,6 +189,13 @@ fn boundary(file: &BoundaryFile) -> BoundaryConditions {
         oil_temperature_k: file.oil_temperature.inside,
         ambient_temperature_k: or(file.ambient_temperature, file.inlet_temperature.inside),
         valve_opening_ratio: 1.0,
+    }
+}
+
+fn follow_outlet(followers: &[FollowerName]) -> FollowOutlet {
+    FollowOutlet {
+        turbine_inlet: followers.contains(&FollowerName::TurbineInletTemperature),
+        oil: followers.contains(&FollowerName::OilTemperature),
     }
 }
 

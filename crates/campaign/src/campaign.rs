@@ -1,6 +1,7 @@
 //! A checked campaign, units resolved and defaults filled in.
 
 use mapper_core::{Channel, DeclaredUncertainty, Method, OperatingPoint, ReferenceState};
+use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::params::{BoundaryConditions, Params};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -19,6 +20,8 @@ pub struct Campaign {
     /// Boundary conditions. `p3_pa` and `valve_opening_ratio` are not the campaign's: they are
     /// the turbine outlet pressure (no flow) and 1 until the plan sets them.
     pub boundary: BoundaryConditions,
+    /// What is held at the compressor's outlet temperature of each point instead.
+    pub follow_outlet: FollowOutlet,
     /// Declared uncertainty of each channel that has a sensor.
     pub sensors: BTreeMap<Channel, SensorDeclaration>,
     /// The rig.

@@ -4,9 +4,9 @@ use crate::campaign::{Campaign, MapSource};
 use mapper_core::OperatingPoint;
 use mapper_physics::characteristic::CompressorCharacteristic;
 use mapper_physics::closed_form_map::ClosedFormMap;
+use mapper_physics::follow_outlet::hold_speed;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
-use mapper_physics::steady::hold_speed;
 use mapper_physics::tabulated_map::{MapError, TabulatedMap};
 use std::sync::Arc;
 
@@ -51,7 +51,7 @@ pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<Unreachable
 fn complaint(campaign: &Campaign, model: &Model, point: &OperatingPoint) -> Option<(String, &'static str)> {
     let limits = &campaign.limits;
     let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
-    let steady = match hold_speed(model, point.speed_rpm, &boundary) {
+    let steady = match hold_speed(model, point.speed_rpm, &boundary, campaign.follow_outlet) {
         Ok(steady) => steady,
         Err(error) => {
             return Some((

@@ -47,6 +47,7 @@ pub fn with_plan_request<T>(
         campaign_canonical: &canonical,
         model,
         boundary: campaign.boundary,
+        follow_outlet: campaign.follow_outlet,
         points: &campaign.points,
         order: match campaign.order {
             Order::SumGradient => VisitOrder::SumGradient,

@@ -265,6 +265,7 @@ fn bench(campaign: &Campaign, model: &Model) -> Bench {
         },
         model: model.clone(),
         boundary: campaign.boundary,
+        follow_outlet: campaign.follow_outlet,
         limits: StepLimits {
             speed_max_rpm: limits.speed_max_rpm,
             p3_min_pa: limits.p3_min_pa,

@@ -76,6 +76,7 @@ fn head_rows(campaign: &Campaign, plan: &Plan) -> Vec<(&'static str, String)> {
     let (display, report, boundary) = (Display::new(&campaign.display), &campaign.report, &campaign.boundary);
     let temperature = |k: f64| format!("{} {}", display.temperature(k), campaign.display.temperature);
     let pressure = |pa: f64| format!("{} {}", display.pressure(pa), campaign.display.pressure);
+    let follows = || "held at the compressor's outlet temperature".to_owned();
     let missing = || "not stated".to_owned();
     let reference = &campaign.reference;
     vec![
@@ -90,9 +91,15 @@ fn head_rows(campaign: &Campaign, plan: &Plan) -> Vec<(&'static str, String)> {
             report.humidity_ratio.map_or_else(missing, |ratio| format!("{:.0} %", 100.0 * ratio)),
         ),
         ("inlet (total)", format!("{}, {}", temperature(boundary.t1_k), pressure(boundary.p1_pa))),
-        ("turbine inlet temperature (total)", temperature(boundary.t3_k)),
+        (
+            "turbine inlet temperature (total)",
+            if campaign.follow_outlet.turbine_inlet { follows() } else { temperature(boundary.t3_k) },
+        ),
         ("turbine outlet pressure", pressure(boundary.p4_pa)),
-        ("oil temperature", temperature(boundary.oil_temperature_k)),
+        (
+            "oil temperature",
+            if campaign.follow_outlet.oil { follows() } else { temperature(boundary.oil_temperature_k) },
+        ),
         ("reference state of corrected quantities", reference.to_string()),
         (
             "identification",

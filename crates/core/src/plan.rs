@@ -139,6 +139,9 @@ pub struct Plan {
     /// How good the best order can be; `None` where the order was not searched for.
     #[serde(default)]
     pub bound: Option<PlanBound>,
+    /// What is not known of the bound, and why; `None` where all is known.
+    #[serde(default)]
+    pub bound_remark: Option<String>,
     /// What whoever runs the plan should know.
     #[serde(default)]
     pub remarks: Vec<String>,

@@ -4,6 +4,7 @@
 //! 50 to 150 krpm and opening 0.5 to 2.5. Prints one line: points, order, effort, seed, sum, smallest, bounds, seconds.
 
 use mapper_core::OperatingPoint;
+use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_planner::{PlanLimits, PlanRequest, PlanTiming, SettleBands, VisitOrder, make_plan};
@@ -49,6 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         campaign_canonical: "{}",
         model: &model,
         boundary: BoundaryConditions::default(),
+        follow_outlet: FollowOutlet::default(),
         points: &points,
         order,
         timing: PlanTiming {

@@ -160,8 +160,8 @@ fn walk(
             from: now.map(|(_, from)| points[from]),
             to,
             p3_pa: target.boundary.p3_pa,
-            t3_k: request.boundary.t3_k,
-            oil_temperature_k: request.boundary.oil_temperature_k,
+            t3_k: target.boundary.t3_k,
+            oil_temperature_k: target.boundary.oil_temperature_k,
             dwell_s,
             start_s,
             predicted: forecast.predicted,
@@ -238,9 +238,28 @@ fn finished(
         cool_down_s: request.timing.cool_down_s,
         remarks: remarks(request, &steps, repeated_to),
         figures,
+        bound_remark: bound_remark(request.order, bound.as_ref()),
         bound,
         steps,
     }
+}
+
+/// What is not known of how good an order could be.
+fn bound_remark(order: VisitOrder, bound: Option<&PlanBound>) -> Option<String> {
+    let text = match order {
+        VisitOrder::Listed | VisitOrder::GreedyGradient => "the order was not searched for",
+        VisitOrder::Time => {
+            "none is known for the shortest campaign: each dwell is chosen for itself, and bounds hold for one dwell alone"
+        }
+        VisitOrder::Information => {
+            "none is known for the predicted error of the efficiency; those of the gradients hold for any order"
+        }
+        VisitOrder::SumGradient | VisitOrder::WorstGradient if bound.is_none() => {
+            "none was worked out: more points than the bound's table takes, or a housing that stays within no box"
+        }
+        VisitOrder::SumGradient | VisitOrder::WorstGradient => return None,
+    };
+    Some(text.to_owned())
 }
 
 fn remarks(request: &PlanRequest<'_>, steps: &[PlanStep], repeated: Option<OperatingPoint>) -> Vec<String> {

@@ -2,9 +2,10 @@
 
 use crate::request::{PlanError, PlanLimits, PlanRequest, UnreachablePoint};
 use mapper_core::OperatingPoint;
+use mapper_physics::follow_outlet::hold_speed;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
-use mapper_physics::steady::{self, SteadyState};
+use mapper_physics::steady::SteadyState;
 
 /// Steady states of `points`, or all that cannot be measured, each with all limits in its way.
 pub(crate) fn reachable(
@@ -16,7 +17,7 @@ pub(crate) fn reachable(
     for &point in points {
         let boundary =
             BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..request.boundary };
-        match steady::hold_speed(request.model, point.speed_rpm, &boundary) {
+        match hold_speed(request.model, point.speed_rpm, &boundary, request.follow_outlet) {
             Ok(target) => {
                 let reasons = violated_limits(request.model, &request.limits, point, &target);
                 if reasons.is_empty() {

@@ -2,6 +2,7 @@
 
 use crate::method::PredictedMethod;
 use mapper_core::OperatingPoint;
+use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::simulate::SimulationError;
@@ -109,6 +110,8 @@ pub struct PlanRequest<'a> {
     pub model: &'a Model,
     /// Nominal boundary conditions; P3 and valve are the plan's.
     pub boundary: BoundaryConditions,
+    /// What is held at the outlet temperature of each point instead.
+    pub follow_outlet: FollowOutlet,
     /// The points, in listed order.
     pub points: &'a [OperatingPoint],
     /// How they are ordered.

@@ -14,6 +14,8 @@ use rand_pcg::Pcg64Mcg;
 /// Longest stretch that is reversed or shifted over: longer ones cost as much as they rarely gain.
 const LONGEST_STRETCH: usize = 50;
 
+/// Above this many points one start is all that a minute allows.
+const MANY_POINTS: usize = 500;
 /// Targets that a search for the largest smallest gradient sets itself.
 const TARGETS: u64 = 10;
 /// How much the second target lies above what the first has given, over the mean gradient of a greedy order; a target that
@@ -36,7 +38,7 @@ impl Effort {
         let (moves, starts) = match points {
             // Few points: many short starts find more than few long ones.
             0..=40 => (60_000.0, 16),
-            41..=500 => (20_000.0 * points as f64, 2),
+            41..=MANY_POINTS => (20_000.0 * points as f64, 2),
             _ => (10_000.0 * points as f64, 1),
         };
         Effort { moves: (moves * factor.clamp(0.0, 1e4)) as u64, starts }
@@ -85,7 +87,9 @@ pub fn search_worst<C: Chain>(chain: &C, given: &[usize], effort: Effort, seed: 
     let mean_k = mean_k.min(chain.gradient_max_k());
     let candidates = Candidates::of(chain, given, Objective::Worst { target_k: mean_k });
     let (mut best_k, mut rise_k) = (worst_k(&order), mean_k);
-    let each = Effort { moves: effort.moves * u64::from(effort.starts.max(1)) / TARGETS, starts: 1 };
+    // Many points need more moves to agree on the smallest gradient than on their sum.
+    let times = if given.len() > MANY_POINTS { 2 } else { 1 } * u64::from(effort.starts.max(1));
+    let each = Effort { moves: effort.moves.saturating_mul(times) / TARGETS, starts: 1 };
     for round in 0..TARGETS {
         let objective = Objective::Worst { target_k: best_k.max(0.0) + rise_k };
         let found = search_among(chain, &candidates, &order, objective, each, seed.wrapping_add(round));

@@ -59,6 +59,7 @@ fn plan() -> Plan {
             minutes: 1.0,
         },
         bound: None,
+        bound_remark: None,
         remarks: Vec::new(),
     }
 }

@@ -1,9 +1,10 @@
 //! What a script may do and know: the campaign's points, times and limits, and the nominal machine that judges points.
 
 use mapper_core::OperatingPoint;
+use mapper_physics::follow_outlet::{FollowOutlet, hold_speed};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
-use mapper_physics::steady::{SteadyState, hold_speed};
+use mapper_physics::steady::SteadyState;
 
 /// Asks the planner for the order of a set of points; the error is a sentence for people.
 pub type OrderPoints = Box<dyn Fn(&[OperatingPoint]) -> Result<Vec<OperatingPoint>, String> + Send>;
@@ -52,6 +53,8 @@ pub struct Bench {
     pub model: Model,
     /// Nominal boundary conditions; P3 and valve are the steps'.
     pub boundary: BoundaryConditions,
+    /// What is held at the outlet temperature of each point instead.
+    pub follow_outlet: FollowOutlet,
     /// What no step may leave.
     pub limits: StepLimits,
     /// The planner.
@@ -87,18 +90,19 @@ impl Bench {
             let what = format!("is outside the valve's range, above 0 to {OPENING_MAX_RATIO}");
             return refuse(what, "choose an opening within the range");
         }
-        if let Some(limit_k) = limits.t3_max_k.filter(|limit_k| self.boundary.t3_k > *limit_k) {
-            let what =
-                format!("has T3 = {:.1} K, above the campaign's limit of {limit_k:.1} K", self.boundary.t3_k);
-            return refuse(what, "lower `boundary.turbine_inlet_temperature` of the campaign");
-        }
         let boundary = BoundaryConditions { valve_opening_ratio: opening, ..self.boundary };
-        let steady = match hold_speed(&self.model, point.speed_rpm, &boundary) {
+        let steady = match hold_speed(&self.model, point.speed_rpm, &boundary, self.follow_outlet) {
             Ok(steady) => steady,
             Err(error) => {
                 return refuse(format!("cannot be held: {error}"), "choose another speed or opening");
             }
         };
+        let t3_k = steady.boundary.t3_k;
+        if let Some(limit_k) = limits.t3_max_k.filter(|limit_k| t3_k > *limit_k) {
+            let what =
+                format!("has T3 = {:.1} K, above the campaign's limit of {limit_k:.1} K", t3_k);
+            return refuse(what, "lower `boundary.turbine_inlet_temperature` of the campaign");
+        }
         let p3_pa = steady.boundary.p3_pa;
         if !(limits.p3_min_pa..=limits.p3_max_pa).contains(&p3_pa) {
             let what = format!(

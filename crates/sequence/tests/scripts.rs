@@ -21,6 +21,7 @@ fn bench() -> Bench {
         settle_bands: SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 },
         model: Model::nominal(),
         boundary: BoundaryConditions::default(),
+        follow_outlet: mapper_physics::follow_outlet::FollowOutlet::default(),
         limits: StepLimits {
             speed_max_rpm: 180e3,
             p3_min_pa: 120e3,

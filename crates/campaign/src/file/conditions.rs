@@ -26,6 +26,17 @@ pub(crate) struct BoundaryFile {
     /// Oil inlet temperature.
     #[schemars(extend("x-min" = "230 K", "x-max" = "450 K"), example = &"50 degC")]
     pub oil_temperature: Quantity<Temperature>,
+    /// What is held at the compressor's outlet temperature instead, at each point at that of the nominal machine settled there: `[turbine_inlet_temperature, oil_temperature]` for adiabatic mapping. Nothing where none is given.
+    #[schemars(extend("uniqueItems" = true, "examples" = [["turbine_inlet_temperature", "oil_temperature"]]))]
+    pub follow_outlet: Option<Vec<FollowerName>>,
+}
+
+/// What may follow the compressor's outlet temperature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum FollowerName {
+    TurbineInletTemperature,
+    OilTemperature,
 }
 
 /// How long things take.

@@ -179,7 +179,7 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
         "sigma_h %".to_owned(),
         "settles s".to_owned(),
         "min".to_owned(),
-        "done after".to_owned(),
+        "ETA".to_owned(),
     ]);
     for step in &plan.steps {
         let predicted = &step.predicted;
@@ -201,7 +201,7 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
             percent(predicted.sigma_h_rel, 1),
             number(predicted.settle_s, 1),
             format!("{:.1}", predicted.minutes),
-            table::duration(step.start_s + step.dwell_s),
+            table::eta(step.start_s + step.dwell_s),
         ]);
     }
     let figures = &plan.figures;
@@ -234,6 +234,9 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
     }
     if let Some(bound) = &plan.bound {
         text.push_str(&bound_text(bound));
+    }
+    if let Some(remark) = &plan.bound_remark {
+        let _ = writeln!(text, "Bound: {remark}.");
     }
     for remark in &plan.remarks {
         let _ = writeln!(text, "Note: {remark}.");

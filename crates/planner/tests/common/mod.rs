@@ -1,6 +1,7 @@
 //! The grid of docs/planner.md, a request, and a housing with one time constant per point.
 
 use mapper_core::OperatingPoint;
+use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::{air, housing, steady};
@@ -22,6 +23,7 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
         campaign_canonical: "{}",
         model,
         boundary: BoundaryConditions::default(),
+        follow_outlet: FollowOutlet::default(),
         points,
         order,
         timing: PlanTiming {

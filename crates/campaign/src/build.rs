@@ -7,10 +7,10 @@ use crate::campaign::{
 };
 use crate::consistency::{beside, rounded};
 use crate::file::{
-    BoundaryFile, CampaignFile, DisplayFile, FollowerName, FormatName, GeometryFile, GridFile, IdentificationFile,
-    LimitsFile, MachineFile, MapFile, MethodName, NamedReference, NamedRepeats, NusseltFile, OrderName,
-    OutputsFile, PointFile, ReferenceFile, RepeatedJumpFile, RepeatsFile, ReportFile, SensorsFile, TapName,
-    TimingFile, WindowFile,
+    BoundaryFile, CampaignFile, DisplayFile, FollowerName, FormatName, GeometryFile, GridFile,
+    IdentificationFile, LimitsFile, MachineFile, MapFile, MethodName, NamedReference, NamedRepeats,
+    NusseltFile, OrderName, OutputsFile, PointFile, ReferenceFile, RepeatedJumpFile, RepeatsFile, ReportFile,
+    SensorsFile, TapName, TimingFile, WindowFile,
 };
 use crate::tree::{Step, steps};
 use crate::units::{Dimension, Fraction, Quantity};

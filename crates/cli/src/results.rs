@@ -11,7 +11,6 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{DisplayUnits, OutputFormat};
 use mapper_core::{IdentifiedPoint, Plan, StepKind, Verdict};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_runner::RunEnd;
 use mapper_score::{ScoreSummary, ScoredPoint};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -35,7 +34,7 @@ pub struct Results {
 pub fn make(
     campaign: &Campaign,
     plan: &Plan,
-    end: &RunEnd,
+    outcome: &str,
     directory: &Path,
     recording: &Path,
 ) -> Result<Results, Failure> {
@@ -79,7 +78,7 @@ pub fn make(
     let text = test_report::markdown(
         campaign,
         plan,
-        end,
+        outcome,
         &read.recording.events,
         &points,
         &repeats,

@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 pub const RECORDING: &str = "recording.mcap";
 /// The plan that was run.
 pub const PLAN: &str = "plan.json";
+/// The steps that a sequence script has made of the run.
+pub const EXECUTED: &str = "executed_plan.json";
 /// The campaign as it was read.
 pub const CAMPAIGN: &str = "campaign.yaml";
 /// The sequence script, where there is one.

@@ -5,7 +5,6 @@ use crate::results::{score_text, step_name, verdict_word};
 use crate::table::{self, Display, number};
 use mapper_campaign::Campaign;
 use mapper_core::{Event, Plan};
-use mapper_runner::RunEnd;
 use mapper_score::{ScoreSummary, ScoredPoint};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -16,7 +15,7 @@ use std::path::PathBuf;
 pub fn markdown(
     campaign: &Campaign,
     plan: &Plan,
-    end: &RunEnd,
+    outcome: &str,
     events: &[Event],
     points: &[ScoredPoint],
     repeats: &[RepeatedJump],
@@ -25,15 +24,6 @@ pub fn markdown(
 ) -> String {
     // Writing to a String cannot fail, here and below.
     let mut text = format!("# Compressor map of {}\n\n", campaign.machine.name);
-    let outcome = match end {
-        RunEnd::Completed => "Completed.".to_owned(),
-        RunEnd::Interrupted { t_s } => {
-            format!("Stopped by the operator at {t_s:.0} s: the map is not complete.")
-        }
-        RunEnd::Tripped(trip) => {
-            format!("Stopped by a guard at {:.1} s ({}): the map is not complete.", trip.t_s, trip.reason)
-        }
-    };
     let _ = writeln!(text, "{outcome}\n");
     if map.contains_key("svg") {
         text.push_str("![map](map.svg)\n\n");

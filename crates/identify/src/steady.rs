@@ -10,6 +10,10 @@ use crate::samples::{Samples, mean};
 use mapper_core::{Channel, EstimateUncertainty, Recording, Window};
 use mapper_physics::compression::isentropic_rise_ratio;
 
+/// Stretch at the end of a step over which temperatures must not drift, s: noise of 0.1 K leaves their slope uncertain by
+/// less than 0.1 K/min then.
+const DRIFT_SPAN_S: f64 = 60.0;
+
 /// Means over the end of a step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Means {
@@ -83,10 +87,10 @@ pub(crate) fn estimate(
         return estimate;
     }
     let uncertainty = uncertainty(&means, &samples, config);
-    for (name, change_k) in [("T2", estimate.dt2_k), ("Tc", estimate.dtc_k)] {
-        let seconds = window.end_s - window.start_s - limits.end_mean_s;
-        let Some(change_k) = change_k.filter(|_| seconds > 0.0) else { continue };
-        let drift_k_min = 60.0 * change_k / seconds;
+    let trend_window = Window { start_s: (step.end_s - DRIFT_SPAN_S).max(step.start_s), end_s: step.end_s };
+    let trend = Samples::of(recording, trend_window, config, false);
+    for (name, column) in [("T2", &trend.t2_k), ("Tc", &trend.tc_k)] {
+        let Some(drift_k_min) = slope_per_s(&trend.t_s, column).map(|slope| 60.0 * slope) else { continue };
         if drift_k_min.abs() > limits.steady_drift_k_min {
             let message = format!(
                 "{name} still drifts by {drift_k_min:+.2} K/min at the step's end (limit {:.2}): the temperatures have not settled",
@@ -111,6 +115,17 @@ pub(crate) fn estimate(
     }
     estimate.eta = Some((eta, Some(uncertainty)));
     estimate
+}
+
+/// Least-squares slope of a column, 1/s; `None` without two finite samples.
+fn slope_per_s(t_s: &[f64], values: &[f64]) -> Option<f64> {
+    let usable = || t_s.iter().zip(values).filter(|(_, value)| value.is_finite());
+    let count = usable().count() as f64;
+    let (mean_t, mean) = usable().fold((0.0, 0.0), |(t, v), (a, b)| (t + a / count, v + b / count));
+    let (top, bottom) = usable().fold((0.0, 0.0), |(top, bottom), (t, value)| {
+        (top + (t - mean_t) * (value - mean), bottom + (t - mean_t) * (t - mean_t))
+    });
+    (bottom > 0.0).then(|| top / bottom)
 }
 
 /// Noise from the scatter of the samples' own efficiencies (or the declared noise where that is more), offsets and

@@ -48,7 +48,9 @@ pub fn hold_speed(
         let held = steady::hold_speed(model, speed_rpm, &boundary)?;
         let outlet_k = held.outputs.t2_k;
         let off_k = |follows: bool, value_k: f64| if follows { (outlet_k - value_k).abs() } else { 0.0 };
-        if off_k(follow.turbine_inlet, boundary.t3_k).max(off_k(follow.oil, boundary.oil_temperature_k)) < AGREED_K {
+        if off_k(follow.turbine_inlet, boundary.t3_k).max(off_k(follow.oil, boundary.oil_temperature_k))
+            < AGREED_K
+        {
             return Ok(held);
         }
         if follow.turbine_inlet {

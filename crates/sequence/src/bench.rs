@@ -99,8 +99,7 @@ impl Bench {
         };
         let t3_k = steady.boundary.t3_k;
         if let Some(limit_k) = limits.t3_max_k.filter(|limit_k| t3_k > *limit_k) {
-            let what =
-                format!("has T3 = {:.1} K, above the campaign's limit of {limit_k:.1} K", t3_k);
+            let what = format!("has T3 = {:.1} K, above the campaign's limit of {limit_k:.1} K", t3_k);
             return refuse(what, "lower `boundary.turbine_inlet_temperature` of the campaign");
         }
         let p3_pa = steady.boundary.p3_pa;

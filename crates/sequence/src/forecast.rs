@@ -9,6 +9,10 @@ use mapper_physics::steady::SteadyState;
 
 /// Interval of the forecast's samples, s.
 const SAMPLE_S: f64 = 0.5;
+/// Windows that follow the settling begin at the earliest this long after the jump, s, as in identification.
+const EARLIEST_S: f64 = 10.0;
+/// Shortest useful window, s, as in identification.
+const SHORTEST_S: f64 = 30.0;
 /// Most samples of a forecast; longer steps are sampled more coarsely.
 const SAMPLE_LIMIT: f64 = 20_000.0;
 
@@ -110,7 +114,10 @@ fn run(
 fn predicted(bench: &Bench, samples: &[Sample], dwell_s: f64, has_jump: bool) -> Predicted {
     let settle_s = settle_s(bench, samples);
     let gradient = |value: fn(&Sample) -> f64| {
-        let (start_s, end_s) = bench.window_s.or(Some((settle_s?, dwell_s)))?;
+        let (start_s, end_s) = bench.window_s.unwrap_or_else(|| {
+            let latest_s = (dwell_s - SHORTEST_S).max(EARLIEST_S);
+            (settle_s.unwrap_or(latest_s).clamp(EARLIEST_S, latest_s), dwell_s)
+        });
         let at = |t_s: f64| samples.iter().min_by(|a, b| (a.t_s - t_s).abs().total_cmp(&(b.t_s - t_s).abs()));
         (has_jump && start_s < dwell_s).then(|| Some(value(at(end_s)?) - value(at(start_s)?))).flatten()
     };

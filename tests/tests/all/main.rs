@@ -10,6 +10,7 @@ mod help;
 mod interrupted;
 mod mistakes;
 mod pipes;
+mod plans;
 mod recordings;
 mod sequences;
 mod shipped_campaign;

@@ -116,6 +116,13 @@ fn a_script_that_throws_in_mid_run_leaves_a_safe_rig_and_the_recording() {
     let again = mapper(["identify".as_ref(), run.as_os_str(), "--json".as_ref()]).exits(0).json();
     let points = again["points"].as_array().unwrap();
     assert!((2..4).contains(&points.len()), "{} steps were recorded", points.len());
+    // What was recorded is there as a map and a report, and so are the steps that were made.
+    let report = std::fs::read_to_string(run.join("report.md")).unwrap();
+    assert!(report.contains("Stopped by a fault") && report.contains("too low"), "{report}");
+    assert!(run.join("map.json").is_file() && run.join("points.json").is_file());
+    let executed = std::fs::read_to_string(run.join("executed_plan.json")).unwrap();
+    let executed: Value = serde_json::from_str(&executed).unwrap();
+    assert_eq!(executed["steps"].as_array().unwrap().len(), points.len());
     // After the last step the rig was made safe and watched for 5 s: no more is blown into the turbine.
     let read =
         read_recording(&run.join("recording.mcap"), &ChannelMap::native(), &ReadOptions::default()).unwrap();

@@ -13,7 +13,9 @@ pub(crate) use choices::{
     DisplayFile, FormatName, IdentificationFile, MethodName, NamedRepeats, OrderName, OutputsFile,
     RepeatedJumpFile, RepeatsFile, ReportFile, WindowFile,
 };
-pub(crate) use conditions::{BoundaryFile, FollowerName, LimitsFile, NamedReference, ReferenceFile, TimingFile};
+pub(crate) use conditions::{
+    BoundaryFile, FollowerName, LimitsFile, NamedReference, ReferenceFile, TimingFile,
+};
 pub(crate) use grid::{GridFile, PointFile};
 pub(crate) use machine::{GeometryFile, MachineFile, MapFile, NusseltFile};
 pub(crate) use sensors::{CALIBRATED, SensorsFile, TapName};

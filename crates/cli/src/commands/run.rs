@@ -73,25 +73,22 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     };
     let (end, recorder) = drive(&campaign, &plan, steps, backend.as_mut(), Recorder::new(writer))?;
     let finished = recorder.finish();
-    if let Err(error) = &end {
-        // What was recorded before is still there; say what went wrong first.
-        return Err(Failure::new(
-            match error {
-                RunError::Backend(_) => Code::Rig,
-                RunError::Source(_) => Code::BadInput,
-                RunError::Observer(_) => Code::Failure,
-            },
-            format!("{error}\nThe recording up to then is {}.", recording.display()),
-        ));
+    if matches!(end, Ok(RunEnd::Completed)) {
+        finished.map_err(|error| Failure::new(Code::Failure, error))?;
     }
-    finished.map_err(|error| Failure::new(Code::Failure, error))?;
-
-    let end = end.unwrap_or(RunEnd::Completed);
-    let plan = scripted.map_or(plan, |steps| steps.executed(&made));
-    match results::make(&campaign, &plan, &end, &directory, &recording) {
+    let plan = scripted.map_or(Ok(plan), |steps| -> Result<Plan, Failure> {
+        let executed = steps.executed(&made);
+        let text = output::to_json(&executed)? + "\n";
+        output::write_new(&directory.join(run_directory::EXECUTED), text.as_bytes())?;
+        Ok(executed)
+    });
+    let completed = matches!(end, Ok(RunEnd::Completed));
+    // Whatever ended the run, what was recorded is identified.
+    let made = plan.and_then(|plan| results::make(&campaign, &plan, &outcome(&end), &directory, &recording));
+    match made {
         Ok(results) if arguments.json => output::print_json(&results.json())?,
         Ok(results) => output::print(&results.text(&campaign))?,
-        Err(failure) if end == RunEnd::Completed => return Err(failure),
+        Err(failure) if completed => return Err(failure),
         // Stopped before there was anything to identify: why it was stopped is what counts.
         Err(_) if arguments.json => {
             output::print_json(&json!({"run": directory, "recording": recording, "points": [], "map": {}}))?;
@@ -99,18 +96,45 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Err(_) => {}
     }
     match end {
-        RunEnd::Completed => Ok(()),
-        RunEnd::Interrupted { t_s } => Err(Failure::new(
+        Ok(RunEnd::Completed) => Ok(()),
+        Ok(RunEnd::Interrupted { t_s }) => Err(Failure::new(
             Code::Interrupted,
             format!("stopped by the operator at {t_s:.0} s; the rig is safe and the recording is kept"),
         )),
-        RunEnd::Tripped(trip) => Err(Failure::new(
+        Ok(RunEnd::Tripped(trip)) => Err(Failure::new(
             Code::Rig,
             format!(
                 "stopped at {:.1} s: {}; the rig is safe and the recording is kept",
                 trip.t_s, trip.reason
             ),
         )),
+        Err(error) => Err(Failure::new(
+            match error {
+                RunError::Backend(_) => Code::Rig,
+                RunError::Source(_) => Code::BadInput,
+                RunError::Observer(_) => Code::Failure,
+            },
+            format!("{error}\nThe recording up to then is {}.", recording.display()),
+        )),
+    }
+}
+
+/// How a run ended, for its report.
+fn outcome(end: &Result<RunEnd, RunError>) -> String {
+    match end {
+        Ok(RunEnd::Completed) => "Completed.".to_owned(),
+        Ok(RunEnd::Interrupted { t_s }) => {
+            format!("Stopped by the operator at {t_s:.0} s: the map is not complete.")
+        }
+        Ok(RunEnd::Tripped(trip)) => {
+            format!("Stopped by a guard at {:.1} s ({}): the map is not complete.", trip.t_s, trip.reason)
+        }
+        // A script's error shows its line below the first one.
+        Err(error) => {
+            let text = error.to_string();
+            let first = text.lines().next().unwrap_or_default();
+            format!("Stopped by a fault ({first}): the map is not complete.")
+        }
     }
 }
 

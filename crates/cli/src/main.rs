@@ -9,6 +9,7 @@ mod commands;
 mod drift;
 mod exit_code;
 mod failure;
+mod gap_arguments;
 mod interrupt;
 mod observers;
 mod output;

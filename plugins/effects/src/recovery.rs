@@ -1,0 +1,33 @@
+//! The T2 probe does not feel the whole total temperature.
+
+use crate::catalogued::{Catalogued, parameter};
+use mapper_physics::effect::Submodel;
+
+pub(crate) fn effect() -> Catalogued {
+    Catalogued::new(
+        "recovery",
+        "the T2 probe recovers only part of the gas's kinetic energy",
+        "T_tip tends to T2 - (1 - r) v^2/(2 cp), v = m/(rho A) in the outlet pipe",
+        "recovery factor of a probe: Moffat, Gas temperature measurement (1962)",
+        Submodel::T2Probe,
+        vec![parameter("recovery", "1", [0.0, 1.5], 1.0, -0.3)],
+        |values, rig| rig.model.params.t2_probe_recovery_ratio += values[0] - 1.0,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    /// Without recovery the probe reads v^2/(2 cp) less, v from the continuity of an ideal gas in a pipe of 35 mm.
+    #[test]
+    fn a_probe_without_recovery_reads_the_static_temperature() {
+        let at = Instant::with(&effect(), &[0.0]);
+        let density_kg_m3 = at.state.p2_pa / (287.05 * at.outputs.t2_k);
+        let velocity_m_s = at.outputs.flow_kg_s / (density_kg_m3 * std::f64::consts::PI / 4.0 * 0.035 * 0.035);
+        let cp = 1002.5 + 275e-6 * (at.outputs.t2_k - 200.0).powi(2);
+        let missing_k = velocity_m_s * velocity_m_s / (2.0 * cp);
+        assert!((at.outputs.t2_k - at.outputs.t2_probe_k - missing_k).abs() < 1e-9 && missing_k > 0.1);
+    }
+}

@@ -88,7 +88,7 @@ pub fn with_plan_request<T>(
         }),
         required_sigma_eta: campaign.required_sigma_eta,
         method: match campaign.identification.method {
-            Method::Dynamic => Some(&dynamic),
+            Method::Dynamic | Method::Joint => Some(&dynamic),
             Method::Steady => None,
         },
         effort: 1.0,

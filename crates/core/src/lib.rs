@@ -22,6 +22,7 @@ mod recording;
 mod reference_state;
 mod sample;
 mod step_marker;
+mod thermal_model;
 
 pub use backend::{Backend, BackendError, RigDescription, RigMode, Setpoints};
 pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
@@ -38,3 +39,4 @@ pub use recording::{Recording, RecordingError, Series};
 pub use reference_state::ReferenceState;
 pub use sample::{ChannelColumn, SampleBatch, TruthColumn};
 pub use step_marker::StepMarker;
+pub use thermal_model::{ConvectionLaw, Entangled, Origin, SharedValue, ThermalModel};

@@ -18,7 +18,7 @@ pub(crate) fn export(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
 pub(crate) fn efficiency_name(method: Method) -> &'static str {
     match method {
         Method::Steady => "apparent: heat transfer not removed",
-        Method::Dynamic => "adiabatic: heat transfer removed",
+        Method::Dynamic | Method::Joint => "adiabatic: heat transfer removed",
     }
 }
 
@@ -69,7 +69,7 @@ pub fn map_panel(map: &CompressorMap) -> Panel {
 fn efficiency_panel(map: &CompressorMap) -> Panel {
     let name = match map.method {
         Method::Steady => "apparent efficiency, %",
-        Method::Dynamic => "adiabatic efficiency, %",
+        Method::Dynamic | Method::Joint => "adiabatic efficiency, %",
     };
     let mut panel = Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new(name))
         .title("(b) efficiency with its 95 % interval");

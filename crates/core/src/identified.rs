@@ -13,6 +13,8 @@ pub enum Method {
     Dynamic,
     /// All points of a campaign together: as `Dynamic`, with what they share fitted over all of them.
     Joint,
+    /// Read from a map that says nothing of how its efficiency was found.
+    Imported,
 }
 
 impl std::fmt::Display for Method {
@@ -21,6 +23,7 @@ impl std::fmt::Display for Method {
             Method::Steady => "steady",
             Method::Dynamic => "dynamic",
             Method::Joint => "joint",
+            Method::Imported => "imported",
         })
     }
 }

@@ -18,6 +18,7 @@ pub mod orifice;
 pub mod params;
 pub mod pressure_tap;
 pub mod rosenbrock;
+pub mod similarity;
 pub mod simulate;
 pub mod standstill;
 pub mod steady;

@@ -17,7 +17,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-sequence",  &["core", "physics", "units"]),
     ("mapper-record",    &["core", "units"]),
     ("mapper-identify",  &["core", "physics"]),
-    ("mapper-assemble",  &["core", "identify"]),
+    ("mapper-assemble",  &["core", "physics", "identify"]),
     ("mapper-score",     &["core", "record"]),
     ("mapper-reproduce", &["core", "physics", "identify", "chart"]),
     // Plug-ins never see each other.

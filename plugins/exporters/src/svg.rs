@@ -19,6 +19,7 @@ pub(crate) fn efficiency_name(method: Method) -> &'static str {
     match method {
         Method::Steady => "apparent: heat transfer not removed",
         Method::Dynamic | Method::Joint => "adiabatic: heat transfer removed",
+        Method::Imported => "as the map file has it",
     }
 }
 
@@ -70,6 +71,7 @@ fn efficiency_panel(map: &CompressorMap) -> Panel {
     let name = match map.method {
         Method::Steady => "apparent efficiency, %",
         Method::Dynamic | Method::Joint => "adiabatic efficiency, %",
+        Method::Imported => "isentropic efficiency, %",
     };
     let mut panel = Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new(name))
         .title("(b) efficiency with its 95 % interval");

@@ -23,8 +23,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Plug-ins never see each other.
     ("mapper-backends",  &["core", "physics", "units"]),
     ("mapper-exporters", &["core", "physics", "chart"]),
+    ("mapper-importers", &["core", "physics"]),
     // The program sees all; nothing sees the program.
-    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "reproduce", "backends", "exporters"]),
+    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "reproduce", "backends", "exporters", "importers"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

@@ -8,12 +8,14 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod assemble;
+mod compare;
 mod error;
 mod grouping;
 mod map_fit;
 mod repeats;
 
 pub use assemble::assemble;
+pub use compare::{ComparedLine, ComparedPlace, MapComparison, compare};
 pub use error::AssembleError;
 pub use grouping::Grouping;
 pub use map_fit::{MapFit, MapFitError, MapFitOptions, NearestPlace, fit_map, leave_out};

@@ -335,11 +335,18 @@ fn limits(file: &LimitsFile) -> Limits {
 }
 
 fn outputs(file: OutputsFile) -> Outputs {
-    let all = vec![FormatName::Csv, FormatName::Json, FormatName::Svg];
-    let formats = file.formats.unwrap_or(all).into_iter().map(|format| match format {
+    let usual = vec![FormatName::Csv, FormatName::Json, FormatName::Svg, FormatName::Fitted];
+    let formats = file.formats.unwrap_or(usual).into_iter().map(|format| match format {
         FormatName::Csv => OutputFormat::Csv,
         FormatName::Json => OutputFormat::Json,
         FormatName::Svg => OutputFormat::Svg,
+        FormatName::Png => OutputFormat::Png,
+        FormatName::Sae => OutputFormat::Sae,
+        FormatName::Fitted => OutputFormat::Fitted,
+        FormatName::Modelica => OutputFormat::Modelica,
+        FormatName::Simscape => OutputFormat::Simscape,
+        FormatName::Npss => OutputFormat::Npss,
+        FormatName::Pycycle => OutputFormat::Pycycle,
     });
     Outputs { directory: file.directory.unwrap_or_else(|| "runs".into()), formats: formats.collect() }
 }

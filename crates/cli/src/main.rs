@@ -10,6 +10,8 @@ mod drift;
 mod exit_code;
 mod failure;
 mod interrupt;
+mod map_comparison_picture;
+mod map_file;
 mod observers;
 mod output;
 mod plan_picture;

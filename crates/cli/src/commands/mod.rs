@@ -2,13 +2,16 @@
 
 mod check;
 mod identify;
+mod map_compare;
+mod map_convert;
+mod map_fit;
 mod plan;
 mod reproduce;
 mod run;
 mod schema;
 mod scripted;
 
-use crate::arguments::{Arguments, Command};
+use crate::arguments::{Arguments, Command, MapCommand};
 use crate::failure::Failure;
 
 /// Runs the command that was asked for.
@@ -20,5 +23,10 @@ pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
         Command::Run(arguments) => run::run(arguments),
         Command::Identify(arguments) => identify::identify(arguments),
         Command::Reproduce(arguments) => reproduce::reproduce(arguments),
+        Command::Map(arguments) => match &arguments.command {
+            MapCommand::Fit(arguments) => map_fit::fit(arguments),
+            MapCommand::Convert(arguments) => map_convert::convert(arguments),
+            MapCommand::Compare(arguments) => map_compare::compare(arguments),
+        },
     }
 }

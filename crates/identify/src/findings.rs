@@ -55,6 +55,16 @@ impl Findings {
         self.warnings.push(Warning { code: code.to_owned(), message });
     }
 
+    /// Adds what another has found.
+    pub(crate) fn take(&mut self, other: Findings) {
+        self.warnings.extend(other.warnings);
+        self.verdict = match (self.verdict, other.verdict) {
+            (Verdict::Unusable, _) | (_, Verdict::Unusable) => Verdict::Unusable,
+            (Verdict::Doubtful, _) | (_, Verdict::Doubtful) => Verdict::Doubtful,
+            _ => Verdict::Good,
+        };
+    }
+
     pub(crate) fn doubt(&mut self, code: &str, message: String) {
         self.remark(code, message);
         if self.verdict == Verdict::Good {

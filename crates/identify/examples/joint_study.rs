@@ -19,7 +19,7 @@ fn main() {
     for seed in 0..seeds {
         let mut rng = Pcg64::seed_from_u64(seed);
         let (recording, declared) = measured(&clean.recording, noise, offset, &mut rng);
-        let mut config = IdentifyConfig { method: Method::Joint, window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 }, ..IdentifyConfig::default() };
+        let mut config = IdentifyConfig { method: Method::Joint, window: WindowRule::Fixed { start_s: arg(7, 10.0), end_s: arg(8, 110.0) }, ..IdentifyConfig::default() };
         if noise + offset > 0.0 { config.declared = declared; }
         let found = identify_recording(&recording, &config).unwrap();
         let dynamic = identify_recording(&recording, &IdentifyConfig { method: Method::Dynamic, ..config.clone() }).unwrap();
@@ -40,9 +40,9 @@ fn main() {
             }
         }
         println!("seed {seed}: rms joint {:.3} dyn {:.3} points, held {:.2}", 100.0 * f64::sqrt(rms / n), 100.0 * f64::sqrt(rmsd / n), held / n);
-        if let Some((shared, errors)) = &found.shared {
-            for (i, e) in errors { if *i < 11 { print!("[{i}] {:.5}±{:.5} ", shared[*i], e); } }
-            println!();
+        if let Some(t) = &found.thermal {
+            let show = |v: &mapper_core::SharedValue| format!("{:?}±{:.5}", v.value, v.uncertainty.combined_standard_error());
+            println!("[] law {:?} alpha {} probe {} f {} doubts {:?} offsets {:?}", t.convection.map(|c| (c.exponent.value, c.exponent.uncertainty.combined_standard_error(), c.deviation_ratio)), show(&t.alpha_area_ratio), show(&t.probe_diameter_m), show(&t.direction_factor), t.doubts, t.offsets.values().map(|v| v.value.unwrap_or(0.0)).collect::<Vec<_>>());
         }
     }
 }

@@ -34,6 +34,16 @@ pub mod code {
     pub const NO_COMPRESSION: &str = "no_compression";
     /// No sensor uncertainty was declared.
     pub const NOTHING_DECLARED: &str = "nothing_declared";
+    /// A noisy channel stood still.
+    pub const STUCK: &str = "stuck";
+    /// The step has no say in what the points share (joint method).
+    pub const LEFT_OUT: &str = "left_out";
+    /// The point's h is far off the law of the others (joint method).
+    pub const OFF_THE_LAW: &str = "off_the_law";
+    /// Something speaks against the joint model as a whole.
+    pub const MODEL_DOUBTED: &str = "model_doubted";
+    /// The step has no transient of its own: its efficiency rests on what is shared (joint method).
+    pub const THROUGH_THE_LAW: &str = "through_the_law";
     /// Part of the state at the step's end is not from its last seconds.
     pub const END_STATE: &str = "end_state";
 }

@@ -4,7 +4,7 @@ use crate::dynamic::Estimate;
 use crate::end_state::{EndState, end_state};
 use crate::findings::Findings;
 use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, WindowRule, dynamic, joint, steady};
-use mapper_core::{Channel, EstimateUncertainty, IdentifiedPoint, Method, Recording, StepMarker, confidence_interval_95};
+use mapper_core::{Channel, EstimateUncertainty, IdentifiedPoint, Method, Recording, StepMarker, ThermalModel, confidence_interval_95};
 
 /// Identifies every step of a recording, in order. Steps of which not even the place on the map is known are left
 /// out; [`identify_each`] says which and why.
@@ -38,8 +38,8 @@ pub fn identify_each(
 pub struct Identified {
     /// One for each step, in order; with the reason where a step gives no point.
     pub points: Vec<Result<IdentifiedPoint, StepError>>,
-    /// Debug.
-    pub shared: Option<(Vec<f64>, Vec<(usize, f64)>)>,
+    /// What the points share; `None` where the method finds nothing of the kind.
+    pub thermal: Option<ThermalModel>,
 }
 
 /// As [`identify_each`], with what the points share (joint method alone).
@@ -79,12 +79,12 @@ pub fn identify_recording(recording: &Recording, config: &IdentifyConfig) -> Res
             end_state(recording, step, config, findings)
         })
         .collect();
-    let mut shared = None;
+    let mut thermal = None;
     let estimates: Vec<Estimate> = match config.method {
         Method::Joint => {
             let known: Vec<Option<EndState>> = states.iter().map(|state| state.as_ref().ok().copied()).collect();
             let joint = joint::estimate(recording, &known, config, &mut findings);
-            shared = joint.shared.map(|(a, b)| (a.to_vec(), b));
+            thermal = joint.thermal;
             joint.estimates
         }
         method => findings
@@ -105,7 +105,7 @@ pub fn identify_recording(recording: &Recording, config: &IdentifyConfig) -> Res
         .zip(findings)
         .map(|(((step, state), estimate), findings)| Ok(point(step, &state?, &estimate, findings, config)))
         .collect();
-    Ok(Identified { points, shared })
+    Ok(Identified { points, thermal })
 }
 
 fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {

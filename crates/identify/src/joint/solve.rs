@@ -74,6 +74,18 @@ pub(crate) struct Covariance {
     pub(crate) own: Vec<(Matrix4<f64>, Matrix4xX<f64>)>,
 }
 
+impl Covariance {
+    /// Where a shared parameter stands; `None` where it was not fitted.
+    pub(crate) fn row_of(&self, index: usize) -> Option<usize> {
+        self.fitted.iter().position(|fitted| *fitted == index)
+    }
+
+    /// Standard error of a shared parameter.
+    pub(crate) fn error_of(&self, index: usize) -> Option<f64> {
+        self.row_of(index).map(|row| self.shared[(row, row)].max(0.0).sqrt())
+    }
+}
+
 impl Problem<'_> {
     fn fitted(&self) -> Vec<usize> {
         (0..SHARED).filter(|index| self.active[*index]).collect()

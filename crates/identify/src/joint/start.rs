@@ -2,7 +2,8 @@
 
 use crate::dynamic::{self, Estimate};
 use crate::end_state::EndState;
-use crate::findings::Findings;
+use crate::findings::{Findings, code};
+use crate::joint::cleaning::cleaned;
 use crate::joint::explained::{self, Explained};
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
@@ -15,10 +16,17 @@ use crate::joint::solve::{Member, Problem};
 use crate::joint::surface::{SurfaceScale, TERM_COUNT, dot};
 use crate::joint::whitening::Whitening;
 use crate::samples::Samples;
-use crate::{IdentifyConfig, window};
-use mapper_core::{Channel, Recording};
+use crate::{IdentifyConfig, jump};
+use mapper_core::{Channel, Recording, Window};
 use mapper_physics::air;
 
+/// Start of what is used of a step, after the last change of a command, s: h and efficiency are followed while the
+/// operating point settles, and the first seconds after a jump tell most of the probe.
+const JOINT_START_S: f64 = 3.0;
+/// Least spread of the points' efficiencies about the surface: maps are no polynomials.
+const LEAST_SURFACE_SIGMA: f64 = 3e-3;
+/// Least spread of the points' h about the law, ratio.
+const LEAST_LAW_SIGMA: f64 = 3e-3;
 /// Standard deviation of a sample of T2 where nothing is declared, K; refined from the residual.
 const UNDECLARED_NOISE_K: f64 = 0.1;
 
@@ -32,8 +40,14 @@ pub(crate) fn steps(
     let mut steps = Vec::new();
     for (position, step) in recording.steps.iter().enumerate() {
         let (Some(Some(end_state)), Some(own)) = (end_states.get(position), findings.get_mut(position)) else { continue };
-        let Some(window) = window::choose(recording, step, &config.window, own) else { continue };
-        let samples = Samples::of(recording, window, config, true);
+        let start_s = jump::commands_settled_s(recording, step).max(step.start_s) + JOINT_START_S;
+        let window = Window { start_s, end_s: step.end_s };
+        if !(start_s < step.end_s) {
+            let message = format!("the commands changed until {:.1} s before the step's end", step.end_s - start_s);
+            own.refuse(code::TOO_FEW_SAMPLES, message);
+            continue;
+        }
+        let samples = cleaned(Samples::of(recording, window, config, true), config, own);
         if !dynamic::enough(&samples, config, own) {
             continue;
         }
@@ -125,7 +139,7 @@ pub(crate) fn problem<'a>(steps: &'a [StepRows], alone: &[Estimate], config: &Id
             let mut local = [0.0; LOCAL];
             let mut own = [free; LOCAL];
             local[ETA] = eta;
-            own[LN_DEVIATION] = Prior { mean: 0.0, sigma: 0.02 };
+            own[LN_DEVIATION] = Prior { mean: 0.0, sigma: 0.01 };
             if !with_law {
                 local[LN_DEVIATION] =
                     found.and_then(|found| found.h_w_m2k).map_or(500.0, |(h, _)| h).clamp(20.0, 5e3).ln();
@@ -169,32 +183,33 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
         let member = &problem.members[i];
         let slopes = problem.setting.sensitivities(&steps[i].end, &problem.shared, &member.local);
         let expected: f64 = slopes.iter().zip(&declared).map(|(slope, sigma)| (slope * sigma).powi(2)).sum();
-        let (residual, _) = problem.residual(member, &problem.shared, &member.local, false);
-        let scatter = residual.iter().map(|r| r * r).sum::<f64>() / (residual.len() as f64 - 3.0).max(1.0);
-        let sigma_k = if expected > 0.0 { expected.sqrt() } else { 0.01 };
-        let _ = scatter;
+        // Without a declaration the residual itself says what noise there is; 2 mK is what block means cost.
+        let sigma_k = if expected > 0.0 {
+            expected.sqrt()
+        } else {
+            let prediction = problem.setting.predict(&member.course, &problem.shared, &member.local, &[false; SHARED], false);
+            let square: f64 =
+                member.measured_k.iter().zip(&prediction.t2_k).skip(1).map(|(a, b)| (a - b).powi(2)).sum();
+            (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(2e-3)
+        };
         let white_sigma_k = if expected > 0.0 { declared[1].max(0.1 * sigma_k) } else { sigma_k };
         problem.members[i].whitening = whitening(&steps[i], config, sigma_k, white_sigma_k);
     }
     problem.explained = explained::explained(problem, steps, config);
-    let Some(covariance) = problem.covariance() else { return };
-    let n = problem.members.len() as f64;
+    let n = (problem.members.len() as f64).max(1.0);
     let (mut off_surface, mut off_law) = (0.0, 0.0);
-    for (member, (own, _)) in problem.members.iter().zip(&covariance.own) {
+    for member in &problem.members {
         let off = member.local[ETA] - dot(&member.end_terms, crate::joint::model::surface_of(&problem.shared));
         off_surface += off * off / n;
-        off_law += (member.local[LN_DEVIATION].powi(2) + own[(LN_DEVIATION, LN_DEVIATION)]) / n;
+        off_law += member.local[LN_DEVIATION].powi(2) / n;
     }
     if problem.setting.shaped {
-        problem.surface_sigma = off_surface.sqrt().clamp(1e-3, 0.02);
+        problem.surface_sigma = off_surface.sqrt().clamp(LEAST_SURFACE_SIGMA, 0.02);
     }
     if problem.setting.with_law {
-        let sigma = off_law.sqrt().clamp(2e-3, 0.1);
+        let sigma = off_law.sqrt().clamp(LEAST_LAW_SIGMA, 0.1);
         for member in &mut problem.members {
             member.priors[LN_DEVIATION].sigma = sigma;
         }
-    }
-    if std::env::var("JOINT_DEBUG").is_ok() {
-        eprintln!("surface_sigma {} law {}", problem.surface_sigma, off_law.sqrt());
     }
 }

@@ -90,7 +90,9 @@ pub fn usual_references() -> String {
 
 impl std::fmt::Display for ReferenceState {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} K, {} kPa", self.t_ref_k, self.p_ref_pa / 1000.0)
+        // For people: a hundredth of a permille is no matter. Files carry all digits.
+        let short = |value: f64| (value * 1e3).round() / 1e3;
+        write!(f, "{} K, {} kPa", short(self.t_ref_k), short(self.p_ref_pa / 1000.0))
     }
 }
 

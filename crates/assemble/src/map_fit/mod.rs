@@ -94,7 +94,7 @@ impl MapFit {
         flow_scale_kg_s: f64,
         ratio_scale: f64,
     ) -> NearestPlace {
-        let speed_ratio = speed_corrected_rpm / self.data.nominal_speed_rpm;
+        let speed_ratio = self.speed_ratio(speed_corrected_rpm);
         let scales = Scales { flow_kg_s: flow_scale_kg_s, ratio: ratio_scale };
         let point = (flow_corrected_kg_s, pressure_ratio);
         let foot = nearest(&self.shape(speed_corrected_rpm), speed_ratio, point, scales, None);
@@ -113,12 +113,12 @@ impl MapFit {
         table::table(self, options)
     }
 
-    fn log_speed(&self, speed_corrected_rpm: f64) -> f64 {
-        (speed_corrected_rpm / self.data.nominal_speed_rpm).ln()
+    fn speed_ratio(&self, speed_corrected_rpm: f64) -> f64 {
+        speed_corrected_rpm / self.data.nominal_speed_rpm
     }
 
     fn shape(&self, speed_corrected_rpm: f64) -> LineShape {
-        self.solution.shape(self.log_speed(speed_corrected_rpm))
+        self.solution.shape(self.speed_ratio(speed_corrected_rpm))
     }
 
     fn speed_bounds_rpm(&self) -> (f64, f64) {

@@ -14,7 +14,7 @@ use super::line_shape::{
 };
 use super::nearest::{Foot, Scales, nearest, normal};
 use super::observations::{Observation, Observations};
-use super::speed_spline::SpeedSpline;
+use super::speed_spline::{Coordinate, SpeedSpline};
 use nalgebra::{DMatrix, DVector};
 
 /// Parameters that get an offset for each line.
@@ -27,13 +27,55 @@ const ROUNDS: [usize; 3] = [8, 22, 15];
 const ROBUST: f64 = 3.0;
 /// Standard deviations of the level of each parameter about its starting value: wide for what points determine.
 const LEVEL_SD: Parameters = [2.0, 2.0, 0.7, 0.25, 0.4, 0.4, 0.03, 0.03, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5];
-/// Roughness of each parameter over the logarithm of speed where the estimation starts.
+/// Roughness of each parameter over speed where the estimation starts.
 const ROUGHNESS: Parameters = [0.5, 0.5, 3.0, 1.0, 1.5, 1.5, 0.15, 0.15, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
+
+/// Splines over speed with equal knots.
+#[derive(Debug, Clone)]
+pub(crate) struct Splines {
+    /// Of the line's shape.
+    pub shape: SpeedSpline,
+    /// Of the work coefficient.
+    pub work: SpeedSpline,
+}
+
+impl Splines {
+    fn new(speed_ratios: &[f64]) -> Self {
+        Splines {
+            shape: SpeedSpline::new(Coordinate::Speed, speed_ratios),
+            work: SpeedSpline::new(Coordinate::Slowness, speed_ratios),
+        }
+    }
+
+    fn of(&self, parameter: usize) -> &SpeedSpline {
+        if parameter < WORK { &self.shape } else { &self.work }
+    }
+
+    fn rows(&self, speed_ratio: f64) -> Rows {
+        Rows { shape: self.shape.row(speed_ratio), work: self.work.row(speed_ratio) }
+    }
+
+    fn len(&self) -> usize {
+        self.shape.len()
+    }
+}
+
+/// Weights of the knot values at a speed.
+struct Rows {
+    shape: DVector<f64>,
+    work: DVector<f64>,
+}
+
+impl Rows {
+    fn of(&self, parameter: usize) -> &DVector<f64> {
+        if parameter < WORK { &self.shape } else { &self.work }
+    }
+}
 
 /// A solved problem.
 #[derive(Debug, Clone)]
 pub(crate) struct Solution {
-    pub spline: SpeedSpline,
+    pub splines: Splines,
     pub frame: FlowFrame,
     /// Parameters at the knots.
     values: DMatrix<f64>,
@@ -51,26 +93,26 @@ pub(crate) struct Solution {
 
 impl Solution {
     /// Parameters of the smooth surface at a speed.
-    pub(crate) fn parameters(&self, log_speed: f64) -> Parameters {
-        let row = self.spline.row(log_speed);
-        std::array::from_fn(|q| self.values.row(q).transpose().dot(&row))
+    pub(crate) fn parameters(&self, speed_ratio: f64) -> Parameters {
+        let rows = self.splines.rows(speed_ratio);
+        std::array::from_fn(|q| self.values.row(q).transpose().dot(rows.of(q)))
     }
 
-    pub(crate) fn shape(&self, log_speed: f64) -> LineShape {
-        LineShape::new(&self.parameters(log_speed), self.frame)
+    pub(crate) fn shape(&self, speed_ratio: f64) -> LineShape {
+        LineShape::new(&self.parameters(speed_ratio), self.frame)
     }
 
     /// Covariance of the parameters at a speed: of the surface, of a line about it, and of what may happen beyond the
     /// outermost knots (an integrated random walk).
-    pub(crate) fn covariance(&self, log_speed: f64) -> DMatrix<f64> {
-        let (row, knots) = (self.spline.row(log_speed), self.spline.len());
-        let outside = self.spline.outside(log_speed).min(1.0);
+    pub(crate) fn covariance(&self, speed_ratio: f64) -> DMatrix<f64> {
+        let (rows, knots) = (self.splines.rows(speed_ratio), self.splines.len());
         let mut out = DMatrix::zeros(PARAMETERS, PARAMETERS);
         for a in 0..PARAMETERS {
             for b in 0..PARAMETERS {
                 let block = self.covariance.view((a * knots, b * knots), (knots, knots));
-                out[(a, b)] = (row.transpose() * block * &row)[(0, 0)];
+                out[(a, b)] = (rows.of(a).transpose() * block * rows.of(b))[(0, 0)];
             }
+            let outside = self.splines.of(a).outside(speed_ratio).min(1.0);
             out[(a, a)] += outside.powi(3) / 3.0 * self.roughness_variance[a];
         }
         for (index, parameter) in LINE_OFFSETS.iter().enumerate() {
@@ -84,8 +126,8 @@ impl Solution {
 struct Problem<'a> {
     data: &'a Observations,
     frame: FlowFrame,
-    spline: SpeedSpline,
-    rows: Vec<DVector<f64>>,
+    splines: Splines,
+    rows: Vec<Rows>,
     start: Parameters,
 }
 
@@ -106,10 +148,12 @@ struct Precisions {
 
 /// Fits. `stiffness` (1 or more) is the factor on the least penalty that the estimation may choose.
 pub(crate) fn solve(data: &Observations, stiffness: f64) -> Result<Solution, MapFitError> {
-    let problem = Problem::new(data);
+    let mut problem = Problem::new(data);
     let start_rough: Parameters = ROUGHNESS.map(|r| stiffness / (r * r));
     let mut precisions = Precisions { rough: start_rough, lines: [1e4; 3], scales: [0.01; 2] };
     let mut unknowns = problem.initial()?;
+    problem.start =
+        std::array::from_fn(|q| if q < WORK { problem.start[q] } else { unknowns.values[(q, 0)] });
     let mut feet = problem.feet(&unknowns, None);
     let mut damping = 1e-2;
     let [free, estimate, settle] = ROUNDS;
@@ -172,7 +216,7 @@ pub(crate) fn solve(data: &Observations, stiffness: f64) -> Result<Solution, Map
     Ok(Solution {
         rms: problem.rms(&problem.residuals(&smooth_feet)),
         angles_rad: smooth_feet.iter().map(|foot| foot.angle_rad).collect(),
-        spline: problem.spline,
+        splines: problem.splines,
         frame: problem.frame,
         values: unknowns.values,
         covariance,
@@ -183,16 +227,17 @@ pub(crate) fn solve(data: &Observations, stiffness: f64) -> Result<Solution, Map
 
 impl<'a> Problem<'a> {
     fn new(data: &'a Observations) -> Self {
-        let log = |speed_rpm: f64| (speed_rpm / data.nominal_speed_rpm).ln();
-        let mut logs: Vec<f64> = data.lines_rpm.iter().map(|speed| log(*speed)).collect();
-        logs.dedup_by(|b, a| *b - *a < 1e-3);
-        let knots = if logs.len() <= MOST_KNOTS { logs } else { thinned(&logs) };
-        let spline = SpeedSpline::new(knots);
-        let rows = data.points.iter().map(|p| spline.row(p.speed_ratio.ln())).collect();
-        let flows = data.points.iter().map(Observation::flow);
-        let (low, high) = flows.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
-        let frame = FlowFrame { middle: 0.5 * (low + high), half: (0.5 * (high - low)).max(1e-6 * high) };
-        let mut problem = Problem { data, frame, spline, rows, start: [0.0; PARAMETERS] };
+        let mut ratios: Vec<f64> =
+            data.lines_rpm.iter().map(|speed| speed / data.nominal_speed_rpm).collect();
+        ratios.dedup_by(|b, a| *b < *a * (1.0 + 1e-3));
+        let splines = Splines::new(&if ratios.len() <= MOST_KNOTS { ratios } else { thinned(&ratios) });
+        let rows = data.points.iter().map(|p| splines.rows(p.speed_ratio)).collect();
+        let mut flows: Vec<f64> = data.points.iter().map(Observation::flow).collect();
+        flows.sort_by(f64::total_cmp);
+        let (low, high) = (flows.first().copied().unwrap_or(0.0), flows.last().copied().unwrap_or(1.0));
+        let middle = flows.get(flows.len() / 2).copied().unwrap_or(0.5);
+        let frame = FlowFrame { middle, half: (0.5 * (high - low)).max(1e-6 * high) };
+        let mut problem = Problem { data, frame, splines, rows, start: [0.0; PARAMETERS] };
         problem.start = problem.starting_level();
         problem
     }
@@ -220,7 +265,7 @@ impl<'a> Problem<'a> {
 
     /// A quadratic work coefficient through all points, and each line's own size.
     fn initial(&self) -> Result<Unknowns, MapFitError> {
-        let knots = self.spline.len();
+        let knots = self.splines.len();
         let mut values = DMatrix::from_fn(PARAMETERS, knots, |q, _| self.start[q]);
         let with_eta: Vec<(f64, f64)> = self
             .data
@@ -238,9 +283,9 @@ impl<'a> Problem<'a> {
         for j in 0..3 {
             values.row_mut(WORK + j).fill(work[j]);
         }
-        let basis = DMatrix::from_fn(self.rows.len(), knots, |i, k| self.rows[i][k]);
+        let basis = DMatrix::from_fn(self.rows.len(), knots, |i, k| self.rows[i].shape[k]);
         let smoother = basis.tr_mul(&basis)
-            + &self.spline.penalty * (0.03 / self.rows.len() as f64)
+            + &self.splines.shape.penalty * (0.03 / self.rows.len() as f64)
             + DMatrix::identity(knots, knots) * 1e-6;
         let smoother = smoother.cholesky().ok_or(MapFitError::Singular)?;
         for (parameter, sizes, factor) in [
@@ -257,9 +302,9 @@ impl<'a> Problem<'a> {
     }
 
     fn parameters(&self, unknowns: &Unknowns, point: usize) -> Parameters {
-        let row = &self.rows[point];
+        let rows = &self.rows[point];
         let mut p: Parameters = std::array::from_fn(|q| {
-            unknowns.values.row(q).iter().zip(row.iter()).map(|(v, w)| v * w).sum::<f64>()
+            unknowns.values.row(q).iter().zip(rows.of(q).iter()).map(|(v, w)| v * w).sum::<f64>()
         });
         for (index, parameter) in LINE_OFFSETS.iter().enumerate() {
             p[*parameter] += unknowns.offsets[(index, self.data.points[point].line)];
@@ -298,7 +343,7 @@ impl<'a> Problem<'a> {
     /// Derivatives of the residuals, each row times the root of its weight.
     fn jacobian(&self, unknowns: &Unknowns, feet: &[Foot], weights: &[[f64; 2]]) -> DMatrix<f64> {
         const STEP: f64 = 1e-5;
-        let (knots, lines) = (self.spline.len(), self.data.lines_rpm.len());
+        let (knots, lines) = (self.splines.len(), self.data.lines_rpm.len());
         let mut out = DMatrix::zeros(2 * feet.len(), PARAMETERS * knots + LINE_OFFSETS.len() * lines);
         for (i, (p, foot)) in self.data.points.iter().zip(feet).enumerate() {
             let parameters = self.parameters(unknowns, i);
@@ -318,7 +363,7 @@ impl<'a> Problem<'a> {
                 for c in 0..2 {
                     let value = derivative[c] * root[c];
                     for k in 0..knots {
-                        out[(2 * i + c, q * knots + k)] = value * self.rows[i][k];
+                        out[(2 * i + c, q * knots + k)] = value * self.rows[i].of(q)[k];
                     }
                     if let Some(index) = LINE_OFFSETS.iter().position(|parameter| *parameter == q) {
                         out[(2 * i + c, PARAMETERS * knots + index * lines + p.line)] = value;
@@ -331,18 +376,18 @@ impl<'a> Problem<'a> {
 
     /// Matrix of the penalty and its gradient.
     fn penalty(&self, unknowns: &Unknowns, precisions: &Precisions) -> (DMatrix<f64>, DVector<f64>) {
-        let (knots, lines) = (self.spline.len(), self.data.lines_rpm.len());
+        let (knots, lines) = (self.splines.len(), self.data.lines_rpm.len());
         let size = PARAMETERS * knots + LINE_OFFSETS.len() * lines;
         let (mut matrix, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
         for q in 0..PARAMETERS {
             let level = self.level_precision(q);
-            let block = &self.spline.penalty * precisions.rough[q];
+            let block = &self.splines.of(q).penalty * precisions.rough[q];
             let values = unknowns.values.row(q).transpose();
             let mut part = &block * &values;
             matrix.view_mut((q * knots, q * knots), (knots, knots)).copy_from(&block);
             for k in 0..knots {
                 matrix[(q * knots + k, q * knots + k)] += level;
-                part[k] += level * (values[k] - self.start_of(q));
+                part[k] += level * (values[k] - self.start[q]);
             }
             gradient.rows_mut(q * knots, knots).copy_from(&part);
         }
@@ -360,8 +405,8 @@ impl<'a> Problem<'a> {
         let mut sum = 0.0;
         for q in 0..PARAMETERS {
             let values = unknowns.values.row(q).transpose();
-            sum += precisions.rough[q] * values.dot(&(&self.spline.penalty * &values));
-            let level = values.iter().map(|v| (v - self.start_of(q)).powi(2)).sum::<f64>();
+            sum += precisions.rough[q] * values.dot(&(&self.splines.of(q).penalty * &values));
+            let level = values.iter().map(|v| (v - self.start[q]).powi(2)).sum::<f64>();
             sum += self.level_precision(q) * level;
         }
         for (index, precision) in precisions.lines.iter().enumerate() {
@@ -371,15 +416,11 @@ impl<'a> Problem<'a> {
     }
 
     fn level_precision(&self, parameter: usize) -> f64 {
-        1.0 / (LEVEL_SD[parameter].powi(2) * self.spline.len() as f64)
-    }
-
-    fn start_of(&self, parameter: usize) -> f64 {
-        self.start[parameter]
+        1.0 / (LEVEL_SD[parameter].powi(2) * self.splines.len() as f64)
     }
 
     fn stepped(&self, unknowns: &Unknowns, step: &DVector<f64>) -> Unknowns {
-        let (knots, lines) = (self.spline.len(), self.data.lines_rpm.len());
+        let (knots, lines) = (self.splines.len(), self.data.lines_rpm.len());
         let mut next = unknowns.clone();
         // Half a logarithm at a time: beyond, the linearisation says nothing.
         let limited = |at: usize| step[at].clamp(-0.5, 0.5);
@@ -405,16 +446,18 @@ impl<'a> Problem<'a> {
         residuals: &[[f64; 2]],
         start_rough: &Parameters,
     ) {
-        let (knots, lines) = (self.spline.len(), self.data.lines_rpm.len());
+        let (knots, lines) = (self.splines.len(), self.data.lines_rpm.len());
         for q in 0..PARAMETERS {
             let values = unknowns.values.row(q).transpose();
             let block = inverse.view((q * knots, q * knots), (knots, knots));
-            let used = precisions.rough[q] * (block * &self.spline.penalty).trace();
+            let used = precisions.rough[q] * (block * &self.splines.of(q).penalty).trace();
             let free = (knots.saturating_sub(2) as f64 - used).max(1e-2);
-            let wanted = free / (values.dot(&(&self.spline.penalty * &values)) + 1e-9);
+            let wanted = free / (values.dot(&(&self.splines.of(q).penalty * &values)) + 1e-9);
             let step = (wanted / precisions.rough[q]).clamp(0.3, 3.0);
+            // Twenty times stiffer than where it starts is a straight line to the eye; more would only make errors too
+            // sure beyond the measured lines.
             precisions.rough[q] =
-                (precisions.rough[q] * step).clamp(0.03 * start_rough[q], 1e4 * start_rough[q]);
+                (precisions.rough[q] * step).clamp(0.03 * start_rough[q], 20.0 * start_rough[q]);
         }
         for (index, precision) in precisions.lines.iter_mut().enumerate() {
             let first = PARAMETERS * knots + index * lines;
@@ -461,13 +504,13 @@ pub(crate) fn scales(point: &Observation) -> Scales {
 }
 
 /// [`MOST_KNOTS`] of the speeds, spread over their ranks.
-fn thinned(logs: &[f64]) -> Vec<f64> {
-    let last = (logs.len() - 1) as f64;
+fn thinned(ratios: &[f64]) -> Vec<f64> {
+    let last = (ratios.len() - 1) as f64;
     (0..MOST_KNOTS)
         .map(|i| {
             let at = last * i as f64 / (MOST_KNOTS - 1) as f64;
-            let below = (at.floor() as usize).min(logs.len() - 2);
-            logs[below] + (at - below as f64) * (logs[below + 1] - logs[below])
+            let below = (at.floor() as usize).min(ratios.len() - 2);
+            ratios[below] + (at - below as f64) * (ratios[below + 1] - ratios[below])
         })
         .collect()
 }

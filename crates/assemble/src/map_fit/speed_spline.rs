@@ -1,17 +1,37 @@
-//! A natural cubic spline over the logarithm of speed, with the penalty that makes it smooth.
+//! A natural cubic spline over a coordinate of speed, with the penalty that makes it smooth.
 //!
 //! Source: P. J. Green, B. W. Silverman, Nonparametric Regression and Generalized Linear Models (1994), ch. 2: values
 //! at the knots as parameters, `g'' = R^-1 Q' g`, integral of `g''^2` equal to `g' K g` with `K = Q R^-1 Q'`.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Length over which the slope beyond the outermost knots dies away, in logarithm of speed: far outside, similarity
-/// holds, and what is a trend inside must not run away.
+/// Length over which the slope beyond the outermost knots dies away, as a share of the nominal speed (or its inverse):
+/// far outside, similarity holds, and what is a trend inside must not run away.
 const DAMPING: f64 = 0.5;
+
+/// The coordinate of a parameter, of speed over the nominal speed: flow and head change with the Mach number, in
+/// proportion to speed; what work there is besides Euler's (friction at small Reynolds numbers, heat) fades with its
+/// inverse. Between measured lines this matters little, beyond them much.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Coordinate {
+    Speed,
+    Slowness,
+}
+
+impl Coordinate {
+    pub(crate) fn of(self, speed_ratio: f64) -> f64 {
+        match self {
+            Coordinate::Speed => speed_ratio,
+            // Rising with speed, as the other.
+            Coordinate::Slowness => -1.0 / speed_ratio,
+        }
+    }
+}
 
 /// The spline's knots and what follows from them.
 #[derive(Debug, Clone)]
 pub(crate) struct SpeedSpline {
+    coordinate: Coordinate,
     knots: Vec<f64>,
     /// Second derivatives at the knots from the values there.
     second: DMatrix<f64>,
@@ -20,8 +40,9 @@ pub(crate) struct SpeedSpline {
 }
 
 impl SpeedSpline {
-    /// `knots` strictly rising, at least one.
-    pub(crate) fn new(knots: Vec<f64>) -> Self {
+    /// `speed_ratios` of the knots strictly rising, at least one.
+    pub(crate) fn new(coordinate: Coordinate, speed_ratios: &[f64]) -> Self {
+        let knots: Vec<f64> = speed_ratios.iter().map(|v| coordinate.of(*v)).collect();
         let n = knots.len();
         let (mut second, mut penalty) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
         if n >= 3 {
@@ -44,22 +65,23 @@ impl SpeedSpline {
                 penalty = &q * inner;
             }
         }
-        SpeedSpline { knots, second, penalty }
+        SpeedSpline { coordinate, knots, second, penalty }
     }
 
     pub(crate) fn len(&self) -> usize {
         self.knots.len()
     }
 
-    /// Weights of the knot values that give the value at `at`.
-    pub(crate) fn row(&self, at: f64) -> DVector<f64> {
+    /// Weights of the knot values that give the value at a speed.
+    pub(crate) fn row(&self, speed_ratio: f64) -> DVector<f64> {
+        let at = self.coordinate.of(speed_ratio);
         let (n, x) = (self.knots.len(), &self.knots);
         let mut row = DVector::zeros(n);
         if n == 1 {
             row[0] = 1.0;
             return row;
         }
-        let outside = self.outside(at);
+        let outside = self.outside(speed_ratio);
         if outside > 0.0 {
             let reach = DAMPING * (1.0 - (-outside / DAMPING).exp());
             let (end, inner) = if at < x[0] { (0, 1) } else { (n - 1, n - 2) };
@@ -84,8 +106,9 @@ impl SpeedSpline {
         row
     }
 
-    /// How far `at` lies outside the knots; 0 inside.
-    pub(crate) fn outside(&self, at: f64) -> f64 {
+    /// How far a speed lies outside the knots, in the coordinate; 0 inside.
+    pub(crate) fn outside(&self, speed_ratio: f64) -> f64 {
+        let at = self.coordinate.of(speed_ratio);
         let (first, last) = (self.knots[0], self.knots[self.knots.len() - 1]);
         (first - at).max(at - last).max(0.0)
     }
@@ -104,7 +127,7 @@ mod tests {
             let mut at = 0.0;
             let mut knots = vec![at];
             for step in &steps { at += step; knots.push(at); }
-            let spline = SpeedSpline::new(knots.clone());
+            let spline = SpeedSpline::new(Coordinate::Speed, &knots);
             let values = DVector::from_iterator(knots.len(), knots.iter().map(|k| 0.3 + slope * k));
             let inside = t * at;
             prop_assert!((spline.row(inside).dot(&values) - (0.3 + slope * inside)).abs() < 1e-9);
@@ -118,7 +141,7 @@ mod tests {
 
         #[test]
         fn it_is_continuous_with_its_slope(values in proptest::collection::vec(-1.0..1.0f64, 5)) {
-            let spline = SpeedSpline::new(vec![0.0, 0.2, 0.5, 0.6, 1.1]);
+            let spline = SpeedSpline::new(Coordinate::Speed, &[0.0, 0.2, 0.5, 0.6, 1.1]);
             let values = DVector::from_vec(values);
             let value = |at: f64| spline.row(at).dot(&values);
             for knot in [0.0, 0.2, 0.5, 0.6, 1.1] {

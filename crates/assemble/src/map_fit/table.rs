@@ -60,12 +60,12 @@ impl MapFit {
     }
 }
 
-/// Where lines end, as angles over the logarithm of speed.
+/// Where lines end, as angles over speed.
 struct Ends {
     /// Smooth surge-side end.
     spline: SpeedSpline,
     surge: DVector<f64>,
-    /// Log speed, and smallest and largest angle with a point, for each measured line.
+    /// Speed ratio, and smallest and largest angle with a point, for each measured line.
     measured: Vec<(f64, f64, f64)>,
 }
 
@@ -78,13 +78,13 @@ impl Ends {
             .data
             .lines_rpm
             .iter()
-            .map(|speed| (fit.log_speed(*speed), f64::INFINITY, f64::NEG_INFINITY))
+            .map(|speed| (fit.speed_ratio(*speed), f64::INFINITY, f64::NEG_INFINITY))
             .collect();
         for (point, angle) in fit.data.points.iter().zip(&fit.solution.angles_rad) {
             let line = &mut measured[point.line];
             (line.1, line.2) = (line.1.min(*angle), line.2.max(*angle));
         }
-        let spline = fit.solution.spline.clone();
+        let spline = fit.solution.splines.shape.clone();
         let rows: Vec<DVector<f64>> = measured.iter().map(|line| spline.row(line.0)).collect();
         let basis = DMatrix::from_fn(rows.len(), spline.len(), |i, k| rows[i][k]);
         let ends = DVector::from_iterator(measured.len(), measured.iter().map(|line| line.2));
@@ -99,20 +99,20 @@ impl Ends {
         Ends { spline, surge: deviation.add_scalar(mean), measured }
     }
 
-    fn surge_rad(&self, log_speed: f64) -> f64 {
-        self.spline.row(log_speed).dot(&self.surge).clamp(0.2, ANGLE_RANGE.1)
+    fn surge_rad(&self, speed_ratio: f64) -> f64 {
+        self.spline.row(speed_ratio).dot(&self.surge).clamp(0.2, ANGLE_RANGE.1)
     }
 
     /// Smallest and largest angle that points support; `None` outside the measured speeds.
-    fn supported(&self, log_speed: f64) -> Option<(f64, f64)> {
+    fn supported(&self, speed_ratio: f64) -> Option<(f64, f64)> {
         let slack = 1e-9;
-        let after = self.measured.partition_point(|line| line.0 < log_speed - slack);
+        let after = self.measured.partition_point(|line| line.0 < speed_ratio - slack);
         let upper = self.measured.get(after)?;
-        if upper.0 <= log_speed + slack {
+        if upper.0 <= speed_ratio + slack {
             return Some((upper.1, upper.2));
         }
         let lower = self.measured.get(after.checked_sub(1)?)?;
-        let share = (log_speed - lower.0) / (upper.0 - lower.0);
+        let share = (speed_ratio - lower.0) / (upper.0 - lower.0);
         let blend = |a: f64, b: f64| a + share * (b - a);
         Some((blend(lower.1, upper.1), blend(lower.2, upper.2)))
     }
@@ -124,9 +124,9 @@ fn bottom_ratio(highest_ratio: f64) -> f64 {
 }
 
 fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Vec<FittedNode> {
-    let log_speed = fit.log_speed(speed_corrected_rpm);
-    let (shape, speed_ratio) = (fit.solution.shape(log_speed), log_speed.exp());
-    let surge = ends.surge_rad(log_speed);
+    let speed_ratio = fit.speed_ratio(speed_corrected_rpm);
+    let shape = fit.solution.shape(speed_ratio);
+    let surge = ends.surge_rad(speed_ratio);
     let bottom = choke_end(&shape, speed_ratio, surge);
     let walk: Vec<f64> = (0..=WALK).map(|i| bottom + (surge - bottom) * i as f64 / WALK as f64).collect();
     let places: Vec<(f64, f64)> = walk
@@ -144,9 +144,9 @@ fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Ve
         length.push(length[length.len() - 1] + step);
     }
     let total = length[WALK];
-    let covariance = fit.solution.covariance(log_speed);
-    let parameters = fit.solution.parameters(log_speed);
-    let supported = ends.supported(log_speed);
+    let covariance = fit.solution.covariance(speed_ratio);
+    let parameters = fit.solution.parameters(speed_ratio);
+    let supported = ends.supported(speed_ratio);
     (0..count)
         .map(|i| {
             let wanted = total * i as f64 / (count - 1) as f64;

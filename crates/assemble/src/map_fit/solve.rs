@@ -17,8 +17,9 @@ use super::observations::{Observation, Observations};
 use super::speed_spline::{Coordinate, SpeedSpline};
 use nalgebra::{DMatrix, DVector};
 
-/// Parameters that get an offset for each line.
-const LINE_OFFSETS: [usize; 3] = [CHOKE_FLOW, ZERO_SLOPE_HEAD, WORK];
+/// Parameters that an offset of a whole line moves together: flow; head with work, as an error of speed does, which
+/// leaves efficiency alone; work alone, which is efficiency.
+const LINE_OFFSETS: [&[usize]; 3] = [&[CHOKE_FLOW], &[ZERO_SLOPE_HEAD, WORK], &[WORK]];
 /// Most knots over speed.
 const MOST_KNOTS: usize = 10;
 /// Rounds with everything fixed but the parameters, rounds that estimate the variances, and rounds to settle.
@@ -115,8 +116,10 @@ impl Solution {
             let outside = self.splines.of(a).outside(speed_ratio).min(1.0);
             out[(a, a)] += outside.powi(3) / 3.0 * self.roughness_variance[a];
         }
-        for (index, parameter) in LINE_OFFSETS.iter().enumerate() {
-            out[(*parameter, *parameter)] += self.line_scatter[index].powi(2);
+        for (index, together) in LINE_OFFSETS.iter().enumerate() {
+            for (a, b) in together.iter().flat_map(|a| together.iter().map(move |b| (*a, *b))) {
+                out[(a, b)] += self.line_scatter[index].powi(2);
+            }
         }
         out
     }
@@ -306,7 +309,9 @@ impl<'a> Problem<'a> {
         let mut p: Parameters = std::array::from_fn(|q| {
             unknowns.values.row(q).iter().zip(rows.of(q).iter()).map(|(v, w)| v * w).sum::<f64>()
         });
-        for (index, parameter) in LINE_OFFSETS.iter().enumerate() {
+        for (index, parameter) in
+            LINE_OFFSETS.iter().enumerate().flat_map(|(i, all)| all.iter().map(move |q| (i, q)))
+        {
             p[*parameter] += unknowns.offsets[(index, self.data.points[point].line)];
         }
         p
@@ -365,8 +370,8 @@ impl<'a> Problem<'a> {
                     for k in 0..knots {
                         out[(2 * i + c, q * knots + k)] = value * self.rows[i].of(q)[k];
                     }
-                    if let Some(index) = LINE_OFFSETS.iter().position(|parameter| *parameter == q) {
-                        out[(2 * i + c, PARAMETERS * knots + index * lines + p.line)] = value;
+                    for (index, _) in LINE_OFFSETS.iter().enumerate().filter(|(_, all)| all.contains(&q)) {
+                        out[(2 * i + c, PARAMETERS * knots + index * lines + p.line)] += value;
                     }
                 }
             }

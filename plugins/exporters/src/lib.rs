@@ -8,6 +8,7 @@
 mod csv;
 mod error;
 mod fitted_csv;
+mod fitted_items;
 mod heading;
 mod json;
 mod modelica;

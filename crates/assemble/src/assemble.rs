@@ -3,9 +3,15 @@
 use crate::grouping::{Group, group};
 use crate::repeats::points_for_map;
 use crate::{AssembleError, Grouping};
-use mapper_core::{CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceState, SpeedLine, Verdict};
+use mapper_core::{
+    CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceState, SpeedLine, SpeedShift, Verdict,
+};
+use mapper_physics::similarity::at_speed;
 
 /// Makes a map of identified points.
+///
+/// Each point is brought from its own corrected speed to the mean of its line by similarity; what that changed stands in
+/// [`MapPoint::shift`], the measured values in [`MapPoint::identified`].
 ///
 /// Points with a target form a line per target speed; points without one are grouped by gaps in corrected speed
 /// ([`Grouping`]). Lines come in order of mean corrected speed, their points in order of corrected flow (then of
@@ -37,7 +43,7 @@ pub fn assemble(
     points.iter().try_for_each(|point| check(point, method))?;
     let mut lines: Vec<SpeedLine> = group(points, &grouping).iter().map(line).collect();
     lines.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
-    Ok(CompressorMap { machine: machine.to_owned(), reference, method, lines })
+    Ok(CompressorMap { machine: machine.to_owned(), reference, method, lines, fitted: None })
 }
 
 fn check(point: &IdentifiedPoint, method: Method) -> Result<(), AssembleError> {
@@ -61,24 +67,40 @@ fn line(group: &Group<'_>) -> SpeedLine {
     let speeds_rpm = || group.points.iter().map(|point| point.speed_corrected_rpm);
     let lowest_rpm = speeds_rpm().fold(f64::INFINITY, f64::min);
     let highest_rpm = speeds_rpm().fold(f64::NEG_INFINITY, f64::max);
-    let mut points: Vec<MapPoint> = group.points.iter().map(|point| map_point(point)).collect();
+    let speed_corrected_rpm = speeds_rpm().sum::<f64>() / group.points.len() as f64;
+    let mut points: Vec<MapPoint> =
+        group.points.iter().map(|point| map_point(point, speed_corrected_rpm)).collect();
     points.sort_by(|a, b| {
         let by_flow = a.flow_corrected_kg_s.total_cmp(&b.flow_corrected_kg_s);
         by_flow.then(b.pressure_ratio.total_cmp(&a.pressure_ratio))
     });
     SpeedLine {
-        speed_corrected_rpm: speeds_rpm().sum::<f64>() / group.points.len() as f64,
+        speed_corrected_rpm,
         speed_spread_rpm: highest_rpm - lowest_rpm,
         target_speed_rpm: group.target_speed_rpm,
         points,
     }
 }
 
-fn map_point(point: &IdentifiedPoint) -> MapPoint {
+fn map_point(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
+    let (flow_kg_s, pressure_ratio) = (point.flow_corrected_kg_s, point.pressure_ratio);
+    let shift_rpm = line_speed_rpm - point.speed_corrected_rpm;
+    // Similarity holds for small shifts; where nothing turns it says nothing.
+    let moved = shift_rpm != 0.0 && point.speed_corrected_rpm > 0.0 && pressure_ratio > 0.0;
+    let (flow_at_line_kg_s, ratio_at_line) = if moved {
+        at_speed(flow_kg_s, pressure_ratio, line_speed_rpm / point.speed_corrected_rpm)
+    } else {
+        (flow_kg_s, pressure_ratio)
+    };
     MapPoint {
-        flow_corrected_kg_s: point.flow_corrected_kg_s,
-        pressure_ratio: point.pressure_ratio,
+        flow_corrected_kg_s: flow_at_line_kg_s,
+        pressure_ratio: ratio_at_line,
         eta: point.eta.filter(|eta| point.verdict != Verdict::Unusable && eta.is_finite()),
         identified: point.clone(),
+        shift: moved.then_some(SpeedShift {
+            speed_corrected_rpm: shift_rpm,
+            flow_corrected_kg_s: flow_at_line_kg_s - flow_kg_s,
+            pressure_ratio: ratio_at_line - pressure_ratio,
+        }),
     }
 }

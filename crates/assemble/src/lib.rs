@@ -1,17 +1,22 @@
 //! From identified points to a compressor map: points in corrected quantities, grouped into speed lines.
 //!
-//! Nothing is fitted, smoothed or extrapolated here: every point but repeats goes into exactly one line as it was measured.
+//! [`assemble`] brings every point but repeats to the speed of its line, by similarity, and keeps the shift on record.
 //! Points that could not be identified stay in the map without an efficiency; their flow and pressure ratio were
-//! measured all the same.
+//! measured all the same. [`fit_map`] lays a smooth surface through all lines together, says how sure it is at every
+//! place and where it is extrapolated.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod assemble;
+mod compare;
 mod error;
 mod grouping;
+mod map_fit;
 mod repeats;
 
 pub use assemble::assemble;
+pub use compare::{ComparedLine, ComparedPlace, MapComparison, compare};
 pub use error::AssembleError;
 pub use grouping::Grouping;
+pub use map_fit::{MapFit, MapFitError, MapFitOptions, NearestPlace, fit_map, leave_out};
 pub use repeats::points_for_map;

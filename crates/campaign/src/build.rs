@@ -116,15 +116,8 @@ fn set_number(target: &mut f64, number: Option<f64>) {
 fn reference_state(file: ReferenceFile) -> ReferenceState {
     match file {
         ReferenceFile::Named(NamedReference::Sae) => ReferenceState::SAE,
-        // 545 degR and 13.95 psia, as Garrett prints on its maps.
-        ReferenceFile::Named(NamedReference::Garrett) => ReferenceState {
-            t_ref_k: 545.0 * 5.0 / 9.0,
-            p_ref_pa: 13.95 * 4.448_221_615_260_5 / 0.000_645_16,
-        },
-        // 293 K and 98.1 kPa, as BorgWarner prints on its maps.
-        ReferenceFile::Named(NamedReference::BorgWarner) => {
-            ReferenceState { t_ref_k: 293.0, p_ref_pa: 98_100.0 }
-        }
+        ReferenceFile::Named(NamedReference::Garrett) => ReferenceState::GARRETT,
+        ReferenceFile::Named(NamedReference::BorgWarner) => ReferenceState::BORGWARNER,
         ReferenceFile::State(state) => {
             ReferenceState { t_ref_k: state.temperature.inside, p_ref_pa: state.pressure.inside }
         }
@@ -367,11 +360,18 @@ fn limits(file: &LimitsFile) -> Limits {
 }
 
 fn outputs(file: OutputsFile) -> Outputs {
-    let all = vec![FormatName::Csv, FormatName::Json, FormatName::Svg];
-    let formats = file.formats.unwrap_or(all).into_iter().map(|format| match format {
+    let usual = vec![FormatName::Csv, FormatName::Json, FormatName::Svg, FormatName::Fitted];
+    let formats = file.formats.unwrap_or(usual).into_iter().map(|format| match format {
         FormatName::Csv => OutputFormat::Csv,
         FormatName::Json => OutputFormat::Json,
         FormatName::Svg => OutputFormat::Svg,
+        FormatName::Png => OutputFormat::Png,
+        FormatName::Sae => OutputFormat::Sae,
+        FormatName::Fitted => OutputFormat::Fitted,
+        FormatName::Modelica => OutputFormat::Modelica,
+        FormatName::Simscape => OutputFormat::Simscape,
+        FormatName::Npss => OutputFormat::Npss,
+        FormatName::Pycycle => OutputFormat::Pycycle,
     });
     Outputs { directory: file.directory.unwrap_or_else(|| "runs".into()), formats: formats.collect() }
 }

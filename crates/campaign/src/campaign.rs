@@ -253,6 +253,38 @@ pub enum OutputFormat {
     Json,
     /// Picture.
     Svg,
+    /// Picture as pixels.
+    Png,
+    /// SAE text.
+    Sae,
+    /// Fitted lines with their errors.
+    Fitted,
+    /// Tables for Modelica.
+    Modelica,
+    /// Tables for Simscape and Powertrain Blockset.
+    Simscape,
+    /// Tables for NPSS.
+    Npss,
+    /// A map for pyCycle.
+    Pycycle,
+}
+
+impl OutputFormat {
+    /// Name as written in campaigns, and of the exporter.
+    pub fn name(self) -> &'static str {
+        match self {
+            OutputFormat::Csv => "csv",
+            OutputFormat::Json => "json",
+            OutputFormat::Svg => "svg",
+            OutputFormat::Png => "png",
+            OutputFormat::Sae => "sae",
+            OutputFormat::Fitted => "fitted",
+            OutputFormat::Modelica => "modelica",
+            OutputFormat::Simscape => "simscape",
+            OutputFormat::Npss => "npss",
+            OutputFormat::Pycycle => "pycycle",
+        }
+    }
 }
 
 /// What a test report needs and no sensor measures.

@@ -35,6 +35,7 @@ mod legend;
 mod marching;
 mod markers;
 pub mod palette;
+mod png;
 mod svg;
 mod text;
 mod ticks;
@@ -49,4 +50,5 @@ pub use items::{
 };
 pub use marching::contour_lines;
 pub use palette::Colour;
+pub use png::PngError;
 pub use ticks::nice_ticks;

@@ -144,3 +144,15 @@ fn items_of_one_label_share_a_legend_entry() {
         1
     );
 }
+
+#[test]
+fn pixels_show_the_texts_without_fonts_of_the_machine() {
+    let bare = Figure::new("").panel(Panel::new(Axis::new(""), Axis::new("")));
+    let titled = Figure::new("Compressor map").panel(Panel::new(Axis::new("flow, kg/s"), Axis::new("P2/P1")));
+    let (bare, titled) = (bare.to_png(1.0).unwrap(), titled.to_png(1.0).unwrap());
+    assert!(titled.starts_with(b"\x89PNG\r\n\x1a\n"));
+    // Letters are what the second picture has more of: some 30 of them, each dozens of bytes.
+    assert!(titled.len() > bare.len() + 1000, "{} {}", titled.len(), bare.len());
+    assert!(Figure::new("x").to_png(f32::NAN).is_err());
+    assert!(Figure::new("x").to_png(1e6).is_err());
+}

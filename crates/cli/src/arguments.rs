@@ -33,6 +33,97 @@ pub enum Command {
     Gap(GapArguments),
     /// Redo the paper's figures 5 to 10 and 12 on the nominal model, beside what the paper states
     Reproduce(ReproduceArguments),
+    /// Fit, convert and compare compressor maps
+    Map(MapArguments),
+}
+
+/// `mapper map`.
+#[derive(Debug, Args)]
+pub struct MapArguments {
+    /// What to do with the map
+    #[command(subcommand)]
+    pub command: MapCommand,
+}
+
+/// One variant a command on maps.
+#[derive(Debug, Subcommand)]
+pub enum MapCommand {
+    /// Fit all speed lines together and print the error at each line when it is left out
+    Fit(MapFitArguments),
+    /// Write a map in another format, at another reference state
+    Convert(MapConvertArguments),
+    /// Show where two maps differ, in units and in their uncertainty
+    Compare(MapCompareArguments),
+}
+
+/// `mapper map fit`.
+#[derive(Debug, Args)]
+pub struct MapFitArguments {
+    /// Map (CSV, JSON or SAE text)
+    pub map: PathBuf,
+    /// State to which the file's corrected quantities refer, where the file does not say: SAE, Garrett, BorgWarner or "T, P"
+    #[arg(long, value_name = "STATE")]
+    pub reference: Option<String>,
+    /// Corrected speeds of further lines, rpm, instead of two below and one above the measured ones
+    #[arg(long, value_delimiter = ',', value_name = "RPM,...")]
+    pub speeds: Option<Vec<f64>>,
+    /// Nodes on each line
+    #[arg(long, default_value_t = 41, value_parser = clap::value_parser!(u16).range(5..=400))]
+    pub nodes: u16,
+    /// Write the fitted map to this new file; the extension says the format, unless `--to` does
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Format of `--out`
+    #[arg(long, value_name = "FORMAT", requires = "out")]
+    pub to: Option<String>,
+    /// Do not leave lines out
+    #[arg(long)]
+    pub no_leave_out: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mapper map convert`.
+#[derive(Debug, Args)]
+pub struct MapConvertArguments {
+    /// Map (CSV, JSON or SAE text)
+    pub map: PathBuf,
+    /// New file; the extension says the format, unless `--to` does
+    pub out: PathBuf,
+    /// Format of the new file
+    #[arg(long, value_name = "FORMAT")]
+    pub to: Option<String>,
+    /// State to which the file's corrected quantities refer, where the file does not say: SAE, Garrett, BorgWarner or "T, P"
+    #[arg(long, value_name = "STATE")]
+    pub reference: Option<String>,
+    /// State to which the new file shall refer [default: as before]
+    #[arg(long, value_name = "STATE")]
+    pub to_reference: Option<String>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mapper map compare`.
+#[derive(Debug, Args)]
+pub struct MapCompareArguments {
+    /// Map that counts as the known one
+    pub first: PathBuf,
+    /// Map that is compared with it
+    pub second: PathBuf,
+    /// State of the first map, where its file does not say
+    #[arg(long, value_name = "STATE")]
+    pub reference: Option<String>,
+    /// State of the second map, where its file does not say
+    #[arg(long, value_name = "STATE")]
+    pub second_reference: Option<String>,
+    /// Draw both maps and their difference in this new file (.svg or .png)
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `mapper check`.

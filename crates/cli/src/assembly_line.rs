@@ -89,8 +89,8 @@ pub fn with_plan_request<T>(
         }),
         required_sigma_eta: campaign.required_sigma_eta,
         method: match campaign.identification.method {
-            Method::Dynamic => Some(&dynamic),
-            Method::Steady => None,
+            Method::Dynamic | Method::Joint => Some(&dynamic),
+            Method::Steady | Method::Imported => None,
         },
         effort: 1.0,
         seed: campaign.seed,

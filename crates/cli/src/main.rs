@@ -11,6 +11,8 @@ mod exit_code;
 mod failure;
 mod gap_arguments;
 mod interrupt;
+mod map_comparison_picture;
+mod map_file;
 mod observers;
 mod output;
 mod plan_picture;

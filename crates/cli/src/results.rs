@@ -6,10 +6,11 @@ use crate::failure::Failure;
 use crate::table::{self, Display, number};
 use crate::test_report;
 use crate::{assembly_line, output, run_directory};
-use mapper_assemble::{Grouping, assemble};
+use mapper_assemble::{Grouping, MapFit, MapFitOptions, assemble};
 use mapper_campaign::Campaign;
-use mapper_campaign::campaign::{DisplayUnits, OutputFormat};
-use mapper_core::{IdentifiedPoint, Plan, StepKind, Verdict};
+use mapper_campaign::campaign::DisplayUnits;
+use mapper_core::{CompressorMap, IdentifiedPoint, Plan, StepKind, Verdict};
+use mapper_exporters::ExportError;
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_score::{ScoreSummary, ScoredPoint};
 use serde_json::json;
@@ -50,15 +51,19 @@ pub fn make(
     let placed: Vec<IdentifiedPoint> = points.iter().filter(|point| has_place(point)).cloned().collect();
     match assemble(&placed, &campaign.machine.name, config.reference, config.method, Grouping::default()) {
         Ok(assembled) => {
+            let assembled = fitted(assembled, &mut remarks);
             for format in &campaign.outputs.formats {
-                let name = match format {
-                    OutputFormat::Csv => "csv",
-                    OutputFormat::Json => "json",
-                    OutputFormat::Svg => "svg",
-                };
+                let name = format.name();
                 let Some(exporter) = mapper_exporters::find(name) else { continue };
-                let bytes =
-                    (exporter.export)(&assembled).map_err(|error| Failure::new(Code::Failure, error))?;
+                let bytes = match (exporter.export)(&assembled) {
+                    Ok(bytes) => bytes,
+                    // A campaign of a few points has a map, but no surface through it.
+                    Err(error @ ExportError::NeedsFit { .. }) => {
+                        remarks.push(error.to_string());
+                        continue;
+                    }
+                    Err(error) => return Err(Failure::new(Code::Failure, error)),
+                };
                 let path = directory.join(format!("map.{}", exporter.extension));
                 output::write_new(&path, &bytes)?;
                 map.insert(name.to_owned(), path);
@@ -96,6 +101,17 @@ pub fn make(
         repeats,
         remarks,
     })
+}
+
+/// The map with a surface through it, where it has enough points.
+fn fitted(map: CompressorMap, remarks: &mut Vec<String>) -> CompressorMap {
+    match MapFit::new(&map).and_then(|fit| fit.table(&MapFitOptions::default())) {
+        Ok(table) => CompressorMap { fitted: Some(table), ..map },
+        Err(error) => {
+            remarks.push(format!("the map is not fitted: {error}"));
+            map
+        }
+    }
 }
 
 fn has_place(point: &IdentifiedPoint) -> bool {

@@ -11,6 +11,10 @@ pub enum Method {
     Steady,
     /// Efficiency and heat-transfer coefficient from the transient (Burke et al., eqs. 1-3).
     Dynamic,
+    /// All points of a campaign together: as `Dynamic`, with what they share fitted over all of them.
+    Joint,
+    /// Read from a map that says nothing of how its efficiency was found.
+    Imported,
 }
 
 impl std::fmt::Display for Method {
@@ -18,6 +22,8 @@ impl std::fmt::Display for Method {
         f.write_str(match self {
             Method::Steady => "steady",
             Method::Dynamic => "dynamic",
+            Method::Joint => "joint",
+            Method::Imported => "imported",
         })
     }
 }
@@ -103,7 +109,7 @@ pub struct IdentifiedPoint {
     pub t1_k: f64,
     /// Inlet total pressure (station 1) at the end of the step, Pa.
     pub p1_pa: f64,
-    /// Isentropic efficiency, total to total, fraction: adiabatic for `dynamic`, apparent for `steady`.
+    /// Isentropic efficiency, total to total, fraction: adiabatic for `dynamic` and `joint`, apparent for `steady`.
     pub eta: Option<f64>,
     /// Lower end of the 95 % interval of `eta`.
     pub eta_low: Option<f64>,

@@ -14,6 +14,7 @@ mod channel;
 mod clock;
 mod declared_uncertainty;
 mod event;
+mod fitted_map;
 mod identified;
 mod map;
 mod model_tolerances;
@@ -23,20 +24,23 @@ mod recording;
 mod reference_state;
 mod sample;
 mod step_marker;
+mod thermal_model;
 
 pub use backend::{Backend, BackendError, RigDescription, RigMode, Setpoints};
 pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
 pub use clock::{Clock, UnpacedClock};
 pub use declared_uncertainty::{DeclaredUncertainty, NoiseColour};
 pub use event::{Event, EventKind};
+pub use fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
 pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
 };
-pub use map::{CompressorMap, MapPoint, SpeedLine};
+pub use map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
 pub use model_tolerances::ModelTolerances;
 pub use operating_point::OperatingPoint;
 pub use plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
 pub use recording::{Recording, RecordingError, Series};
-pub use reference_state::ReferenceState;
+pub use reference_state::{NAMED_REFERENCES, NamedReference, ReferenceState, usual_references};
 pub use sample::{ChannelColumn, SampleBatch, TruthColumn};
 pub use step_marker::StepMarker;
+pub use thermal_model::{ConvectionLaw, Entangled, Origin, SharedValue, ThermalModel};

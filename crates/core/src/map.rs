@@ -1,19 +1,34 @@
 //! The product: a compressor map in corrected quantities.
 
-use crate::{IdentifiedPoint, Method, ReferenceState};
+use crate::{FittedMap, IdentifiedPoint, Method, ReferenceState};
 use serde::{Deserialize, Serialize};
 
 /// One measured point of the map, brought to corrected quantities.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MapPoint {
-    /// Corrected mass flow, kg/s.
+    /// Corrected mass flow at the speed of the line, kg/s.
     pub flow_corrected_kg_s: f64,
-    /// Total pressure ratio P2/P1.
+    /// Total pressure ratio P2/P1 at the speed of the line.
     pub pressure_ratio: f64,
     /// Isentropic efficiency, fraction; `None` where the point could not be identified.
     pub eta: Option<f64>,
     /// The point as identified, with its uncertainty and warnings.
     pub identified: IdentifiedPoint,
+    /// How the point was brought to the speed of its line; `None` where it stands as measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shift: Option<SpeedShift>,
+}
+
+/// What bringing a point from its own corrected speed to that of its line changed, by similarity: flow in proportion
+/// to speed, isentropic head to its square, efficiency unchanged.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SpeedShift {
+    /// Corrected speed of the line less that of the point, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Added to the measured corrected flow, kg/s.
+    pub flow_corrected_kg_s: f64,
+    /// Added to the measured pressure ratio.
+    pub pressure_ratio: f64,
 }
 
 /// Points of one corrected speed, from the surge side to the choke side.
@@ -40,4 +55,33 @@ pub struct CompressorMap {
     pub method: Method,
     /// Speed lines in order of speed.
     pub lines: Vec<SpeedLine>,
+    /// Smooth surface through the points, as a table; `None` where none was fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<FittedMap>,
+}
+
+impl CompressorMap {
+    /// The same map with corrected flows and speeds referred to another state.
+    pub fn at_reference(mut self, reference: ReferenceState) -> Self {
+        let (flow, speed) =
+            (self.reference.flow_factor_to(reference), self.reference.speed_factor_to(reference));
+        for line in &mut self.lines {
+            line.speed_corrected_rpm *= speed;
+            line.speed_spread_rpm *= speed;
+            for point in &mut line.points {
+                point.flow_corrected_kg_s *= flow;
+                point.identified.flow_corrected_kg_s *= flow;
+                point.identified.speed_corrected_rpm *= speed;
+                if let Some(shift) = &mut point.shift {
+                    shift.speed_corrected_rpm *= speed;
+                    shift.flow_corrected_kg_s *= flow;
+                }
+            }
+        }
+        if let Some(fitted) = &mut self.fitted {
+            fitted.scale(speed, flow);
+        }
+        self.reference = reference;
+        self
+    }
 }

@@ -15,6 +15,33 @@ impl ReferenceState {
     /// SAE J922: 298 K, 100 kPa.
     pub const SAE: ReferenceState = ReferenceState { t_ref_k: 298.0, p_ref_pa: 100_000.0 };
 
+    /// As Garrett prints on its maps: 545 degR, 13.95 psia (a pound-force over a square inch, exactly).
+    pub const GARRETT: ReferenceState =
+        ReferenceState { t_ref_k: 545.0 * 5.0 / 9.0, p_ref_pa: 13.95 * 4.448_221_615_260_5 / 0.000_645_16 };
+
+    /// As BorgWarner prints on its maps: 293 K, 98.1 kPa.
+    pub const BORGWARNER: ReferenceState = ReferenceState { t_ref_k: 293.0, p_ref_pa: 98_100.0 };
+
+    /// The state that goes by a name, whatever its capitals.
+    pub fn named(name: &str) -> Option<ReferenceState> {
+        NAMED_REFERENCES.iter().find(|row| row.name.eq_ignore_ascii_case(name.trim())).map(|row| row.state)
+    }
+
+    /// Whether both numbers make a reference state: 200 K to 400 K, 50 kPa to 200 kPa.
+    pub fn is_plausible(&self) -> bool {
+        (200.0..=400.0).contains(&self.t_ref_k) && (50e3..=200e3).contains(&self.p_ref_pa)
+    }
+
+    /// Factor that turns a corrected flow of this state into one of `other` (the machine's state is the same).
+    pub fn flow_factor_to(&self, other: ReferenceState) -> f64 {
+        (other.p_ref_pa / self.p_ref_pa) * (self.t_ref_k / other.t_ref_k).sqrt()
+    }
+
+    /// Factor that turns a corrected speed of this state into one of `other`.
+    pub fn speed_factor_to(&self, other: ReferenceState) -> f64 {
+        (other.t_ref_k / self.t_ref_k).sqrt()
+    }
+
     /// Corrected shaft speed `N sqrt(T_ref/T1)`, rpm.
     pub fn corrected_speed_rpm(&self, speed_rpm: f64, t1_total_k: f64) -> f64 {
         speed_rpm * (self.t_ref_k / t1_total_k).sqrt()
@@ -36,8 +63,60 @@ impl ReferenceState {
     }
 }
 
+/// A reference state in use under a name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NamedReference {
+    /// Name as written in campaigns and on the command line.
+    pub name: &'static str,
+    /// The state.
+    pub state: ReferenceState,
+    /// How it is printed on maps.
+    pub printed: &'static str,
+}
+
+/// Every reference state that has a name.
+pub const NAMED_REFERENCES: &[NamedReference] = &[
+    NamedReference { name: "SAE", state: ReferenceState::SAE, printed: "298 K, 100 kPa" },
+    NamedReference { name: "Garrett", state: ReferenceState::GARRETT, printed: "545 degR, 13.95 psia" },
+    NamedReference { name: "BorgWarner", state: ReferenceState::BORGWARNER, printed: "293 K, 98.1 kPa" },
+];
+
+/// The usual choices in a sentence: `SAE (298 K, 100 kPa), Garrett (...), ...`.
+pub fn usual_references() -> String {
+    let rows: Vec<String> =
+        NAMED_REFERENCES.iter().map(|row| format!("{} ({})", row.name, row.printed)).collect();
+    rows.join(", ")
+}
+
 impl std::fmt::Display for ReferenceState {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} K, {} kPa", self.t_ref_k, self.p_ref_pa / 1000.0)
+        // For people: a hundredth of a permille is no matter. Files carry all digits.
+        let short = |value: f64| (value * 1e3).round() / 1e3;
+        write!(f, "{} K, {} kPa", short(self.t_ref_k), short(self.p_ref_pa / 1000.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn named_states_are_what_the_makers_print() {
+        // 545 degR = 302.778 K, 13.95 psia = 96 182 Pa.
+        assert!((ReferenceState::GARRETT.t_ref_k - 302.778).abs() < 1e-3);
+        assert!((ReferenceState::GARRETT.p_ref_pa - 96_182.0).abs() < 1.0);
+        assert_eq!(ReferenceState::named("borgwarner"), Some(ReferenceState::BORGWARNER));
+        assert_eq!(ReferenceState::named("ISO"), None);
+        assert!(NAMED_REFERENCES.iter().all(|row| row.state.is_plausible()));
+    }
+
+    #[test]
+    fn a_change_of_reference_is_a_way_over_the_physical_values() {
+        let (from, to) = (ReferenceState::SAE, ReferenceState::GARRETT);
+        let (t1_k, p1_pa) = (311.0, 97_000.0);
+        let flow = from.physical_flow_kg_s(0.1, t1_k, p1_pa);
+        let speed = from.physical_speed_rpm(90e3, t1_k);
+        assert!((to.corrected_flow_kg_s(flow, t1_k, p1_pa) - 0.1 * from.flow_factor_to(to)).abs() < 1e-15);
+        assert!((to.corrected_speed_rpm(speed, t1_k) - 90e3 * from.speed_factor_to(to)).abs() < 1e-9);
     }
 }

@@ -1,5 +1,6 @@
 //! What identification is told: method, window, geometry, declared uncertainty, thresholds.
 
+use crate::joint::settings::JointSettings;
 use mapper_core::{Channel, Method, ReferenceState};
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,12 @@ pub struct IdentifyConfig {
     pub alpha_area_ratio: f64,
     /// Internal area of the compressor housing A_c, m2, > 0.
     pub internal_area_m2: f64,
+    /// Diameter of the outlet pipe, m, > 0: characteristic length of the convection law, and where the T2 probe stands.
+    pub outlet_diameter_m: f64,
+    /// Declared diameter of the T2 probe's tip, m, >= 0; 0 is a probe without inertia. The joint method alone uses it.
+    pub probe_diameter_m: f64,
+    /// Which refinements the joint method makes.
+    pub joint: JointSettings,
     /// Reference state of corrected quantities.
     pub reference: ReferenceState,
     /// What the tap of P1 reads.
@@ -38,6 +45,9 @@ impl Default for IdentifyConfig {
             window: WindowRule::default(),
             alpha_area_ratio: 0.0,
             internal_area_m2: 29e-3,
+            outlet_diameter_m: 35e-3,
+            probe_diameter_m: 0.0,
+            joint: JointSettings::default(),
             reference: ReferenceState::SAE,
             inlet_tap: PressureTap::Total,
             outlet_tap: PressureTap::Total,

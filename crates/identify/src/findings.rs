@@ -34,6 +34,16 @@ pub mod code {
     pub const NO_COMPRESSION: &str = "no_compression";
     /// No sensor uncertainty was declared.
     pub const NOTHING_DECLARED: &str = "nothing_declared";
+    /// A noisy channel stood still.
+    pub const STUCK: &str = "stuck";
+    /// The step has no say in what the points share (joint method).
+    pub const LEFT_OUT: &str = "left_out";
+    /// The point's h is far off the law of the others (joint method).
+    pub const OFF_THE_LAW: &str = "off_the_law";
+    /// Something speaks against the joint model as a whole.
+    pub const MODEL_DOUBTED: &str = "model_doubted";
+    /// The step has no transient of its own: its efficiency rests on what is shared (joint method).
+    pub const THROUGH_THE_LAW: &str = "through_the_law";
     /// Part of the state at the step's end is not from its last seconds.
     pub const END_STATE: &str = "end_state";
 }
@@ -53,6 +63,16 @@ impl Findings {
     /// Something to know that is no reason to doubt.
     pub(crate) fn remark(&mut self, code: &str, message: String) {
         self.warnings.push(Warning { code: code.to_owned(), message });
+    }
+
+    /// Adds what another has found.
+    pub(crate) fn take(&mut self, other: Findings) {
+        self.warnings.extend(other.warnings);
+        self.verdict = match (self.verdict, other.verdict) {
+            (Verdict::Unusable, _) | (_, Verdict::Unusable) => Verdict::Unusable,
+            (Verdict::Doubtful, _) | (_, Verdict::Doubtful) => Verdict::Doubtful,
+            _ => Verdict::Good,
+        };
     }
 
     pub(crate) fn doubt(&mut self, code: &str, message: String) {

@@ -1,10 +1,10 @@
 //! From a recording to points: one for each step.
 
 use crate::dynamic::Estimate;
-use crate::end_state::end_state;
+use crate::end_state::{EndState, end_state};
 use crate::findings::Findings;
-use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, WindowRule, dynamic, steady};
-use mapper_core::{Channel, EstimateUncertainty, IdentifiedPoint, Method, Recording, confidence_interval_95};
+use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, WindowRule, dynamic, joint, steady};
+use mapper_core::{Channel, EstimateUncertainty, IdentifiedPoint, Method, Recording, StepMarker, ThermalModel, confidence_interval_95};
 
 /// Identifies every step of a recording, in order. Steps of which not even the place on the map is known are left
 /// out; [`identify_each`] says which and why.
@@ -30,6 +30,23 @@ pub fn identify_each(
     recording: &Recording,
     config: &IdentifyConfig,
 ) -> Result<Vec<Result<IdentifiedPoint, StepError>>, IdentifyError> {
+    Ok(identify_recording(recording, config)?.points)
+}
+
+/// What a recording gives.
+#[derive(Debug)]
+pub struct Identified {
+    /// One for each step, in order; with the reason where a step gives no point.
+    pub points: Vec<Result<IdentifiedPoint, StepError>>,
+    /// What the points share; `None` where the method finds nothing of the kind.
+    pub thermal: Option<ThermalModel>,
+}
+
+/// As [`identify_each`], with what the points share (joint method alone).
+///
+/// # Errors
+/// As [`identify`].
+pub fn identify_recording(recording: &Recording, config: &IdentifyConfig) -> Result<Identified, IdentifyError> {
     check(config)?;
     let mut needed = vec![
         Channel::ShaftSpeed,
@@ -39,7 +56,7 @@ pub fn identify_each(
         Channel::P2,
         Channel::T2,
     ];
-    if config.method == Method::Dynamic {
+    if config.method != Method::Steady {
         needed.push(Channel::Tc);
     }
     needed.retain(|channel| recording.require(*channel).is_err());
@@ -49,7 +66,46 @@ pub fn identify_each(
     if recording.steps.is_empty() {
         return Err(IdentifyError::NoSteps);
     }
-    Ok((0..recording.steps.len()).map(|position| point(recording, position, config)).collect())
+    let mut findings = vec![Findings::new(); recording.steps.len()];
+    let states: Vec<Result<EndState, StepError>> = recording
+        .steps
+        .iter()
+        .zip(&mut findings)
+        .map(|(step, findings)| {
+            let (start_s, end_s) = (step.start_s, step.end_s);
+            if !(start_s.is_finite() && end_s.is_finite() && start_s < end_s) {
+                return Err(StepError::NoDuration { step: step.index, start_s, end_s });
+            }
+            end_state(recording, step, config, findings)
+        })
+        .collect();
+    let mut thermal = None;
+    let estimates: Vec<Estimate> = match config.method {
+        Method::Joint => {
+            let known: Vec<Option<EndState>> = states.iter().map(|state| state.as_ref().ok().copied()).collect();
+            let joint = joint::estimate(recording, &known, config, &mut findings);
+            thermal = joint.thermal;
+            joint.estimates
+        }
+        method => findings
+            .iter_mut()
+            .enumerate()
+            .map(|(position, findings)| match (&states[position], method) {
+                (Err(_), _) => Estimate::default(),
+                (Ok(_), Method::Steady) => steady::estimate(recording, position, config, findings),
+                (Ok(_), _) => dynamic::estimate(recording, position, config, findings),
+            })
+            .collect(),
+    };
+    let points = recording
+        .steps
+        .iter()
+        .zip(states)
+        .zip(estimates)
+        .zip(findings)
+        .map(|(((step, state), estimate), findings)| Ok(point(step, &state?, &estimate, findings, config)))
+        .collect();
+    Ok(Identified { points, thermal })
 }
 
 fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {
@@ -96,27 +152,18 @@ fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {
 }
 
 fn point(
-    recording: &Recording,
-    position: usize,
+    step: &StepMarker,
+    state: &EndState,
+    estimate: &Estimate,
+    findings: Findings,
     config: &IdentifyConfig,
-) -> Result<IdentifiedPoint, StepError> {
-    let step = &recording.steps[position];
-    let (start_s, end_s) = (step.start_s, step.end_s);
-    if !(start_s.is_finite() && end_s.is_finite() && start_s < end_s) {
-        return Err(StepError::NoDuration { step: step.index, start_s, end_s });
-    }
-    let mut findings = Findings::new();
-    let state = end_state(recording, step, config, &mut findings)?;
-    let estimate: Estimate = match config.method {
-        Method::Dynamic => dynamic::estimate(recording, position, config, &mut findings),
-        Method::Steady => steady::estimate(recording, position, config, &mut findings),
-    };
+) -> IdentifiedPoint {
     let interval = |quantity: Option<(f64, Option<EstimateUncertainty>)>| {
         let (value, uncertainty) = quantity?;
         Some(confidence_interval_95(value, uncertainty?.combined_standard_error()))
     };
     let (eta_interval, h_interval) = (interval(estimate.eta), interval(estimate.h_w_m2k));
-    Ok(IdentifiedPoint {
+    IdentifiedPoint {
         step: step.index,
         kind: step.kind,
         target: step.to,
@@ -143,5 +190,5 @@ fn point(
         residual_rms_k: estimate.residual_rms_k,
         dt2_k: estimate.dt2_k,
         dtc_k: estimate.dtc_k,
-    })
+    }
 }

@@ -17,6 +17,7 @@ mod findings;
 mod fit;
 mod flow_drift;
 mod identify;
+mod joint;
 mod jump;
 mod plausible;
 mod samples;
@@ -30,4 +31,6 @@ pub use config::{
 pub use error::{IdentifyError, StepError};
 pub use expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use findings::code;
-pub use identify::{identify, identify_each};
+pub use joint::settings::{Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings};
+pub use joint::surface::EfficiencySurface;
+pub use identify::{Identified, identify, identify_each, identify_recording};

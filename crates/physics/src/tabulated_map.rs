@@ -6,6 +6,7 @@
 //! extrapolation, good enough to run a machine up, not to be read as a measurement.
 
 use crate::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+use crate::similarity::{head_ratio as head, pressure_ratio_of_head};
 use mapper_core::ReferenceState;
 
 /// A row of a map file.
@@ -104,17 +105,6 @@ pub struct TabulatedMap {
     fingerprint: String,
 }
 
-/// Isentropic head over cp T1 of cold air: what similarity scales with the square of speed.
-fn head(pressure_ratio: f64) -> f64 {
-    pressure_ratio.powf(SIMILARITY_KAPPA) - 1.0
-}
-
-fn pressure_ratio_of_head(head: f64) -> f64 {
-    (1.0 + head.max(0.0)).powf(1.0 / SIMILARITY_KAPPA)
-}
-
-/// (gamma - 1)/gamma of cold air.
-const SIMILARITY_KAPPA: f64 = 0.4 / 1.4;
 /// Lowest efficiency that a blend may give; the same floor as the closed form's.
 const LOWEST_EFFICIENCY: f64 = 0.2;
 /// Points whose speeds differ by less than this belong to one line.

@@ -4,7 +4,7 @@ use crate::ExportError;
 use mapper_core::{CompressorMap, MapPoint, SpeedLine, Verdict};
 
 /// Column names, in order. An absent number is an empty field; `eta*` are fractions, 95 % intervals.
-const COLUMNS: [&str; 22] = [
+const COLUMNS: [&str; 24] = [
     "line_speed_corrected_rpm",
     "speed_corrected_rpm",
     "flow_corrected_kg_s",
@@ -27,6 +27,8 @@ const COLUMNS: [&str; 22] = [
     "verdict",
     "warnings",
     "step",
+    "flow_measured_corrected_kg_s",
+    "pressure_ratio_measured",
 ];
 
 pub(crate) fn export(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
@@ -41,22 +43,20 @@ pub(crate) fn export(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
 }
 
 fn header(map: &CompressorMap) -> String {
-    // A line break in a name must not end the comment.
-    let machine: String = map.machine.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    let (t_ref_k, p_ref_pa) = (map.reference.t_ref_k, map.reference.p_ref_pa);
     format!(
-        "# compressor map of {machine}\n\
-         # reference state of corrected flow and speed: {t_ref_k} K, {p_ref_pa} Pa\n\
+        "{}\
          # method: {}\n\
          # units: SI as in the column names, speeds in rpm; pressures and temperatures are total; ratios and eta are fractions\n\
          # eta: isentropic, total to total ({}); *_low and *_high bound the 95 % interval; empty where undefined\n\
+         # flow_corrected_kg_s and pressure_ratio: brought to line_speed_corrected_rpm by similarity; *_measured: before\n\
          # h: heat-transfer coefficient between gas and compressor housing; warnings: codes separated by semicolons\n",
+        crate::heading::heading(map, "#"),
         map.method,
         crate::svg::efficiency_name(map.method),
     )
 }
 
-fn row(line: &SpeedLine, point: &MapPoint) -> [String; 22] {
+fn row(line: &SpeedLine, point: &MapPoint) -> [String; 24] {
     let p = &point.identified;
     // Shortest text that reads back to the same number.
     let number = |value: f64| value.to_string();
@@ -90,5 +90,7 @@ fn row(line: &SpeedLine, point: &MapPoint) -> [String; 22] {
         verdict.to_owned(),
         p.warnings.iter().map(|warning| warning.code.as_str()).collect::<Vec<_>>().join(";"),
         p.step.to_string(),
+        number(p.flow_corrected_kg_s),
+        number(p.pressure_ratio),
     ]
 }

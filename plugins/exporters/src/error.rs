@@ -25,4 +25,15 @@ pub enum ExportError {
         /// Its value.
         value: f64,
     },
+    /// The format is a table over the whole map, and the map has only points.
+    #[error(
+        "`{format}` needs a fitted map, not points alone; fit it (`mapper map fit FILE --out NEW`), or see why the fit was not possible"
+    )]
+    NeedsFit {
+        /// The format.
+        format: &'static str,
+    },
+    /// The picture could not be drawn as pixels.
+    #[error("failed to draw the picture as PNG")]
+    Png(#[from] mapper_chart::PngError),
 }

@@ -7,8 +7,18 @@
 
 mod csv;
 mod error;
+mod fitted_csv;
+mod fitted_items;
+mod heading;
 mod json;
+mod modelica;
 mod monotone;
+mod npss;
+mod png;
+mod pycycle;
+mod sae;
+mod simscape;
+mod simulation_table;
 mod surface;
 mod svg;
 
@@ -49,10 +59,52 @@ pub const EXPORTERS: &[ExporterEntry] = &[
         export: json::export,
     },
     ExporterEntry {
+        name: "sae",
+        extension: "txt",
+        description: "SAE text: corrected rpm, corrected kg/s, pressure ratio, efficiency, from choke to surge",
+        export: sae::export,
+    },
+    ExporterEntry {
+        name: "fitted",
+        extension: "fitted.csv",
+        description: "the fitted lines with standard errors, each node marked measured or extrapolated",
+        export: fitted_csv::export,
+    },
+    ExporterEntry {
+        name: "modelica",
+        extension: "modelica.txt",
+        description: "tables over corrected speed and beta for Modelica.Blocks.Tables.CombiTable2Ds",
+        export: modelica::export,
+    },
+    ExporterEntry {
+        name: "simscape",
+        extension: "m",
+        description: "MATLAB script: tables over corrected speed and beta, and over corrected speed and pressure ratio",
+        export: simscape::export,
+    },
+    ExporterEntry {
+        name: "npss",
+        extension: "npss.map",
+        description: "NPSS tables of flow, pressure ratio and efficiency over beta and corrected speed",
+        export: npss::export,
+    },
+    ExporterEntry {
+        name: "pycycle",
+        extension: "py",
+        description: "Python module with a pyCycle map: [alpha][Nc][Rline]",
+        export: pycycle::export,
+    },
+    ExporterEntry {
         name: "svg",
         extension: "svg",
         description: "picture: speed lines with efficiency contours, and efficiency with its 95 % interval",
         export: svg::export,
+    },
+    ExporterEntry {
+        name: "png",
+        extension: "png",
+        description: "the picture as pixels",
+        export: png::export,
     },
 ];
 

@@ -151,7 +151,7 @@ fn places(line: &SpeedLine, spans: (f64, f64)) -> Vec<Place> {
 }
 
 /// Values between lines, `SUBDIVISIONS` a gap; NaN in every gap with an unknown end.
-fn across(speeds: &[f64], values: &[f64]) -> Vec<f64> {
+pub(crate) fn across(speeds: &[f64], values: &[f64]) -> Vec<f64> {
     let mut out = vec![f64::NAN; (speeds.len() - 1) * SUBDIVISIONS + 1];
     let mut start = 0;
     while start < values.len() {

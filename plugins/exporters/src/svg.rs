@@ -4,11 +4,11 @@
 //! bury the map), and in (b) by the interval itself as a bar. Shape and colour tell good from doubtful; points without
 //! an efficiency are hollow.
 
-use crate::{ExportError, surface};
+use crate::{ExportError, fitted_items, surface};
 use mapper_chart::{
     Axis, Contours, Figure, Line, LineEnd, Marker, Panel, Scatter, ScatterPoint, nice_ticks, palette,
 };
-use mapper_core::{CompressorMap, MapPoint, Method, SpeedLine, Verdict};
+use mapper_core::{CompressorMap, MapPoint, Method, Verdict};
 
 pub(crate) fn export(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     Ok(map_figure(map).to_svg().into_bytes())
@@ -18,7 +18,8 @@ pub(crate) fn export(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
 pub(crate) fn efficiency_name(method: Method) -> &'static str {
     match method {
         Method::Steady => "apparent: heat transfer not removed",
-        Method::Dynamic => "adiabatic: heat transfer removed",
+        Method::Dynamic | Method::Joint => "adiabatic: heat transfer removed",
+        Method::Imported => "as the map file has it",
     }
 }
 
@@ -29,11 +30,19 @@ pub fn map_figure(map: &CompressorMap) -> Figure {
     Figure::new(format!("Compressor map of {machine}"))
         .subtitle(format!(
             "Corrected to {}. Method: {} (isentropic efficiency total to total, {}). {points} points on {} speed lines; \
-             contours only between measured points.",
+             {}.",
             map.reference,
             map.method,
             efficiency_name(map.method),
             map.lines.len(),
+            match &map.fitted {
+                None => "contours only between measured points".to_owned(),
+                Some(fitted) => format!(
+                    "lines and contours are fitted to all of them (scatter {:.1} % of distance, {:.1} points of efficiency)",
+                    100.0 * fitted.distance_rms_ratio,
+                    100.0 * fitted.eta_rms
+                ),
+            },
         ))
         .panel(map_panel(map))
         .panel(efficiency_panel(map))
@@ -45,13 +54,9 @@ pub fn map_panel(map: &CompressorMap) -> Panel {
     let mut panel =
         Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new("total pressure ratio P2/P1"))
             .title("(a) speed lines (krpm, corrected) and efficiency contours (%)");
-    if let Some(grid) = surface::efficiency_surface(map) {
-        let levels = contour_levels(grid.value_range());
-        panel.add(Contours::new(grid, &levels, percent).shaded().colour(palette::Colour(40, 80, 120)));
-    }
-    for line in &map.lines {
-        let curve = surface::speed_curve(map, line);
-        panel.add(Line::new(curve, palette::INK).width_px(1.3).end_label(krpm(line), LineEnd::Last));
+    match &map.fitted {
+        Some(fitted) => fitted_items::add_map(&mut panel, fitted),
+        None => add_measured_lines(&mut panel, map),
     }
     let all = || map.lines.iter().flat_map(|line| &line.points);
     for class in CLASSES {
@@ -66,13 +71,30 @@ pub fn map_panel(map: &CompressorMap) -> Panel {
     panel
 }
 
+/// Lines and contours without a fit: through the points.
+fn add_measured_lines(panel: &mut Panel, map: &CompressorMap) {
+    if let Some(grid) = surface::efficiency_surface(map) {
+        let levels = contour_levels(grid.value_range());
+        panel.add(Contours::new(grid, &levels, percent).shaded().colour(palette::Colour(40, 80, 120)));
+    }
+    for line in &map.lines {
+        let curve = surface::speed_curve(map, line);
+        let speed = krpm(line.speed_corrected_rpm);
+        panel.add(Line::new(curve, palette::INK).width_px(1.3).end_label(speed, LineEnd::Last));
+    }
+}
+
 fn efficiency_panel(map: &CompressorMap) -> Panel {
     let name = match map.method {
         Method::Steady => "apparent efficiency, %",
-        Method::Dynamic => "adiabatic efficiency, %",
+        Method::Dynamic | Method::Joint => "adiabatic efficiency, %",
+        Method::Imported => "isentropic efficiency, %",
     };
     let mut panel = Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new(name))
         .title("(b) efficiency with its 95 % interval");
+    if let Some(fitted) = &map.fitted {
+        fitted_items::add_eta(&mut panel, fitted);
+    }
     let last = map.lines.len().saturating_sub(1).max(1) as f64;
     for (index, line) in map.lines.iter().enumerate() {
         let colour = palette::sequential(index as f64 / last);
@@ -89,8 +111,10 @@ fn efficiency_panel(map: &CompressorMap) -> Panel {
         if points.is_empty() {
             continue;
         }
-        let label = format!("{} krpm", krpm(line));
-        panel.add(Line::new(points.iter().map(|(p, _)| (p.x, p.y)).collect(), colour).label(&label));
+        let label = format!("{} krpm", krpm(line.speed_corrected_rpm));
+        if map.fitted.is_none() {
+            panel.add(Line::new(points.iter().map(|(p, _)| (p.x, p.y)).collect(), colour).label(&label));
+        }
         for (verdict, marker) in [(Verdict::Good, Marker::Circle), (Verdict::Doubtful, Marker::Diamond)] {
             let members: Vec<ScatterPoint> = points.iter().filter(|p| p.1 == verdict).map(|p| p.0).collect();
             let scatter = Scatter::new(members, colour).marker(marker);
@@ -159,19 +183,20 @@ impl Class {
     }
 }
 
-fn krpm(line: &SpeedLine) -> String {
-    let text = format!("{:.1}", line.speed_corrected_rpm / 1000.0);
+/// A speed in krpm without needless digits.
+pub(crate) fn krpm(speed_rpm: f64) -> String {
+    let text = format!("{:.1}", speed_rpm / 1000.0);
     text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
 }
 
 /// Text of an efficiency (fraction) in %, without needless digits.
-fn percent(eta: f64) -> String {
+pub(crate) fn percent(eta: f64) -> String {
     let text = format!("{:.1}", 100.0 * eta);
     text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
 }
 
 /// Round levels (fractions): finer towards the best efficiency, where the map is flat.
-fn contour_levels(range: Option<(f64, f64)>) -> Vec<f64> {
+pub(crate) fn contour_levels(range: Option<(f64, f64)>) -> Vec<f64> {
     let Some((low, high)) = range else { return Vec::new() };
     let (low, high) = (low.max(0.0), high.min(1.5));
     if low >= high {

@@ -17,17 +17,18 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-sequence",  &["core", "physics", "units"]),
     ("mapper-record",    &["core", "units"]),
     ("mapper-identify",  &["core", "physics"]),
-    ("mapper-assemble",  &["core", "identify"]),
+    ("mapper-assemble",  &["core", "physics", "identify"]),
     ("mapper-score",     &["core", "record"]),
     ("mapper-reproduce", &["core", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
     ("mapper-backends",  &["core", "physics", "units"]),
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-exporters", &["core", "physics", "chart"]),
+    ("mapper-importers", &["core", "physics"]),
     // Draws cases on the virtual lab; above it, like the program.
     ("mapper-blind",     &["core", "physics", "campaign", "record", "backends", "effects"]),
     // The program sees all; nothing sees the program.
-    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters"]),
+    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters", "importers"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

@@ -127,7 +127,7 @@ pub(crate) struct OutputsFile {
     /// Directory of the run directories; `runs` where none is given.
     #[schemars(length(min = 1), example = &"runs")]
     pub directory: Option<String>,
-    /// Formats of the map; all where none is given.
+    /// Formats of the map; csv, json, svg and fitted where none is given.
     #[schemars(extend("uniqueItems" = true, "examples" = [["csv", "json", "svg"]]))]
     pub formats: Option<Vec<FormatName>>,
 }
@@ -138,6 +138,13 @@ pub(crate) enum FormatName {
     Csv,
     Json,
     Svg,
+    Png,
+    Sae,
+    Fitted,
+    Modelica,
+    Simscape,
+    Npss,
+    Pycycle,
 }
 
 /// What a test report needs and no sensor measures.

@@ -5,13 +5,16 @@ mod gap;
 mod gap_blind;
 mod gap_effects;
 mod identify;
+mod map_compare;
+mod map_convert;
+mod map_fit;
 mod plan;
 mod reproduce;
 mod run;
 mod schema;
 mod scripted;
 
-use crate::arguments::{Arguments, Command};
+use crate::arguments::{Arguments, Command, MapCommand};
 use crate::failure::Failure;
 
 /// Runs the command that was asked for.
@@ -24,5 +27,10 @@ pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
         Command::Identify(arguments) => identify::identify(arguments),
         Command::Gap(arguments) => gap::gap(arguments),
         Command::Reproduce(arguments) => reproduce::reproduce(arguments),
+        Command::Map(arguments) => match &arguments.command {
+            MapCommand::Fit(arguments) => map_fit::fit(arguments),
+            MapCommand::Convert(arguments) => map_convert::convert(arguments),
+            MapCommand::Compare(arguments) => map_compare::compare(arguments),
+        },
     }
 }

@@ -53,6 +53,7 @@ pub fn turbo_a() -> CompressorMap {
         reference: ReferenceState::SAE,
         method: Method::Dynamic,
         lines,
+        fitted: None,
     }
 }
 
@@ -102,5 +103,5 @@ fn point(step: usize, speed_rpm: f64, x: f64, valve_opening_ratio: f64) -> MapPo
         dt2_k: Some(-12.5),
         dtc_k: None,
     };
-    MapPoint { flow_corrected_kg_s: flow_kg_s, pressure_ratio, eta, identified }
+    MapPoint { flow_corrected_kg_s: flow_kg_s, pressure_ratio, eta, identified, shift: None }
 }

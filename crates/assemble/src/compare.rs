@@ -1,0 +1,190 @@
+//! Where two maps differ, in units and in their uncertainty.
+
+use crate::map_fit::{MapFit, MapFitError, MapFitOptions};
+use mapper_core::{CompressorMap, FittedLine, FittedNode, confidence_interval_95};
+use serde::Serialize;
+
+/// Nodes compared on each line.
+const NODES: usize = 25;
+
+/// A place of the second map beside the nearest place of the first at equal corrected speed. Differences: second less
+/// first.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ComparedPlace {
+    /// Corrected flow of the second map, kg/s.
+    pub flow_corrected_kg_s: f64,
+    /// Pressure ratio of the second map.
+    pub pressure_ratio: f64,
+    /// Efficiency of the second map, fraction.
+    pub eta: f64,
+    /// Difference of flow across the line, kg/s.
+    pub flow_difference_kg_s: f64,
+    /// Difference of pressure ratio across the line.
+    pub pressure_ratio_difference: f64,
+    /// Distance across the line, in units of the first line's largest flow and largest PR - 1, positive outwards.
+    pub distance_ratio: f64,
+    /// Standard error of the distance, both maps together.
+    pub distance_standard_error: f64,
+    /// Difference of efficiency, fraction.
+    pub eta_difference: f64,
+    /// Standard error of the difference of efficiency, both maps together, fraction.
+    pub eta_standard_error: f64,
+}
+
+impl ComparedPlace {
+    /// Whether the 95 % interval of the distance leaves 0 out.
+    pub fn line_differs(&self) -> bool {
+        beyond(self.distance_ratio, self.distance_standard_error)
+    }
+
+    /// Whether the 95 % interval of the difference of efficiency leaves 0 out.
+    pub fn eta_differs(&self) -> bool {
+        beyond(self.eta_difference, self.eta_standard_error)
+    }
+}
+
+fn beyond(difference: f64, standard_error: f64) -> bool {
+    let (low, high) = confidence_interval_95(difference, standard_error);
+    low > 0.0 || high < 0.0
+}
+
+/// All places of a speed at which both maps are measured.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComparedLine {
+    /// Corrected speed, rpm, at the first map's reference state.
+    pub speed_corrected_rpm: f64,
+    /// Places from the choke side to the surge side; empty where the lines do not overlap.
+    pub places: Vec<ComparedPlace>,
+}
+
+/// Two maps side by side.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MapComparison {
+    /// Lines in order of speed.
+    pub lines: Vec<ComparedLine>,
+    /// Speeds of either map that the other does not reach, rpm: not compared.
+    pub not_compared_rpm: Vec<f64>,
+    /// Root mean square of the distance over all places, ratio.
+    pub distance_rms_ratio: f64,
+    /// Root mean square of the difference of efficiency, fraction.
+    pub eta_rms: f64,
+    /// Mean difference of efficiency, fraction.
+    pub eta_mean: f64,
+    /// Share of places where the lines differ beyond their 95 % interval.
+    pub line_differs_ratio: f64,
+    /// Share of places where the efficiencies differ beyond their 95 % interval.
+    pub eta_differs_ratio: f64,
+}
+
+/// Compares two maps, each by its own fit, at every measured speed that lies within both; the second is brought to the
+/// first's reference state. Extrapolated places are left out.
+///
+/// # Errors
+/// [`MapFitError`] where one of the maps cannot be fitted.
+pub fn compare(first: &CompressorMap, second: &CompressorMap) -> Result<MapComparison, MapFitError> {
+    let second = second.clone().at_reference(first.reference);
+    let fits = [MapFit::new(first)?, MapFit::new(&second)?];
+    let speeds = [speeds_of(first), speeds_of(&second)];
+    let bounds =
+        speeds.each_ref().map(|s| (s.first().copied().unwrap_or(0.0), s.last().copied().unwrap_or(0.0)));
+    let (low, high) = (bounds[0].0.max(bounds[1].0), bounds[0].1.min(bounds[1].1));
+    // The slack is that of a reference state's rounding.
+    let within = |speed: &f64| *speed >= low * (1.0 - 1e-6) && *speed <= high * (1.0 + 1e-6);
+    let mut all: Vec<f64> = speeds.iter().flatten().copied().collect();
+    all.sort_by(f64::total_cmp);
+    // Two measured lines less than half a percent apart say the same.
+    all.dedup_by(|b, a| *b <= *a * 1.005);
+    let (common, not_compared_rpm): (Vec<f64>, Vec<f64>) = all.into_iter().partition(within);
+    let options =
+        MapFitOptions { further_speeds_rpm: Some(common.clone()), nodes: 4 * NODES, leave_one_out: false };
+    let tables = [fits[0].table(&options)?, fits[1].table(&options)?];
+    let line_at = |lines: &[FittedLine], speed: f64| {
+        let near = |line: &&FittedLine| (line.speed_corrected_rpm - speed).abs();
+        lines.iter().min_by(|a, b| near(a).total_cmp(&near(b))).cloned()
+    };
+    let lines: Vec<ComparedLine> = common
+        .iter()
+        .filter_map(|speed| {
+            let places =
+                compare_lines(&line_at(&tables[0].lines, *speed)?, &line_at(&tables[1].lines, *speed)?);
+            Some(ComparedLine { speed_corrected_rpm: *speed, places })
+        })
+        .collect();
+    Ok(summary(lines, not_compared_rpm))
+}
+
+fn speeds_of(map: &CompressorMap) -> Vec<f64> {
+    let mut speeds: Vec<f64> =
+        map.lines.iter().map(|line| line.speed_corrected_rpm).filter(|s| s.is_finite() && *s > 0.0).collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds
+}
+
+fn summary(lines: Vec<ComparedLine>, not_compared_rpm: Vec<f64>) -> MapComparison {
+    let places = || lines.iter().flat_map(|line| &line.places);
+    let count = places().count().max(1) as f64;
+    let mean = |value: fn(&ComparedPlace) -> f64| places().map(value).sum::<f64>() / count;
+    let share = |differs: fn(&ComparedPlace) -> bool| places().filter(|p| differs(p)).count() as f64 / count;
+    MapComparison {
+        distance_rms_ratio: mean(|p| p.distance_ratio.powi(2)).sqrt(),
+        eta_rms: mean(|p| p.eta_difference.powi(2)).sqrt(),
+        eta_mean: mean(|p| p.eta_difference),
+        line_differs_ratio: share(ComparedPlace::line_differs),
+        eta_differs_ratio: share(ComparedPlace::eta_differs),
+        lines,
+        not_compared_rpm,
+    }
+}
+
+fn compare_lines(first: &FittedLine, second: &FittedLine) -> Vec<ComparedPlace> {
+    let known: Vec<&FittedNode> = first.nodes.iter().filter(|n| !n.extrapolated).collect();
+    let flow_scale = known.iter().map(|n| n.flow_corrected_kg_s).fold(1e-12, f64::max);
+    let ratio_scale = known.iter().map(|n| n.pressure_ratio - 1.0).fold(1e-6, f64::max);
+    let compared = |node: &FittedNode| compare_place(&known, node, flow_scale, ratio_scale);
+    second.nodes.iter().step_by(4).filter(|node| !node.extrapolated).filter_map(compared).collect()
+}
+
+/// The nearest place of the first line; none where it is the line's very end: there the other line goes on alone.
+fn compare_place(
+    known: &[&FittedNode],
+    node: &FittedNode,
+    flow_scale: f64,
+    ratio_scale: f64,
+) -> Option<ComparedPlace> {
+    let scaled = |n: &FittedNode| (n.flow_corrected_kg_s / flow_scale, n.pressure_ratio / ratio_scale);
+    let (px, py) = scaled(node);
+    let mut best: Option<(f64, usize, f64)> = None;
+    for (i, pair) in known.windows(2).enumerate() {
+        let ((ax, ay), (bx, by)) = (scaled(pair[0]), scaled(pair[1]));
+        let (dx, dy) = (bx - ax, by - ay);
+        let share = ((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy).max(1e-30);
+        let inside = share.clamp(0.0, 1.0);
+        let distance = (px - ax - inside * dx).hypot(py - ay - inside * dy);
+        let end = (i == 0 && share < -1e-6) || (i + 2 == known.len() && share > 1.0 + 1e-6);
+        if best.is_none_or(|(least, ..)| distance < least) {
+            best = Some((distance, i, if end { f64::NAN } else { inside }));
+        }
+    }
+    let (_, i, share) = best.filter(|(.., share)| share.is_finite())?;
+    let between =
+        |value: fn(&FittedNode) -> f64| value(known[i]) + share * (value(known[i + 1]) - value(known[i]));
+    let flow_difference_kg_s = node.flow_corrected_kg_s - between(|n| n.flow_corrected_kg_s);
+    let pressure_ratio_difference = node.pressure_ratio - between(|n| n.pressure_ratio);
+    let (x, y) = (flow_difference_kg_s / flow_scale, pressure_ratio_difference / ratio_scale);
+    // Outwards is where flow and pressure ratio grow.
+    let distance_ratio = x.hypot(y) * (x + y).signum();
+    let across = |n: &FittedNode| {
+        (n.flow_standard_error_kg_s / flow_scale).hypot(n.pressure_ratio_standard_error / ratio_scale)
+    };
+    Some(ComparedPlace {
+        flow_corrected_kg_s: node.flow_corrected_kg_s,
+        pressure_ratio: node.pressure_ratio,
+        eta: node.eta,
+        flow_difference_kg_s,
+        pressure_ratio_difference,
+        distance_ratio,
+        distance_standard_error: across(node).hypot(across(known[i])),
+        eta_difference: node.eta - between(|n| n.eta),
+        eta_standard_error: node.eta_standard_error.hypot(known[i].eta_standard_error),
+    })
+}

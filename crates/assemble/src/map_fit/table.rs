@@ -1,0 +1,222 @@
+//! The fit as a rectangular table with errors and marks of extrapolation.
+
+use super::crossing::crossings;
+use super::line_shape::{ANGLE_RANGE, LineShape, PARAMETERS};
+use super::nearest::normal;
+use super::speed_spline::SpeedSpline;
+use super::{MapFit, MapFitError, MapFitOptions, leave_out};
+use mapper_core::{FittedLine, FittedMap, FittedNode};
+use nalgebra::{DMatrix, DVector};
+
+/// Steps of the walk along a line from which nodes at equal distances are taken.
+const WALK: usize = 240;
+/// Speeds beyond the measured ones that a table gets unasked, over the slowest (two) and the fastest.
+const UNASKED: (f64, f64, f64) = (0.4, 0.7, 1.05);
+
+pub(super) fn table(fit: &MapFit, options: &MapFitOptions) -> Result<FittedMap, MapFitError> {
+    let (lowest_rpm, highest_rpm) = fit.speed_bounds_rpm();
+    let measured = &fit.data.lines_rpm;
+    let (first, last) = (lowest_rpm / super::SPEED_REACH.0, highest_rpm / super::SPEED_REACH.1);
+    let further = match &options.further_speeds_rpm {
+        Some(speeds) => speeds.clone(),
+        None => vec![UNASKED.0 * first, UNASKED.1 * first, UNASKED.2 * last],
+    };
+    for speed in &further {
+        if !(*speed >= lowest_rpm && *speed <= highest_rpm) {
+            return Err(MapFitError::Speed { speed_corrected_rpm: *speed, lowest_rpm, highest_rpm });
+        }
+    }
+    let mut speeds: Vec<(f64, bool)> = measured.iter().map(|speed| (*speed, true)).collect();
+    speeds.extend(further.iter().map(|speed| (*speed, false)));
+    speeds.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+    // A further speed that is a measured one stays that; lines of one speed are one.
+    speeds.dedup_by(|b, a| b.0 <= a.0 * (1.0 + 1e-9));
+    let nodes = options.nodes.clamp(5, 400);
+    let ends = Ends::new(fit);
+    let lines: Vec<FittedLine> = speeds
+        .into_iter()
+        .map(|(speed_corrected_rpm, measured)| FittedLine {
+            speed_corrected_rpm,
+            measured,
+            nodes: line(fit, &ends, speed_corrected_rpm, nodes),
+        })
+        .collect();
+    Ok(FittedMap {
+        beta_ratio: (0..nodes).map(|i| i as f64 / (nodes - 1) as f64).collect(),
+        crossings: crossings(&lines),
+        lines,
+        distance_rms_ratio: fit.solution.rms[0],
+        eta_rms: fit.solution.rms[1],
+        line_scatter_ratio: fit.solution.line_scatter[0],
+        left_out: if options.leave_one_out { leave_out(fit) } else { Vec::new() },
+    })
+}
+
+impl MapFit {
+    /// Measured and a few extrapolated lines, coarse: enough to see whether lines cross.
+    pub(super) fn lines_for_check(&self) -> Vec<FittedLine> {
+        let options = MapFitOptions { further_speeds_rpm: None, nodes: 41, leave_one_out: false };
+        table(self, &options).map(|table| table.lines).unwrap_or_default()
+    }
+}
+
+/// Where lines end, as angles over speed.
+struct Ends {
+    /// Smooth surge-side end.
+    spline: SpeedSpline,
+    surge: DVector<f64>,
+    /// Speed ratio, and smallest and largest angle with a point, for each measured line.
+    measured: Vec<(f64, f64, f64)>,
+}
+
+/// Smoothing of the surge-side ends: variance of an end over that of its roughness.
+const END_SMOOTHING: f64 = 0.004;
+
+impl Ends {
+    fn new(fit: &MapFit) -> Self {
+        let mut measured: Vec<(f64, f64, f64)> = fit
+            .data
+            .lines_rpm
+            .iter()
+            .map(|speed| (fit.speed_ratio(*speed), f64::INFINITY, f64::NEG_INFINITY))
+            .collect();
+        for (point, angle) in fit.data.points.iter().zip(&fit.solution.angles_rad) {
+            let line = &mut measured[point.line];
+            (line.1, line.2) = (line.1.min(*angle), line.2.max(*angle));
+        }
+        let spline = fit.solution.splines.shape.clone();
+        let rows: Vec<DVector<f64>> = measured.iter().map(|line| spline.row(line.0)).collect();
+        let basis = DMatrix::from_fn(rows.len(), spline.len(), |i, k| rows[i][k]);
+        let ends = DVector::from_iterator(measured.len(), measured.iter().map(|line| line.2));
+        let mean = ends.mean();
+        let square = basis.tr_mul(&basis)
+            + &spline.penalty * END_SMOOTHING
+            + DMatrix::identity(spline.len(), spline.len()) * 1e-9;
+        let deviation = square
+            .cholesky()
+            .map(|factor| factor.solve(&basis.tr_mul(&ends.add_scalar(-mean))))
+            .unwrap_or_else(|| DVector::zeros(spline.len()));
+        Ends { spline, surge: deviation.add_scalar(mean), measured }
+    }
+
+    fn surge_rad(&self, speed_ratio: f64) -> f64 {
+        self.spline.row(speed_ratio).dot(&self.surge).clamp(0.2, ANGLE_RANGE.1)
+    }
+
+    /// Smallest and largest angle that points support; `None` outside the measured speeds.
+    fn supported(&self, speed_ratio: f64) -> Option<(f64, f64)> {
+        let slack = 1e-9;
+        let after = self.measured.partition_point(|line| line.0 < speed_ratio - slack);
+        let upper = self.measured.get(after)?;
+        if upper.0 <= speed_ratio + slack {
+            return Some((upper.1, upper.2));
+        }
+        let lower = self.measured.get(after.checked_sub(1)?)?;
+        let share = (speed_ratio - lower.0) / (upper.0 - lower.0);
+        let blend = |a: f64, b: f64| a + share * (b - a);
+        Some((blend(lower.1, upper.1), blend(lower.2, upper.2)))
+    }
+}
+
+/// Lowest pressure ratio of a line: some way below 1, in proportion to what the line reaches.
+fn bottom_ratio(highest_ratio: f64) -> f64 {
+    (1.0 - 0.15 * (highest_ratio - 1.0)).clamp(0.9, 1.0)
+}
+
+fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Vec<FittedNode> {
+    let speed_ratio = fit.speed_ratio(speed_corrected_rpm);
+    let shape = fit.solution.shape(speed_ratio);
+    let surge = ends.surge_rad(speed_ratio);
+    let bottom = choke_end(&shape, speed_ratio, surge);
+    let walk: Vec<f64> = (0..=WALK).map(|i| bottom + (surge - bottom) * i as f64 / WALK as f64).collect();
+    let places: Vec<(f64, f64)> = walk
+        .iter()
+        .map(|angle| {
+            let place = shape.physical(*angle, speed_ratio);
+            (place.flow_kg_s, place.pressure_ratio)
+        })
+        .collect();
+    let largest = |value: fn(&(f64, f64)) -> f64| places.iter().map(value).fold(f64::MIN, f64::max);
+    let scales = (largest(|p| p.0).max(1e-12), (largest(|p| p.1) - 1.0).max(1e-6));
+    let mut length = vec![0.0];
+    for pair in places.windows(2) {
+        let step = ((pair[1].0 - pair[0].0) / scales.0).hypot((pair[1].1 - pair[0].1) / scales.1);
+        length.push(length[length.len() - 1] + step);
+    }
+    let total = length[WALK];
+    let covariance = fit.solution.covariance(speed_ratio);
+    let parameters = fit.solution.parameters(speed_ratio);
+    let supported = ends.supported(speed_ratio);
+    (0..count)
+        .map(|i| {
+            let wanted = total * i as f64 / (count - 1) as f64;
+            let after = length.partition_point(|l| *l < wanted).clamp(1, WALK);
+            let gap = length[after] - length[after - 1];
+            let share = if gap > 0.0 { ((wanted - length[after - 1]) / gap).clamp(0.0, 1.0) } else { 0.0 };
+            let angle = walk[after - 1] + share * (walk[after] - walk[after - 1]);
+            let place = shape.physical(angle, speed_ratio);
+            let [flow_error, ratio_error, eta_error] =
+                errors(fit, &parameters, &covariance, angle, speed_ratio, scales);
+            FittedNode {
+                flow_corrected_kg_s: place.flow_kg_s,
+                pressure_ratio: place.pressure_ratio,
+                eta: place.eta,
+                work_ratio: shape.at(angle).work * speed_ratio * speed_ratio,
+                flow_standard_error_kg_s: flow_error,
+                pressure_ratio_standard_error: ratio_error,
+                eta_standard_error: eta_error,
+                // A hair's breadth beyond the last point is no extrapolation.
+                extrapolated: supported.is_none_or(|(low, high)| angle < low - 0.02 || angle > high + 0.02),
+            }
+        })
+        .collect()
+}
+
+/// Angle at which the line has fallen to its lowest pressure ratio.
+fn choke_end(shape: &LineShape, speed_ratio: f64, surge_rad: f64) -> f64 {
+    let ratio = |angle: f64| shape.physical(angle, speed_ratio).pressure_ratio;
+    let top = ratio(surge_rad.min(std::f64::consts::FRAC_PI_2)).max(ratio(surge_rad));
+    let wanted = bottom_ratio(top);
+    let (mut low, mut high) = (ANGLE_RANGE.0, surge_rad.min(std::f64::consts::FRAC_PI_2));
+    if ratio(low) > wanted {
+        return low;
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if ratio(middle) < wanted { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// One standard error of a place: across the line (flow and pressure-ratio parts), and of efficiency.
+fn errors(
+    fit: &MapFit,
+    parameters: &[f64; PARAMETERS],
+    covariance: &DMatrix<f64>,
+    angle: f64,
+    speed_ratio: f64,
+    (flow_scale, ratio_scale): (f64, f64),
+) -> [f64; 3] {
+    const STEP: f64 = 1e-5;
+    let at = |p: &[f64; PARAMETERS], angle: f64| {
+        let place = LineShape::new(p, fit.solution.frame).physical(angle, speed_ratio);
+        [place.flow_kg_s / flow_scale, place.pressure_ratio / ratio_scale, place.eta]
+    };
+    let (here, next) = (at(parameters, angle), at(parameters, angle + STEP));
+    let slope: [f64; 3] = std::array::from_fn(|i| (next[i] - here[i]) / STEP);
+    let (nx, ny) = normal(&slope);
+    let length = (slope[0].powi(2) + slope[1].powi(2)).max(1e-12);
+    let mut across = DVector::zeros(PARAMETERS);
+    let mut eta = DVector::zeros(PARAMETERS);
+    for q in 0..PARAMETERS {
+        let mut moved = *parameters;
+        moved[q] += STEP;
+        let there = at(&moved, angle);
+        let d: [f64; 3] = std::array::from_fn(|i| (there[i] - here[i]) / STEP);
+        across[q] = d[0] * nx + d[1] * ny;
+        eta[q] = d[2] - slope[2] * (d[0] * slope[0] + d[1] * slope[1]) / length;
+    }
+    let error = |gradient: &DVector<f64>| gradient.dot(&(covariance * gradient)).max(0.0).sqrt();
+    let distance = error(&across);
+    [distance * nx.abs() * flow_scale, distance * ny.abs() * ratio_scale, error(&eta)]
+}

@@ -1,0 +1,119 @@
+//! `mapper map fit`: all speed lines together, with the error at lines that are left out.
+
+use crate::arguments::MapFitArguments;
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::table::{self, number};
+use crate::{map_file, output};
+use mapper_assemble::{MapFitOptions, fit_map};
+use mapper_core::{CompressorMap, FittedLine, FittedMap};
+use serde_json::json;
+use std::fmt::Write;
+
+/// Fits a map.
+pub fn fit(arguments: &MapFitArguments) -> Result<(), Failure> {
+    let exporter = match &arguments.out {
+        Some(path) => Some((path, map_file::exporter(path, arguments.to.as_deref())?)),
+        None => None,
+    };
+    let map = map_file::read(&arguments.map, map_file::reference(arguments.reference.as_deref())?)?;
+    let options = MapFitOptions {
+        further_speeds_rpm: arguments.speeds.clone(),
+        nodes: usize::from(arguments.nodes),
+        leave_one_out: !arguments.no_leave_out,
+    };
+    let map = fit_map(map, &options)
+        .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", arguments.map.display())))?;
+    if let Some((path, exporter)) = exporter {
+        map_file::write(path, exporter, &map)?;
+    }
+    if arguments.json {
+        return output::print_json(&json!({
+            "map": arguments.map,
+            "reference": map.reference,
+            "fitted": map.fitted,
+            "file": arguments.out,
+        }));
+    }
+    let mut text = map.fitted.as_ref().map(|fitted| describe(&map, fitted)).unwrap_or_default();
+    if let Some(path) = &arguments.out {
+        let _ = writeln!(text, "map        {}", path.display());
+    }
+    output::print(&text)
+}
+
+fn describe(map: &CompressorMap, fitted: &FittedMap) -> String {
+    let heads = [
+        "corrected rpm",
+        "surge kg/s",
+        "surge PR",
+        "choke kg/s",
+        "best eta %",
+        "+/- points",
+        "left out: distance %",
+        "eta points",
+        "",
+    ];
+    let mut table = table::with_heads(&heads.map(str::to_owned));
+    for line in &fitted.lines {
+        let left_out = fitted.left_out.iter().find(|l| l.speed_corrected_rpm == line.speed_corrected_rpm);
+        let best = line.nodes.iter().max_by(|a, b| a.eta.total_cmp(&b.eta));
+        let surge = line.nodes.last();
+        table.add_row(vec![
+            format!("{:.0}", line.speed_corrected_rpm),
+            number(surge.map(|n| n.flow_corrected_kg_s), 4),
+            number(surge.map(|n| n.pressure_ratio), 3),
+            number(choke_flow(line), 4),
+            number(best.map(|n| 100.0 * n.eta), 1),
+            number(best.map(|n| 196.0 * n.eta_standard_error), 1),
+            number(left_out.map(|l| 100.0 * l.distance_ratio), 2),
+            number(left_out.and_then(|l| l.eta).map(|eta| 100.0 * eta), 2),
+            match (line.measured, line.nodes.iter().all(|n| n.extrapolated)) {
+                (true, _) if left_out.is_some_and(|l| l.outermost) => "measured, outermost".to_owned(),
+                (true, _) => "measured".to_owned(),
+                (false, true) => "extrapolated".to_owned(),
+                (false, false) => "between lines".to_owned(),
+            },
+        ]);
+    }
+    let mut text = format!("{table}\n\nCorrected to {}. ", map.reference);
+    let _ = writeln!(
+        text,
+        "Points lie {:.2} % (distance in flow over the line's largest flow and PR - 1 over its largest) and {:.2} points of \
+         efficiency from the fit, rms; whole lines scatter by {:.1} % of flow.",
+        100.0 * fitted.distance_rms_ratio,
+        100.0 * fitted.eta_rms,
+        100.0 * fitted.line_scatter_ratio
+    );
+    for (outermost, name) in [(false, "inner"), (true, "outermost")] {
+        let lines = || fitted.left_out.iter().filter(move |l| l.outermost == outermost);
+        let count = lines().count();
+        if count == 0 {
+            continue;
+        }
+        let mean = |sum: f64| 100.0 * sum / count as f64;
+        let eta = || lines().filter_map(|l| l.eta);
+        let _ = writeln!(
+            text,
+            "Left out, {name} lines: distance {:.2} % in the mean, {:.2} % at worst; efficiency {:.2} points in the mean, {:.2} at worst (medians of each line's points).",
+            mean(lines().map(|l| l.distance_ratio).sum()),
+            100.0 * lines().map(|l| l.distance_ratio).fold(0.0, f64::max),
+            mean(eta().sum()),
+            100.0 * eta().fold(0.0, f64::max),
+        );
+    }
+    if fitted.crossings > 0 {
+        let _ = writeln!(
+            text,
+            "{} pair(s) of neighbouring lines cross: do not use the map there; look for a line whose speed is wrong.",
+            fitted.crossings
+        );
+    } else {
+        text.push_str("No speed lines cross.\n");
+    }
+    text
+}
+
+fn choke_flow(line: &FittedLine) -> Option<f64> {
+    line.nodes.iter().map(|n| n.flow_corrected_kg_s).max_by(f64::total_cmp)
+}

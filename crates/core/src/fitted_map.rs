@@ -1,0 +1,102 @@
+//! A smooth surface through a map's points, as a table over speed and the place on the line.
+
+use serde::{Deserialize, Serialize};
+
+/// One node of a fitted speed line. Errors are one standard error.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FittedNode {
+    /// Corrected mass flow, kg/s.
+    pub flow_corrected_kg_s: f64,
+    /// Total pressure ratio P2/P1; below 1 at the far end of the choke side.
+    pub pressure_ratio: f64,
+    /// Isentropic efficiency, fraction; 0 at pressure ratio 1 and negative below, where the machine only brakes the gas.
+    pub eta: f64,
+    /// Isentropic efficiency by the work coefficient: isentropic work over actual work. Actual specific work over
+    /// `cp T_ref`, ratio, always above 0.
+    pub work_ratio: f64,
+    /// Standard error across the line: its part along flow, kg/s.
+    pub flow_standard_error_kg_s: f64,
+    /// Standard error across the line: its part along the pressure ratio.
+    pub pressure_ratio_standard_error: f64,
+    /// Standard error of `eta`, fraction.
+    pub eta_standard_error: f64,
+    /// Whether no measured point supports this place: beyond the ends of the measured lines, or between two lines
+    /// beyond the outermost speeds.
+    pub extrapolated: bool,
+}
+
+/// A fitted speed line, from the choke side to the surge side.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FittedLine {
+    /// Corrected speed, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Whether this is the speed of a measured line.
+    pub measured: bool,
+    /// Nodes; equal index is equal `beta` on every line.
+    pub nodes: Vec<FittedNode>,
+}
+
+/// Error at a speed line that was left out of the fit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LeftOutLine {
+    /// Corrected speed of the line, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Whether the line is the slowest or the fastest: the fit was extrapolated.
+    pub outermost: bool,
+    /// Median orthogonal distance of its points: flow over the line's largest flow, PR - 1 over the line's largest;
+    /// ratio.
+    pub distance_ratio: f64,
+    /// Median absolute error of efficiency at the nearest place of the fitted line, fraction; `None` without points
+    /// that have one.
+    pub eta: Option<f64>,
+}
+
+/// A fitted map: a rectangular table over corrected speed and `beta` (0 at the choke end, 1 at the surge end).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FittedMap {
+    /// Place on the line of each node, 0..1, rising.
+    pub beta_ratio: Vec<f64>,
+    /// Lines in order of speed, each with as many nodes as `beta_ratio`.
+    pub lines: Vec<FittedLine>,
+    /// Root mean square of the points' orthogonal distance from their fitted line (measure as in [`LeftOutLine`]).
+    pub distance_rms_ratio: f64,
+    /// Root mean square of the points' efficiency less the fitted one, fraction.
+    pub eta_rms: f64,
+    /// Scatter of whole lines about the smooth surface (errors of speed, of the day): of flow, ratio.
+    pub line_scatter_ratio: f64,
+    /// Pairs of neighbouring lines that cross; 0 in a sound fit.
+    pub crossings: usize,
+    /// What happens at each line when it is left out; empty where this was not asked for or there are too few lines.
+    pub left_out: Vec<LeftOutLine>,
+}
+
+impl FittedMap {
+    /// Surge-side end of each line: (corrected speed, rpm; node).
+    pub fn surge_line(&self) -> impl Iterator<Item = (f64, &FittedNode)> {
+        self.lines.iter().filter_map(|line| Some((line.speed_corrected_rpm, line.nodes.last()?)))
+    }
+
+    /// Largest flow of each line: (corrected speed, rpm; node where the flow is first reached from the surge side).
+    pub fn choke_line(&self) -> impl Iterator<Item = (f64, &FittedNode)> {
+        self.lines.iter().filter_map(|line| {
+            let largest = line.nodes.iter().map(|n| n.flow_corrected_kg_s).fold(f64::MIN, f64::max);
+            // The end of a line is vertical: its top is where the machine chokes.
+            let node = line.nodes.iter().rev().find(|n| n.flow_corrected_kg_s >= 0.998 * largest)?;
+            Some((line.speed_corrected_rpm, node))
+        })
+    }
+
+    /// Multiplies all corrected speeds and flows, for a change of the reference state.
+    pub(crate) fn scale(&mut self, speed_factor: f64, flow_factor: f64) {
+        for line in &mut self.lines {
+            line.speed_corrected_rpm *= speed_factor;
+            for node in &mut line.nodes {
+                node.flow_corrected_kg_s *= flow_factor;
+                node.flow_standard_error_kg_s *= flow_factor;
+            }
+        }
+        for line in &mut self.left_out {
+            line.speed_corrected_rpm *= speed_factor;
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Samples that are no measurement: spikes, and readings that stand still where noise is declared.
+
+use crate::IdentifyConfig;
+use crate::findings::{Findings, code};
+use crate::samples::Samples;
+use crate::window::median;
+use mapper_core::Channel;
+
+/// Samples on either side whose median a spike is held against.
+const NEIGHBOURS: usize = 7;
+/// Robust standard deviations beyond which a sample is a spike.
+const SIGMAS: f64 = 8.0;
+/// Time for which a noisy channel may show one and the same value, s.
+const STUCK_S: f64 = 5.0;
+
+/// The samples without them; says so in `findings`.
+pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut Findings) -> Samples {
+    // Smallest distances that count, K, and shares of the reading for flow and pressures.
+    let columns: [(Channel, &[f64], f64); 6] = [
+        (Channel::T1, &samples.t1_k, 1.0),
+        (Channel::T2, &samples.t2_k, 1.0),
+        (Channel::Tc, &samples.tc_k, 1.0),
+        (Channel::P1, &samples.p1_pa, 500.0),
+        (Channel::P2, &samples.p2_pa, 1000.0),
+        (Channel::CompressorFlow, &samples.flow_kg_s, 2e-3),
+    ];
+    let mut kept = vec![true; samples.len()];
+    let mut spikes = 0;
+    for (channel, column, smallest) in columns {
+        for index in spikes_of(column, smallest) {
+            if let Some(keep) = kept.get_mut(index) {
+                spikes += usize::from(*keep);
+                *keep = false;
+            }
+        }
+        let noisy = config.declared.get(&channel).is_some_and(|declared| declared.noise_sigma > 0.0);
+        if !noisy {
+            continue;
+        }
+        let stuck = stuck_of(&samples.t_s, column);
+        if let (Some(first), Some(last)) = (stuck.first(), stuck.last()) {
+            let message = format!(
+                "{channel} shows one and the same value for {:.0} s though noise is declared: these samples are left out",
+                samples.t_s.get(*last).zip(samples.t_s.get(*first)).map_or(0.0, |(last_s, first_s)| last_s - first_s)
+            );
+            findings.doubt(code::STUCK, message);
+        }
+        for index in stuck {
+            if let Some(keep) = kept.get_mut(index) {
+                *keep = false;
+            }
+        }
+    }
+    if spikes > 0 {
+        findings.remark(code::OUTLIERS, format!("{spikes} samples far off those around them are left out"));
+    }
+    if kept.iter().all(|keep| *keep) {
+        return samples;
+    }
+    samples.filtered(|index| kept.get(index).copied().unwrap_or(false))
+}
+
+fn spikes_of(column: &[f64], smallest: f64) -> Vec<usize> {
+    let mut scratch = Vec::with_capacity(2 * NEIGHBOURS + 1);
+    let last = column.len().saturating_sub(1);
+    let off: Vec<f64> = (0..column.len())
+        .map(|i| {
+            scratch.clear();
+            scratch.extend_from_slice(&column[i.saturating_sub(NEIGHBOURS)..=(i + NEIGHBOURS).min(last)]);
+            column[i] - median(&mut scratch).unwrap_or(column[i])
+        })
+        .collect();
+    let mut sizes: Vec<f64> = off.iter().map(|off| off.abs()).collect();
+    let Some(middle) = median(&mut sizes) else { return Vec::new() };
+    let limit = (SIGMAS * middle / 0.6745).max(smallest);
+    (0..off.len()).filter(|i| off[*i].abs() > limit).collect()
+}
+
+fn stuck_of(t_s: &[f64], column: &[f64]) -> Vec<usize> {
+    let mut stuck = Vec::new();
+    let mut start = 0;
+    for i in 1..=column.len() {
+        if i < column.len() && column[i] == column[start] {
+            continue;
+        }
+        if t_s[i - 1] - t_s[start] >= STUCK_S {
+            stuck.extend(start..i);
+        }
+        start = i;
+    }
+    stuck
+}

@@ -1,0 +1,151 @@
+//! What speaks against a joint fit: for one step, and for the model as a whole.
+
+use crate::IdentifyConfig;
+use crate::findings::{Findings, code};
+use crate::joint::parameters::{ALPHA, ETA, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION};
+use crate::joint::rows::StepRows;
+use crate::joint::solve::{Covariance, Member, Problem};
+use crate::samples::mean;
+
+/// Whitened mean square above which a step is doubted.
+const DOUBT_SQUARE: f64 = 2.0;
+/// Whitened mean square, and its multiple of the median step's, above which a step has no say in what is shared.
+const EXCLUDE_SQUARE: f64 = 4.0;
+/// Whitened mean square of all steps above which the model itself is doubted.
+const MODEL_SQUARE: f64 = 1.4;
+/// Scatter of the points about the convection law above which it is no law, ratio.
+const LAW_SCATTER_RATIO: f64 = 0.06;
+/// Standard errors by which rising and falling steps may differ.
+const SPLIT_SIGMAS: f64 = 4.0;
+
+/// Mean square of a step's whitened residual.
+pub(crate) fn mean_square(problem: &Problem<'_>, member: &Member<'_>) -> f64 {
+    let (residual, _) = problem.residual(member, &problem.shared, &member.local, false);
+    residual.iter().map(|r| r * r).sum::<f64>() / (residual.len() as f64).max(1.0)
+}
+
+/// Takes steps that fit far worse than the others out of what is shared; true where that changed anything.
+pub(crate) fn exclude(problem: &mut Problem<'_>) -> bool {
+    let squares: Vec<f64> = problem.members.iter().map(|member| mean_square(problem, member)).collect();
+    let mut sorted = squares.clone();
+    let Some(middle) = crate::window::median(&mut sorted) else { return false };
+    let limit = EXCLUDE_SQUARE * middle.max(1.0);
+    let mut changed = false;
+    // Never more than a third: then it is the model that is wrong, not the steps.
+    let bad = squares.iter().filter(|square| **square > limit).count();
+    let few = 3 * bad <= squares.len();
+    for (member, square) in problem.members.iter_mut().zip(&squares) {
+        let shares = !(few && *square > limit);
+        changed |= shares != member.shares;
+        member.shares = shares;
+    }
+    changed
+}
+
+/// Verdict on one step.
+pub(crate) fn judge_step(
+    problem: &Problem<'_>,
+    index: usize,
+    step: &StepRows,
+    sigma_eta: f64,
+    config: &IdentifyConfig,
+    findings: &mut Findings,
+) {
+    let Some(member) = problem.members.get(index) else { return };
+    let eta = member.local[ETA];
+    if eta > 1.0 || eta < 0.05 {
+        let message = format!("the fitted efficiency is {eta:.3}: something that the model does not know is at work");
+        findings.refuse(code::POOR_FIT, message);
+    }
+    let limits = &config.thresholds;
+    if sigma_eta > limits.sigma_eta {
+        let message = format!(
+            "noise, declared offsets and what is shared leave eta uncertain by {:.1} points (1 sigma)",
+            100.0 * sigma_eta
+        );
+        if sigma_eta > limits.unusable_sigma_eta {
+            findings.refuse(code::SMALL_GRADIENT, message);
+        } else {
+            findings.doubt(code::SMALL_GRADIENT, message);
+        }
+    }
+    let declared = !config.declared.is_empty();
+    let square = mean_square(problem, member);
+    if declared && square > DOUBT_SQUARE {
+        let message = format!("the fit leaves {:.1} times the declared noise of T2", square.sqrt());
+        findings.doubt(code::POOR_FIT, message);
+    }
+    if !member.shares {
+        let message = "this step fits so much worse than the others that it has no say in what they share".to_owned();
+        findings.doubt(code::LEFT_OUT, message);
+    }
+    let deviation = member.local[LN_DEVIATION];
+    if problem.setting.with_law && deviation.abs() > LAW_SCATTER_RATIO.max(3.0 * member.priors[LN_DEVIATION].sigma) {
+        let message = format!("h lies {:+.1} % off the law that the other points follow", 100.0 * deviation.exp_m1());
+        findings.doubt(code::OFF_THE_LAW, message);
+    }
+    let _ = step;
+}
+
+/// What speaks against the model as a whole, one sentence each.
+pub(crate) fn doubts(problem: &Problem<'_>, covariance: &Covariance, config: &IdentifyConfig) -> Vec<String> {
+    let mut doubts = Vec::new();
+    let squares: Vec<f64> =
+        problem.members.iter().filter(|member| member.shares).map(|member| mean_square(problem, member)).collect();
+    let overall = mean(&squares).unwrap_or(0.0);
+    if !config.declared.is_empty() && overall > MODEL_SQUARE {
+        doubts.push(format!(
+            "all steps together leave {:.2} times the declared noise: something that the model does not know is at work",
+            overall.sqrt()
+        ));
+    }
+    let error = |index: usize| covariance.error_of(index);
+    if let Some(sigma) = error(ALPHA) {
+        let alpha = problem.shared[ALPHA];
+        let outside = (-alpha).max(alpha - 1.0);
+        if outside > 3.0 * sigma {
+            doubts.push(format!("alpha_A comes out as {alpha:.3} +/- {:.3}, outside 0 to 1", 1.96 * sigma));
+        }
+    }
+    let deviations: Vec<f64> = problem.members.iter().map(|member| member.local[LN_DEVIATION].powi(2)).collect();
+    let scatter = mean(&deviations).unwrap_or(0.0).sqrt();
+    if problem.setting.with_law && scatter > LAW_SCATTER_RATIO {
+        doubts.push(format!("the points scatter by {:.1} % about the convection law", 100.0 * scatter));
+    }
+    doubts.extend(split_doubt(problem));
+    doubts
+}
+
+/// Fits steps whose T2 rises and steps whose T2 falls apart: what they share must be the same.
+fn split_doubt(problem: &Problem<'_>) -> Option<String> {
+    let rises = |member: &Member<'_>| match (member.measured_k.first(), member.measured_k.last()) {
+        (Some(first), Some(last)) => last > first,
+        _ => false,
+    };
+    let half = |rising: bool| {
+        let mut half = problem.clone();
+        for member in &mut half.members {
+            member.shares &= rises(member) == rising;
+        }
+        if half.members.iter().filter(|member| member.shares).count() < 4 {
+            return None;
+        }
+        half.minimise()?;
+        let covariance = half.covariance()?;
+        Some((half.shared, covariance))
+    };
+    let ((up, up_covariance), (down, down_covariance)) = (half(true)?, half(false)?);
+    [LN_COEFFICIENT, ALPHA, LN_DIRECTION].into_iter().find_map(|index| {
+        let (a, b) = (up_covariance.error_of(index)?, down_covariance.error_of(index)?);
+        let (difference, sigma) = (up[index] - down[index], a.hypot(b));
+        (difference.abs() > SPLIT_SIGMAS * sigma).then(|| {
+            format!(
+                "steps with rising T2 and steps with falling T2 disagree on the {}: {:.3} and {:.3}, {:.1} standard errors apart",
+                crate::joint::parameters::symbol(index),
+                up[index],
+                down[index],
+                difference.abs() / sigma
+            )
+        })
+    })
+}

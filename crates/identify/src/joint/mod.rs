@@ -1,0 +1,176 @@
+//! The joint method: all steps of a campaign together.
+//!
+//! Each step keeps its own efficiency; what the steps share (how convection follows flow and temperature, the share of
+//! the area before the wheel, the probe's lag, what a hotter wall does, the sensors' offsets, how efficiency varies over
+//! the map) is found once, from all of them. Why that is needed, what it assumes and what it can not do stands in
+//! `docs/identification.md`.
+
+pub(crate) mod cleaning;
+pub(crate) mod explained;
+pub(crate) mod judge;
+pub(crate) mod model;
+pub(crate) mod parameters;
+pub(crate) mod probe;
+pub(crate) mod rows;
+pub(crate) mod settings;
+pub(crate) mod shared;
+pub(crate) mod smoothing;
+pub(crate) mod solve;
+pub(crate) mod start;
+pub(crate) mod surface;
+pub(crate) mod whitening;
+
+use crate::dynamic::{self, Estimate};
+use crate::end_state::EndState;
+use crate::findings::{Findings, code};
+use crate::joint::parameters::{ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, PROBE_MM2, SHARED, SURFACE};
+use crate::joint::solve::{Covariance, Problem};
+use crate::samples::mean;
+use crate::{IdentifyConfig, jump};
+use mapper_core::{EstimateUncertainty, Recording, ThermalModel, Window};
+
+/// Fits before the last one.
+const ROUNDS: usize = 3;
+
+/// What the method makes of a recording.
+#[derive(Debug)]
+pub(crate) struct Joint {
+    pub(crate) estimates: Vec<Estimate>,
+    /// What the points share; `None` where nothing is.
+    pub(crate) thermal: Option<ThermalModel>,
+}
+
+/// Identifies all steps. `end_states` and `findings`: one for each step; no end state, no estimate.
+pub(crate) fn estimate(
+    recording: &Recording,
+    end_states: &[Option<EndState>],
+    config: &IdentifyConfig,
+    findings: &mut [Findings],
+) -> Joint {
+    let alone: Vec<Estimate> = (0..recording.steps.len())
+        .map(|position| {
+            let mut own = Findings::new();
+            let estimate = dynamic::estimate(recording, position, config, &mut own);
+            if config.joint == settings::JointSettings::all_off() {
+                findings[position].take(own);
+            }
+            estimate
+        })
+        .collect();
+    if config.joint == settings::JointSettings::all_off() {
+        return Joint { estimates: alone, thermal: None };
+    }
+    let nothing = || Joint { estimates: vec![Estimate::default(); recording.steps.len()], thermal: None };
+    let steps = start::steps(recording, end_states, config, findings);
+    let Some(mut problem) = start::problem(&steps, &alone, config) else { return nothing() };
+    let Some(covariance) = fitted(&mut problem, &steps, config) else {
+        for step in &steps {
+            let message = "least squares over all steps came to no end".to_owned();
+            findings[step.position].refuse(code::FIT_FAILED, message);
+        }
+        return nothing();
+    };
+    let thermal = shared::thermal_model(&problem, &covariance, &steps, config);
+    let mut estimates = vec![Estimate::default(); recording.steps.len()];
+    for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
+        let own = &mut findings[step.position];
+        let eta = eta_uncertainty(&problem, &covariance, i);
+        let (h_w_m2k, _) = problem.setting.h_at_end(&step.end, &problem.shared, &member.local);
+        let h = h_uncertainty(&problem, &covariance, &steps, i);
+        let finite = member.local[ETA].is_finite() && h_w_m2k.is_finite() && eta.combined_standard_error().is_finite();
+        if !finite || !h.combined_standard_error().is_finite() {
+            own.refuse(code::FIT_FAILED, "the fit gives no finite number for this step".to_owned());
+            continue;
+        }
+        let (first, last) = (step.rows.first(), step.rows.last());
+        let change = |read: fn(&rows::Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
+        let prediction =
+            problem.setting.predict(&member.course, &problem.shared, &member.local, &[false; SHARED], false);
+        let squares: Vec<f64> =
+            member.measured_k.iter().zip(&prediction.t2_k).map(|(measured, found)| (measured - found).powi(2)).collect();
+        estimates[step.position] = Estimate {
+            eta: Some((member.local[ETA], Some(eta))),
+            h_w_m2k: Some((h_w_m2k, Some(h))),
+            window: first.zip(last).map(|(first, last)| Window { start_s: first.t_s, end_s: last.t_s }),
+            residual_rms_k: mean(&squares).map(f64::sqrt),
+            dt2_k: change(|row| row.t2_k),
+            dtc_k: change(|row| row.tc_k),
+        };
+        judge::judge_step(&problem, i, step, eta.combined_standard_error(), config, own);
+        if !jump::begins_with_jump(&recording.steps, step.position) {
+            let message = "no jump leads to this step: its efficiency rests on what the points share".to_owned();
+            own.remark(code::THROUGH_THE_LAW, message);
+        }
+        if config.declared.is_empty() {
+            let message = "no sensor uncertainty was declared: the interval holds noise alone".to_owned();
+            own.remark(code::NOTHING_DECLARED, message);
+        }
+        for doubt in &thermal.doubts {
+            own.doubt(code::MODEL_DOUBTED, doubt.clone());
+        }
+    }
+    Joint { estimates, thermal: Some(thermal) }
+}
+
+/// Fits, learns from the fit how noisy steps are and how far points may scatter, leaves out what fits far worse, and
+/// fits again.
+fn fitted(problem: &mut Problem<'_>, steps: &[rows::StepRows], config: &IdentifyConfig) -> Option<Covariance> {
+    for round in 0..ROUNDS {
+        problem.minimise()?;
+        start::refine(problem, steps, config);
+        if round > 0 {
+            judge::exclude(problem);
+        }
+        // A probe that came to rest on its bound may leave it under better weights.
+        problem.active[PROBE_MM2] = problem.probe_fitted;
+    }
+    problem.minimise()?;
+    problem.covariance()
+}
+
+/// Splits a variance into what declared offsets and gains bring and the rest.
+fn split(problem: &Problem<'_>, covariance: &Covariance, variance: f64, with_shared: impl Fn(usize) -> f64) -> EstimateUncertainty {
+    let mut bias = 0.0;
+    for (row, index) in covariance.fitted.iter().enumerate() {
+        if (OFFSETS..SURFACE).contains(index) {
+            bias += with_shared(row).powi(2) * problem.priors[*index].weight();
+        }
+    }
+    EstimateUncertainty {
+        noise_standard_error: (variance - bias).max(0.0).sqrt(),
+        bias_standard_error: bias.sqrt(),
+    }
+}
+
+fn eta_uncertainty(problem: &Problem<'_>, covariance: &Covariance, i: usize) -> EstimateUncertainty {
+    let (own, mixed) = &covariance.own[i];
+    split(problem, covariance, own[(ETA, ETA)], |row| mixed[(ETA, row)])
+}
+
+fn h_uncertainty(problem: &Problem<'_>, covariance: &Covariance, steps: &[rows::StepRows], i: usize) -> EstimateUncertainty {
+    let (own, mixed) = &covariance.own[i];
+    let (h, ln_re) = problem.setting.h_at_end(&steps[i].end, &problem.shared, &problem.members[i].local);
+    let mut weights = [0.0; SHARED];
+    if problem.setting.with_law {
+        weights[LN_COEFFICIENT] = 1.0;
+        weights[EXPONENT] = ln_re;
+    }
+    let with_shared = |row: usize| {
+        let shared: f64 = covariance
+            .fitted
+            .iter()
+            .enumerate()
+            .map(|(other, index)| weights[*index] * covariance.shared[(other, row)])
+            .sum();
+        shared + mixed[(LN_DEVIATION, row)]
+    };
+    let mut variance = own[(LN_DEVIATION, LN_DEVIATION)];
+    for (row, index) in covariance.fitted.iter().enumerate() {
+        variance += weights[*index] * (with_shared(row) + mixed[(LN_DEVIATION, row)]);
+    }
+    let relative = split(problem, covariance, variance, with_shared);
+    EstimateUncertainty {
+        noise_standard_error: h * relative.noise_standard_error,
+        bias_standard_error: h * relative.bias_standard_error,
+    }
+}

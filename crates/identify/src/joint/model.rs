@@ -1,0 +1,284 @@
+//! The reading of T2 that a step's rows give under given parameters, and its derivatives.
+
+use crate::joint::parameters::{
+    ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, LocalVector,
+    OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
+};
+use crate::joint::probe::Lag;
+use crate::joint::rows::Row;
+use crate::joint::surface::{TERM_COUNT, dot};
+use mapper_physics::air;
+use mapper_physics::compression::{CompressionInputs, compress, compressed_k, isentropic_rise_ratio};
+use mapper_physics::{nusselt, thermocouple};
+
+/// What is fixed for all steps.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Setting {
+    pub(crate) internal_area_m2: f64,
+    pub(crate) outlet_diameter_m: f64,
+    /// Reynolds number at which the law's coefficient is taken.
+    pub(crate) reynolds_reference: f64,
+    /// Whether h follows the law; else it holds still within a step.
+    pub(crate) with_law: bool,
+    /// Whether efficiency follows the surface.
+    pub(crate) shaped: bool,
+}
+
+/// A step as the model needs it: its rows, and the surface's terms at each less those at the step's end.
+#[derive(Debug, Clone)]
+pub(crate) struct Course<'a> {
+    pub(crate) rows: &'a [Row],
+    pub(crate) terms: Vec<[f64; TERM_COUNT]>,
+}
+
+/// Predicted readings with their derivatives, one column per parameter: shared first, then those of the step.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Prediction {
+    pub(crate) t2_k: Vec<f64>,
+    pub(crate) columns: Vec<Vec<f64>>,
+}
+
+/// Relative step of one-sided derivatives: rounding and curvature both stay below 1e-6 of them.
+const STEP_RATIO: f64 = 1e-6;
+
+/// Gas properties on the way, one row.
+#[derive(Debug, Clone, Copy)]
+struct Gas {
+    t1_k: f64,
+    tc_k: f64,
+    flow_kg_s: f64,
+    rise_ratio: f64,
+    eta: f64,
+}
+
+impl Setting {
+    /// Heat-transfer coefficient by the law, W/(m2 K), and the bulk temperature.
+    fn h(&self, gas: &Gas, shared: &SharedVector, ln_deviation: f64) -> (f64, f64) {
+        let bulk_k = compressed_k(gas.t1_k, gas.rise_ratio, gas.eta);
+        if !self.with_law {
+            return (ln_deviation.exp(), bulk_k);
+        }
+        let exponent = shared[EXPONENT];
+        let ln_coefficient = shared[LN_COEFFICIENT] + ln_deviation - exponent * self.reynolds_reference.ln();
+        let h = nusselt::coefficient_w_m2k(
+            ln_coefficient.exp(),
+            exponent,
+            self.outlet_diameter_m,
+            gas.flow_kg_s,
+            bulk_k,
+            gas.tc_k,
+        );
+        (h, bulk_k)
+    }
+
+    /// T2 by eqs. 1-3. The direction factor scales h where the metal is the hotter; eqs. 1-3 have one h, so each part of
+    /// the area is scaled instead.
+    fn t2_k(&self, gas: &Gas, (h_w_m2k, bulk_k): (f64, f64), alpha: f64, ln_direction: f64) -> f64 {
+        let outward = |hotter: bool| if hotter && ln_direction != 0.0 { ln_direction.exp() } else { 1.0 };
+        let before_m2 = outward(gas.tc_k > gas.t1_k) * alpha * self.internal_area_m2;
+        let pass = |after_m2: f64| {
+            let inputs = CompressionInputs {
+                t1_k: gas.t1_k,
+                tc_k: gas.tc_k,
+                flow_kg_s: gas.flow_kg_s,
+                isentropic_rise_ratio: gas.rise_ratio,
+                efficiency: gas.eta,
+                h_w_m2k,
+                alpha_area_ratio: before_m2 / (before_m2 + after_m2),
+                internal_area_m2: before_m2 + after_m2,
+            };
+            // Without the law the identification is that of the paper, which takes cp at T2'.
+            compress(&inputs, self.with_law.then_some(bulk_k))
+        };
+        let after_m2 = (1.0 - alpha) * self.internal_area_m2;
+        let plain = pass(after_m2);
+        if ln_direction != 0.0 && gas.tc_k > plain.t2_prime_k {
+            return pass(after_m2 * outward(true)).t2_k;
+        }
+        plain.t2_k
+    }
+
+    fn reynolds(&self, flow_kg_s: f64, bulk_k: f64) -> f64 {
+        4.0 * flow_kg_s / (std::f64::consts::PI * self.outlet_diameter_m * air::viscosity_pa_s(bulk_k))
+    }
+
+    fn gas(&self, row: &Row, terms: &[f64; TERM_COUNT], shared: &SharedVector, local: &LocalVector) -> Gas {
+        let offset = |index: usize| shared[OFFSETS + index];
+        let t1_k = row.t1_k - offset(0);
+        let pressure_ratio = (row.p2_pa - offset(4)) / (row.p1_pa - offset(3));
+        let slope = if self.shaped { local[SLOPE] * dot(terms, surface_of(shared)) } else { 0.0 };
+        Gas {
+            t1_k,
+            tc_k: row.tc_k - offset(2),
+            flow_kg_s: row.flow_kg_s / (1.0 + shared[FLOW_GAIN]),
+            rise_ratio: isentropic_rise_ratio(pressure_ratio, t1_k),
+            eta: (local[ETA] + slope).max(0.02),
+        }
+    }
+
+    /// h at a step's end, W/(m2 K), and ln of its Reynolds number over the reference.
+    pub(crate) fn h_at_end(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> (f64, f64) {
+        let gas = self.gas(end, &[0.0; TERM_COUNT], shared, local);
+        let (h_w_m2k, bulk_k) = self.h(&gas, shared, local[LN_DEVIATION]);
+        (h_w_m2k, (self.reynolds(gas.flow_kg_s, bulk_k) / self.reynolds_reference).ln())
+    }
+
+    /// Derivative of T2 at a step's end by each reading: T1, T2, Tc, P1, P2, flow. What a sensor's noise does.
+    pub(crate) fn sensitivities(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> [f64; 6] {
+        let course = Course { rows: std::slice::from_ref(end), terms: vec![[0.0; TERM_COUNT]] };
+        let ideal = { let mut ideal = *shared; ideal[PROBE_MM2] = 0.0; ideal };
+        let mut active = [false; SHARED];
+        active[OFFSETS..=FLOW_GAIN].fill(true);
+        let columns = self.predict(&course, &ideal, local, &active, true).columns;
+        let at = |index: usize| columns.get(index).and_then(|column| column.first()).copied().unwrap_or(0.0);
+        [at(OFFSETS), at(OFFSETS + 1), at(OFFSETS + 2), at(OFFSETS + 3), at(OFFSETS + 4), at(FLOW_GAIN) / end.flow_kg_s]
+    }
+
+    /// Readings of T2, with derivatives by the parameters in `active` and those of the step where `derivatives` asks.
+    pub(crate) fn predict(
+        &self,
+        course: &Course<'_>,
+        shared: &SharedVector,
+        local: &LocalVector,
+        active: &[bool; SHARED],
+        derivatives: bool,
+    ) -> Prediction {
+        let n = course.rows.len();
+        let mut gas_k = Vec::with_capacity(n);
+        let mut columns = vec![Vec::new(); if derivatives { SHARED + LOCAL } else { 0 }];
+        if derivatives {
+            for (index, column) in columns.iter_mut().enumerate() {
+                if index >= SHARED || active[index] {
+                    *column = vec![0.0; n];
+                }
+            }
+        }
+        let (alpha, ln_direction, deviation) = (shared[ALPHA], shared[LN_DIRECTION], local[LN_DEVIATION]);
+        for (i, (row, terms)) in course.rows.iter().zip(&course.terms).enumerate() {
+            let gas = self.gas(row, terms, shared, local);
+            let h = self.h(&gas, shared, deviation);
+            let t2_k = self.t2_k(&gas, h, alpha, ln_direction);
+            gas_k.push(t2_k);
+            if !derivatives {
+                continue;
+            }
+            let full = |moved: Gas, step: f64| {
+                (self.t2_k(&moved, self.h(&moved, shared, deviation), alpha, ln_direction) - t2_k) / step
+            };
+            let by_eta = full(Gas { eta: gas.eta + STEP_RATIO, ..gas }, STEP_RATIO);
+            let by_ln_h = (self.t2_k(&gas, (h.0 * (1.0 + STEP_RATIO), h.1), alpha, ln_direction) - t2_k) / STEP_RATIO;
+            let mut put = |index: usize, value: f64| {
+                if let Some(cell) = columns[index].get_mut(i) {
+                    *cell = value;
+                }
+            };
+            put(SHARED + ETA, by_eta);
+            put(SHARED + LN_DEVIATION, by_ln_h);
+            if self.shaped {
+                put(SHARED + SLOPE, by_eta * dot(terms, surface_of(shared)));
+                for (k, term) in terms.iter().enumerate() {
+                    put(SURFACE + k, by_eta * local[SLOPE] * term);
+                }
+            }
+            if self.with_law {
+                put(LN_COEFFICIENT, by_ln_h);
+                put(EXPONENT, by_ln_h * (self.reynolds(gas.flow_kg_s, h.1) / self.reynolds_reference).ln());
+            }
+            if active[ALPHA] {
+                put(ALPHA, (self.t2_k(&gas, h, alpha + STEP_RATIO, ln_direction) - t2_k) / STEP_RATIO);
+            }
+            if active[LN_DIRECTION] {
+                // Away from 0, where the factor is switched off.
+                let step = if ln_direction == -STEP_RATIO { -STEP_RATIO } else { STEP_RATIO };
+                put(LN_DIRECTION, (self.t2_k(&gas, h, alpha, ln_direction + step) - t2_k) / step);
+            }
+            if active[OFFSETS] {
+                let (step, t1_k) = (gas.t1_k * STEP_RATIO, gas.t1_k * (1.0 + STEP_RATIO));
+                let pressure_ratio = (row.p2_pa - shared[OFFSETS + 4]) / (row.p1_pa - shared[OFFSETS + 3]);
+                let moved = Gas { t1_k, rise_ratio: isentropic_rise_ratio(pressure_ratio, t1_k), ..gas };
+                put(OFFSETS, -full(moved, step));
+            }
+            put(OFFSETS + 1, 1.0);
+            if active[OFFSETS + 2] {
+                let step = gas.tc_k * STEP_RATIO;
+                put(OFFSETS + 2, -full(Gas { tc_k: gas.tc_k + step, ..gas }, step));
+            }
+            if active[OFFSETS + 3] || active[OFFSETS + 4] {
+                let by_rise = full(Gas { rise_ratio: gas.rise_ratio + STEP_RATIO, ..gas }, STEP_RATIO);
+                let by_ln_ratio = by_rise * (1.0 + gas.rise_ratio) * air::isentropic_exponent(gas.t1_k);
+                put(OFFSETS + 3, by_ln_ratio / (row.p1_pa - shared[OFFSETS + 3]));
+                put(OFFSETS + 4, -by_ln_ratio / (row.p2_pa - shared[OFFSETS + 4]));
+            }
+            if active[FLOW_GAIN] {
+                let step = gas.flow_kg_s * STEP_RATIO;
+                let by_flow = full(Gas { flow_kg_s: gas.flow_kg_s + step, ..gas }, step);
+                put(FLOW_GAIN, -by_flow * gas.flow_kg_s / (1.0 + shared[FLOW_GAIN]));
+            }
+        }
+        self.through_probe(course.rows, gas_k, columns, shared, local, active)
+    }
+
+    /// The probe's lag from row to row, for the square of its diameter.
+    pub(crate) fn lags(&self, rows: &[Row], gas_k: &[f64], square_mm2: f64) -> Vec<Lag> {
+        let diameter_m = 1e-3 * square_mm2.max(0.0).sqrt();
+        let tau_s = |i: usize| {
+            thermocouple::time_constant_s(diameter_m, self.outlet_diameter_m, rows[i].flow_kg_s, gas_k[i])
+        };
+        (1..rows.len()).map(|i| Lag::of(rows[i].t_s - rows[i - 1].t_s, 0.5 * (tau_s(i - 1) + tau_s(i)))).collect()
+    }
+
+    /// Lets the probe follow the gas, and every derivative with it.
+    fn through_probe(
+        &self,
+        rows: &[Row],
+        gas_k: Vec<f64>,
+        mut columns: Vec<Vec<f64>>,
+        shared: &SharedVector,
+        local: &LocalVector,
+        active: &[bool; SHARED],
+    ) -> Prediction {
+        let offset_k = shared[OFFSETS + 1];
+        let ideal = shared[PROBE_MM2] <= 0.0 && !active[PROBE_MM2];
+        if ideal || rows.len() < 2 {
+            let t2_k = gas_k.iter().map(|gas| gas + offset_k).collect();
+            return Prediction { t2_k, columns };
+        }
+        let lags_at = |square_mm2: f64| self.lags(rows, &gas_k, square_mm2);
+        let follow = |lags: &[Lag], first: f64, course: &[f64]| {
+            let mut reading = first;
+            let mut readings = Vec::with_capacity(course.len());
+            readings.push(reading);
+            for (lag, pair) in lags.iter().zip(course.windows(2)) {
+                reading = lag.next(reading, pair[0], pair[1]);
+                readings.push(reading);
+            }
+            readings
+        };
+        let lags = lags_at(shared[PROBE_MM2]);
+        let first_k = local[FIRST_READING];
+        let readings = follow(&lags, first_k, &gas_k);
+        for (index, column) in columns.iter_mut().enumerate() {
+            let own_offset = index == OFFSETS + 1;
+            if !column.is_empty() && !own_offset && index != PROBE_MM2 && index != SHARED + FIRST_READING {
+                // The first reading is a parameter of its own.
+                *column = follow(&lags, 0.0, column);
+            }
+        }
+        if !columns.is_empty() {
+            let zeros = vec![0.0; gas_k.len()];
+            columns[SHARED + FIRST_READING] = follow(&lags, 1.0, &zeros);
+            if active[PROBE_MM2] {
+                let step = 1e-4 * shared[PROBE_MM2].max(0.1);
+                let moved = follow(&lags_at(shared[PROBE_MM2] + step), first_k, &gas_k);
+                columns[PROBE_MM2] = moved.iter().zip(&readings).map(|(a, b)| (a - b) / step).collect();
+            }
+        }
+        Prediction { t2_k: readings.iter().map(|reading| reading + offset_k).collect(), columns }
+    }
+}
+
+/// The surface's coefficients among the shared parameters.
+pub(crate) fn surface_of(shared: &SharedVector) -> &[f64; TERM_COUNT] {
+    const NONE: [f64; TERM_COUNT] = [0.0; TERM_COUNT];
+    shared.get(SURFACE..).and_then(|tail| tail.try_into().ok()).unwrap_or(&NONE)
+}

@@ -1,0 +1,72 @@
+//! The numbers of a joint fit: those that all steps share, and those of each step.
+
+use crate::joint::surface::TERM_COUNT;
+use mapper_core::Channel;
+
+/// Index of ln of the Nusselt number's coefficient at the reference Reynolds number.
+pub(crate) const LN_COEFFICIENT: usize = 0;
+/// Index of the exponent of the Reynolds number.
+pub(crate) const EXPONENT: usize = 1;
+/// Index of alpha_A.
+pub(crate) const ALPHA: usize = 2;
+/// Index of the square of the probe's diameter, mm2: the lag grows with it from 0 on.
+pub(crate) const PROBE_MM2: usize = 3;
+/// Index of ln of the direction factor.
+pub(crate) const LN_DIRECTION: usize = 4;
+/// Index of the first offset, in the order of [`OFFSET_CHANNELS`]; K or Pa.
+pub(crate) const OFFSETS: usize = 5;
+/// Channels with an offset.
+pub(crate) const OFFSET_CHANNELS: [Channel; 5] =
+    [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2];
+/// Index of the flow meter's gain error, ratio.
+pub(crate) const FLOW_GAIN: usize = OFFSETS + OFFSET_CHANNELS.len();
+/// Index of the first coefficient of the efficiency surface.
+pub(crate) const SURFACE: usize = FLOW_GAIN + 1;
+/// Number of shared parameters.
+pub(crate) const SHARED: usize = SURFACE + TERM_COUNT;
+
+/// Efficiency at the step's end, fraction.
+pub(crate) const ETA: usize = 0;
+/// ln of the point's h over the law.
+pub(crate) const LN_DEVIATION: usize = 1;
+/// Reading of the probe at the first row, K.
+pub(crate) const FIRST_READING: usize = 2;
+/// Scale of the surface's slope.
+pub(crate) const SLOPE: usize = 3;
+/// Number of parameters of a step.
+pub(crate) const LOCAL: usize = 4;
+
+/// Values of the shared parameters.
+pub(crate) type SharedVector = [f64; SHARED];
+/// Values of a step's parameters.
+pub(crate) type LocalVector = [f64; LOCAL];
+
+/// A normal distribution; infinite `sigma` knows nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Prior {
+    pub(crate) mean: f64,
+    pub(crate) sigma: f64,
+}
+
+impl Prior {
+    /// One over the variance.
+    pub(crate) fn weight(&self) -> f64 {
+        1.0 / (self.sigma * self.sigma)
+    }
+}
+
+/// Symbol of a shared parameter for people.
+pub(crate) fn symbol(index: usize) -> String {
+    match index {
+        LN_COEFFICIENT => "Nusselt coefficient".to_owned(),
+        EXPONENT => "Nusselt exponent".to_owned(),
+        ALPHA => "alpha_A".to_owned(),
+        PROBE_MM2 => "probe diameter".to_owned(),
+        LN_DIRECTION => "direction factor".to_owned(),
+        FLOW_GAIN => "gain of m_c".to_owned(),
+        _ => match OFFSET_CHANNELS.get(index.wrapping_sub(OFFSETS)) {
+            Some(channel) => format!("offset of {channel}"),
+            None => format!("efficiency surface {}", index.saturating_sub(SURFACE)),
+        },
+    }
+}

@@ -1,0 +1,102 @@
+//! One step condensed to block means, with where on the map each of them lies.
+
+use crate::IdentifyConfig;
+use crate::end_state::EndState;
+use crate::joint::smoothing::smooth;
+use crate::joint::whitening::RowNoise;
+use crate::samples::{Samples, mean};
+use mapper_core::{Channel, Recording, Window};
+
+/// Block over which samples are averaged before they are fitted, s: a quarter of what sensor noise remembers, and far
+/// below anything that moves in a window.
+pub(crate) const BLOCK_S: f64 = 0.5;
+
+/// Means over one block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Row {
+    pub(crate) t_s: f64,
+    pub(crate) t1_k: f64,
+    pub(crate) t2_k: f64,
+    pub(crate) tc_k: f64,
+    pub(crate) p1_pa: f64,
+    pub(crate) p2_pa: f64,
+    pub(crate) flow_kg_s: f64,
+    /// Corrected speed and flow.
+    pub(crate) place: (f64, f64),
+    pub(crate) noise: RowNoise,
+}
+
+/// One step with what the fit needs of it.
+#[derive(Debug, Clone)]
+pub(crate) struct StepRows {
+    /// Position in the recording.
+    pub(crate) position: usize,
+    pub(crate) rows: Vec<Row>,
+    /// Means over the step's end: one row more, that is not fitted.
+    pub(crate) end: Row,
+}
+
+/// Condenses the samples of a window.
+pub(crate) fn condensed(
+    recording: &Recording,
+    position: usize,
+    samples: &Samples,
+    end_state: &EndState,
+    config: &IdentifyConfig,
+) -> Option<StepRows> {
+    let step = recording.steps.get(position)?;
+    let speed = recording.series.get(&Channel::ShaftSpeed)?;
+    let mut rows = Vec::new();
+    let mut start = 0;
+    while start < samples.len() {
+        let start_s = samples.t_s[start];
+        // Half a nanosecond: times of samples are rounded.
+        let end = samples.t_s.partition_point(|t| *t < start_s + BLOCK_S - 5e-10).max(start + 1);
+        let of = |column: &[f64]| mean(&column[start..end]).unwrap_or(f64::NAN);
+        let t_s = of(&samples.t_s);
+        let (first_s, last_s) = (samples.t_s[start], samples.t_s[end - 1]);
+        let (_, speeds) = speed.slice(first_s, last_s);
+        let speeds: Vec<f64> = speeds.iter().copied().filter(|value| *value > 0.0 && value.is_finite()).collect();
+        let speed_rpm = mean(&speeds).or_else(|| speed.interpolate(t_s)).unwrap_or(end_state.speed_rpm);
+        let (t1_k, p1_pa, flow_kg_s) = (of(&samples.t1_k), of(&samples.p1_pa), of(&samples.flow_kg_s));
+        let count = (end - start) as f64;
+        let block_s = if end > start + 1 { (last_s - first_s) * count / (count - 1.0) } else { 0.0 };
+        rows.push(Row {
+            t_s,
+            t1_k,
+            t2_k: of(&samples.t2_k),
+            tc_k: of(&samples.tc_k),
+            p1_pa,
+            p2_pa: of(&samples.p2_pa),
+            flow_kg_s,
+            place: place(config, speed_rpm, flow_kg_s, t1_k, p1_pa),
+            noise: RowNoise::of_mean(config.noise_colour, count, block_s),
+        });
+        start = end;
+    }
+    if !config.declared.is_empty() {
+        smooth(&mut rows);
+    }
+    let last = *rows.last()?;
+    let end_window = Window { start_s: step.end_s - config.thresholds.end_mean_s, end_s: step.end_s };
+    let at_end = Samples::of(recording, end_window, config, true);
+    let of = |column: &[f64], otherwise: f64| mean(column).unwrap_or(otherwise);
+    let end = Row {
+        t_s: step.end_s,
+        t1_k: end_state.t1_k,
+        t2_k: of(&at_end.t2_k, last.t2_k),
+        tc_k: of(&at_end.tc_k, last.tc_k),
+        p1_pa: end_state.p1_pa,
+        p2_pa: end_state.p1_pa * end_state.pressure_ratio,
+        flow_kg_s: end_state.flow_kg_s,
+        place: place(config, end_state.speed_rpm, end_state.flow_kg_s, end_state.t1_k, end_state.p1_pa),
+        noise: last.noise,
+    };
+    let usable = end.place.0 > 0.0 && end.place.1 > 0.0 && rows.iter().all(|row| row.place.0.is_finite());
+    usable.then_some(StepRows { position, rows, end })
+}
+
+fn place(config: &IdentifyConfig, speed_rpm: f64, flow_kg_s: f64, t1_k: f64, p1_pa: f64) -> (f64, f64) {
+    let reference = &config.reference;
+    (reference.corrected_speed_rpm(speed_rpm, t1_k), reference.corrected_flow_kg_s(flow_kg_s, t1_k, p1_pa))
+}

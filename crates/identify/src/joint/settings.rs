@@ -1,0 +1,81 @@
+//! Which refinements a joint identification makes, and what is assumed of them beforehand.
+
+use serde::{Deserialize, Serialize};
+
+/// Whether a shared number is taken as declared or found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Choice {
+    /// As declared.
+    Fixed,
+    /// Found together with the points.
+    #[default]
+    Fitted,
+}
+
+/// How the efficiency moves within a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EfficiencyWithinStep {
+    /// It does not.
+    Constant,
+    /// As a smooth surface through all points does between the sample's place on the map and the step's end.
+    #[default]
+    Shaped,
+}
+
+/// How the heat-transfer coefficient moves within a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ConvectionWithinStep {
+    /// It does not, and no point knows of another's.
+    Constant,
+    /// By a Nusselt law that all points share, each with a deviation of its own.
+    #[default]
+    Law,
+}
+
+/// The refinements of the joint method. With every one switched off it is the dynamic method.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct JointSettings {
+    /// Share of the area before compression, alpha_A.
+    pub alpha_area: Choice,
+    /// Diameter of the T2 probe's tip.
+    pub probe: Choice,
+    /// Factor on h where the metal is hotter than the gas.
+    pub direction: Choice,
+    /// Offsets of the sensors, with their declared uncertainty as prior.
+    pub offsets: Choice,
+    /// Efficiency within a step.
+    pub efficiency: EfficiencyWithinStep,
+    /// Heat-transfer coefficient within a step.
+    pub h: ConvectionWithinStep,
+}
+
+impl Default for JointSettings {
+    fn default() -> Self {
+        JointSettings {
+            alpha_area: Choice::Fitted,
+            probe: Choice::Fitted,
+            direction: Choice::Fitted,
+            offsets: Choice::Fitted,
+            efficiency: EfficiencyWithinStep::Shaped,
+            h: ConvectionWithinStep::Law,
+        }
+    }
+}
+
+impl JointSettings {
+    /// Nothing but the two numbers of each step: the dynamic method.
+    pub fn all_off() -> Self {
+        JointSettings {
+            alpha_area: Choice::Fixed,
+            probe: Choice::Fixed,
+            direction: Choice::Fixed,
+            offsets: Choice::Fixed,
+            efficiency: EfficiencyWithinStep::Constant,
+            h: ConvectionWithinStep::Constant,
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! The shared numbers of a joint fit as others see them.
+
+use crate::IdentifyConfig;
+use crate::joint::judge;
+use crate::joint::parameters::{
+    ALPHA, EXPONENT, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, SURFACE,
+    symbol,
+};
+use crate::joint::rows::StepRows;
+use crate::joint::solve::{Covariance, Problem};
+use mapper_core::{ConvectionLaw, Entangled, EstimateUncertainty, Origin, SharedValue, ThermalModel};
+
+/// Correlation beyond which two numbers count as entangled.
+const ENTANGLED: f64 = 0.95;
+/// Standard error over that of the prior above which the recording said nothing.
+const UNINFORMED_RATIO: f64 = 0.7;
+
+/// Puts them together.
+pub(crate) fn thermal_model(
+    problem: &Problem<'_>,
+    covariance: &Covariance,
+    steps: &[StepRows],
+    config: &IdentifyConfig,
+) -> ThermalModel {
+    let of = |index: usize, transform: &dyn Fn(f64) -> f64| value(problem, covariance, index, transform);
+    let reynolds: Vec<f64> = steps
+        .iter()
+        .zip(&problem.members)
+        .map(|(step, member)| {
+            problem.setting.reynolds_reference * problem.setting.h_at_end(&step.end, &problem.shared, &member.local).1.exp()
+        })
+        .collect();
+    let range = reynolds.iter().fold((f64::INFINITY, 0.0f64), |(low, high), x| (low.min(*x), high.max(*x)));
+    let deviations: f64 = problem.members.iter().map(|member| member.local[LN_DEVIATION].powi(2)).sum();
+    let reference = problem.setting.reynolds_reference;
+    let exponent = problem.shared[EXPONENT];
+    let convection = problem.setting.with_law.then(|| ConvectionLaw {
+        diameter_m: problem.setting.outlet_diameter_m,
+        coefficient: of(LN_COEFFICIENT, &|x| x.exp() * reference.powf(-exponent)),
+        exponent: of(EXPONENT, &|x| x),
+        reynolds_reference: reference,
+        reynolds_range: range,
+        deviation_ratio: (deviations / (problem.members.len() as f64).max(1.0)).sqrt(),
+    });
+    let mut entangled = Vec::new();
+    for (row, a) in covariance.fitted.iter().enumerate() {
+        for (column, b) in covariance.fitted.iter().enumerate().skip(row + 1) {
+            if *a >= SURFACE || *b >= SURFACE {
+                continue;
+            }
+            let correlation = covariance.shared[(row, column)]
+                / (covariance.shared[(row, row)] * covariance.shared[(column, column)]).sqrt();
+            if correlation.abs() > ENTANGLED {
+                entangled.push(Entangled { first: symbol(*a), second: symbol(*b), correlation });
+            }
+        }
+    }
+    ThermalModel {
+        convection,
+        internal_area_m2: problem.setting.internal_area_m2,
+        alpha_area_ratio: of(ALPHA, &|x| x),
+        probe_diameter_m: probe(problem, covariance),
+        direction_factor: of(LN_DIRECTION, &f64::exp),
+        offsets: OFFSET_CHANNELS
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| problem.active[OFFSETS + i])
+            .map(|(i, channel)| (*channel, of(OFFSETS + i, &|x| x)))
+            .collect(),
+        entangled,
+        doubts: judge::doubts(problem, covariance, config),
+    }
+}
+
+/// A parameter as others see it; `transform` from how it is fitted to how it is told.
+fn value(problem: &Problem<'_>, covariance: &Covariance, index: usize, transform: &dyn Fn(f64) -> f64) -> SharedValue {
+    let fitted = problem.shared[index];
+    let told = transform(fitted);
+    let Some(row) = covariance.row_of(index) else { return SharedValue::assumed(told) };
+    let variance = covariance.shared[(row, row)];
+    let slope = (transform(fitted + 1e-6) - transform(fitted - 1e-6)) / 2e-6;
+    let mut bias = 0.0;
+    for (other, index) in covariance.fitted.iter().enumerate() {
+        if (OFFSETS..=FLOW_GAIN).contains(index) {
+            bias += covariance.shared[(row, other)].powi(2) * problem.priors[*index].weight();
+        }
+    }
+    let uninformed = variance.sqrt() > UNINFORMED_RATIO * problem.priors[index].sigma;
+    let is_offset = (OFFSETS..=FLOW_GAIN).contains(&index);
+    SharedValue {
+        // An offset has its declared spread even where the recording adds nothing.
+        value: (!uninformed || is_offset).then_some(told),
+        uncertainty: EstimateUncertainty {
+            noise_standard_error: slope.abs() * (variance - bias).max(0.0).sqrt(),
+            bias_standard_error: slope.abs() * bias.min(variance).sqrt(),
+        },
+        origin: if uninformed { Origin::NotIdentifiable } else { Origin::Fitted },
+    }
+}
+
+/// The probe's diameter. Its square was fitted, which for an ideal probe rests on 0: then the error says how large a
+/// probe could hide in the noise.
+fn probe(problem: &Problem<'_>, covariance: &Covariance) -> SharedValue {
+    let square = problem.shared[PROBE_MM2].max(0.0);
+    if !problem.probe_fitted {
+        return SharedValue::assumed(1e-3 * square.sqrt());
+    }
+    let sigma = covariance.error_of(PROBE_MM2).or_else(|| {
+        let mut free = problem.clone();
+        free.active[PROBE_MM2] = true;
+        free.covariance()?.error_of(PROBE_MM2)
+    });
+    let Some(sigma) = sigma else {
+        return SharedValue { value: None, uncertainty: EstimateUncertainty::default(), origin: Origin::NotIdentifiable };
+    };
+    let error_m = 1e-3 * ((square + sigma).sqrt() - square.sqrt());
+    SharedValue {
+        value: (sigma < UNINFORMED_RATIO * problem.priors[PROBE_MM2].sigma).then_some(1e-3 * square.sqrt()),
+        uncertainty: EstimateUncertainty { noise_standard_error: error_m, bias_standard_error: 0.0 },
+        origin: Origin::Fitted,
+    }
+}

@@ -1,0 +1,79 @@
+//! Smooths what drives the model, along a step.
+//!
+//! The model takes T1, Tc, flow and pressures as read. Their noise would not only add to that of T2: a fitted probe could
+//! "explain" it by a lag that smooths the prediction, and a slope by a smaller one. Over ten seconds nothing that really
+//! moves in a window is more than a cubic; noise that remembers two seconds is.
+
+use crate::joint::rows::Row;
+use nalgebra::{Matrix4, Vector4};
+
+/// Half of the stretch of time that a local cubic is fitted to, s.
+const HALF_S: f64 = 10.0;
+/// Fewest rows in it.
+const FEWEST_ROWS: usize = 12;
+
+/// For each row the rows around it and their weights in a local cubic.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Smoother {
+    weights: Vec<(usize, Vec<f64>)>,
+}
+
+impl Smoother {
+    /// For rows at these times.
+    pub(crate) fn new(t_s: &[f64]) -> Self {
+        let weights = (0..t_s.len())
+            .map(|i| {
+                let start = t_s.partition_point(|t| *t < t_s[i] - HALF_S);
+                let end = t_s.partition_point(|t| *t <= t_s[i] + HALF_S);
+                let powers = |j: usize| {
+                    let x = (t_s[j] - t_s[i]) / HALF_S;
+                    Vector4::new(1.0, x, x * x, x * x * x)
+                };
+                let mut normal = Matrix4::zeros();
+                for j in start..end {
+                    let p = powers(j);
+                    normal += p * p.transpose();
+                }
+                let factors = if end - start < FEWEST_ROWS { None } else { normal.cholesky() };
+                match factors {
+                    None => (i, vec![1.0]),
+                    Some(factors) => {
+                        let at_row = factors.solve(&Vector4::new(1.0, 0.0, 0.0, 0.0));
+                        (start, (start..end).map(|j| at_row.dot(&powers(j))).collect())
+                    }
+                }
+            })
+            .collect();
+        Smoother { weights }
+    }
+
+    /// The smoothed column.
+    pub(crate) fn apply(&self, column: &[f64]) -> Vec<f64> {
+        self.weights
+            .iter()
+            .map(|(start, weights)| {
+                let around = column.get(*start..).unwrap_or(&[]);
+                weights.iter().zip(around).map(|(weight, value)| weight * value).sum()
+            })
+            .collect()
+    }
+}
+
+/// Smooths T1, Tc, P1, P2, flow and the place on the map.
+pub(crate) fn smooth(rows: &mut [Row]) {
+    let t_s: Vec<f64> = rows.iter().map(|row| row.t_s).collect();
+    let smoother = Smoother::new(&t_s);
+    let mut column = |read: fn(&Row) -> f64, write: fn(&mut Row, f64)| {
+        let raw: Vec<f64> = rows.iter().map(read).collect();
+        for (row, value) in rows.iter_mut().zip(smoother.apply(&raw)) {
+            write(row, value);
+        }
+    };
+    column(|row| row.t1_k, |row, value| row.t1_k = value);
+    column(|row| row.tc_k, |row, value| row.tc_k = value);
+    column(|row| row.p1_pa, |row, value| row.p1_pa = value);
+    column(|row| row.p2_pa, |row, value| row.p2_pa = value);
+    column(|row| row.flow_kg_s, |row, value| row.flow_kg_s = value);
+    column(|row| row.place.0, |row, value| row.place.0 = value);
+    column(|row| row.place.1, |row, value| row.place.1 = value);
+}

@@ -1,0 +1,317 @@
+//! Levenberg-Marquardt on the joint fit's normal equations, whose matrix has the shape of an arrow: each step's own
+//! parameters touch only themselves and the shared ones, so they are eliminated step by step.
+
+use crate::joint::explained::Explained;
+use crate::joint::model::{Course, Setting};
+use crate::joint::parameters::{ETA, LOCAL, LocalVector, PROBE_MM2, Prior, SHARED, SURFACE, SharedVector};
+use crate::joint::surface::{TERM_COUNT, dot};
+use crate::joint::whitening::Whitening;
+use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
+
+/// Most iterations: a good start needs about ten.
+const MOST_ITERATIONS: usize = 60;
+/// Relative decrease of the cost below which the search ends.
+const ENOUGH_RATIO: f64 = 1e-10;
+
+/// One step in the fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Member<'a> {
+    pub(crate) course: Course<'a>,
+    /// Measured T2 of each row, K.
+    pub(crate) measured_k: Vec<f64>,
+    pub(crate) whitening: Whitening,
+    /// The surface's terms at the step's end.
+    pub(crate) end_terms: [f64; TERM_COUNT],
+    pub(crate) local: LocalVector,
+    /// Of the step's parameters; that of the efficiency is not used: see `surface_sigma`.
+    pub(crate) priors: [Prior; LOCAL],
+    /// Whether the step takes part in the shared parameters.
+    pub(crate) shares: bool,
+}
+
+/// The whole fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Problem<'a> {
+    pub(crate) setting: Setting,
+    pub(crate) members: Vec<Member<'a>>,
+    pub(crate) shared: SharedVector,
+    pub(crate) priors: [Prior; SHARED],
+    pub(crate) active: [bool; SHARED],
+    /// Lowest value of each shared parameter.
+    pub(crate) lowest: SharedVector,
+    /// How far a point's efficiency may lie off the surface, one standard deviation; infinite where there is none.
+    pub(crate) surface_sigma: f64,
+    /// What noise in T1, Tc, flow and pressures adds to the sum of squares, by the probe.
+    pub(crate) explained: Explained,
+    /// Whether the probe is sought, be it on its bound for now.
+    pub(crate) probe_fitted: bool,
+}
+
+/// A step's part of the normal equations.
+#[derive(Debug, Clone)]
+struct Block {
+    own: Matrix4<f64>,
+    /// Own by shared, only the active ones.
+    mixed: Matrix4xX<f64>,
+    right: Vector4<f64>,
+}
+
+struct Normal {
+    cost: f64,
+    shared: DMatrix<f64>,
+    right: DVector<f64>,
+    blocks: Vec<Block>,
+}
+
+/// Covariance of everything, as far as it is needed.
+#[derive(Debug, Clone)]
+pub(crate) struct Covariance {
+    /// Shared parameters that were fitted, by index.
+    pub(crate) fitted: Vec<usize>,
+    /// Their covariance.
+    pub(crate) shared: DMatrix<f64>,
+    /// For each step: own covariance with the shared ones free, and own by shared.
+    pub(crate) own: Vec<(Matrix4<f64>, Matrix4xX<f64>)>,
+}
+
+impl Covariance {
+    /// Where a shared parameter stands; `None` where it was not fitted.
+    pub(crate) fn row_of(&self, index: usize) -> Option<usize> {
+        self.fitted.iter().position(|fitted| *fitted == index)
+    }
+
+    /// Standard error of a shared parameter.
+    pub(crate) fn error_of(&self, index: usize) -> Option<f64> {
+        self.row_of(index).map(|row| self.shared[(row, row)].max(0.0).sqrt())
+    }
+}
+
+impl Problem<'_> {
+    fn fitted(&self) -> Vec<usize> {
+        (0..SHARED).filter(|index| self.active[*index]).collect()
+    }
+
+    /// Whitened residuals of a step (measured less predicted), and derivatives of the prediction.
+    pub(crate) fn residual(&self, member: &Member<'_>, shared: &SharedVector, local: &LocalVector, derivatives: bool) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let prediction = self.setting.predict(&member.course, shared, local, &self.active, derivatives);
+        let mut residual: Vec<f64> =
+            member.measured_k.iter().zip(&prediction.t2_k).map(|(measured, predicted)| measured - predicted).collect();
+        member.whitening.apply(&mut residual);
+        let mut columns = prediction.columns;
+        for column in &mut columns {
+            member.whitening.apply(column);
+        }
+        (residual, columns)
+    }
+
+    fn local_cost(&self, member: &Member<'_>, shared: &SharedVector, local: &LocalVector) -> f64 {
+        let (residual, _) = self.residual(member, shared, local, false);
+        let mut cost: f64 = residual.iter().map(|r| r * r).sum();
+        for (index, prior) in member.priors.iter().enumerate() {
+            if index != ETA {
+                cost += prior.weight() * (local[index] - prior.mean).powi(2);
+            }
+        }
+        let off = local[ETA] - dot(&member.end_terms, crate::joint::model::surface_of(shared));
+        cost + off * off / (self.surface_sigma * self.surface_sigma)
+    }
+
+    fn shared_cost(&self, shared: &SharedVector) -> f64 {
+        let priors: f64 =
+            self.fitted().iter().map(|i| self.priors[*i].weight() * (shared[*i] - self.priors[*i].mean).powi(2)).sum();
+        priors - self.explained.at(shared[PROBE_MM2]).0
+    }
+
+    fn normal(&self, fitted: &[usize]) -> Normal {
+        let m = fitted.len();
+        let mut normal = Normal {
+            cost: self.shared_cost(&self.shared),
+            shared: DMatrix::zeros(m, m),
+            right: DVector::zeros(m),
+            blocks: Vec::with_capacity(self.members.len()),
+        };
+        for (row, index) in fitted.iter().enumerate() {
+            let prior = self.priors[*index];
+            normal.shared[(row, row)] += prior.weight();
+            normal.right[row] += prior.weight() * (prior.mean - self.shared[*index]);
+            if *index == PROBE_MM2 {
+                normal.right[row] += 0.5 * self.explained.at(self.shared[PROBE_MM2]).1;
+            }
+        }
+        let surface_weight = 1.0 / (self.surface_sigma * self.surface_sigma);
+        for member in &self.members {
+            let (residual, columns) = self.residual(member, &self.shared, &member.local, true);
+            let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+            let mut block =
+                Block { own: Matrix4::zeros(), mixed: Matrix4xX::zeros(m), right: Vector4::zeros() };
+            for i in 0..LOCAL {
+                let column = &columns[SHARED + i];
+                for j in i..LOCAL {
+                    let value = product(column, &columns[SHARED + j]);
+                    block.own[(i, j)] += value;
+                    if i != j {
+                        block.own[(j, i)] += value;
+                    }
+                }
+                block.right[i] += product(column, &residual);
+                if i != ETA {
+                    let prior = member.priors[i];
+                    block.own[(i, i)] += prior.weight();
+                    block.right[i] += prior.weight() * (prior.mean - member.local[i]);
+                }
+            }
+            let off = member.local[ETA] - dot(&member.end_terms, crate::joint::model::surface_of(&self.shared));
+            block.own[(ETA, ETA)] += surface_weight;
+            block.right[ETA] -= surface_weight * off;
+            if member.shares {
+                normal.cost += residual.iter().map(|r| r * r).sum::<f64>() + off * off * surface_weight;
+                for i in (0..LOCAL).filter(|i| *i != ETA) {
+                    normal.cost += member.priors[i].weight() * (member.local[i] - member.priors[i].mean).powi(2);
+                }
+            }
+            for (a, index) in fitted.iter().enumerate() {
+                for i in 0..LOCAL {
+                    block.mixed[(i, a)] += product(&columns[SHARED + i], &columns[*index]);
+                }
+                let term = |index: usize| {
+                    index.checked_sub(SURFACE).and_then(|k| member.end_terms.get(k)).copied().unwrap_or(0.0)
+                };
+                block.mixed[(ETA, a)] -= surface_weight * term(*index);
+                if !member.shares {
+                    continue;
+                }
+                normal.right[a] += product(&columns[*index], &residual) + surface_weight * off * term(*index);
+                for (b, other) in fitted.iter().enumerate().skip(a) {
+                    let value =
+                        product(&columns[*index], &columns[*other]) + surface_weight * term(*index) * term(*other);
+                    normal.shared[(a, b)] += value;
+                    if a != b {
+                        normal.shared[(b, a)] += value;
+                    }
+                }
+            }
+            normal.blocks.push(block);
+        }
+        normal
+    }
+
+    /// Changes of the shared and of each step's parameters with damping; `None` where the equations are singular.
+    fn change(&self, normal: &Normal, damping: f64) -> Option<(DVector<f64>, Vec<Vector4<f64>>)> {
+        let mut reduced = normal.shared.clone();
+        let mut right = normal.right.clone();
+        for i in 0..reduced.nrows() {
+            reduced[(i, i)] *= 1.0 + damping;
+        }
+        let mut inverses = Vec::with_capacity(normal.blocks.len());
+        for (block, member) in normal.blocks.iter().zip(&self.members) {
+            let mut own = block.own;
+            for i in 0..LOCAL {
+                own[(i, i)] *= 1.0 + damping;
+            }
+            let inverse = own.cholesky()?.inverse();
+            if member.shares {
+                let folded = block.mixed.transpose() * inverse;
+                reduced -= &folded * &block.mixed;
+                right -= &folded * block.right;
+            }
+            inverses.push(inverse);
+        }
+        let shared = if reduced.nrows() == 0 { DVector::zeros(0) } else { reduced.cholesky()?.solve(&right) };
+        let own = normal
+            .blocks
+            .iter()
+            .zip(&inverses)
+            .map(|(block, inverse)| inverse * (block.right - &block.mixed * &shared))
+            .collect();
+        Some((shared, own))
+    }
+
+    fn cost(&self, shared: &SharedVector, locals: &[LocalVector]) -> f64 {
+        let members = self.members.iter().zip(locals).filter(|(member, _)| member.shares);
+        self.shared_cost(shared) + members.map(|(member, local)| self.local_cost(member, shared, local)).sum::<f64>()
+    }
+
+    /// Finds the minimum from where the parameters stand; `None` where it comes to no finite end.
+    pub(crate) fn minimise(&mut self) -> Option<f64> {
+        let mut fitted = self.fitted();
+        let mut damping = 1e-4;
+        let mut best = f64::INFINITY;
+        for _ in 0..MOST_ITERATIONS {
+            let normal = self.normal(&fitted);
+            best = normal.cost;
+            if !best.is_finite() {
+                return None;
+            }
+            let mut accepted = None;
+            for _ in 0..12 {
+                let Some((change, own)) = self.change(&normal, damping) else {
+                    damping *= 10.0;
+                    continue;
+                };
+                let mut shared = self.shared;
+                for (row, index) in fitted.iter().enumerate() {
+                    shared[*index] = (shared[*index] + change[row]).max(self.lowest[*index]);
+                }
+                let locals: Vec<LocalVector> = self
+                    .members
+                    .iter()
+                    .zip(&own)
+                    .map(|(member, change)| std::array::from_fn(|i| member.local[i] + change[i]))
+                    .collect();
+                let cost = self.cost(&shared, &locals);
+                if cost <= best * (1.0 + 1e-14) {
+                    accepted = Some((shared, locals, cost));
+                    damping = (damping * 0.1).max(1e-12);
+                    break;
+                }
+                damping = (damping * 10.0).max(1e-8);
+                if damping > 1e8 {
+                    break;
+                }
+            }
+            let Some((shared, locals, cost)) = accepted else { break };
+            // A parameter on its bound rests there as long as the others are searched.
+            fitted.retain(|index| shared[*index] > self.lowest[*index]);
+            for index in 0..SHARED {
+                self.active[index] &= shared[index] > self.lowest[index];
+            }
+            self.shared = shared;
+            for (member, local) in self.members.iter_mut().zip(locals) {
+                member.local = local;
+            }
+            let decrease = best - cost;
+            best = cost;
+            if decrease <= ENOUGH_RATIO * cost.max(1e-12) {
+                break;
+            }
+        }
+        Some(best)
+    }
+
+    /// Covariance at the minimum; `None` where the equations are singular.
+    pub(crate) fn covariance(&self) -> Option<Covariance> {
+        let fitted = self.fitted();
+        let normal = self.normal(&fitted);
+        let mut reduced = normal.shared.clone();
+        let mut inverses = Vec::new();
+        for (block, member) in normal.blocks.iter().zip(&self.members) {
+            let inverse = block.own.cholesky()?.inverse();
+            if member.shares {
+                reduced -= block.mixed.transpose() * inverse * &block.mixed;
+            }
+            inverses.push(inverse);
+        }
+        let shared = if fitted.is_empty() { reduced } else { reduced.cholesky()?.inverse() };
+        let own = normal
+            .blocks
+            .iter()
+            .zip(&inverses)
+            .map(|(block, inverse)| {
+                let spread = inverse * &block.mixed;
+                let own = inverse + &spread * &shared * spread.transpose();
+                (own, -(spread * &shared))
+            })
+            .collect();
+        Some(Covariance { fitted, shared, own })
+    }
+}

@@ -1,0 +1,215 @@
+//! From a recording to a fit that can be started, and what the fit learns of its own spreads.
+
+use crate::dynamic::{self, Estimate};
+use crate::end_state::EndState;
+use crate::findings::{Findings, code};
+use crate::joint::cleaning::cleaned;
+use crate::joint::explained::{self, Explained};
+use crate::joint::model::{Course, Setting};
+use crate::joint::parameters::{
+    ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, OFFSET_CHANNELS,
+    OFFSETS, PROBE_MM2, Prior, SHARED, SLOPE, SURFACE,
+};
+use crate::joint::rows::{StepRows, condensed};
+use crate::joint::settings::{Choice, ConvectionWithinStep, EfficiencyWithinStep};
+use crate::joint::solve::{Member, Problem};
+use crate::joint::surface::{SurfaceScale, TERM_COUNT, dot};
+use crate::joint::whitening::Whitening;
+use crate::samples::Samples;
+use crate::{IdentifyConfig, jump};
+use mapper_core::{Channel, Recording, Window};
+use mapper_physics::air;
+
+/// Start of what is used of a step, after the last change of a command, s: h and efficiency are followed while the
+/// operating point settles, and the first seconds after a jump tell most of the probe.
+const JOINT_START_S: f64 = 3.0;
+/// Least spread of the points' efficiencies about the surface: maps are no polynomials.
+const LEAST_SURFACE_SIGMA: f64 = 3e-3;
+/// Least spread of the points' h about the law, ratio.
+const LEAST_LAW_SIGMA: f64 = 3e-3;
+/// Standard deviation of a sample of T2 where nothing is declared, K; refined from the residual.
+const UNDECLARED_NOISE_K: f64 = 0.1;
+
+/// Condenses every step that has a window with enough samples.
+pub(crate) fn steps(
+    recording: &Recording,
+    end_states: &[Option<EndState>],
+    config: &IdentifyConfig,
+    findings: &mut [Findings],
+) -> Vec<StepRows> {
+    let mut steps = Vec::new();
+    for (position, step) in recording.steps.iter().enumerate() {
+        let (Some(Some(end_state)), Some(own)) = (end_states.get(position), findings.get_mut(position)) else { continue };
+        let start_s = jump::commands_settled_s(recording, step).max(step.start_s) + JOINT_START_S;
+        let window = Window { start_s, end_s: step.end_s };
+        if !(start_s < step.end_s) {
+            let message = format!("the commands changed until {:.1} s before the step's end", step.end_s - start_s);
+            own.refuse(code::TOO_FEW_SAMPLES, message);
+            continue;
+        }
+        let samples = cleaned(Samples::of(recording, window, config, true), config, own);
+        if !dynamic::enough(&samples, config, own) {
+            continue;
+        }
+        steps.extend(condensed(recording, position, &samples, end_state, config));
+    }
+    steps
+}
+
+/// The fit with its start values.
+pub(crate) fn problem<'a>(steps: &'a [StepRows], alone: &[Estimate], config: &IdentifyConfig) -> Option<Problem<'a>> {
+    let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
+    let scale = SurfaceScale::of(&places, config.reference)?;
+    let choice = &config.joint;
+    let with_law = choice.h == ConvectionWithinStep::Law;
+    let shaped = choice.efficiency == EfficiencyWithinStep::Shaped;
+    let reynolds = |step: &StepRows| {
+        let bulk_k = step.end.t2_k;
+        4.0 * step.end.flow_kg_s / (std::f64::consts::PI * config.outlet_diameter_m * air::viscosity_pa_s(bulk_k))
+    };
+    let ln_reference = steps.iter().map(|step| reynolds(step).ln()).sum::<f64>() / steps.len() as f64;
+    let setting = Setting {
+        internal_area_m2: config.internal_area_m2,
+        outlet_diameter_m: config.outlet_diameter_m,
+        reynolds_reference: ln_reference.exp(),
+        with_law,
+        shaped,
+    };
+
+    let free = Prior { mean: 0.0, sigma: f64::INFINITY };
+    let mut priors = [free; SHARED];
+    let mut shared = [0.0; SHARED];
+    let mut active = [false; SHARED];
+    let mut lowest = [f64::NEG_INFINITY; SHARED];
+    // A turbocharger's law may be far from Appendix A's, but not by orders of magnitude.
+    let law = mapper_physics::params::Params::default().compressor;
+    shared[EXPONENT] = law.nusselt_exponent;
+    shared[LN_COEFFICIENT] = law.nusselt_coefficient.ln() + law.nusselt_exponent * ln_reference;
+    priors[LN_COEFFICIENT] = Prior { mean: shared[LN_COEFFICIENT], sigma: 3.0 };
+    priors[EXPONENT] = Prior { mean: 0.9, sigma: 0.5 };
+    active[LN_COEFFICIENT] = with_law;
+    active[EXPONENT] = with_law;
+    shared[ALPHA] = config.alpha_area_ratio;
+    priors[ALPHA] = Prior { mean: config.alpha_area_ratio, sigma: 0.3 };
+    active[ALPHA] = choice.alpha_area == Choice::Fitted;
+    let probe_mm2 = (1e3 * config.probe_diameter_m).powi(2);
+    shared[PROBE_MM2] = if choice.probe == Choice::Fitted { probe_mm2.max(0.5) } else { probe_mm2 };
+    priors[PROBE_MM2] = Prior { mean: probe_mm2, sigma: 10.0 };
+    active[PROBE_MM2] = choice.probe == Choice::Fitted;
+    lowest[PROBE_MM2] = 0.0;
+    priors[LN_DIRECTION] = Prior { mean: 0.0, sigma: 0.5 };
+    active[LN_DIRECTION] = choice.direction == Choice::Fitted;
+    if choice.offsets == Choice::Fitted {
+        for (i, channel) in OFFSET_CHANNELS.iter().enumerate() {
+            let sigma = config.declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);
+            priors[OFFSETS + i] = Prior { mean: 0.0, sigma };
+            active[OFFSETS + i] = sigma > 0.0;
+        }
+        let sigma = config.declared.get(&Channel::CompressorFlow).map_or(0.0, |declared| declared.gain_sigma_ratio);
+        priors[FLOW_GAIN] = Prior { mean: 0.0, sigma };
+        active[FLOW_GAIN] = sigma > 0.0;
+    }
+    let etas: Vec<f64> = steps
+        .iter()
+        .filter_map(|step| alone.get(step.position)?.eta.map(|(eta, _)| eta))
+        .filter(|eta| (0.2..0.95).contains(eta))
+        .collect();
+    let mean_eta = crate::samples::mean(&etas).unwrap_or(0.65);
+    shared[SURFACE] = mean_eta;
+    for (k, sigma) in SurfaceScale::prior_sigmas().into_iter().enumerate() {
+        priors[SURFACE + k] = Prior { mean: shared[SURFACE + k], sigma };
+        active[SURFACE + k] = shaped;
+    }
+
+    let members = steps
+        .iter()
+        .map(|step| {
+            let end_terms = scale.terms(step.end.place);
+            let terms = step
+                .rows
+                .iter()
+                .map(|row| {
+                    let here = scale.terms(row.place);
+                    std::array::from_fn::<f64, TERM_COUNT, _>(|k| here[k] - end_terms[k])
+                })
+                .collect();
+            let found = alone.get(step.position);
+            let eta = found.and_then(|found| found.eta).map_or(mean_eta, |(eta, _)| eta).clamp(0.3, 0.9);
+            let first_k = step.rows.first().map_or(step.end.t2_k, |row| row.t2_k);
+            let mut local = [0.0; LOCAL];
+            let mut own = [free; LOCAL];
+            local[ETA] = eta;
+            own[LN_DEVIATION] = Prior { mean: 0.0, sigma: 0.01 };
+            if !with_law {
+                local[LN_DEVIATION] =
+                    found.and_then(|found| found.h_w_m2k).map_or(500.0, |(h, _)| h).clamp(20.0, 5e3).ln();
+                own[LN_DEVIATION] = Prior { mean: local[LN_DEVIATION], sigma: 3.0 };
+            }
+            local[FIRST_READING] = first_k;
+            own[FIRST_READING] = Prior { mean: first_k, sigma: 5.0 };
+            local[SLOPE] = 1.0;
+            own[SLOPE] = Prior { mean: 1.0, sigma: 0.05 };
+            Member {
+                course: Course { rows: &step.rows, terms },
+                measured_k: step.rows.iter().map(|row| row.t2_k).collect(),
+                whitening: whitening(step, config, UNDECLARED_NOISE_K, UNDECLARED_NOISE_K),
+                end_terms,
+                local,
+                priors: own,
+                shares: true,
+            }
+        })
+        .collect();
+    let surface_sigma = if shaped { 0.005 } else { 1e3 };
+    Some(Problem { setting, members, shared, priors, active, lowest, surface_sigma, explained: Explained::default(), probe_fitted: choice.probe == Choice::Fitted })
+}
+
+fn whitening(step: &StepRows, config: &IdentifyConfig, sigma_k: f64, white_sigma_k: f64) -> Whitening {
+    Whitening::new(
+        step.rows.iter().map(|row| row.t_s),
+        step.rows.iter().map(|row| row.noise),
+        config.noise_colour,
+        sigma_k,
+        white_sigma_k,
+    )
+}
+
+/// Takes the noise of each step and the spreads of the points about surface and law from what was found.
+pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
+    let channels = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
+    let declared: Vec<f64> =
+        channels.iter().map(|channel| config.declared.get(channel).map_or(0.0, |declared| declared.noise_sigma)).collect();
+    for i in 0..problem.members.len() {
+        let member = &problem.members[i];
+        let slopes = problem.setting.sensitivities(&steps[i].end, &problem.shared, &member.local);
+        let expected: f64 = slopes.iter().zip(&declared).map(|(slope, sigma)| (slope * sigma).powi(2)).sum();
+        // Without a declaration the residual itself says what noise there is; 2 mK is what block means cost.
+        let sigma_k = if expected > 0.0 {
+            expected.sqrt()
+        } else {
+            let prediction = problem.setting.predict(&member.course, &problem.shared, &member.local, &[false; SHARED], false);
+            let square: f64 =
+                member.measured_k.iter().zip(&prediction.t2_k).skip(1).map(|(a, b)| (a - b).powi(2)).sum();
+            (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(2e-3)
+        };
+        let white_sigma_k = if expected > 0.0 { declared[1].max(0.1 * sigma_k) } else { sigma_k };
+        problem.members[i].whitening = whitening(&steps[i], config, sigma_k, white_sigma_k);
+    }
+    problem.explained = explained::explained(problem, steps, config);
+    let n = (problem.members.len() as f64).max(1.0);
+    let (mut off_surface, mut off_law) = (0.0, 0.0);
+    for member in &problem.members {
+        let off = member.local[ETA] - dot(&member.end_terms, crate::joint::model::surface_of(&problem.shared));
+        off_surface += off * off / n;
+        off_law += member.local[LN_DEVIATION].powi(2) / n;
+    }
+    if problem.setting.shaped {
+        problem.surface_sigma = off_surface.sqrt().clamp(LEAST_SURFACE_SIGMA, 0.02);
+    }
+    if problem.setting.with_law {
+        let sigma = off_law.sqrt().clamp(LEAST_LAW_SIGMA, 0.1);
+        for member in &mut problem.members {
+            member.priors[LN_DEVIATION].sigma = sigma;
+        }
+    }
+}

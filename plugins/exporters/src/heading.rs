@@ -1,0 +1,20 @@
+//! What every text format says first: machine, reference state.
+
+use mapper_core::CompressorMap;
+
+/// Two comment lines that begin with `mark`.
+pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
+    let (t_ref_k, p_ref_pa) = (map.reference.t_ref_k, map.reference.p_ref_pa);
+    format!(
+        "{mark} compressor map of {}\n\
+         {mark} reference state of corrected flow and speed: {t_ref_k} K, {p_ref_pa} Pa\n",
+        one_line(&map.machine),
+    )
+}
+
+/// A name that cannot end a comment.
+pub(crate) fn one_line(name: &str) -> String {
+    name.chars()
+        .map(|c| if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') { ' ' } else { c })
+        .collect()
+}

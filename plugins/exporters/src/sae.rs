@@ -1,0 +1,31 @@
+//! SAE text, compressor (J1826, J922): four columns, from choke to surge within a line.
+
+use crate::{ExportError, heading::heading};
+use mapper_core::CompressorMap;
+use std::fmt::Write;
+
+pub(crate) fn export(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
+    let mut text = heading(map, "#");
+    let all = || map.lines.iter().flat_map(|line| &line.points);
+    let without = all().filter(|point| point.eta.is_none()).count();
+    if without > 0 {
+        let _ = writeln!(
+            text,
+            "# {without} points without efficiency are left out: the format has no place for them"
+        );
+    }
+    text.push_str("# N(rpm) mdot(kg/s) PR Eff\n");
+    for line in &map.lines {
+        // Points stand in order of rising flow; the format goes from choke to surge.
+        for point in line.points.iter().rev() {
+            let Some(eta) = point.eta else { continue };
+            // Shortest text that reads back to the same number.
+            let _ = writeln!(
+                text,
+                "{} {} {} {eta}",
+                line.speed_corrected_rpm, point.flow_corrected_kg_s, point.pressure_ratio
+            );
+        }
+    }
+    Ok(text.into_bytes())
+}

@@ -1,0 +1,56 @@
+//! SAE text, compressor: `#` comments, then corrected rpm, corrected kg/s, pressure ratio, efficiency in a row.
+
+use crate::lines::{Row, map_of_rows, room_for_one_more};
+use crate::{ImportError, reference};
+use mapper_core::{CompressorMap, ReferenceState};
+
+pub(crate) fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
+    let (mut rows, mut found, mut machine) = (Vec::new(), None, String::new());
+    let mut heading_allowed = true;
+    for (index, line) in text.lines().enumerate() {
+        let at = index + 1;
+        let (content, comment) = match line.split_once('#') {
+            Some((content, comment)) => (content.trim(), Some(comment)),
+            None => (line.trim(), None),
+        };
+        if let Some(comment) = comment {
+            found = found.or_else(|| reference::in_comment(comment));
+            if let Some((_, name)) = comment.split_once("compressor map of ") {
+                machine = name.trim().chars().take(200).collect();
+            }
+        }
+        if content.is_empty() {
+            continue;
+        }
+        match four_numbers(content) {
+            Some([speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, eta]) => {
+                room_for_one_more(rows.len(), at)?;
+                let row =
+                    Row { at, speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, eta: Some(eta) };
+                row.check()?;
+                rows.push(row);
+            }
+            // One line of column names.
+            None if heading_allowed => {}
+            None => {
+                let shown: String = content.chars().take(60).collect();
+                let message = format!(
+                    "`{shown}` is not four numbers: corrected rpm, corrected kg/s, pressure ratio, efficiency"
+                );
+                return Err(ImportError::Syntax { line: at, message });
+            }
+        }
+        heading_allowed = false;
+    }
+    map_of_rows(machine, &rows, found, given)
+}
+
+fn four_numbers(content: &str) -> Option<[f64; 4]> {
+    let mut fields =
+        content.split(|c: char| c.is_whitespace() || matches!(c, ',' | ';')).filter(|f| !f.is_empty());
+    let mut numbers = [0.0; 4];
+    for number in &mut numbers {
+        *number = fields.next()?.parse().ok()?;
+    }
+    fields.next().is_none().then_some(numbers)
+}

@@ -17,7 +17,14 @@ pub enum Mode {
 }
 
 /// What is generated below docs: files, and folders with all that is in them.
-const GENERATED: &[&str] = &["reproduction.md", "reproduction", "sequences.md", "turbo_a.svg"];
+const GENERATED: &[&str] = &["methods.md", "reproduction.md", "reproduction", "sequences.md", "turbo_a.svg"];
+
+/// Methods of mapping, and the campaigns that map one grid by them.
+const METHODS: &[(&str, &str)] = &[
+    ("dynamic", "turbo_a"),
+    ("conventional", "turbo_a_conventional"),
+    ("adiabatic", "turbo_a_adiabatic"),
+];
 
 /// Writes or checks everything that is generated.
 pub fn docs(mode: Mode) -> Result<(), Error> {
@@ -33,18 +40,32 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
     let page = output(command(workspace::cargo(), &arguments))? + "\n";
     write(&made.join("sequences.md"), page.as_bytes())?;
 
-    // The README's picture is the map of the shipped campaign.
+    // The README's picture is the map of the shipped campaign; the other campaigns map the same grid by other methods.
     let runs = workspace::target_dir().join("xtask-docs-runs");
     if runs.exists() {
         fs::remove_dir_all(&runs).map_err(at(&runs))?;
     }
-    let arguments =
-        ["run", "--release", "--quiet", "-p", "mapper-cli", "--", "run", "campaigns/turbo_a.yaml", "--out"];
-    run(command(workspace::cargo(), &[&arguments[..], &[&*runs.to_string_lossy()]].concat()))?;
-    for run in fs::read_dir(&runs).map_err(at(&runs))? {
-        let map = run.map_err(at(&runs))?.path().join("map.svg");
-        write(&made.join("turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
+    let mut methods: Vec<String> =
+        ["run", "--release", "--quiet", "-p", "mapper-score", "--example", "methods_table", "--"]
+            .map(str::to_owned)
+            .into();
+    for (name, campaign) in METHODS {
+        let out = runs.join(campaign);
+        let file = format!("campaigns/{campaign}.yaml");
+        let arguments = ["run", "--release", "--quiet", "-p", "mapper-cli", "--", "run", &file, "--out"];
+        run(command(workspace::cargo(), &[&arguments[..], &[&*out.to_string_lossy()]].concat()))?;
+        for run in fs::read_dir(&out).map_err(at(&out))? {
+            let run = run.map_err(at(&out))?.path();
+            methods.extend([(*name).to_owned(), run.to_string_lossy().into_owned()]);
+            if *campaign == "turbo_a" {
+                let map = run.join("map.svg");
+                write(&made.join("turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
+            }
+        }
     }
+    let methods: Vec<&str> = methods.iter().map(String::as_str).collect();
+    let page = output(command(workspace::cargo(), &methods))? + "\n";
+    write(&made.join("methods.md"), page.as_bytes())?;
 
     let (new, old) = (contents(&made)?, contents(&docs)?);
     let names: BTreeSet<&PathBuf> = new.keys().chain(old.keys()).collect();

@@ -35,7 +35,8 @@ rehearsal never touches the rig.
   capture variables. Operations
   (5 million), depth of calls (32), length of strings (4096 bytes), arrays (4096 elements, or twice the grid) and maps
   (1024 entries), variables (128), steps (20 000) and time (a day a step, four weeks in all) are bounded.
-- An error ends the run in its safe state; what was recorded is kept.
+- An error ends the run in its safe state; what was recorded is kept, identified and reported. The steps that were made
+  stand in `executed_plan.json` of the run directory.
 
 Examples with their campaigns are in `examples/sequences`.
 ";

@@ -18,8 +18,10 @@ const STEP_LIMIT: usize = 20_000;
 const DWELL_LIMIT_S: f64 = 86_400.0;
 /// Longest sequence, s: four weeks.
 const DURATION_LIMIT_S: f64 = 28.0 * 86_400.0;
-/// Points that are judged at most; each takes the time of some thousand operations.
-const CHECK_LIMIT: usize = 50_000;
+/// Points that are judged without a step that goes there, at most: so many and some for each point of the grid. Each takes
+/// the time of some thousand operations.
+const CHECK_LIMIT: usize = 2_000;
+const CHECKS_OF_POINT: usize = 10;
 /// Notes that are kept, and characters of each.
 const NOTE_LIMIT: usize = 1000;
 const NOTE_LENGTH_LIMIT: usize = 500;
@@ -86,20 +88,23 @@ impl Session {
         }
     }
 
+    fn check_limit(&self) -> usize {
+        CHECK_LIMIT + CHECKS_OF_POINT * self.bench.points.len()
+    }
+
     fn check(&mut self, point: OperatingPoint) -> Result<mapper_physics::steady::SteadyState, Thrown> {
-        self.checks += 1;
-        if self.checks > CHECK_LIMIT {
-            return Err(throw(
-                format!("the script has had {CHECK_LIMIT} points judged"),
-                "judge fewer points",
-            ));
+        let limit = self.check_limit();
+        if self.checks >= limit {
+            let message = format!("the script has had {limit} points judged without going there");
+            return Err(throw(message, "judge fewer points"));
         }
+        self.checks += 1;
         self.bench.check(point).map_err(|Refusal { message, remedy }| throw(message, &remedy))
     }
 
     /// Whether a step may go to a point.
     pub fn reachable(&mut self, point: OperatingPoint) -> Result<bool, Thrown> {
-        if self.checks >= CHECK_LIMIT {
+        if self.checks >= self.check_limit() {
             self.check(point)?;
         }
         Ok(self.check(point).is_ok())
@@ -167,6 +172,7 @@ impl Session {
         let result = self.wait()?.ok_or_else(stopped)?;
         let duration_s = result.end_s - result.start_s;
         self.nominal.finish(&self.bench, &target.boundary, duration_s).map_err(fail)?;
+        self.checks = self.checks.saturating_sub(1);
         self.results.push(result.clone());
         Ok(result)
     }

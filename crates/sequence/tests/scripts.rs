@@ -280,3 +280,12 @@ fn the_documentation_is_what_the_functions_say() {
     let written = std::fs::read_to_string(path).unwrap();
     assert!(written == api_markdown(), "docs/sequences.md is stale: run `cargo xtask docs`");
 }
+
+/// Refusals that a script swallows cost it operations, and points that are judged in vain are counted: it ends.
+#[test]
+fn a_script_that_never_takes_no_for_an_answer_ends() {
+    let error = error_of("loop { try { jump(point(\"175 krpm\", 0.2)); } catch { } }");
+    assert!(error.to_string().contains("operations"), "{error}");
+    let error = error_of("loop { reachable(point(\"175 krpm\", 0.2)); }");
+    assert!(error.to_string().contains("points judged"), "{error}");
+}

@@ -144,12 +144,15 @@ impl LineShape {
                 break;
             }
         }
-        let correction: f64 = self
-            .harmonics
-            .iter()
-            .enumerate()
-            .map(|(j, c)| c * (2.0 * (j as f64 + 1.0) * angle_rad).sin())
-            .sum();
+        // None at choke, nor its slope: there the line must not lean over.
+        let correction: f64 = sin
+            * sin
+            * self
+                .harmonics
+                .iter()
+                .enumerate()
+                .map(|(j, c)| c * (2.0 * (j as f64 + 1.0) * angle_rad).sin())
+                .sum::<f64>();
         r * (1.0 + correction.clamp(-0.5, 0.5))
     }
 

@@ -141,3 +141,27 @@ fn what_makes_no_map_is_said() {
     );
     assert!(matches!(wide, Err(AssembleError::SpeedGap { .. })));
 }
+
+proptest! {
+    #[test]
+    fn the_shift_to_the_line_is_similarity_and_stands_on_record(speeds in proptest::collection::vec(-0.01..0.01f64, 4)) {
+        let points: Vec<_> =
+            speeds.iter().enumerate().map(|(i, s)| point(i, Some(1e5), 1e5 * (1.0 + s), 0.02 + 0.01 * i as f64)).collect();
+        let map = make(&points).unwrap();
+        let line = &map.lines[0];
+        for at_line in &line.points {
+            let measured = &at_line.identified;
+            let ratio = line.speed_corrected_rpm / measured.speed_corrected_rpm;
+            // Flow over speed, and isentropic head over its square, are what they were.
+            prop_assert!((at_line.flow_corrected_kg_s / measured.flow_corrected_kg_s - ratio).abs() < 1e-12);
+            let head = |pr: f64| pr.powf(2.0 / 7.0) - 1.0;
+            prop_assert!((head(at_line.pressure_ratio) / head(measured.pressure_ratio) - ratio * ratio).abs() < 1e-10);
+            prop_assert_eq!(at_line.eta, measured.eta);
+            if let Some(shift) = at_line.shift {
+                prop_assert!((measured.flow_corrected_kg_s + shift.flow_corrected_kg_s - at_line.flow_corrected_kg_s).abs() < 1e-15);
+                prop_assert!((measured.pressure_ratio + shift.pressure_ratio - at_line.pressure_ratio).abs() < 1e-12);
+                prop_assert!((measured.speed_corrected_rpm + shift.speed_corrected_rpm - line.speed_corrected_rpm).abs() < 1e-9);
+            }
+        }
+    }
+}

@@ -54,6 +54,24 @@ pub enum MapCommand {
     Convert(MapConvertArguments),
     /// Show where two maps differ, in units and in their uncertainty
     Compare(MapCompareArguments),
+    /// Write what a run gave beside the map: thermal model, turbine, pictures of h and of errors
+    Rig(MapRigArguments),
+}
+
+/// `mapper map rig`.
+#[derive(Debug, Args)]
+pub struct MapRigArguments {
+    /// Run directory, or MCAP file of a run
+    pub recording: PathBuf,
+    /// Directory for the files; those that are there are not replaced
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Campaign that says machine, sensors and window, instead of the one attached to the recording
+    #[arg(long, value_name = "FILE")]
+    pub campaign: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `mapper map fit`.

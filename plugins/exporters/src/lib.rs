@@ -10,6 +10,7 @@ mod error;
 mod fitted_csv;
 mod fitted_items;
 mod heading;
+mod heat_picture;
 mod json;
 mod modelica;
 mod monotone;
@@ -21,10 +22,15 @@ mod simscape;
 mod simulation_table;
 mod surface;
 mod svg;
+mod thermal;
+mod turbine;
 
 pub use error::ExportError;
+pub use heat_picture::{ErrorAtGradient, error_figure, heat_transfer_figure};
 pub use surface::efficiency_surface;
 pub use svg::{map_figure, map_panel};
+pub use thermal::ThermalExport;
+pub use turbine::{TurbinePoint, turbine_points, turbine_text};
 
 use mapper_core::CompressorMap;
 

@@ -29,8 +29,14 @@ fn empty() -> CompressorMap {
 fn names_are_unique_and_every_format_takes_any_map_and_repeats_itself() {
     for (i, entry) in EXPORTERS.iter().enumerate() {
         assert!(EXPORTERS[i + 1..].iter().all(|other| other.name != entry.name));
-        for map in [empty(), support::turbo_a()] {
-            assert_eq!((entry.export)(&map).unwrap(), (entry.export)(&map).unwrap());
+        assert!(EXPORTERS[i + 1..].iter().all(|other| other.extension != entry.extension));
+        for map in [empty(), support::turbo_a(), support::fitted()] {
+            match (entry.export)(&map) {
+                Ok(bytes) => assert!(bytes == (entry.export)(&map).unwrap(), "{}", entry.name),
+                Err(error) => {
+                    assert!(matches!(error, ExportError::NeedsFit { .. }) && map.fitted.is_none(), "{error}");
+                }
+            }
         }
     }
     assert!(find("xlsx").is_none());
@@ -153,4 +159,36 @@ fn odd_maps_give_a_picture() {
         assert!(roxmltree::Document::parse(&text).is_ok());
         assert!(!text.contains("NaN"));
     }
+}
+
+#[test]
+fn every_text_says_its_reference_state() {
+    let map = support::fitted();
+    for entry in EXPORTERS.iter().filter(|entry| !["json", "svg", "png"].contains(&entry.name)) {
+        let text = export(entry.name, &map);
+        assert!(text.contains("298 K, 100000 Pa"), "{}", entry.name);
+    }
+}
+
+#[test]
+fn sae_goes_from_choke_to_surge_and_holds_every_efficiency() {
+    let map = support::turbo_a();
+    let text = export("sae", &map);
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| line.split(' ').map(|field| field.parse().unwrap()).collect())
+        .collect();
+    assert_eq!(rows.len(), points(&map).iter().filter(|p| p.eta.is_some()).count());
+    assert!(rows.windows(2).all(|w| w[1][0] > w[0][0] || w[1][1] <= w[0][1]));
+}
+
+#[test]
+fn the_fitted_table_marks_what_is_extrapolated() {
+    let map = support::fitted();
+    let text = export("fitted", &map);
+    let (fitted, marks) = (map.fitted.unwrap(), text.matches(",extrapolated\n").count());
+    let nodes = || fitted.lines.iter().flat_map(|line| &line.nodes);
+    assert_eq!(marks, nodes().filter(|n| n.extrapolated).count());
+    assert_eq!(text.matches(",measured\n").count(), nodes().filter(|n| !n.extrapolated).count());
 }

@@ -8,6 +8,7 @@ mod dependencies;
 mod full_disk;
 mod help;
 mod interrupted;
+mod maps;
 mod mistakes;
 mod pipes;
 mod plans;

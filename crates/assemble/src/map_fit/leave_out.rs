@@ -8,7 +8,19 @@ use mapper_core::LeftOutLine;
 /// that fit says at its speed. Lines without which too little is left are passed over.
 pub fn leave_out(fit: &MapFit) -> Vec<LeftOutLine> {
     let count = fit.data.lines_rpm.len();
-    (0..count).filter_map(|line| left_out(&fit.data, line, line == 0 || line + 1 == count)).collect()
+    let one = |line: usize| left_out(&fit.data, line, line == 0 || line + 1 == count);
+    // Each line by itself, so that the result does not depend on the number of cores.
+    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(count).max(1);
+    let mut found: Vec<(usize, LeftOutLine)> = std::thread::scope(|scope| {
+        let part =
+            |worker: usize| (worker..count).step_by(workers).filter_map(|l| Some((l, one(l)?))).collect();
+        let handles: Vec<_> =
+            (0..workers).map(|worker| scope.spawn(move || -> Vec<_> { part(worker) })).collect();
+        // A worker cannot panic; were it to, its lines would be missing.
+        handles.into_iter().filter_map(|handle| handle.join().ok()).flatten().collect()
+    });
+    found.sort_by_key(|(line, _)| *line);
+    found.into_iter().map(|(_, left_out)| left_out).collect()
 }
 
 fn left_out(data: &Observations, line: usize, outermost: bool) -> Option<LeftOutLine> {

@@ -41,7 +41,9 @@ pub(crate) type Parameters = [f64; PARAMETERS];
 const LEAST_EXPONENT: f64 = 1.05;
 /// Largest size of the choke head over that at zero slope.
 const CHOKE_HEAD_LIMIT: f64 = 0.7;
-/// Bounds of the angle walked, rad: 0 is choke, pi/2 zero slope; below 0 the line falls vertically.
+/// Lowest angle at all, rad: low enough for a pressure ratio below 1 on every line ([`CHOKE_HEAD_LIMIT`]).
+pub(crate) const LOWEST_ANGLE: f64 = -3.0;
+/// Bounds of the angle where points are looked for, rad: 0 is choke, pi/2 zero slope; below 0 the line falls vertically.
 pub(crate) const ANGLE_RANGE: (f64, f64) = (-0.6, 0.8 * std::f64::consts::PI);
 
 /// Where flow coefficients lie: makes the work coefficient's terms of order 1.
@@ -144,12 +146,15 @@ impl LineShape {
                 break;
             }
         }
-        let correction: f64 = self
-            .harmonics
-            .iter()
-            .enumerate()
-            .map(|(j, c)| c * (2.0 * (j as f64 + 1.0) * angle_rad).sin())
-            .sum();
+        // None at choke, nor its slope: there the line must not lean over.
+        let correction: f64 = sin
+            * sin
+            * self
+                .harmonics
+                .iter()
+                .enumerate()
+                .map(|(j, c)| c * (2.0 * (j as f64 + 1.0) * angle_rad).sin())
+                .sum::<f64>();
         r * (1.0 + correction.clamp(-0.5, 0.5))
     }
 

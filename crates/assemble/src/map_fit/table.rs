@@ -1,7 +1,7 @@
 //! The fit as a rectangular table with errors and marks of extrapolation.
 
 use super::crossing::crossings;
-use super::line_shape::{ANGLE_RANGE, LineShape, PARAMETERS};
+use super::line_shape::{ANGLE_RANGE, LOWEST_ANGLE, LineShape, PARAMETERS};
 use super::nearest::normal;
 use super::speed_spline::SpeedSpline;
 use super::{MapFit, MapFitError, MapFitOptions, leave_out};
@@ -177,7 +177,7 @@ fn choke_end(shape: &LineShape, speed_ratio: f64, surge_rad: f64) -> f64 {
     let ratio = |angle: f64| shape.physical(angle, speed_ratio).pressure_ratio;
     let top = ratio(surge_rad.min(std::f64::consts::FRAC_PI_2)).max(ratio(surge_rad));
     let wanted = bottom_ratio(top);
-    let (mut low, mut high) = (ANGLE_RANGE.0, surge_rad.min(std::f64::consts::FRAC_PI_2));
+    let (mut low, mut high) = (LOWEST_ANGLE, surge_rad.min(std::f64::consts::FRAC_PI_2));
     if ratio(low) > wanted {
         return low;
     }

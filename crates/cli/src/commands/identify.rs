@@ -44,7 +44,7 @@ pub fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
 }
 
 /// A file named by the campaign of a recording. The sequence script, which identification does not need, may be missing.
-fn read_beside(path: &Path) -> std::io::Result<String> {
+pub(super) fn read_beside(path: &Path) -> std::io::Result<String> {
     let text = std::fs::read_to_string(path);
     if path.extension().is_some_and(|extension| extension == "rhai") {
         Ok(text.unwrap_or_default())
@@ -53,7 +53,7 @@ fn read_beside(path: &Path) -> std::io::Result<String> {
     }
 }
 
-fn bad_recording(error: RecordError) -> Failure {
+pub(super) fn bad_recording(error: RecordError) -> Failure {
     let code = match error {
         RecordError::Read { .. } => Code::Failure,
         _ => Code::BadRecording,

@@ -8,6 +8,7 @@ mod identify;
 mod map_compare;
 mod map_convert;
 mod map_fit;
+mod map_rig;
 mod plan;
 mod reproduce;
 mod run;
@@ -31,6 +32,7 @@ pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
             MapCommand::Fit(arguments) => map_fit::fit(arguments),
             MapCommand::Convert(arguments) => map_convert::convert(arguments),
             MapCommand::Compare(arguments) => map_compare::compare(arguments),
+            MapCommand::Rig(arguments) => map_rig::rig(arguments),
         },
     }
 }

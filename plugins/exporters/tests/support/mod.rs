@@ -105,3 +105,10 @@ fn point(step: usize, speed_rpm: f64, x: f64, valve_opening_ratio: f64) -> MapPo
     };
     MapPoint { flow_corrected_kg_s: flow_kg_s, pressure_ratio, eta, identified, shift: None }
 }
+
+/// [`turbo_a`] with a surface through it.
+#[allow(dead_code)]
+pub fn fitted() -> CompressorMap {
+    let options = mapper_assemble::MapFitOptions { leave_one_out: false, ..Default::default() };
+    mapper_assemble::fit_map(turbo_a(), &options).unwrap()
+}

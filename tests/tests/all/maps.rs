@@ -1,0 +1,130 @@
+//! Commands on maps, as a user runs them.
+
+use mapper_tests::{mapper, python, repository, scratch};
+use serde_json::Value;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+fn sample() -> PathBuf {
+    repository().join("crates/assemble/tests/data/sample_compressor.csv")
+}
+
+fn run<const N: usize>(arguments: [&OsStr; N]) -> mapper_tests::Finished {
+    mapper([OsStr::new("map")].into_iter().chain(arguments))
+}
+
+fn convert(from: &Path, to: &Path, reference: &str) {
+    let option = OsStr::new("--reference");
+    run(["convert".as_ref(), from.as_os_str(), to.as_os_str(), option, reference.as_ref()]).exits(0);
+}
+
+#[test]
+fn a_map_without_reference_is_refused_and_nothing_is_written() {
+    let scratch = scratch();
+    let out = scratch.path().join("map.json");
+    let finished = run(["convert".as_ref(), sample().as_os_str(), out.as_os_str()]).exits(3);
+    for choice in ["SAE (298 K, 100 kPa)", "Garrett", "BorgWarner", "--reference"] {
+        assert!(finished.stderr.contains(choice), "{}", finished.stderr);
+    }
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_chain_of_formats_and_reference_states_comes_back_to_the_same_numbers() {
+    let scratch = scratch();
+    let file = |name: &str| scratch.path().join(name);
+    convert(&sample(), &file("a.json"), "SAE");
+    let to_garrett = ["--to-reference".as_ref(), OsStr::new("Garrett")];
+    let [option, garrett] = to_garrett;
+    run(["convert".as_ref(), file("a.json").as_os_str(), file("b.txt").as_os_str(), option, garrett])
+        .exits(0);
+    run(["convert".as_ref(), file("b.txt").as_os_str(), file("c.csv").as_os_str(), option, "SAE".as_ref()])
+        .exits(0);
+    run(["convert".as_ref(), file("c.csv").as_os_str(), file("d.json").as_os_str()]).exits(0);
+    let read = |name: &str| -> Value { serde_json::from_slice(&std::fs::read(file(name)).unwrap()).unwrap() };
+    let (first, last) = (read("a.json"), read("d.json"));
+    for (a, b) in lines(&first).iter().zip(lines(&last)) {
+        for key in ["flow_corrected_kg_s", "pressure_ratio", "eta"] {
+            for (p, q) in points(a).iter().zip(points(&b)) {
+                let (p, q) = (p[key].as_f64().unwrap(), q[key].as_f64().unwrap());
+                // Two changes of the state and back: some roundings.
+                assert!((p - q).abs() <= 1e-13 * p.abs(), "{key} {p} {q}");
+            }
+        }
+    }
+    // An existing file is never replaced.
+    run(["convert".as_ref(), file("a.json").as_os_str(), file("d.json").as_os_str()]).exits(1);
+}
+
+fn lines(map: &Value) -> Vec<Value> {
+    map["lines"].as_array().unwrap().clone()
+}
+
+fn points(line: &Value) -> Vec<Value> {
+    line["points"].as_array().unwrap().clone()
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn tables_for_simulation_programs_are_read_by_others_as_they_were_meant() {
+    let scratch = scratch();
+    let file = |name: &str| scratch.path().join(name);
+    convert(&sample(), &file("map.json"), "SAE");
+    let fitted = run([
+        "fit".as_ref(),
+        sample().as_os_str(),
+        "--reference".as_ref(),
+        "SAE".as_ref(),
+        "--no-leave-out".as_ref(),
+        "--json".as_ref(),
+    ])
+    .exits(0)
+    .json();
+    let names = ["m.modelica.txt", "m.npss.map", "m.py", "m.m"];
+    for name in names {
+        convert(&sample(), &file(name), "SAE");
+    }
+    // The middle of the table on a measured line, the surge end, and a place between two lines.
+    let speed = 84_871.571_4;
+    let pairs = [format!("{speed},0.5"), format!("{speed},1"), "95000,0.75".to_owned()];
+    let arguments = names.iter().map(|name| file(name).into_os_string());
+    let seen = python("read_map_tables.py", arguments.chain(pairs.iter().map(Into::into)));
+    let line = lines(&fitted["fitted"]).into_iter().find(|l| l["speed_corrected_rpm"] == speed).unwrap();
+    let surge = line["nodes"].as_array().unwrap().last().unwrap().clone();
+    for format in ["modelica", "npss", "pycycle", "simscape"] {
+        let values = &seen[format]["values"];
+        for (index, key) in ["flow_corrected_kg_s", "pressure_ratio", "eta"].iter().enumerate() {
+            let (theirs, ours) = (values[1][index].as_f64().unwrap(), surge[key].as_f64().unwrap());
+            assert!((theirs - ours).abs() < 1e-9, "{format} {key}: {theirs} {ours}");
+            // All four are the same table.
+            for pair in 0..3 {
+                let (a, b) = (&values[pair][index], &seen["modelica"]["values"][pair][index]);
+                assert!((a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-9, "{format} {key}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_map_differs_from_itself_nowhere() {
+    let scratch = scratch();
+    let picture = scratch.path().join("difference.svg");
+    let (map, option) = (sample(), OsStr::new("--reference"));
+    let arguments = [
+        "compare".as_ref(),
+        map.as_os_str(),
+        map.as_os_str(),
+        option,
+        "SAE".as_ref(),
+        "--second-reference".as_ref(),
+        "SAE".as_ref(),
+        "--json".as_ref(),
+        "--picture".as_ref(),
+        picture.as_os_str(),
+    ];
+    let result = run(arguments).exits(0).json();
+    assert_eq!([&result["line_differs_ratio"], &result["eta_differs_ratio"]], [0.0, 0.0]);
+    assert!(result["eta_rms"].as_f64().unwrap() < 1e-9);
+    assert_eq!(result["lines"].as_array().unwrap().len(), 13);
+    assert!(std::fs::read_to_string(picture).unwrap().starts_with("<svg"));
+}

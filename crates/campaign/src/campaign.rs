@@ -1,6 +1,6 @@
 //! A checked campaign, units resolved and defaults filled in.
 
-use mapper_core::{Channel, DeclaredUncertainty, Method, OperatingPoint, ReferenceState};
+use mapper_core::{Channel, DeclaredUncertainty, JointSettings, Method, OperatingPoint, ReferenceState};
 use mapper_physics::params::{BoundaryConditions, Params};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -125,6 +125,8 @@ pub struct Identification {
     pub alpha_area_ratio: f64,
     /// When a point counts as settled.
     pub stabilisation: Stabilisation,
+    /// Which refinements the joint method makes.
+    pub joint: JointSettings,
 }
 
 /// Part of each step that is used.

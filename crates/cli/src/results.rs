@@ -4,11 +4,12 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::table::{self, Display, number};
 use crate::test_report;
+use crate::thermal_text::thermal_text;
 use crate::{assembly_line, output, run_directory};
 use mapper_assemble::{Grouping, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{DisplayUnits, OutputFormat};
-use mapper_core::{IdentifiedPoint, Plan, Verdict};
+use mapper_core::{IdentifiedPoint, Plan, ThermalModel, Verdict};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_runner::RunEnd;
 use mapper_score::{ScoreSummary, ScoredPoint};
@@ -26,6 +27,8 @@ pub struct Results {
     map: BTreeMap<String, PathBuf>,
     points: Vec<ScoredPoint>,
     score: Option<ScoreSummary>,
+    /// What the points share (joint method).
+    thermal: Option<ThermalModel>,
     remarks: Vec<String>,
 }
 
@@ -42,8 +45,10 @@ pub fn make(
     let mut remarks: Vec<String> = read.warnings.iter().map(ToString::to_string).collect();
     let mut config = assembly_line::identification(campaign);
     config.method = campaign.identification.method;
-    let points = mapper_identify::identify(&read.recording, &config)
+    let identified = mapper_identify::identify_recording(&read.recording, &config)
         .map_err(|error| Failure::new(Code::BadRecording, error))?;
+    let thermal = identified.thermal;
+    let points: Vec<IdentifiedPoint> = identified.points.into_iter().filter_map(Result::ok).collect();
 
     let mut map = BTreeMap::new();
     let placed: Vec<IdentifiedPoint> = points.iter().filter(|point| has_place(point)).cloned().collect();
@@ -70,7 +75,9 @@ pub fn make(
     let score = mapper_score::summarise(&points);
     output::write_new(
         &directory.join(run_directory::POINTS),
-        (output::to_json(&json!({"reference": config.reference, "points": points}))? + "\n").as_bytes(),
+        (output::to_json(&json!({"reference": config.reference, "points": points, "thermal": thermal}))?
+            + "\n")
+            .as_bytes(),
     )?;
     let report = directory.join(run_directory::REPORT);
     let text =
@@ -83,6 +90,7 @@ pub fn make(
         map,
         points,
         score,
+        thermal,
         remarks,
     })
 }
@@ -101,6 +109,7 @@ impl Results {
             "map": self.map,
             "report": self.report,
             "score": self.score,
+            "thermal": self.thermal,
             "remarks": self.remarks,
         })
     }
@@ -108,6 +117,9 @@ impl Results {
     /// A table with what to know below it.
     pub fn text(&self, campaign: &Campaign) -> String {
         let mut text = points_text(&self.points, &campaign.display);
+        if let Some(thermal) = &self.thermal {
+            text.push_str(&thermal_text(thermal));
+        }
         for remark in &self.remarks {
             let _ = writeln!(text, "{remark}");
         }

@@ -15,6 +15,7 @@ mod clock;
 mod declared_uncertainty;
 mod event;
 mod identified;
+mod joint_settings;
 mod map;
 mod operating_point;
 mod plan;
@@ -32,6 +33,7 @@ pub use event::{Event, EventKind};
 pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
 };
+pub use joint_settings::{Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings};
 pub use map::{CompressorMap, MapPoint, SpeedLine};
 pub use operating_point::OperatingPoint;
 pub use plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};

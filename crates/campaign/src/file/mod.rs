@@ -10,8 +10,8 @@ mod machine;
 mod sensors;
 
 pub(crate) use choices::{
-    DisplayFile, FormatName, IdentificationFile, MethodName, NamedRepeats, OrderName, OutputsFile,
-    RepeatsFile, ReportFile, WindowFile,
+    ChoiceName, ConvectionName, DisplayFile, EfficiencyName, FormatName, IdentificationFile, JointFile,
+    MethodName, NamedRepeats, OrderName, OutputsFile, RepeatsFile, ReportFile, WindowFile,
 };
 pub(crate) use conditions::{BoundaryFile, LimitsFile, NamedReference, ReferenceFile, TimingFile};
 pub(crate) use grid::{GridFile, PointFile};

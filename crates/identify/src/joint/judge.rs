@@ -54,7 +54,8 @@ pub(crate) fn judge_step(
     let Some(member) = problem.members.get(index) else { return };
     let eta = member.local[ETA];
     if eta > 1.0 || eta < 0.05 {
-        let message = format!("the fitted efficiency is {eta:.3}: something that the model does not know is at work");
+        let message =
+            format!("the fitted efficiency is {eta:.3}: something that the model does not know is at work");
         findings.refuse(code::POOR_FIT, message);
     }
     let limits = &config.thresholds;
@@ -76,12 +77,16 @@ pub(crate) fn judge_step(
         findings.doubt(code::POOR_FIT, message);
     }
     if !member.shares {
-        let message = "this step fits so much worse than the others that it has no say in what they share".to_owned();
+        let message =
+            "this step fits so much worse than the others that it has no say in what they share".to_owned();
         findings.doubt(code::LEFT_OUT, message);
     }
     let deviation = member.local[LN_DEVIATION];
-    if problem.setting.with_law && deviation.abs() > LAW_SCATTER_RATIO.max(3.0 * member.priors[LN_DEVIATION].sigma) {
-        let message = format!("h lies {:+.1} % off the law that the other points follow", 100.0 * deviation.exp_m1());
+    if problem.setting.with_law
+        && deviation.abs() > LAW_SCATTER_RATIO.max(3.0 * member.priors[LN_DEVIATION].sigma)
+    {
+        let message =
+            format!("h lies {:+.1} % off the law that the other points follow", 100.0 * deviation.exp_m1());
         findings.doubt(code::OFF_THE_LAW, message);
     }
     let _ = step;
@@ -90,8 +95,12 @@ pub(crate) fn judge_step(
 /// What speaks against the model as a whole, one sentence each.
 pub(crate) fn doubts(problem: &Problem<'_>, covariance: &Covariance, config: &IdentifyConfig) -> Vec<String> {
     let mut doubts = Vec::new();
-    let squares: Vec<f64> =
-        problem.members.iter().filter(|member| member.shares).map(|member| mean_square(problem, member)).collect();
+    let squares: Vec<f64> = problem
+        .members
+        .iter()
+        .filter(|member| member.shares)
+        .map(|member| mean_square(problem, member))
+        .collect();
     let overall = mean(&squares).unwrap_or(0.0);
     if !config.declared.is_empty() && overall > MODEL_SQUARE {
         doubts.push(format!(
@@ -107,7 +116,8 @@ pub(crate) fn doubts(problem: &Problem<'_>, covariance: &Covariance, config: &Id
             doubts.push(format!("alpha_A comes out as {alpha:.3} +/- {:.3}, outside 0 to 1", 1.96 * sigma));
         }
     }
-    let deviations: Vec<f64> = problem.members.iter().map(|member| member.local[LN_DEVIATION].powi(2)).collect();
+    let deviations: Vec<f64> =
+        problem.members.iter().map(|member| member.local[LN_DEVIATION].powi(2)).collect();
     let scatter = mean(&deviations).unwrap_or(0.0).sqrt();
     if problem.setting.with_law && scatter > LAW_SCATTER_RATIO {
         doubts.push(format!("the points scatter by {:.1} % about the convection law", 100.0 * scatter));

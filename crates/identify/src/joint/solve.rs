@@ -92,10 +92,20 @@ impl Problem<'_> {
     }
 
     /// Whitened residuals of a step (measured less predicted), and derivatives of the prediction.
-    pub(crate) fn residual(&self, member: &Member<'_>, shared: &SharedVector, local: &LocalVector, derivatives: bool) -> (Vec<f64>, Vec<Vec<f64>>) {
+    pub(crate) fn residual(
+        &self,
+        member: &Member<'_>,
+        shared: &SharedVector,
+        local: &LocalVector,
+        derivatives: bool,
+    ) -> (Vec<f64>, Vec<Vec<f64>>) {
         let prediction = self.setting.predict(&member.course, shared, local, &self.active, derivatives);
-        let mut residual: Vec<f64> =
-            member.measured_k.iter().zip(&prediction.t2_k).map(|(measured, predicted)| measured - predicted).collect();
+        let mut residual: Vec<f64> = member
+            .measured_k
+            .iter()
+            .zip(&prediction.t2_k)
+            .map(|(measured, predicted)| measured - predicted)
+            .collect();
         member.whitening.apply(&mut residual);
         let mut columns = prediction.columns;
         for column in &mut columns {
@@ -117,8 +127,11 @@ impl Problem<'_> {
     }
 
     fn shared_cost(&self, shared: &SharedVector) -> f64 {
-        let priors: f64 =
-            self.fitted().iter().map(|i| self.priors[*i].weight() * (shared[*i] - self.priors[*i].mean).powi(2)).sum();
+        let priors: f64 = self
+            .fitted()
+            .iter()
+            .map(|i| self.priors[*i].weight() * (shared[*i] - self.priors[*i].mean).powi(2))
+            .sum();
         priors - self.explained.at(shared[PROBE_MM2]).0
     }
 
@@ -160,13 +173,15 @@ impl Problem<'_> {
                     block.right[i] += prior.weight() * (prior.mean - member.local[i]);
                 }
             }
-            let off = member.local[ETA] - dot(&member.end_terms, crate::joint::model::surface_of(&self.shared));
+            let off =
+                member.local[ETA] - dot(&member.end_terms, crate::joint::model::surface_of(&self.shared));
             block.own[(ETA, ETA)] += surface_weight;
             block.right[ETA] -= surface_weight * off;
             if member.shares {
                 normal.cost += residual.iter().map(|r| r * r).sum::<f64>() + off * off * surface_weight;
                 for i in (0..LOCAL).filter(|i| *i != ETA) {
-                    normal.cost += member.priors[i].weight() * (member.local[i] - member.priors[i].mean).powi(2);
+                    normal.cost +=
+                        member.priors[i].weight() * (member.local[i] - member.priors[i].mean).powi(2);
                 }
             }
             for (a, index) in fitted.iter().enumerate() {
@@ -182,8 +197,8 @@ impl Problem<'_> {
                 }
                 normal.right[a] += product(&columns[*index], &residual) + surface_weight * off * term(*index);
                 for (b, other) in fitted.iter().enumerate().skip(a) {
-                    let value =
-                        product(&columns[*index], &columns[*other]) + surface_weight * term(*index) * term(*other);
+                    let value = product(&columns[*index], &columns[*other])
+                        + surface_weight * term(*index) * term(*other);
                     normal.shared[(a, b)] += value;
                     if a != b {
                         normal.shared[(b, a)] += value;
@@ -228,7 +243,8 @@ impl Problem<'_> {
 
     fn cost(&self, shared: &SharedVector, locals: &[LocalVector]) -> f64 {
         let members = self.members.iter().zip(locals).filter(|(member, _)| member.shares);
-        self.shared_cost(shared) + members.map(|(member, local)| self.local_cost(member, shared, local)).sum::<f64>()
+        self.shared_cost(shared)
+            + members.map(|(member, local)| self.local_cost(member, shared, local)).sum::<f64>()
     }
 
     /// Finds the minimum from where the parameters stand; `None` where it comes to no finite end.

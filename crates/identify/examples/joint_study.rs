@@ -70,7 +70,7 @@ fn main() {
                 format!("{:?}±{:.5}", v.value, v.uncertainty.combined_standard_error())
             };
             println!(
-                "[] law {:?} alpha {} probe {} f {} doubts {:?} offsets {:?}",
+                "[] law {:?} alpha {} probe {} f {} doubts {:?} offsets {:.3?}",
                 t.convection.map(|c| (
                     c.exponent.value,
                     c.exponent.uncertainty.combined_standard_error(),

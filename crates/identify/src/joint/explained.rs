@@ -19,8 +19,8 @@ use rand_pcg::Pcg64;
 
 /// Diameters at which it is worked out, mm; between them the square counts.
 const DIAMETERS_MM: [f64; 10] = [0.0, 0.25, 0.5, 0.8, 1.2, 1.7, 2.3, 3.2, 4.5, 7.0];
-/// Draws of noise for each step: the scatter of their mean adds a thirtieth to that of the recording's own noise.
-const DRAWS: usize = 30;
+/// Draws of noise for each step: the scatter of their mean adds a twelfth to that of the recording's own noise.
+const DRAWS: usize = 12;
 
 /// Expected sum of squares over the squares of diameters.
 #[derive(Debug, Clone, Default)]

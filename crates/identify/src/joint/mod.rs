@@ -9,6 +9,7 @@ pub(crate) mod cleaning;
 pub(crate) mod explained;
 pub(crate) mod judge;
 pub(crate) mod model;
+pub(crate) mod parsimony;
 pub(crate) mod parameters;
 pub(crate) mod probe;
 pub(crate) mod rows;
@@ -137,6 +138,7 @@ fn fitted(
         problem.active[PROBE_MM2] = problem.probe_fitted;
     }
     problem.minimise()?;
+    parsimony::settle(problem)?;
     problem.covariance()
 }
 

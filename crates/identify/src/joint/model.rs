@@ -145,6 +145,17 @@ impl Setting {
         ]
     }
 
+    /// Derivative of T2 at a step's end by the efficiency, K.
+    pub(crate) fn by_efficiency(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> f64 {
+        let at = |eta: f64| {
+            let mut moved = *local;
+            moved[ETA] = eta;
+            let gas = self.gas(end, &[0.0; TERM_COUNT], shared, &moved);
+            self.t2_k(&gas, self.h(&gas, shared, moved[LN_DEVIATION]), shared[ALPHA], shared[LN_DIRECTION])
+        };
+        (at(local[ETA] + STEP_RATIO) - at(local[ETA] - STEP_RATIO)) / (2.0 * STEP_RATIO)
+    }
+
     /// Readings of T2, with derivatives by the parameters in `active` and those of the step where `derivatives` asks.
     pub(crate) fn predict(
         &self,

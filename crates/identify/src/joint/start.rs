@@ -12,7 +12,7 @@ use crate::joint::parameters::{
 };
 use crate::joint::rows::{StepRows, condensed};
 use crate::joint::solve::{Member, Problem};
-use crate::joint::surface::{SurfaceScale, TERM_COUNT, dot};
+use crate::joint::surface::{SurfaceScale, TERM_COUNT};
 use crate::joint::whitening::Whitening;
 use crate::samples::Samples;
 use crate::{IdentifyConfig, jump};
@@ -162,7 +162,7 @@ pub(crate) fn problem<'a>(
                 course: Course { rows: &step.rows, terms },
                 measured_k: step.rows.iter().map(|row| row.t2_k).collect(),
                 whitening: whitening(step, config, UNDECLARED_NOISE_K, UNDECLARED_NOISE_K),
-                end_terms,
+                coupling: std::array::from_fn(|i| i.checked_sub(SURFACE).map_or(0.0, |k| end_terms[k])),
                 local,
                 priors: own,
                 shares: true,
@@ -219,6 +219,11 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
                 member.measured_k.iter().zip(&prediction.t2_k).skip(1).map(|(a, b)| (a - b).powi(2)).sum();
             (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(3e-4)
         };
+        let by_eta = problem.setting.by_efficiency(&steps[i].end, &problem.shared, &member.local);
+        let coupled: Vec<f64> = slopes.iter().take(OFFSET_CHANNELS.len()).map(|slope| -slope / by_eta).collect();
+        if problem.setting.shaped && coupled.iter().all(|x| x.is_finite()) {
+            problem.members[i].coupling[OFFSETS..FLOW_GAIN].copy_from_slice(&coupled);
+        }
         let white_sigma_k = if expected > 0.0 { declared[1].max(0.1 * sigma_k) } else { sigma_k };
         problem.members[i].whitening = whitening(&steps[i], config, sigma_k, white_sigma_k);
     }
@@ -226,8 +231,7 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
     let n = (problem.members.len() as f64).max(1.0);
     let (mut off_surface, mut off_law) = (0.0, 0.0);
     for member in &problem.members {
-        let off =
-            member.local[ETA] - dot(&member.end_terms, crate::joint::model::surface_of(&problem.shared));
+        let off = member.off_surface(&problem.shared, &member.local);
         off_surface += off * off / n;
         off_law += member.local[LN_DEVIATION].powi(2) / n;
     }

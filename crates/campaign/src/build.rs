@@ -7,14 +7,17 @@ use crate::campaign::{
 };
 use crate::consistency::{beside, rounded};
 use crate::file::{
-    BoundaryFile, CampaignFile, DisplayFile, FollowerName, FormatName, GeometryFile, GridFile,
-    IdentificationFile, LimitsFile, MachineFile, MapFile, MethodName, NamedReference, NamedRepeats,
-    NusseltFile, OrderName, OutputsFile, PointFile, ReferenceFile, RepeatedJumpFile, RepeatsFile, ReportFile,
-    SensorsFile, TapName, TimingFile, TolerancesFile, WindowFile,
+    BoundaryFile, CampaignFile, ChoiceName, ConvectionName, DisplayFile, EfficiencyName, FollowerName,
+    FormatName, GeometryFile, GridFile, IdentificationFile, JointFile, LimitsFile, MachineFile, MapFile,
+    MethodName, NamedReference, NamedRepeats, NusseltFile, OrderName, OutputsFile, PointFile, ReferenceFile,
+    RepeatedJumpFile, RepeatsFile, ReportFile, SensorsFile, TapName, TimingFile, TolerancesFile, WindowFile,
 };
 use crate::tree::{Step, steps};
 use crate::units::{Dimension, Fraction, Quantity};
-use mapper_core::{Channel, DeclaredUncertainty, Method, ModelTolerances, OperatingPoint, ReferenceState};
+use mapper_core::{
+    Channel, Choice, ConvectionWithinStep, DeclaredUncertainty, EfficiencyWithinStep, JointSettings, Method,
+    ModelTolerances, OperatingPoint, ReferenceState,
+};
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::params::{BoundaryConditions, Params};
 use std::collections::{BTreeMap, HashSet};
@@ -315,6 +318,7 @@ fn identification(file: &IdentificationFile, alpha_area_ratio: f64) -> Identific
     Identification {
         method: match file.method {
             Some(MethodName::Steady) => Method::Steady,
+            Some(MethodName::Joint) => Method::Joint,
             Some(MethodName::Dynamic) | None => Method::Dynamic,
         },
         window: match file.window {
@@ -325,6 +329,28 @@ fn identification(file: &IdentificationFile, alpha_area_ratio: f64) -> Identific
         },
         alpha_area_ratio: file.alpha_area.unwrap_or(alpha_area_ratio),
         stabilisation,
+        joint: joint(file.joint.unwrap_or_default()),
+    }
+}
+
+fn joint(file: JointFile) -> JointSettings {
+    let choice = |name: Option<ChoiceName>| match name {
+        Some(ChoiceName::Fixed) => Choice::Fixed,
+        Some(ChoiceName::Fitted) | None => Choice::Fitted,
+    };
+    JointSettings {
+        alpha_area: choice(file.alpha_area),
+        probe: choice(file.probe),
+        direction: choice(file.direction),
+        offsets: choice(file.offsets),
+        efficiency: match file.efficiency {
+            Some(EfficiencyName::Constant) => EfficiencyWithinStep::Constant,
+            Some(EfficiencyName::Shaped) | None => EfficiencyWithinStep::Shaped,
+        },
+        h: match file.h {
+            Some(ConvectionName::Constant) => ConvectionWithinStep::Constant,
+            Some(ConvectionName::Law) | None => ConvectionWithinStep::Law,
+        },
     }
 }
 

@@ -1,6 +1,8 @@
 //! A checked campaign, units resolved and defaults filled in.
 
-use mapper_core::{Channel, DeclaredUncertainty, Method, ModelTolerances, OperatingPoint, ReferenceState};
+use mapper_core::{
+    Channel, DeclaredUncertainty, JointSettings, Method, ModelTolerances, OperatingPoint, ReferenceState,
+};
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::params::{BoundaryConditions, Params};
 use serde::Serialize;
@@ -130,6 +132,8 @@ pub struct Identification {
     pub alpha_area_ratio: f64,
     /// When a point counts as settled.
     pub stabilisation: Stabilisation,
+    /// Which refinements the joint method makes.
+    pub joint: JointSettings,
 }
 
 /// Part of each step that is used.

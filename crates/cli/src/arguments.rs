@@ -250,6 +250,8 @@ pub enum MethodArgument {
     Steady,
     /// Efficiency and heat-transfer coefficient from the transient (Burke et al.)
     Dynamic,
+    /// All points together: what they share is fitted over all of them
+    Joint,
 }
 
 impl From<MethodArgument> for Method {
@@ -257,6 +259,7 @@ impl From<MethodArgument> for Method {
         match argument {
             MethodArgument::Steady => Method::Steady,
             MethodArgument::Dynamic => Method::Dynamic,
+            MethodArgument::Joint => Method::Joint,
         }
     }
 }

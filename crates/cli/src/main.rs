@@ -23,6 +23,7 @@ mod run_directory;
 mod sequence_run;
 mod table;
 mod test_report;
+mod thermal_text;
 
 use clap::Parser;
 use std::process::ExitCode;

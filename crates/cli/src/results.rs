@@ -5,11 +5,12 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::table::{self, Display, number};
 use crate::test_report;
+use crate::thermal_text::thermal_text;
 use crate::{assembly_line, output, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{CompressorMap, IdentifiedPoint, Plan, StepKind, Verdict};
+use mapper_core::{CompressorMap, IdentifiedPoint, Plan, StepKind, ThermalModel, Verdict};
 use mapper_exporters::ExportError;
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_score::{ScoreSummary, ScoredPoint};
@@ -28,6 +29,8 @@ pub struct Results {
     points: Vec<ScoredPoint>,
     score: Option<ScoreSummary>,
     repeats: Vec<RepeatedJump>,
+    /// What the points share (joint method).
+    thermal: Option<ThermalModel>,
     remarks: Vec<String>,
 }
 
@@ -44,8 +47,10 @@ pub fn make(
     let mut remarks: Vec<String> = read.warnings.iter().map(ToString::to_string).collect();
     let mut config = assembly_line::identification(campaign);
     config.method = campaign.identification.method;
-    let points = mapper_identify::identify(&read.recording, &config)
+    let identified = mapper_identify::identify_recording(&read.recording, &config)
         .map_err(|error| Failure::new(Code::BadRecording, error))?;
+    let thermal = identified.thermal;
+    let points: Vec<IdentifiedPoint> = identified.points.into_iter().filter_map(Result::ok).collect();
 
     let mut map = BTreeMap::new();
     let placed: Vec<IdentifiedPoint> = points.iter().filter(|point| has_place(point)).cloned().collect();
@@ -76,7 +81,9 @@ pub fn make(
     let score = mapper_score::summarise(&points);
     output::write_new(
         &directory.join(run_directory::POINTS),
-        (output::to_json(&json!({"reference": config.reference, "points": points}))? + "\n").as_bytes(),
+        (output::to_json(&json!({"reference": config.reference, "points": points, "thermal": thermal}))?
+            + "\n")
+            .as_bytes(),
     )?;
     let report = directory.join(run_directory::REPORT);
     let repeats = drift::repeated_jumps(&read.recording.steps, &points);
@@ -99,6 +106,7 @@ pub fn make(
         points,
         score,
         repeats,
+        thermal,
         remarks,
     })
 }
@@ -129,6 +137,7 @@ impl Results {
             "report": self.report,
             "score": self.score,
             "repeats": self.repeats,
+            "thermal": self.thermal,
             "remarks": self.remarks,
         })
     }
@@ -137,6 +146,9 @@ impl Results {
     pub fn text(&self, campaign: &Campaign) -> String {
         let mut text = points_text(&self.points, &campaign.display);
         text.push_str(&drift::sentences(&self.repeats, &Display::new(&campaign.display)));
+        if let Some(thermal) = &self.thermal {
+            text.push_str(&thermal_text(thermal));
+        }
         for remark in &self.remarks {
             let _ = writeln!(text, "{remark}");
         }

@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::registry::{BackendContext, make_backend};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{BackendChoice, Order, SequenceSource, WindowChoice};
-use mapper_core::{Plan, PlanStep, Recording, SampleBatch, StepMarker, UnpacedClock};
+use mapper_core::{Method, Plan, PlanStep, Recording, SampleBatch, StepMarker, UnpacedClock};
 use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_physics::model::Model;
 use mapper_runner::{RunEnd, RunError, RunObserver, Runner, StepSource, StepSourceError};
@@ -41,7 +41,8 @@ impl ScriptedSteps {
             .map_err(|error| Failure::new(Code::Failure, error))?;
         Ok(ScriptedSteps {
             script,
-            config: assembly_line::identification(campaign),
+            // A script sees a step at once, the joint method all of them at the end.
+            config: single_steps(assembly_line::identification(campaign)),
             warm_up_s: campaign.timing.warm_up_s,
             cool_down_s: campaign.timing.cool_down_s,
             recent: Recording::default(),
@@ -125,6 +126,14 @@ impl StepSource for ScriptedSteps {
     fn take_notes(&mut self) -> Vec<String> {
         self.script.take_notes()
     }
+}
+
+fn single_steps(config: IdentifyConfig) -> IdentifyConfig {
+    let method = match config.method {
+        Method::Joint => Method::Dynamic,
+        method => method,
+    };
+    IdentifyConfig { method, ..config }
 }
 
 fn source_error(error: impl std::error::Error + Send + Sync + 'static) -> StepSourceError {

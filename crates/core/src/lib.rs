@@ -16,6 +16,7 @@ mod declared_uncertainty;
 mod event;
 mod fitted_map;
 mod identified;
+mod joint_settings;
 mod map;
 mod model_tolerances;
 mod operating_point;
@@ -35,6 +36,7 @@ pub use fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
 pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
 };
+pub use joint_settings::{Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings};
 pub use map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
 pub use model_tolerances::ModelTolerances;
 pub use operating_point::OperatingPoint;

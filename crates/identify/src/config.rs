@@ -1,7 +1,6 @@
 //! What identification is told: method, window, geometry, declared uncertainty, thresholds.
 
-use crate::joint::settings::JointSettings;
-use mapper_core::{Channel, Method, ReferenceState};
+use mapper_core::{Channel, JointSettings, Method, ReferenceState};
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -4,7 +4,10 @@ use crate::dynamic::Estimate;
 use crate::end_state::{EndState, end_state};
 use crate::findings::Findings;
 use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, WindowRule, dynamic, joint, steady};
-use mapper_core::{Channel, EstimateUncertainty, IdentifiedPoint, Method, Recording, StepMarker, ThermalModel, confidence_interval_95};
+use mapper_core::{
+    Channel, EstimateUncertainty, IdentifiedPoint, Method, Recording, StepMarker, ThermalModel,
+    confidence_interval_95,
+};
 
 /// Identifies every step of a recording, in order. Steps of which not even the place on the map is known are left
 /// out; [`identify_each`] says which and why.
@@ -46,7 +49,10 @@ pub struct Identified {
 ///
 /// # Errors
 /// As [`identify`].
-pub fn identify_recording(recording: &Recording, config: &IdentifyConfig) -> Result<Identified, IdentifyError> {
+pub fn identify_recording(
+    recording: &Recording,
+    config: &IdentifyConfig,
+) -> Result<Identified, IdentifyError> {
     check(config)?;
     let mut needed = vec![
         Channel::ShaftSpeed,
@@ -82,7 +88,8 @@ pub fn identify_recording(recording: &Recording, config: &IdentifyConfig) -> Res
     let mut thermal = None;
     let estimates: Vec<Estimate> = match config.method {
         Method::Joint => {
-            let known: Vec<Option<EndState>> = states.iter().map(|state| state.as_ref().ok().copied()).collect();
+            let known: Vec<Option<EndState>> =
+                states.iter().map(|state| state.as_ref().ok().copied()).collect();
             let joint = joint::estimate(recording, &known, config, &mut findings);
             thermal = joint.thermal;
             joint.estimates

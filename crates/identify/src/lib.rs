@@ -31,6 +31,6 @@ pub use config::{
 pub use error::{IdentifyError, StepError};
 pub use expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use findings::code;
-pub use joint::settings::{Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings};
-pub use joint::surface::EfficiencySurface;
 pub use identify::{Identified, identify, identify_each, identify_recording};
+pub use joint::surface::EfficiencySurface;
+pub use mapper_core::{Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings};

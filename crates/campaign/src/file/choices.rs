@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct IdentificationFile {
-    /// `dynamic`, the default, finds both from the transient; `steady` is conventional mapping.
+    /// `dynamic`, the default, finds both from the transient; `joint` fits all points together; `steady` is conventional mapping.
     pub method: Option<MethodName>,
     /// Part of the step that is used: `auto`, the default, begins when speed, flow and pressure ratio have settled; or `start` and `end` after the jump.
     #[schemars(example = &"auto")]
@@ -21,12 +21,54 @@ pub(crate) struct IdentificationFile {
     pub alpha_area: Option<f64>,
     /// Drifts within which a point counts as settled.
     pub stabilisation: Option<StabilisationFile>,
+    /// What `joint` finds and what it takes as declared; everything is found where nothing is said.
+    pub joint: Option<JointFile>,
+}
+
+/// Refinements of the joint method. With every one switched off it is the dynamic method.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct JointFile {
+    /// Share of the internal area before compression.
+    pub alpha_area: Option<ChoiceName>,
+    /// Diameter of the T2 probe; `fixed` takes that of `sensors.T2.probe_diameter`.
+    pub probe: Option<ChoiceName>,
+    /// Factor on the heat-transfer coefficient where the metal is hotter than the gas; 1 where `fixed`.
+    pub direction: Option<ChoiceName>,
+    /// Offsets of the sensors, with their declared uncertainty as prior.
+    pub offsets: Option<ChoiceName>,
+    /// Efficiency within a step: `constant`, or as a surface through all points has it.
+    pub efficiency: Option<EfficiencyName>,
+    /// Heat-transfer coefficient within a step: `constant`, or by a law that all points share.
+    pub h: Option<ConvectionName>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum ChoiceName {
+    Fixed,
+    Fitted,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum EfficiencyName {
+    Constant,
+    Shaped,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum ConvectionName {
+    Constant,
+    Law,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum MethodName {
     Dynamic,
+    Joint,
     Steady,
 }
 

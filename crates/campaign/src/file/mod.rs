@@ -11,8 +11,8 @@ mod sensors;
 mod tolerances;
 
 pub(crate) use choices::{
-    DisplayFile, FormatName, IdentificationFile, MethodName, NamedRepeats, OrderName, OutputsFile,
-    RepeatedJumpFile, RepeatsFile, ReportFile, WindowFile,
+    ChoiceName, ConvectionName, DisplayFile, EfficiencyName, FormatName, IdentificationFile, JointFile,
+    MethodName, NamedRepeats, OrderName, OutputsFile, RepeatedJumpFile, RepeatsFile, ReportFile, WindowFile,
 };
 pub(crate) use conditions::{
     BoundaryFile, FollowerName, LimitsFile, NamedReference, ReferenceFile, TimingFile,

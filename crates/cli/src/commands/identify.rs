@@ -4,6 +4,7 @@ use crate::arguments::IdentifyArguments;
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::results;
+use crate::thermal_text;
 use crate::{assembly_line, output, run_directory};
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::ReferenceState;
@@ -24,19 +25,25 @@ pub fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
     if let Some(method) = arguments.method {
         config.method = method.into();
     }
-    let points = mapper_identify::identify(&report.recording, &config)
+    let identified = mapper_identify::identify_recording(&report.recording, &config)
         .map_err(|error| Failure::new(Code::BadRecording, error))?;
+    let thermal = identified.thermal;
+    let points = identified.points.into_iter().filter_map(Result::ok).collect();
     let points = mapper_score::score(&path, &report.recording.steps, points).map_err(bad_recording)?;
     if arguments.json {
         return output::print_json(&json!({
             "recording": path,
             "reference": config.reference,
             "points": points,
+            "thermal": thermal,
             "score": mapper_score::summarise(&points),
             "recording_warnings": report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
         }));
     }
     let mut text = results::points_text(&points, &display);
+    if let Some(thermal) = &thermal {
+        text.push_str(&thermal_text::thermal_text(thermal));
+    }
     for warning in &report.warnings {
         text.push_str(&format!("recording: {warning}\n"));
     }

@@ -41,7 +41,11 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
         if let (Some(first), Some(last)) = (stuck.first(), stuck.last()) {
             let message = format!(
                 "{channel} shows one and the same value for {:.0} s though noise is declared: these samples are left out",
-                samples.t_s.get(*last).zip(samples.t_s.get(*first)).map_or(0.0, |(last_s, first_s)| last_s - first_s)
+                samples
+                    .t_s
+                    .get(*last)
+                    .zip(samples.t_s.get(*first))
+                    .map_or(0.0, |(last_s, first_s)| last_s - first_s)
             );
             findings.doubt(code::STUCK, message);
         }

@@ -6,12 +6,12 @@
 //! least squares, e.g. Carroll et al., Measurement Error in Nonlinear Models, ch. 7). It is found by sending noise of the
 //! declared kind the same way: smoothing, model, probe, whitening.
 
+use crate::IdentifyConfig;
 use crate::joint::model::Setting;
 use crate::joint::parameters::{PROBE_MM2, SHARED, SharedVector};
 use crate::joint::rows::StepRows;
 use crate::joint::smoothing::Smoother;
 use crate::joint::solve::Problem;
-use crate::IdentifyConfig;
 use mapper_core::Channel;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -19,8 +19,8 @@ use rand_pcg::Pcg64;
 
 /// Diameters at which it is worked out, mm; between them the square counts.
 const DIAMETERS_MM: [f64; 10] = [0.0, 0.25, 0.5, 0.8, 1.2, 1.7, 2.3, 3.2, 4.5, 7.0];
-/// Draws of noise for each step: the scatter of their mean adds a thirtieth to that of the recording's own noise.
-const DRAWS: usize = 30;
+/// Draws of noise for each step: the scatter of their mean adds a twelfth to that of the recording's own noise.
+const DRAWS: usize = 12;
 
 /// Expected sum of squares over the squares of diameters.
 #[derive(Debug, Clone, Default)]
@@ -52,7 +52,9 @@ impl Explained {
 
     /// Value and slope at the square of a diameter, mm2.
     pub(crate) fn at(&self, square_mm2: f64) -> (f64, f64) {
-        let (Some(first), Some(last)) = (self.squares_mm2.first(), self.squares_mm2.last()) else { return (0.0, 0.0) };
+        let (Some(first), Some(last)) = (self.squares_mm2.first(), self.squares_mm2.last()) else {
+            return (0.0, 0.0);
+        };
         let x = square_mm2.clamp(*first, *last);
         let i = self.squares_mm2.partition_point(|knot| *knot <= x).clamp(1, self.squares_mm2.len() - 1);
         let width = self.squares_mm2[i] - self.squares_mm2[i - 1];
@@ -91,7 +93,8 @@ pub(crate) fn explained(problem: &Problem<'_>, steps: &[StepRows], config: &Iden
         let slopes = problem.setting.sensitivities(&step.end, &problem.shared, &member.local);
         let sigma_k = noisy.iter().map(|(index, sigma)| (slopes[*index] * sigma).powi(2)).sum::<f64>().sqrt();
         let gas_k: Vec<f64> = ideal_gas(&problem.setting, member, &problem.shared);
-        let lags: Vec<_> = squares_mm2.iter().map(|square| problem.setting.lags(rows, &gas_k, *square)).collect();
+        let lags: Vec<_> =
+            squares_mm2.iter().map(|square| problem.setting.lags(rows, &gas_k, *square)).collect();
         for _ in 0..DRAWS {
             let noise = smoother.apply(&draw(&t_s, rows, config, sigma_k, &mut rng));
             for (sum, lags) in sums.iter_mut().zip(&lags) {

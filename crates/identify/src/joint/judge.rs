@@ -2,7 +2,7 @@
 
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
-use crate::joint::parameters::{ALPHA, ETA, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION};
+use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Member, Problem};
 use crate::samples::mean;
@@ -15,6 +15,12 @@ const EXCLUDE_SQUARE: f64 = 4.0;
 const MODEL_SQUARE: f64 = 1.4;
 /// Scatter of the points about the convection law above which it is no law, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;
+/// Standard errors by which a number must lie outside its range to count against the model.
+const OUTSIDE_SIGMAS: f64 = 2.0;
+/// Exponents of the Reynolds number that pipe-like flow may have: 0.33 is laminar, 0.8 turbulent, and Burke et al. have 1.13.
+const EXPONENT_RANGE: (f64, f64) = (0.5, 1.5);
+/// Largest tip of a probe that anyone would put into a compressor's outlet, mm.
+const LARGEST_PROBE_MM: f64 = 4.0;
 /// Standard errors by which rising and falling steps may differ.
 const SPLIT_SIGMAS: f64 = 4.0;
 
@@ -54,7 +60,8 @@ pub(crate) fn judge_step(
     let Some(member) = problem.members.get(index) else { return };
     let eta = member.local[ETA];
     if eta > 1.0 || eta < 0.05 {
-        let message = format!("the fitted efficiency is {eta:.3}: something that the model does not know is at work");
+        let message =
+            format!("the fitted efficiency is {eta:.3}: something that the model does not know is at work");
         findings.refuse(code::POOR_FIT, message);
     }
     let limits = &config.thresholds;
@@ -76,12 +83,16 @@ pub(crate) fn judge_step(
         findings.doubt(code::POOR_FIT, message);
     }
     if !member.shares {
-        let message = "this step fits so much worse than the others that it has no say in what they share".to_owned();
+        let message =
+            "this step fits so much worse than the others that it has no say in what they share".to_owned();
         findings.doubt(code::LEFT_OUT, message);
     }
     let deviation = member.local[LN_DEVIATION];
-    if problem.setting.with_law && deviation.abs() > LAW_SCATTER_RATIO.max(3.0 * member.priors[LN_DEVIATION].sigma) {
-        let message = format!("h lies {:+.1} % off the law that the other points follow", 100.0 * deviation.exp_m1());
+    if problem.setting.with_law
+        && deviation.abs() > LAW_SCATTER_RATIO.max(3.0 * member.priors[LN_DEVIATION].sigma)
+    {
+        let message =
+            format!("h lies {:+.1} % off the law that the other points follow", 100.0 * deviation.exp_m1());
         findings.doubt(code::OFF_THE_LAW, message);
     }
     let _ = step;
@@ -90,8 +101,12 @@ pub(crate) fn judge_step(
 /// What speaks against the model as a whole, one sentence each.
 pub(crate) fn doubts(problem: &Problem<'_>, covariance: &Covariance, config: &IdentifyConfig) -> Vec<String> {
     let mut doubts = Vec::new();
-    let squares: Vec<f64> =
-        problem.members.iter().filter(|member| member.shares).map(|member| mean_square(problem, member)).collect();
+    let squares: Vec<f64> = problem
+        .members
+        .iter()
+        .filter(|member| member.shares)
+        .map(|member| mean_square(problem, member))
+        .collect();
     let overall = mean(&squares).unwrap_or(0.0);
     if !config.declared.is_empty() && overall > MODEL_SQUARE {
         doubts.push(format!(
@@ -103,11 +118,31 @@ pub(crate) fn doubts(problem: &Problem<'_>, covariance: &Covariance, config: &Id
     if let Some(sigma) = error(ALPHA) {
         let alpha = problem.shared[ALPHA];
         let outside = (-alpha).max(alpha - 1.0);
-        if outside > 3.0 * sigma {
+        if outside > OUTSIDE_SIGMAS * sigma {
             doubts.push(format!("alpha_A comes out as {alpha:.3} +/- {:.3}, outside 0 to 1", 1.96 * sigma));
         }
     }
-    let deviations: Vec<f64> = problem.members.iter().map(|member| member.local[LN_DEVIATION].powi(2)).collect();
+    if let Some(sigma) = error(EXPONENT) {
+        let exponent = problem.shared[EXPONENT];
+        let outside = (EXPONENT_RANGE.0 - exponent).max(exponent - EXPONENT_RANGE.1);
+        if outside > OUTSIDE_SIGMAS * sigma {
+            doubts.push(format!(
+                "the convection law's exponent comes out as {exponent:.2} +/- {:.2}, which no flow in a housing has",
+                1.96 * sigma
+            ));
+        }
+    }
+    if let Some(sigma) = error(PROBE_MM2) {
+        let square = problem.shared[PROBE_MM2];
+        if square - OUTSIDE_SIGMAS * sigma > LARGEST_PROBE_MM * LARGEST_PROBE_MM {
+            doubts.push(format!(
+                "T2 lags as behind a probe of {:.1} mm, which no outlet has: something else delays it",
+                square.sqrt()
+            ));
+        }
+    }
+    let deviations: Vec<f64> =
+        problem.members.iter().map(|member| member.local[LN_DEVIATION].powi(2)).collect();
     let scatter = mean(&deviations).unwrap_or(0.0).sqrt();
     if problem.setting.with_law && scatter > LAW_SCATTER_RATIO {
         doubts.push(format!("the points scatter by {:.1} % about the convection law", 100.0 * scatter));

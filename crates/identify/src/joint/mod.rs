@@ -10,9 +10,9 @@ pub(crate) mod explained;
 pub(crate) mod judge;
 pub(crate) mod model;
 pub(crate) mod parameters;
+pub(crate) mod parsimony;
 pub(crate) mod probe;
 pub(crate) mod rows;
-pub(crate) mod settings;
 pub(crate) mod shared;
 pub(crate) mod smoothing;
 pub(crate) mod solve;
@@ -23,11 +23,13 @@ pub(crate) mod whitening;
 use crate::dynamic::{self, Estimate};
 use crate::end_state::EndState;
 use crate::findings::{Findings, code};
-use crate::joint::parameters::{ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, PROBE_MM2, SHARED, SURFACE};
+use crate::joint::parameters::{
+    ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, PROBE_MM2, SHARED, SURFACE,
+};
 use crate::joint::solve::{Covariance, Problem};
 use crate::samples::mean;
 use crate::{IdentifyConfig, jump};
-use mapper_core::{EstimateUncertainty, Recording, ThermalModel, Window};
+use mapper_core::{EstimateUncertainty, JointSettings, Recording, ThermalModel, Window};
 
 /// Fits before the last one.
 const ROUNDS: usize = 3;
@@ -51,13 +53,13 @@ pub(crate) fn estimate(
         .map(|position| {
             let mut own = Findings::new();
             let estimate = dynamic::estimate(recording, position, config, &mut own);
-            if config.joint == settings::JointSettings::all_off() {
+            if config.joint == JointSettings::all_off() {
                 findings[position].take(own);
             }
             estimate
         })
         .collect();
-    if config.joint == settings::JointSettings::all_off() {
+    if config.joint == JointSettings::all_off() {
         return Joint { estimates: alone, thermal: None };
     }
     let nothing = || Joint { estimates: vec![Estimate::default(); recording.steps.len()], thermal: None };
@@ -77,17 +79,23 @@ pub(crate) fn estimate(
         let eta = eta_uncertainty(&problem, &covariance, i);
         let (h_w_m2k, _) = problem.setting.h_at_end(&step.end, &problem.shared, &member.local);
         let h = h_uncertainty(&problem, &covariance, &steps, i);
-        let finite = member.local[ETA].is_finite() && h_w_m2k.is_finite() && eta.combined_standard_error().is_finite();
+        let finite =
+            member.local[ETA].is_finite() && h_w_m2k.is_finite() && eta.combined_standard_error().is_finite();
         if !finite || !h.combined_standard_error().is_finite() {
             own.refuse(code::FIT_FAILED, "the fit gives no finite number for this step".to_owned());
             continue;
         }
         let (first, last) = (step.rows.first(), step.rows.last());
-        let change = |read: fn(&rows::Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
+        let change =
+            |read: fn(&rows::Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
         let prediction =
             problem.setting.predict(&member.course, &problem.shared, &member.local, &[false; SHARED], false);
-        let squares: Vec<f64> =
-            member.measured_k.iter().zip(&prediction.t2_k).map(|(measured, found)| (measured - found).powi(2)).collect();
+        let squares: Vec<f64> = member
+            .measured_k
+            .iter()
+            .zip(&prediction.t2_k)
+            .map(|(measured, found)| (measured - found).powi(2))
+            .collect();
         estimates[step.position] = Estimate {
             eta: Some((member.local[ETA], Some(eta))),
             h_w_m2k: Some((h_w_m2k, Some(h))),
@@ -98,7 +106,8 @@ pub(crate) fn estimate(
         };
         judge::judge_step(&problem, i, step, eta.combined_standard_error(), config, own);
         if !jump::begins_with_jump(&recording.steps, step.position) {
-            let message = "no jump leads to this step: its efficiency rests on what the points share".to_owned();
+            let message =
+                "no jump leads to this step: its efficiency rests on what the points share".to_owned();
             own.remark(code::THROUGH_THE_LAW, message);
         }
         if config.declared.is_empty() {
@@ -114,7 +123,11 @@ pub(crate) fn estimate(
 
 /// Fits, learns from the fit how noisy steps are and how far points may scatter, leaves out what fits far worse, and
 /// fits again.
-fn fitted(problem: &mut Problem<'_>, steps: &[rows::StepRows], config: &IdentifyConfig) -> Option<Covariance> {
+fn fitted(
+    problem: &mut Problem<'_>,
+    steps: &[rows::StepRows],
+    config: &IdentifyConfig,
+) -> Option<Covariance> {
     for round in 0..ROUNDS {
         problem.minimise()?;
         start::refine(problem, steps, config);
@@ -125,11 +138,17 @@ fn fitted(problem: &mut Problem<'_>, steps: &[rows::StepRows], config: &Identify
         problem.active[PROBE_MM2] = problem.probe_fitted;
     }
     problem.minimise()?;
+    parsimony::settle(problem)?;
     problem.covariance()
 }
 
 /// Splits a variance into what declared offsets and gains bring and the rest.
-fn split(problem: &Problem<'_>, covariance: &Covariance, variance: f64, with_shared: impl Fn(usize) -> f64) -> EstimateUncertainty {
+fn split(
+    problem: &Problem<'_>,
+    covariance: &Covariance,
+    variance: f64,
+    with_shared: impl Fn(usize) -> f64,
+) -> EstimateUncertainty {
     let mut bias = 0.0;
     for (row, index) in covariance.fitted.iter().enumerate() {
         if (OFFSETS..SURFACE).contains(index) {
@@ -147,7 +166,12 @@ fn eta_uncertainty(problem: &Problem<'_>, covariance: &Covariance, i: usize) -> 
     split(problem, covariance, own[(ETA, ETA)], |row| mixed[(ETA, row)])
 }
 
-fn h_uncertainty(problem: &Problem<'_>, covariance: &Covariance, steps: &[rows::StepRows], i: usize) -> EstimateUncertainty {
+fn h_uncertainty(
+    problem: &Problem<'_>,
+    covariance: &Covariance,
+    steps: &[rows::StepRows],
+    i: usize,
+) -> EstimateUncertainty {
     let (own, mixed) = &covariance.own[i];
     let (h, ln_re) = problem.setting.h_at_end(&steps[i].end, &problem.shared, &problem.members[i].local);
     let mut weights = [0.0; SHARED];

@@ -1,8 +1,8 @@
 //! The reading of T2 that a step's rows give under given parameters, and its derivatives.
 
 use crate::joint::parameters::{
-    ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, LocalVector,
-    OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
+    ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL,
+    LocalVector, OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
 };
 use crate::joint::probe::Lag;
 use crate::joint::rows::Row;
@@ -126,12 +126,34 @@ impl Setting {
     /// Derivative of T2 at a step's end by each reading: T1, T2, Tc, P1, P2, flow. What a sensor's noise does.
     pub(crate) fn sensitivities(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> [f64; 6] {
         let course = Course { rows: std::slice::from_ref(end), terms: vec![[0.0; TERM_COUNT]] };
-        let ideal = { let mut ideal = *shared; ideal[PROBE_MM2] = 0.0; ideal };
+        let ideal = {
+            let mut ideal = *shared;
+            ideal[PROBE_MM2] = 0.0;
+            ideal
+        };
         let mut active = [false; SHARED];
         active[OFFSETS..=FLOW_GAIN].fill(true);
         let columns = self.predict(&course, &ideal, local, &active, true).columns;
         let at = |index: usize| columns.get(index).and_then(|column| column.first()).copied().unwrap_or(0.0);
-        [at(OFFSETS), at(OFFSETS + 1), at(OFFSETS + 2), at(OFFSETS + 3), at(OFFSETS + 4), at(FLOW_GAIN) / end.flow_kg_s]
+        [
+            at(OFFSETS),
+            at(OFFSETS + 1),
+            at(OFFSETS + 2),
+            at(OFFSETS + 3),
+            at(OFFSETS + 4),
+            at(FLOW_GAIN) / end.flow_kg_s,
+        ]
+    }
+
+    /// Derivative of T2 at a step's end by the efficiency, K.
+    pub(crate) fn by_efficiency(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> f64 {
+        let at = |eta: f64| {
+            let mut moved = *local;
+            moved[ETA] = eta;
+            let gas = self.gas(end, &[0.0; TERM_COUNT], shared, &moved);
+            self.t2_k(&gas, self.h(&gas, shared, moved[LN_DEVIATION]), shared[ALPHA], shared[LN_DIRECTION])
+        };
+        (at(local[ETA] + STEP_RATIO) - at(local[ETA] - STEP_RATIO)) / (2.0 * STEP_RATIO)
     }
 
     /// Readings of T2, with derivatives by the parameters in `active` and those of the step where `derivatives` asks.
@@ -166,7 +188,8 @@ impl Setting {
                 (self.t2_k(&moved, self.h(&moved, shared, deviation), alpha, ln_direction) - t2_k) / step
             };
             let by_eta = full(Gas { eta: gas.eta + STEP_RATIO, ..gas }, STEP_RATIO);
-            let by_ln_h = (self.t2_k(&gas, (h.0 * (1.0 + STEP_RATIO), h.1), alpha, ln_direction) - t2_k) / STEP_RATIO;
+            let by_ln_h =
+                (self.t2_k(&gas, (h.0 * (1.0 + STEP_RATIO), h.1), alpha, ln_direction) - t2_k) / STEP_RATIO;
             let mut put = |index: usize, value: f64| {
                 if let Some(cell) = columns[index].get_mut(i) {
                     *cell = value;
@@ -224,7 +247,9 @@ impl Setting {
         let tau_s = |i: usize| {
             thermocouple::time_constant_s(diameter_m, self.outlet_diameter_m, rows[i].flow_kg_s, gas_k[i])
         };
-        (1..rows.len()).map(|i| Lag::of(rows[i].t_s - rows[i - 1].t_s, 0.5 * (tau_s(i - 1) + tau_s(i)))).collect()
+        (1..rows.len())
+            .map(|i| Lag::of(rows[i].t_s - rows[i - 1].t_s, 0.5 * (tau_s(i - 1) + tau_s(i))))
+            .collect()
     }
 
     /// Lets the probe follow the gas, and every derivative with it.

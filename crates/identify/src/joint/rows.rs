@@ -56,7 +56,8 @@ pub(crate) fn condensed(
         let t_s = of(&samples.t_s);
         let (first_s, last_s) = (samples.t_s[start], samples.t_s[end - 1]);
         let (_, speeds) = speed.slice(first_s, last_s);
-        let speeds: Vec<f64> = speeds.iter().copied().filter(|value| *value > 0.0 && value.is_finite()).collect();
+        let speeds: Vec<f64> =
+            speeds.iter().copied().filter(|value| *value > 0.0 && value.is_finite()).collect();
         let speed_rpm = mean(&speeds).or_else(|| speed.interpolate(t_s)).unwrap_or(end_state.speed_rpm);
         let (t1_k, p1_pa, flow_kg_s) = (of(&samples.t1_k), of(&samples.p1_pa), of(&samples.flow_kg_s));
         let count = (end - start) as f64;

@@ -3,8 +3,8 @@
 use crate::IdentifyConfig;
 use crate::joint::judge;
 use crate::joint::parameters::{
-    ALPHA, EXPONENT, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, SURFACE,
-    symbol,
+    ALPHA, EXPONENT, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS,
+    PROBE_MM2, SURFACE, symbol,
 };
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
@@ -27,7 +27,8 @@ pub(crate) fn thermal_model(
         .iter()
         .zip(&problem.members)
         .map(|(step, member)| {
-            problem.setting.reynolds_reference * problem.setting.h_at_end(&step.end, &problem.shared, &member.local).1.exp()
+            problem.setting.reynolds_reference
+                * problem.setting.h_at_end(&step.end, &problem.shared, &member.local).1.exp()
         })
         .collect();
     let range = reynolds.iter().fold((f64::INFINITY, 0.0f64), |(low, high), x| (low.min(*x), high.max(*x)));
@@ -73,7 +74,12 @@ pub(crate) fn thermal_model(
 }
 
 /// A parameter as others see it; `transform` from how it is fitted to how it is told.
-fn value(problem: &Problem<'_>, covariance: &Covariance, index: usize, transform: &dyn Fn(f64) -> f64) -> SharedValue {
+fn value(
+    problem: &Problem<'_>,
+    covariance: &Covariance,
+    index: usize,
+    transform: &dyn Fn(f64) -> f64,
+) -> SharedValue {
     let fitted = problem.shared[index];
     let told = transform(fitted);
     let Some(row) = covariance.row_of(index) else { return SharedValue::assumed(told) };
@@ -111,7 +117,11 @@ fn probe(problem: &Problem<'_>, covariance: &Covariance) -> SharedValue {
         free.covariance()?.error_of(PROBE_MM2)
     });
     let Some(sigma) = sigma else {
-        return SharedValue { value: None, uncertainty: EstimateUncertainty::default(), origin: Origin::NotIdentifiable };
+        return SharedValue {
+            value: None,
+            uncertainty: EstimateUncertainty::default(),
+            origin: Origin::NotIdentifiable,
+        };
     };
     let error_m = 1e-3 * ((square + sigma).sqrt() - square.sqrt());
     SharedValue {

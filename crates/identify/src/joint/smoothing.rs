@@ -10,7 +10,9 @@ use nalgebra::{Matrix4, Vector4};
 /// Half of the stretch of time that a local cubic is fitted to, s.
 const HALF_S: f64 = 10.0;
 /// Fewest rows in it.
-const FEWEST_ROWS: usize = 12;
+const FEWEST_ROWS: usize = 6;
+/// Half of that stretch at the first row, s.
+const SHORTEST_HALF_S: f64 = 3.0;
 
 /// For each row the rows around it and their weights in a local cubic.
 #[derive(Debug, Clone, Default)]
@@ -23,8 +25,10 @@ impl Smoother {
     pub(crate) fn new(t_s: &[f64]) -> Self {
         let weights = (0..t_s.len())
             .map(|i| {
-                let start = t_s.partition_point(|t| *t < t_s[i] - HALF_S);
-                let end = t_s.partition_point(|t| *t <= t_s[i] + HALF_S);
+                // Soon after a jump things move faster.
+                let half_s = (SHORTEST_HALF_S + 0.5 * (t_s[i] - t_s[0])).min(HALF_S);
+                let start = t_s.partition_point(|t| *t < t_s[i] - half_s);
+                let end = t_s.partition_point(|t| *t <= t_s[i] + half_s);
                 let powers = |j: usize| {
                     let x = (t_s[j] - t_s[i]) / HALF_S;
                     Vector4::new(1.0, x, x * x, x * x * x)

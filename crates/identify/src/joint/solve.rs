@@ -3,8 +3,9 @@
 
 use crate::joint::explained::Explained;
 use crate::joint::model::{Course, Setting};
-use crate::joint::parameters::{ETA, LOCAL, LocalVector, PROBE_MM2, Prior, SHARED, SURFACE, SharedVector};
-use crate::joint::surface::{TERM_COUNT, dot};
+use crate::joint::parameters::{
+    ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, SHARED, SURFACE, SharedVector,
+};
 use crate::joint::whitening::Whitening;
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 
@@ -20,8 +21,10 @@ pub(crate) struct Member<'a> {
     /// Measured T2 of each row, K.
     pub(crate) measured_k: Vec<f64>,
     pub(crate) whitening: Whitening,
-    /// The surface's terms at the step's end.
-    pub(crate) end_terms: [f64; TERM_COUNT],
+    /// What the shared parameters make of the point's efficiency: the surface's terms at the step's end, and for each
+    /// offset what it does to the efficiency found. So the surface goes through the points as the readings have them, and
+    /// its smoothness says nothing of the offsets, which bend a map as well as nature does.
+    pub(crate) coupling: SharedVector,
     pub(crate) local: LocalVector,
     /// Of the step's parameters; that of the efficiency is not used: see `surface_sigma`.
     pub(crate) priors: [Prior; LOCAL],
@@ -74,6 +77,13 @@ pub(crate) struct Covariance {
     pub(crate) own: Vec<(Matrix4<f64>, Matrix4xX<f64>)>,
 }
 
+impl Member<'_> {
+    /// How far the point's efficiency lies off the surface.
+    pub(crate) fn off_surface(&self, shared: &SharedVector, local: &LocalVector) -> f64 {
+        local[ETA] - self.coupling.iter().zip(shared).map(|(a, b)| a * b).sum::<f64>()
+    }
+}
+
 impl Covariance {
     /// Where a shared parameter stands; `None` where it was not fitted.
     pub(crate) fn row_of(&self, index: usize) -> Option<usize> {
@@ -87,15 +97,36 @@ impl Covariance {
 }
 
 impl Problem<'_> {
+    /// All shared parameters that are not known, offsets last.
+    fn unknown(&self) -> Vec<usize> {
+        let (carried, mut sought): (Vec<usize>, Vec<usize>) = (0..SHARED)
+            .filter(|index| self.active[*index])
+            .partition(|index| (OFFSETS..SURFACE).contains(index));
+        sought.extend(carried);
+        sought
+    }
+
+    /// Those that are sought. Offsets and gains are not: next to what is declared of them the recording says nothing of
+    /// them, and what little it seems to say is rather the model's smallest faults. They are carried into the covariance.
     fn fitted(&self) -> Vec<usize> {
-        (0..SHARED).filter(|index| self.active[*index]).collect()
+        (0..SHARED).filter(|index| self.active[*index] && !(OFFSETS..SURFACE).contains(index)).collect()
     }
 
     /// Whitened residuals of a step (measured less predicted), and derivatives of the prediction.
-    pub(crate) fn residual(&self, member: &Member<'_>, shared: &SharedVector, local: &LocalVector, derivatives: bool) -> (Vec<f64>, Vec<Vec<f64>>) {
+    pub(crate) fn residual(
+        &self,
+        member: &Member<'_>,
+        shared: &SharedVector,
+        local: &LocalVector,
+        derivatives: bool,
+    ) -> (Vec<f64>, Vec<Vec<f64>>) {
         let prediction = self.setting.predict(&member.course, shared, local, &self.active, derivatives);
-        let mut residual: Vec<f64> =
-            member.measured_k.iter().zip(&prediction.t2_k).map(|(measured, predicted)| measured - predicted).collect();
+        let mut residual: Vec<f64> = member
+            .measured_k
+            .iter()
+            .zip(&prediction.t2_k)
+            .map(|(measured, predicted)| measured - predicted)
+            .collect();
         member.whitening.apply(&mut residual);
         let mut columns = prediction.columns;
         for column in &mut columns {
@@ -112,13 +143,16 @@ impl Problem<'_> {
                 cost += prior.weight() * (local[index] - prior.mean).powi(2);
             }
         }
-        let off = local[ETA] - dot(&member.end_terms, crate::joint::model::surface_of(shared));
+        let off = member.off_surface(shared, local);
         cost + off * off / (self.surface_sigma * self.surface_sigma)
     }
 
     fn shared_cost(&self, shared: &SharedVector) -> f64 {
-        let priors: f64 =
-            self.fitted().iter().map(|i| self.priors[*i].weight() * (shared[*i] - self.priors[*i].mean).powi(2)).sum();
+        let priors: f64 = self
+            .fitted()
+            .iter()
+            .map(|i| self.priors[*i].weight() * (shared[*i] - self.priors[*i].mean).powi(2))
+            .sum();
         priors - self.explained.at(shared[PROBE_MM2]).0
     }
 
@@ -160,30 +194,29 @@ impl Problem<'_> {
                     block.right[i] += prior.weight() * (prior.mean - member.local[i]);
                 }
             }
-            let off = member.local[ETA] - dot(&member.end_terms, crate::joint::model::surface_of(&self.shared));
+            let off = member.off_surface(&self.shared, &member.local);
             block.own[(ETA, ETA)] += surface_weight;
             block.right[ETA] -= surface_weight * off;
             if member.shares {
                 normal.cost += residual.iter().map(|r| r * r).sum::<f64>() + off * off * surface_weight;
                 for i in (0..LOCAL).filter(|i| *i != ETA) {
-                    normal.cost += member.priors[i].weight() * (member.local[i] - member.priors[i].mean).powi(2);
+                    normal.cost +=
+                        member.priors[i].weight() * (member.local[i] - member.priors[i].mean).powi(2);
                 }
             }
             for (a, index) in fitted.iter().enumerate() {
                 for i in 0..LOCAL {
                     block.mixed[(i, a)] += product(&columns[SHARED + i], &columns[*index]);
                 }
-                let term = |index: usize| {
-                    index.checked_sub(SURFACE).and_then(|k| member.end_terms.get(k)).copied().unwrap_or(0.0)
-                };
+                let term = |index: usize| member.coupling[index];
                 block.mixed[(ETA, a)] -= surface_weight * term(*index);
                 if !member.shares {
                     continue;
                 }
                 normal.right[a] += product(&columns[*index], &residual) + surface_weight * off * term(*index);
                 for (b, other) in fitted.iter().enumerate().skip(a) {
-                    let value =
-                        product(&columns[*index], &columns[*other]) + surface_weight * term(*index) * term(*other);
+                    let value = product(&columns[*index], &columns[*other])
+                        + surface_weight * term(*index) * term(*other);
                     normal.shared[(a, b)] += value;
                     if a != b {
                         normal.shared[(b, a)] += value;
@@ -228,7 +261,8 @@ impl Problem<'_> {
 
     fn cost(&self, shared: &SharedVector, locals: &[LocalVector]) -> f64 {
         let members = self.members.iter().zip(locals).filter(|(member, _)| member.shares);
-        self.shared_cost(shared) + members.map(|(member, local)| self.local_cost(member, shared, local)).sum::<f64>()
+        self.shared_cost(shared)
+            + members.map(|(member, local)| self.local_cost(member, shared, local)).sum::<f64>()
     }
 
     /// Finds the minimum from where the parameters stand; `None` where it comes to no finite end.
@@ -289,8 +323,11 @@ impl Problem<'_> {
     }
 
     /// Covariance at the minimum; `None` where the equations are singular.
+    ///
+    /// Offsets keep their declared spread, and everything else answers to them as the fit would (Schmidt's consider
+    /// covariance).
     pub(crate) fn covariance(&self) -> Option<Covariance> {
-        let fitted = self.fitted();
+        let fitted = self.unknown();
         let normal = self.normal(&fitted);
         let mut reduced = normal.shared.clone();
         let mut inverses = Vec::new();
@@ -301,7 +338,24 @@ impl Problem<'_> {
             }
             inverses.push(inverse);
         }
-        let shared = if fitted.is_empty() { reduced } else { reduced.cholesky()?.inverse() };
+        let sought = fitted.iter().filter(|index| !(OFFSETS..SURFACE).contains(*index)).count();
+        let carried = fitted.len() - sought;
+        let mut shared = DMatrix::zeros(fitted.len(), fitted.len());
+        let inverse = if sought == 0 {
+            DMatrix::zeros(0, 0)
+        } else {
+            reduced.view((0, 0), (sought, sought)).into_owned().cholesky()?.inverse()
+        };
+        let answer = -(&inverse * reduced.view((0, sought), (sought, carried)));
+        let spread = DMatrix::from_diagonal(&DVector::from_iterator(
+            carried,
+            fitted[sought..].iter().map(|index| self.priors[*index].sigma.powi(2)),
+        ));
+        let mixed = &answer * &spread;
+        shared.view_mut((0, 0), (sought, sought)).copy_from(&(inverse + &mixed * answer.transpose()));
+        shared.view_mut((0, sought), (sought, carried)).copy_from(&mixed);
+        shared.view_mut((sought, 0), (carried, sought)).copy_from(&mixed.transpose());
+        shared.view_mut((sought, sought), (carried, carried)).copy_from(&spread);
         let own = normal
             .blocks
             .iter()

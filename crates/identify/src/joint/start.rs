@@ -7,17 +7,16 @@ use crate::joint::cleaning::cleaned;
 use crate::joint::explained::{self, Explained};
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
-    ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, OFFSET_CHANNELS,
-    OFFSETS, PROBE_MM2, Prior, SHARED, SLOPE, SURFACE,
+    ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL,
+    OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior, SHARED, SLOPE, SURFACE,
 };
 use crate::joint::rows::{StepRows, condensed};
-use crate::joint::settings::{Choice, ConvectionWithinStep, EfficiencyWithinStep};
 use crate::joint::solve::{Member, Problem};
-use crate::joint::surface::{SurfaceScale, TERM_COUNT, dot};
+use crate::joint::surface::{SurfaceScale, TERM_COUNT};
 use crate::joint::whitening::Whitening;
 use crate::samples::Samples;
 use crate::{IdentifyConfig, jump};
-use mapper_core::{Channel, Recording, Window};
+use mapper_core::{Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, Window};
 use mapper_physics::air;
 
 /// Start of what is used of a step, after the last change of a command, s: h and efficiency are followed while the
@@ -39,11 +38,15 @@ pub(crate) fn steps(
 ) -> Vec<StepRows> {
     let mut steps = Vec::new();
     for (position, step) in recording.steps.iter().enumerate() {
-        let (Some(Some(end_state)), Some(own)) = (end_states.get(position), findings.get_mut(position)) else { continue };
+        let (Some(Some(end_state)), Some(own)) = (end_states.get(position), findings.get_mut(position))
+        else {
+            continue;
+        };
         let start_s = jump::commands_settled_s(recording, step).max(step.start_s) + JOINT_START_S;
         let window = Window { start_s, end_s: step.end_s };
         if !(start_s < step.end_s) {
-            let message = format!("the commands changed until {:.1} s before the step's end", step.end_s - start_s);
+            let message =
+                format!("the commands changed until {:.1} s before the step's end", step.end_s - start_s);
             own.refuse(code::TOO_FEW_SAMPLES, message);
             continue;
         }
@@ -57,7 +60,11 @@ pub(crate) fn steps(
 }
 
 /// The fit with its start values.
-pub(crate) fn problem<'a>(steps: &'a [StepRows], alone: &[Estimate], config: &IdentifyConfig) -> Option<Problem<'a>> {
+pub(crate) fn problem<'a>(
+    steps: &'a [StepRows],
+    alone: &[Estimate],
+    config: &IdentifyConfig,
+) -> Option<Problem<'a>> {
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
     let scale = SurfaceScale::of(&places, config.reference)?;
     let choice = &config.joint;
@@ -65,7 +72,8 @@ pub(crate) fn problem<'a>(steps: &'a [StepRows], alone: &[Estimate], config: &Id
     let shaped = choice.efficiency == EfficiencyWithinStep::Shaped;
     let reynolds = |step: &StepRows| {
         let bulk_k = step.end.t2_k;
-        4.0 * step.end.flow_kg_s / (std::f64::consts::PI * config.outlet_diameter_m * air::viscosity_pa_s(bulk_k))
+        4.0 * step.end.flow_kg_s
+            / (std::f64::consts::PI * config.outlet_diameter_m * air::viscosity_pa_s(bulk_k))
     };
     let ln_reference = steps.iter().map(|step| reynolds(step).ln()).sum::<f64>() / steps.len() as f64;
     let setting = Setting {
@@ -105,7 +113,8 @@ pub(crate) fn problem<'a>(steps: &'a [StepRows], alone: &[Estimate], config: &Id
             priors[OFFSETS + i] = Prior { mean: 0.0, sigma };
             active[OFFSETS + i] = sigma > 0.0;
         }
-        let sigma = config.declared.get(&Channel::CompressorFlow).map_or(0.0, |declared| declared.gain_sigma_ratio);
+        let sigma =
+            config.declared.get(&Channel::CompressorFlow).map_or(0.0, |declared| declared.gain_sigma_ratio);
         priors[FLOW_GAIN] = Prior { mean: 0.0, sigma };
         active[FLOW_GAIN] = sigma > 0.0;
     }
@@ -153,7 +162,7 @@ pub(crate) fn problem<'a>(steps: &'a [StepRows], alone: &[Estimate], config: &Id
                 course: Course { rows: &step.rows, terms },
                 measured_k: step.rows.iter().map(|row| row.t2_k).collect(),
                 whitening: whitening(step, config, UNDECLARED_NOISE_K, UNDECLARED_NOISE_K),
-                end_terms,
+                coupling: std::array::from_fn(|i| i.checked_sub(SURFACE).map_or(0.0, |k| end_terms[k])),
                 local,
                 priors: own,
                 shares: true,
@@ -161,7 +170,17 @@ pub(crate) fn problem<'a>(steps: &'a [StepRows], alone: &[Estimate], config: &Id
         })
         .collect();
     let surface_sigma = if shaped { 0.005 } else { 1e3 };
-    Some(Problem { setting, members, shared, priors, active, lowest, surface_sigma, explained: Explained::default(), probe_fitted: choice.probe == Choice::Fitted })
+    Some(Problem {
+        setting,
+        members,
+        shared,
+        priors,
+        active,
+        lowest,
+        surface_sigma,
+        explained: Explained::default(),
+        probe_fitted: choice.probe == Choice::Fitted,
+    })
 }
 
 fn whitening(step: &StepRows, config: &IdentifyConfig, sigma_k: f64, white_sigma_k: f64) -> Whitening {
@@ -177,21 +196,35 @@ fn whitening(step: &StepRows, config: &IdentifyConfig, sigma_k: f64, white_sigma
 /// Takes the noise of each step and the spreads of the points about surface and law from what was found.
 pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
     let channels = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
-    let declared: Vec<f64> =
-        channels.iter().map(|channel| config.declared.get(channel).map_or(0.0, |declared| declared.noise_sigma)).collect();
+    let declared: Vec<f64> = channels
+        .iter()
+        .map(|channel| config.declared.get(channel).map_or(0.0, |declared| declared.noise_sigma))
+        .collect();
     for i in 0..problem.members.len() {
         let member = &problem.members[i];
         let slopes = problem.setting.sensitivities(&steps[i].end, &problem.shared, &member.local);
         let expected: f64 = slopes.iter().zip(&declared).map(|(slope, sigma)| (slope * sigma).powi(2)).sum();
-        // Without a declaration the residual itself says what noise there is; 2 mK is what block means cost.
+        // Without a declaration the residual itself says what noise there is; 0.3 mK is what block means cost.
         let sigma_k = if expected > 0.0 {
             expected.sqrt()
         } else {
-            let prediction = problem.setting.predict(&member.course, &problem.shared, &member.local, &[false; SHARED], false);
+            let prediction = problem.setting.predict(
+                &member.course,
+                &problem.shared,
+                &member.local,
+                &[false; SHARED],
+                false,
+            );
             let square: f64 =
                 member.measured_k.iter().zip(&prediction.t2_k).skip(1).map(|(a, b)| (a - b).powi(2)).sum();
-            (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(2e-3)
+            (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(3e-4)
         };
+        let by_eta = problem.setting.by_efficiency(&steps[i].end, &problem.shared, &member.local);
+        let coupled: Vec<f64> =
+            slopes.iter().take(OFFSET_CHANNELS.len()).map(|slope| -slope / by_eta).collect();
+        if problem.setting.shaped && coupled.iter().all(|x| x.is_finite()) {
+            problem.members[i].coupling[OFFSETS..FLOW_GAIN].copy_from_slice(&coupled);
+        }
         let white_sigma_k = if expected > 0.0 { declared[1].max(0.1 * sigma_k) } else { sigma_k };
         problem.members[i].whitening = whitening(&steps[i], config, sigma_k, white_sigma_k);
     }
@@ -199,7 +232,7 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
     let n = (problem.members.len() as f64).max(1.0);
     let (mut off_surface, mut off_law) = (0.0, 0.0);
     for member in &problem.members {
-        let off = member.local[ETA] - dot(&member.end_terms, crate::joint::model::surface_of(&problem.shared));
+        let off = member.off_surface(&problem.shared, &member.local);
         off_surface += off * off / n;
         off_law += member.local[LN_DEVIATION].powi(2) / n;
     }

@@ -46,9 +46,11 @@ impl SurfaceScale {
         if places.is_empty() || !places.iter().all(|(speed, flow)| usable(*speed) && usable(*flow)) {
             return None;
         }
-        let (speed_middle_rpm, speed_half_range_rpm) = middle_and_half_range(places.iter().map(|place| place.0));
+        let (speed_middle_rpm, speed_half_range_rpm) =
+            middle_and_half_range(places.iter().map(|place| place.0));
         let flow_exponent = exponent(places);
-        let reduced = places.iter().map(|(speed, flow)| flow / (speed / speed_middle_rpm).powf(flow_exponent));
+        let reduced =
+            places.iter().map(|(speed, flow)| flow / (speed / speed_middle_rpm).powf(flow_exponent));
         let (middle, half_range) = middle_and_half_range(reduced);
         Some(SurfaceScale {
             reference,
@@ -76,8 +78,8 @@ impl SurfaceScale {
 
 /// Middle and half of the range; a range of a tenth of the middle at least, so that a single point has one.
 fn middle_and_half_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (low, high) =
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let (low, high) = values
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     let middle = 0.5 * (low + high);
     (middle, (0.5 * (high - low)).max(0.05 * middle))
 }

@@ -1,0 +1,53 @@
+//! What the points of a campaign share, for people.
+
+use mapper_core::{Origin, SharedValue, ThermalModel};
+use std::fmt::Write;
+
+/// The thermal model as lines of text, one for each number.
+pub fn thermal_text(thermal: &ThermalModel) -> String {
+    let mut text = String::from("\nshared by all points (+/- 95 %):\n");
+    let mut line = |name: &str, value: &SharedValue, scale: f64, unit: &str, decimals: usize| {
+        let half = 1.96 * scale * value.uncertainty.combined_standard_error();
+        let _ = match (value.value, value.origin) {
+            (Some(number), Origin::Assumed) => {
+                writeln!(text, "  {name:<34} {:.decimals$} {unit} (assumed)", scale * number)
+            }
+            (Some(number), _) => {
+                writeln!(text, "  {name:<34} {:.decimals$} +/- {half:.decimals$} {unit}", scale * number)
+            }
+            (None, _) => {
+                writeln!(text, "  {name:<34} the recording can not tell (+/- {half:.decimals$} {unit})")
+            }
+        };
+    };
+    if let Some(law) = &thermal.convection {
+        line("Nusselt coefficient", &law.coefficient, 1.0, "", 6);
+        line("Nusselt exponent", &law.exponent, 1.0, "", 4);
+    }
+    line("alpha_A", &thermal.alpha_area_ratio, 1.0, "", 3);
+    line("T2 probe diameter", &thermal.probe_diameter_m, 1e3, "mm", 2);
+    line("direction factor of h", &thermal.direction_factor, 1.0, "", 3);
+    for (channel, offset) in &thermal.offsets {
+        line(&format!("offset of {channel}"), offset, 1.0, channel.unit(), 2);
+    }
+    if let Some(law) = &thermal.convection {
+        let _ = writeln!(
+            text,
+            "  the law holds from Re {:.0} to {:.0}; single points lie {:.1} % off it",
+            law.reynolds_range.0,
+            law.reynolds_range.1,
+            100.0 * law.deviation_ratio
+        );
+    }
+    for pair in &thermal.entangled {
+        let _ = writeln!(
+            text,
+            "  {} and {} are hardly told apart (correlation {:+.2})",
+            pair.first, pair.second, pair.correlation
+        );
+    }
+    for doubt in &thermal.doubts {
+        let _ = writeln!(text, "  doubt: {doubt}");
+    }
+    text
+}

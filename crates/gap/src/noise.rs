@@ -53,6 +53,11 @@ impl Factor {
         Some(Factor { lower: covariance.cholesky()?.unpack() })
     }
 
+    /// Independent values of standard deviation `sigma`.
+    pub fn identity(n: usize, sigma: f64) -> Factor {
+        Factor { lower: DMatrix::identity(n, n) * sigma }
+    }
+
     /// `L^-1 v`, in place.
     pub fn whiten(&self, values: &mut [f64]) {
         let n = values.len();

@@ -2,7 +2,7 @@
 //! with its declared size as prior, in every hypothesis.
 
 use crate::declared::Declared;
-use crate::shape::SHAPES;
+use crate::shape::{SHAPES, SHAPE_SUM};
 use mapper_core::Channel;
 use mapper_physics::effect::Rig;
 
@@ -89,10 +89,8 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
         (K::StartTc, START_SIGMA_K),
         (K::StartTt, START_SIGMA_K),
     ];
-    // Each function has a root mean square of about one; together they have the declared one.
-    let each = t.efficiency_shape_ratio / (SHAPES as f64).sqrt();
-    // Half as much again: where a machine dwells, a few functions carry all of it.
-    all.extend((0..SHAPES).map(|i| (K::Shape(i), 1.5 * each)));
+    // Together they have the declared size.
+    all.extend((0..SHAPES).map(|i| (K::Shape(i), t.efficiency_shape_ratio / SHAPE_SUM)));
     let sensors = DRIVERS.iter().chain(OUTPUTS.iter().filter(|channel| !DRIVERS.contains(channel)));
     all.extend(sensors.map(|channel| (K::Offset(*channel), declared.offset_sigma(*channel))));
     all.extend((0..OUTPUTS.len()).map(|i| (K::Delay(i), DELAY_SIGMA_S)));

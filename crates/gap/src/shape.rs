@@ -4,8 +4,20 @@ use mapper_core::ReferenceState;
 use mapper_physics::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use std::sync::Arc;
 
+/// Places of the bumps over corrected speed, 100 krpm.
+const SPEEDS: [f64; 6] = [0.5, 0.7, 0.9, 1.1, 1.3, 1.5];
+/// Places of the bumps over the way from the surge line (0) to choke (1).
+const WAYS: [f64; 3] = [0.1, 0.4, 0.7];
+/// Widths of a bump.
+const SPEED_WIDTH: f64 = 0.2;
+const WAY_WIDTH: f64 = 0.3;
+
 /// Number of basis functions.
-pub const SHAPES: usize = 9;
+pub const SHAPES: usize = SPEEDS.len() * WAYS.len();
+
+/// What the declared size is divided by for one coefficient. The root mean square of all together would be 1.7: a
+/// deviation that lives in one corner of the map must not count as impossible.
+pub const SHAPE_SUM: f64 = 1.0;
 
 /// A map whose efficiency is multiplied by `1 + sum c_i phi_i(speed, place on the speed line)`.
 #[derive(Debug, Clone)]
@@ -16,25 +28,16 @@ pub struct ShapedMap {
     pub coefficients: [f64; SHAPES],
 }
 
-/// Legendre products without the constant, each of root mean square about 1: speed 0.4..1.6 times 100 krpm to the
-/// third order, place on the line 0..1 to the second, mixed up to third.
+/// Gaussian bumps a fifth of the speed range and a third of a speed line wide: a deviation may rise and fall from one
+/// operating point to its neighbour, and is smooth between.
 fn basis(speed_corrected_rpm: f64, surge_position_ratio: f64) -> [f64; SHAPES] {
-    let a = ((speed_corrected_rpm / 100_000.0 - 1.0) / 0.6).clamp(-1.3, 1.3);
-    let b = (2.0 * surge_position_ratio - 1.0).clamp(-1.3, 1.3);
-    let (p1, p2, p3) = (a, 1.5 * a * a - 0.5, 2.5 * a * a * a - 1.5 * a);
-    let (q1, q2, q3) = (b, 1.5 * b * b - 0.5, 2.5 * b * b * b - 1.5 * b);
-    let root = |n: f64| n.sqrt();
-    [
-        root(3.0) * p1,
-        root(5.0) * p2,
-        root(7.0) * p3,
-        root(3.0) * q1,
-        root(5.0) * q2,
-        root(7.0) * q3,
-        3.0 * p1 * q1,
-        root(15.0) * p2 * q1,
-        root(15.0) * p1 * q2,
-    ]
+    let speed = speed_corrected_rpm / 100_000.0;
+    let position = surge_position_ratio.clamp(0.0, 1.0);
+    let way = (1.0 - position * position).sqrt();
+    let bump = |away: f64, width: f64| (-0.5 * (away / width) * (away / width)).exp();
+    let over_speed = SPEEDS.map(|at| bump(speed - at, SPEED_WIDTH));
+    let over_way = WAYS.map(|at| bump(way - at, WAY_WIDTH));
+    std::array::from_fn(|i| over_speed[i / WAYS.len()] * over_way[i % WAYS.len()])
 }
 
 impl CompressorCharacteristic for ShapedMap {

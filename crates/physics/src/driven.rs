@@ -12,9 +12,12 @@ use crate::rosenbrock::{Integrator, OdeSystem, Tolerances};
 use crate::state::MAX_STATES;
 use nalgebra::{Const, DimMin};
 
-/// Steps after a jump: up to so many seconds, steps of so many seconds.
-const STEPS_S: [(f64, f64); 6] =
-    [(0.2, 0.05), (1.0, 0.1), (3.0, 0.25), (8.0, 0.5), (20.0, 1.0), (f64::INFINITY, 2.5)];
+/// Longest steps after a jump: up to so many seconds, steps of at most so many seconds.
+const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.0), (f64::INFINITY, 3.0)];
+
+/// Within this of the surge line, in places on the speed line, a fast step is taken in parts.
+const SURGE_CORNER: f64 = 0.01;
+const CORNER_PARTS: u32 = 5;
 
 /// Times between which the integration takes single steps.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,21 +26,28 @@ pub struct FrozenGrid {
 }
 
 impl FrozenGrid {
-    /// A grid from `start_s` to `end_s`, fine after the start and after each jump within (rising).
-    pub fn new(start_s: f64, end_s: f64, jumps_s: &[f64]) -> Self {
+    /// A grid from `start_s` to `end_s` with nodes at each jump and each of `times_s` within (rising both), and between
+    /// them as fine as the time since the last jump asks for. What is read at nodes is read where the method is
+    /// stiffly accurate.
+    pub fn new(start_s: f64, end_s: f64, jumps_s: &[f64], times_s: &[f64]) -> Self {
+        let mut wanted: Vec<f64> = jumps_s.iter().chain(times_s).copied().collect();
+        wanted.retain(|t| *t > start_s && *t < end_s);
+        wanted.push(end_s);
+        wanted.sort_by(f64::total_cmp);
         let mut nodes_s = vec![start_s];
-        let inside = jumps_s.iter().copied().filter(|t| *t > start_s && *t < end_s);
-        let mut from_s = start_s;
-        for until_s in inside.chain([end_s]) {
-            let mut at_s = from_s;
-            while at_s < until_s - 1e-9 {
-                let since_s = at_s - from_s;
-                let step_s = STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(2.5, |(_, step)| *step);
-                // No sliver before the next jump.
-                at_s = if at_s + 1.3 * step_s >= until_s { until_s } else { at_s + step_s };
+        let (mut at_s, mut jump_s) = (start_s, f64::NEG_INFINITY);
+        for until_s in wanted {
+            while until_s - at_s > 1e-9 {
+                let since_s = at_s - jump_s;
+                let limit_s = STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(3.0, |(_, step)| *step);
+                // Equal parts, each within the limit.
+                let parts = ((until_s - at_s) / limit_s - 1e-6).ceil().max(1.0);
+                at_s = if parts <= 1.0 { until_s } else { at_s + ((until_s - at_s) / parts).max(limit_s * 0.5) };
                 nodes_s.push(at_s);
             }
-            from_s = until_s;
+            if jumps_s.contains(&until_s) {
+                jump_s = until_s;
+            }
         }
         FrozenGrid { nodes_s }
     }
@@ -118,7 +128,20 @@ where
         boundary.check().map_err(|_| failed)?;
         let before_end_s = end_s - 1e-9 * (end_s - pair[0]);
         let mut system = DrivenSystem { model, inputs, last_s: before_end_s, boundary_s: pair[0], prepared: model.prepare(&boundary) };
-        let step = integrator.step_on_grid(&mut system, end_s).map_err(|_| failed)?;
+        let surge_before = system.surge_position(&integrator.y);
+        let kept = integrator.clone();
+        let mut step = integrator.step_on_grid(&mut system, end_s).map_err(|_| failed)?;
+        // The speed line has a corner on the surge line, with an infinite slope on one side: short steps across it.
+        let surge_after = system.surge_position(&step.y1);
+        let near = (surge_before - 1.0).abs().min((surge_after - 1.0).abs()) < SURGE_CORNER;
+        if end_s - pair[0] < 0.11 && (near || (surge_before < 1.0) != (surge_after < 1.0)) {
+            integrator = kept;
+            for part in 1..=CORNER_PARTS {
+                let share = f64::from(part) / f64::from(CORNER_PARTS);
+                let part_end_s = if part == CORNER_PARTS { end_s } else { pair[0] + share * (end_s - pair[0]) };
+                step = integrator.step_on_grid(&mut system, part_end_s).map_err(|_| failed)?;
+            }
+        }
         if !(step.y1[0] > 0.0 && step.y1[1] > 0.0) {
             return Err(failed);
         }
@@ -143,6 +166,10 @@ struct DrivenSystem<'a, I: Inputs> {
 }
 
 impl<I: Inputs> DrivenSystem<'_, I> {
+    fn surge_position<const N: usize>(&self, y: &[f64; N]) -> f64 {
+        self.prepared.evaluate(&State::from_array(y)).surge_position_ratio
+    }
+
     fn prepare_for(&mut self, t_s: f64) {
         let t_s = t_s.min(self.last_s);
         if t_s != self.boundary_s {

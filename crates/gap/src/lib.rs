@@ -11,6 +11,7 @@ pub mod inputs;
 pub mod noise;
 pub mod nuisance;
 pub mod parallel;
+pub mod select;
 pub mod shape;
 pub mod smoother;
 pub mod study;

@@ -258,6 +258,12 @@ impl Study {
                 } else {
                     true_value(*channel, prepared, state, outputs).unwrap_or(f64::NAN)
                 };
+                // T4 is what is left of T3' after a drop that is known to a few per cent only.
+                let seen = if *channel == Channel::T4 {
+                    seen - circumstances.t4_drop_ratio * (outputs.turbine.t3_prime_k - outputs.turbine.t4_k)
+                } else {
+                    seen
+                };
                 let reading = followers[output].read(t_s, seen);
                 let Some((step, block)) = place else { continue };
                 let Some(row) = self.rows[step][block][output] else { continue };

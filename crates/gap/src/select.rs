@@ -16,50 +16,69 @@ pub struct Found {
     pub null: Fit,
     /// Singles and pairs, best score first.
     pub fits: Vec<Fit>,
-    /// For the best fits: what one more effect would take off the cost, largest first (effect, cost).
-    pub one_more: Vec<(usize, f64)>,
-}
-
-/// How wide to search.
-#[derive(Debug, Clone, Copy)]
-pub struct Breadth {
-    /// Singles that get a full fit.
-    pub singles: usize,
-    /// Singles beside which a second effect is tried.
-    pub bases: usize,
-    /// Pairs that get a fit.
-    pub pairs: usize,
-}
-
-impl Default for Breadth {
-    fn default() -> Self {
-        Breadth { singles: 6, bases: 4, pairs: 8 }
-    }
+    /// Linearised beside the best single, where the nominal point is far from it.
+    pub anew: Option<Linearised>,
 }
 
 /// A single must take at least this off the cost to be worth a second look.
 const WORTH: f64 = 6.0;
+/// Above this share of the number of values, the null's cost says that something strong is there, and nuisances are
+/// linearised anew beside the best single.
+const STRONG: f64 = 2.0;
 
-/// Searches singles and pairs on the steps of `selection`.
+/// What the search works with.
+#[derive(Clone, Copy)]
+pub struct Search<'a> {
+    /// The recording.
+    pub study: &'a Study,
+    /// Linearised where nothing is off.
+    pub linearised: &'a Linearised,
+    /// Steps that count.
+    pub selection: &'a Selection,
+    /// Told the share done, and what comes.
+    pub progress: &'a (dyn Fn(f64, &str) + Sync),
+}
+
+/// Searches singles and pairs on the steps of the selection.
 ///
 /// # Errors
 /// [`PredictError`] where the nominal model cannot follow the recording.
-pub fn search(
-    study: &Study,
-    linearised: &Linearised,
-    selection: &Selection,
-    breadth: Breadth,
-    progress: &(dyn Fn(f64, &str) + Sync),
-) -> Result<Found, PredictError> {
-    let null = fit(study, linearised, &study.nothing(), selection, Effort::default())?;
-    progress(0.2, "single effects");
+pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
+    let Search { study, selection, progress, .. } = search;
+    let null = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
+    progress(0.15, "single effects");
+    let mut singles = singles(search, &null);
+    let strong = null.cost > STRONG * study.measured.len() as f64;
+    let anew = match singles.first() {
+        Some(best) if strong => search.linearised.at(study, &best.hypothesis).ok(),
+        _ => None,
+    };
+    let linearised = anew.as_ref().unwrap_or(search.linearised);
+    let beside = Search { linearised, ..search };
+    if anew.is_some() {
+        refit(beside, &mut singles, 4, Effort::default());
+    }
+    progress(0.5, "pairs");
+    let mut fits = if singles.first().is_some_and(|first| null.cost - first.cost > WORTH) {
+        pairs(beside, &singles)
+    } else {
+        Vec::new()
+    };
+    fits.append(&mut singles);
+    sort(&mut fits);
+    Ok(Found { null, fits, anew })
+}
+
+/// Fits of all single effects, best first.
+fn singles(search: Search<'_>, null: &Fit) -> Vec<Fit> {
+    let Search { study, linearised, selection, .. } = search;
     let mut starts: Vec<Hypothesis> = Vec::new();
     for index in 0..study.effects.len() {
         starts.extend(starts_of(study, &study.nothing(), index));
     }
-    let quick = Effort { iterations: 5, enough: 1.0 };
+    let quick = Effort { iterations: 3, enough: 1.0 };
     let tried = parallel::map(&starts, |start| {
-        let started = linear_start(study, linearised, selection, start, &null)?;
+        let started = linear_start(study, linearised, selection, start, null)?;
         fit(study, linearised, &started, selection, quick).ok()
     });
     let mut singles: Vec<Fit> = Vec::new();
@@ -67,75 +86,75 @@ pub fn search(
         keep_best(&mut singles, fitted);
     }
     sort(&mut singles);
-    let best: Vec<Hypothesis> = singles.iter().take(breadth.singles).map(|f| f.hypothesis.clone()).collect();
-    for fitted in parallel::map(&best, |start| fit(study, linearised, start, selection, Effort::default())).into_iter().flatten() {
-        keep_best(&mut singles, fitted);
-    }
-    sort(&mut singles);
-    progress(0.45, "pairs");
-    // Pairs: beside the best singles, and beside the partners that these ask for.
-    let worth = singles.first().is_some_and(|first| null.cost - first.cost > WORTH);
-    let mut pairs: Vec<Fit> = Vec::new();
-    if worth {
-        let mut bases: Vec<usize> = (0..singles.len().min(breadth.bases)).collect();
-        let mut wanted: Vec<(f64, Hypothesis)> = Vec::new();
-        let mut seen: Vec<Vec<usize>> = Vec::new();
-        for round in 0..2 {
-            let additions = parallel::map(&bases, |base| additions(study, linearised, selection, &singles[*base]));
-            let mut partners: Vec<(f64, usize)> = Vec::new();
-            for (base, added) in bases.iter().zip(additions) {
-                for addition in added {
-                    let cost = singles[*base].cost - addition.gain;
-                    partners.push((cost, addition.effect));
-                    let mut names = vec![singles[*base].hypothesis.effects[0].0, addition.effect];
-                    names.sort_unstable();
-                    match seen.iter().position(|other| *other == names) {
-                        Some(place) if wanted[place].0 <= cost => {}
-                        Some(place) => wanted[place] = (cost, addition.start),
-                        None => {
-                            seen.push(names);
-                            wanted.push((cost, addition.start));
-                        }
-                    }
-                }
-            }
-            if round == 0 {
-                partners.sort_by(|a, b| a.0.total_cmp(&b.0));
-                let place = |effect: usize| singles.iter().position(|f| f.hypothesis.effects[0].0 == effect);
-                let mut next: Vec<usize> = partners.iter().take(6).filter_map(|(_, effect)| place(*effect)).collect();
-                next.sort_unstable();
-                next.dedup();
-                next.retain(|base| !bases.contains(base));
-                next.truncate(3);
-                bases = next;
-            }
-        }
-        wanted.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let starts: Vec<Hypothesis> = wanted.into_iter().take(breadth.pairs).map(|(_, start)| start).collect();
-        let effort = Effort { iterations: 7, enough: 0.3 };
-        for fitted in parallel::map(&starts, |start| fit(study, linearised, start, selection, effort)).into_iter().flatten() {
-            keep_best(&mut pairs, fitted);
-        }
-        sort(&mut pairs);
-        let best: Vec<Hypothesis> = pairs.iter().take(2).map(|f| f.hypothesis.clone()).collect();
-        for fitted in parallel::map(&best, |start| fit(study, linearised, start, selection, Effort::default())).into_iter().flatten() {
-            keep_best(&mut pairs, fitted);
-        }
-    }
-    let mut fits = singles;
-    fits.append(&mut pairs);
-    sort(&mut fits);
-    progress(0.7, "adequacy");
-    let one_more = fits.first().map_or_else(Vec::new, |best| {
-        let mut gains: Vec<(usize, f64)> =
-            additions(study, linearised, selection, best).into_iter().map(|a| (a.effect, a.gain)).collect();
-        gains.sort_by(|a, b| b.1.total_cmp(&a.1));
-        gains
-    });
-    Ok(Found { null, fits, one_more })
+    refit(search, &mut singles, 7, Effort { iterations: 6, enough: 0.2 });
+    singles
 }
 
-fn sort(fits: &mut [Fit]) {
+/// Fits the best few more thoroughly.
+pub fn refit(search: Search<'_>, fits: &mut Vec<Fit>, count: usize, effort: Effort) {
+    let best: Vec<Hypothesis> = fits.iter().take(count).map(|f| f.hypothesis.clone()).collect();
+    let again = parallel::map(&best, |start| fit(search.study, search.linearised, start, search.selection, effort));
+    for fitted in again.into_iter().flatten() {
+        keep_best(fits, fitted);
+    }
+    sort(fits);
+}
+
+/// Fits of the most promising pairs: beside the best singles, and beside the partners that these ask for.
+fn pairs(search: Search<'_>, singles: &[Fit]) -> Vec<Fit> {
+    let Search { study, linearised, selection, progress } = search;
+    let mut wanted: Vec<Wanted> = Vec::new();
+    let mut bases: Vec<usize> = (0..singles.len().min(2)).collect();
+    for round in 0..2 {
+        let found = parallel::map(&bases, |base| additions(study, linearised, selection, &singles[*base]));
+        for (base, added) in bases.iter().zip(found) {
+            for addition in added {
+                let cost = singles[*base].cost - addition.gain;
+                let mut names = vec![singles[*base].hypothesis.effects[0].0, addition.effect];
+                names.sort_unstable();
+                let candidate = Wanted { cost, names, partner: addition.effect, start: addition.start };
+                match wanted.iter_mut().find(|other| other.names == candidate.names) {
+                    Some(other) if other.cost <= cost => {}
+                    Some(other) => *other = candidate,
+                    None => wanted.push(candidate),
+                }
+            }
+        }
+        wanted.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        if round == 0 {
+            let place = |effect: usize| singles.iter().position(|f| f.hypothesis.effects[0].0 == effect);
+            let mut next: Vec<usize> = Vec::new();
+            for base in wanted.iter().take(8).filter_map(|w| place(w.partner)) {
+                if !next.contains(&base) && !bases.contains(&base) && next.len() < 2 {
+                    next.push(base);
+                }
+            }
+            bases = next;
+        }
+    }
+    progress(0.65, "pairs");
+    let starts: Vec<Hypothesis> = wanted.into_iter().take(6).map(|w| w.start).collect();
+    let effort = Effort { iterations: 5, enough: 0.5 };
+    let fitted = parallel::map(&starts, |start| fit(study, linearised, start, selection, effort));
+    let mut pairs = Vec::new();
+    for fitted in fitted.into_iter().flatten() {
+        keep_best(&mut pairs, fitted);
+    }
+    sort(&mut pairs);
+    refit(search, &mut pairs, 2, Effort::default());
+    pairs
+}
+
+/// A pair worth a fit.
+struct Wanted {
+    cost: f64,
+    names: Vec<usize>,
+    partner: usize,
+    start: Hypothesis,
+}
+
+/// Best score first.
+pub fn sort(fits: &mut [Fit]) {
     fits.sort_by(|a, b| b.score.total_cmp(&a.score));
 }
 
@@ -147,7 +166,7 @@ pub fn members(hypothesis: &Hypothesis) -> Vec<usize> {
 }
 
 /// Keeps one fit for each set of effects: the better.
-fn keep_best(fits: &mut Vec<Fit>, fitted: Fit) {
+pub fn keep_best(fits: &mut Vec<Fit>, fitted: Fit) {
     let names = members(&fitted.hypothesis);
     match fits.iter_mut().find(|other| members(&other.hypothesis) == names) {
         Some(other) if other.cost <= fitted.cost => {}

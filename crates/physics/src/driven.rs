@@ -13,7 +13,7 @@ use crate::state::MAX_STATES;
 use nalgebra::{Const, DimMin};
 
 /// Longest steps after a jump: up to so many seconds, steps of at most so many seconds.
-const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.0), (f64::INFINITY, 3.0)];
+const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.8), (20.0, 2.0), (f64::INFINITY, 6.0)];
 
 /// Within this of the surge line, in places on the speed line, a fast step is taken in parts.
 const SURGE_CORNER: f64 = 0.01;
@@ -39,7 +39,7 @@ impl FrozenGrid {
         for until_s in wanted {
             while until_s - at_s > 1e-9 {
                 let since_s = at_s - jump_s;
-                let limit_s = STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(3.0, |(_, step)| *step);
+                let limit_s = STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(6.0, |(_, step)| *step);
                 // Equal parts, each within the limit.
                 let parts = ((until_s - at_s) / limit_s - 1e-6).ceil().max(1.0);
                 at_s = if parts <= 1.0 { until_s } else { at_s + ((until_s - at_s) / parts).max(limit_s * 0.5) };

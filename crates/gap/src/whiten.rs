@@ -62,6 +62,11 @@ impl Linearised {
         }
     }
 
+    /// Whitens values of one group, in place.
+    pub fn whiten_group(&self, group: usize, values: &mut [f64]) {
+        self.factors[group].whiten(values);
+    }
+
     /// Whitened residual of a prediction.
     pub fn residual(&self, study: &Study, prediction: &Prediction) -> Vec<f64> {
         let mut residual: Vec<f64> =

@@ -8,6 +8,7 @@ mod assembly_line;
 mod commands;
 mod exit_code;
 mod failure;
+mod gap_arguments;
 mod interrupt;
 mod observers;
 mod output;

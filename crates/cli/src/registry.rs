@@ -3,9 +3,11 @@
 use mapper_backends::{replay, virtual_lab};
 use mapper_campaign::Campaign;
 use mapper_core::{Backend, BackendError};
+use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use std::path::Path;
+use std::sync::Arc;
 
 /// What a backend is made from.
 pub struct BackendContext<'a> {
@@ -42,6 +44,11 @@ pub fn make_backend(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, Ba
     }
 }
 
+/// Every effect of the catalogue.
+pub fn effects() -> Vec<Arc<dyn Effect>> {
+    mapper_effects::catalogue()
+}
+
 fn make_virtual_lab(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, BackendError> {
     let campaign = context.campaign;
     let nominal = virtual_lab::NominalRig {
@@ -54,6 +61,8 @@ fn make_virtual_lab(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, Ba
             .iter()
             .filter_map(|(channel, sensor)| Some((*channel, sensor.static_tap_pipe_diameter_m?)))
             .collect(),
+        tolerances: campaign.tolerances,
+        effects: effects(),
         seed: campaign.seed,
     };
     let settings = virtual_lab::read_settings(&campaign.backend.settings, nominal)?;

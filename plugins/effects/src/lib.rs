@@ -5,6 +5,8 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod catalogued;
+#[cfg(test)]
+mod testing;
 
 use mapper_physics::effect::Effect;
 use std::sync::Arc;

@@ -24,8 +24,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-backends",  &["core", "physics", "units"]),
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-exporters", &["core", "physics", "chart"]),
+    // Draws cases on the virtual lab; above it, like the program.
+    ("mapper-blind",     &["core", "physics", "campaign", "record", "backends", "effects"]),
     // The program sees all; nothing sees the program.
-    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "reproduce", "backends", "exporters"]),
+    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

@@ -1,6 +1,9 @@
 //! One file a command.
 
 mod check;
+mod gap;
+mod gap_blind;
+mod gap_effects;
 mod identify;
 mod plan;
 mod reproduce;
@@ -19,6 +22,7 @@ pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
         Command::Plan(arguments) => plan::plan(arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Identify(arguments) => identify::identify(arguments),
+        Command::Gap(arguments) => gap::gap(arguments),
         Command::Reproduce(arguments) => reproduce::reproduce(arguments),
     }
 }

@@ -11,7 +11,7 @@ use crate::next::next;
 use crate::parallel;
 use crate::place::places;
 use crate::report::{Candidate, Diagnosis, Estimate, Verdict};
-use crate::select::{Search, additions, keep_best, members, search, sort};
+use crate::select::{Search, additions, keep_best, members, refit, search, sort};
 use crate::study::{PredictError, Study};
 use crate::table::Table;
 use crate::whiten::Linearised;
@@ -104,6 +104,16 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         keep_best(&mut fits, fitted);
     }
     sort(&mut fits);
+    // Close races are run where the best stands, not where nothing is off.
+    let anew = match (fits.first(), &found.anew) {
+        (Some(best), Some(_)) => linearised.at(&study, &best.hypothesis).ok(),
+        _ => None,
+    };
+    let beside = anew.as_ref().unwrap_or(beside);
+    if anew.is_some() {
+        let finals = Search { study: &study, linearised: beside, selection: &everywhere, progress };
+        refit(finals, &mut fits, 4, effort);
+    }
     progress(0.9, "what is left");
     let best = fits.first().unwrap_or(&null);
     let one_more =
@@ -137,7 +147,8 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     } else {
         places(&study, &linearised, &null, &all_fits, named)
     };
-    let next = rivals(&weighed, &null, &fits)
+    let next = rivals(&weighed, &fits)
+        .filter(|_| named)
         .and_then(|(first, second, odds)| next(&study, &linearised, first, second, odds));
     progress(1.0, "done");
     let diagnosis = Diagnosis {
@@ -251,13 +262,16 @@ fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> BTreeMap<St
     estimates
 }
 
-/// The two hypotheses that are left to tell apart, and the logarithm of their odds; `None` where one of them is certain.
-fn rivals<'a>(weighed: &Weighed, null: &'a Fit, fits: &'a [Fit]) -> Option<(&'a Fit, &'a Fit, f64)> {
-    let all: Vec<&Fit> = std::iter::once(null).chain(fits).collect();
-    let mut order: Vec<usize> = (0..all.len()).collect();
-    order.sort_by(|a, b| weighed.scores[*b].total_cmp(&weighed.scores[*a]));
-    let (first, second) = (*order.first()?, *order.get(1)?);
-    let odds = weighed.scores[first] - weighed.scores[second];
+/// The best cause and its strongest rival that is no mere addition to it, with the logarithm of their odds; `None`
+/// where there is none, or it is settled.
+fn rivals<'a>(weighed: &Weighed, fits: &'a [Fit]) -> Option<(&'a Fit, &'a Fit, f64)> {
+    let first = fits.first()?;
+    let of_first = members(&first.hypothesis);
+    let (place, second) = fits.iter().enumerate().skip(1).find(|(_, fit)| {
+        let others = members(&fit.hypothesis);
+        !of_first.iter().all(|effect| others.contains(effect))
+    })?;
+    let odds = weighed.scores[1] - weighed.scores[place + 1];
     // Odds of e^12 are settled.
-    (odds < 12.0).then(|| (all[first], all[second], odds))
+    (odds < 12.0).then_some((first, second, odds))
 }

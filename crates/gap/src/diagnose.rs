@@ -95,7 +95,14 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     progress(0.75, "all steps");
     let everywhere = Selection::all(&study);
     let beside = found.anew.as_ref().unwrap_or(&linearised);
-    let finalists: Vec<&Fit> = found.fits.iter().take(FINALISTS).collect();
+    let mut finalists: Vec<&Fit> = found.fits.iter().take(FINALISTS).collect();
+    // Whatever a pair adds, its members alone must have lost on all steps likewise.
+    if let Some(best) = found.fits.first() {
+        for effect in members(&best.hypothesis) {
+            let alone = found.fits.iter().find(|f| members(&f.hypothesis) == [effect]);
+            finalists.extend(alone.filter(|f| !finalists.iter().any(|other| std::ptr::eq(*other, *f))));
+        }
+    }
     let effort = Effort { iterations: 5, enough: 0.1 };
     let null = fit(&study, &linearised, &found.null.hypothesis, &everywhere, Effort::default())?;
     let mut fits: Vec<Fit> = Vec::new();

@@ -7,7 +7,7 @@ fn main() {
     for f in &a[1..] {
         let t0 = Instant::now();
         let r = read_recording(std::path::Path::new(f), &map, &ReadOptions::default()).unwrap();
-        let declared = Declared { sensors: map.sensors.clone(), noise_colour: map.noise_colour.unwrap(), tolerances: ModelTolerances::default(), nominal: Default::default() };
+        let declared = Declared { sensors: map.sensors.clone(), noise_colour: map.noise_colour.unwrap(), tolerances: Default::default(), nominal: Default::default() };
         let table = Table::new(&r.recording).unwrap();
         let study = Study::new(&r.recording, table, declared, mapper_physics::model::Model::nominal(), mapper_effects::catalogue()).unwrap();
         let lin = Linearised::new(&study).unwrap();

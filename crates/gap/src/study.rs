@@ -130,7 +130,8 @@ impl Study {
         model: Model,
         effects: Vec<Arc<dyn Effect>>,
     ) -> Result<Study, InputError> {
-        let nominal = Rig::new(model);
+        let mut nominal = Rig::new(model);
+        nominal.instruments.p3_lag_s = declared.tolerances.actuator_lag_s;
         let first_s = table.t_s.first().copied().unwrap_or(0.0);
         let steps: Vec<StudyStep> = recording
             .steps

@@ -14,10 +14,31 @@ pub struct GapArguments {
 /// One variant a command.
 #[derive(Debug, Subcommand)]
 pub enum GapCommand {
+    /// Say where a recording leaves the nominal model, which effect causes it, how far that closes the gap, what is next
+    Diagnose(DiagnoseArguments),
     /// Check the diagnosis on data whose causes are withheld
     Blind(BlindArguments),
     /// List the effects that a rig may have and the nominal model has not
     Effects(EffectsArguments),
+}
+
+/// `mapper gap diagnose`.
+#[derive(Debug, Args)]
+pub struct DiagnoseArguments {
+    /// Campaign that says machine, declared uncertainties and tolerances (YAML)
+    pub campaign: PathBuf,
+    /// Run directory, or MCAP file
+    #[arg(long, value_name = "FILE")]
+    pub recording: PathBuf,
+    /// Where a recording made by another program holds the rig's channels (YAML)
+    #[arg(long, value_name = "MAP")]
+    pub channels: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+    /// Also write a page with pictures to this new file
+    #[arg(long, value_name = "OUT")]
+    pub html: Option<PathBuf>,
 }
 
 /// `mapper gap effects`.

@@ -9,6 +9,7 @@ mod bracket;
 pub mod characteristic;
 pub mod closed_form_map;
 pub mod compression;
+pub mod driven;
 pub mod effect;
 pub mod efficiency_shape;
 pub mod follow_outlet;

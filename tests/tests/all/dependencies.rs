@@ -18,6 +18,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-record",    &["core", "units"]),
     ("mapper-identify",  &["core", "physics"]),
     ("mapper-assemble",  &["core", "physics", "identify"]),
+    ("mapper-gap",       &["core", "physics"]),
     ("mapper-score",     &["core", "record"]),
     ("mapper-reproduce", &["core", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
@@ -28,7 +29,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Draws cases on the virtual lab; above it, like the program.
     ("mapper-blind",     &["core", "physics", "campaign", "record", "backends", "effects"]),
     // The program sees all; nothing sees the program.
-    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters", "importers"]),
+    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters", "importers"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),
@@ -39,6 +40,7 @@ const NEVER_IN_TESTS: &[(&str, &[&str])] = &[
     ("mapper-identify", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
     ("mapper-assemble", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
     ("mapper-drift", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
+    ("mapper-gap", &["mapper-backends", "mapper-blind", "mapper-score", "mapper-cli"]),
 ];
 
 /// Libraries that only some packages may use.

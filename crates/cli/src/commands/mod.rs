@@ -3,6 +3,9 @@
 mod check;
 mod gap;
 mod gap_blind;
+mod gap_diagnose;
+mod gap_page;
+mod gap_text;
 mod gap_effects;
 mod identify;
 mod map_compare;

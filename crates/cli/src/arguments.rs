@@ -4,6 +4,7 @@ use crate::exit_code;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mapper_campaign::units::{Kind, parse};
 use mapper_core::{Method, OperatingPoint};
+use mapper_history::Figure;
 use std::path::PathBuf;
 
 /// From a campaign file to a complete turbocharger-compressor map, efficiency and heat transfer included.
@@ -28,6 +29,10 @@ pub enum Command {
     Run(RunArguments),
     /// Identify efficiency and heat transfer from a run directory or any MCAP recording
     Identify(IdentifyArguments),
+    /// Run every map of a nightly campaign on the simulated rig and say what moved against the last nights
+    Nightly(NightlyArguments),
+    /// List, filter and draw what the nightly runs gave
+    History(HistoryArguments),
     /// Redo the paper's figures 5 to 10 and 12 on the nominal model, beside what the paper states
     Reproduce(ReproduceArguments),
 }
@@ -118,6 +123,68 @@ pub struct IdentifyArguments {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+}
+
+/// `mapper nightly`.
+#[derive(Debug, Args)]
+pub struct NightlyArguments {
+    /// Nightly campaign (YAML): campaigns, methods, seeds
+    pub nightly: PathBuf,
+    /// History to compare with and append to, instead of the file's `history`
+    #[arg(long, value_name = "FILE")]
+    pub db: Option<PathBuf>,
+    /// What moves tonight is right: begin a new band with this night
+    #[arg(long)]
+    pub accept: bool,
+    /// Runs at a time [default: all cores]
+    #[arg(long, value_name = "COUNT")]
+    pub jobs: Option<usize>,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mapper history`.
+#[derive(Debug, Args)]
+pub struct HistoryArguments {
+    /// The history
+    #[arg(long, value_name = "FILE", default_value = "runs/history.db")]
+    pub db: PathBuf,
+    /// Only this machine, or campaign
+    #[arg(long, value_name = "NAME")]
+    pub machine: Option<String>,
+    /// Only this method
+    #[arg(long, value_name = "METHOD")]
+    pub method: Option<String>,
+    /// Show this figure instead of the usual ones; may be given more than once
+    #[arg(long, value_name = "FIGURE", value_parser = figure)]
+    pub figure: Vec<Figure>,
+    /// Only nights from this day on (UTC)
+    #[arg(long, value_name = "YYYY-MM-DD", value_parser = day)]
+    pub since: Option<jiff::Timestamp>,
+    /// A row for each run, instead of the medians over the seeds
+    #[arg(long)]
+    pub runs: bool,
+    /// Draw the trends into this new SVG file
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn figure(text: &str) -> Result<Figure, String> {
+    Figure::find(text).ok_or_else(|| {
+        let names: Vec<&str> = Figure::ALL.into_iter().map(Figure::name).collect();
+        format!("there is no figure `{text}`; there are {}", names.join(", "))
+    })
+}
+
+/// Midnight UTC at the begin of a day.
+fn day(text: &str) -> Result<jiff::Timestamp, String> {
+    let day: jiff::civil::Date = text.parse().map_err(|error| format!("{error}; write e.g. 2026-11-21"))?;
+    let midnight = day.to_zoned(jiff::tz::TimeZone::UTC).map_err(|error| error.to_string())?;
+    Ok(midnight.timestamp())
 }
 
 /// `mapper reproduce`.

@@ -19,12 +19,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-identify",  &["core", "physics"]),
     ("mapper-assemble",  &["core", "identify"]),
     ("mapper-score",     &["core", "record"]),
+    ("mapper-history",   &[]),
     ("mapper-reproduce", &["core", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
     ("mapper-backends",  &["core", "physics", "units"]),
     ("mapper-exporters", &["core", "physics", "chart"]),
     // The program sees all; nothing sees the program.
-    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "reproduce", "backends", "exporters"]),
+    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "history", "reproduce", "backends", "exporters"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

@@ -1,7 +1,9 @@
 //! One file a command.
 
 mod check;
+mod history;
 mod identify;
+mod nightly;
 mod plan;
 mod reproduce;
 mod run;
@@ -10,6 +12,7 @@ mod scripted;
 
 use crate::arguments::{Arguments, Command};
 use crate::failure::Failure;
+pub use history::median as history_median;
 
 /// Runs the command that was asked for.
 pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
@@ -19,6 +22,8 @@ pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
         Command::Plan(arguments) => plan::plan(arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Identify(arguments) => identify::identify(arguments),
+        Command::Nightly(arguments) => nightly::nightly(arguments),
+        Command::History(arguments) => history::history(arguments),
         Command::Reproduce(arguments) => reproduce::reproduce(arguments),
     }
 }

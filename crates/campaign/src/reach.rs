@@ -33,7 +33,7 @@ pub fn nominal_model(campaign: &Campaign) -> Result<Model, MapError> {
         }
         MapSource::Table { text, reference, .. } => Arc::new(TabulatedMap::from_csv(text, *reference)?),
     };
-    Ok(Model { params, map })
+    Ok(Model::new(params, map))
 }
 
 /// The points that cannot be measured: no steady state, beyond the surge line or too close to it, P3 or compressor

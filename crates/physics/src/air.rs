@@ -33,6 +33,18 @@ pub fn isentropic_exponent(temperature_k: f64) -> f64 {
     GAS_CONSTANT_J_KGK / heat_capacity_j_kgk(temperature_k)
 }
 
+/// Gas constant of air with `humidity_kg_kg` of water per dry air, `R (1 + 0.6078 w)`, J/(kg K).
+#[inline]
+pub fn moist_gas_constant_j_kgk(humidity_kg_kg: f64) -> f64 {
+    GAS_CONSTANT_J_KGK * (1.0 + 0.6078 * humidity_kg_kg)
+}
+
+/// Heat capacity of air with `humidity_kg_kg` of water per dry air over that of dry air, `1 + 0.84 w`.
+#[inline]
+pub fn moist_heat_capacity_ratio(humidity_kg_kg: f64) -> f64 {
+    1.0 + 0.84 * humidity_kg_kg
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

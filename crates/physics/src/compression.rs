@@ -53,19 +53,58 @@ pub fn compressed_k(inlet_k: f64, isentropic_rise_ratio: f64, efficiency: f64) -
     inlet_k * (1.0 + isentropic_rise_ratio / efficiency)
 }
 
+/// Eq. 1 for a conductance in front of the wheel: heat from gas to metal in W, and the gas behind it in K.
+#[inline]
+pub fn before_wheel(
+    conductance_w_k: f64,
+    t1_k: f64,
+    wall_k: f64,
+    flow_kg_s: f64,
+    cp_j_kgk: f64,
+) -> (f64, f64) {
+    let heat_w = conductance_w_k * (t1_k - wall_k);
+    (heat_w, t1_k - heat_w / (flow_kg_s * cp_j_kgk))
+}
+
+/// Gas after a wheel that pumps part of its flow in a circle, K: `r` m of the (1 + r) m it pumps come back, hot, to its
+/// inlet, so that T2' = T1'(1 + X)/(1 - r X) with X = rise/efficiency. Eq. 2 where `recirculation_ratio` is 0.
+#[inline]
+pub fn behind_wheel_k(
+    t1_prime_k: f64,
+    isentropic_rise_ratio: f64,
+    efficiency: f64,
+    recirculation_ratio: f64,
+) -> f64 {
+    // Beyond a tenth the circle would heat itself without bound; no compressor comes near it.
+    let circle = (1.0 - recirculation_ratio * isentropic_rise_ratio / efficiency).max(0.1);
+    compressed_k(t1_prime_k, isentropic_rise_ratio, efficiency) / circle
+}
+
+/// Eq. 3 for a conductance behind the wheel: heat from gas to metal in W, and the gas at the outlet in K.
+#[inline]
+pub fn after_wheel(
+    conductance_w_k: f64,
+    t2_prime_k: f64,
+    wall_k: f64,
+    flow_kg_s: f64,
+    cp_j_kgk: f64,
+) -> (f64, f64) {
+    let transfer_units = conductance_w_k / (flow_kg_s * cp_j_kgk);
+    let t2_k = (t2_prime_k + transfer_units * wall_k) / (1.0 + transfer_units);
+    (conductance_w_k * (t2_k - wall_k), t2_k)
+}
+
 /// Eqs. 1-3. `bulk_heat_capacity_k` is the temperature at which eq. 3 takes cp: the model takes the temperature of
 /// compression without heat transfer, the identification T2' itself (pass `None`).
 #[inline]
 pub fn compress(inputs: &CompressionInputs, bulk_heat_capacity_k: Option<f64>) -> Compression {
-    let area_before_m2 = inputs.alpha_area_ratio * inputs.internal_area_m2;
-    let area_after_m2 = (1.0 - inputs.alpha_area_ratio) * inputs.internal_area_m2;
-    let q1_w = inputs.h_w_m2k * area_before_m2 * (inputs.t1_k - inputs.tc_k);
-    let t1_prime_k = inputs.t1_k - q1_w / (inputs.flow_kg_s * air::heat_capacity_j_kgk(inputs.t1_k));
-    let t2_prime_k = compressed_k(t1_prime_k, inputs.isentropic_rise_ratio, inputs.efficiency);
+    let &CompressionInputs { t1_k, tc_k, flow_kg_s, isentropic_rise_ratio, efficiency, h_w_m2k, .. } = inputs;
+    let before_w_k = h_w_m2k * (inputs.alpha_area_ratio * inputs.internal_area_m2);
+    let after_w_k = h_w_m2k * ((1.0 - inputs.alpha_area_ratio) * inputs.internal_area_m2);
+    let (q1_w, t1_prime_k) = before_wheel(before_w_k, t1_k, tc_k, flow_kg_s, air::heat_capacity_j_kgk(t1_k));
+    let t2_prime_k = compressed_k(t1_prime_k, isentropic_rise_ratio, efficiency);
     let cp = air::heat_capacity_j_kgk(bulk_heat_capacity_k.unwrap_or(t2_prime_k));
-    let transfer_units = inputs.h_w_m2k * area_after_m2 / (inputs.flow_kg_s * cp);
-    let t2_k = (t2_prime_k + transfer_units * inputs.tc_k) / (1.0 + transfer_units);
-    let q2_w = inputs.h_w_m2k * area_after_m2 * (t2_k - inputs.tc_k);
+    let (q2_w, t2_k) = after_wheel(after_w_k, t2_prime_k, tc_k, flow_kg_s, cp);
     Compression { t1_prime_k, t2_prime_k, t2_k, q1_w, q2_w }
 }
 

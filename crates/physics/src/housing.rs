@@ -26,16 +26,30 @@ pub fn bearing_k(
         / (2.0 * bearing_conductance_w_k + oil_conductance_w_k)
 }
 
-/// Heat from a housing to the cell by free convection and radiation (Appendix A), W.
+/// Heat from a housing to the cell by free convection and radiation (Appendix A), W. `convection_ratio` multiplies the
+/// convection; 1 is Appendix A's.
 #[inline]
-pub fn external_heat_w(area_m2: f64, emissivity_ratio: f64, wall_k: f64, ambient_k: f64) -> f64 {
+pub fn external_heat_w(
+    area_m2: f64,
+    emissivity_ratio: f64,
+    convection_ratio: f64,
+    wall_k: f64,
+    ambient_k: f64,
+) -> f64 {
     let over_k = wall_k - ambient_k;
     // The library's cube root takes three times as long as this; 0 gives exp(-inf) = 0, as it must.
     let third_root = (over_k.abs().ln() / 3.0).exp();
     let (wall2, ambient2) = (wall_k * wall_k, ambient_k * ambient_k);
     area_m2
-        * (FREE_CONVECTION_COEFFICIENT * third_root * over_k
+        * (convection_ratio * FREE_CONVECTION_COEFFICIENT * third_root * over_k
             + emissivity_ratio * STEFAN_BOLTZMANN_W_M2K4 * (wall2 * wall2 - ambient2 * ambient2))
+}
+
+/// Heat from turbine to compressor housing by radiation through a view factor times area, W.
+#[inline]
+pub fn radiation_w(area_m2: f64, tt_k: f64, tc_k: f64) -> f64 {
+    let (tt2, tc2) = (tt_k * tt_k, tc_k * tc_k);
+    area_m2 * STEFAN_BOLTZMANN_W_M2K4 * (tt2 * tt2 - tc2 * tc2)
 }
 
 /// Heat capacity of the compressor housing, J/K (Appendix A: 930-990 J/(kg K) over 300..500 K).

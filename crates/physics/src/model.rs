@@ -1,8 +1,11 @@
 //! The lumped turbocharger: shaft, outlet volume, two housings, and the gas paths between them.
 
 use crate::characteristic::CompressorCharacteristic;
-use crate::compression::{self, CompressionInputs};
+use crate::compression;
+use crate::hooks::{HookList, Hooks, Site};
 use crate::params::{BoundaryConditions, Params};
+use crate::state::MAX_STATES;
+pub use crate::state::{State, rad_s_of_rpm};
 use crate::turbine::{TurbineInlet, TurbineState};
 use crate::{air, housing, nusselt, orifice, thermocouple};
 use std::sync::Arc;
@@ -17,41 +20,8 @@ pub struct Model {
     pub params: Params,
     /// Flow and efficiency.
     pub map: Arc<dyn CompressorCharacteristic>,
-}
-
-/// What moves: the five states.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct State {
-    /// Shaft speed, rad/s, > 0.
-    pub shaft_speed_rad_s: f64,
-    /// Compressor outlet total pressure (station 2), Pa.
-    pub p2_pa: f64,
-    /// Compressor housing temperature, K.
-    pub tc_k: f64,
-    /// Turbine housing temperature, K.
-    pub tt_k: f64,
-    /// Temperature of the T2 probe's tip, K; unused with an ideal probe.
-    pub t2_tip_k: f64,
-}
-
-impl State {
-    /// Shaft speed, rpm.
-    pub fn shaft_speed_rpm(&self) -> f64 {
-        self.shaft_speed_rad_s * 30.0 / std::f64::consts::PI
-    }
-
-    pub(crate) fn to_array(self) -> [f64; 5] {
-        [self.shaft_speed_rad_s, self.p2_pa, self.tc_k, self.tt_k, self.t2_tip_k]
-    }
-
-    pub(crate) fn from_array(y: &[f64; 5]) -> Self {
-        State { shaft_speed_rad_s: y[0], p2_pa: y[1], tc_k: y[2], tt_k: y[3], t2_tip_k: y[4] }
-    }
-}
-
-/// Shaft speed in rad/s of one in rpm.
-pub fn rad_s_of_rpm(speed_rpm: f64) -> f64 {
-    speed_rpm * std::f64::consts::PI / 30.0
+    /// What takes part beyond the parameters; usually nothing.
+    pub hooks: HookList,
 }
 
 /// Everything the model knows at one instant.
@@ -77,12 +47,24 @@ pub struct Outputs {
     pub t2_k: f64,
     /// Reading of the T2 probe, K.
     pub t2_probe_k: f64,
+    /// What the T2 probe tends to: the gas, but for stem and recovery, K.
+    pub t2_probe_target_k: f64,
     /// Time constant of the T2 probe, s; 0 for an ideal one.
     pub t2_probe_time_constant_s: f64,
     /// Heat from gas to compressor housing, both places, W.
     pub compressor_heat_w: f64,
+    /// Temperature of the metal that touches the compressor's gas, K.
+    pub wall_k: f64,
     /// Power the compressor takes from the shaft, W.
     pub compressor_power_w: f64,
+    /// Power that bearing friction takes from the shaft, W.
+    pub friction_power_w: f64,
+    /// Heat from turbine to compressor housing by radiation, W.
+    pub radiation_w: f64,
+    /// Heat from the inner wall to the rest of the compressor housing, W; 0 where the housing is one node.
+    pub inner_heat_w: f64,
+    /// What hooks add.
+    pub added: Added,
     /// Heat from the compressor housing to the cell, W.
     pub compressor_external_heat_w: f64,
     /// Heat from the turbine housing to the cell, W.
@@ -95,6 +77,21 @@ pub struct Outputs {
     pub turbine_flow_kg_s: f64,
     /// Turbine gas path.
     pub turbine: TurbineState,
+}
+
+/// Heats and power that hooks add; 0 without them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Added {
+    /// Heat to the compressor housing (its outer part), W.
+    pub compressor_heat_w: f64,
+    /// Heat to the inner wall of the compressor housing, W.
+    pub inner_heat_w: f64,
+    /// Heat to the turbine housing, W.
+    pub turbine_heat_w: f64,
+    /// Power to the shaft, W.
+    pub shaft_power_w: f64,
+    /// Rates of the hidden temperatures, K/s.
+    pub extra_rates_k_s: [f64; crate::state::MAX_EXTRA],
 }
 
 /// The model under boundary conditions that hold for a while; evaluating it repeats nothing that they fix.
@@ -110,6 +107,14 @@ pub struct PreparedModel<'a> {
     flow_correction_ratio: f64,
     kappa1: f64,
     cp1_j_kgk: f64,
+    /// Heat capacity of the compressor's air over that of dry air.
+    moist_cp_ratio: f64,
+    /// Gas constant of the compressor's air, J/(kg K).
+    gas_constant_j_kgk: f64,
+    /// Flow of the compressor's air over that of dry air, through map and valve.
+    moist_flow_ratio: f64,
+    /// h of the compressor's air over that of dry air: the Prandtl number's root.
+    moist_h_ratio: f64,
 }
 
 /// Boundary conditions under which the model has no meaning.
@@ -170,22 +175,44 @@ impl Model {
         let params = Params::default();
         let map =
             crate::closed_form_map::ClosedFormMap { wheel_diameter_m: params.compressor.wheel_diameter_m };
-        Model { params, map: Arc::new(map) }
+        Model::new(params, Arc::new(map))
+    }
+
+    /// A machine without hooks.
+    pub fn new(params: Params, map: Arc<dyn CompressorCharacteristic>) -> Self {
+        Model { params, map, hooks: HookList::default() }
+    }
+
+    /// Whether the inner wall of the compressor housing has its own temperature.
+    #[inline]
+    pub fn has_inner_wall(&self) -> bool {
+        self.params.compressor.inner_capacity_ratio > 0.0
     }
 
     /// The model under fixed boundary conditions, which the caller has [checked](BoundaryConditions::check).
     #[inline]
     pub fn prepare(&self, boundary: &BoundaryConditions) -> PreparedModel<'_> {
         let reference = self.map.reference();
+        let humidity_kg_kg = self.params.compressor.humidity_kg_kg;
+        let moist_cp_ratio = air::moist_heat_capacity_ratio(humidity_kg_kg);
+        let gas_constant_j_kgk = air::moist_gas_constant_j_kgk(humidity_kg_kg);
+        let moist_flow_ratio = (air::GAS_CONSTANT_J_KGK / gas_constant_j_kgk).sqrt();
+        let cp1_j_kgk = moist_cp_ratio * air::heat_capacity_j_kgk(boundary.t1_k);
         PreparedModel {
             model: self,
             boundary: *boundary,
             turbine: TurbineInlet::new(&self.params.turbine, boundary),
             bearing_conductance_w_k: housing::bearing_conductance_w_k(&self.params.bearing),
             speed_correction_ratio: reference.corrected_speed_rpm(1.0, boundary.t1_k),
-            flow_correction_ratio: reference.physical_flow_kg_s(1.0, boundary.t1_k, boundary.p1_pa),
-            kappa1: air::isentropic_exponent(boundary.t1_k),
-            cp1_j_kgk: air::heat_capacity_j_kgk(boundary.t1_k),
+            flow_correction_ratio: reference.physical_flow_kg_s(1.0, boundary.t1_k, boundary.p1_pa)
+                * moist_flow_ratio
+                / (1.0 + self.params.compressor.recirculation_ratio),
+            kappa1: gas_constant_j_kgk / cp1_j_kgk,
+            cp1_j_kgk,
+            moist_cp_ratio,
+            gas_constant_j_kgk,
+            moist_flow_ratio,
+            moist_h_ratio: moist_cp_ratio.cbrt(),
         }
     }
 }
@@ -199,94 +226,241 @@ impl PreparedModel<'_> {
     /// Everything the model knows at `state`.
     #[inline]
     pub fn evaluate(&self, state: &State) -> Outputs {
-        let (params, boundary) = (&self.model.params, &self.boundary);
+        // Two bodies from one text: a model without hooks must not pay for looking.
+        if self.model.hooks.is_empty() {
+            self.evaluate_with::<false>(state)
+        } else {
+            self.evaluate_with::<true>(state)
+        }
+    }
+
+    #[inline]
+    fn evaluate_with<const HOOKED: bool>(&self, state: &State) -> Outputs {
+        let (params, boundary, hooks) = (&self.model.params, &self.boundary, &self.model.hooks);
         let compressor = &params.compressor;
         let pressure_ratio = state.p2_pa / boundary.p1_pa;
         let on_map =
             self.model.map.evaluate(state.shaft_speed_rpm() * self.speed_correction_ratio, pressure_ratio);
-        let flow_kg_s = (on_map.flow_corrected_kg_s * self.flow_correction_ratio).max(LOWEST_FLOW_KG_S);
+        let flow_corrected_kg_s = on_map.flow_corrected_kg_s * compressor.flow_scale_ratio;
+        let inner = self.model.has_inner_wall();
+        let wall_k = if inner { state.inner_k } else { state.tc_k };
+        let bearing_k = housing::bearing_k(
+            self.bearing_conductance_w_k,
+            params.bearing.oil_conductance_w_k,
+            state.tc_k,
+            state.tt_k,
+            boundary.oil_temperature_k,
+        );
+        let mut site = Site::before_the_gas(boundary, state, wall_k, pressure_ratio, bearing_k);
+        let mut flow_kg_s = flow_corrected_kg_s * self.flow_correction_ratio;
+        let mut efficiency = on_map.efficiency * compressor.efficiency_scale_ratio;
+        if HOOKED {
+            flow_kg_s = hooks.fold(&site, flow_kg_s, |hook, site, value| hook.flow_kg_s(site, value));
+        }
+        flow_kg_s = flow_kg_s.max(LOWEST_FLOW_KG_S);
+        if HOOKED {
+            site.flow_kg_s = flow_kg_s;
+            efficiency = hooks.fold(&site, efficiency, |hook, site, value| hook.efficiency(site, value));
+            site.efficiency = efficiency;
+        }
 
         let isentropic_rise_ratio = pressure_ratio.powf(self.kappa1) - 1.0;
         // Bulk temperature of the properties: compression from T1 without heat transfer.
-        let bulk_k = compression::compressed_k(boundary.t1_k, isentropic_rise_ratio, on_map.efficiency);
-        let h_w_m2k = nusselt::coefficient_w_m2k(
+        let bulk_k = compression::compressed_k(boundary.t1_k, isentropic_rise_ratio, efficiency);
+        let mut h_w_m2k = nusselt::coefficient_w_m2k(
             compressor.nusselt_coefficient,
             compressor.nusselt_exponent,
             compressor.outlet_diameter_m,
             flow_kg_s,
             bulk_k,
-            state.tc_k,
+            wall_k,
+        ) * self.moist_h_ratio;
+        if HOOKED {
+            h_w_m2k = hooks.fold(&site, h_w_m2k, |hook, site, value| hook.h_w_m2k(site, value));
+            site.h_w_m2k = h_w_m2k;
+        }
+        let conductance_w_k = h_w_m2k * compressor.internal_area_m2;
+        let directed_w_k = |gas_k: f64| {
+            if wall_k > gas_k { conductance_w_k * compressor.hot_metal_h_ratio } else { conductance_w_k }
+        };
+        let (q1_w, mut t1_prime_k) = compression::before_wheel(
+            directed_w_k(boundary.t1_k) * compressor.alpha_area_ratio + compressor.inlet_conductance_w_k,
+            boundary.t1_k,
+            wall_k,
+            flow_kg_s,
+            self.cp1_j_kgk,
         );
-        let gas = compression::compress(
-            &CompressionInputs {
-                t1_k: boundary.t1_k,
-                tc_k: state.tc_k,
-                flow_kg_s,
-                isentropic_rise_ratio,
-                efficiency: on_map.efficiency,
-                h_w_m2k,
-                alpha_area_ratio: compressor.alpha_area_ratio,
-                internal_area_m2: compressor.internal_area_m2,
-            },
-            Some(bulk_k),
+        if HOOKED {
+            t1_prime_k = hooks.fold(&site, t1_prime_k, |hook, site, value| hook.gas_before_k(site, value));
+            site.t1_prime_k = t1_prime_k;
+        }
+        let mut t2_prime_k = compression::behind_wheel_k(
+            t1_prime_k,
+            isentropic_rise_ratio,
+            efficiency,
+            compressor.recirculation_ratio,
         );
+        let compressor_power_w = flow_kg_s * self.cp1_j_kgk * (t2_prime_k - t1_prime_k);
+        if HOOKED {
+            t2_prime_k = hooks.fold(&site, t2_prime_k, |hook, site, value| hook.gas_after_k(site, value));
+            site.t2_prime_k = t2_prime_k;
+        }
+        let (q2_w, mut t2_k) = compression::after_wheel(
+            directed_w_k(t2_prime_k) * (1.0 - compressor.alpha_area_ratio),
+            t2_prime_k,
+            wall_k,
+            flow_kg_s,
+            self.moist_cp_ratio * air::heat_capacity_j_kgk(bulk_k),
+        );
+        if HOOKED {
+            site.t2_k = t2_k;
+            t2_k = hooks.fold(&site, t2_k, |hook, site, value| hook.gas_outlet_k(site, value));
+            site.t2_k = t2_k;
+        }
         let t2_probe_time_constant_s = thermocouple::time_constant_s(
             params.t2_probe_diameter_m,
             compressor.outlet_diameter_m,
             flow_kg_s,
-            gas.t2_k,
+            t2_k,
         );
+        let t2_probe_target_k = t2_k + params.t2_probe_stem_ratio * (state.tc_k - t2_k)
+            - if params.t2_probe_recovery_ratio == 1.0 {
+                0.0
+            } else {
+                (1.0 - params.t2_probe_recovery_ratio)
+                    * thermocouple::dynamic_temperature_k(
+                        compressor.outlet_diameter_m,
+                        flow_kg_s,
+                        state.p2_pa,
+                        t2_k,
+                        self.gas_constant_j_kgk,
+                    )
+            };
+        let external_heat_w = |area_m2: f64, emissivity_ratio: f64, wall_k: f64| {
+            let convection_ratio = params.external_convection_ratio;
+            let ambient_k = boundary.ambient_temperature_k;
+            housing::external_heat_w(area_m2, emissivity_ratio, convection_ratio, wall_k, ambient_k)
+        };
         Outputs {
             flow_kg_s,
-            flow_corrected_kg_s: on_map.flow_corrected_kg_s,
+            flow_corrected_kg_s,
             pressure_ratio,
-            efficiency: on_map.efficiency,
+            efficiency,
             surge_position_ratio: on_map.surge_position_ratio,
             h_w_m2k,
-            t1_prime_k: gas.t1_prime_k,
-            t2_prime_k: gas.t2_prime_k,
-            t2_k: gas.t2_k,
-            t2_probe_k: if t2_probe_time_constant_s > 0.0 { state.t2_tip_k } else { gas.t2_k },
+            t1_prime_k,
+            t2_prime_k,
+            t2_k,
+            t2_probe_k: if t2_probe_time_constant_s > 0.0 { state.t2_tip_k } else { t2_probe_target_k },
+            t2_probe_target_k,
             t2_probe_time_constant_s,
-            compressor_heat_w: gas.q1_w + gas.q2_w,
-            compressor_power_w: flow_kg_s * self.cp1_j_kgk * (gas.t2_prime_k - gas.t1_prime_k),
-            compressor_external_heat_w: housing::external_heat_w(
+            compressor_heat_w: q1_w + q2_w,
+            wall_k,
+            compressor_power_w,
+            friction_power_w: params.bearing_friction_w_s2
+                * state.shaft_speed_rad_s
+                * state.shaft_speed_rad_s,
+            radiation_w: if params.radiation_area_m2 == 0.0 {
+                0.0
+            } else {
+                housing::radiation_w(params.radiation_area_m2, state.tt_k, state.tc_k)
+            },
+            inner_heat_w: if inner { compressor.inner_conductance_w_k * (wall_k - state.tc_k) } else { 0.0 },
+            added: if HOOKED { self.added(&site) } else { Added::default() },
+            compressor_external_heat_w: external_heat_w(
                 compressor.external_area_m2,
                 compressor.emissivity_ratio,
                 state.tc_k,
-                boundary.ambient_temperature_k,
             ),
-            turbine_external_heat_w: housing::external_heat_w(
+            turbine_external_heat_w: external_heat_w(
                 params.turbine.external_area_m2,
                 params.turbine.emissivity_ratio,
                 state.tt_k,
-                boundary.ambient_temperature_k,
             ),
-            valve_flow_kg_s: orifice::flow_kg_s(
-                boundary.valve_opening_ratio
-                    * params.outlet.discharge_coefficient
-                    * params.outlet.valve_area_m2,
-                state.p2_pa,
-                gas.t2_k,
-                boundary.p1_pa,
-            ),
-            bearing_k: housing::bearing_k(
-                self.bearing_conductance_w_k,
-                params.bearing.oil_conductance_w_k,
-                state.tc_k,
-                state.tt_k,
-                boundary.oil_temperature_k,
-            ),
+            valve_flow_kg_s: self.moist_flow_ratio
+                * orifice::flow_kg_s(
+                    boundary.valve_opening_ratio
+                        * params.outlet.discharge_coefficient
+                        * params.outlet.valve_area_m2,
+                    state.p2_pa,
+                    t2_k,
+                    boundary.p1_pa,
+                ),
+            bearing_k,
             turbine_flow_kg_s: self.turbine.flow_kg_s,
             turbine: self.turbine.at(state.tt_k, state.shaft_speed_rad_s),
         }
     }
 
-    /// Heat that stays in the compressor housing, W.
+    /// What hooks add at a site where the gas path is known.
+    #[cold]
+    fn added(&self, site: &Site<'_>) -> Added {
+        let hooks = &self.model.hooks;
+        let sum = |ask: fn(&dyn Hooks, &Site<'_>) -> f64| {
+            hooks.fold(site, 0.0, |hook, site, sum| sum + ask(hook, site))
+        };
+        Added {
+            compressor_heat_w: sum(|hook, site| hook.heat_to_compressor_w(site)),
+            inner_heat_w: sum(|hook, site| hook.heat_to_inner_w(site)),
+            turbine_heat_w: sum(|hook, site| hook.heat_to_turbine_w(site)),
+            shaft_power_w: sum(|hook, site| hook.shaft_torque_nm(site)) * site.state.shaft_speed_rad_s,
+            extra_rates_k_s: hooks.extra_rates_k_s(site),
+        }
+    }
+
+    /// Where hooks that look at readings are asked: everything is known.
+    pub fn site<'b>(&'b self, state: &'b State, outputs: &Outputs) -> Site<'b> {
+        Site {
+            flow_kg_s: outputs.flow_kg_s,
+            efficiency: outputs.efficiency,
+            h_w_m2k: outputs.h_w_m2k,
+            t1_prime_k: outputs.t1_prime_k,
+            t2_prime_k: outputs.t2_prime_k,
+            t2_k: outputs.t2_k,
+            ..Site::before_the_gas(
+                &self.boundary,
+                state,
+                outputs.wall_k,
+                outputs.pressure_ratio,
+                outputs.bearing_k,
+            )
+        }
+    }
+
+    /// The model itself.
+    pub fn model(&self) -> &Model {
+        self.model
+    }
+
+    /// Power that is left to accelerate the shaft, W.
+    #[inline]
+    pub fn shaft_balance_w(&self, outputs: &Outputs) -> f64 {
+        outputs.turbine.power_w - outputs.compressor_power_w - outputs.friction_power_w
+            + outputs.added.shaft_power_w
+    }
+
+    /// Heat that stays in the compressor housing, W; in its outer part where the inner wall has its own temperature.
     #[inline]
     pub fn compressor_housing_balance_w(&self, state: &State, outputs: &Outputs) -> f64 {
-        outputs.compressor_heat_w + self.bearing_conductance_w_k * (outputs.bearing_k - state.tc_k)
+        let from_inside_w = if self.model.has_inner_wall() {
+            outputs.inner_heat_w
+        } else {
+            outputs.compressor_heat_w + outputs.added.inner_heat_w
+        };
+        from_inside_w + self.bearing_conductance_w_k * (outputs.bearing_k - state.tc_k)
             - outputs.compressor_external_heat_w
+            + outputs.radiation_w
+            + outputs.added.compressor_heat_w
+    }
+
+    /// Heat that stays in the inner wall of the compressor housing, W; 0 where the housing is one node.
+    #[inline]
+    pub fn inner_wall_balance_w(&self, outputs: &Outputs) -> f64 {
+        if self.model.has_inner_wall() {
+            outputs.compressor_heat_w + outputs.added.inner_heat_w - outputs.inner_heat_w
+        } else {
+            0.0
+        }
     }
 
     /// Heat that stays in the turbine housing, W.
@@ -295,23 +469,35 @@ impl PreparedModel<'_> {
         outputs.turbine.heat_w
             - self.bearing_conductance_w_k * (state.tt_k - outputs.bearing_k)
             - outputs.turbine_external_heat_w
+            - outputs.radiation_w
+            + outputs.added.turbine_heat_w
     }
 
-    /// Rates of the five states, in the order of [`State`]'s fields.
+    /// Rates of the first `N` states, in the order of [`State`]'s fields.
     #[inline]
-    pub(crate) fn derivatives(&self, state: &State, outputs: &Outputs) -> [f64; 5] {
+    pub(crate) fn derivatives<const N: usize>(&self, state: &State, outputs: &Outputs) -> [f64; N] {
         let params = &self.model.params;
         let tau_s = outputs.t2_probe_time_constant_s;
-        [
-            (outputs.turbine.power_w - outputs.compressor_power_w)
-                / (params.shaft_inertia_kgm2 * state.shaft_speed_rad_s),
-            air::HEAT_CAPACITY_RATIO * air::GAS_CONSTANT_J_KGK * outputs.t2_k / params.outlet.volume_m3
+        let outer_ratio = 1.0 - params.compressor.inner_capacity_ratio;
+        let all: [f64; MAX_STATES] = [
+            self.shaft_balance_w(outputs) / (params.shaft_inertia_kgm2 * state.shaft_speed_rad_s),
+            air::HEAT_CAPACITY_RATIO * self.gas_constant_j_kgk * outputs.t2_k / params.outlet.volume_m3
                 * (outputs.flow_kg_s - outputs.valve_flow_kg_s),
             self.compressor_housing_balance_w(state, outputs)
-                / housing::compressor_capacity_j_k(params, state.tc_k),
+                / (outer_ratio * housing::compressor_capacity_j_k(params, state.tc_k)),
             self.turbine_housing_balance_w(state, outputs)
                 / housing::turbine_capacity_j_k(params, state.tt_k),
-            if tau_s > 0.0 { (outputs.t2_k - state.t2_tip_k) / tau_s } else { 0.0 },
-        ]
+            if tau_s > 0.0 { (outputs.t2_probe_target_k - state.t2_tip_k) / tau_s } else { 0.0 },
+            if N > 5 && self.model.has_inner_wall() {
+                self.inner_wall_balance_w(outputs)
+                    / (params.compressor.inner_capacity_ratio
+                        * housing::compressor_capacity_j_k(params, state.inner_k))
+            } else {
+                0.0
+            },
+            outputs.added.extra_rates_k_s[0],
+            outputs.added.extra_rates_k_s[1],
+        ];
+        std::array::from_fn(|i| all[i])
     }
 }

@@ -21,6 +21,16 @@ pub struct Params {
     pub outlet: OutletParams,
     /// Diameter of the T2 probe's tip, m; 0 is an ideal probe (eqs. 11-12).
     pub t2_probe_diameter_m: f64,
+    /// Share chi of the way from gas to housing that the T2 probe's stem pulls its tip: it tends to T2 + chi (Tc - T2); 0.
+    pub t2_probe_stem_ratio: f64,
+    /// Recovery r of the T2 probe: it tends to T2 - (1 - r) v^2/(2 cp), v in the outlet pipe; 1.
+    pub t2_probe_recovery_ratio: f64,
+    /// Bearing friction c: c omega^2 is taken from the shaft, W s^2/rad^2, >= 0; Appendix A has none.
+    pub bearing_friction_w_s2: f64,
+    /// Multiplies the convection of both housings to the cell, >= 0; 1.
+    pub external_convection_ratio: f64,
+    /// View factor times area of the radiation from turbine to compressor housing, m2, >= 0; Appendix A has none.
+    pub radiation_area_m2: f64,
 }
 
 /// Compressor housing and wheel.
@@ -45,6 +55,23 @@ pub struct CompressorParams {
     pub external_area_m2: f64,
     /// External emissivity, 0..1, ratio to a black body.
     pub emissivity_ratio: f64,
+    /// Multiplies h where the metal is hotter than the gas it touches (T1 before, T2' after compression), > 0; 1.
+    pub hot_metal_h_ratio: f64,
+    /// Conductance from the housing to the gas between the T1 probe and the wheel, besides `alpha_area_ratio`, W/K; 0.
+    pub inlet_conductance_w_k: f64,
+    /// Multiplies the map's efficiency, > 0; 1.
+    pub efficiency_scale_ratio: f64,
+    /// Multiplies the map's flow, > 0; 1.
+    pub flow_scale_ratio: f64,
+    /// Part r of the flow that comes back, hot, from the wheel's exit to its inlet: the wheel, and with it the map, has
+    /// (1 + r) times the flow that leaves the compressor; 0.
+    pub recirculation_ratio: f64,
+    /// Water in the air of the compressor side, kg per kg of dry air, >= 0; 0.
+    pub humidity_kg_kg: f64,
+    /// Fraction phi of the housing's heat capacity that touches the gas and has its own temperature, 0..1; 0 is one node.
+    pub inner_capacity_ratio: f64,
+    /// Conductance G between that inner wall and the rest, W/K, > 0; without meaning where the housing is one node.
+    pub inner_conductance_w_k: f64,
 }
 
 /// Turbine housing and wheel.
@@ -114,6 +141,14 @@ impl Default for Params {
                 housing_mass_kg: 0.93,
                 external_area_m2: 79e-3,
                 emissivity_ratio: 0.1,
+                hot_metal_h_ratio: 1.0,
+                inlet_conductance_w_k: 0.0,
+                efficiency_scale_ratio: 1.0,
+                flow_scale_ratio: 1.0,
+                recirculation_ratio: 0.0,
+                humidity_kg_kg: 0.0,
+                inner_capacity_ratio: 0.0,
+                inner_conductance_w_k: 20.0,
             },
             turbine: TurbineParams {
                 internal_area_m2: 24e-3,
@@ -137,6 +172,11 @@ impl Default for Params {
             shaft_inertia_kgm2: 16e-6,
             outlet: OutletParams { volume_m3: 0.78e-3, valve_area_m2: 0.4e-3, discharge_coefficient: 0.6 },
             t2_probe_diameter_m: 0.0,
+            t2_probe_stem_ratio: 0.0,
+            t2_probe_recovery_ratio: 1.0,
+            bearing_friction_w_s2: 0.0,
+            external_convection_ratio: 1.0,
+            radiation_area_m2: 0.0,
         }
     }
 }

@@ -207,6 +207,32 @@ where
         }
     }
 
+    /// Takes exactly one step, to `end_s` (> `t_s`), without control of its error: on a frozen grid of steps, runs with
+    /// slightly different parameters differ smoothly, which a step-size control would spoil.
+    ///
+    /// # Errors
+    /// [`IntegrationError::StepTooSmall`] where the system cannot be stepped at all (rates that are no numbers).
+    pub fn step_on_grid(
+        &mut self,
+        system: &mut impl OdeSystem<N>,
+        end_s: f64,
+    ) -> Result<Step<N>, IntegrationError> {
+        let (t0_s, y0) = (self.t_s, self.y);
+        let f0 = system.rates(t0_s, &y0);
+        let time_derivative = system.time_derivative(t0_s, &y0, &f0);
+        let jacobian = self.jacobian(system, t0_s, &y0, &f0);
+        let failed = IntegrationError::StepTooSmall { t_s: t0_s, step_s: end_s - t0_s };
+        let stages =
+            self.stages(system, &jacobian, &f0, time_derivative.as_ref(), end_s - t0_s).ok_or(failed)?;
+        if !stages.y1.iter().all(|value| value.is_finite()) {
+            return Err(failed);
+        }
+        self.steps += 1;
+        self.t_s = end_s;
+        self.y = stages.y1;
+        Ok(Step { t0_s, t1_s: end_s, y0, y1: stages.y1, dense: stages.dense })
+    }
+
     fn scale(&self, i: usize, a: f64, b: f64) -> f64 {
         self.tolerances.absolute[i] + self.tolerances.relative_ratio * a.abs().max(b.abs())
     }

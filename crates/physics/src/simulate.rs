@@ -4,8 +4,8 @@ use crate::inputs::Inputs;
 use crate::model::{BoundaryError, Model, Outputs, PreparedModel, State};
 use crate::params::BoundaryConditions;
 use crate::rosenbrock::{IntegrationError, Integrator, OdeSystem, Step, Tolerances};
-
-const STATES: usize = 5;
+use crate::state::MAX_STATES;
+use nalgebra::{Const, DimMin};
 
 /// What to look out for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +66,35 @@ pub enum SimulationError {
 #[derive(Debug, Clone)]
 pub struct Simulator {
     model: Model,
-    integrator: Integrator<STATES>,
+    integrator: SizedIntegrator,
+    crossings: CrossingWatch,
+}
+
+/// An integrator of as many states as the model has: the nominal one does not pay for the others' linear algebra.
+#[derive(Debug, Clone)]
+enum SizedIntegrator {
+    /// Without inner wall and hidden temperatures.
+    Five(Integrator<5>),
+    /// With an inner wall.
+    Six(Integrator<6>),
+    /// With hidden temperatures, with or without inner wall.
+    All(Integrator<MAX_STATES>),
+}
+
+/// The same expression for an integrator of any size.
+macro_rules! sized {
+    ($integrator:expr, $name:ident => $body:expr) => {
+        match $integrator {
+            SizedIntegrator::Five($name) => $body,
+            SizedIntegrator::Six($name) => $body,
+            SizedIntegrator::All($name) => $body,
+        }
+    };
+}
+
+/// Looks for crossings from step to step.
+#[derive(Debug, Clone)]
+struct CrossingWatch {
     watch: Watch,
     /// Surge position minus 1, and speed minus limit, at the end of the last step; `None` before the first.
     margins: Option<[f64; 2]>,
@@ -75,40 +103,54 @@ pub struct Simulator {
 /// Local error allowed by default, relative: three orders below the noise of any sensor.
 pub const DEFAULT_RELATIVE_TOLERANCE: f64 = 1e-6;
 
+/// Usual sizes of the states.
+const STATE_SIZES: [f64; MAX_STATES] = [1e4, 1e5, 3e2, 5e2, 3e2, 3e2, 3e2, 3e2];
+
+impl SizedIntegrator {
+    fn new(model: &Model, t_s: f64, state: State, relative_ratio: f64) -> Self {
+        if model.hooks.extra_states() > 0 {
+            SizedIntegrator::All(Integrator::new(t_s, state.to_array(), tolerances(relative_ratio)))
+        } else if model.has_inner_wall() {
+            SizedIntegrator::Six(Integrator::new(t_s, state.to_array(), tolerances(relative_ratio)))
+        } else {
+            SizedIntegrator::Five(Integrator::new(t_s, state.to_array(), tolerances(relative_ratio)))
+        }
+    }
+}
+
+fn tolerances<const N: usize>(relative_ratio: f64) -> Tolerances<N> {
+    // Absolute parts: a thousandth of each state's usual size.
+    Tolerances { relative_ratio, absolute: std::array::from_fn(|i| 1e-3 * STATE_SIZES[i] * relative_ratio) }
+}
+
 impl Simulator {
     /// A machine at `state` at `t_s`, integrated to `relative_tolerance` per step.
     pub fn new(model: &Model, t_s: f64, state: State, relative_tolerance: f64, watch: Watch) -> Self {
-        // Absolute parts: a thousandth of each state's usual size.
-        let tolerances = Tolerances {
-            relative_ratio: relative_tolerance,
-            absolute: [1e4, 1e5, 3e2, 5e2, 3e2].map(|size| 1e-3 * size * relative_tolerance),
-        };
         Simulator {
             model: model.clone(),
-            integrator: Integrator::new(t_s, state.to_array(), tolerances),
-            watch,
-            margins: None,
+            integrator: SizedIntegrator::new(model, t_s, state, relative_tolerance),
+            crossings: CrossingWatch { watch, margins: None },
         }
     }
 
     /// Current time, s.
     pub fn t_s(&self) -> f64 {
-        self.integrator.t_s
+        sized!(&self.integrator, integrator => integrator.t_s)
     }
 
     /// Current state.
     pub fn state(&self) -> State {
-        State::from_array(&self.integrator.y)
+        sized!(&self.integrator, integrator => State::from_array(&integrator.y))
     }
 
     /// Steps taken so far.
     pub fn steps(&self) -> usize {
-        self.integrator.steps()
+        sized!(&self.integrator, integrator => integrator.steps())
     }
 
     /// Forgets the step size; call after a jump of the inputs.
     pub fn restart(&mut self) {
-        self.integrator.restart();
+        sized!(&mut self.integrator, integrator => integrator.restart());
     }
 
     /// Runs to `end_s`. `on_sample` is called with time, state and outputs at each of `sample_times_s` (rising, within
@@ -121,46 +163,69 @@ impl Simulator {
         end_s: f64,
         inputs: &impl Inputs,
         sample_times_s: impl IntoIterator<Item = f64>,
-        mut on_sample: impl FnMut(f64, &State, &Outputs),
-        mut on_event: impl FnMut(ModelEvent),
+        on_sample: impl FnMut(f64, &State, &Outputs),
+        on_event: impl FnMut(ModelEvent),
     ) -> Result<(), SimulationError> {
-        // A handle of its own, so that the prepared model does not hold `self`.
-        let model = self.model.clone();
-        let mut samples = sample_times_s.into_iter().peekable();
-        let mut sample = |t_s: f64, y: &[f64; STATES], prepared: &PreparedModel<'_>| {
-            let state = State::from_array(y);
-            on_sample(t_s, &state, &prepared.evaluate(&state));
-        };
-        while let Some(t_s) = samples.next_if(|t| *t <= self.t_s()) {
-            let boundary = checked(inputs, t_s)?;
-            sample(t_s, &self.integrator.y, &model.prepare(&boundary));
-        }
-        while self.t_s() < end_s {
-            let start_s = self.t_s();
-            let kink_s = inputs.next_kink_s(start_s);
-            let stretch_end_s = kink_s.min(end_s);
-            let boundary = checked(inputs, start_s)?;
-            let prepared = model.prepare(&boundary);
-            let constant = inputs.is_constant_after(start_s);
-            let mut system = ModelSystem { model: &model, prepared, inputs, constant };
-            while self.integrator.t_s < stretch_end_s {
-                let step = self.integrator.step(&mut system, stretch_end_s)?;
-                self.report_crossings(&step, &mut system, &mut on_event);
-                while let Some(t_s) = samples.next_if(|t| *t <= step.t1_s) {
-                    system.prepare_for(t_s);
-                    sample(t_s, &step.at(t_s), &system.prepared);
-                }
-            }
-            if kink_s <= end_s {
-                self.integrator.restart();
-            }
-        }
-        Ok(())
+        let Simulator { model, integrator, crossings } = self;
+        sized!(integrator, integrator =>
+            run(model, integrator, crossings, end_s, inputs, sample_times_s, on_sample, on_event))
     }
+}
 
-    fn report_crossings(
+/// [`Simulator::run_to`] with `N` states.
+#[allow(
+    clippy::too_many_arguments,
+    reason = "the simulator's own parts, taken apart so that its size can be a type"
+)]
+fn run<const N: usize>(
+    model: &Model,
+    integrator: &mut Integrator<N>,
+    crossings: &mut CrossingWatch,
+    end_s: f64,
+    inputs: &impl Inputs,
+    sample_times_s: impl IntoIterator<Item = f64>,
+    mut on_sample: impl FnMut(f64, &State, &Outputs),
+    mut on_event: impl FnMut(ModelEvent),
+) -> Result<(), SimulationError>
+where
+    Const<N>: DimMin<Const<N>, Output = Const<N>>,
+{
+    let mut samples = sample_times_s.into_iter().peekable();
+    let mut sample = |t_s: f64, y: &[f64; N], prepared: &PreparedModel<'_>| {
+        let state = State::from_array(y);
+        on_sample(t_s, &state, &prepared.evaluate(&state));
+    };
+    while let Some(t_s) = samples.next_if(|t| *t <= integrator.t_s) {
+        let boundary = checked(inputs, t_s)?;
+        sample(t_s, &integrator.y, &model.prepare(&boundary));
+    }
+    while integrator.t_s < end_s {
+        let start_s = integrator.t_s;
+        let kink_s = inputs.next_kink_s(start_s);
+        let stretch_end_s = kink_s.min(end_s);
+        let boundary = checked(inputs, start_s)?;
+        let prepared = model.prepare(&boundary);
+        let constant = inputs.is_constant_after(start_s);
+        let mut system = ModelSystem { model, prepared, inputs, constant };
+        while integrator.t_s < stretch_end_s {
+            let step = integrator.step(&mut system, stretch_end_s)?;
+            crossings.report(&step, &mut system, &mut on_event);
+            while let Some(t_s) = samples.next_if(|t| *t <= step.t1_s) {
+                system.prepare_for(t_s);
+                sample(t_s, &step.at(t_s), &system.prepared);
+            }
+        }
+        if kink_s <= end_s {
+            integrator.restart();
+        }
+    }
+    Ok(())
+}
+
+impl CrossingWatch {
+    fn report<const N: usize>(
         &mut self,
-        step: &Step<STATES>,
+        step: &Step<N>,
         system: &mut ModelSystem<'_, impl Inputs>,
         on_event: &mut impl FnMut(ModelEvent),
     ) {
@@ -207,13 +272,19 @@ impl Simulator {
     }
 
     /// Surge position minus 1; shaft speed minus its limit, rpm.
-    fn margins_at(&self, t_s: f64, y: &[f64; STATES], system: &mut ModelSystem<'_, impl Inputs>) -> [f64; 2] {
+    fn margins_at<const N: usize>(
+        &self,
+        t_s: f64,
+        y: &[f64; N],
+        system: &mut ModelSystem<'_, impl Inputs>,
+    ) -> [f64; 2] {
         system.prepare_for(t_s);
         let boundary = system.prepared.boundary();
         let state = State::from_array(y);
         let speed_rpm = state.shaft_speed_rpm();
-        let corrected_rpm = self.model.map.reference().corrected_speed_rpm(speed_rpm, boundary.t1_k);
-        let on_map = self.model.map.evaluate(corrected_rpm, state.p2_pa / boundary.p1_pa);
+        let map = &system.model.map;
+        let corrected_rpm = map.reference().corrected_speed_rpm(speed_rpm, boundary.t1_k);
+        let on_map = map.evaluate(corrected_rpm, state.p2_pa / boundary.p1_pa);
         [on_map.surge_position_ratio - 1.0, speed_rpm - self.watch.overspeed_rpm]
     }
 }
@@ -239,20 +310,15 @@ impl<I: Inputs> ModelSystem<'_, I> {
     }
 }
 
-impl<I: Inputs> OdeSystem<STATES> for ModelSystem<'_, I> {
-    fn rates(&mut self, t_s: f64, y: &[f64; STATES]) -> [f64; STATES] {
+impl<const N: usize, I: Inputs> OdeSystem<N> for ModelSystem<'_, I> {
+    fn rates(&mut self, t_s: f64, y: &[f64; N]) -> [f64; N] {
         self.prepare_for(t_s);
         let state = State::from_array(y);
         let outputs = self.prepared.evaluate(&state);
         self.prepared.derivatives(&state, &outputs)
     }
 
-    fn time_derivative(
-        &mut self,
-        t_s: f64,
-        y: &[f64; STATES],
-        rates: &[f64; STATES],
-    ) -> Option<[f64; STATES]> {
+    fn time_derivative(&mut self, t_s: f64, y: &[f64; N], rates: &[f64; N]) -> Option<[f64; N]> {
         if self.constant {
             return None;
         }

@@ -47,11 +47,14 @@ fn rates_k_s(params: &Params, tc_k: f64, tt_k: f64, oil_k: f64, ambient_k: f64) 
     let bearing_w_k = housing::bearing_conductance_w_k(&params.bearing);
     let bearing_k = housing::bearing_k(bearing_w_k, params.bearing.oil_conductance_w_k, tc_k, tt_k, oil_k);
     let external_w = |area_m2, emissivity_ratio, wall_k| {
-        housing::external_heat_w(area_m2, emissivity_ratio, wall_k, ambient_k)
+        let convection_ratio = params.external_convection_ratio;
+        housing::external_heat_w(area_m2, emissivity_ratio, convection_ratio, wall_k, ambient_k)
     };
-    let compressor_w = bearing_w_k * (bearing_k - tc_k)
+    let radiation_w = housing::radiation_w(params.radiation_area_m2, tt_k, tc_k);
+    let compressor_w = bearing_w_k * (bearing_k - tc_k) + radiation_w
         - external_w(compressor.external_area_m2, compressor.emissivity_ratio, tc_k);
     let turbine_w = bearing_w_k * (bearing_k - tt_k)
+        - radiation_w
         - external_w(turbine.external_area_m2, turbine.emissivity_ratio, tt_k);
     [
         compressor_w / housing::compressor_capacity_j_k(params, tc_k),

@@ -3,6 +3,12 @@
 use crate::bracket::root_between;
 use crate::model::{BoundaryError, Model, Outputs, State, rad_s_of_rpm};
 use crate::params::BoundaryConditions;
+use crate::state::MAX_EXTRA;
+use nalgebra::{SMatrix, SVector};
+
+/// Temperatures that come to rest: both housings, the inner wall, hidden ones.
+const HEAT_NODES: usize = 3 + MAX_EXTRA;
+type Temperatures = SVector<f64, HEAT_NODES>;
 
 /// A steady state with everything the model knows there.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,7 +55,7 @@ pub enum SteadyError {
         speed_rpm: f64,
         /// Valve opening.
         valve_opening_ratio: f64,
-        /// Power the compressor takes, W.
+        /// Power that compressor and bearings take, W.
         power_w: f64,
         /// Lowest pressure tried, Pa.
         lowest_pa: f64,
@@ -75,7 +81,7 @@ const HEAT_TOLERANCE_W: f64 = 1e-9;
 
 /// The steady state at `speed_rpm` under `boundary`, whose `p3_pa` is ignored and found.
 ///
-/// Nested: outlet pressure from flow balance, P3 from power balance, housing temperatures by Newton's method.
+/// Nested: outlet pressure from flow balance, P3 from power balance, temperatures by Newton's method.
 ///
 /// # Errors
 /// [`SteadyError`] naming the balance that cannot be met.
@@ -92,52 +98,61 @@ pub fn hold_speed(
     }
     let no_heat_balance =
         SteadyError::NoHeatBalance { speed_rpm, valve_opening_ratio: boundary.valve_opening_ratio };
-    let balance = |temperatures: [f64; 2]| -> Result<([f64; 2], BoundaryConditions, State), SteadyError> {
-        let (boundary, state) = gas_path_at_rest(model, speed_rpm, &boundary, temperatures)?;
-        let prepared = model.prepare(&boundary);
-        let outputs = prepared.evaluate(&state);
-        let heat_w = [
-            prepared.compressor_housing_balance_w(&state, &outputs),
-            prepared.turbine_housing_balance_w(&state, &outputs),
-        ];
-        Ok((heat_w, boundary, state))
-    };
-    let mut temperatures = [boundary.t1_k + 30.0, 0.5 * (boundary.t3_k + boundary.ambient_temperature_k)];
+    let balance =
+        |temperatures: Temperatures| -> Result<(Temperatures, BoundaryConditions, State), SteadyError> {
+            let (boundary, state) = gas_path_at_rest(model, speed_rpm, &boundary, temperatures)?;
+            let prepared = model.prepare(&boundary);
+            let outputs = prepared.evaluate(&state);
+            let heat_w = Temperatures::from([
+                prepared.compressor_housing_balance_w(&state, &outputs),
+                prepared.turbine_housing_balance_w(&state, &outputs),
+                prepared.inner_wall_balance_w(&outputs),
+                // Rates of hidden temperatures, as heats of a node of 1 kJ/K.
+                1e3 * outputs.added.extra_rates_k_s[0],
+                1e3 * outputs.added.extra_rates_k_s[1],
+            ]);
+            Ok((heat_w, boundary, state))
+        };
+    let extra_states = model.hooks.extra_states();
+    let moves = [true, true, model.has_inner_wall(), extra_states > 0, extra_states > 1];
+    let first_k = boundary.t1_k + 30.0;
+    let turbine_k = 0.5 * (boundary.t3_k + boundary.ambient_temperature_k);
+    let mut temperatures = Temperatures::from([first_k, turbine_k, first_k, first_k, first_k]);
     let (mut heat_w, mut at_rest, mut state) = balance(temperatures)?;
     for _ in 0..60 {
-        if heat_w.iter().all(|heat_w| heat_w.abs() < HEAT_TOLERANCE_W) {
+        if heat_w.amax() < HEAT_TOLERANCE_W {
             let outputs = model.prepare(&at_rest).evaluate(&state);
-            state.t2_tip_k = outputs.t2_k;
+            state.t2_tip_k = outputs.t2_probe_target_k;
             let outputs = model.prepare(&at_rest).evaluate(&state);
             return Ok(SteadyState { boundary: at_rest, state, outputs });
         }
-        // Forward differences of the two balances; the balances are smooth in both temperatures.
+        // Forward differences of the balances, which are smooth in the temperatures; what does not move stays.
         let step_k = 1e-4;
-        let (by_tc, ..) = balance([temperatures[0] + step_k, temperatures[1]])?;
-        let (by_tt, ..) = balance([temperatures[0], temperatures[1] + step_k])?;
-        let [a, c] = [(by_tc[0] - heat_w[0]) / step_k, (by_tc[1] - heat_w[1]) / step_k];
-        let [b, d] = [(by_tt[0] - heat_w[0]) / step_k, (by_tt[1] - heat_w[1]) / step_k];
-        let determinant = a * d - b * c;
-        if !determinant.is_finite() || determinant == 0.0 {
-            return Err(no_heat_balance);
+        let mut slopes = SMatrix::<f64, HEAT_NODES, HEAT_NODES>::identity();
+        for node in (0..HEAT_NODES).filter(|node| moves[*node]) {
+            let mut moved = temperatures;
+            moved[node] += step_k;
+            let (by_node, ..) = balance(moved)?;
+            slopes.set_column(node, &((by_node - heat_w) / step_k));
         }
-        let step =
-            [(-heat_w[0] * d + heat_w[1] * b) / determinant, (-heat_w[1] * a + heat_w[0] * c) / determinant];
+        let Some(step) = slopes.lu().solve(&-heat_w).filter(|step| step.iter().all(|step| step.is_finite()))
+        else {
+            return Err(no_heat_balance);
+        };
         let before = (heat_w, temperatures);
-        let mut share = (80.0 / step[0].abs().max(step[1].abs())).min(1.0);
+        let mut share = (80.0 / step.amax()).min(1.0);
         loop {
-            temperatures = std::array::from_fn(|i| (before.1[i] + share * step[i]).clamp(200.0, 1500.0));
+            temperatures = (before.1 + step * share).map(|temperature| temperature.clamp(200.0, 1500.0));
             (heat_w, at_rest, state) = balance(temperatures)?;
-            let size = |heat: [f64; 2]| heat[0].hypot(heat[1]);
-            if size(heat_w) < size(before.0) || share < 1e-3 {
+            if heat_w.norm() < before.0.norm() || share < 1e-3 {
                 break;
             }
             share *= 0.5;
         }
         if temperatures == before.1 {
             // The balances cannot be told from rounding any more.
-            if heat_w.iter().all(|heat_w| heat_w.abs() < 1e-6) {
-                heat_w = [0.0; 2];
+            if heat_w.amax() < 1e-6 {
+                heat_w = Temperatures::zeros();
                 continue;
             }
             return Err(no_heat_balance);
@@ -151,16 +166,15 @@ fn gas_path_at_rest(
     model: &Model,
     speed_rpm: f64,
     boundary: &BoundaryConditions,
-    [tc_k, tt_k]: [f64; 2],
+    temperatures: Temperatures,
 ) -> Result<(BoundaryConditions, State), SteadyError> {
     let valve_opening_ratio = boundary.valve_opening_ratio;
     let mut boundary = *boundary;
+    let tt_k = temperatures[1];
     let at = |p2_pa: f64| State {
-        shaft_speed_rad_s: rad_s_of_rpm(speed_rpm),
-        p2_pa,
-        tc_k,
-        tt_k,
-        t2_tip_k: boundary.t1_k,
+        inner_k: temperatures[2],
+        extra_k: [temperatures[3], temperatures[4]],
+        ..State::new(rad_s_of_rpm(speed_rpm), p2_pa, temperatures[0], tt_k, boundary.t1_k)
     };
     let prepared = model.prepare(&boundary);
     let corrected_rpm = model.map.reference().corrected_speed_rpm(speed_rpm, boundary.t1_k);
@@ -173,7 +187,8 @@ fn gas_path_at_rest(
     })
     .ok_or(SteadyError::NoFlowBalance { speed_rpm, valve_opening_ratio })?;
     let state = at(p2_pa);
-    let power_w = prepared.evaluate(&state).compressor_power_w;
+    let outputs = prepared.evaluate(&state);
+    let power_w = outputs.compressor_power_w + outputs.friction_power_w - outputs.added.shaft_power_w;
     let (lowest_pa, highest_pa) = (boundary.p4_pa * (1.0 + 1e-6), boundary.p4_pa * HIGHEST_EXPANSION_RATIO);
     let p3_pa = root_between(lowest_pa, highest_pa, 0.0, |p3_pa| {
         let turbine = crate::turbine::TurbineInlet::new(

@@ -24,6 +24,20 @@ pub fn time_constant_s(tip_diameter_m: f64, pipe_diameter_m: f64, flow_kg_s: f64
     TIP_HEAT_CAPACITY_J_M3K * tip_diameter_m * tip_diameter_m / (6.0 * nusselt * k)
 }
 
+/// `v^2/(2 cp)` in the outlet pipe, K, with `v = m/(rho A)` and `rho = P2/(R T2)`: what a probe without recovery misses.
+#[inline]
+pub fn dynamic_temperature_k(
+    pipe_diameter_m: f64,
+    flow_kg_s: f64,
+    p2_pa: f64,
+    t2_k: f64,
+    gas_constant_j_kgk: f64,
+) -> f64 {
+    let area_m2 = 0.25 * std::f64::consts::PI * pipe_diameter_m * pipe_diameter_m;
+    let velocity_m_s = flow_kg_s * gas_constant_j_kgk * t2_k / (p2_pa * area_m2);
+    0.5 * velocity_m_s * velocity_m_s / air::heat_capacity_j_kgk(t2_k)
+}
+
 #[cfg(test)]
 mod tests {
     /// The paper: "time constants can be as large as 10 s for a 3 mm thermocouple": at the lowest flows of the map.

@@ -23,6 +23,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-reproduce", &["core", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
     ("mapper-backends",  &["core", "physics", "units"]),
+    ("mapper-effects",   &["core", "physics"]),
     ("mapper-exporters", &["core", "physics", "chart"]),
     // The program sees all; nothing sees the program.
     ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "history", "reproduce", "backends", "exporters"]),

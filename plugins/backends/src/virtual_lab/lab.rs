@@ -258,13 +258,9 @@ impl Armed {
         let now_s = self.now_s;
         let next = match (&self.machine, self.wanted) {
             (Some(Machine::Standstill { state, .. }), RigMode::Running) => {
-                let start = State {
-                    shaft_speed_rad_s: rad_s_of_rpm(CRANKING_SPEED_RPM),
-                    p2_pa: self.inputs.cell.p1_pa * 1.0005,
-                    tc_k: state.tc_k,
-                    tt_k: state.tt_k,
-                    t2_tip_k: self.inputs.cell.t1_k,
-                };
+                let cell = &self.inputs.cell;
+                let speed_rad_s = rad_s_of_rpm(CRANKING_SPEED_RPM);
+                let start = State::new(speed_rad_s, cell.p1_pa * 1.0005, state.tc_k, state.tt_k, cell.t1_k);
                 Machine::Running(Box::new(running(settings, now_s, start)))
             }
             (Some(Machine::Running(simulator)), RigMode::Standstill)

@@ -133,7 +133,7 @@ pub fn read_settings(settings: &serde_json::Value, nominal: NominalRig) -> Resul
         })?,
     };
     let params = &nominal.model.params;
-    let model = Model { params: true_params(*params, &file.machine)?, map: nominal.model.map.clone() };
+    let model = Model { params: true_params(*params, &file.machine)?, ..nominal.model.clone() };
     let sample_rate_hz = file.sample_rate.map_or(10.0, |rate| rate.inside);
     if !(0.1..=1000.0).contains(&sample_rate_hz) {
         let message = format!("{sample_rate_hz} Hz is not between 0.1 and 1000 Hz");

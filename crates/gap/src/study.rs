@@ -1,0 +1,324 @@
+//! One recording made ready: residuals' layout, whitening, and the model's prediction for any hypothesis.
+
+use crate::declared::Declared;
+use crate::inputs::{DrivenInputs, InputDeclarations, InputError, LaggedCommand, measured_lag_s};
+use crate::nuisance::{Circumstances, DRIVERS, Nuisance, OUTPUTS, apply, nuisances};
+use crate::shape::{SHAPES, ShapedMap};
+use crate::table::{Block, Table, block_mean, blocks};
+use mapper_core::{Channel, Recording, StepMarker};
+use mapper_physics::driven::{DriveError, FrozenGrid, drive, settle};
+use mapper_physics::effect::{Effect, EffectError, Rig, add};
+use mapper_physics::instruments::{ChannelFollower, true_value};
+use mapper_physics::inputs::Inputs;
+use mapper_physics::model::{Model, State, rad_s_of_rpm};
+use std::sync::Arc;
+
+/// Values of one output in one step that have a common noise.
+#[derive(Debug, Clone)]
+pub struct Group {
+    /// Step, by its place in [`Study::steps`].
+    pub step: usize,
+    /// Output, by its place in [`OUTPUTS`].
+    pub output: usize,
+    /// Where the group's values lie in the vector of residuals.
+    pub rows: std::ops::Range<usize>,
+    /// Blocks of the values, by their place in the step.
+    pub blocks: Vec<usize>,
+}
+
+/// One step with its blocks.
+#[derive(Debug, Clone)]
+pub struct StudyStep {
+    /// As recorded.
+    pub marker: StepMarker,
+    /// Whether P3 or valve jumped at its start.
+    pub jumped: bool,
+    /// Its blocks.
+    pub blocks: Vec<Block>,
+}
+
+/// Effects with their values: indices into the candidates, and as many values as each has parameters.
+pub type EffectValues = Vec<(usize, Vec<f64>)>;
+
+/// A point in the space of everything that may be off.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hypothesis {
+    /// Nuisances, in their sigmas.
+    pub nuisances: Vec<f64>,
+    /// Effects.
+    pub effects: EffectValues,
+}
+
+/// What the model gives for a hypothesis.
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    /// Block means in the residuals' layout, in the channels' units.
+    pub values: Vec<f64>,
+    /// Their slopes, unit/s.
+    pub slopes: Vec<f64>,
+}
+
+/// Why no prediction can be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PredictError {
+    /// The model cannot follow.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+    /// A value out of its range.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+}
+
+/// One recording made ready.
+#[derive(Debug)]
+pub struct Study {
+    /// What is declared.
+    pub declared: Declared,
+    /// All samples.
+    pub table: Table,
+    /// Steps.
+    pub steps: Vec<StudyStep>,
+    /// The nominal rig.
+    pub nominal: Rig,
+    /// Candidate effects.
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// What may be off besides.
+    pub nuisances: Vec<Nuisance>,
+    /// Values of one output and step each.
+    pub groups: Vec<Group>,
+    /// Measured block means, in the layout of the groups.
+    pub measured: Vec<f64>,
+    /// The recorded inputs.
+    pub inputs: DrivenInputs,
+    /// Time constant of P3 behind its command as recorded, s, and its standard error.
+    pub measured_lag_s: Option<(f64, f64)>,
+    grid: FrozenGrid,
+    /// Times at which the model is read; two a block, and one at each jump.
+    times_s: Vec<f64>,
+    /// For each time, the place of its block: step and block; `None` at a jump.
+    places: Vec<Option<(usize, usize)>>,
+    /// Row of each output in each step's blocks.
+    rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>>,
+}
+
+/// The first step counts from this long before the first jump, s: before it nothing tells what a rig was doing, and
+/// the metal's start is fitted anyway.
+const HOLD_S: f64 = 100.0;
+
+impl Study {
+    /// Makes a recording ready.
+    ///
+    /// # Errors
+    /// [`InputError`] where a channel that drives the model is missing.
+    pub fn new(
+        recording: &Recording,
+        table: Table,
+        declared: Declared,
+        model: Model,
+        effects: Vec<Arc<dyn Effect>>,
+    ) -> Result<Study, InputError> {
+        let nominal = Rig::new(model);
+        let first_s = table.t_s.first().copied().unwrap_or(0.0);
+        let steps: Vec<StudyStep> = recording
+            .steps
+            .iter()
+            .enumerate()
+            .map(|(index, marker)| {
+                let jumped = index > 0;
+                // Half a sample beyond the last one, which is the next step's first where steps follow each other.
+                let end_s = recording.steps.get(index + 1).map_or(marker.end_s, |next| next.start_s);
+                let start_s = if jumped { marker.start_s } else { marker.start_s.max(end_s - HOLD_S).max(first_s) };
+                StudyStep { marker: *marker, jumped, blocks: blocks(&table, start_s, end_s, jumped) }
+            })
+            .collect();
+        let measured_lag =
+            measured_lag_s(&table, &recording.steps, declared.noise_sigma(Channel::P3).max(1.0));
+        let lag_s = measured_lag.map_or(nominal.instruments.p3_lag_s, |(lag_s, _)| lag_s);
+        let declarations = InputDeclarations {
+            sensors: declared.sensors.clone(),
+            noise_colour: declared.noise_colour,
+            nominal: declared.nominal,
+        };
+        let inputs = DrivenInputs::read(&table, &recording.steps, &declarations, lag_s)?;
+        let mut groups = Vec::new();
+        let mut measured = Vec::new();
+        let mut rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>> =
+            steps.iter().map(|step| vec![[None; OUTPUTS.len()]; step.blocks.len()]).collect();
+        for (step_index, step) in steps.iter().enumerate() {
+            for (output, channel) in OUTPUTS.iter().enumerate() {
+                let Some(column) = table.column(*channel) else { continue };
+                let start = measured.len();
+                let mut of_group = Vec::new();
+                for (block_index, block) in step.blocks.iter().enumerate() {
+                    if let Some(mean) = block_mean(column, block) {
+                        rows[step_index][block_index][output] = Some(measured.len() as u32);
+                        measured.push(mean);
+                        of_group.push(block_index);
+                    }
+                }
+                if !of_group.is_empty() {
+                    groups.push(Group {
+                        step: step_index,
+                        output,
+                        rows: start..measured.len(),
+                        blocks: of_group,
+                    });
+                }
+            }
+        }
+        let mut reads: Vec<(f64, Option<(usize, usize)>)> = Vec::new();
+        for (step_index, step) in steps.iter().enumerate() {
+            if step.jumped {
+                reads.push((step.marker.start_s, None));
+            }
+            for (block_index, block) in step.blocks.iter().enumerate() {
+                // The mean of the two ends of one standard deviation has the mean and the spread of the samples.
+                let place = Some((step_index, block_index));
+                reads.push((block.mean_s - block.spread_s, place));
+                if block.spread_s > 0.0 {
+                    reads.push((block.mean_s + block.spread_s, place));
+                }
+            }
+        }
+        reads.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let start_s = reads.first().map_or(first_s, |(t_s, _)| *t_s) - 0.5;
+        let end_s = reads.last().map_or(start_s + 1.0, |(t_s, _)| t_s + 0.1);
+        let jumps_s: Vec<f64> =
+            steps.iter().filter(|step| step.jumped).map(|step| step.marker.start_s).collect();
+        let (times_s, places): (Vec<f64>, Vec<_>) = reads.into_iter().unzip();
+        Ok(Study {
+            nuisances: nuisances(&declared),
+            grid: FrozenGrid::new(start_s, end_s, &jumps_s, &times_s),
+            declared,
+            table,
+            steps,
+            nominal,
+            effects,
+            groups,
+            measured,
+            inputs,
+            measured_lag_s: measured_lag,
+            times_s,
+            places,
+            rows,
+        })
+    }
+
+    /// The hypothesis that nothing is off.
+    pub fn nothing(&self) -> Hypothesis {
+        Hypothesis { nuisances: vec![0.0; self.nuisances.len()], effects: Vec::new() }
+    }
+
+    /// The rig of a hypothesis, and what it is driven with.
+    ///
+    /// # Errors
+    /// [`EffectError`] where a value is out of its range.
+    pub fn rig(&self, hypothesis: &Hypothesis) -> Result<(Rig, Circumstances, DrivenInputs), EffectError> {
+        let mut rig = self.nominal.clone();
+        let mut circumstances = Circumstances::default();
+        for (index, values) in &hypothesis.effects {
+            add(&mut rig, self.effects[*index].as_ref(), values)?;
+        }
+        for (nuisance, sigmas) in self.nuisances.iter().zip(&hypothesis.nuisances) {
+            apply(nuisance.kind, sigmas * nuisance.sigma, &mut rig, &mut circumstances);
+        }
+        if circumstances.shape != [0.0; SHAPES] {
+            rig.model.map =
+                Arc::new(ShapedMap { inner: rig.model.map.clone(), coefficients: circumstances.shape });
+        }
+        let mut inputs = self.inputs.clone();
+        let offset = |channel: Channel| rig.instruments.path(channel).offset;
+        let [t1, p1, p3, t3, p4, oil] = DRIVERS.map(offset);
+        inputs.offsets.t1_k = t1;
+        inputs.offsets.p1_pa = p1;
+        inputs.offsets.p3_pa = p3;
+        inputs.offsets.t3_k = t3;
+        inputs.offsets.p4_pa = p4;
+        inputs.offsets.oil_k = oil;
+        inputs.offsets.ambient_k = circumstances.ambient_k;
+        Ok((rig, circumstances, inputs))
+    }
+
+    /// What the model gives.
+    ///
+    /// # Errors
+    /// [`PredictError`] where a value is out of its range or the model cannot follow.
+    pub fn predict(&self, hypothesis: &Hypothesis) -> Result<Prediction, PredictError> {
+        let (rig, circumstances, inputs) = self.rig(hypothesis)?;
+        let mut followers = OUTPUTS.map(|channel| ChannelFollower::new(*rig.instruments.path(channel)));
+        let command = LaggedCommand::new(inputs.command.levels().to_vec(), rig.instruments.p3_lag_s);
+        let mut values = vec![0.0; self.measured.len()];
+        let start = self.start(&rig, &inputs, &circumstances)?;
+        drive(&rig.model, &inputs, start, &self.grid, &self.times_s, |index, prepared, state, outputs| {
+            let t_s = self.times_s[index];
+            let place = self.places[index];
+            for (output, channel) in OUTPUTS.iter().enumerate() {
+                let seen = if *channel == Channel::P3 {
+                    command.p3_pa(t_s)
+                } else {
+                    true_value(*channel, prepared, state, outputs).unwrap_or(f64::NAN)
+                };
+                let reading = followers[output].read(t_s, seen);
+                let Some((step, block)) = place else { continue };
+                let Some(row) = self.rows[step][block][output] else { continue };
+                let single = self.steps[step].blocks[block].spread_s == 0.0;
+                values[row as usize] += if single { reading } else { 0.5 * reading };
+            }
+        })?;
+        let slopes = self.slopes(&values);
+        for group in &self.groups {
+            let delay_s = circumstances.delay_s[group.output];
+            if delay_s != 0.0 {
+                for row in group.rows.clone() {
+                    values[row] -= delay_s * slopes[row];
+                }
+            }
+        }
+        Ok(Prediction { values, slopes })
+    }
+
+    /// Slopes of predicted values, from block to block.
+    fn slopes(&self, values: &[f64]) -> Vec<f64> {
+        let mut slopes = vec![0.0; values.len()];
+        for group in &self.groups {
+            let time = |i: usize| self.steps[group.step].blocks[group.blocks[i]].mean_s;
+            let last = group.blocks.len() - 1;
+            for (i, row) in group.rows.clone().enumerate() {
+                let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
+                if before < after {
+                    let rise = values[group.rows.start + after] - values[group.rows.start + before];
+                    slopes[row] = rise / (time(after) - time(before));
+                }
+            }
+        }
+        slopes
+    }
+
+    /// Rest under the first inputs, shifted as the circumstances say.
+    fn start(
+        &self,
+        rig: &Rig,
+        inputs: &DrivenInputs,
+        circumstances: &Circumstances,
+    ) -> Result<State, DriveError> {
+        let start_s = self.grid.nodes_s().first().copied().unwrap_or(0.0);
+        let boundary = inputs.at(start_s);
+        let first = |channel: Channel, otherwise: f64| {
+            let column = self.table.column(channel);
+            let early = column.map(|c| c.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>());
+            early.filter(|v| !v.is_empty()).map_or(otherwise, |v| v.iter().sum::<f64>() / v.len() as f64)
+        };
+        let guess = State::new(
+            rad_s_of_rpm(first(Channel::ShaftSpeed, 90e3).max(1e3)),
+            first(Channel::P2, 1.5 * boundary.p1_pa).max(boundary.p1_pa),
+            first(Channel::Tc, boundary.t1_k + 40.0),
+            first(Channel::Tt, 0.5 * (boundary.t3_k + boundary.t1_k)),
+            first(Channel::T2, boundary.t1_k + 50.0),
+        );
+        let mut start = settle(&rig.model, &boundary, guess)?;
+        start.tc_k += circumstances.start_tc_k;
+        start.inner_k += circumstances.start_tc_k;
+        start.tt_k += circumstances.start_tt_k;
+        Ok(start)
+    }
+}

@@ -1,0 +1,191 @@
+//! Residuals in units of what noise and imperfectly known inputs explain.
+
+use crate::noise::{Factor, block_covariance};
+use crate::nuisance::{DRIVERS, NuisanceKind, OUTPUTS};
+use crate::parallel;
+use crate::study::{Group, Hypothesis, PredictError, Prediction, Study};
+use mapper_core::Channel;
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The study linearised where nothing is off: predictions, whitening, and what each nuisance does.
+#[derive(Debug)]
+pub struct Linearised {
+    /// Prediction without any deviation.
+    pub base: Prediction,
+    /// One factor for each group.
+    factors: Arc<Vec<Factor>>,
+    /// Whitened change for one sigma of each nuisance.
+    pub columns: Vec<Vec<f64>>,
+    /// Products of the columns, for each step.
+    pub products: Vec<DMatrix<f64>>,
+}
+
+impl Linearised {
+    /// Linearised where nothing is off.
+    ///
+    /// # Errors
+    /// [`PredictError`] where the nominal model cannot follow the recording.
+    pub fn new(study: &Study) -> Result<Linearised, PredictError> {
+        let nothing = study.nothing();
+        let base = study.predict(&nothing)?;
+        let changes = changes(study, &nothing, &base);
+        let factors = Arc::new(factors(study, &changes));
+        Ok(Linearised::with(study, base, changes, factors))
+    }
+
+    /// Linearised anew at a hypothesis; the whitening stays.
+    ///
+    /// # Errors
+    /// [`PredictError`] where the model cannot follow there.
+    pub fn at(&self, study: &Study, hypothesis: &Hypothesis) -> Result<Linearised, PredictError> {
+        let base = study.predict(hypothesis)?;
+        let changes = changes(study, hypothesis, &base);
+        Ok(Linearised::with(study, base, changes, self.factors.clone()))
+    }
+
+    fn with(study: &Study, base: Prediction, mut columns: Vec<Vec<f64>>, factors: Arc<Vec<Factor>>) -> Linearised {
+        let mut linearised = Linearised { base, factors, columns: Vec::new(), products: Vec::new() };
+        for column in &mut columns {
+            linearised.whiten(study, column);
+        }
+        linearised.products = (0..study.steps.len()).map(|step| products_of_step(study, &columns, step)).collect();
+        linearised.columns = columns;
+        linearised
+    }
+
+    /// Whitens a vector in the residuals' layout, in place.
+    pub fn whiten(&self, study: &Study, values: &mut [f64]) {
+        for (group, factor) in study.groups.iter().zip(self.factors.iter()) {
+            factor.whiten(&mut values[group.rows.clone()]);
+        }
+    }
+
+    /// Whitened residual of a prediction.
+    pub fn residual(&self, study: &Study, prediction: &Prediction) -> Vec<f64> {
+        let mut residual: Vec<f64> =
+            study.measured.iter().zip(&prediction.values).map(|(seen, told)| seen - told).collect();
+        self.whiten(study, &mut residual);
+        residual
+    }
+
+    /// Predicts and gives the whitened residual.
+    ///
+    /// # Errors
+    /// [`PredictError`].
+    pub fn residual_of(&self, study: &Study, hypothesis: &Hypothesis) -> Result<Vec<f64>, PredictError> {
+        Ok(self.residual(study, &study.predict(hypothesis)?))
+    }
+}
+
+/// What one sigma of each nuisance changes at a hypothesis, over the cores.
+fn changes(study: &Study, here: &Hypothesis, base: &Prediction) -> Vec<Vec<f64>> {
+    let indices: Vec<usize> = (0..study.nuisances.len()).collect();
+    parallel::map(&indices, |index| {
+        let nuisance = study.nuisances[*index];
+        if let NuisanceKind::Delay(output) = nuisance.kind {
+            let mut change = vec![0.0; base.values.len()];
+            for group in study.groups.iter().filter(|group| group.output == output) {
+                for row in group.rows.clone() {
+                    change[row] = -nuisance.sigma * base.slopes[row];
+                }
+            }
+            return change;
+        }
+        let mut moved = here.clone();
+        // Towards the middle, so that a nuisance at its end stays within.
+        let step = if here.nuisances[*index] > 0.0 { -1.0 } else { 1.0 };
+        moved.nuisances[*index] += step;
+        match study.predict(&moved) {
+            Ok(there) => there.values.iter().zip(&base.values).map(|(there, here)| (there - here) / step).collect(),
+            // A tolerance that stops the model says nothing: it stays where it is.
+            Err(_) => vec![0.0; base.values.len()],
+        }
+    })
+}
+
+/// Rows of a step: its groups lie one behind the other.
+pub fn rows_of_step(study: &Study, step: usize) -> std::ops::Range<usize> {
+    let mut of_step = study.groups.iter().filter(|group| group.step == step);
+    let first = of_step.next().map_or(0..0, |group| group.rows.clone());
+    of_step.fold(first, |all, group| all.start..group.rows.end)
+}
+
+fn products_of_step(study: &Study, columns: &[Vec<f64>], step: usize) -> DMatrix<f64> {
+    let rows = rows_of_step(study, step);
+    let n = columns.len();
+    let mut products = DMatrix::zeros(n, n);
+    for i in 0..n {
+        for j in 0..=i {
+            let product = dot(&columns[i][rows.clone()], &columns[j][rows.clone()]);
+            products[(i, j)] = product;
+            products[(j, i)] = product;
+        }
+    }
+    products
+}
+
+/// Scalar product.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+fn factors(study: &Study, changes: &[Vec<f64>]) -> Vec<Factor> {
+    let inputs = study.inputs.noise();
+    // Response of every value to a unit of each input, from that of its offset.
+    let responses: Vec<(f64, f64, Option<&Vec<f64>>, f64)> = DRIVERS
+        .iter()
+        .zip(inputs)
+        .map(|(channel, noise)| {
+            let place = study.nuisances.iter().position(|n| n.kind == NuisanceKind::Offset(*channel));
+            let sigma = place.map_or(1.0, |i| study.nuisances[i].sigma);
+            (noise.sigma, noise.correlation_s, place.map(|i| &changes[i]), sigma)
+        })
+        .collect();
+    let mut cache: BTreeMap<Vec<(usize, i64)>, DMatrix<f64>> = BTreeMap::new();
+    study
+        .groups
+        .iter()
+        .map(|group| {
+            let blocks: Vec<_> =
+                group.blocks.iter().map(|i| study.steps[group.step].blocks[*i].clone()).collect();
+            // Blocks alike to a tenth of a millisecond have one covariance.
+            let key = blocks
+                .iter()
+                .map(|b| (b.samples.len(), ((b.mean_s - blocks[0].mean_s) * 1e4).round() as i64))
+                .collect::<Vec<_>>();
+            let unit = cache
+                .entry(key)
+                .or_insert_with(|| block_covariance(&study.table.t_s, &blocks, study.declared.noise_colour));
+            let sigma = noise_sigma(study, group);
+            let mut covariance = unit.clone() * (sigma * sigma);
+            if OUTPUTS[group.output] != Channel::P3 {
+                for (course_sigma, correlation_s, change, offset_sigma) in &responses {
+                    let Some(change) = change.filter(|_| *course_sigma > 0.0) else { continue };
+                    let gain: Vec<f64> =
+                        change[group.rows.clone()].iter().map(|c| c / offset_sigma * course_sigma).collect();
+                    for i in 0..gain.len() {
+                        for j in 0..gain.len() {
+                            let apart_s = (blocks[i].mean_s - blocks[j].mean_s).abs();
+                            covariance[(i, j)] += gain[i] * gain[j] * (-apart_s / correlation_s).exp();
+                        }
+                    }
+                }
+            }
+            let n = covariance.nrows();
+            // Positive definite by construction; the identity stands in should rounding say otherwise.
+            Factor::new(covariance).unwrap_or_else(|| Factor::identity(n, sigma))
+        })
+        .collect()
+}
+
+/// Noise of one sample; where none is declared, a thousandth of the values' size.
+fn noise_sigma(study: &Study, group: &Group) -> f64 {
+    let declared = study.declared.noise_sigma(OUTPUTS[group.output]);
+    if declared > 0.0 {
+        return declared;
+    }
+    let values = &study.measured[group.rows.clone()];
+    (1e-3 * values.iter().map(|v| v.abs()).sum::<f64>() / values.len().max(1) as f64).max(1e-9)
+}

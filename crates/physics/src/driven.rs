@@ -1,0 +1,195 @@
+//! The model driven by recorded inputs on a frozen grid of steps.
+//!
+//! Runs with slightly different parameters share every step, so that their difference is as smooth as the model
+//! itself: what a fit needs and what adaptive steps spoil. The grid is fine after each jump and coarse where only metal
+//! moves; each step is one of [Rodas5P](crate::rosenbrock), which is L-stable, so that the outlet volume (milliseconds)
+//! does not limit it.
+
+use crate::inputs::Inputs;
+use crate::model::{Model, Outputs, PreparedModel, State};
+use crate::params::BoundaryConditions;
+use crate::rosenbrock::{Integrator, OdeSystem, Tolerances};
+use crate::state::MAX_STATES;
+use nalgebra::{Const, DimMin};
+
+/// Longest steps after a jump: up to so many seconds, steps of at most so many seconds.
+const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.0), (f64::INFINITY, 3.0)];
+
+/// Within this of the surge line, in places on the speed line, a fast step is taken in parts.
+const SURGE_CORNER: f64 = 0.01;
+const CORNER_PARTS: u32 = 5;
+
+/// Times between which the integration takes single steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrozenGrid {
+    nodes_s: Vec<f64>,
+}
+
+impl FrozenGrid {
+    /// A grid from `start_s` to `end_s` with nodes at each jump and each of `times_s` within (rising both), and between
+    /// them as fine as the time since the last jump asks for. What is read at nodes is read where the method is
+    /// stiffly accurate.
+    pub fn new(start_s: f64, end_s: f64, jumps_s: &[f64], times_s: &[f64]) -> Self {
+        let mut wanted: Vec<f64> = jumps_s.iter().chain(times_s).copied().collect();
+        wanted.retain(|t| *t > start_s && *t < end_s);
+        wanted.push(end_s);
+        wanted.sort_by(f64::total_cmp);
+        let mut nodes_s = vec![start_s];
+        let (mut at_s, mut jump_s) = (start_s, f64::NEG_INFINITY);
+        for until_s in wanted {
+            while until_s - at_s > 1e-9 {
+                let since_s = at_s - jump_s;
+                let limit_s = STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(3.0, |(_, step)| *step);
+                // Equal parts, each within the limit.
+                let parts = ((until_s - at_s) / limit_s - 1e-6).ceil().max(1.0);
+                at_s = if parts <= 1.0 { until_s } else { at_s + ((until_s - at_s) / parts).max(limit_s * 0.5) };
+                nodes_s.push(at_s);
+            }
+            if jumps_s.contains(&until_s) {
+                jump_s = until_s;
+            }
+        }
+        FrozenGrid { nodes_s }
+    }
+
+    /// Ends of the steps, s.
+    pub fn nodes_s(&self) -> &[f64] {
+        &self.nodes_s
+    }
+}
+
+/// A drive that left what the model can do.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("the driven model cannot go on at {t_s:.2} s; the inputs or parameters there are beyond it")]
+pub struct DriveError {
+    /// Time, s.
+    pub t_s: f64,
+}
+
+/// Drives `model` from `start` over the grid. `on_sample` gets the index of each of `times_s` (rising, within the grid)
+/// with the model there.
+///
+/// # Errors
+/// [`DriveError`] where the boundary conditions have no meaning or a step gives no number.
+pub fn drive(
+    model: &Model,
+    inputs: &impl Inputs,
+    start: State,
+    grid: &FrozenGrid,
+    times_s: &[f64],
+    on_sample: impl FnMut(usize, &PreparedModel<'_>, &State, &Outputs),
+) -> Result<State, DriveError> {
+    if model.hooks.extra_states() > 0 {
+        run::<{ MAX_STATES }>(model, inputs, start, grid, times_s, on_sample)
+    } else if model.has_inner_wall() {
+        run::<6>(model, inputs, start, grid, times_s, on_sample)
+    } else {
+        run::<5>(model, inputs, start, grid, times_s, on_sample)
+    }
+}
+
+/// The state in which `model` rests under constant boundary conditions, from a first guess: driven for ten hours.
+///
+/// # Errors
+/// [`DriveError`] where it does not rest.
+pub fn settle(model: &Model, boundary: &BoundaryConditions, guess: State) -> Result<State, DriveError> {
+    // Steps that grow by half: a step far longer than every time constant of an L-stable method lands at rest.
+    let mut nodes_s = vec![0.0];
+    let mut step_s = 0.02;
+    let mut at_s = 0.0;
+    while at_s < 36_000.0 {
+        at_s += step_s;
+        step_s *= 1.5;
+        nodes_s.push(at_s);
+    }
+    drive(model, boundary, guess, &FrozenGrid { nodes_s }, &[], |_, _, _, _| {})
+}
+
+fn run<const N: usize>(
+    model: &Model,
+    inputs: &impl Inputs,
+    start: State,
+    grid: &FrozenGrid,
+    times_s: &[f64],
+    mut on_sample: impl FnMut(usize, &PreparedModel<'_>, &State, &Outputs),
+) -> Result<State, DriveError>
+where
+    Const<N>: DimMin<Const<N>, Output = Const<N>>,
+{
+    let Some(&start_s) = grid.nodes_s.first() else { return Ok(start) };
+    let no_control = Tolerances { relative_ratio: 1.0, absolute: [1.0; N] };
+    let mut integrator = Integrator::<N>::new(start_s, start.to_array(), no_control);
+    let mut next = times_s.partition_point(|t| *t < start_s);
+    for pair in grid.nodes_s.windows(2) {
+        let failed = DriveError { t_s: pair[0] };
+        // Within a step the inputs are those of its own level, also at its end, where the next jump may be.
+        let end_s = pair[1];
+        let boundary = inputs.at(pair[0]);
+        boundary.check().map_err(|_| failed)?;
+        let before_end_s = end_s - 1e-9 * (end_s - pair[0]);
+        let mut system = DrivenSystem { model, inputs, last_s: before_end_s, boundary_s: pair[0], prepared: model.prepare(&boundary) };
+        let surge_before = system.surge_position(&integrator.y);
+        let kept = integrator.clone();
+        let mut step = integrator.step_on_grid(&mut system, end_s).map_err(|_| failed)?;
+        // The speed line has a corner on the surge line, with an infinite slope on one side: short steps across it.
+        let surge_after = system.surge_position(&step.y1);
+        let near = (surge_before - 1.0).abs().min((surge_after - 1.0).abs()) < SURGE_CORNER;
+        if end_s - pair[0] < 0.11 && (near || (surge_before < 1.0) != (surge_after < 1.0)) {
+            integrator = kept;
+            for part in 1..=CORNER_PARTS {
+                let share = f64::from(part) / f64::from(CORNER_PARTS);
+                let part_end_s = if part == CORNER_PARTS { end_s } else { pair[0] + share * (end_s - pair[0]) };
+                step = integrator.step_on_grid(&mut system, part_end_s).map_err(|_| failed)?;
+            }
+        }
+        if !(step.y1[0] > 0.0 && step.y1[1] > 0.0) {
+            return Err(failed);
+        }
+        while let Some(t_s) = times_s.get(next).filter(|t| **t <= end_s) {
+            system.prepare_for(*t_s);
+            let state = State::from_array(&step.at(*t_s));
+            on_sample(next, &system.prepared, &state, &system.prepared.evaluate(&state));
+            next += 1;
+        }
+    }
+    Ok(State::from_array(&integrator.y))
+}
+
+struct DrivenSystem<'a, I: Inputs> {
+    model: &'a Model,
+    inputs: &'a I,
+    /// Last time that belongs to the step.
+    last_s: f64,
+    /// Time for which the model is prepared.
+    boundary_s: f64,
+    prepared: PreparedModel<'a>,
+}
+
+impl<I: Inputs> DrivenSystem<'_, I> {
+    fn surge_position<const N: usize>(&self, y: &[f64; N]) -> f64 {
+        self.prepared.evaluate(&State::from_array(y)).surge_position_ratio
+    }
+
+    fn prepare_for(&mut self, t_s: f64) {
+        let t_s = t_s.min(self.last_s);
+        if t_s != self.boundary_s {
+            self.prepared = self.model.prepare(&self.inputs.at(t_s));
+            self.boundary_s = t_s;
+        }
+    }
+}
+
+impl<const N: usize, I: Inputs> OdeSystem<N> for DrivenSystem<'_, I> {
+    fn rates(&mut self, t_s: f64, y: &[f64; N]) -> [f64; N] {
+        self.prepare_for(t_s);
+        let state = State::from_array(y);
+        let outputs = self.prepared.evaluate(&state);
+        self.prepared.derivatives(&state, &outputs)
+    }
+
+    fn time_derivative(&mut self, t_s: f64, y: &[f64; N], rates: &[f64; N]) -> Option<[f64; N]> {
+        let ahead_s = 1e-6;
+        let moved = self.rates(t_s + ahead_s, y);
+        Some(std::array::from_fn(|i| (moved[i] - rates[i]) / ahead_s))
+    }
+}

@@ -1,0 +1,225 @@
+//! Where something that the model does not have can take part: named places in the gas path and the metal.
+//!
+//! What is a number of the model is one of its [parameters](crate::params::Params); hooks are for the rest. Each gets
+//! the value the model would use and gives the one it shall use. A model without hooks never looks for them.
+
+use crate::params::BoundaryConditions;
+use crate::state::{MAX_EXTRA, State};
+use mapper_core::Channel;
+use std::sync::Arc;
+
+/// What is known where a hook is asked; values that come later in the gas path are NaN.
+#[derive(Debug, Clone, Copy)]
+pub struct Site<'a> {
+    /// Boundary conditions.
+    pub boundary: &'a BoundaryConditions,
+    /// States.
+    pub state: &'a State,
+    /// Hidden temperatures of the hook that is asked, K.
+    pub extra_k: &'a [f64],
+    /// Temperature of the metal that touches the compressor's gas, K.
+    pub wall_k: f64,
+    /// Total pressure ratio P2/P1.
+    pub pressure_ratio: f64,
+    /// Compressor mass flow, kg/s.
+    pub flow_kg_s: f64,
+    /// Isentropic efficiency of the compressor, fraction.
+    pub efficiency: f64,
+    /// Heat-transfer coefficient between gas and compressor housing, W/(m2 K).
+    pub h_w_m2k: f64,
+    /// Gas before the compressor wheel, K.
+    pub t1_prime_k: f64,
+    /// Gas after the compressor wheel, K.
+    pub t2_prime_k: f64,
+    /// Gas at the compressor outlet, K.
+    pub t2_k: f64,
+    /// Temperature of the bearing housing, K.
+    pub bearing_k: f64,
+}
+
+impl<'a> Site<'a> {
+    /// A site of whose gas path nothing is known yet.
+    #[inline]
+    pub(crate) fn before_the_gas(
+        boundary: &'a BoundaryConditions,
+        state: &'a State,
+        wall_k: f64,
+        pressure_ratio: f64,
+        bearing_k: f64,
+    ) -> Self {
+        Site {
+            boundary,
+            state,
+            extra_k: &[],
+            wall_k,
+            pressure_ratio,
+            flow_kg_s: f64::NAN,
+            efficiency: f64::NAN,
+            h_w_m2k: f64::NAN,
+            t1_prime_k: f64::NAN,
+            t2_prime_k: f64::NAN,
+            t2_k: f64::NAN,
+            bearing_k,
+        }
+    }
+}
+
+/// Something that takes part in the model. Every method does nothing unless it is written; all must be smooth in what
+/// they are given, or the integration takes small steps.
+pub trait Hooks: std::fmt::Debug + Send + Sync {
+    /// Compressor mass flow, kg/s.
+    fn flow_kg_s(&self, _site: &Site<'_>, flow_kg_s: f64) -> f64 {
+        flow_kg_s
+    }
+
+    /// Isentropic efficiency, fraction.
+    fn efficiency(&self, _site: &Site<'_>, efficiency: f64) -> f64 {
+        efficiency
+    }
+
+    /// Convection between gas and compressor housing, W/(m2 K).
+    fn h_w_m2k(&self, _site: &Site<'_>, h_w_m2k: f64) -> f64 {
+        h_w_m2k
+    }
+
+    /// Gas before compression (station 1'), K.
+    fn gas_before_k(&self, _site: &Site<'_>, t1_prime_k: f64) -> f64 {
+        t1_prime_k
+    }
+
+    /// Gas after compression, before it meets the housing (station 2'), K.
+    fn gas_after_k(&self, _site: &Site<'_>, t2_prime_k: f64) -> f64 {
+        t2_prime_k
+    }
+
+    /// Gas at the outlet (station 2), which probe and valve meet, K.
+    fn gas_outlet_k(&self, _site: &Site<'_>, t2_k: f64) -> f64 {
+        t2_k
+    }
+
+    /// Heat added to the compressor housing (its outer part), W.
+    fn heat_to_compressor_w(&self, _site: &Site<'_>) -> f64 {
+        0.0
+    }
+
+    /// Heat added to the inner wall of the compressor housing, W; to the housing where it is one node.
+    fn heat_to_inner_w(&self, _site: &Site<'_>) -> f64 {
+        0.0
+    }
+
+    /// Heat added to the turbine housing, W.
+    fn heat_to_turbine_w(&self, _site: &Site<'_>) -> f64 {
+        0.0
+    }
+
+    /// Torque added to the shaft, N m.
+    fn shaft_torque_nm(&self, _site: &Site<'_>) -> f64 {
+        0.0
+    }
+
+    /// What the sensor of `channel` sees, in the channel's unit.
+    fn reading(&self, _site: &Site<'_>, _channel: Channel, value: f64) -> f64 {
+        value
+    }
+
+    /// Number of hidden temperatures it needs, at most [`MAX_EXTRA`].
+    fn extra_states(&self) -> usize {
+        0
+    }
+
+    /// Rates of its hidden temperatures, K/s; `rates` has [`extra_states`](Hooks::extra_states) elements.
+    fn extra_rates_k_s(&self, _site: &Site<'_>, _rates: &mut [f64]) {}
+
+    /// What went wrong so far, if anything did: hooks cannot fail, they give NaN and keep the reason.
+    fn fault(&self) -> Option<String> {
+        None
+    }
+}
+
+/// The hooks of a model, each with its place among the hidden temperatures.
+#[derive(Debug, Clone, Default)]
+pub struct HookList {
+    placed: Vec<Placed>,
+    extra_states: usize,
+}
+
+#[derive(Debug, Clone)]
+struct Placed {
+    hooks: Arc<dyn Hooks>,
+    first_extra: usize,
+    extra_states: usize,
+}
+
+/// The hooks of a model want more hidden temperatures than it has room for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the effects need {wanted} hidden temperatures together; a model has room for {MAX_EXTRA}: try fewer effects at once"
+)]
+pub struct TooManyExtraStates {
+    /// How many they want.
+    pub wanted: usize,
+}
+
+impl HookList {
+    /// Adds hooks behind those that are there: they see what those made.
+    ///
+    /// # Errors
+    /// [`TooManyExtraStates`]; the list is then as before.
+    pub fn push(&mut self, hooks: Arc<dyn Hooks>) -> Result<(), TooManyExtraStates> {
+        let extra_states = hooks.extra_states();
+        let wanted = self.extra_states.saturating_add(extra_states);
+        if wanted > MAX_EXTRA {
+            return Err(TooManyExtraStates { wanted });
+        }
+        self.placed.push(Placed { hooks, first_extra: self.extra_states, extra_states });
+        self.extra_states = wanted;
+        Ok(())
+    }
+
+    /// Whether there are none.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.placed.is_empty()
+    }
+
+    /// Hidden temperatures of all of them.
+    pub fn extra_states(&self) -> usize {
+        self.extra_states
+    }
+
+    /// The first fault that any of them kept.
+    pub fn fault(&self) -> Option<String> {
+        self.placed.iter().find_map(|placed| placed.hooks.fault())
+    }
+
+    /// Each hook's opinion of `value` after the one before it.
+    pub(crate) fn fold(
+        &self,
+        site: &Site<'_>,
+        value: f64,
+        ask: impl Fn(&dyn Hooks, &Site<'_>, f64) -> f64,
+    ) -> f64 {
+        self.placed.iter().fold(value, |value, placed| ask(placed.hooks.as_ref(), &placed.site(site), value))
+    }
+
+    /// What the sensor of `channel` sees of `value`.
+    pub fn reading(&self, site: &Site<'_>, channel: Channel, value: f64) -> f64 {
+        self.fold(site, value, |hooks, site, value| hooks.reading(site, channel, value))
+    }
+
+    pub(crate) fn extra_rates_k_s(&self, site: &Site<'_>) -> [f64; MAX_EXTRA] {
+        let mut rates = [0.0; MAX_EXTRA];
+        for placed in self.placed.iter().filter(|placed| placed.extra_states > 0) {
+            let range = placed.first_extra..placed.first_extra + placed.extra_states;
+            placed.hooks.extra_rates_k_s(&placed.site(site), &mut rates[range]);
+        }
+        rates
+    }
+}
+
+impl Placed {
+    fn site<'a>(&self, site: &Site<'a>) -> Site<'a> {
+        let extra = &site.state.extra_k;
+        Site { extra_k: &extra[self.first_extra..self.first_extra + self.extra_states], ..*site }
+    }
+}

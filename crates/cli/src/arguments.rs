@@ -29,6 +29,8 @@ pub enum Command {
     Run(RunArguments),
     /// Identify efficiency and heat transfer from a run directory or any MCAP recording
     Identify(IdentifyArguments),
+    /// Say whether the rig stayed the same while a map was made: which sensor drifts, or the machine, since when, how fast
+    Drift(DriftArguments),
     /// Run every map of a nightly campaign on the simulated rig and say what moved against the last nights
     Nightly(NightlyArguments),
     /// List, filter and draw what the nightly runs gave
@@ -120,6 +122,26 @@ pub struct IdentifyArguments {
     /// How to identify [default: the campaign's method, or dynamic]
     #[arg(long, value_enum)]
     pub method: Option<MethodArgument>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mapper drift`.
+#[derive(Debug, Args)]
+pub struct DriftArguments {
+    /// Run directories in the order in which they were made; with `--recording`, the one campaign of the recordings
+    #[arg(required = true, value_name = "RUN|CAMPAIGN")]
+    pub paths: Vec<PathBuf>,
+    /// MCAP recording, also of another program; may be given more than once, in the order in which they were made
+    #[arg(long, value_name = "FILE")]
+    pub recording: Vec<PathBuf>,
+    /// Where recordings made by another program hold the rig's channels (YAML)
+    #[arg(long, value_name = "FILE", requires = "recording")]
+    pub channels: Option<PathBuf>,
+    /// Write the points without the drift into this new CSV file
+    #[arg(long, value_name = "FILE")]
+    pub corrected: Option<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,

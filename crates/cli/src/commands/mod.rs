@@ -1,6 +1,7 @@
 //! One file a command.
 
 mod check;
+mod drift;
 mod history;
 mod identify;
 mod nightly;
@@ -22,6 +23,7 @@ pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
         Command::Plan(arguments) => plan::plan(arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Identify(arguments) => identify::identify(arguments),
+        Command::Drift(arguments) => drift::drift(arguments),
         Command::Nightly(arguments) => nightly::nightly(arguments),
         Command::History(arguments) => history::history(arguments),
         Command::Reproduce(arguments) => reproduce::reproduce(arguments),

@@ -1,15 +1,39 @@
 //! Boundary conditions as recorded, for the model to be driven by: averaged where they are quiet, as they are after jumps.
 
 use mapper_core::{Channel, Recording};
-use mapper_physics::inputs::{InputsError, InterpolatedInputs};
+use mapper_physics::inputs::{Inputs, InputsError, InterpolatedInputs};
 use mapper_physics::params::BoundaryConditions;
 
 /// After a jump readings are taken as they are for this long, s: actuators need some tenths.
 const RAW_S: f64 = 3.0;
 /// Between jumps means over this long are taken, s.
 const MEAN_S: f64 = 10.0;
-/// Just before a jump, s.
+/// A sample at a jump belongs to what comes after it, s.
 const BEFORE_S: f64 = 1e-6;
+
+/// Boundary conditions from jump to jump: never interpolated across one, however close to it.
+pub(crate) struct RecordedInputs {
+    starts_s: Vec<f64>,
+    levels: Vec<InterpolatedInputs>,
+}
+
+impl Inputs for RecordedInputs {
+    fn at(&self, t_s: f64) -> BoundaryConditions {
+        let level = self.starts_s.partition_point(|start_s| *start_s <= t_s).saturating_sub(1);
+        self.levels[level].at(t_s)
+    }
+
+    fn next_kink_s(&self, t_s: f64) -> f64 {
+        let level = self.starts_s.partition_point(|start_s| *start_s <= t_s).saturating_sub(1);
+        let next_s = self.starts_s.get(level + 1).copied().unwrap_or(f64::INFINITY);
+        self.levels[level].next_kink_s(t_s).min(next_s)
+    }
+
+    fn is_constant_after(&self, t_s: f64) -> bool {
+        let level = self.starts_s.partition_point(|start_s| *start_s <= t_s).saturating_sub(1);
+        self.levels[level].is_constant_after(t_s)
+    }
+}
 
 /// The inputs of a recording. `jumps_s` are the times at which commands change, rising.
 pub(crate) fn recorded(
@@ -18,15 +42,18 @@ pub(crate) fn recorded(
     start_s: f64,
     end_s: f64,
     jumps_s: &[f64],
-) -> Result<InterpolatedInputs, InputsError> {
-    let mut nodes = Nodes { recording, nominal, t_s: Vec::new(), rows: Vec::new() };
+) -> Result<RecordedInputs, InputsError> {
     let mut edges: Vec<f64> = jumps_s.iter().copied().filter(|t| *t > start_s && *t < end_s).collect();
     edges.insert(0, start_s);
     edges.push(end_s);
+    let mut inputs = RecordedInputs { starts_s: Vec::new(), levels: Vec::new() };
     for (index, pair) in edges.windows(2).enumerate() {
+        let mut nodes = Nodes { recording, nominal, t_s: Vec::new(), rows: Vec::new() };
         nodes.level(pair[0], pair[1], index > 0);
+        inputs.starts_s.push(pair[0]);
+        inputs.levels.push(InterpolatedInputs::new(nodes.t_s, nodes.rows)?);
     }
-    InterpolatedInputs::new(nodes.t_s, nodes.rows)
+    Ok(inputs)
 }
 
 struct Nodes<'a> {
@@ -69,14 +96,7 @@ impl Nodes<'_> {
                 let at = |share: f64| raw_end_s + length_s * share / parts as f64;
                 let (low_s, high_s) = (at(part as f64), at(part as f64 + 1.0));
                 let row = self.means(low_s, high_s - BEFORE_S, valve);
-                if part == 0 && !after_jump {
-                    self.push(low_s, row);
-                }
                 self.push(0.5 * (low_s + high_s), row);
-                if part + 1 == parts {
-                    // Held to the jump, which is never interpolated across.
-                    self.push(end_s - BEFORE_S, row);
-                }
             }
         }
     }

@@ -2,11 +2,11 @@
 
 use crate::DriftError;
 use crate::blocks::{Block, CampaignStep, OUTPUTS};
-use crate::inputs;
+use crate::inputs::{self, RecordedInputs};
 use crate::knob::Knob;
 use mapper_core::{Channel, Recording};
 use mapper_physics::driven::{DriveError, FrozenGrid, drive, settle};
-use mapper_physics::inputs::{Inputs, InterpolatedInputs};
+use mapper_physics::inputs::Inputs;
 use mapper_physics::instruments::true_value;
 use mapper_physics::model::{Model, State, rad_s_of_rpm};
 use mapper_physics::params::BoundaryConditions;
@@ -32,7 +32,7 @@ pub(crate) struct Prediction {
 /// One run, ready to be driven.
 pub(crate) struct Drive<'a> {
     model: &'a Model,
-    inputs: InterpolatedInputs,
+    inputs: RecordedInputs,
     start: State,
     grid: FrozenGrid,
     /// Times at which the model is read, and where each reading belongs.
@@ -179,7 +179,7 @@ fn start_state(
     run: usize,
     recording: &Recording,
     model: &Model,
-    inputs: &InterpolatedInputs,
+    inputs: &RecordedInputs,
     start_s: f64,
 ) -> Result<State, DriftError> {
     let mean = |channel: Channel, from_s: f64, to_s: f64| {
@@ -211,7 +211,7 @@ fn start_state(
 
 /// Inputs with one of them turned.
 struct Turned<'a> {
-    inputs: &'a InterpolatedInputs,
+    inputs: &'a RecordedInputs,
     turned: Option<(Knob, f64)>,
 }
 

@@ -15,6 +15,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Readings of the model within a stretch, s apart.
 const SAMPLE_S: f64 = 2.5;
+/// Where the usual grid fails, on the surge line, steps are as short as the first for as long as the second, s.
+const FINE_S: (f64, f64) = (0.02, 4.0);
 /// Readings this long before the start say what state it is in, s.
 const BEFORE_S: f64 = 2.0;
 
@@ -35,6 +37,8 @@ pub(crate) struct Drive<'a> {
     inputs: RecordedInputs,
     start: State,
     grid: FrozenGrid,
+    jumps_s: Vec<f64>,
+    span_s: (f64, f64),
     /// Times at which the model is read, and where each reading belongs.
     times_s: Vec<f64>,
     places: Vec<Place>,
@@ -91,6 +95,8 @@ impl<'a> Drive<'a> {
             inputs,
             start,
             grid,
+            jumps_s,
+            span_s: (start_s, end_s),
             times_s: readings.iter().map(|reading| reading.0).collect(),
             places: readings.iter().map(|reading| reading.1).collect(),
             blocks: block_count,
@@ -145,7 +151,21 @@ impl<'a> Drive<'a> {
     }
 
     /// The run as it is, and with each knob turned, over all cores.
-    pub fn predict_all(&self) -> Result<(Prediction, Vec<Prediction>), DriveError> {
+    pub fn predict_all(&mut self) -> Result<(Prediction, Vec<Prediction>), DriveError> {
+        self.try_all().or_else(|_| {
+            let (step_s, until_s) = FINE_S;
+            let fine = |jump_s: &f64| {
+                let jump_s = *jump_s;
+                let count = (until_s / step_s).round() as usize;
+                (1..=count).map(move |index| jump_s + step_s * index as f64)
+            };
+            let nodes_s: Vec<f64> = self.jumps_s.iter().flat_map(fine).collect();
+            self.grid = FrozenGrid::new(self.span_s.0, self.span_s.1, &self.jumps_s, &nodes_s);
+            self.try_all()
+        })
+    }
+
+    fn try_all(&self) -> Result<(Prediction, Vec<Prediction>), DriveError> {
         let next = AtomicUsize::new(0);
         let done = Mutex::new(Vec::new());
         let work = || {

@@ -23,6 +23,8 @@ fn usual_noise(channel: Channel) -> f64 {
         Dimension::Temperature | Dimension::Ratio => 0.2,
     }
 }
+/// Begin of each run that is left out, s: what the rig did before is not known, and rigs are still settling.
+const FIRST_S: f64 = 30.0;
 /// What the model leaves unexplained in the mean of a stretch, over the noise of one sample.
 const MODEL_FLOOR: f64 = 0.15;
 
@@ -167,7 +169,7 @@ fn read(
     let mut base = Prediction { means: Vec::new(), surge_position_ratio: Vec::new(), step_ends: Vec::new() };
     let mut turned: Vec<Prediction> = vec![base.clone(); Knob::ALL.len()];
     for (run, recording) in recordings.iter().enumerate() {
-        let drive = Drive::new(run, recording, request.model, &request.boundary, &steps, &all_blocks)?;
+        let mut drive = Drive::new(run, recording, request.model, &request.boundary, &steps, &all_blocks)?;
         let (own_base, own_turned) =
             drive.predict_all().map_err(|source| DriftError::Drive { run, source })?;
         append(&mut base, own_base);
@@ -183,7 +185,10 @@ fn read(
         .collect();
     let kept: Vec<usize> = (0..all.len())
         .filter(|index| {
-            base.surge_position_ratio[*index] < SURGE_LIMIT
+            let step = &steps[all[*index].0.step];
+            let begins = step.from.is_none() && all[*index].0.start_s < step.start_s + FIRST_S;
+            !begins
+                && base.surge_position_ratio[*index] < SURGE_LIMIT
                 && columns
                     .iter()
                     .all(|column| all[*index].1[*column].is_some() && all[*index].2[*column].is_finite())

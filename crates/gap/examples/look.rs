@@ -3,36 +3,16 @@ use mapper_record::*;
 use std::time::Instant;
 fn main() {
     let a: Vec<String> = std::env::args().collect();
-    let map =
-        ChannelMap::from_yaml(&std::fs::read_to_string("examples/channels/gap_rig.yaml").unwrap()).unwrap();
+    let map = ChannelMap::from_yaml(&std::fs::read_to_string("examples/channels/gap_rig.yaml").unwrap()).unwrap();
     for f in &a[1..] {
         let t = Instant::now();
         let r = read_recording(std::path::Path::new(f), &map, &ReadOptions::default()).unwrap();
         println!("{f} read {:?} {:?}", t.elapsed(), r.warnings);
-        let declared = Declared {
-            sensors: map.sensors.clone(),
-            noise_colour: map.noise_colour.unwrap(),
-            tolerances: ModelTolerances::default(),
-            nominal: Default::default(),
-        };
+        let declared = Declared { sensors: map.sensors.clone(), noise_colour: map.noise_colour.unwrap(), tolerances: ModelTolerances::default(), nominal: Default::default() };
         let t = Instant::now();
         let table = Table::new(&r.recording).unwrap();
-        let study = Study::new(
-            &r.recording,
-            table,
-            declared,
-            mapper_physics::model::Model::nominal(),
-            mapper_effects::catalogue(),
-        )
-        .unwrap();
-        println!(
-            "study {:?} steps {} rows {} lag {:?} noise {:?}",
-            t.elapsed(),
-            study.steps.len(),
-            study.measured.len(),
-            study.measured_lag_s,
-            study.inputs.noise()
-        );
+        let study = Study::new(&r.recording, table, declared, mapper_physics::model::Model::nominal(), mapper_effects::catalogue()).unwrap();
+        println!("study {:?} steps {} rows {} lag {:?} noise {:?}", t.elapsed(), study.steps.len(), study.measured.len(), study.measured_lag_s, study.inputs.noise());
         let t = Instant::now();
         let p = study.predict(&study.nothing()).unwrap();
         println!("predict {:?} {}", t.elapsed(), p.values.len());
@@ -41,13 +21,7 @@ fn main() {
         println!("lin {:?}", t.elapsed());
         let t = Instant::now();
         let null = fit(&study, &lin, &study.nothing(), &Selection::all(&study), Effort::default()).unwrap();
-        println!(
-            "null {:?} cost {:.0} n {} score {:.1}",
-            t.elapsed(),
-            null.cost,
-            study.measured.len(),
-            null.score
-        );
+        println!("null {:?} cost {:.0} n {} score {:.1}", t.elapsed(), null.cost, study.measured.len(), null.score);
         for o in 0..9 {
             let mut s = String::new();
             for st in 0..study.steps.len() {
@@ -68,20 +42,10 @@ fn main() {
             _ => vec![],
         };
         let mut start = study.nothing();
-        start.effects = truth
-            .iter()
-            .map(|(id, v)| (study.effects.iter().position(|e| e.info().id == *id).unwrap(), v.clone()))
-            .collect();
+        start.effects = truth.iter().map(|(id, v)| (study.effects.iter().position(|e| e.info().id == *id).unwrap(), v.clone())).collect();
         let t = Instant::now();
         let null = fit(&study, &lin, &start, &Selection::all(&study), Effort::default()).unwrap();
-        println!(
-            "truth {:?} cost {:.0} score {:.1} {:?} cov {:?}",
-            t.elapsed(),
-            null.cost,
-            null.score,
-            null.hypothesis.effects,
-            null.covariance.diagonal().map(|x| x.sqrt())
-        );
+        println!("truth {:?} cost {:.0} score {:.1} {:?} cov {:?}", t.elapsed(), null.cost, null.score, null.hypothesis.effects, null.covariance.diagonal().map(|x| x.sqrt()));
         for o in 0..9 {
             let mut s = String::new();
             for st in 0..study.steps.len() {
@@ -97,24 +61,9 @@ fn main() {
         println!("relin {:?}", t.elapsed());
         let t = Instant::now();
         let null = fit(&study, &lin2, &null.hypothesis, &Selection::all(&study), Effort::default()).unwrap();
-        println!(
-            "refit {:?} cost {:.0} score {:.1} {:?} cov {:?}",
-            t.elapsed(),
-            null.cost,
-            null.score,
-            null.hypothesis.effects,
-            null.covariance.diagonal().map(|x| x.sqrt())
-        );
-        let mut big: Vec<_> = study
-            .nuisances
-            .iter()
-            .zip(&null.hypothesis.nuisances)
-            .map(|(n, u)| (format!("{:?}", n.kind), *u))
-            .collect();
+        println!("refit {:?} cost {:.0} score {:.1} {:?} cov {:?}", t.elapsed(), null.cost, null.score, null.hypothesis.effects, null.covariance.diagonal().map(|x| x.sqrt()));
+        let mut big: Vec<_> = study.nuisances.iter().zip(&null.hypothesis.nuisances).map(|(n, u)| (format!("{:?}", n.kind), *u)).collect();
         big.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-        println!(
-            "{}",
-            big.iter().take(14).map(|(a, b)| format!("{a} {b:.2}")).collect::<Vec<_>>().join(", ")
-        );
+        println!("{}", big.iter().take(14).map(|(a, b)| format!("{a} {b:.2}")).collect::<Vec<_>>().join(", "));
     }
 }

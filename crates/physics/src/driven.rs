@@ -39,12 +39,10 @@ impl FrozenGrid {
         for until_s in wanted {
             while until_s - at_s > 1e-9 {
                 let since_s = at_s - jump_s;
-                let limit_s =
-                    STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(3.0, |(_, step)| *step);
+                let limit_s = STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(3.0, |(_, step)| *step);
                 // Equal parts, each within the limit.
                 let parts = ((until_s - at_s) / limit_s - 1e-6).ceil().max(1.0);
-                at_s =
-                    if parts <= 1.0 { until_s } else { at_s + ((until_s - at_s) / parts).max(limit_s * 0.5) };
+                at_s = if parts <= 1.0 { until_s } else { at_s + ((until_s - at_s) / parts).max(limit_s * 0.5) };
                 nodes_s.push(at_s);
             }
             if jumps_s.contains(&until_s) {
@@ -129,13 +127,7 @@ where
         let boundary = inputs.at(pair[0]);
         boundary.check().map_err(|_| failed)?;
         let before_end_s = end_s - 1e-9 * (end_s - pair[0]);
-        let mut system = DrivenSystem {
-            model,
-            inputs,
-            last_s: before_end_s,
-            boundary_s: pair[0],
-            prepared: model.prepare(&boundary),
-        };
+        let mut system = DrivenSystem { model, inputs, last_s: before_end_s, boundary_s: pair[0], prepared: model.prepare(&boundary) };
         let surge_before = system.surge_position(&integrator.y);
         let kept = integrator.clone();
         let mut step = integrator.step_on_grid(&mut system, end_s).map_err(|_| failed)?;
@@ -146,8 +138,7 @@ where
             integrator = kept;
             for part in 1..=CORNER_PARTS {
                 let share = f64::from(part) / f64::from(CORNER_PARTS);
-                let part_end_s =
-                    if part == CORNER_PARTS { end_s } else { pair[0] + share * (end_s - pair[0]) };
+                let part_end_s = if part == CORNER_PARTS { end_s } else { pair[0] + share * (end_s - pair[0]) };
                 step = integrator.step_on_grid(&mut system, part_end_s).map_err(|_| failed)?;
             }
         }

@@ -102,14 +102,16 @@ fn one(seed: u64, cause: Option<Cause>, limits: &BTreeMap<Cause, f64>, factor: f
         for (step, (true_eta, point)) in campaign.eta_true.iter().zip(&report.corrected_points).enumerate() {
             let drift = planted.size * planted.course.at(campaign.recording.steps[step].end_s);
             let start = if planted.cause == Cause::Fouling { true_eta / (1.0 + drift) } else { *true_eta };
-            errors.push((eta(step)? - start, point.eta_uncorrected? - start));
+            // Steps that cannot be identified (the first one, and opening 0.5 near surge) have nothing to compare.
+            if let (Some(now), Some(uncorrected)) = (eta(step), point.eta_uncorrected) {
+                errors.push((now - start, uncorrected - start));
+            }
         }
         let rms = |values: Vec<f64>| {
             let mean = values.iter().sum::<f64>() / values.len() as f64;
             (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
         };
-        // The first step has no jump before it, and the near-surge opening no identification worth the name.
-        let (corrected, uncorrected): (Vec<f64>, Vec<f64>) = errors.into_iter().skip(1).unzip();
+        let (corrected, uncorrected): (Vec<f64>, Vec<f64>) = errors.into_iter().unzip();
         Some(rms(corrected) / rms(uncorrected))
     };
     Row {

@@ -7,6 +7,7 @@ use mapper_physics::params::{BoundaryConditions, Params};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Knob {
     Input(Channel),
+    Ambient,
     Efficiency,
     Flow,
     TurbineEfficiency,
@@ -26,13 +27,14 @@ pub(crate) const INPUTS: [Channel; 6] =
     [Channel::T1, Channel::P1, Channel::P3, Channel::T3, Channel::P4, Channel::TOil];
 
 impl Knob {
-    pub const ALL: [Knob; 18] = [
+    pub const ALL: [Knob; 19] = [
         Knob::Input(Channel::T1),
         Knob::Input(Channel::P1),
         Knob::Input(Channel::P3),
         Knob::Input(Channel::T3),
         Knob::Input(Channel::P4),
         Knob::Input(Channel::TOil),
+        Knob::Ambient,
         Knob::Efficiency,
         Knob::Flow,
         Knob::TurbineEfficiency,
@@ -51,7 +53,7 @@ impl Knob {
     pub fn step(self) -> f64 {
         match self {
             Knob::Input(channel) if channel.info().dimension == mapper_core::Dimension::Pressure => 100.0,
-            Knob::Input(_) | Knob::InitialTc | Knob::InitialTt => 0.5,
+            Knob::Input(_) | Knob::Ambient | Knob::InitialTc | Knob::InitialTt => 0.5,
             Knob::Friction => 5e-8,
             _ => 2e-3,
         }
@@ -64,6 +66,7 @@ impl Knob {
     pub fn tolerance(self) -> f64 {
         match self {
             Knob::Input(_) => 0.0,
+            Knob::Ambient => 2.0,
             Knob::Efficiency | Knob::Flow | Knob::ValveArea => 0.01,
             Knob::TurbineEfficiency => 0.02,
             Knob::TurbineFlow => 0.01,
@@ -89,13 +92,18 @@ impl Knob {
             Knob::ExternalConvection => params.external_convection_ratio *= 1.0 + by,
             Knob::OilConductance => params.bearing.oil_conductance_w_k *= 1.0 + by,
             Knob::Friction => params.bearing_friction_w_s2 += by,
-            Knob::Input(_) | Knob::InitialTc | Knob::InitialTt => {}
+            Knob::Input(_) | Knob::Ambient | Knob::InitialTc | Knob::InitialTt => {}
         }
     }
 
     /// Turns the boundary conditions.
     pub fn shift(self, boundary: &mut BoundaryConditions, by: f64) {
-        let Knob::Input(channel) = self else { return };
+        let Knob::Input(channel) = self else {
+            if self == Knob::Ambient {
+                boundary.ambient_temperature_k += by;
+            }
+            return;
+        };
         match channel {
             Channel::T1 => boundary.t1_k += by,
             Channel::P1 => boundary.p1_pa += by,

@@ -88,8 +88,52 @@ pub(crate) fn constants(
             ));
         }
     }
+    wander(readings, &mut constants);
     constants.retain(|constant| constant.readings.iter().any(|value| *value != 0.0));
     constants
+}
+
+/// Distance of the knots of what wanders slowly, s.
+const KNOT_S: f64 = 480.0;
+/// The air around the housings is seldom recorded: it wanders by so much, K.
+const AMBIENT_WANDER_K: f64 = 0.7;
+/// What the turbine side wanders by, K: its housing takes an hour to forget what the model has wrong.
+const TURBINE_WANDER: [(Channel, f64); 2] = [(Channel::Tt, 0.2), (Channel::T4, 0.1)];
+
+/// Courses that are linear between knots: no drift of the causes looked for.
+fn wander(readings: &Readings, constants: &mut Vec<Constant>) {
+    let (start_s, end_s) = readings.span_s();
+    let count = ((end_s - start_s) / KNOT_S).ceil().clamp(1.0, 60.0);
+    for knot in 0..=count as usize {
+        let hat = |block: &crate::blocks::Block| {
+            let t_s = 0.5 * (block.start_s + block.end_s) + readings.steps[block.step].offset_s;
+            let place = (t_s - start_s) / (end_s - start_s).max(1.0) * count;
+            (1.0 - (place - knot as f64).abs()).max(0.0)
+        };
+        let columns = readings.columns.len();
+        let steps = readings.steps.len();
+        let course = |value: &dyn Fn(usize, usize) -> f64| {
+            let readings = readings
+                .blocks
+                .iter()
+                .enumerate()
+                .flat_map(|(index, block)| {
+                    let size = hat(block);
+                    (0..columns).map(move |column| (index * columns + column, column, size))
+                })
+                .map(|(row, column, size)| if size > 0.0 { size * value(row, column) } else { 0.0 })
+                .collect();
+            Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] }
+        };
+        if let Some(ambient) = readings.answer(Knob::Ambient) {
+            constants.push(course(&|row, _| AMBIENT_WANDER_K * ambient.readings[row]));
+        }
+        for (channel, sigma) in TURBINE_WANDER {
+            constants.push(course(&|_, column| {
+                if OUTPUTS[readings.columns[column]] == channel { sigma } else { 0.0 }
+            }));
+        }
+    }
 }
 
 fn scaled(readings: &Readings, answer: &Constant, sigma: f64, holds: &dyn Fn(usize) -> bool) -> Constant {

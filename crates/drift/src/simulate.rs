@@ -15,8 +15,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Readings of the model within a stretch, s apart.
 const SAMPLE_S: f64 = 2.5;
-/// Where the usual grid fails, on the surge line, steps are as short as the first for as long as the second, s.
-const FINE_S: (f64, f64) = (0.02, 4.0);
+/// Longest steps after a jump: up to so many seconds, steps of at most so many seconds.
+const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.0), (f64::INFINITY, 3.0)];
+/// A jump that the model cannot follow (deep beyond the surge line) is left out for this long, s: shaft and outlet then
+/// stand where they were read, the metal where it was.
+const LEFT_OUT_S: f64 = 5.0;
 /// Readings this long before the start say what state it is in, s.
 const BEFORE_S: f64 = 2.0;
 
@@ -36,20 +39,27 @@ pub(crate) struct Drive<'a> {
     model: &'a Model,
     inputs: RecordedInputs,
     start: State,
-    grid: FrozenGrid,
-    jumps_s: Vec<f64>,
-    span_s: (f64, f64),
+    stretches: Vec<Stretch>,
+    blocks: usize,
+}
+
+/// One step of the run.
+struct Stretch {
+    start_s: f64,
+    end_s: f64,
+    /// Shaft and outlet as read [`LEFT_OUT_S`] after the jump.
+    read_later: Option<State>,
+    /// Whether the jump itself is left out.
+    left_out: bool,
     /// Times at which the model is read, and where each reading belongs.
     times_s: Vec<f64>,
     places: Vec<Place>,
-    blocks: usize,
-    steps: usize,
 }
 
 #[derive(Debug, Clone, Copy)]
 enum Place {
     Block(usize),
-    StepEnd(usize),
+    StepEnd,
 }
 
 impl<'a> Drive<'a> {
@@ -63,59 +73,54 @@ impl<'a> Drive<'a> {
         blocks: &[Block],
     ) -> Result<Self, DriftError> {
         let unusable = |message: String| DriftError::Unusable { run, message };
-        let of_run: Vec<&CampaignStep> = steps.iter().filter(|step| step.run == run).collect();
-        let (Some(first), Some(last)) = (of_run.first(), of_run.last()) else {
+        let of_run: Vec<(usize, &CampaignStep)> =
+            steps.iter().enumerate().filter(|(_, step)| step.run == run).collect();
+        let (Some((_, first)), Some((_, last))) = (of_run.first(), of_run.last()) else {
             return Err(unusable("it has no steps; commands that change make steps".to_owned()));
         };
-        let (start_s, end_s) = (first.start_s, last.end_s);
-        let jumps_s: Vec<f64> = of_run.iter().map(|step| step.start_s).collect();
-        let inputs = inputs::recorded(recording, nominal, start_s, end_s, &jumps_s)
+        let jumps_s: Vec<f64> = of_run.iter().map(|(_, step)| step.start_s).collect();
+        let inputs = inputs::recorded(recording, nominal, first.start_s, last.end_s, &jumps_s)
             .map_err(|error| unusable(format!("its inputs cannot be used: {error}")))?;
-        let start = start_state(run, recording, model, &inputs, start_s)?;
-
-        let mut readings: Vec<(f64, Place)> = Vec::new();
-        let own = blocks.iter().filter(|block| steps.get(block.step).is_some_and(|step| step.run == run));
+        let start = start_state(run, recording, model, &inputs, first.start_s)?;
         let mut block_count = 0;
-        for (position, block) in own.enumerate() {
-            let count = (block.length_s() / SAMPLE_S).round().max(1.0) as usize;
-            for index in 0..count {
-                let share = (index as f64 + 0.5) / count as f64;
-                readings.push((block.start_s + share * block.length_s(), Place::Block(position)));
+        let mut stretches = Vec::new();
+        for (position, step) in &of_run {
+            let mut stretch = Stretch {
+                start_s: step.start_s,
+                end_s: step.end_s,
+                read_later: read_state(recording, step.start_s + LEFT_OUT_S),
+                left_out: false,
+                times_s: Vec::new(),
+                places: Vec::new(),
+            };
+            for block in blocks.iter().filter(|block| block.step == *position) {
+                let count = (block.length_s() / SAMPLE_S).round().max(1.0) as usize;
+                for index in 0..count {
+                    let share = (index as f64 + 0.5) / count as f64;
+                    stretch.times_s.push(block.start_s + share * block.length_s());
+                    stretch.places.push(Place::Block(block_count));
+                }
+                block_count += 1;
             }
-            block_count += 1;
+            stretch.times_s.push(step.end_s - 1e-3);
+            stretch.places.push(Place::StepEnd);
+            stretches.push(stretch);
         }
-        for (position, step) in of_run.iter().enumerate() {
-            readings.push((step.end_s - 1e-3, Place::StepEnd(position)));
-        }
-        readings.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // The first step's start is no jump for the model: it starts there.
-        let grid = FrozenGrid::new(start_s, end_s, &jumps_s, &[]);
-        Ok(Drive {
-            model,
-            inputs,
-            start,
-            grid,
-            jumps_s,
-            span_s: (start_s, end_s),
-            times_s: readings.iter().map(|reading| reading.0).collect(),
-            places: readings.iter().map(|reading| reading.1).collect(),
-            blocks: block_count,
-            steps: of_run.len(),
-        })
+        Ok(Drive { model, inputs, start, stretches, blocks: block_count })
     }
 
-    /// The run with one knob turned, or none.
-    pub fn predict(&self, turned: Option<(Knob, f64)>) -> Result<Prediction, DriveError> {
+    /// The run with one knob turned, or none. An error names the stretch that the model could not follow.
+    fn predict(&self, turned: Option<(Knob, f64)>) -> Result<Prediction, (usize, DriveError)> {
         let mut model = self.model.clone();
-        let mut start = self.start;
+        let mut state = self.start;
         if let Some((knob, by)) = turned {
             knob.turn(&mut model.params, by);
             match knob {
                 Knob::InitialTc => {
-                    start.tc_k += by;
-                    start.inner_k += by;
+                    state.tc_k += by;
+                    state.inner_k += by;
                 }
-                Knob::InitialTt => start.tt_k += by,
+                Knob::InitialTt => state.tt_k += by,
                 _ => {}
             }
         }
@@ -123,27 +128,37 @@ impl<'a> Drive<'a> {
         let mut prediction = Prediction {
             means: vec![[0.0; OUTPUTS.len()]; self.blocks],
             surge_position_ratio: vec![f64::NEG_INFINITY; self.blocks],
-            step_ends: vec![(f64::NAN, f64::NAN); self.steps],
+            step_ends: vec![(f64::NAN, f64::NAN); self.stretches.len()],
         };
         let mut counts = vec![0_usize; self.blocks];
-        drive(
-            &model,
-            &inputs,
-            start,
-            &self.grid,
-            &self.times_s,
-            |index, prepared, state, outputs| match self.places[index] {
-                Place::StepEnd(step) => prediction.step_ends[step] = (outputs.efficiency, outputs.h_w_m2k),
-                Place::Block(block) => {
-                    for (sum, channel) in prediction.means[block].iter_mut().zip(OUTPUTS) {
-                        *sum += true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
+        for (index, stretch) in self.stretches.iter().enumerate() {
+            let mut start_s = stretch.start_s;
+            if let Some(read) = stretch.read_later.filter(|_| stretch.left_out) {
+                start_s += LEFT_OUT_S;
+                state.shaft_speed_rad_s = read.shaft_speed_rad_s;
+                state.p2_pa = read.p2_pa;
+            }
+            let grid = FrozenGrid::new(start_s, stretch.end_s, &[], &nodes_s(stretch, start_s));
+            state = drive(
+                &model,
+                &inputs,
+                state,
+                &grid,
+                &stretch.times_s,
+                |reading, prepared, state, outputs| match stretch.places[reading] {
+                    Place::StepEnd => prediction.step_ends[index] = (outputs.efficiency, outputs.h_w_m2k),
+                    Place::Block(block) => {
+                        for (sum, channel) in prediction.means[block].iter_mut().zip(OUTPUTS) {
+                            *sum += true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
+                        }
+                        let highest = &mut prediction.surge_position_ratio[block];
+                        *highest = highest.max(outputs.surge_position_ratio);
+                        counts[block] += 1;
                     }
-                    let highest = &mut prediction.surge_position_ratio[block];
-                    *highest = highest.max(outputs.surge_position_ratio);
-                    counts[block] += 1;
-                }
-            },
-        )?;
+                },
+            )
+            .map_err(|error| (index, error))?;
+        }
         for (means, count) in prediction.means.iter_mut().zip(counts) {
             means.iter_mut().for_each(|sum| *sum /= count.max(1) as f64);
         }
@@ -152,30 +167,28 @@ impl<'a> Drive<'a> {
 
     /// The run as it is, and with each knob turned, over all cores.
     pub fn predict_all(&mut self) -> Result<(Prediction, Vec<Prediction>), DriveError> {
-        self.try_all().or_else(|_| {
-            let (step_s, until_s) = FINE_S;
-            let fine = |jump_s: &f64| {
-                let jump_s = *jump_s;
-                let count = (until_s / step_s).round() as usize;
-                (1..=count).map(move |index| jump_s + step_s * index as f64)
+        loop {
+            // What is left out is left out in all, so that their differences stay smooth.
+            let (index, error) = match self.try_all() {
+                Ok(predictions) => return Ok(predictions),
+                Err(failed) => failed,
             };
-            let nodes_s: Vec<f64> = self.jumps_s.iter().flat_map(fine).collect();
-            self.grid = FrozenGrid::new(self.span_s.0, self.span_s.1, &self.jumps_s, &nodes_s);
-            self.try_all()
-        })
+            match self.stretches.get_mut(index) {
+                Some(stretch) if !stretch.left_out && stretch.read_later.is_some() => stretch.left_out = true,
+                _ => return Err(error),
+            }
+        }
     }
 
-    fn try_all(&self) -> Result<(Prediction, Vec<Prediction>), DriveError> {
+    fn try_all(&self) -> Result<(Prediction, Vec<Prediction>), (usize, DriveError)> {
+        let base = self.predict(None)?;
         let next = AtomicUsize::new(0);
         let done = Mutex::new(Vec::new());
         let work = || {
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
-                if index > Knob::ALL.len() {
-                    return;
-                }
-                let turned = index.checked_sub(1).map(|index| (Knob::ALL[index], Knob::ALL[index].step()));
-                let prediction = self.predict(turned);
+                let Some(knob) = Knob::ALL.get(index) else { return };
+                let prediction = self.predict(Some((*knob, knob.step())));
                 done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((index, prediction));
             }
         };
@@ -187,11 +200,34 @@ impl<'a> Drive<'a> {
         });
         let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
         done.sort_by_key(|(index, _)| *index);
-        let mut predictions =
-            done.into_iter().map(|(_, prediction)| prediction).collect::<Result<Vec<_>, _>>()?.into_iter();
-        let Some(base) = predictions.next() else { return Err(DriveError { t_s: f64::NAN }) };
-        Ok((base, predictions.collect()))
+        let turned = done.into_iter().map(|(_, prediction)| prediction).collect::<Result<Vec<_>, _>>()?;
+        Ok((base, turned))
     }
+}
+
+/// Ends of the integration's steps: fine after the jump, coarse where only metal moves.
+fn nodes_s(stretch: &Stretch, start_s: f64) -> Vec<f64> {
+    let mut nodes = Vec::new();
+    let mut at_s = start_s;
+    while at_s < stretch.end_s {
+        let since_s = at_s - start_s;
+        let step_s =
+            STEPS_S.iter().find(|(until_s, _)| since_s < until_s - 1e-9).map_or(3.0, |(_, step_s)| *step_s);
+        at_s += step_s;
+        nodes.push(at_s);
+    }
+    nodes
+}
+
+/// Shaft and outlet as read around a time; the metal's temperatures are not used.
+fn read_state(recording: &Recording, t_s: f64) -> Option<State> {
+    let mean = |channel: Channel| {
+        let values = recording.series.get(&channel)?.slice(t_s - 0.5, t_s + 0.5).1;
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        (!values.is_empty() && mean.is_finite() && mean > 0.0).then_some(mean)
+    };
+    let speed_rpm = mean(Channel::ShaftSpeed)?;
+    Some(State::new(rad_s_of_rpm(speed_rpm), mean(Channel::P2)?, 300.0, 300.0, mean(Channel::T2)?))
 }
 
 /// State at the start: as measured just before it, or at rest under the first inputs where nothing was recorded before.

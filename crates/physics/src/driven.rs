@@ -13,7 +13,7 @@ use crate::state::MAX_STATES;
 use nalgebra::{Const, DimMin};
 
 /// Longest steps after a jump: up to so many seconds, steps of at most so many seconds.
-const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.0), (f64::INFINITY, 3.0)];
+const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.8), (20.0, 2.0), (f64::INFINITY, 6.0)];
 
 /// Within this of the surge line, in places on the speed line, a fast step is taken in parts.
 const SURGE_CORNER: f64 = 0.01;
@@ -39,7 +39,7 @@ impl FrozenGrid {
         for until_s in wanted {
             while until_s - at_s > 1e-9 {
                 let since_s = at_s - jump_s;
-                let limit_s = STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(3.0, |(_, step)| *step);
+                let limit_s = STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(6.0, |(_, step)| *step);
                 // Equal parts, each within the limit.
                 let parts = ((until_s - at_s) / limit_s - 1e-6).ceil().max(1.0);
                 at_s = if parts <= 1.0 { until_s } else { at_s + ((until_s - at_s) / parts).max(limit_s * 0.5) };
@@ -128,18 +128,22 @@ where
         boundary.check().map_err(|_| failed)?;
         let before_end_s = end_s - 1e-9 * (end_s - pair[0]);
         let mut system = DrivenSystem { model, inputs, last_s: before_end_s, boundary_s: pair[0], prepared: model.prepare(&boundary) };
-        let surge_before = system.surge_position(&integrator.y);
-        let kept = integrator.clone();
-        let mut step = integrator.step_on_grid(&mut system, end_s).map_err(|_| failed)?;
         // The speed line has a corner on the surge line, with an infinite slope on one side: short steps across it.
-        let surge_after = system.surge_position(&step.y1);
-        let near = (surge_before - 1.0).abs().min((surge_after - 1.0).abs()) < SURGE_CORNER;
-        if end_s - pair[0] < 0.11 && (near || (surge_before < 1.0) != (surge_after < 1.0)) {
-            integrator = kept;
-            for part in 1..=CORNER_PARTS {
-                let share = f64::from(part) / f64::from(CORNER_PARTS);
-                let part_end_s = if part == CORNER_PARTS { end_s } else { pair[0] + share * (end_s - pair[0]) };
-                step = integrator.step_on_grid(&mut system, part_end_s).map_err(|_| failed)?;
+        let fast = end_s - pair[0] < 0.11;
+        let surge_before = if fast { system.surge_position(&integrator.y) } else { 0.0 };
+        let kept = fast.then(|| integrator.clone());
+        let mut step = integrator.step_on_grid(&mut system, end_s).map_err(|_| failed)?;
+        if let Some(kept) = kept {
+            let surge_after = system.surge_position(&step.y1);
+            let near = (surge_before - 1.0).abs().min((surge_after - 1.0).abs()) < SURGE_CORNER;
+            if near || (surge_before < 1.0) != (surge_after < 1.0) {
+                integrator = kept;
+                for part in 1..=CORNER_PARTS {
+                    let share = f64::from(part) / f64::from(CORNER_PARTS);
+                    let last = part == CORNER_PARTS;
+                    let part_end_s = if last { end_s } else { pair[0] + share * (end_s - pair[0]) };
+                    step = integrator.step_on_grid(&mut system, part_end_s).map_err(|_| failed)?;
+                }
             }
         }
         if !(step.y1[0] > 0.0 && step.y1[1] > 0.0) {

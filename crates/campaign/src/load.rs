@@ -177,7 +177,7 @@ fn read_text(path: &Path) -> io::Result<String> {
 }
 
 /// Reads a file without ever holding much more than `limit` bytes, whatever the file claims to be.
-fn read_limited(path: &Path, limit: usize) -> io::Result<Vec<u8>> {
+pub(crate) fn read_limited(path: &Path, limit: usize) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let file = std::fs::File::open(path)?;
     file.take(limit as u64 + 1).read_to_end(&mut bytes)?;

@@ -5,6 +5,7 @@ use crate::gap_arguments::GapArguments;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mapper_campaign::units::{Kind, parse};
 use mapper_core::{Method, OperatingPoint};
+use mapper_history::Figure;
 use std::path::PathBuf;
 
 /// From a campaign file to a complete turbocharger-compressor map, efficiency and heat transfer included.
@@ -31,6 +32,12 @@ pub enum Command {
     Identify(IdentifyArguments),
     /// Diagnose the gap between nominal model and rig, and check that diagnosis on withheld data
     Gap(GapArguments),
+    /// Say whether the rig stayed the same while a map was made: which sensor drifts, or the machine, since when, how fast
+    Drift(DriftArguments),
+    /// Run every map of a nightly campaign on the simulated rig and say what moved against the last nights
+    Nightly(NightlyArguments),
+    /// List, filter and draw what the nightly runs gave
+    History(HistoryArguments),
     /// Redo the paper's figures 5 to 10 and 12 on the nominal model, beside what the paper states
     Reproduce(ReproduceArguments),
     /// Fit, convert and compare compressor maps
@@ -230,6 +237,88 @@ pub struct IdentifyArguments {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+}
+
+/// `mapper drift`.
+#[derive(Debug, Args)]
+pub struct DriftArguments {
+    /// Run directories in the order in which they were made; with `--recording`, the one campaign of the recordings
+    #[arg(required = true, value_name = "RUN|CAMPAIGN")]
+    pub paths: Vec<PathBuf>,
+    /// MCAP recording, also of another program; may be given more than once, in the order in which they were made
+    #[arg(long, value_name = "FILE")]
+    pub recording: Vec<PathBuf>,
+    /// Where recordings made by another program hold the rig's channels (YAML)
+    #[arg(long, value_name = "FILE", requires = "recording")]
+    pub channels: Option<PathBuf>,
+    /// Write the points without the drift into this new CSV file
+    #[arg(long, value_name = "FILE")]
+    pub corrected: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mapper nightly`.
+#[derive(Debug, Args)]
+pub struct NightlyArguments {
+    /// Nightly campaign (YAML): campaigns, methods, seeds
+    pub nightly: PathBuf,
+    /// History to compare with and append to, instead of the file's `history`
+    #[arg(long, value_name = "FILE")]
+    pub db: Option<PathBuf>,
+    /// What moves tonight is right: begin a new band with this night
+    #[arg(long)]
+    pub accept: bool,
+    /// Runs at a time [default: all cores]
+    #[arg(long, value_name = "COUNT")]
+    pub jobs: Option<usize>,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mapper history`.
+#[derive(Debug, Args)]
+pub struct HistoryArguments {
+    /// The history
+    #[arg(long, value_name = "FILE", default_value = "runs/history.db")]
+    pub db: PathBuf,
+    /// Only this machine, or campaign
+    #[arg(long, value_name = "NAME")]
+    pub machine: Option<String>,
+    /// Only this method
+    #[arg(long, value_name = "METHOD")]
+    pub method: Option<String>,
+    /// Show this figure instead of the usual ones; may be given more than once
+    #[arg(long, value_name = "FIGURE", value_parser = figure)]
+    pub figure: Vec<Figure>,
+    /// Only nights from this day on (UTC)
+    #[arg(long, value_name = "YYYY-MM-DD", value_parser = day)]
+    pub since: Option<jiff::Timestamp>,
+    /// A row for each run, instead of the medians over the seeds
+    #[arg(long)]
+    pub runs: bool,
+    /// Draw the trends into this new SVG file
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn figure(text: &str) -> Result<Figure, String> {
+    Figure::find(text).ok_or_else(|| {
+        let names: Vec<&str> = Figure::ALL.into_iter().map(Figure::name).collect();
+        format!("there is no figure `{text}`; there are {}", names.join(", "))
+    })
+}
+
+/// Midnight UTC at the begin of a day.
+fn day(text: &str) -> Result<jiff::Timestamp, String> {
+    let day: jiff::civil::Date = text.parse().map_err(|error| format!("{error}; write e.g. 2026-11-21"))?;
+    let midnight = day.to_zoned(jiff::tz::TimeZone::UTC).map_err(|error| error.to_string())?;
+    Ok(midnight.timestamp())
 }
 
 /// `mapper reproduce`.

@@ -15,6 +15,8 @@ pub enum Code {
     Rig = 5,
     /// The recording does not hold what identification needs.
     BadRecording = 6,
+    /// A nightly run failed, or one of its figures left the band of the nights before.
+    Moved = 7,
     /// Stopped by the operator; the rig is safe and what was recorded is kept.
     Interrupted = 130,
 }
@@ -29,4 +31,5 @@ Exit codes:
   4    there is no plan, or the plan given is stale
   5    the rig failed or a guard tripped; the rig is safe, the recording is kept
   6    the recording does not hold what identification needs
+  7    a nightly run failed, or one of its figures left the band of the nights before
   130  stopped by the operator; the rig is safe, the recording is kept";

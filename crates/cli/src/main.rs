@@ -6,13 +6,15 @@
 mod arguments;
 mod assembly_line;
 mod commands;
-mod drift;
+mod repeated_jumps;
 mod exit_code;
 mod failure;
 mod gap_arguments;
+mod history_picture;
 mod interrupt;
 mod map_comparison_picture;
 mod map_file;
+mod nightly_run;
 mod observers;
 mod output;
 mod plan_picture;

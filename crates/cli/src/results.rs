@@ -1,6 +1,6 @@
 //! What a run gives: points, map, report; the same for people and for machines.
 
-use crate::drift::{self, RepeatedJump};
+use crate::repeated_jumps::{self, RepeatedJump};
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::table::{self, Display, number};
@@ -86,7 +86,7 @@ pub fn make(
             .as_bytes(),
     )?;
     let report = directory.join(run_directory::REPORT);
-    let repeats = drift::repeated_jumps(&read.recording.steps, &points);
+    let repeats = repeated_jumps::repeated_jumps(&read.recording.steps, &points);
     let text = test_report::markdown(
         campaign,
         plan,
@@ -145,7 +145,7 @@ impl Results {
     /// A table with what to know below it.
     pub fn text(&self, campaign: &Campaign) -> String {
         let mut text = points_text(&self.points, &campaign.display);
-        text.push_str(&drift::sentences(&self.repeats, &Display::new(&campaign.display)));
+        text.push_str(&repeated_jumps::sentences(&self.repeats, &Display::new(&campaign.display)));
         if let Some(thermal) = &self.thermal {
             text.push_str(&thermal_text(thermal));
         }

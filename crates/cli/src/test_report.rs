@@ -1,6 +1,6 @@
 //! The test report of a run, as Markdown.
 
-use crate::drift::{self, RepeatedJump};
+use crate::repeated_jumps::{self, RepeatedJump};
 use crate::results::{score_text, step_name, verdict_word};
 use crate::table::{self, Display, number};
 use mapper_campaign::Campaign;
@@ -45,7 +45,7 @@ pub fn markdown(
     }
     points_section(&mut text, campaign, points);
     if !repeats.is_empty() {
-        let sentences = drift::sentences(repeats, &Display::new(&campaign.display));
+        let sentences = repeated_jumps::sentences(repeats, &Display::new(&campaign.display));
         let _ = write!(
             text,
             "\n## Drift\n\nRepeats are kept out of the map. Fixed offsets cancel in what changes between them.\n\n{}",

@@ -18,8 +18,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-record",    &["core", "units"]),
     ("mapper-identify",  &["core", "physics"]),
     ("mapper-assemble",  &["core", "physics", "identify"]),
+    ("mapper-drift",     &["core", "physics", "identify"]),
     ("mapper-gap",       &["core", "physics"]),
     ("mapper-score",     &["core", "record"]),
+    ("mapper-history",   &[]),
     ("mapper-reproduce", &["core", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
     ("mapper-backends",  &["core", "physics", "units"]),
@@ -29,7 +31,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Draws cases on the virtual lab; above it, like the program.
     ("mapper-blind",     &["core", "physics", "campaign", "record", "backends", "effects"]),
     // The program sees all; nothing sees the program.
-    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters", "importers"]),
+    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "drift", "history", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters", "importers"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

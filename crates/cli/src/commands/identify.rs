@@ -51,7 +51,7 @@ pub fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
 }
 
 /// A file named by the campaign of a recording. The sequence script, which identification does not need, may be missing.
-pub(super) fn read_beside(path: &Path) -> std::io::Result<String> {
+pub fn read_beside(path: &Path) -> std::io::Result<String> {
     let text = std::fs::read_to_string(path);
     if path.extension().is_some_and(|extension| extension == "rhai") {
         Ok(text.unwrap_or_default())
@@ -68,7 +68,7 @@ pub(super) fn bad_recording(error: RecordError) -> Failure {
     Failure::new(code, error)
 }
 
-fn channel_map(file: &Path) -> Result<ChannelMap, Failure> {
+pub fn channel_map(file: &Path) -> Result<ChannelMap, Failure> {
     let text = std::fs::read_to_string(file).map_err(|error| {
         Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display()))
     })?;

@@ -1,17 +1,20 @@
 //! One file a command.
 
 mod check;
+mod drift;
 mod gap;
 mod gap_blind;
 mod gap_diagnose;
+mod gap_effects;
 mod gap_page;
 mod gap_text;
-mod gap_effects;
+mod history;
 mod identify;
 mod map_compare;
 mod map_convert;
 mod map_fit;
 mod map_rig;
+mod nightly;
 mod plan;
 mod reproduce;
 mod run;
@@ -20,6 +23,7 @@ mod scripted;
 
 use crate::arguments::{Arguments, Command, MapCommand};
 use crate::failure::Failure;
+pub use history::median as history_median;
 
 /// Runs the command that was asked for.
 pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
@@ -30,6 +34,9 @@ pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
         Command::Run(arguments) => run::run(arguments),
         Command::Identify(arguments) => identify::identify(arguments),
         Command::Gap(arguments) => gap::gap(arguments),
+        Command::Drift(arguments) => drift::drift(arguments),
+        Command::Nightly(arguments) => nightly::nightly(arguments),
+        Command::History(arguments) => history::history(arguments),
         Command::Reproduce(arguments) => reproduce::reproduce(arguments),
         Command::Map(arguments) => match &arguments.command {
             MapCommand::Fit(arguments) => map_fit::fit(arguments),

@@ -1,0 +1,151 @@
+//! `mapper history`: what the nights gave.
+
+use crate::arguments::HistoryArguments;
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::{history_picture, output, table};
+use mapper_history::{Figure, Filter, History, ListedRun};
+use serde_json::json;
+use std::collections::BTreeMap;
+
+/// Figures that are shown where none is asked for.
+const SHOWN: [Figure; 6] = [
+    Figure::GoodPoints,
+    Figure::EtaMean,
+    Figure::EtaMedianError,
+    Figure::EtaWorstError,
+    Figure::HMean,
+    Figure::HMedianError,
+];
+
+/// Lists, filters, prints JSON, draws.
+pub fn history(arguments: &HistoryArguments) -> Result<(), Failure> {
+    let fail = |error| Failure::new(Code::Failure, error);
+    let history = History::open_existing(&arguments.db).map_err(fail)?;
+    let filter = Filter {
+        machine: arguments.machine.clone(),
+        method: arguments.method.clone(),
+        since_ms: arguments.since.map(|since| since.as_millisecond()),
+    };
+    let runs = history.runs(&filter).map_err(fail)?;
+    let figures: Vec<Figure> =
+        if arguments.figure.is_empty() { SHOWN.to_vec() } else { arguments.figure.clone() };
+    if let Some(path) = &arguments.svg {
+        output::write_new(path, history_picture::svg(&runs, &figures).as_bytes())?;
+    }
+    if arguments.json {
+        return output::print_json(
+            &json!({"history": arguments.db, "runs": runs.iter().map(run_json).collect::<Vec<_>>()}),
+        );
+    }
+    output::print(&if arguments.runs { runs_text(&runs, &figures) } else { groups_text(&runs, &figures) })
+}
+
+fn run_json(listed: &ListedRun) -> serde_json::Value {
+    let ListedRun { night, run } = listed;
+    let figures: BTreeMap<&str, Option<f64>> =
+        Figure::ALL.into_iter().map(|figure| (figure.name(), run.figures.get(&figure).copied())).collect();
+    json!({
+        "night": {
+            "id": night.id, "name": night.name, "started": time(night.started_ms, "%Y-%m-%dT%H:%M:%SZ"),
+            "duration_s": night.duration_s, "program": night.program, "accepted": night.accepted, "moved": night.moved,
+        },
+        "campaign": run.key.campaign, "machine": run.key.machine, "method": run.key.method, "seed": run.key.seed,
+        "campaign_sha256": run.campaign_sha256, "model_sha256": run.model_sha256,
+        "failure": run.failure, "figures": figures,
+    })
+}
+
+fn time(ms: i64, format: &str) -> String {
+    jiff::Timestamp::from_millisecond(ms)
+        .map_or_else(|_| "-".to_owned(), |time| time.strftime(format).to_string())
+}
+
+fn heads(first: &[&str], figures: &[Figure]) -> Vec<String> {
+    let figure_heads = figures.iter().map(|figure| format!("{figure} {}", figure.shown_unit().0));
+    first.iter().map(|head| (*head).to_owned()).chain(figure_heads).collect()
+}
+
+fn shown(figure: Figure, value: Option<f64>) -> String {
+    let decimals = match figure {
+        Figure::GoodPoints | Figure::HMean | Figure::HTrueMean | Figure::RigMinutes => 1,
+        _ => 3,
+    };
+    table::number(value.map(|value| figure.shown_unit().1 * value), decimals)
+}
+
+fn state(listed: &ListedRun) -> &'static str {
+    match (listed.night.accepted, listed.night.moved) {
+        (true, _) => "accepted",
+        (_, true) => "moved",
+        _ => "",
+    }
+}
+
+/// A row per night, campaign and method: medians over the seeds.
+fn groups_text(runs: &[ListedRun], figures: &[Figure]) -> String {
+    let mut groups: BTreeMap<(i64, i64, &str, &str), Vec<&ListedRun>> = BTreeMap::new();
+    for listed in runs {
+        let key = (
+            listed.night.started_ms,
+            listed.night.id,
+            listed.run.key.campaign.as_str(),
+            listed.run.key.method.as_str(),
+        );
+        groups.entry(key).or_default().push(listed);
+    }
+    let mut table =
+        table::with_heads(&heads(&["night (UTC)", "campaign", "method", "seeds", "night is"], figures));
+    for ((started_ms, _, campaign, method), group) in &groups {
+        let mut row = vec![
+            time(*started_ms, "%Y-%m-%d %H:%M"),
+            (*campaign).to_owned(),
+            (*method).to_owned(),
+            group.len().to_string(),
+            group.first().map(|listed| state(listed)).unwrap_or_default().to_owned(),
+        ];
+        row.extend(figures.iter().map(|figure| {
+            shown(
+                *figure,
+                median(group.iter().filter_map(|listed| listed.run.figures.get(figure).copied()).collect()),
+            )
+        }));
+        table.add_row(row);
+    }
+    format!("{table}\n\n{} rows of {} runs; figures are medians over the seeds.\n", groups.len(), runs.len())
+}
+
+/// A row per run.
+fn runs_text(runs: &[ListedRun], figures: &[Figure]) -> String {
+    let mut table =
+        table::with_heads(&heads(&["night (UTC)", "campaign", "method", "seed", "night is"], figures));
+    let mut failures = String::new();
+    for listed in runs {
+        let key = &listed.run.key;
+        let started = time(listed.night.started_ms, "%Y-%m-%d %H:%M");
+        if let Some(failure) = &listed.run.failure {
+            failures.push_str(&format!("{started} {key} failed: {failure}\n"));
+        }
+        let mut row = vec![
+            started,
+            key.campaign.clone(),
+            key.method.clone(),
+            key.seed.to_string(),
+            state(listed).to_owned(),
+        ];
+        row.extend(figures.iter().map(|figure| shown(*figure, listed.run.figures.get(figure).copied())));
+        table.add_row(row);
+    }
+    format!("{table}\n\n{failures}{} runs.\n", runs.len())
+}
+
+/// Median; `None` of nothing.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => None,
+        count if count % 2 == 1 => Some(values[middle]),
+        _ => Some(0.5 * (values[middle - 1] + values[middle])),
+    }
+}

@@ -1,0 +1,32 @@
+//! Whether the rig stayed the same while a map was made, and if not, what moved: which sensor, or the machine, since
+//! when and how fast.
+//!
+//! The nominal model is driven by the recorded boundary conditions through all steps; what the readings differ from it
+//! is explained by what is constant over the campaign (declared tolerances and offsets, and a deviation of each operating
+//! point that its repeats share) and, one after the other, by each cause with each course over time. Only what repeats
+//! show can count against the constants. docs/drift.md has the method with its measured error rates.
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod blocks;
+mod cause;
+mod correct;
+mod course;
+mod decide;
+mod inputs;
+mod knob;
+mod low_rank;
+mod nuisance;
+mod repeats;
+mod report;
+mod request;
+mod simulate;
+mod study;
+
+pub use cause::{Cause, CauseKind};
+pub use course::{Course, CourseKind};
+pub use report::{
+    Alternative, CorrectedPoint, DetectionLimit, DriftReport, DriftVerdict, RateOrStep, RepeatGroup, Visit,
+    VisitChannel,
+};
+pub use request::{DriftError, DriftRequest, RecordedRun};
+pub use study::diagnose;

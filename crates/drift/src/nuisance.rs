@@ -1,0 +1,173 @@
+//! What is constant over a campaign, each with its prior: it is not drift.
+
+use crate::blocks::OUTPUTS;
+use crate::knob::Knob;
+use crate::study::Readings;
+use mapper_core::{Channel, DeclaredUncertainty, Dimension};
+
+/// A constant of one standard deviation, as readings and points show it.
+#[derive(Debug, Clone)]
+pub(crate) struct Constant {
+    /// Readings, stretch after stretch.
+    pub readings: Vec<f64>,
+    /// Efficiency at the end of each step, fraction.
+    pub eta: Vec<f64>,
+    /// Heat-transfer coefficient at the end of each step, W/(m2 K).
+    pub h_w_m2k: Vec<f64>,
+}
+
+/// Deviations of each operating point from the smooth model, shared by its repeats: one standard deviation.
+const OWN_DEVIATIONS: [(Knob, f64); 4] = [
+    (Knob::Efficiency, 0.005),
+    (Knob::Flow, 0.004),
+    (Knob::TurbineEfficiency, 0.006),
+    (Knob::CompressorConvection, 0.03),
+];
+
+/// The same of each channel at each operating point, which no law of the model gives.
+fn own_deviation(channel: Channel, level: f64) -> f64 {
+    match channel {
+        Channel::ShaftSpeed => 40.0,
+        Channel::P2 => 50.0,
+        Channel::CompressorFlow | Channel::TurbineFlow => 1e-3 * level,
+        Channel::T2 => 0.1,
+        Channel::Tc => 0.2,
+        _ => 0.4,
+    }
+}
+
+/// All constants of a campaign.
+pub(crate) fn constants(
+    readings: &Readings,
+    declared: &dyn Fn(Channel) -> DeclaredUncertainty,
+) -> Vec<Constant> {
+    let mut constants = Vec::new();
+    for (knob, answer) in Knob::ALL.iter().zip(&readings.answers) {
+        let sigma = match knob {
+            Knob::Input(channel) => {
+                let declared = declared(*channel);
+                declared.offset_sigma.hypot(declared.gain_sigma_ratio * readings.input_level(*channel))
+            }
+            knob => knob.tolerance(),
+        };
+        if sigma <= 0.0 {
+            continue;
+        }
+        let of_runs = matches!(knob, Knob::InitialTc | Knob::InitialTt);
+        for run in 0..if of_runs { readings.runs } else { 1 } {
+            let holds = |step: usize| !of_runs || readings.steps[step].run == run;
+            constants.push(scaled(readings, answer, sigma, &holds));
+        }
+    }
+    for (column, channel) in OUTPUTS.iter().enumerate() {
+        let declared = declared(*channel);
+        let sigma = |level: f64| {
+            // A flow meter without a declared gain still has one.
+            let gain = match channel.info().dimension {
+                Dimension::MassFlow => declared.gain_sigma_ratio.max(0.005),
+                _ => declared.gain_sigma_ratio,
+            };
+            declared.offset_sigma.hypot(gain * level)
+        };
+        constants.push(channel_constant(readings, column, &sigma, &|_| true));
+    }
+    let conditions = readings.steps.iter().map(|step| step.condition + 1).max().unwrap_or(0);
+    for condition in 0..conditions {
+        let here = |step: usize| readings.steps[step].condition == condition;
+        for (knob, sigma) in OWN_DEVIATIONS {
+            if let Some(answer) = readings.answer(knob) {
+                constants.push(scaled(readings, answer, sigma, &here));
+            }
+        }
+        for (column, channel) in OUTPUTS.iter().enumerate() {
+            constants.push(channel_constant(
+                readings,
+                column,
+                &|level| own_deviation(*channel, level),
+                &here,
+            ));
+        }
+    }
+    wander(readings, &mut constants);
+    constants.retain(|constant| constant.readings.iter().any(|value| *value != 0.0));
+    constants
+}
+
+/// Distance of the knots of what wanders slowly, s.
+const KNOT_S: f64 = 480.0;
+/// The air around the housings is seldom recorded: it wanders by so much, K.
+const AMBIENT_WANDER_K: f64 = 0.7;
+/// What the turbine side wanders by, K: its housing takes an hour to forget what the model has wrong.
+const TURBINE_WANDER: [(Channel, f64); 2] = [(Channel::Tt, 0.2), (Channel::T4, 0.1)];
+
+/// Courses that are linear between knots: no drift of the causes looked for.
+fn wander(readings: &Readings, constants: &mut Vec<Constant>) {
+    let (start_s, end_s) = readings.span_s();
+    let count = ((end_s - start_s) / KNOT_S).ceil().clamp(1.0, 60.0);
+    for knot in 0..=count as usize {
+        let hat = |block: &crate::blocks::Block| {
+            let t_s = 0.5 * (block.start_s + block.end_s) + readings.steps[block.step].offset_s;
+            let place = (t_s - start_s) / (end_s - start_s).max(1.0) * count;
+            (1.0 - (place - knot as f64).abs()).max(0.0)
+        };
+        let columns = readings.columns.len();
+        let steps = readings.steps.len();
+        let course = |value: &dyn Fn(usize, usize) -> f64| {
+            let readings = readings
+                .blocks
+                .iter()
+                .enumerate()
+                .flat_map(|(index, block)| {
+                    let size = hat(block);
+                    (0..columns).map(move |column| (index * columns + column, column, size))
+                })
+                .map(|(row, column, size)| if size > 0.0 { size * value(row, column) } else { 0.0 })
+                .collect();
+            Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] }
+        };
+        if let Some(ambient) = readings.answer(Knob::Ambient) {
+            constants.push(course(&|row, _| AMBIENT_WANDER_K * ambient.readings[row]));
+        }
+        for (channel, sigma) in TURBINE_WANDER {
+            constants.push(course(&|_, column| {
+                if OUTPUTS[readings.columns[column]] == channel { sigma } else { 0.0 }
+            }));
+        }
+    }
+}
+
+fn scaled(readings: &Readings, answer: &Constant, sigma: f64, holds: &dyn Fn(usize) -> bool) -> Constant {
+    let columns = readings.columns.len();
+    let of_step = |values: &[f64]| {
+        values.iter().enumerate().map(|(step, value)| if holds(step) { sigma * value } else { 0.0 }).collect()
+    };
+    Constant {
+        readings: answer
+            .readings
+            .iter()
+            .enumerate()
+            .map(|(row, value)| if holds(readings.blocks[row / columns].step) { sigma * value } else { 0.0 })
+            .collect(),
+        eta: of_step(&answer.eta),
+        h_w_m2k: of_step(&answer.h_w_m2k),
+    }
+}
+
+fn channel_constant(
+    readings: &Readings,
+    output: usize,
+    sigma: &dyn Fn(f64) -> f64,
+    holds: &dyn Fn(usize) -> bool,
+) -> Constant {
+    let columns = readings.columns.len();
+    let mut values = vec![0.0; readings.difference.len()];
+    if let Some(column) = readings.columns.iter().position(|column| *column == output) {
+        for (block, place) in readings.blocks.iter().enumerate() {
+            if holds(place.step) {
+                values[block * columns + column] = sigma(readings.model[block * columns + column]);
+            }
+        }
+    }
+    let steps = readings.steps.len();
+    Constant { readings: values, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] }
+}

@@ -1,0 +1,197 @@
+//! The answer, as it is printed and written as JSON.
+
+use crate::{Cause, CauseKind};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The answer in a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DriftVerdict {
+    /// Nothing beyond what chance shows in one drift-free campaign of a hundred.
+    None,
+    /// A sensor drifts.
+    Sensor,
+    /// The machine changes.
+    Machine,
+    /// Something may have moved, but the recording cannot tell what; or it cannot tell whether: `reason` says.
+    Unclear,
+}
+
+impl From<CauseKind> for DriftVerdict {
+    fn from(kind: CauseKind) -> Self {
+        match kind {
+            CauseKind::Sensor => DriftVerdict::Sensor,
+            CauseKind::Machine => DriftVerdict::Machine,
+        }
+    }
+}
+
+/// How fast, or how far.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RateOrStep {
+    /// Change per hour.
+    RatePerH(f64),
+    /// Change at the onset.
+    Step(f64),
+}
+
+/// A cause with its probability.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Alternative {
+    /// The cause; `None` is no drift.
+    pub cause: Option<Cause>,
+    /// Its probability; all of them and that of `none` sum to 1.
+    pub probability: f64,
+}
+
+/// The smallest drift that is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DetectionLimit {
+    /// The cause.
+    pub cause: Cause,
+    /// Steady drift over the whole campaign whose expected evidence meets the threshold, unit of the cause.
+    pub change: f64,
+    /// Unit.
+    pub unit: &'static str,
+}
+
+/// A channel at one visit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct VisitChannel {
+    /// Mean reading over the end of the step, SI.
+    pub end: f64,
+    /// The same less the model's, SI: boundary conditions that wander are taken out.
+    pub end_less_model: f64,
+    /// Mean reading over the transient less the model's, SI; `None` where the step is too short.
+    pub transient_less_model: Option<f64>,
+    /// One standard error of the end, from noise, SI.
+    pub sigma: f64,
+}
+
+/// One visit of a repeated jump.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Visit {
+    /// Which recording, from 0.
+    pub run: usize,
+    /// Step within the recording.
+    pub step: usize,
+    /// Start of the step, time of the campaign, s.
+    pub t_s: f64,
+    /// Identified efficiency, fraction.
+    pub eta: Option<f64>,
+    /// One standard error of it from noise, fraction: offsets are the same at each visit.
+    pub sigma_eta: Option<f64>,
+    /// Change of it since the first visit, fraction.
+    pub change_eta: Option<f64>,
+    /// Identified heat-transfer coefficient, W/(m2 K).
+    pub h_w_m2k: Option<f64>,
+    /// One standard error of it from noise, W/(m2 K).
+    pub sigma_h_w_m2k: Option<f64>,
+    /// Change of it since the first visit, W/(m2 K).
+    pub change_h_w_m2k: Option<f64>,
+    /// Channels by symbol.
+    pub channels: BTreeMap<&'static str, VisitChannel>,
+}
+
+/// All visits of one jump.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RepeatGroup {
+    /// Where the jump starts, in words.
+    pub from: String,
+    /// Where it leads, in words.
+    pub to: String,
+    /// Its visits, in order of time.
+    pub visits: Vec<Visit>,
+}
+
+/// A point of the map without the drift.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CorrectedPoint {
+    /// Which recording, from 0.
+    pub run: usize,
+    /// Step within the recording.
+    pub step: usize,
+    /// Measured shaft speed at the end of the step, rpm.
+    pub speed_rpm: f64,
+    /// Commanded valve opening relative to the nominal area.
+    pub valve: f64,
+    /// Efficiency of the model as fitted to all steps of the campaign, the drift taken out, fraction.
+    pub eta: f64,
+    /// One standard error of `eta`, fraction.
+    pub sigma_eta: f64,
+    /// Heat-transfer coefficient of the model as fitted, W/(m2 K).
+    pub h_w_m2k: f64,
+    /// Efficiency identified from this step with the drift taken out of the readings, fraction.
+    pub eta_identified: Option<f64>,
+    /// Efficiency identified from this step as recorded, fraction.
+    pub eta_uncorrected: Option<f64>,
+    /// What was taken off the drifting quantity at the end of this step, unit of the cause.
+    pub correction: f64,
+}
+
+/// What is said of a campaign.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DriftReport {
+    /// In a word.
+    pub verdict: DriftVerdict,
+    /// What drifts; `None` where nothing does or it is not known.
+    pub cause: Option<Cause>,
+    /// Probability of the cause, or of no drift.
+    pub probability: f64,
+    /// All others, most probable first.
+    pub alternatives: Vec<Alternative>,
+    /// Onset, time of the campaign, s.
+    pub onset_s: Option<f64>,
+    /// Lower end of its 95 % interval, s.
+    pub onset_low_s: Option<f64>,
+    /// Upper end of its 95 % interval, s.
+    pub onset_high_s: Option<f64>,
+    /// Rate or step.
+    #[serde(flatten)]
+    pub size: Option<RateOrStep>,
+    /// Lower end of the 95 % interval of rate or step.
+    pub low: Option<f64>,
+    /// Upper end.
+    pub high: Option<f64>,
+    /// Unit of the drifting quantity; a rate is per hour.
+    pub unit: Option<&'static str>,
+    /// In sentences: why there is no verdict, what was found, what was corrected.
+    pub reason: String,
+    /// Evidence of the best cause, and what one drift-free campaign in a hundred reaches (twice the log of the ratio).
+    pub evidence: f64,
+    /// That threshold.
+    pub threshold: f64,
+    /// Smallest drift that is seen, per cause.
+    pub detection_limits: Vec<DetectionLimit>,
+    /// Repeated jumps.
+    pub groups: Vec<RepeatGroup>,
+    /// Points of the map without the drift; empty where nothing drifts.
+    pub corrected_points: Vec<CorrectedPoint>,
+}
+
+impl DriftReport {
+    /// A recording that cannot tell, with why.
+    pub fn without_verdict(reason: String) -> Self {
+        DriftReport {
+            verdict: DriftVerdict::Unclear,
+            cause: None,
+            probability: 0.0,
+            alternatives: Vec::new(),
+            onset_s: None,
+            onset_low_s: None,
+            onset_high_s: None,
+            size: None,
+            low: None,
+            high: None,
+            unit: None,
+            reason,
+            evidence: 0.0,
+            threshold: 0.0,
+            detection_limits: Vec::new(),
+            groups: Vec::new(),
+            corrected_points: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! The nominal model through a whole run, and how its readings answer to each knob.
+
+use crate::DriftError;
+use crate::blocks::{Block, CampaignStep, OUTPUTS};
+use crate::inputs::{self, RecordedInputs};
+use crate::knob::Knob;
+use mapper_core::{Channel, Recording};
+use mapper_physics::driven::{DriveError, FrozenGrid, drive, settle};
+use mapper_physics::inputs::Inputs;
+use mapper_physics::instruments::true_value;
+use mapper_physics::model::{Model, State, rad_s_of_rpm};
+use mapper_physics::params::BoundaryConditions;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Readings of the model within a stretch, s apart.
+const SAMPLE_S: f64 = 2.5;
+/// Longest steps after a jump: up to so many seconds, steps of at most so many seconds.
+const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.0), (f64::INFINITY, 3.0)];
+/// A jump that the model cannot follow (deep beyond the surge line) is left out for this long, s: shaft and outlet then
+/// stand where they were read, the metal where it was.
+const LEFT_OUT_S: f64 = 5.0;
+/// Readings this long before the start say what state it is in, s.
+const BEFORE_S: f64 = 2.0;
+
+/// What the model says of one run.
+#[derive(Debug, Clone)]
+pub(crate) struct Prediction {
+    /// Means over the stretches, [`OUTPUTS`] in each.
+    pub means: Vec<[f64; OUTPUTS.len()]>,
+    /// Highest place on the speed line within each stretch; 1 is the surge line.
+    pub surge_position_ratio: Vec<f64>,
+    /// Efficiency and heat-transfer coefficient, W/(m2 K), at the end of each step.
+    pub step_ends: Vec<(f64, f64)>,
+}
+
+/// One run, ready to be driven.
+pub(crate) struct Drive<'a> {
+    model: &'a Model,
+    inputs: RecordedInputs,
+    start: State,
+    stretches: Vec<Stretch>,
+    blocks: usize,
+}
+
+/// One step of the run.
+struct Stretch {
+    start_s: f64,
+    end_s: f64,
+    /// Shaft and outlet as read [`LEFT_OUT_S`] after the jump.
+    read_later: Option<State>,
+    /// Whether the jump itself is left out.
+    left_out: bool,
+    /// Times at which the model is read, and where each reading belongs.
+    times_s: Vec<f64>,
+    places: Vec<Place>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Place {
+    Block(usize),
+    StepEnd,
+}
+
+impl<'a> Drive<'a> {
+    /// Prepares run `run`; `steps` and `blocks` are all of the campaign.
+    pub fn new(
+        run: usize,
+        recording: &Recording,
+        model: &'a Model,
+        nominal: &BoundaryConditions,
+        steps: &[CampaignStep],
+        blocks: &[Block],
+    ) -> Result<Self, DriftError> {
+        let unusable = |message: String| DriftError::Unusable { run, message };
+        let of_run: Vec<(usize, &CampaignStep)> =
+            steps.iter().enumerate().filter(|(_, step)| step.run == run).collect();
+        let (Some((_, first)), Some((_, last))) = (of_run.first(), of_run.last()) else {
+            return Err(unusable("it has no steps; commands that change make steps".to_owned()));
+        };
+        let jumps_s: Vec<f64> = of_run.iter().map(|(_, step)| step.start_s).collect();
+        let inputs = inputs::recorded(recording, nominal, first.start_s, last.end_s, &jumps_s)
+            .map_err(|error| unusable(format!("its inputs cannot be used: {error}")))?;
+        let start = start_state(run, recording, model, &inputs, first.start_s)?;
+        let mut block_count = 0;
+        let mut stretches = Vec::new();
+        for (position, step) in &of_run {
+            let mut stretch = Stretch {
+                start_s: step.start_s,
+                end_s: step.end_s,
+                read_later: read_state(recording, step.start_s + LEFT_OUT_S),
+                left_out: false,
+                times_s: Vec::new(),
+                places: Vec::new(),
+            };
+            for block in blocks.iter().filter(|block| block.step == *position) {
+                let count = (block.length_s() / SAMPLE_S).round().max(1.0) as usize;
+                for index in 0..count {
+                    let share = (index as f64 + 0.5) / count as f64;
+                    stretch.times_s.push(block.start_s + share * block.length_s());
+                    stretch.places.push(Place::Block(block_count));
+                }
+                block_count += 1;
+            }
+            stretch.times_s.push(step.end_s - 1e-3);
+            stretch.places.push(Place::StepEnd);
+            stretches.push(stretch);
+        }
+        Ok(Drive { model, inputs, start, stretches, blocks: block_count })
+    }
+
+    /// The run with one knob turned, or none. An error names the stretch that the model could not follow.
+    fn predict(&self, turned: Option<(Knob, f64)>) -> Result<Prediction, (usize, DriveError)> {
+        let mut model = self.model.clone();
+        let mut state = self.start;
+        if let Some((knob, by)) = turned {
+            knob.turn(&mut model.params, by);
+            match knob {
+                Knob::InitialTc => {
+                    state.tc_k += by;
+                    state.inner_k += by;
+                }
+                Knob::InitialTt => state.tt_k += by,
+                _ => {}
+            }
+        }
+        let inputs = Turned { inputs: &self.inputs, turned };
+        let mut prediction = Prediction {
+            means: vec![[0.0; OUTPUTS.len()]; self.blocks],
+            surge_position_ratio: vec![f64::NEG_INFINITY; self.blocks],
+            step_ends: vec![(f64::NAN, f64::NAN); self.stretches.len()],
+        };
+        let mut counts = vec![0_usize; self.blocks];
+        for (index, stretch) in self.stretches.iter().enumerate() {
+            let mut start_s = stretch.start_s;
+            if let Some(read) = stretch.read_later.filter(|_| stretch.left_out) {
+                start_s += LEFT_OUT_S;
+                state.shaft_speed_rad_s = read.shaft_speed_rad_s;
+                state.p2_pa = read.p2_pa;
+            }
+            let grid = FrozenGrid::new(start_s, stretch.end_s, &[], &nodes_s(stretch, start_s));
+            state = drive(
+                &model,
+                &inputs,
+                state,
+                &grid,
+                &stretch.times_s,
+                |reading, prepared, state, outputs| match stretch.places[reading] {
+                    Place::StepEnd => prediction.step_ends[index] = (outputs.efficiency, outputs.h_w_m2k),
+                    Place::Block(block) => {
+                        for (sum, channel) in prediction.means[block].iter_mut().zip(OUTPUTS) {
+                            *sum += true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
+                        }
+                        let highest = &mut prediction.surge_position_ratio[block];
+                        *highest = highest.max(outputs.surge_position_ratio);
+                        counts[block] += 1;
+                    }
+                },
+            )
+            .map_err(|error| (index, error))?;
+        }
+        for (means, count) in prediction.means.iter_mut().zip(counts) {
+            means.iter_mut().for_each(|sum| *sum /= count.max(1) as f64);
+        }
+        Ok(prediction)
+    }
+
+    /// The run as it is, and with each knob turned, over all cores.
+    pub fn predict_all(&mut self) -> Result<(Prediction, Vec<Prediction>), DriveError> {
+        loop {
+            // What is left out is left out in all, so that their differences stay smooth.
+            let (index, error) = match self.try_all() {
+                Ok(predictions) => return Ok(predictions),
+                Err(failed) => failed,
+            };
+            match self.stretches.get_mut(index) {
+                Some(stretch) if !stretch.left_out && stretch.read_later.is_some() => stretch.left_out = true,
+                _ => return Err(error),
+            }
+        }
+    }
+
+    fn try_all(&self) -> Result<(Prediction, Vec<Prediction>), (usize, DriveError)> {
+        let base = self.predict(None)?;
+        let next = AtomicUsize::new(0);
+        let done = Mutex::new(Vec::new());
+        let work = || {
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                let Some(knob) = Knob::ALL.get(index) else { return };
+                let prediction = self.predict(Some((*knob, knob.step())));
+                done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((index, prediction));
+            }
+        };
+        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        std::thread::scope(|scope| {
+            for _ in 0..cores {
+                scope.spawn(work);
+            }
+        });
+        let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        done.sort_by_key(|(index, _)| *index);
+        let turned = done.into_iter().map(|(_, prediction)| prediction).collect::<Result<Vec<_>, _>>()?;
+        Ok((base, turned))
+    }
+}
+
+/// Ends of the integration's steps: fine after the jump, coarse where only metal moves.
+fn nodes_s(stretch: &Stretch, start_s: f64) -> Vec<f64> {
+    let mut nodes = Vec::new();
+    let mut at_s = start_s;
+    while at_s < stretch.end_s {
+        let since_s = at_s - start_s;
+        let step_s =
+            STEPS_S.iter().find(|(until_s, _)| since_s < until_s - 1e-9).map_or(3.0, |(_, step_s)| *step_s);
+        at_s += step_s;
+        nodes.push(at_s);
+    }
+    nodes
+}
+
+/// Shaft and outlet as read around a time; the metal's temperatures are not used.
+fn read_state(recording: &Recording, t_s: f64) -> Option<State> {
+    let mean = |channel: Channel| {
+        let values = recording.series.get(&channel)?.slice(t_s - 0.5, t_s + 0.5).1;
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        (!values.is_empty() && mean.is_finite() && mean > 0.0).then_some(mean)
+    };
+    let speed_rpm = mean(Channel::ShaftSpeed)?;
+    Some(State::new(rad_s_of_rpm(speed_rpm), mean(Channel::P2)?, 300.0, 300.0, mean(Channel::T2)?))
+}
+
+/// State at the start: as measured just before it, or at rest under the first inputs where nothing was recorded before.
+fn start_state(
+    run: usize,
+    recording: &Recording,
+    model: &Model,
+    inputs: &RecordedInputs,
+    start_s: f64,
+) -> Result<State, DriftError> {
+    let mean = |channel: Channel, from_s: f64, to_s: f64| {
+        let values = recording.series.get(&channel)?.slice(from_s, to_s).1;
+        (values.len() >= 5).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    let before = |channel| mean(channel, start_s - BEFORE_S, start_s - 1e-6);
+    let first = |channel| mean(channel, start_s, start_s + BEFORE_S);
+    let boundary = inputs.at(start_s);
+    let read = |channel, usual: f64| before(channel).or_else(|| first(channel)).unwrap_or(usual);
+    let tc_k = read(Channel::Tc, 330.0);
+    let tt_k = read(Channel::Tt, 600.0);
+    let gas_k = read(Channel::T2, 350.0);
+    let guess = State::new(
+        rad_s_of_rpm(read(Channel::ShaftSpeed, 90e3).max(5e3)),
+        read(Channel::P2, 1.3e5),
+        tc_k,
+        tt_k,
+        gas_k,
+    );
+    if before(Channel::ShaftSpeed).is_some() && before(Channel::P2).is_some() {
+        return Ok(guess);
+    }
+    let settled = settle(model, &boundary, guess).map_err(|source| DriftError::Drive { run, source })?;
+    let has_metal =
+        recording.series.contains_key(&Channel::Tc) && recording.series.contains_key(&Channel::Tt);
+    Ok(if has_metal { State { tc_k, inner_k: tc_k, tt_k, ..settled } } else { settled })
+}
+
+/// Inputs with one of them turned.
+struct Turned<'a> {
+    inputs: &'a RecordedInputs,
+    turned: Option<(Knob, f64)>,
+}
+
+impl Inputs for Turned<'_> {
+    fn at(&self, t_s: f64) -> BoundaryConditions {
+        let mut boundary = self.inputs.at(t_s);
+        if let Some((knob, by)) = self.turned {
+            knob.shift(&mut boundary, by);
+        }
+        boundary
+    }
+
+    fn next_kink_s(&self, t_s: f64) -> f64 {
+        self.inputs.next_kink_s(t_s)
+    }
+
+    fn is_constant_after(&self, t_s: f64) -> bool {
+        self.inputs.is_constant_after(t_s)
+    }
+}

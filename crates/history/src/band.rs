@@ -1,0 +1,96 @@
+//! The band in which a figure has been: robust, so that one odd night does not widen it.
+
+use serde::Serialize;
+
+/// From the median absolute deviation to the standard deviation of a normal distribution: 1 / quantile(0.75).
+const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
+/// Half width of the band in such standard deviations.
+const WIDTH_SIGMAS: f64 = 4.0;
+
+/// Least half width of a band.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Floor {
+    /// In the unit of the figure.
+    Absolute(f64),
+    /// Of the median's absolute value, ratio.
+    Relative(f64),
+}
+
+/// Where a figure has been.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Band {
+    /// Median of the nights.
+    pub median: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Nights it is made of.
+    pub nights: usize,
+}
+
+impl Band {
+    /// Median -/+ 4 robust standard deviations (median absolute deviation), at least the floor. `None` without nights;
+    /// values that are not finite are left out.
+    pub fn of(values: &[f64], floor: Floor) -> Option<Band> {
+        let mut values: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+        let median = median(&mut values)?;
+        let mut deviations: Vec<f64> = values.iter().map(|value| (value - median).abs()).collect();
+        let sigma = MAD_TO_SIGMA * crate::band::median(&mut deviations)?;
+        let least = match floor {
+            Floor::Absolute(half_width) => half_width,
+            Floor::Relative(ratio) => ratio * median.abs(),
+        };
+        let half_width = (WIDTH_SIGMAS * sigma).max(least);
+        Some(Band { median, low: median - half_width, high: median + half_width, nights: values.len() })
+    }
+
+    /// Whether a value lies in it, ends included.
+    pub fn holds(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value)
+    }
+}
+
+/// Median of some numbers, which are sorted by it.
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => None,
+        count if count % 2 == 1 => Some(values[middle]),
+        _ => Some(0.5 * (values[middle - 1] + values[middle])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_nights_give_the_floor() {
+        let band = Band::of(&[0.7; 14], Floor::Absolute(5e-4)).unwrap();
+        assert!(band.holds(0.7004) && !band.holds(0.702) && !band.holds(0.698));
+        assert_eq!(band.nights, 14);
+        let band = Band::of(&[-200.0], Floor::Relative(0.01)).unwrap();
+        assert!(band.holds(-201.9) && !band.holds(-202.1));
+    }
+
+    #[test]
+    fn one_odd_night_does_not_widen_the_band() {
+        // Normal scatter 0.01; scipy.stats.median_abs_deviation([...]) of these is 0.01.
+        let quiet = [0.98, 0.99, 1.0, 1.01, 1.02, 1.0, 0.99];
+        let mut odd = quiet.to_vec();
+        odd.push(50.0);
+        let (quiet, odd) =
+            (Band::of(&quiet, Floor::Absolute(0.0)).unwrap(), Band::of(&odd, Floor::Absolute(0.0)).unwrap());
+        assert!(odd.high - odd.low < 1.5 * (quiet.high - quiet.low), "{odd:?} {quiet:?}");
+        assert!(!odd.holds(1.2));
+    }
+
+    #[test]
+    fn nothing_gives_nothing() {
+        assert_eq!(Band::of(&[], Floor::Absolute(1.0)), None);
+        assert_eq!(Band::of(&[f64::NAN], Floor::Absolute(1.0)), None);
+    }
+}

@@ -1,0 +1,247 @@
+//! Tonight against the band of the nights before, and what it means when something has left it.
+
+use crate::{Band, Figure, Night, PointQuantity, PointRow, RunKey, RunRow};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A figure of a run outside its band.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Moved {
+    /// The run.
+    pub run: RunKey,
+    /// The figure.
+    pub figure: Figure,
+    /// Tonight's value; `None` where tonight has none and the nights before had.
+    pub value: Option<f64>,
+    /// Where it has been.
+    pub band: Band,
+}
+
+/// One point's shift.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Shift {
+    /// Which point, in words.
+    pub place: String,
+    /// Tonight's value.
+    pub value: f64,
+    /// Where it has been.
+    pub band: Band,
+}
+
+/// Points of a run outside their bands, in one quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MovedPoints {
+    /// The run.
+    pub run: RunKey,
+    /// The quantity.
+    pub quantity: PointQuantity,
+    /// Points that left their band, or have no value any more.
+    pub moved: usize,
+    /// Points compared.
+    pub compared: usize,
+    /// Mean shift of all points compared, unit of the quantity.
+    pub mean_shift: f64,
+    /// Mean of the bands' medians, unit of the quantity.
+    pub mean_level: f64,
+    /// The largest shift; `None` where points only lost their value.
+    pub largest: Option<Shift>,
+}
+
+/// Tonight against the nights before.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Comparison {
+    /// Largest number of earlier nights that a run was compared with; 0 on the first night.
+    pub nights: usize,
+    /// Runs that failed tonight, with why.
+    pub failed: Vec<(RunKey, String)>,
+    /// Runs that the last nights had and tonight has not.
+    pub missing: Vec<RunKey>,
+    /// Figures outside their band.
+    pub moved: Vec<Moved>,
+    /// Points outside their band.
+    pub moved_points: Vec<MovedPoints>,
+    /// What moved, in sentences.
+    pub conclusions: Vec<String>,
+}
+
+impl Comparison {
+    /// Whether tonight is as the nights before and nothing failed.
+    pub fn is_quiet(&self) -> bool {
+        self.failed.is_empty()
+            && self.missing.is_empty()
+            && self.moved.is_empty()
+            && self.moved_points.is_empty()
+    }
+}
+
+/// Compares a night with the runs of the nights before, newest first within a key.
+pub fn compare(night: &Night, earlier: &BTreeMap<RunKey, Vec<RunRow>>) -> Comparison {
+    let mut comparison = Comparison::default();
+    let tonight: BTreeSet<&RunKey> = night.runs.iter().map(|run| &run.key).collect();
+    comparison.missing = earlier.keys().filter(|key| !tonight.contains(key)).cloned().collect();
+    for run in &night.runs {
+        if let Some(failure) = &run.failure {
+            comparison.failed.push((run.key.clone(), failure.clone()));
+            continue;
+        }
+        let before: Vec<&RunRow> =
+            earlier.get(&run.key).into_iter().flatten().filter(|run| run.failure.is_none()).collect();
+        if before.is_empty() {
+            continue;
+        }
+        comparison.nights = comparison.nights.max(before.len());
+        compare_figures(run, &before, &mut comparison.moved);
+        compare_points(run, &before, &mut comparison.moved_points);
+    }
+    comparison.conclusions = conclusions(night, earlier, &comparison);
+    comparison
+}
+
+fn compare_figures(run: &RunRow, before: &[&RunRow], moved: &mut Vec<Moved>) {
+    for figure in Figure::ALL {
+        let values: Vec<f64> =
+            before.iter().filter_map(|earlier| earlier.figures.get(&figure).copied()).collect();
+        let Some(band) = Band::of(&values, figure.floor()) else { continue };
+        let value = run.figures.get(&figure).copied().filter(|value| value.is_finite());
+        if value.is_none_or(|value| !band.holds(value)) {
+            moved.push(Moved { run: run.key.clone(), figure, value, band });
+        }
+    }
+}
+
+/// A point's identity from night to night. The bits of its numbers, which come from the same file each night.
+type Place = (u64, u64, usize);
+
+fn place(point: &PointRow) -> Place {
+    (point.speed_rpm.to_bits(), point.valve_opening_ratio.to_bits(), point.visit)
+}
+
+fn compare_points(run: &RunRow, before: &[&RunRow], moved: &mut Vec<MovedPoints>) {
+    let mut earlier: BTreeMap<Place, Vec<&PointRow>> = BTreeMap::new();
+    for point in before.iter().flat_map(|run| &run.points) {
+        earlier.entry(place(point)).or_default().push(point);
+    }
+    let tonight: BTreeMap<Place, &PointRow> = run.points.iter().map(|point| (place(point), point)).collect();
+    for quantity in PointQuantity::ALL {
+        let (mut left, mut lost, mut compared) = (0, 0, 0);
+        let (mut shift_sum, mut level_sum) = (0.0, 0.0);
+        let mut largest: Option<(f64, Shift)> = None;
+        for (place, points) in &earlier {
+            let values: Vec<f64> = points.iter().filter_map(|point| quantity.of(point)).collect();
+            // A point that had a value on a few nights only has none that could be missed.
+            let usual = 2 * values.len() > before.len();
+            let Some(band) = Band::of(&values, quantity.floor()).filter(|_| usual) else { continue };
+            let point = tonight.get(place);
+            let Some((point, value)) = point.and_then(|point| Some((point, quantity.of(point)?))) else {
+                lost += 1;
+                continue;
+            };
+            compared += 1;
+            let shift = value - band.median;
+            shift_sum += shift;
+            level_sum += band.median;
+            if band.holds(value) {
+                continue;
+            }
+            left += 1;
+            if largest.as_ref().is_none_or(|(size, _)| shift.abs() > *size) {
+                largest = Some((shift.abs(), Shift { place: point.place(), value, band }));
+            }
+        }
+        if left + lost > 0 {
+            let count = f64::from(u32::try_from(compared.max(1)).unwrap_or(u32::MAX));
+            moved.push(MovedPoints {
+                run: run.key.clone(),
+                quantity,
+                moved: left + lost,
+                compared: compared + lost,
+                mean_shift: shift_sum / count,
+                mean_level: level_sum / count,
+                largest: largest.map(|(_, shift)| shift),
+            });
+        }
+    }
+}
+
+/// Which part of the program the movements point at, a sentence per campaign and quantity.
+fn conclusions(
+    night: &Night,
+    earlier: &BTreeMap<RunKey, Vec<RunRow>>,
+    comparison: &Comparison,
+) -> Vec<String> {
+    let mut sentences = changed_inputs(night, earlier);
+    let campaigns: BTreeSet<&str> = night.runs.iter().map(|run| run.key.campaign.as_str()).collect();
+    for campaign in campaigns {
+        for (truth, result, what) in [
+            (PointQuantity::EtaTrue, PointQuantity::Eta, "efficiency"),
+            (PointQuantity::HTrue, PointQuantity::H, "heat-transfer coefficient"),
+        ] {
+            let of = |quantity| {
+                comparison
+                    .moved_points
+                    .iter()
+                    .filter(move |moved| moved.run.campaign == campaign && moved.quantity == quantity)
+            };
+            let shown = |quantity: PointQuantity| {
+                let (mut shift, mut level, mut points) = (0.0, 0.0, 0);
+                let mut methods = BTreeSet::new();
+                for moved in of(quantity) {
+                    let count = moved.compared as f64;
+                    shift += count * moved.mean_shift;
+                    level += count * moved.mean_level;
+                    points += moved.compared;
+                    methods.insert(moved.run.method.as_str());
+                }
+                let count = (points as f64).max(1.0);
+                let methods = methods.into_iter().collect::<Vec<_>>().join(" and ");
+                (quantity.show_shift(shift / count, level / count), points, methods)
+            };
+            let (truth_shift, truth_points, _) = shown(truth);
+            let (result_shift, result_points, methods) = shown(result);
+            if truth_points > 0 {
+                let followed = if result_points > 0 {
+                    format!("the results moved by {result_shift} with it")
+                } else {
+                    "the results stayed".to_owned()
+                };
+                sentences.push(format!(
+                    "{campaign}: the true {what} moved by {truth_shift} in the mean of {truth_points} points, and {followed}: the simulated machine or its model changed."
+                ));
+            } else if result_points > 0 {
+                sentences.push(format!(
+                    "{campaign}: the identified {what} moved by {result_shift} in the mean of {result_points} points ({methods}), the true one stayed: planning, recording or identification changed."
+                ));
+            }
+        }
+    }
+    sentences
+}
+
+/// Inputs of the runs that are others than last night.
+fn changed_inputs(night: &Night, earlier: &BTreeMap<RunKey, Vec<RunRow>>) -> Vec<String> {
+    let mut campaigns = BTreeSet::new();
+    let mut models = BTreeSet::new();
+    for run in night.runs.iter().filter(|run| run.failure.is_none()) {
+        let Some(last) = earlier.get(&run.key).into_iter().flatten().find(|run| run.failure.is_none()) else {
+            continue;
+        };
+        if last.campaign_sha256 != run.campaign_sha256 {
+            campaigns.insert(run.key.campaign.as_str());
+        }
+        if last.model_sha256 != run.model_sha256 {
+            models.insert(run.key.machine.as_str());
+        }
+    }
+    let list = |names: &BTreeSet<&str>| names.iter().copied().collect::<Vec<_>>().join(", ");
+    let mut sentences = Vec::new();
+    if !campaigns.is_empty() {
+        sentences.push(format!("The campaign is another than in the last night: {}.", list(&campaigns)));
+    }
+    if !models.is_empty() {
+        sentences.push(format!(
+            "The nominal model's parameters or map are others than in the last night: {}.",
+            list(&models)
+        ));
+    }
+    sentences
+}

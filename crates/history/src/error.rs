@@ -1,0 +1,38 @@
+//! What can go wrong with a history.
+
+use std::path::PathBuf;
+
+/// Why a history cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum HistoryError {
+    /// The directory of the file cannot be made.
+    #[error("failed to create {}: {source}", .path.display())]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// There is no such file, and only reading was asked for.
+    #[error("there is no history {}; `mapper nightly` makes one, `--db FILE` names another", .path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is a database of something else, or of a newer program.
+    #[error("{} is no history that this program can read: {reason}; name another file with `--db`", .path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What was found.
+        reason: String,
+    },
+    /// SQLite's own word.
+    #[error("the history {} cannot be used: {source}", .path.display())]
+    Sqlite {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: rusqlite::Error,
+    },
+}

@@ -1,0 +1,107 @@
+//! The figures of one run that are kept and watched.
+
+use crate::Floor;
+use serde::Serialize;
+
+/// One figure of a run. Efficiencies are fractions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Figure {
+    /// Points with the verdict `good`.
+    GoodPoints,
+    /// Mean identified efficiency, fraction.
+    EtaMean,
+    /// Mean true efficiency, fraction.
+    EtaTrueMean,
+    /// Median absolute error of the efficiency, fraction.
+    EtaMedianError,
+    /// Largest absolute error of the efficiency, fraction.
+    EtaWorstError,
+    /// Share of the points whose 95 % interval holds the true efficiency, ratio.
+    EtaCoverage,
+    /// Mean identified heat-transfer coefficient, W/(m2 K).
+    HMean,
+    /// Mean true heat-transfer coefficient, W/(m2 K).
+    HTrueMean,
+    /// Median absolute relative error of the heat-transfer coefficient, ratio.
+    HMedianError,
+    /// Largest absolute relative error of the heat-transfer coefficient, ratio.
+    HWorstError,
+    /// Duration of the run in the rig's own time, minutes.
+    RigMinutes,
+}
+
+impl Figure {
+    /// All of them, in the order in which they are shown.
+    pub const ALL: [Figure; 11] = [
+        Figure::GoodPoints,
+        Figure::EtaMean,
+        Figure::EtaTrueMean,
+        Figure::EtaMedianError,
+        Figure::EtaWorstError,
+        Figure::EtaCoverage,
+        Figure::HMean,
+        Figure::HTrueMean,
+        Figure::HMedianError,
+        Figure::HWorstError,
+        Figure::RigMinutes,
+    ];
+
+    /// Name on the command line, in JSON, and of the column in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Figure::GoodPoints => "good_points",
+            Figure::EtaMean => "eta_mean",
+            Figure::EtaTrueMean => "eta_true_mean",
+            Figure::EtaMedianError => "eta_median_error",
+            Figure::EtaWorstError => "eta_worst_error",
+            Figure::EtaCoverage => "eta_coverage",
+            Figure::HMean => "h_mean",
+            Figure::HTrueMean => "h_true_mean",
+            Figure::HMedianError => "h_median_error",
+            Figure::HWorstError => "h_worst_error",
+            Figure::RigMinutes => "rig_minutes",
+        }
+    }
+
+    /// The figure of this name.
+    pub fn find(name: &str) -> Option<Figure> {
+        Figure::ALL.into_iter().find(|figure| figure.name() == name)
+    }
+
+    /// Unit in which people are shown it, and the factor from the stored value to it.
+    pub fn shown_unit(self) -> (&'static str, f64) {
+        match self {
+            Figure::GoodPoints => ("points", 1.0),
+            Figure::EtaMean | Figure::EtaTrueMean | Figure::EtaCoverage => ("%", 100.0),
+            Figure::EtaMedianError | Figure::EtaWorstError => ("%points", 100.0),
+            Figure::HMean | Figure::HTrueMean => ("W/(m2 K)", 1.0),
+            Figure::HMedianError | Figure::HWorstError => ("%", 100.0),
+            Figure::RigMinutes => ("min", 1.0),
+        }
+    }
+
+    /// Half width that its band has at least.
+    ///
+    /// Seeds are fixed, so that the same program gives the same bytes and the scatter of the nights is 0: the floor is
+    /// all there is. It is a quarter of the smallest change that has to be seen (0.2 points of efficiency), and far
+    /// above what another compiler's rounding does (1e-9).
+    pub fn floor(self) -> Floor {
+        match self {
+            Figure::GoodPoints => Floor::Absolute(0.5),
+            Figure::EtaMean | Figure::EtaTrueMean | Figure::EtaMedianError | Figure::EtaWorstError => {
+                Floor::Absolute(5e-4)
+            }
+            Figure::EtaCoverage => Floor::Absolute(0.02),
+            Figure::HMean | Figure::HTrueMean => Floor::Relative(2.5e-3),
+            Figure::HMedianError | Figure::HWorstError => Floor::Absolute(2.5e-3),
+            Figure::RigMinutes => Floor::Relative(2.5e-3),
+        }
+    }
+}
+
+impl std::fmt::Display for Figure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}

@@ -1,0 +1,86 @@
+//! The rows of one night, before they are stored.
+
+use crate::Figure;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// What a run is, from night to night.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct RunKey {
+    /// Name of the campaign.
+    pub campaign: String,
+    /// Name of the machine.
+    pub machine: String,
+    /// Method of identification.
+    pub method: String,
+    /// Seed of search and simulated rig.
+    pub seed: u64,
+}
+
+impl std::fmt::Display for RunKey {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {} seed {}", self.campaign, self.method, self.seed)
+    }
+}
+
+/// One identified point beside its truth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PointRow {
+    /// Speed aimed at, rpm.
+    pub speed_rpm: f64,
+    /// Valve opening relative to the nominal area.
+    pub valve_opening_ratio: f64,
+    /// Which visit of this point, from 0: repeats come again.
+    pub visit: usize,
+    /// Identified efficiency, fraction.
+    pub eta: Option<f64>,
+    /// True efficiency, fraction.
+    pub eta_true: Option<f64>,
+    /// Identified heat-transfer coefficient, W/(m2 K).
+    pub h_w_m2k: Option<f64>,
+    /// True heat-transfer coefficient, W/(m2 K).
+    pub h_true_w_m2k: Option<f64>,
+}
+
+impl PointRow {
+    /// The point in words.
+    pub fn place(&self) -> String {
+        let visit = if self.visit == 0 { String::new() } else { format!(", visit {}", self.visit + 1) };
+        format!("{} krpm at opening {}{visit}", self.speed_rpm / 1e3, self.valve_opening_ratio)
+    }
+}
+
+/// One run of a night.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunRow {
+    /// Which run.
+    #[serde(flatten)]
+    pub key: RunKey,
+    /// SHA-256 of the campaign as it was understood; empty where the run failed before.
+    pub campaign_sha256: String,
+    /// SHA-256 of the nominal model; empty where the run failed before.
+    pub model_sha256: String,
+    /// Why the run failed; `None` where it did not.
+    pub failure: Option<String>,
+    /// The figures it has.
+    pub figures: BTreeMap<Figure, f64>,
+    /// Its points.
+    pub points: Vec<PointRow>,
+}
+
+/// All runs of one night.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Night {
+    /// Name of the nightly campaign; nights of other names are never compared.
+    pub name: String,
+    /// Start, ms since 1970-01-01 00:00 UTC.
+    pub started_ms: i64,
+    /// Wall-clock duration, s.
+    pub duration_s: f64,
+    /// Program and version.
+    pub program: String,
+    /// Whether what moves tonight is right: this night begins a new band.
+    pub accepted: bool,
+    /// The runs.
+    pub runs: Vec<RunRow>,
+}

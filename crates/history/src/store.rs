@@ -1,0 +1,328 @@
+//! The file: one SQLite database.
+
+use crate::{Comparison, Figure, HistoryError, Night, PointRow, RunKey, RunRow, compare};
+use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior, params};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Nights that make a band where nothing else is said: two weeks.
+pub const DEFAULT_NIGHTS: usize = 14;
+
+/// Marks the file as one of ours: "mapr".
+const APPLICATION_ID: i32 = 0x6d61_7072;
+/// Layout of the tables; counts up with each change.
+const LAYOUT: i32 = 1;
+/// A night is written in milliseconds; a neighbour that holds the file for this long is stuck.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(60);
+
+/// A night as it is listed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StoredNight {
+    /// Number of the night, counting up.
+    pub id: i64,
+    /// Name of the nightly campaign.
+    pub name: String,
+    /// Start, ms since 1970-01-01 00:00 UTC.
+    pub started_ms: i64,
+    /// Wall-clock duration, s.
+    pub duration_s: f64,
+    /// Program and version.
+    pub program: String,
+    /// Whether it began a new band.
+    pub accepted: bool,
+    /// Whether a figure had left its band.
+    pub moved: bool,
+}
+
+/// A run as it is listed, with its night.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ListedRun {
+    /// Its night.
+    pub night: StoredNight,
+    /// The run; without its points.
+    #[serde(flatten)]
+    pub run: RunRow,
+}
+
+/// Which runs are listed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Filter {
+    /// Of this machine or campaign only.
+    pub machine: Option<String>,
+    /// By this method only.
+    pub method: Option<String>,
+    /// Not older than this, ms since 1970-01-01 00:00 UTC.
+    pub since_ms: Option<i64>,
+}
+
+/// An open history.
+pub struct History {
+    connection: Connection,
+    path: PathBuf,
+}
+
+impl History {
+    /// Opens the history, making it where there is none.
+    ///
+    /// # Errors
+    /// [`HistoryError`] where the file cannot be made, is no history, or was written by a newer program.
+    pub fn open(path: &Path) -> Result<History, HistoryError> {
+        if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+            std::fs::create_dir_all(parent)
+                .map_err(|source| HistoryError::Directory { path: parent.to_owned(), source })?;
+        }
+        let mut history = Self::connect(path, OpenFlags::default())?;
+        history.prepare()?;
+        Ok(history)
+    }
+
+    /// Opens a history that is there, to read it.
+    ///
+    /// # Errors
+    /// [`HistoryError::Missing`] where there is none, otherwise as [`History::open`].
+    pub fn open_existing(path: &Path) -> Result<History, HistoryError> {
+        if !path.exists() {
+            return Err(HistoryError::Missing { path: path.to_owned() });
+        }
+        // Reading a WAL database may have to make its side files, so that read-only would fail after a crash.
+        let mut history =
+            Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
+        history.prepare()?;
+        Ok(history)
+    }
+
+    fn connect(path: &Path, flags: OpenFlags) -> Result<History, HistoryError> {
+        let fail = |source| HistoryError::Sqlite { path: path.to_owned(), source };
+        let connection = Connection::open_with_flags(path, flags).map_err(fail)?;
+        connection.busy_timeout(BUSY_TIMEOUT).map_err(fail)?;
+        Ok(History { connection, path: path.to_owned() })
+    }
+
+    /// Makes the tables in a new file; refuses what is not ours.
+    fn prepare(&mut self) -> Result<(), HistoryError> {
+        let path = self.path.clone();
+        let fail = |source: rusqlite::Error| match source.sqlite_error_code() {
+            Some(rusqlite::ErrorCode::NotADatabase | rusqlite::ErrorCode::DatabaseCorrupt) => {
+                HistoryError::Foreign { path: path.clone(), reason: source.to_string() }
+            }
+            _ => HistoryError::Sqlite { path: path.clone(), source },
+        };
+        let foreign = |reason: String| HistoryError::Foreign { path: path.clone(), reason };
+        // Another process may be switching at this very moment, which SQLite reports as busy at once; the mode stays
+        // with the file, so that it is enough if one of the two succeeds.
+        let switched = self.connection.pragma_update(None, "journal_mode", "WAL");
+        if let Err(error) = switched
+            && error.sqlite_error_code() != Some(rusqlite::ErrorCode::DatabaseBusy)
+        {
+            return Err(fail(error));
+        }
+        self.connection.pragma_update(None, "foreign_keys", true).map_err(fail)?;
+        let application_id: i32 =
+            self.connection.pragma_query_value(None, "application_id", |row| row.get(0)).map_err(fail)?;
+        let layout: i32 =
+            self.connection.pragma_query_value(None, "user_version", |row| row.get(0)).map_err(fail)?;
+        if (application_id, layout) == (APPLICATION_ID, LAYOUT) {
+            return Ok(());
+        }
+        let transaction =
+            self.connection.transaction_with_behavior(TransactionBehavior::Immediate).map_err(fail)?;
+        // Looked at again with the lock held: another process may have made the tables meanwhile.
+        let application_id: i32 =
+            transaction.pragma_query_value(None, "application_id", |row| row.get(0)).map_err(fail)?;
+        let layout: i32 =
+            transaction.pragma_query_value(None, "user_version", |row| row.get(0)).map_err(fail)?;
+        let tables: i64 = transaction
+            .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
+            .map_err(fail)?;
+        match (application_id, layout) {
+            (APPLICATION_ID, LAYOUT) => return Ok(()),
+            (APPLICATION_ID, _) => {
+                return Err(foreign(format!("its layout is {layout}, this program knows {LAYOUT}")));
+            }
+            _ if tables > 0 => return Err(foreign("it is a database of another program".to_owned())),
+            _ => {}
+        }
+        transaction.execute_batch(include_str!("schema.sql")).map_err(fail)?;
+        transaction.pragma_update(None, "application_id", APPLICATION_ID).map_err(fail)?;
+        transaction.pragma_update(None, "user_version", LAYOUT).map_err(fail)?;
+        transaction.commit().map_err(fail)
+    }
+
+    /// Compares a night with the band of the last `nights` nights and appends it, in one transaction. A night that has
+    /// moved, or is accepted as a new beginning, is marked so.
+    ///
+    /// # Errors
+    /// [`HistoryError::Sqlite`]; the history is then as it was.
+    pub fn append(&mut self, night: &Night, nights: usize) -> Result<Comparison, HistoryError> {
+        let path = self.path.clone();
+        self.try_append(night, nights).map_err(|source| HistoryError::Sqlite { path, source })
+    }
+
+    fn try_append(&mut self, night: &Night, nights: usize) -> rusqlite::Result<Comparison> {
+        let transaction = self.connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+        let earlier = earlier(&transaction, &night.name, nights)?;
+        let comparison = compare(night, &earlier);
+        let moved = !comparison.is_quiet() && !night.accepted;
+        transaction.execute(
+            "INSERT INTO night (name, started_ms, duration_s, program, accepted, moved) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+            params![night.name, night.started_ms, night.duration_s, night.program, night.accepted, moved],
+        )?;
+        let night_id = transaction.last_insert_rowid();
+        {
+            let mut insert_run = transaction.prepare(&insert_run())?;
+            let mut insert_point =
+                transaction.prepare("INSERT INTO point VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?;
+            for run in &night.runs {
+                let RunKey { campaign, machine, method, seed } = &run.key;
+                let mut values: Vec<rusqlite::types::Value> = vec![
+                    night_id.into(),
+                    campaign.clone().into(),
+                    machine.clone().into(),
+                    method.clone().into(),
+                    // SQLite's integers are signed; the bits come back as they went.
+                    seed.cast_signed().into(),
+                    run.campaign_sha256.clone().into(),
+                    run.model_sha256.clone().into(),
+                    run.failure.clone().into(),
+                ];
+                values.extend(Figure::ALL.map(|figure| finite(run.figures.get(&figure).copied()).into()));
+                insert_run.execute(rusqlite::params_from_iter(values))?;
+                let run_id = transaction.last_insert_rowid();
+                for point in &run.points {
+                    insert_point.execute(params![
+                        run_id,
+                        point.speed_rpm,
+                        point.valve_opening_ratio,
+                        i64::try_from(point.visit).unwrap_or(i64::MAX),
+                        finite(point.eta),
+                        finite(point.eta_true),
+                        finite(point.h_w_m2k),
+                        finite(point.h_true_w_m2k),
+                    ])?;
+                }
+            }
+        }
+        transaction.commit()?;
+        Ok(comparison)
+    }
+
+    /// Runs, oldest night first, without their points.
+    ///
+    /// # Errors
+    /// [`HistoryError::Sqlite`].
+    pub fn runs(&self, filter: &Filter) -> Result<Vec<ListedRun>, HistoryError> {
+        self.try_runs(filter).map_err(|source| HistoryError::Sqlite { path: self.path.clone(), source })
+    }
+
+    fn try_runs(&self, filter: &Filter) -> rusqlite::Result<Vec<ListedRun>> {
+        let mut statement = self.connection.prepare(&format!(
+            "SELECT n.id, n.name, n.started_ms, n.duration_s, n.program, n.accepted, n.moved, {RUN_COLUMNS}, {} \
+             FROM run r JOIN night n ON n.id = r.night_id \
+             WHERE (?1 IS NULL OR r.machine = ?1 OR r.campaign = ?1) AND (?2 IS NULL OR r.method = ?2) \
+               AND (?3 IS NULL OR n.started_ms >= ?3) \
+             ORDER BY n.started_ms, n.id, r.id",
+            figure_columns("r.")
+        ))?;
+        statement
+            .query_map(params![filter.machine, filter.method, filter.since_ms], |row| {
+                let night = StoredNight {
+                    id: row.get(0)?,
+                    name: row.get(1)?,
+                    started_ms: row.get(2)?,
+                    duration_s: row.get(3)?,
+                    program: row.get(4)?,
+                    accepted: row.get(5)?,
+                    moved: row.get(6)?,
+                };
+                Ok(ListedRun { night, run: run_of(row, 7)? })
+            })?
+            .collect()
+    }
+}
+
+const RUN_COLUMNS: &str =
+    "r.campaign, r.machine, r.method, r.seed, r.campaign_sha256, r.model_sha256, r.failure";
+
+fn figure_columns(prefix: &str) -> String {
+    Figure::ALL.map(|figure| format!("{prefix}{}", figure.name())).join(", ")
+}
+
+fn insert_run() -> String {
+    let marks: Vec<String> = (1..=8 + Figure::ALL.len()).map(|index| format!("?{index}")).collect();
+    format!(
+        "INSERT INTO run (night_id, campaign, machine, method, seed, campaign_sha256, model_sha256, failure, {}) VALUES ({})",
+        figure_columns(""),
+        marks.join(", ")
+    )
+}
+
+/// A run from the columns that begin at `first`.
+fn run_of(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<RunRow> {
+    let mut figures = BTreeMap::new();
+    for (index, figure) in Figure::ALL.into_iter().enumerate() {
+        if let Some(value) = row.get::<_, Option<f64>>(first + 7 + index)? {
+            figures.insert(figure, value);
+        }
+    }
+    Ok(RunRow {
+        key: RunKey {
+            campaign: row.get(first)?,
+            machine: row.get(first + 1)?,
+            method: row.get(first + 2)?,
+            seed: row.get::<_, i64>(first + 3)?.cast_unsigned(),
+        },
+        campaign_sha256: row.get(first + 4)?,
+        model_sha256: row.get(first + 5)?,
+        failure: row.get(first + 6)?,
+        figures,
+        points: Vec::new(),
+    })
+}
+
+/// The runs that make tonight's bands, newest first: of the last `nights` quiet nights since the last accepted one.
+fn earlier(
+    transaction: &Transaction<'_>,
+    name: &str,
+    nights: usize,
+) -> rusqlite::Result<BTreeMap<RunKey, Vec<RunRow>>> {
+    let mut select_runs = transaction.prepare(&format!(
+        "SELECT r.id, {RUN_COLUMNS}, {} FROM run r WHERE r.night_id IN \
+           (SELECT id FROM night WHERE name = ?1 AND moved = 0 \
+              AND id >= coalesce((SELECT max(id) FROM night WHERE name = ?1 AND accepted = 1), 0) \
+            ORDER BY id DESC LIMIT ?2) \
+         ORDER BY r.night_id DESC",
+        figure_columns("r.")
+    ))?;
+    let mut select_points = transaction.prepare(
+        "SELECT speed_rpm, valve_opening_ratio, visit, eta, eta_true, h_w_m2k, h_true_w_m2k FROM point WHERE run_id = ?1",
+    )?;
+    let mut earlier: BTreeMap<RunKey, Vec<RunRow>> = BTreeMap::new();
+    let limit = i64::try_from(nights).unwrap_or(i64::MAX);
+    let mut rows = select_runs.query(params![name, limit])?;
+    while let Some(row) = rows.next()? {
+        let run_id: i64 = row.get(0)?;
+        let mut run = run_of(row, 1)?;
+        run.points = select_points
+            .query_map([run_id], |row| {
+                Ok(PointRow {
+                    speed_rpm: row.get(0)?,
+                    valve_opening_ratio: row.get(1)?,
+                    visit: usize::try_from(row.get::<_, i64>(2)?).unwrap_or_default(),
+                    eta: row.get(3)?,
+                    eta_true: row.get(4)?,
+                    h_w_m2k: row.get(5)?,
+                    h_true_w_m2k: row.get(6)?,
+                })
+            })?
+            .collect::<rusqlite::Result<_>>()?;
+        earlier.entry(run.key.clone()).or_default().push(run);
+    }
+    Ok(earlier)
+}
+
+/// NULL for what is no number.
+fn finite(value: Option<f64>) -> Option<f64> {
+    value.filter(|value| value.is_finite())
+}

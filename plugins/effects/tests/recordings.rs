@@ -87,9 +87,12 @@ fn scatter(rig: &Rig, means: &[Vec<f64>], inputs: &InterpolatedInputs) -> [f64; 
 /// pressure as it costs), 3 % of convection. What the effect moves lies far above.
 const DECLARED: [f64; 4] = [400.0, 1200.0, 1.0, 1.0];
 
+/// Name, effects with their values, channel that they move most.
+type Case = (&'static str, &'static [(&'static str, &'static [f64])], usize);
+
 #[test]
 fn with_its_effect_the_model_follows_the_recording_and_without_it_does_not() {
-    let cases: [(&str, &[(&str, &[f64])], usize); 5] = [
+    let cases: [Case; 5] = [
         // Name, effects, channel that the effect moves most: 0 speed, 1 P2, 2 T2, 3 Tc.
         ("area_split", &[("area_split", &[0.12])], 3),
         ("tip_diameter", &[("tip_diameter", &[1.5e-3])], 2),

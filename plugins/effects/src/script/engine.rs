@@ -29,8 +29,11 @@ pub(super) struct At {
     values: [f64; FIELDS.len()],
 }
 
+/// Reads one value of the machine.
+type Field = fn(&Site<'_>) -> f64;
+
 /// What a script sees, by its name. Values that come later in the gas path than a hook are NaN there.
-const FIELDS: [(&str, fn(&Site<'_>) -> f64); 22] = [
+const FIELDS: [(&str, Field); 22] = [
     ("speed_rad_s", |site| site.state.shaft_speed_rad_s),
     ("speed_rpm", |site| site.state.shaft_speed_rpm()),
     ("p1_pa", |site| site.boundary.p1_pa),
@@ -94,10 +97,8 @@ impl Program {
         for function in ast.iter_functions() {
             let name = function.name;
             let reading = name.strip_prefix("reading_");
-            if let Some(symbol) = reading {
-                if let Err(unknown) = symbol.parse::<Channel>() {
-                    return Err((None, format!("function {name}: {unknown}")));
-                }
+            if let Some(Err(unknown)) = reading.map(str::parse::<Channel>) {
+                return Err((None, format!("function {name}: {unknown}")));
             }
             let hook = HOOK_NAMES.iter().find(|(hook, _)| *hook == name);
             let Some(arguments) = reading.map(|_| 3).or(hook.map(|(_, arguments)| *arguments)) else {

@@ -44,6 +44,9 @@ pub struct DiagnoseArguments {
 /// `mapper gap effects`.
 #[derive(Debug, Args)]
 pub struct EffectsArguments {
+    /// Also check and list a suspected effect written in rhai; may be repeated
+    #[arg(long = "effect", value_name = "FILE")]
+    pub effects: Vec<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,

@@ -6,7 +6,6 @@
 mod arguments;
 mod assembly_line;
 mod commands;
-mod repeated_jumps;
 mod exit_code;
 mod failure;
 mod gap_arguments;
@@ -20,6 +19,7 @@ mod output;
 mod plan_picture;
 mod predicted_method;
 mod registry;
+mod repeated_jumps;
 mod results;
 mod run_directory;
 mod sequence_run;

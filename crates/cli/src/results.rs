@@ -1,8 +1,8 @@
 //! What a run gives: points, map, report; the same for people and for machines.
 
-use crate::repeated_jumps::{self, RepeatedJump};
 use crate::exit_code::Code;
 use crate::failure::Failure;
+use crate::repeated_jumps::{self, RepeatedJump};
 use crate::table::{self, Display, number};
 use crate::test_report;
 use crate::thermal_text::thermal_text;

@@ -90,8 +90,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     for step in &held_out {
         training.steps[*step] = false;
     }
-    let found =
-        search(Search { study: &study, linearised: &linearised, selection: &training, progress })?;
+    let found = search(Search { study: &study, linearised: &linearised, selection: &training, progress })?;
     progress(0.75, "all steps");
     let everywhere = Selection::all(&study);
     let beside = found.anew.as_ref().unwrap_or(&linearised);
@@ -193,8 +192,7 @@ fn weigh(study: &Study, calibration: &Calibration, null: &Fit, fits: &[Fit], lef
         1 => (calibration.prior_single / count).ln(),
         _ => (calibration.prior_pair / pairs).ln(),
     };
-    let scores: Vec<f64> =
-        std::iter::once(null).chain(fits).map(|fit| fit.score + prior(fit)).collect();
+    let scores: Vec<f64> = std::iter::once(null).chain(fits).map(|fit| fit.score + prior(fit)).collect();
     let top = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let weights: Vec<f64> = scores.iter().map(|s| ((s - top) / calibration.temperature).exp()).collect();
     let total: f64 = weights.iter().sum();

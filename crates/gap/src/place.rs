@@ -20,7 +20,11 @@ pub fn places(study: &Study, linearised: &Linearised, null: &Fit, fits: &[Fit], 
     let excess = (null.cost - null.residual.len() as f64).max(1.0);
     let submodel = |effect: usize| study.effects[effect].info().submodel;
     let mut gains: Vec<(Submodel, f64, &Fit, usize)> = Vec::new();
-    let mut offer = |part: Submodel, gain: f64, fit: &'_ Fit, effect: usize, gains: &mut Vec<(Submodel, f64, usize, usize)>| {
+    let mut offer = |part: Submodel,
+                     gain: f64,
+                     fit: &'_ Fit,
+                     effect: usize,
+                     gains: &mut Vec<(Submodel, f64, usize, usize)>| {
         let place = fits.iter().position(|f| std::ptr::eq(f, fit)).unwrap_or(0);
         match gains.iter_mut().find(|(other, ..)| *other == part) {
             Some(other) if other.1 >= gain => {}
@@ -50,7 +54,9 @@ pub fn places(study: &Study, linearised: &Linearised, null: &Fit, fits: &[Fit], 
         }
         first.sort_by(|a, b| b.1.total_cmp(&a.1));
     }
-    for (part, gain, fit, effect) in first.iter().chain(singles.iter().filter(|s| first.iter().all(|f| f.0 != s.0))) {
+    for (part, gain, fit, effect) in
+        first.iter().chain(singles.iter().filter(|s| first.iter().all(|f| f.0 != s.0)))
+    {
         gains.push((*part, *gain, &fits[*fit], *effect));
     }
     let points = study.points(&null.hypothesis).unwrap_or_default();
@@ -82,7 +88,13 @@ struct Shown {
 }
 
 /// Where one effect of a fit shows most: its signature against the same fit without it.
-fn show(study: &Study, linearised: &Linearised, fit: &Fit, effect: usize, points: &[PointState]) -> Option<Shown> {
+fn show(
+    study: &Study,
+    linearised: &Linearised,
+    fit: &Fit,
+    effect: usize,
+    points: &[PointState],
+) -> Option<Shown> {
     let mut without = fit.hypothesis.clone();
     without.effects.retain(|(index, _)| *index != effect);
     let there = study.predict(&without).ok()?;
@@ -104,14 +116,15 @@ fn show(study: &Study, linearised: &Linearised, fit: &Fit, effect: usize, points
         }
         (whole, (squares / count.max(1) as f64).sqrt())
     };
-    let largest = |candidates: usize, of: &dyn Fn(usize) -> f64| (0..candidates).max_by(|a, b| of(*a).total_cmp(&of(*b)));
+    let largest = |candidates: usize, of: &dyn Fn(usize) -> f64| {
+        (0..candidates).max_by(|a, b| of(*a).total_cmp(&of(*b)))
+    };
     let output = largest(OUTPUTS.len(), &|o| energy(&|output, _, _| output == o).0)?;
     let in_phase = |phase: usize, since_s: f64| {
         let end_s = PHASES.get(phase + 1).map_or(f64::INFINITY, |(_, start_s)| *start_s);
         (PHASES[phase].1..end_s).contains(&since_s)
     };
-    let phase =
-        largest(PHASES.len(), &|p| energy(&|o, _, since_s| o == output && in_phase(p, since_s)).0)?;
+    let phase = largest(PHASES.len(), &|p| energy(&|o, _, since_s| o == output && in_phase(p, since_s)).0)?;
     let step = largest(study.steps.len(), &|s| energy(&|o, step, _| o == output && step == s).0)?;
     let region = points.get(step).map_or_else(String::new, region);
     Some(Shown {

@@ -93,7 +93,8 @@ fn singles(search: Search<'_>, null: &Fit) -> Vec<Fit> {
 /// Fits the best few more thoroughly.
 pub fn refit(search: Search<'_>, fits: &mut Vec<Fit>, count: usize, effort: Effort) {
     let best: Vec<Hypothesis> = fits.iter().take(count).map(|f| f.hypothesis.clone()).collect();
-    let again = parallel::map(&best, |start| fit(search.study, search.linearised, start, search.selection, effort));
+    let again =
+        parallel::map(&best, |start| fit(search.study, search.linearised, start, search.selection, effort));
     for fitted in again.into_iter().flatten() {
         keep_best(fits, fitted);
     }
@@ -270,8 +271,7 @@ fn linear_start(
         return Some(start.clone());
     }
     let there = study.predict(start).ok()?;
-    let mut change: Vec<f64> =
-        there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
+    let mut change: Vec<f64> = there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
     linearised.whiten(study, &mut change);
     let projector = Projector::new(study, linearised, selection, &[])?;
     let residual = linearised.residual(study, &linearised.base);
@@ -340,7 +340,8 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
             let parameter = &parameters[0];
             let step = 0.3 * parameter.typical_step;
             // The straight estimate, kept within the range.
-            let value = (parameter.neutral + share.clamp(-12.0, 12.0) * step).clamp(parameter.low, parameter.high);
+            let value =
+                (parameter.neutral + share.clamp(-12.0, 12.0) * step).clamp(parameter.low, parameter.high);
             share = (value - parameter.neutral) / step;
             let value = if value == parameter.neutral { parameter.neutral + 0.1 * step } else { value };
             if let Some((_, values)) = addition.start.effects.last_mut() {

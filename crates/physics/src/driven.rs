@@ -39,10 +39,12 @@ impl FrozenGrid {
         for until_s in wanted {
             while until_s - at_s > 1e-9 {
                 let since_s = at_s - jump_s;
-                let limit_s = STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(6.0, |(_, step)| *step);
+                let limit_s =
+                    STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(6.0, |(_, step)| *step);
                 // Equal parts, each within the limit.
                 let parts = ((until_s - at_s) / limit_s - 1e-6).ceil().max(1.0);
-                at_s = if parts <= 1.0 { until_s } else { at_s + ((until_s - at_s) / parts).max(limit_s * 0.5) };
+                at_s =
+                    if parts <= 1.0 { until_s } else { at_s + ((until_s - at_s) / parts).max(limit_s * 0.5) };
                 nodes_s.push(at_s);
             }
             if jumps_s.contains(&until_s) {
@@ -127,7 +129,13 @@ where
         let boundary = inputs.at(pair[0]);
         boundary.check().map_err(|_| failed)?;
         let before_end_s = end_s - 1e-9 * (end_s - pair[0]);
-        let mut system = DrivenSystem { model, inputs, last_s: before_end_s, boundary_s: pair[0], prepared: model.prepare(&boundary) };
+        let mut system = DrivenSystem {
+            model,
+            inputs,
+            last_s: before_end_s,
+            boundary_s: pair[0],
+            prepared: model.prepare(&boundary),
+        };
         // The speed line has a corner on the surge line, with an infinite slope on one side: short steps across it.
         let fast = end_s - pair[0] < 0.11;
         let surge_before = if fast { system.surge_position(&integrator.y) } else { 0.0 };

@@ -20,11 +20,8 @@ pub enum Mode {
 const GENERATED: &[&str] = &["methods.md", "reproduction.md", "reproduction", "sequences.md", "turbo_a.svg"];
 
 /// Methods of mapping, and the campaigns that map one grid by them.
-const METHODS: &[(&str, &str)] = &[
-    ("dynamic", "turbo_a"),
-    ("conventional", "turbo_a_conventional"),
-    ("adiabatic", "turbo_a_adiabatic"),
-];
+const METHODS: &[(&str, &str)] =
+    &[("dynamic", "turbo_a"), ("conventional", "turbo_a_conventional"), ("adiabatic", "turbo_a_adiabatic")];
 
 /// Writes or checks everything that is generated.
 pub fn docs(mode: Mode) -> Result<(), Error> {

@@ -41,7 +41,10 @@ struct Truth {
     h_w_m2k: f64,
 }
 
-fn read<T: serde::de::DeserializeOwned>(directory: &Path, names: &[&str]) -> Result<T, Box<dyn std::error::Error>> {
+fn read<T: serde::de::DeserializeOwned>(
+    directory: &Path,
+    names: &[&str],
+) -> Result<T, Box<dyn std::error::Error>> {
     let path = names.iter().map(|name| directory.join(name)).find(|path| path.is_file());
     Ok(serde_json::from_slice(&std::fs::read(path.ok_or("no such run")?)?)?)
 }
@@ -69,10 +72,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             })
             .collect();
         let score = summarise(&points).ok_or("no point has both a number and a truth")?;
-        let mut errors: Vec<f64> = points
-            .iter()
-            .filter_map(|scored| Some((scored.point.eta? - scored.truth?.eta).abs()))
-            .collect();
+        let mut errors: Vec<f64> =
+            points.iter().filter_map(|scored| Some((scored.point.eta? - scored.truth?.eta).abs())).collect();
         let mut halves: Vec<f64> = points
             .iter()
             .filter_map(|scored| Some(0.5 * (scored.point.eta_high? - scored.point.eta_low?)))

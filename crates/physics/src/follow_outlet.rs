@@ -67,7 +67,7 @@ pub fn hold_speed(
 mod tests {
     use super::*;
 
-    /// With T3 and oil at T2 and hardly any heat lost outside, the temperature rise gives the map's own efficiency.
+    /// With T3 and oil at T2 the temperature rise gives the map's own efficiency, but for what is lost to the cell.
     #[test]
     fn nothing_heats_the_gas_when_all_is_at_its_temperature() {
         let model = Model::nominal();
@@ -82,10 +82,13 @@ mod tests {
             let held = hold_speed(&model, speed_rpm, &boundary, follow).unwrap();
             assert!((held.boundary.t3_k - held.outputs.t2_k).abs() < 1e-5);
             assert!((held.boundary.oil_temperature_k - held.outputs.t2_k).abs() < 1e-5);
-            let hot = steady::hold_speed(&model, speed_rpm, &boundary).unwrap();
-            // What is left is the heat that the housings lose to the cell: some watts.
-            assert!(error(&held) < 0.25 * error(&hot), "{} {}", error(&held), error(&hot));
+            // What is left is what the housings lose to the cell, some watts.
+            assert!(error(&held) < 0.01, "{}", error(&held));
         }
+        // At low speed the hot turbine heats the compressor most: several points of efficiency.
+        let cold = hold_speed(&model, 50e3, &boundary, follow).unwrap();
+        let hot = steady::hold_speed(&model, 50e3, &boundary).unwrap();
+        assert!(error(&cold) < 0.25 * error(&hot), "{} {}", error(&cold), error(&hot));
         // Nothing to follow: the same state.
         let plain = hold_speed(&model, 80e3, &boundary, FollowOutlet::default()).unwrap();
         assert_eq!(plain, steady::hold_speed(&model, 80e3, &boundary).unwrap());

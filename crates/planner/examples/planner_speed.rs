@@ -3,6 +3,8 @@
 //! `planner_speed POINTS [ORDER] [EFFORT] [SEED]`: 18 is the grid of docs/planner.md, others are rectangular grids from
 //! 50 to 150 krpm and opening 0.5 to 2.5. Prints one line: points, order, effort, seed, sum, smallest, bounds, seconds.
 
+#![allow(clippy::print_stdout, reason = "what it prints is what it is for")]
+
 use mapper_core::OperatingPoint;
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::model::Model;

@@ -4,6 +4,8 @@
 //! `static_problem POINTS [SEED]`. The weight of a jump is what it moves the compressor housing within 10 to 110 s, in K,
 //! when the housing has settled before and has one time constant at each point, `C/(h A/(1 + NTU) + G_bearing)`.
 
+#![allow(clippy::print_stdout, reason = "what it prints is what it is for")]
+
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::{air, housing, steady};

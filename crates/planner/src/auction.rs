@@ -26,7 +26,9 @@ pub(crate) struct Prices {
 pub(crate) fn prices(n: usize, weight: &[f64], increments: (f64, f64)) -> Prices {
     let mut price = vec![0.0f64; n];
     let (mut increment, last) = increments;
-    while n > 1 {
+    // A single row has nothing to bid against.
+    let mut more = n > 1;
+    while more {
         let mut row_of: Vec<Option<usize>> = vec![None; n];
         let mut waiting: Vec<usize> = (0..n).rev().collect();
         let mut left = BIDS * n;
@@ -49,9 +51,7 @@ pub(crate) fn prices(n: usize, weight: &[f64], increments: (f64, f64)) -> Prices
             price[column] += best - second + increment;
             waiting.extend(row_of[column].replace(row));
         }
-        if increment <= last {
-            break;
-        }
+        more = increment > last;
         increment = (increment * FALL_RATIO).max(last);
     }
     let profit: Vec<f64> = (0..n)

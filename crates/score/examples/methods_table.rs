@@ -1,5 +1,7 @@
 //! Runs of the same grid by several methods, side by side, as a page of Markdown: `methods_table NAME DIRECTORY ...`.
 
+#![allow(clippy::print_stdout, reason = "what it prints is what it is for")]
+
 use mapper_core::{IdentifiedPoint, Plan, StepKind, Verdict};
 use mapper_score::{PointTruth, ScoredPoint, summarise};
 use serde::Deserialize;

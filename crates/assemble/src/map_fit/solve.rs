@@ -461,8 +461,7 @@ impl<'a> Problem<'a> {
             let step = (wanted / precisions.rough[q]).clamp(0.3, 3.0);
             // Twenty times stiffer than where it starts is a straight line to the eye; more would only make errors too
             // sure beyond the measured lines.
-            precisions.rough[q] =
-                (precisions.rough[q] * step).clamp(0.03 * start, 20.0 * start);
+            precisions.rough[q] = (precisions.rough[q] * step).clamp(0.03 * start, 20.0 * start);
         }
         for (index, precision) in precisions.lines.iter_mut().enumerate() {
             let first = PARAMETERS * knots + index * lines;

@@ -67,7 +67,7 @@ pub(crate) fn nearest(
         let (x, y) = offset(foot.angle_rad);
         let [sx, sy, _] = foot.slope;
         let length = sx * sx + sy * sy;
-        if !(length > 1e-12) {
+        if length.is_nan() || length <= 1e-12 {
             break;
         }
         let next = (foot.angle_rad + (x * sx + y * sy) / length).clamp(low, high);

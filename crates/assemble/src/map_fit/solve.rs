@@ -452,7 +452,7 @@ impl<'a> Problem<'a> {
         start_rough: &Parameters,
     ) {
         let (knots, lines) = (self.splines.len(), self.data.lines_rpm.len());
-        for q in 0..PARAMETERS {
+        for (q, start) in start_rough.iter().enumerate() {
             let values = unknowns.values.row(q).transpose();
             let block = inverse.view((q * knots, q * knots), (knots, knots));
             let used = precisions.rough[q] * (block * &self.splines.of(q).penalty).trace();
@@ -461,8 +461,7 @@ impl<'a> Problem<'a> {
             let step = (wanted / precisions.rough[q]).clamp(0.3, 3.0);
             // Twenty times stiffer than where it starts is a straight line to the eye; more would only make errors too
             // sure beyond the measured lines.
-            precisions.rough[q] =
-                (precisions.rough[q] * step).clamp(0.03 * start_rough[q], 20.0 * start_rough[q]);
+            precisions.rough[q] = (precisions.rough[q] * step).clamp(0.03 * start, 20.0 * start);
         }
         for (index, precision) in precisions.lines.iter_mut().enumerate() {
             let first = PARAMETERS * knots + index * lines;

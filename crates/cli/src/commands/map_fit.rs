@@ -57,7 +57,10 @@ fn describe(map: &CompressorMap, fitted: &FittedMap) -> String {
     let mut table = table::with_heads(&heads.map(str::to_owned));
     for line in &fitted.lines {
         let left_out = fitted.left_out.iter().find(|l| l.speed_corrected_rpm == line.speed_corrected_rpm);
-        let best = line.nodes.iter().max_by(|a, b| a.eta.total_cmp(&b.eta));
+        // Where the line is supported at all, its best efficiency is one that is.
+        let supported = line.nodes.iter().any(|n| !n.extrapolated);
+        let known = line.nodes.iter().filter(|n| !(supported && n.extrapolated));
+        let best = known.max_by(|a, b| a.eta.total_cmp(&b.eta));
         let surge = line.nodes.last();
         table.add_row(vec![
             format!("{:.0}", line.speed_corrected_rpm),

@@ -24,6 +24,7 @@ mod samples;
 mod steady;
 mod taps;
 mod window;
+mod zero;
 
 pub use config::{
     DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Stabilisation, Thresholds, WindowRule,
@@ -34,3 +35,4 @@ pub use findings::code;
 pub use identify::{Identified, identify, identify_each, identify_recording};
 pub use joint::surface::EfficiencySurface;
 pub use mapper_core::{Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings};
+pub use zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};

@@ -19,8 +19,8 @@ use rand_pcg::Pcg64;
 
 /// Diameters at which it is worked out, mm; between them the square counts.
 const DIAMETERS_MM: [f64; 10] = [0.0, 0.25, 0.5, 0.8, 1.2, 1.7, 2.3, 3.2, 4.5, 7.0];
-/// Draws of noise for each step: the scatter of their mean adds a twelfth to that of the recording's own noise.
-const DRAWS: usize = 12;
+/// Draws of noise for each step: the scatter of their mean adds a sixteenth to that of the recording's own noise.
+const DRAWS: usize = 16;
 
 /// Expected sum of squares over the squares of diameters.
 #[derive(Debug, Clone, Default)]
@@ -29,10 +29,23 @@ pub(crate) struct Explained {
     squares_mm2: Vec<f64>,
     sums: Vec<f64>,
     curvatures: Vec<f64>,
+    /// Variance of the slope between knots from one course of noise to another.
+    slope_variances: Vec<f64>,
 }
 
 impl Explained {
-    fn new(squares_mm2: Vec<f64>, sums: Vec<f64>) -> Self {
+    fn new(squares_mm2: Vec<f64>, draws: &[Vec<f64>]) -> Self {
+        let count = (draws.len() as f64).max(1.0);
+        let sums: Vec<f64> =
+            (0..squares_mm2.len()).map(|i| draws.iter().map(|draw| draw[i]).sum::<f64>() / count).collect();
+        let slope_variances = (1..squares_mm2.len())
+            .map(|i| {
+                let width = squares_mm2[i] - squares_mm2[i - 1];
+                let mean = (sums[i] - sums[i - 1]) / width;
+                let off = |draw: &Vec<f64>| ((draw[i] - draw[i - 1]) / width - mean).powi(2);
+                draws.iter().map(off).sum::<f64>() / (count - 1.0).max(1.0) * (1.0 + 1.0 / count)
+            })
+            .collect();
         let n = squares_mm2.len();
         let mut curvatures = vec![0.0; n];
         let mut carried = vec![0.0; n];
@@ -47,7 +60,14 @@ impl Explained {
         for i in (0..n.saturating_sub(1)).rev() {
             curvatures[i] = curvatures[i] * curvatures[i + 1] + carried[i];
         }
-        Explained { squares_mm2, sums, curvatures }
+        Explained { squares_mm2, sums, curvatures, slope_variances }
+    }
+
+    /// Variance of half the slope: how far the recording's own noise pulls the probe on top of what least squares sees.
+    pub(crate) fn pull_variance(&self, square_mm2: f64) -> f64 {
+        let after = self.squares_mm2.partition_point(|knot| *knot <= square_mm2);
+        let segment = after.saturating_sub(1).min(self.slope_variances.len().saturating_sub(1));
+        0.25 * self.slope_variances.get(segment).copied().unwrap_or(0.0)
     }
 
     /// Value and slope at the square of a diameter, mm2.
@@ -65,7 +85,7 @@ impl Explained {
             + ((a * a * a - a) * low + (b * b * b - b) * high) * width * width / 6.0;
         let slope = (self.sums[i] - self.sums[i - 1]) / width
             + ((3.0 * b * b - 1.0) * high - (3.0 * a * a - 1.0) * low) * width / 6.0;
-        if square_mm2 > *last { (value + slope * 0.0, 0.0) } else { (value, slope) }
+        if square_mm2 > *last { (value, 0.0) } else { (value, slope) }
     }
 }
 
@@ -83,7 +103,7 @@ pub(crate) fn explained(problem: &Problem<'_>, steps: &[StepRows], config: &Iden
         return Explained::default();
     }
     let squares_mm2: Vec<f64> = DIAMETERS_MM.iter().map(|diameter| diameter * diameter).collect();
-    let mut sums = vec![0.0; squares_mm2.len()];
+    let mut draws = vec![vec![0.0; squares_mm2.len()]; DRAWS];
     // Always the same noise: the same recording gives the same result.
     let mut rng = Pcg64::seed_from_u64(1);
     for (member, step) in problem.members.iter().zip(steps).filter(|(member, _)| member.shares) {
@@ -95,7 +115,7 @@ pub(crate) fn explained(problem: &Problem<'_>, steps: &[StepRows], config: &Iden
         let gas_k: Vec<f64> = ideal_gas(&problem.setting, member, &problem.shared);
         let lags: Vec<_> =
             squares_mm2.iter().map(|square| problem.setting.lags(rows, &gas_k, *square)).collect();
-        for _ in 0..DRAWS {
+        for sums in &mut draws {
             let noise = smoother.apply(&draw(&t_s, rows, config, sigma_k, &mut rng));
             for (sum, lags) in sums.iter_mut().zip(&lags) {
                 // What the first row holds is the step's own parameter.
@@ -106,11 +126,11 @@ pub(crate) fn explained(problem: &Problem<'_>, steps: &[StepRows], config: &Iden
                     readings.push(reading);
                 }
                 member.whitening.apply(&mut readings);
-                *sum += readings.iter().map(|r| r * r).sum::<f64>() / DRAWS as f64;
+                *sum += readings.iter().map(|r| r * r).sum::<f64>();
             }
         }
     }
-    Explained::new(squares_mm2, sums)
+    Explained::new(squares_mm2, &draws)
 }
 
 fn ideal_gas(setting: &Setting, member: &crate::joint::solve::Member<'_>, shared: &SharedVector) -> Vec<f64> {

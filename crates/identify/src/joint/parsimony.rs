@@ -19,8 +19,12 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<()> {
         let judged: Vec<(usize, f64, Prior)> = left
             .iter()
             .filter_map(|index| {
-                let (weight, prior) =
-                    mixture(problem.priors[*index], problem.shared[*index], covariance.error_of(*index)?)?;
+                let (weight, prior) = mixture(
+                    problem.priors[*index],
+                    problem.shared[*index],
+                    covariance.error_of(*index)?,
+                    problem.information(*index)?,
+                )?;
                 Some((*index, weight, prior))
             })
             .collect();
@@ -34,18 +38,19 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<()> {
 
 /// Probability that a value other than the declared one holds, and the prior with which the fit gives the mixture's mean
 /// and variance; `None` for errors that are no number.
-fn mixture(prior: Prior, found: f64, error: f64) -> Option<(f64, Prior)> {
-    // What the recording alone says: the fit holds the prior already.
-    let precision = 1.0 / (error * error) - prior.weight();
-    if !(precision.is_finite() && precision > 0.0 && error > 0.0) {
+///
+/// `information`: one over the variance that least squares alone gives, without the prior.
+fn mixture(prior: Prior, found: f64, error: f64, information: f64) -> Option<(f64, Prior)> {
+    if !(information.is_finite() && information > 0.0 && error > 0.0) {
         return None;
     }
     let distance = (found - prior.mean) / error;
     let odds_declared = prior.sigma / error * (-0.5 * distance * distance).exp();
     let weight = 1.0 / (1.0 + odds_declared);
     let variance = weight * (error * error + (1.0 - weight) * (found - prior.mean).powi(2));
-    let needed = 1.0 / variance - precision;
-    // A mixture wider than the fit itself: the prior stays as it is.
+    // The fit draws by prior over information; what it has to draw is what is left of the variance.
+    let drawn = (variance / (error * error)).min(1.0);
+    let needed = information * (1.0 / drawn - 1.0);
     let sigma = if needed > prior.weight() { needed.powf(-0.5) } else { prior.sigma };
     Some((weight, Prior { mean: prior.mean, sigma }))
 }
@@ -58,9 +63,9 @@ mod tests {
 
     #[test]
     fn a_clear_finding_is_left_alone_and_none_is_drawn_to_the_declared_value() {
-        let (sure, kept) = mixture(PRIOR, 0.2, 0.01).unwrap();
+        let (sure, kept) = mixture(PRIOR, 0.2, 0.01, 1e4).unwrap();
         assert!(sure > 0.999 && kept.sigma > 0.1);
-        let (doubtful, drawn) = mixture(PRIOR, 0.005, 0.02).unwrap();
+        let (doubtful, drawn) = mixture(PRIOR, 0.005, 0.02, 2.5e3).unwrap();
         assert!(doubtful < 0.1 && drawn.sigma < 0.01);
     }
 }

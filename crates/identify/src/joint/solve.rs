@@ -322,6 +322,21 @@ impl Problem<'_> {
         Some(best)
     }
 
+    /// What the recording alone knows of a shared parameter when all others are free: one over its variance by least
+    /// squares, less the prior's part.
+    pub(crate) fn information(&self, index: usize) -> Option<f64> {
+        let fitted = self.fitted();
+        let row = fitted.iter().position(|other| *other == index)?;
+        let normal = self.normal(&fitted);
+        let mut reduced = normal.shared.clone();
+        for (block, _) in normal.blocks.iter().zip(&self.members).filter(|(_, member)| member.shares) {
+            let inverse = block.own.cholesky()?.inverse();
+            reduced -= block.mixed.transpose() * inverse * &block.mixed;
+        }
+        let variance = reduced.cholesky()?.inverse()[(row, row)];
+        Some(1.0 / variance - self.priors[index].weight())
+    }
+
     /// Covariance at the minimum; `None` where the equations are singular.
     ///
     /// Offsets keep their declared spread, and everything else answers to them as the fit would (Schmidt's consider
@@ -347,6 +362,15 @@ impl Problem<'_> {
             reduced.view((0, 0), (sought, sought)).into_owned().cholesky()?.inverse()
         };
         let answer = -(&inverse * reduced.view((0, sought), (sought, carried)));
+        // The noise of the inputs pulls the probe beyond what least squares knows of.
+        let inverse = match fitted[..sought].iter().position(|index| *index == PROBE_MM2) {
+            None => inverse,
+            Some(row) => {
+                let pulled = inverse.column(row).into_owned();
+                let variance = self.explained.pull_variance(self.shared[PROBE_MM2]);
+                inverse + variance * &pulled * pulled.transpose()
+            }
+        };
         let spread = DMatrix::from_diagonal(&DVector::from_iterator(
             carried,
             fitted[sought..].iter().map(|index| self.priors[*index].sigma.powi(2)),

@@ -21,9 +21,9 @@ use mapper_physics::air;
 
 /// Start of what is used of a step, after the last change of a command, s: h and efficiency are followed while the
 /// operating point settles, and the first seconds after a jump tell most of the probe.
-const JOINT_START_S: f64 = 3.0;
+const JOINT_START_S: f64 = 1.5;
 /// Least spread of the points' efficiencies about the surface: maps are no polynomials.
-const LEAST_SURFACE_SIGMA: f64 = 3e-3;
+const LEAST_SURFACE_SIGMA: f64 = 1e-3;
 /// Least spread of the points' h about the law, ratio.
 const LEAST_LAW_SIGMA: f64 = 3e-3;
 /// Standard deviation of a sample of T2 where nothing is declared, K; refined from the residual.

@@ -1,0 +1,201 @@
+//! The isothermal zero: what sensors read when all of them must read the same.
+//!
+//! After a long soak at standstill (shaft at rest, oil and cell at one temperature) T1, T2, Tc and T_oil see one
+//! temperature, P1 and P2 one pressure. Their differences are offsets, to within how even the rig really was. What they
+//! have in common stays unknown; it shifts an efficiency by its share of the absolute temperature only, which is nothing.
+
+use crate::IdentifyConfig;
+use crate::plausible::plausible;
+use crate::samples::mean;
+use mapper_core::{Channel, DeclaredUncertainty, Recording, Series};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// How even a soak is, and how it is recognised.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ZeroSettings {
+    /// One standard deviation of a sensor's true temperature about that of all, K, > 0.
+    pub temperature_sigma_k: f64,
+    /// The same of the pressures, Pa, > 0.
+    pub pressure_sigma_pa: f64,
+    /// Longest stretch before the first step that is used, s: the last one of the standstill.
+    pub longest_s: f64,
+    /// Shortest stretch that will do, s.
+    pub shortest_s: f64,
+    /// Largest drift of a temperature over the stretch, K/min; a soak that drifts faster is not over.
+    pub drift_k_min: f64,
+}
+
+impl Default for ZeroSettings {
+    /// Even to 0.05 K and 5 Pa, recognised from the last minute to ten minutes that drift by less than 0.1 K/min.
+    fn default() -> Self {
+        ZeroSettings {
+            temperature_sigma_k: 0.05,
+            pressure_sigma_pa: 5.0,
+            longest_s: 600.0,
+            shortest_s: 60.0,
+            drift_k_min: 0.1,
+        }
+    }
+}
+
+/// Shaft speed below which the machine is at rest, rpm: far below any idle, far above any sensor's noise.
+const AT_REST_RPM: f64 = 1000.0;
+/// Standard deviations by which readings may differ before the soak itself is in doubt.
+const UNEVEN_SIGMAS: f64 = 5.0;
+
+/// Offsets found, and the stretch they were found in.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct IsothermalZero {
+    /// Start of the stretch, s.
+    pub start_s: f64,
+    /// End of the stretch, s.
+    pub end_s: f64,
+    /// Reading less what all read together, K or Pa.
+    pub offsets: BTreeMap<Channel, f64>,
+    /// One standard deviation of what is left of each offset, K or Pa.
+    pub left_sigma: BTreeMap<Channel, f64>,
+}
+
+/// Why a recording has no isothermal zero.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoZero {
+    /// The shaft never rested long enough before the first step.
+    #[error("the shaft rests for {found_s:.0} s before the first step; the zero needs {needed_s:.0} s")]
+    NoSoak {
+        /// Time at rest, s.
+        found_s: f64,
+        /// Time needed, s.
+        needed_s: f64,
+    },
+    /// A temperature still moves.
+    #[error("{channel} still drifts by {drift_k_min:+.2} K/min in the soak (limit {limit_k_min:.2}): soak longer")]
+    Drifts {
+        /// The channel.
+        channel: Channel,
+        /// Its drift, K/min.
+        drift_k_min: f64,
+        /// Largest drift allowed, K/min.
+        limit_k_min: f64,
+    },
+    /// Sensors differ by more than their declared offsets allow.
+    #[error(
+        "{channel} reads {off:+.2} {} off the others in the soak, {:.1} times its declared offset: the rig is not even, or the sensor is broken",
+        channel.unit(), off.abs() / sigma
+    )]
+    Uneven {
+        /// The channel.
+        channel: Channel,
+        /// Reading less that of all, K or Pa.
+        off: f64,
+        /// Standard deviation expected of it, K or Pa.
+        sigma: f64,
+    },
+}
+
+/// Finds the offsets of T1, T2, Tc and T_oil against each other, and of P1 and P2.
+///
+/// Channels without a declared offset count as exact. Common temperature and pressure are the means weighted by declared
+/// offset and evenness.
+///
+/// # Errors
+/// [`NoZero`] where the recording has no soak, or one that is none.
+pub fn isothermal_zero(
+    recording: &Recording,
+    config: &IdentifyConfig,
+    settings: &ZeroSettings,
+) -> Result<IsothermalZero, NoZero> {
+    let (start_s, end_s) = at_rest(recording);
+    let no_soak = NoZero::NoSoak { found_s: (end_s - start_s).max(0.0), needed_s: settings.shortest_s };
+    if !(end_s - start_s >= settings.shortest_s) {
+        return Err(no_soak);
+    }
+    let start_s = start_s.max(end_s - settings.longest_s);
+    let mut zero = IsothermalZero { start_s, end_s, ..IsothermalZero::default() };
+    let temperatures = [Channel::T1, Channel::T2, Channel::Tc, Channel::TOil];
+    for (group, sigma) in [
+        (&temperatures[..], settings.temperature_sigma_k),
+        (&[Channel::P1, Channel::P2][..], settings.pressure_sigma_pa),
+    ] {
+        let mut readings = Vec::new();
+        for channel in group {
+            let Some(reading) = soak_mean(recording, *channel, start_s, end_s) else { continue };
+            if group.len() > 2 && reading.drift_per_min.abs() > settings.drift_k_min {
+                return Err(NoZero::Drifts {
+                    channel: *channel,
+                    drift_k_min: reading.drift_per_min,
+                    limit_k_min: settings.drift_k_min,
+                });
+            }
+            let declared = config.declared.get(channel).copied().unwrap_or_default();
+            // The first-order part of the noise averages over twice its time constant only.
+            let share = config.noise_colour.first_order_share_ratio;
+            let averaged = share * (2.0 * config.noise_colour.time_constant_s / (end_s - start_s)).sqrt();
+            let own = sigma.hypot(declared.noise_sigma * averaged);
+            readings.push((*channel, reading.mean, own, own.hypot(declared.offset_sigma)));
+        }
+        let weight: f64 = readings.iter().map(|(.., total)| total.powi(-2)).sum();
+        let common = readings.iter().map(|(_, mean, _, total)| mean * total.powi(-2)).sum::<f64>() / weight;
+        if readings.len() < 2 || !common.is_finite() {
+            continue;
+        }
+        for (channel, reading, own, total) in readings {
+            let off = reading - common;
+            if off.abs() > UNEVEN_SIGMAS * total {
+                return Err(NoZero::Uneven { channel, off, sigma: total });
+            }
+            zero.offsets.insert(channel, off);
+            zero.left_sigma.insert(channel, own);
+        }
+    }
+    if zero.offsets.is_empty() { Err(no_soak) } else { Ok(zero) }
+}
+
+/// The recording without the offsets, and the configuration with what is left of them as declared offset: prior of the
+/// joint method, bias of the others.
+pub fn zeroed(
+    mut recording: Recording,
+    mut config: IdentifyConfig,
+    zero: &IsothermalZero,
+) -> (Recording, IdentifyConfig) {
+    for (channel, offset) in &zero.offsets {
+        if let Some(series) = recording.series.get_mut(channel) {
+            series.values.iter_mut().for_each(|value| *value -= offset);
+        }
+        if let (Some(declared), Some(left)) = (config.declared.get_mut(channel), zero.left_sigma.get(channel)) {
+            *declared = DeclaredUncertainty { offset_sigma: *left, ..*declared };
+        }
+    }
+    (recording, config)
+}
+
+/// The last stretch before the first step in which the shaft rests.
+fn at_rest(recording: &Recording) -> (f64, f64) {
+    let first_s = recording.steps.first().map_or(f64::INFINITY, |step| step.start_s);
+    let Some(speed) = recording.series.get(&Channel::ShaftSpeed) else { return (0.0, 0.0) };
+    let before = speed.t_s.partition_point(|t| *t < first_s);
+    let rests = |i: usize| speed.values.get(i).is_some_and(|value| value.abs() < AT_REST_RPM);
+    let Some(last) = (0..before).rev().find(|i| rests(*i)) else { return (0.0, 0.0) };
+    let first = (0..last).rev().find(|i| !rests(*i)).map_or(0, |i| i + 1);
+    // The last sample at rest may already belong to the start of the machine.
+    (speed.t_s[first], speed.t_s[last.saturating_sub(1).max(first)])
+}
+
+struct SoakMean {
+    mean: f64,
+    drift_per_min: f64,
+}
+
+/// Mean of a channel over a stretch, and how it drifts from the first to the last third.
+fn soak_mean(recording: &Recording, channel: Channel, start_s: f64, end_s: f64) -> Option<SoakMean> {
+    let series: &Series = recording.series.get(&channel)?;
+    let third_s = (end_s - start_s) / 3.0;
+    let of = |start_s: f64, end_s: f64| {
+        let (_, values) = series.slice(start_s, end_s);
+        let usable: Vec<f64> = values.iter().copied().filter(|value| plausible(channel, *value)).collect();
+        mean(&usable)
+    };
+    let (early, late) = (of(start_s, start_s + third_s)?, of(end_s - third_s, end_s)?);
+    Some(SoakMean { mean: of(start_s, end_s)?, drift_per_min: (late - early) / (2.0 * third_s / 60.0) })
+}

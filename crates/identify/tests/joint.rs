@@ -1,0 +1,239 @@
+//! The joint method on campaigns of the lumped model: what it must find without noise, and with it.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+#[path = "common/lab.rs"]
+mod lab;
+
+use lab::{Campaign, Machine, campaign, eighteen, measured};
+use mapper_core::{Channel, IdentifiedPoint, Method, Recording, ThermalModel, Verdict};
+use mapper_identify::{
+    Choice, DeclaredUncertainty, Identified, IdentifyConfig, JointSettings, WindowRule, code, identify_recording,
+};
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+
+fn joint() -> IdentifyConfig {
+    IdentifyConfig { method: Method::Joint, ..IdentifyConfig::default() }
+}
+
+fn found(recording: &Recording, config: &IdentifyConfig) -> (Vec<IdentifiedPoint>, ThermalModel) {
+    let Identified { points, thermal } = identify_recording(recording, config).unwrap();
+    (points.into_iter().map(Result::unwrap).collect(), thermal.unwrap())
+}
+
+/// Largest errors of eta (fraction) and h (ratio).
+fn worst(points: &[IdentifiedPoint], campaign: &Campaign) -> (f64, f64) {
+    points.iter().zip(&campaign.truth).fold((0.0, 0.0), |(eta, h), (point, truth)| {
+        let off_eta = (point.eta.unwrap() - truth.eta).abs();
+        let off_h = (point.h_w_m2k.unwrap() / truth.h_w_m2k - 1.0).abs();
+        (f64::max(eta, off_eta), f64::max(h, off_h))
+    })
+}
+
+fn value(shared: &mapper_core::SharedValue) -> f64 {
+    shared.value.unwrap()
+}
+
+/// A jump to 50 krpm with constant h is 4 points off; with the law and the surface nothing is left but what a polynomial
+/// misses of the map. Also the first point, which has no transient.
+#[test]
+fn without_noise_every_point_of_the_nominal_machine_is_right() {
+    let campaign = campaign(&eighteen(), 120.0, Machine::default());
+    let (points, thermal) = found(&campaign.recording, &joint());
+    let (eta, h) = worst(&points, &campaign);
+    assert!(eta < 0.0015 && h < 0.015, "eta {eta}, h {h}");
+    let law = thermal.convection.unwrap();
+    // MODEL.md's law: 0.004 and 1.13. A coefficient at Re = 1 lies three decades off the points.
+    assert!((value(&law.exponent) - 1.13).abs() < 0.002 && (value(&law.coefficient) / 0.004 - 1.0).abs() < 0.02);
+    assert!(thermal.doubts.is_empty(), "{:?}", thermal.doubts);
+    assert!(points[0].warnings.iter().any(|warning| warning.code == code::THROUGH_THE_LAW));
+}
+
+/// The twelve reference jumps of the paper's table: each in a campaign of its own kind, two levels at three openings.
+#[test]
+fn without_noise_the_reference_jumps_are_right() {
+    let jumps = [(110e3, 50e3), (50e3, 110e3), (150e3, 90e3), (90e3, 150e3)];
+    let points: Vec<(f64, f64)> = [0.5, 0.7, 1.0]
+        .into_iter()
+        .flat_map(|valve| jumps.into_iter().flat_map(move |(from, to)| [(valve, from), (valve, to)]))
+        .collect();
+    let campaign = campaign(&points, 110.0, Machine::default());
+    let (points, _) = found(&campaign.recording, &joint());
+    let (eta, h) = worst(&points, &campaign);
+    assert!(eta < 0.0015 && h < 0.015, "eta {eta}, h {h}");
+}
+
+#[test]
+fn without_noise_an_unknown_share_before_the_wheel_is_found() {
+    let campaign = campaign(&eighteen(), 120.0, Machine { alpha: 0.2, ..Machine::default() });
+    let (points, thermal) = found(&campaign.recording, &joint());
+    let (eta, _) = worst(&points, &campaign);
+    let alpha = value(&thermal.alpha_area_ratio);
+    assert!((alpha - 0.2).abs() < 0.002 && eta < 0.001, "alpha {alpha}, eta {eta}");
+}
+
+#[test]
+fn without_noise_a_slow_probe_is_found_with_and_without_a_known_share() {
+    for alpha in [0.0, 0.2] {
+        let campaign = campaign(&eighteen(), 120.0, Machine { alpha, probe_m: 3e-3, ..Machine::default() });
+        let (points, thermal) = found(&campaign.recording, &joint());
+        let (eta, _) = worst(&points, &campaign);
+        let diameter_m = value(&thermal.probe_diameter_m);
+        assert!((diameter_m - 3e-3).abs() < 2e-5 && eta < 0.005, "{diameter_m} m, eta {eta}");
+    }
+}
+
+#[test]
+fn without_noise_convection_that_depends_on_direction_is_found() {
+    let campaign = campaign(&eighteen(), 120.0, Machine { direction: 0.65, ..Machine::default() });
+    let (points, thermal) = found(&campaign.recording, &joint());
+    let (eta, _) = worst(&points, &campaign);
+    let factor = value(&thermal.direction_factor);
+    assert!((factor - 0.65).abs() < 0.02 && eta < 0.003, "factor {factor}, eta {eta}");
+}
+
+/// Switched off entirely it is the dynamic method, to the digit.
+#[test]
+fn with_every_refinement_off_it_is_the_dynamic_method() {
+    let campaign = campaign(&eighteen()[..7], 120.0, Machine::default());
+    let mut rng = Pcg64::seed_from_u64(3);
+    let (recording, declared) = measured(&campaign.recording, 1.0, 1.0, &mut rng);
+    let off = IdentifyConfig { joint: JointSettings::all_off(), declared, ..joint() };
+    let dynamic = IdentifyConfig { method: Method::Dynamic, ..off.clone() };
+    let (off, dynamic) =
+        (identify_recording(&recording, &off).unwrap(), identify_recording(&recording, &dynamic).unwrap());
+    assert!(off.thermal.is_none());
+    for (off, dynamic) in off.points.into_iter().zip(dynamic.points) {
+        let (off, dynamic) = (off.unwrap(), dynamic.unwrap());
+        assert_eq!(IdentifiedPoint { method: Method::Dynamic, ..off }, dynamic);
+    }
+}
+
+/// A refinement that is switched off is not looked for.
+#[test]
+fn a_fixed_share_stays_what_it_was_declared() {
+    let campaign = campaign(&eighteen()[..8], 120.0, Machine { alpha: 0.2, ..Machine::default() });
+    let fixed = JointSettings { alpha_area: Choice::Fixed, ..JointSettings::default() };
+    let (points, thermal) =
+        found(&campaign.recording, &IdentifyConfig { joint: fixed, alpha_area_ratio: 0.2, ..joint() });
+    assert_eq!(thermal.alpha_area_ratio, mapper_core::SharedValue::assumed(0.2));
+    assert!(worst(&points, &campaign).0 < 0.002);
+}
+
+/// 0.1 K of white noise on T2, as the figure of the issue has it: alpha_A within 0.015, eta within 0.6 points; the root
+/// mean square over seeds, since three standard errors of a single one are more.
+#[test]
+fn with_noise_on_t2_the_share_is_found() {
+    let campaign = campaign(&eighteen(), 120.0, Machine { alpha: 0.2, ..Machine::default() });
+    let (mut alpha_squares, mut eta_squares, mut held, mut count) = (0.0, 0.0, 0.0, 0.0);
+    let seeds = 5;
+    for seed in 0..seeds {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let mut recording = campaign.recording.clone();
+        let series = recording.series.get_mut(&Channel::T2).unwrap();
+        let mut normal = || -> f64 { rand_distr::Distribution::sample(&rand_distr::StandardNormal, &mut rng) };
+        series.values.iter_mut().for_each(|value| *value += 0.1 * normal());
+        let mut config = joint();
+        config.noise_colour.first_order_share_ratio = 0.0;
+        let noise = DeclaredUncertainty { noise_sigma: 0.1, ..DeclaredUncertainty::default() };
+        config.declared.insert(Channel::T2, noise);
+        let (points, thermal) = found(&recording, &config);
+        alpha_squares += (value(&thermal.alpha_area_ratio) - 0.2).powi(2);
+        for (point, truth) in points.iter().zip(&campaign.truth) {
+            eta_squares += (point.eta.unwrap() - truth.eta).powi(2);
+            held += f64::from(u8::from(
+                point.eta_low.unwrap() <= truth.eta && truth.eta <= point.eta_high.unwrap(),
+            ));
+            count += 1.0;
+        }
+    }
+    let alpha_rms = f64::sqrt(alpha_squares / seeds as f64);
+    let eta_rms = f64::sqrt(eta_squares / count);
+    assert!(alpha_rms < 0.015 && eta_rms < 0.006, "alpha {alpha_rms}, eta {eta_rms}");
+    // All points of a seed share one alpha_A: five seeds hold between three fifths and all of them.
+    assert!(held / count >= 0.6, "held {}", held / count);
+}
+
+/// Noise on every channel, its slow part included: a probe that is ideal is not taken for a slow one (noise in T1 and
+/// flow, which a lag would smooth away, is what tempts the fit), and every interval is honest.
+#[test]
+fn noise_in_the_inputs_is_not_taken_for_a_probe() {
+    let campaign = campaign(&eighteen(), 120.0, Machine::default());
+    for seed in 0..4 {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let (recording, declared) = measured(&campaign.recording, 1.0, 0.0, &mut rng);
+        let config = IdentifyConfig { declared, ..joint() };
+        let (points, thermal) = found(&recording, &config);
+        let (eta, _) = worst(&points, &campaign);
+        assert!(value(&thermal.probe_diameter_m) < 1e-3, "seed {seed}: {:?}", thermal.probe_diameter_m);
+        // Three standard errors at 50 krpm, where the two-parameter method is 4 points off without any noise.
+        assert!(eta < 0.01, "seed {seed}: {eta}");
+    }
+}
+
+fn noisy(seed: u64) -> (Campaign, Recording, IdentifyConfig) {
+    let campaign = campaign(&eighteen(), 120.0, Machine::default());
+    let (recording, declared) = measured(&campaign.recording, 1.0, 0.0, &mut Pcg64::seed_from_u64(seed));
+    (campaign, recording, IdentifyConfig { declared, ..joint() })
+}
+
+/// Spikes, gaps and a stuck sensor in single steps: those steps say so, the others stay right.
+#[test]
+fn bad_data_in_one_step_does_not_spoil_the_others() {
+    let (campaign, mut recording, config) = noisy(7);
+    let t2 = recording.series.get_mut(&Channel::T2).unwrap();
+    // Spikes in step 3, nothing at all for half of step 5.
+    for i in (3 * 1200 + 100..4 * 1200).step_by(97) {
+        t2.values[i] += 40.0;
+    }
+    t2.values[5 * 1200..5 * 1200 + 600].fill(f64::NAN);
+    // Tc stands still in step 8, and the flow is 20 % off in step 11.
+    let tc = recording.series.get_mut(&Channel::Tc).unwrap();
+    let stuck = tc.values[8 * 1200 + 300];
+    tc.values[8 * 1200 + 300..9 * 1200].fill(stuck);
+    let t1 = recording.series.get_mut(&Channel::T1).unwrap();
+    for (i, value) in t1.values[11 * 1200..12 * 1200].iter_mut().enumerate() {
+        *value += 5.0 * (i as f64 / 120.0).sin();
+    }
+    let (points, _) = found(&recording, &config);
+    let warned = |step: usize, code: &str| points[step].warnings.iter().any(|warning| warning.code == code);
+    assert!(warned(3, code::OUTLIERS) && warned(5, code::LOST_SAMPLES) && warned(8, code::STUCK));
+    assert!(warned(11, code::POOR_FIT) && warned(11, code::LEFT_OUT));
+    for step in [5, 8, 11] {
+        assert_ne!(points[step].verdict, Verdict::Good, "step {step}");
+    }
+    for (step, (point, truth)) in points.iter().zip(&campaign.truth).enumerate() {
+        let off = (point.eta.unwrap() - truth.eta).abs();
+        assert!(off < 0.015 || point.verdict != Verdict::Good, "step {step} is called good and {off} off");
+    }
+}
+
+/// A window with nothing in it: no number, and a reason.
+#[test]
+fn a_step_without_samples_has_no_number() {
+    let (_, mut recording, config) = noisy(8);
+    recording.series.get_mut(&Channel::Tc).unwrap().values[4 * 1200..5 * 1200].fill(f64::NAN);
+    let (points, _) = found(&recording, &config);
+    assert_eq!((points[4].eta, points[4].verdict), (None, Verdict::Unusable));
+    assert_eq!(points[4].warnings[0].code, code::TOO_FEW_SAMPLES);
+    assert!(points[3].eta.is_some() && points[5].eta.is_some());
+}
+
+/// The same recording gives the same result, to the bit.
+#[test]
+fn the_result_is_repeatable() {
+    let (_, recording, config) = noisy(9);
+    assert_eq!(found(&recording, &config), found(&recording, &config));
+}
+
+/// A recording of a window rule that the joint method does not need is no reason to fail.
+#[test]
+fn a_campaign_of_one_step_gives_what_it_can() {
+    let campaign = campaign(&eighteen()[..1], 120.0, Machine::default());
+    let config = IdentifyConfig { window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 }, ..joint() };
+    let Identified { points, .. } = identify_recording(&campaign.recording, &config).unwrap();
+    let point = points[0].as_ref().unwrap();
+    // Settled, alone: nothing tells efficiency from heat.
+    assert!(point.verdict != Verdict::Good || point.eta.is_none(), "{point:?}");
+}

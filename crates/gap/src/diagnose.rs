@@ -9,9 +9,9 @@ use crate::how_far::{held_out, how_far};
 use crate::inputs::InputError;
 use crate::next::next;
 use crate::parallel;
-use crate::place::places;
+use crate::place::{Gain, places};
 use crate::report::{Candidate, Diagnosis, Estimate, Verdict};
-use crate::select::{Search, additions, keep_best, members, refit, search, sort};
+use crate::select::{Search, additions, keep_best, members, refit, search};
 use crate::study::{PredictError, Study};
 use crate::table::Table;
 use crate::whiten::Linearised;
@@ -90,7 +90,8 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     for step in &held_out {
         training.steps[*step] = false;
     }
-    let found = search(Search { study: &study, linearised: &linearised, selection: &training, progress })?;
+    let found =
+        search(Search { study: &study, linearised: &linearised, selection: &training, progress })?;
     progress(0.75, "all steps");
     let everywhere = Selection::all(&study);
     let beside = found.anew.as_ref().unwrap_or(&linearised);
@@ -109,7 +110,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     for fitted in again.into_iter().flatten() {
         keep_best(&mut fits, fitted);
     }
-    sort(&mut fits);
+    by_weight(&calibration, &study, &mut fits);
     // Close races are run where the best stands, not where nothing is off.
     let anew = match (fits.first(), &found.anew) {
         (Some(best), Some(_)) => linearised.at(&study, &best.hypothesis).ok(),
@@ -119,6 +120,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     if anew.is_some() {
         let finals = Search { study: &study, linearised: beside, selection: &everywhere, progress };
         refit(finals, &mut fits, 4, effort);
+        by_weight(&calibration, &study, &mut fits);
     }
     progress(0.9, "what is left");
     let best = fits.first().unwrap_or(&null);
@@ -142,16 +144,19 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     let trained = found.fits.iter().find(|f| members(&f.hypothesis) == members(&best.hypothesis));
     let after = if named { trained.unwrap_or(&found.null) } else { &found.null };
     let gap = how_far(&study, &found.null, after, &held_out, 7);
-    let mut all_fits: Vec<Fit> = Vec::new();
-    for fitted in fits.iter().chain(found.fits.iter()) {
-        if all_fits.iter().all(|f| members(&f.hypothesis) != members(&fitted.hypothesis)) {
-            all_fits.push(fitted.clone());
+    let mut gains: Vec<Gain<'_>> =
+        fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
+    let counted = training.steps.iter().filter(|counts| **counts).count().max(1);
+    let whole = study.steps.len() as f64 / counted as f64;
+    for fit in &found.fits {
+        if gains.iter().all(|other| members(&other.fit.hypothesis) != members(&fit.hypothesis)) {
+            gains.push(Gain { fit, gain: whole * (found.null.cost - fit.cost) });
         }
     }
     let r#where = if verdict == Verdict::WithinTolerance {
         Vec::new()
     } else {
-        places(&study, &linearised, &null, &all_fits, named)
+        places(&study, &linearised, &null, &gains, named)
     };
     let next = rivals(&weighed, &fits)
         .filter(|_| named)
@@ -184,15 +189,25 @@ struct Weighed {
     scores: Vec<f64>,
 }
 
-fn weigh(study: &Study, calibration: &Calibration, null: &Fit, fits: &[Fit], left: &Adequacy) -> Weighed {
+/// Logarithm of what is known of a cause before any data: pairs are rarer than singles, and many.
+fn prior(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
     let count = study.effects.len().max(2) as f64;
-    let pairs = count * (count - 1.0) / 2.0;
-    let prior = |fit: &Fit| match fit.hypothesis.effects.len() {
+    match fit.hypothesis.effects.len() {
         0 => calibration.prior_none.ln(),
         1 => (calibration.prior_single / count).ln(),
-        _ => (calibration.prior_pair / pairs).ln(),
-    };
-    let scores: Vec<f64> = std::iter::once(null).chain(fits).map(|fit| fit.score + prior(fit)).collect();
+        _ => (calibration.prior_pair / (0.5 * count * (count - 1.0))).ln(),
+    }
+}
+
+/// Best first, priors included.
+fn by_weight(calibration: &Calibration, study: &Study, fits: &mut [Fit]) {
+    let weight = |fit: &Fit| fit.score + prior(calibration, study, fit);
+    fits.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+}
+
+fn weigh(study: &Study, calibration: &Calibration, null: &Fit, fits: &[Fit], left: &Adequacy) -> Weighed {
+    let scores: Vec<f64> =
+        std::iter::once(null).chain(fits).map(|fit| fit.score + prior(calibration, study, fit)).collect();
     let top = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let weights: Vec<f64> = scores.iter().map(|s| ((s - top) / calibration.temperature).exp()).collect();
     let total: f64 = weights.iter().sum();

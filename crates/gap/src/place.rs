@@ -11,63 +11,68 @@ use crate::study::{PointState, Study};
 use crate::whiten::Linearised;
 use mapper_physics::effect::Submodel;
 
+/// A part that takes off less, in squared sigmas, is not a place.
+const LEAST_GAIN: f64 = 4.0;
+
 /// Phases of a step: name and first second after the jump.
 const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 30.0)];
 
-/// Places of the gap, largest first. `null` has no effect; `fits` are single effects and pairs, best first; where
-/// `named` is set, the first of them is the cause, and its parts come first.
-pub fn places(study: &Study, linearised: &Linearised, null: &Fit, fits: &[Fit], named: bool) -> Vec<Place> {
-    let excess = (null.cost - null.residual.len() as f64).max(1.0);
+/// A fit with what it takes off the misfit of all steps.
+#[derive(Debug)]
+pub struct Gain<'a> {
+    /// The fit.
+    pub fit: &'a Fit,
+    /// Cost of the null less its own; of a fit to some steps, in proportion.
+    pub gain: f64,
+}
+
+/// One part with its gain, the fit in which it shows, and the effect that stands for it.
+#[derive(Clone, Copy)]
+struct Part<'a> {
+    submodel: Submodel,
+    gain: f64,
+    fit: &'a Fit,
+    effect: usize,
+}
+
+/// Places of the gap, largest first. `fits` are single effects and pairs, best first; where `named` is set, the first of
+/// them is the cause, and its parts come first.
+pub fn places(study: &Study, linearised: &Linearised, null: &Fit, fits: &[Gain<'_>], named: bool) -> Vec<Place> {
+    // What no hypothesis gets below is noise.
+    let excess = fits.iter().map(|f| f.gain).fold(1.0, f64::max);
     let submodel = |effect: usize| study.effects[effect].info().submodel;
-    let mut gains: Vec<(Submodel, f64, &Fit, usize)> = Vec::new();
-    let mut offer = |part: Submodel,
-                     gain: f64,
-                     fit: &'_ Fit,
-                     effect: usize,
-                     gains: &mut Vec<(Submodel, f64, usize, usize)>| {
-        let place = fits.iter().position(|f| std::ptr::eq(f, fit)).unwrap_or(0);
-        match gains.iter_mut().find(|(other, ..)| *other == part) {
-            Some(other) if other.1 >= gain => {}
-            Some(other) => *other = (part, gain, place, effect),
-            None => gains.push((part, gain, place, effect)),
-        }
-    };
-    let mut singles: Vec<(Submodel, f64, usize, usize)> = Vec::new();
-    for fit in fits {
-        if let [effect] = members(&fit.hypothesis)[..] {
-            offer(submodel(effect), null.cost - fit.cost, fit, effect, &mut singles);
-        }
-    }
-    singles.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut first: Vec<(Submodel, f64, usize, usize)> = Vec::new();
+    let mut first: Vec<Part<'_>> = Vec::new();
     if let (true, Some(best)) = (named, fits.first()) {
-        let of_best = members(&best.hypothesis);
+        let of_best = members(&best.fit.hypothesis);
         for effect in &of_best {
             // What this one takes off beside the others.
             let without: Vec<usize> = of_best.iter().copied().filter(|other| other != effect).collect();
-            let cost = if without.is_empty() {
-                null.cost
-            } else {
-                fits.iter().find(|f| members(&f.hypothesis) == without).map_or(null.cost, |f| f.cost)
-            };
-            offer(submodel(*effect), cost - best.cost, best, *effect, &mut first);
+            let others = fits.iter().find(|f| members(&f.fit.hypothesis) == without).map_or(0.0, |f| f.gain);
+            let gain = (best.gain - others).max(0.0);
+            offer(&mut first, Part { submodel: submodel(*effect), gain, fit: best.fit, effect: *effect });
         }
-        first.sort_by(|a, b| b.1.total_cmp(&a.1));
     }
-    for (part, gain, fit, effect) in
-        first.iter().chain(singles.iter().filter(|s| first.iter().all(|f| f.0 != s.0)))
-    {
-        gains.push((*part, *gain, &fits[*fit], *effect));
+    let mut singles: Vec<Part<'_>> = Vec::new();
+    for candidate in fits {
+        if let [effect] = members(&candidate.fit.hypothesis)[..] {
+            let part = submodel(effect);
+            if first.iter().all(|other| other.submodel != part) {
+                offer(&mut singles, Part { submodel: part, gain: candidate.gain, fit: candidate.fit, effect });
+            }
+        }
     }
+    first.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    singles.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    first.extend(singles);
     let points = study.points(&null.hypothesis).unwrap_or_default();
-    gains
+    first
         .into_iter()
-        .filter(|(_, gain, ..)| *gain > 4.0)
-        .take(Submodel::ALL.len())
-        .filter_map(|(part, gain, fit, effect)| {
+        .filter(|part| part.gain > LEAST_GAIN)
+        .filter_map(|part| {
+            let Part { submodel, gain, fit, effect } = part;
             let shown = show(study, linearised, fit, effect, &points)?;
             Some(Place {
-                submodel: part.name().to_owned(),
+                submodel: submodel.name().to_owned(),
                 channel: OUTPUTS[shown.output].symbol().to_owned(),
                 phase: shown.phase.to_owned(),
                 region: shown.region,
@@ -80,6 +85,15 @@ pub fn places(study: &Study, linearised: &Linearised, null: &Fit, fits: &[Fit], 
         .collect()
 }
 
+/// Keeps the better of two for one part.
+fn offer<'a>(parts: &mut Vec<Part<'a>>, part: Part<'a>) {
+    match parts.iter_mut().find(|other| other.submodel == part.submodel) {
+        Some(other) if other.gain >= part.gain => {}
+        Some(other) => *other = part,
+        None => parts.push(part),
+    }
+}
+
 struct Shown {
     output: usize,
     phase: &'static str,
@@ -88,13 +102,7 @@ struct Shown {
 }
 
 /// Where one effect of a fit shows most: its signature against the same fit without it.
-fn show(
-    study: &Study,
-    linearised: &Linearised,
-    fit: &Fit,
-    effect: usize,
-    points: &[PointState],
-) -> Option<Shown> {
+fn show(study: &Study, linearised: &Linearised, fit: &Fit, effect: usize, points: &[PointState]) -> Option<Shown> {
     let mut without = fit.hypothesis.clone();
     without.effects.retain(|(index, _)| *index != effect);
     let there = study.predict(&without).ok()?;
@@ -116,15 +124,14 @@ fn show(
         }
         (whole, (squares / count.max(1) as f64).sqrt())
     };
-    let largest = |candidates: usize, of: &dyn Fn(usize) -> f64| {
-        (0..candidates).max_by(|a, b| of(*a).total_cmp(&of(*b)))
-    };
+    let largest = |candidates: usize, of: &dyn Fn(usize) -> f64| (0..candidates).max_by(|a, b| of(*a).total_cmp(&of(*b)));
     let output = largest(OUTPUTS.len(), &|o| energy(&|output, _, _| output == o).0)?;
     let in_phase = |phase: usize, since_s: f64| {
         let end_s = PHASES.get(phase + 1).map_or(f64::INFINITY, |(_, start_s)| *start_s);
         (PHASES[phase].1..end_s).contains(&since_s)
     };
-    let phase = largest(PHASES.len(), &|p| energy(&|o, _, since_s| o == output && in_phase(p, since_s)).0)?;
+    let phase =
+        largest(PHASES.len(), &|p| energy(&|o, _, since_s| o == output && in_phase(p, since_s)).0)?;
     let step = largest(study.steps.len(), &|s| energy(&|o, step, _| o == output && step == s).0)?;
     let region = points.get(step).map_or_else(String::new, region);
     Some(Shown {

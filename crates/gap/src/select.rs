@@ -93,8 +93,7 @@ fn singles(search: Search<'_>, null: &Fit) -> Vec<Fit> {
 /// Fits the best few more thoroughly.
 pub fn refit(search: Search<'_>, fits: &mut Vec<Fit>, count: usize, effort: Effort) {
     let best: Vec<Hypothesis> = fits.iter().take(count).map(|f| f.hypothesis.clone()).collect();
-    let again =
-        parallel::map(&best, |start| fit(search.study, search.linearised, start, search.selection, effort));
+    let again = parallel::map(&best, |start| fit(search.study, search.linearised, start, search.selection, effort));
     for fitted in again.into_iter().flatten() {
         keep_best(fits, fitted);
     }
@@ -143,7 +142,35 @@ fn pairs(search: Search<'_>, singles: &[Fit]) -> Vec<Fit> {
     }
     sort(&mut pairs);
     refit(search, &mut pairs, 2, Effort::default());
+    swap(search, &mut pairs);
     pairs
+}
+
+/// Above this share of the number of values, the best pair's cost says that it is not the right one.
+const INADEQUATE: f64 = 1.1;
+
+/// Where even the best pair leaves too much, what a third effect would do beside it may be what one of the two should
+/// have done: each member in turn gives way to the three that promise most.
+fn swap(search: Search<'_>, pairs: &mut Vec<Fit>) {
+    let Search { study, linearised, selection, .. } = search;
+    let values: usize = selection.rows(study).iter().map(ExactSizeIterator::len).sum();
+    let Some(best) = pairs.first().filter(|best| best.cost > INADEQUATE * values as f64) else { return };
+    let mut thirds = additions(study, linearised, selection, best);
+    thirds.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut starts: Vec<Hypothesis> = Vec::new();
+    for third in thirds.into_iter().take(3) {
+        for dropped in members(&best.hypothesis) {
+            let mut start = third.start.clone();
+            start.effects.retain(|(index, _)| *index != dropped);
+            starts.push(start);
+        }
+    }
+    let effort = Effort { iterations: 6, enough: 0.5 };
+    for fitted in parallel::map(&starts, |start| fit(study, linearised, start, selection, effort)).into_iter().flatten() {
+        keep_best(pairs, fitted);
+    }
+    sort(pairs);
+    refit(search, pairs, 2, Effort::default());
 }
 
 /// A pair worth a fit.
@@ -271,7 +298,8 @@ fn linear_start(
         return Some(start.clone());
     }
     let there = study.predict(start).ok()?;
-    let mut change: Vec<f64> = there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
+    let mut change: Vec<f64> =
+        there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
     linearised.whiten(study, &mut change);
     let projector = Projector::new(study, linearised, selection, &[])?;
     let residual = linearised.residual(study, &linearised.base);
@@ -319,13 +347,13 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
     }
     let mut best: Vec<Addition> = Vec::new();
     for (index, start) in starts {
-        // A tenth of the typical step keeps to the straight; effects that bend get their curvature in the fit.
+        // A whole typical step: some effects have no slope where they vanish.
         let parameters = &study.effects[index].info().parameters;
         let single = parameters.len() == 1;
         let mut near = start.clone();
         if let (true, Some((_, values))) = (single, near.effects.last_mut()) {
             let (neutral, step) = (parameters[0].neutral, values[0] - parameters[0].neutral);
-            values[0] = (neutral + 0.3 * step).clamp(parameters[0].low, parameters[0].high);
+            values[0] = (neutral + step).clamp(parameters[0].low, parameters[0].high);
         }
         let Ok(there) = study.predict(&near) else { continue };
         let mut change: Vec<f64> =
@@ -338,10 +366,9 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
         let mut addition = Addition { effect: index, gain: 0.0, start };
         if single {
             let parameter = &parameters[0];
-            let step = 0.3 * parameter.typical_step;
-            // The straight estimate, kept within the range.
-            let value =
-                (parameter.neutral + share.clamp(-12.0, 12.0) * step).clamp(parameter.low, parameter.high);
+            let step = parameter.typical_step;
+            // The straight estimate, kept within the range; not far beyond the step that was taken, for effects bend.
+            let value = (parameter.neutral + share.clamp(-3.0, 3.0) * step).clamp(parameter.low, parameter.high);
             share = (value - parameter.neutral) / step;
             let value = if value == parameter.neutral { parameter.neutral + 0.1 * step } else { value };
             if let Some((_, values)) = addition.start.effects.last_mut() {

@@ -1,15 +1,16 @@
 //! The file as written -> the campaign: units resolved, defaults filled in.
 
 use crate::campaign::{
-    BackendChoice, Campaign, DisplayUnits, Identification, Limits, Machine, MapSource, Order, OutputFormat,
-    Outputs, Repeats, Report, SensorDeclaration, SequenceSource, Stabilisation, Timing, WindowChoice,
+    BackendChoice, Campaign, DisplayUnits, Identification, Limits, Machine, MapSource, OnDrift, Order,
+    OutputFormat, Outputs, Repeats, Report, SensorDeclaration, SequenceSource, Stabilisation, Timing,
+    WindowChoice,
 };
 use crate::consistency::{beside, rounded};
 use crate::file::{
     BoundaryFile, CampaignFile, DisplayFile, FormatName, GeometryFile, GridFile, IdentificationFile,
-    LimitsFile, MachineFile, MapFile, MethodName, NamedReference, NamedRepeats, NusseltFile, OrderName,
-    OutputsFile, PointFile, ReferenceFile, RepeatsFile, ReportFile, SensorsFile, TapName, TimingFile,
-    WindowFile,
+    LimitsFile, MachineFile, MapFile, MethodName, NamedReference, NamedRepeats, NusseltFile, OnDriftName,
+    OrderName, OutputsFile, PointFile, ReferenceFile, RepeatsFile, ReportFile, SensorsFile, TapName,
+    TimingFile, WindowFile,
 };
 use crate::tree::{Step, steps};
 use crate::units::{Dimension, Fraction, Quantity};
@@ -69,6 +70,11 @@ pub(crate) fn build(
         sequence,
         required_sigma_eta: file.required_sigma_eta.map(|quantity| quantity.inside),
         repeats: repeats(file.repeats, &points),
+        on_drift: file.drift.map(|drift| match drift.on_drift {
+            OnDriftName::Hold => OnDrift::Hold,
+            OnDriftName::Continue => OnDrift::Continue,
+            OnDriftName::Zero => OnDrift::Zero,
+        }),
         points,
         seed: file.seed.unwrap_or(1),
         limits: limits(&file.limits),

@@ -10,8 +10,8 @@ mod machine;
 mod sensors;
 
 pub(crate) use choices::{
-    DisplayFile, FormatName, IdentificationFile, MethodName, NamedRepeats, OrderName, OutputsFile,
-    RepeatsFile, ReportFile, WindowFile,
+    DisplayFile, DriftFile, FormatName, IdentificationFile, MethodName, NamedRepeats, OnDriftName, OrderName,
+    OutputsFile, RepeatsFile, ReportFile, WindowFile,
 };
 pub(crate) use conditions::{BoundaryFile, LimitsFile, NamedReference, ReferenceFile, TimingFile};
 pub(crate) use grid::{GridFile, PointFile};
@@ -59,6 +59,8 @@ pub(crate) struct CampaignFile {
     /// A jump that is repeated, so that drift shows; `off`, the default, for none.
     #[schemars(example = &"off")]
     pub repeats: Option<RepeatsFile>,
+    /// Watches the repeats while the campaign runs: one that differs from its first visit by more than is declared is made again, and what differs again is drift.
+    pub drift: Option<DriftFile>,
     /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.
     #[schemars(example = 1)]
     pub seed: Option<u64>,

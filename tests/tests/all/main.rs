@@ -9,6 +9,7 @@ mod full_disk;
 mod help;
 mod interrupted;
 mod mistakes;
+mod nightly;
 mod pipes;
 mod recordings;
 mod sequences;

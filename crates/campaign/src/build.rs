@@ -1,7 +1,7 @@
 //! The file as written -> the campaign: units resolved, defaults filled in.
 
 use crate::campaign::{
-    BackendChoice, Campaign, DisplayUnits, Identification, Jump, Limits, Machine, MapSource, Order,
+    BackendChoice, Campaign, DisplayUnits, Identification, Jump, Limits, Machine, MapSource, OnDrift, Order,
     OutputFormat, Outputs, Repeats, Report, SensorDeclaration, SequenceSource, Stabilisation, Timing,
     WindowChoice,
 };
@@ -9,8 +9,9 @@ use crate::consistency::{beside, rounded};
 use crate::file::{
     BoundaryFile, CampaignFile, ChoiceName, ConvectionName, DisplayFile, EfficiencyName, FollowerName,
     FormatName, GeometryFile, GridFile, IdentificationFile, JointFile, LimitsFile, MachineFile, MapFile,
-    MethodName, NamedReference, NamedRepeats, NusseltFile, OrderName, OutputsFile, PointFile, ReferenceFile,
-    RepeatedJumpFile, RepeatsFile, ReportFile, SensorsFile, TapName, TimingFile, TolerancesFile, WindowFile,
+    MethodName, NamedReference, NamedRepeats, NusseltFile, OnDriftName, OrderName, OutputsFile, PointFile,
+    ReferenceFile, RepeatedJumpFile, RepeatsFile, ReportFile, SensorsFile, TapName, TimingFile, TolerancesFile,
+    WindowFile,
 };
 use crate::tree::{Step, steps};
 use crate::units::{Dimension, Fraction, Quantity};
@@ -76,6 +77,11 @@ pub(crate) fn build(
         sequence,
         required_sigma_eta: file.required_sigma_eta.map(|quantity| quantity.inside),
         repeats: repeats(file.repeats),
+        on_drift: file.drift.map(|drift| match drift.on_drift {
+            OnDriftName::Hold => OnDrift::Hold,
+            OnDriftName::Continue => OnDrift::Continue,
+            OnDriftName::Zero => OnDrift::Zero,
+        }),
         points,
         seed: file.seed.unwrap_or(1),
         limits: limits(&file.limits),

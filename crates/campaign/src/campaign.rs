@@ -45,6 +45,9 @@ pub struct Campaign {
     pub required_sigma_eta: Option<f64>,
     /// The jump that is repeated, if any.
     pub repeats: Option<Repeats>,
+    /// What is done when repeats differ by more than is declared; `None`: they are not watched.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub on_drift: Option<OnDrift>,
     /// Seed of the search and of simulated rigs.
     pub seed: u64,
     /// What the run must never leave.
@@ -215,6 +218,18 @@ pub struct Repeats {
     pub every_steps: usize,
     /// Fewest of them, >= 1.
     pub at_least: usize,
+}
+
+/// What is done when repeats differ during a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnDrift {
+    /// The run is held in its safe state.
+    Hold,
+    /// The run goes on with a note.
+    Continue,
+    /// The run is stopped without flow and asks for a zero of the sensors.
+    Zero,
 }
 
 /// What the run must never leave.

@@ -4,12 +4,12 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::predicted_method::Dynamic;
 use mapper_campaign::Campaign;
-use mapper_campaign::campaign::{Order, WindowChoice};
+use mapper_campaign::campaign::{self, Order, WindowChoice};
 use mapper_core::{Channel, Method, Plan};
 use mapper_identify::{IdentifyConfig, PressureTap, Stabilisation, WindowRule};
 use mapper_physics::model::Model;
 use mapper_planner::{PlanLimits, PlanRequest, PlanTiming, Repeats, SettleBands, VisitOrder, make_plan};
-use mapper_runner::{Guard, LimitGuard, SilenceGuard, SurgeGuard};
+use mapper_runner::{DriftWatch, Guard, LimitGuard, OnDrift, SilenceGuard, StepSource, SurgeGuard};
 
 /// Surge longer than this ends a run, s: a jump may touch the line, a point may not stay beyond it.
 const SURGE_ALLOWED_S: f64 = 5.0;
@@ -117,6 +117,17 @@ pub fn guards(campaign: &Campaign, delivered: &[Channel]) -> Vec<Box<dyn Guard>>
     guards.push(Box::new(SilenceGuard::new(watched, SILENCE_ALLOWED_S)));
     guards.push(Box::new(SurgeGuard::new(SURGE_ALLOWED_S)));
     guards
+}
+
+/// Watches the repeats of a run, where the campaign says what to do about drift.
+pub fn drift_watch<'a>(campaign: &Campaign, steps: &'a mut dyn StepSource) -> Option<DriftWatch<'a>> {
+    let on_drift = match campaign.on_drift? {
+        campaign::OnDrift::Hold => OnDrift::Hold,
+        campaign::OnDrift::Continue => OnDrift::Continue,
+        campaign::OnDrift::Zero => OnDrift::Zero,
+    };
+    let declared = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    Some(DriftWatch::new(steps, on_drift, declared))
 }
 
 /// How the recordings of this campaign are identified.

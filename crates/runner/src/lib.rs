@@ -4,11 +4,13 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod drift_watch;
 mod guard;
 mod observer;
 mod run;
 mod source;
 
+pub use drift_watch::{DriftWatch, OnDrift};
 pub use guard::{Guard, LimitGuard, SilenceGuard, SurgeGuard, Trip};
 pub use observer::{ObserverError, RunObserver};
 pub use run::{RunEnd, RunError, Runner};

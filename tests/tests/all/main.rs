@@ -10,6 +10,7 @@ mod help;
 mod interrupted;
 mod maps;
 mod mistakes;
+mod nightly;
 mod pipes;
 mod plans;
 mod recordings;

@@ -162,6 +162,23 @@ pub(crate) struct JumpFile {
     pub to: PointFile,
 }
 
+/// What is done about drift.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DriftFile {
+    /// `hold` ends the run in its safe state, `zero` too and asks for a zero of the sensors, `continue` goes on with a note.
+    #[schemars(example = &"hold")]
+    pub on_drift: OnDriftName,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum OnDriftName {
+    Hold,
+    Continue,
+    Zero,
+}
+
 /// What is written, and where.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -11,8 +11,9 @@ mod sensors;
 mod tolerances;
 
 pub(crate) use choices::{
-    ChoiceName, ConvectionName, DisplayFile, EfficiencyName, FormatName, IdentificationFile, JointFile,
-    MethodName, NamedRepeats, OrderName, OutputsFile, RepeatedJumpFile, RepeatsFile, ReportFile, WindowFile,
+    ChoiceName, ConvectionName, DisplayFile, DriftFile, EfficiencyName, FormatName, IdentificationFile, JointFile,
+    MethodName, NamedRepeats, OnDriftName, OrderName, OutputsFile, RepeatedJumpFile, RepeatsFile, ReportFile,
+    WindowFile,
 };
 pub(crate) use conditions::{
     BoundaryFile, FollowerName, LimitsFile, NamedReference, ReferenceFile, TimingFile,
@@ -65,6 +66,8 @@ pub(crate) struct CampaignFile {
     /// A jump that is repeated, so that drift shows: at least twice, and every 12 steps where nothing else is said; `off` for none. A sequence script makes its own repeats.
     #[schemars(example = &"off")]
     pub repeats: Option<RepeatsFile>,
+    /// Watches the repeats while the campaign runs: one that differs from its first visit by more than is declared is made again, and what differs again is drift.
+    pub drift: Option<DriftFile>,
     /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.
     #[schemars(example = 1)]
     pub seed: Option<u64>,

@@ -71,7 +71,14 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(scripted) => scripted,
         None => &mut planned,
     };
-    let (end, recorder) = drive(&campaign, &plan, steps, backend.as_mut(), Recorder::new(writer))?;
+    let recorder = Recorder::new(writer);
+    let (end, recorder) = if campaign.on_drift.is_some()
+        && let Some(mut watch) = assembly_line::drift_watch(&campaign, steps)
+    {
+        drive(&campaign, &plan, &mut watch, backend.as_mut(), recorder)?
+    } else {
+        drive(&campaign, &plan, steps, backend.as_mut(), recorder)?
+    };
     let finished = recorder.finish();
     if matches!(end, Ok(RunEnd::Completed)) {
         finished.map_err(|error| Failure::new(Code::Failure, error))?;

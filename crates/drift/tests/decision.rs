@@ -1,0 +1,133 @@
+//! The decision on simulated campaigns: no drift, drifts at three times the printed limit, and what cannot be judged.
+//! Error rates over many campaigns are the business of `examples/drift_study`, with their figures in docs/drift.md.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::{Planted, campaign, judge, judge_all};
+use mapper_core::Channel;
+use mapper_drift::{Cause, Course, CourseKind, DriftReport, DriftVerdict, RateOrStep, RecordedRun};
+
+fn limit(report: &DriftReport, cause: Cause) -> f64 {
+    report.detection_limits.iter().find(|limit| limit.cause == cause).unwrap().change
+}
+
+fn sums_to_one(report: &DriftReport) {
+    let sum: f64 =
+        report.probability + report.alternatives.iter().map(|other| other.probability).sum::<f64>();
+    assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+}
+
+#[test]
+fn a_drift_free_campaign_is_not_flagged_and_prints_its_limits() {
+    let report = judge(&campaign(11, None).recording);
+    assert_eq!((report.verdict, report.cause), (DriftVerdict::None, None), "{}", report.reason);
+    sums_to_one(&report);
+    // What a campaign of 53 minutes with four visits has to see.
+    assert!(limit(&report, Cause::Sensor(Channel::T2)) <= 0.1);
+    assert!(limit(&report, Cause::Sensor(Channel::P2)) <= 60.0);
+    assert!(limit(&report, Cause::Sensor(Channel::CompressorFlow)) <= 0.003);
+    assert!(limit(&report, Cause::Sensor(Channel::TurbineFlow)) <= 0.003);
+    assert_eq!(report.groups[0].visits.len(), 4);
+}
+
+#[test]
+fn a_sensor_that_drifts_is_named_and_its_points_are_put_right() {
+    // Three times the limit of 0.08 K over the campaign, from 600 s on.
+    let course = Course { kind: CourseKind::Ramp, onset_s: 600.0 };
+    let planted = Planted { cause: Cause::Sensor(Channel::T2), course, size: 0.34 };
+    let campaign = campaign(12, Some(planted));
+    let report = judge(&campaign.recording);
+    assert_eq!(report.cause, Some(planted.cause), "{}", report.reason);
+    assert_eq!(report.verdict, DriftVerdict::Sensor);
+    sums_to_one(&report);
+    let Some(RateOrStep::RatePerH(rate)) = report.size else { panic!("{:?}", report.size) };
+    assert!(report.low.unwrap() <= 0.34 && 0.34 <= report.high.unwrap(), "{rate}");
+    // Two repeats: twice 16 minutes.
+    assert!((report.onset_s.unwrap() - 600.0).abs() < 1920.0);
+    assert!(report.reason.contains("taken off the reading of T2"), "never in silence: {}", report.reason);
+
+    // Against the truth, constant bias removed: at most a third of what is left without.
+    let (mut corrected, mut uncorrected) = (Vec::new(), Vec::new());
+    for (eta, point) in campaign.eta_true.iter().zip(&report.corrected_points) {
+        if let Some(before) = point.eta_uncorrected {
+            corrected.push(point.eta - eta);
+            uncorrected.push(before - eta);
+        }
+    }
+    let rms = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
+    };
+    assert!(rms(&corrected) * 3.0 <= rms(&uncorrected), "{} of {}", rms(&corrected), rms(&uncorrected));
+}
+
+#[test]
+fn a_machine_that_fouls_is_told_from_its_sensors() {
+    let course = Course { kind: CourseKind::Ramp, onset_s: 0.0 };
+    let planted = Planted { cause: Cause::Fouling, course, size: -0.01 };
+    let report = judge(&campaign(13, Some(planted)).recording);
+    assert_eq!(
+        (report.verdict, report.cause),
+        (DriftVerdict::Machine, Some(Cause::Fouling)),
+        "{}",
+        report.reason
+    );
+    assert!(report.low.unwrap() <= -0.01 && -0.01 <= report.high.unwrap());
+}
+
+#[test]
+fn a_step_over_two_nights_is_dated_within_two_repeats() {
+    // The second night follows the first on the campaign's axis of time; the gain of the flow meter steps at its begin.
+    let course = Course { kind: CourseKind::Step, onset_s: 0.0 };
+    let planted = Planted { cause: Cause::Sensor(Channel::CompressorFlow), course, size: 0.01 };
+    let (first, second) = (campaign(14, None), campaign(14, Some(planted)));
+    let runs =
+        [&first, &second].map(|night| RecordedRun { recording: &night.recording, fingerprint: Some("a") });
+    let report = judge_all(&runs);
+    assert_eq!(report.cause, Some(planted.cause), "{}", report.reason);
+    assert!((report.onset_s.unwrap() - 3150.0).abs() < 1920.0, "{:?}", report.onset_s);
+    assert_eq!(report.groups[0].visits.len(), 8);
+
+    // The same two, but the second by another machine.
+    let runs = [
+        RecordedRun { fingerprint: Some("a"), ..runs[0] },
+        RecordedRun { fingerprint: Some("b"), ..runs[1] },
+    ];
+    refused(&judge_all(&runs), "another campaign or machine");
+}
+
+fn refused(report: &DriftReport, word: &str) {
+    assert_eq!((report.verdict, report.cause), (DriftVerdict::Unclear, None), "{}", report.reason);
+    assert!(report.reason.starts_with("No verdict") && report.reason.contains(word), "{}", report.reason);
+}
+
+#[test]
+fn what_cannot_be_judged_gets_a_clear_word() {
+    let whole = campaign(15, None).recording;
+    // Between the first two reference jumps: nothing is made twice.
+    let mut none = whole.clone();
+    none.steps.retain(|step| (2..8).contains(&step.index));
+    refused(&judge(&none), "no repeats");
+
+    let mut one = whole.clone();
+    one.steps.retain(|step| step.index < 10);
+    refused(&judge(&one), "one repeat");
+
+    // The reference point is visited again, but from other points each time.
+    let mut other_jumps = whole.clone();
+    other_jumps.steps.retain(|step| (9..16).contains(&step.index));
+    refused(&judge(&other_jumps), "different jumps");
+
+    let mut gap = whole.clone();
+    for series in gap.series.values_mut().filter(|series| series.t_s.len() > 100) {
+        let kept = |t_s: &f64| !(1000.0..1040.0).contains(t_s);
+        series.values =
+            series.values.iter().zip(&series.t_s).filter(|(_, t)| kept(t)).map(|(v, _)| *v).collect();
+        series.t_s.retain(kept);
+    }
+    refused(&judge(&gap), "gap");
+
+    let empty = mapper_core::Recording::default();
+    refused(&judge(&empty), "no repeats");
+}

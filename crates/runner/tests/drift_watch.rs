@@ -1,0 +1,136 @@
+//! The watch over repeats: what differs is made again, and only what differs again is acted upon.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_core::{
+    Channel, ChannelColumn, DeclaredUncertainty, OperatingPoint, PlanStep, Predicted, SampleBatch, StepKind,
+    StepMarker,
+};
+use mapper_runner::{DriftWatch, OnDrift, StepSource, StepSourceError};
+use std::collections::BTreeMap;
+
+/// Three times slow to fast, with a point between.
+struct Steps(usize);
+
+const SPEEDS: [f64; 8] = [70e3, 130e3, 90e3, 70e3, 130e3, 90e3, 70e3, 130e3];
+
+fn step(index: usize) -> PlanStep {
+    let to = |index: usize| OperatingPoint { speed_rpm: SPEEDS[index], valve_opening_ratio: 0.7 };
+    PlanStep {
+        index,
+        kind: StepKind::Point,
+        from: index.checked_sub(1).map(to),
+        to: to(index),
+        p3_pa: 2e5,
+        t3_k: 773.15,
+        oil_temperature_k: 323.15,
+        dwell_s: 100.0,
+        start_s: 100.0 * index as f64,
+        predicted: Predicted {
+            dt2_k: None,
+            dtc_k: None,
+            sigma_eta: None,
+            sigma_h_rel: None,
+            bias_eta: None,
+            bias_h_rel: None,
+            flow_kg_s: 0.05,
+            pressure_ratio: 1.5,
+            t2_k: 350.0,
+            settle_s: None,
+            minutes: 2.0,
+        },
+    }
+}
+
+impl StepSource for Steps {
+    fn warm_up_s(&self) -> f64 {
+        0.0
+    }
+    fn cool_down_s(&self) -> f64 {
+        0.0
+    }
+    fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
+        let next = (self.0 < SPEEDS.len()).then(|| step(self.0));
+        self.0 += 1;
+        Ok(next)
+    }
+}
+
+/// Runs all steps with T2 = 350 K + `drift(t)`; speeds as run, and notes.
+fn run(on_drift: OnDrift, drift: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<String>) {
+    let declared = BTreeMap::from([(
+        Channel::T2,
+        DeclaredUncertainty { noise_sigma: 0.1, offset_sigma: 0.25, gain_sigma_ratio: 0.0 },
+    )]);
+    let mut inner = Steps(0);
+    let mut watch = DriftWatch::new(&mut inner, on_drift, declared);
+    let (mut speeds, mut notes, mut t_s) = (Vec::new(), Vec::new(), 0.0);
+    while let Some(step) = watch.next_step().unwrap() {
+        assert_eq!(step.index, speeds.len(), "indices count up");
+        assert_eq!(step.start_s, t_s, "later steps know of inserted ones");
+        assert_eq!(step.from.map(|from| from.speed_rpm), speeds.last().copied());
+        let times: Vec<f64> = (1..=100).map(|second| t_s + f64::from(second)).collect();
+        let column = |channel, values| ChannelColumn { channel, values };
+        watch.on_batch(&SampleBatch {
+            t_s: times.clone(),
+            columns: vec![
+                // An inlet that warms by itself is no drift.
+                column(Channel::T1, times.iter().map(|t_s| 298.0 + 0.01 * t_s).collect()),
+                column(Channel::T2, times.iter().map(|t_s| 350.0 + 0.01 * t_s + drift(*t_s)).collect()),
+            ],
+            ..SampleBatch::default()
+        });
+        watch
+            .after_step(&StepMarker {
+                index: step.index,
+                kind: step.kind,
+                start_s: t_s,
+                end_s: t_s + step.dwell_s,
+                from: step.from,
+                to: Some(step.to),
+                p3_pa: step.p3_pa,
+                valve_opening_ratio: 0.7,
+            })
+            .unwrap();
+        notes.extend(watch.take_notes());
+        speeds.push(step.to.speed_rpm);
+        t_s += step.dwell_s;
+    }
+    (speeds, notes)
+}
+
+#[test]
+fn without_drift_nothing_is_put_in() {
+    let (speeds, notes) = run(OnDrift::Hold, |_| 0.0);
+    assert_eq!(speeds, SPEEDS);
+    assert!(notes.is_empty(), "{notes:?}");
+}
+
+#[test]
+fn drift_is_confirmed_and_then_the_run_is_held() {
+    // 1 K from 350 s on: seen at the second visit, beyond 1.96 times the declared 0.25 K.
+    let (speeds, notes) = run(OnDrift::Hold, |t_s| if t_s > 350.0 { 1.0 } else { 0.0 });
+    assert_eq!(speeds, [70e3, 130e3, 90e3, 70e3, 130e3, 70e3, 130e3], "the jump again, and no further");
+    assert!(notes[0].contains("T2 by +1.0000 K") && notes[0].contains("made again"), "{notes:?}");
+    assert!(notes[1].contains("differs again") && notes[1].contains("held"), "{notes:?}");
+}
+
+#[test]
+fn a_run_that_goes_on_tells_of_drift_once() {
+    let (speeds, notes) = run(OnDrift::Continue, |t_s| if t_s > 350.0 { 1.0 } else { 0.0 });
+    assert_eq!(speeds.len(), SPEEDS.len() + 2);
+    assert_eq!(speeds[7..], [90e3, 70e3, 130e3], "then the plan goes on where it was");
+    assert_eq!(notes.len(), 2, "{notes:?}");
+}
+
+#[test]
+fn what_is_not_seen_again_stops_nothing() {
+    let (speeds, notes) = run(OnDrift::Zero, |t_s| if (401.0..=500.0).contains(&t_s) { 1.0 } else { 0.0 });
+    assert_eq!(speeds.len(), SPEEDS.len() + 2);
+    assert!(notes.last().unwrap().contains("not seen again"), "{notes:?}");
+}
+
+#[test]
+fn a_zero_is_asked_for_where_the_campaign_says_so() {
+    let (_, notes) = run(OnDrift::Zero, |t_s| 0.005 * t_s);
+    assert!(notes.last().unwrap().contains("zero the sensors"), "{notes:?}");
+}

@@ -1,0 +1,138 @@
+//! The nightly run from outside: quiet where nothing changed, an exit code of its own where something did.
+
+use mapper_tests::{Finished, mapper, mapper_command, repository, scratch};
+use std::path::Path;
+
+/// A campaign of six points by two methods: some tenths of a second.
+fn write_nightly(folder: &Path, nusselt: &str) {
+    let shipped = std::fs::read_to_string(repository().join("campaigns/nightly/turbo_a.yaml")).unwrap();
+    let changed = [
+        (
+            "speeds: [50 krpm, 70 krpm, 90 krpm, 110 krpm, 130 krpm, 150 krpm]",
+            "speeds: [70 krpm, 100 krpm, 130 krpm]",
+        ),
+        ("openings: [0.5, 0.7, 1.0, 1.4, 2.0]", "openings: [0.7, 1.0]"),
+        ("nusselt: {coefficient: 0.004,", nusselt),
+    ];
+    let campaign = changed.iter().fold(shipped, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    });
+    std::fs::write(folder.join("small.yaml"), campaign).unwrap();
+    let nightly =
+        "nightly: small\nruns:\n  - {campaign: small.yaml, methods: [dynamic, steady], seeds: [1, 2]}\n";
+    std::fs::write(folder.join("nightly.yaml"), nightly).unwrap();
+}
+
+const AS_SHIPPED: &str = "nusselt: {coefficient: 0.004,";
+
+fn arguments(folder: &Path) -> [String; 4] {
+    let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+    ["nightly".to_owned(), path("nightly.yaml"), "--db".to_owned(), path("history.db")]
+}
+
+fn night(folder: &Path, more: &[&str]) -> Finished {
+    let arguments = arguments(folder);
+    mapper(arguments.iter().map(String::as_str).chain(more.iter().copied()))
+}
+
+#[test]
+fn nights_are_quiet_until_the_model_changes_and_then_say_what_moved() {
+    let scratch = scratch();
+    let folder = scratch.path();
+    write_nightly(folder, AS_SHIPPED);
+    let first = night(folder, &[]).exits(0);
+    assert!(first.stdout.contains("The first night"), "{}", first.stdout);
+    assert_eq!(first.stderr, "", "a night into a pipe is quiet");
+    let second = night(folder, &["--json"]).exits(0).json();
+    assert_eq!(second["quiet"], true);
+    // Same seeds, same figures: nothing but noise of another compiler could move them.
+    assert_eq!(second["night"]["runs"].as_array().unwrap().len(), 4);
+
+    // 3 % more heat transfer in the model moves truth and results.
+    write_nightly(folder, "nusselt: {coefficient: 0.00412,");
+    let moved = night(folder, &[]).exits(7);
+    for word in
+        ["the true heat-transfer coefficient moved by +", "its model changed", "nominal model's parameters"]
+    {
+        assert!(moved.stdout.contains(word), "{word} in\n{}", moved.stdout);
+    }
+    assert!(moved.stderr.contains("--accept"), "{}", moved.stderr);
+    night(folder, &[]).exits(7);
+    night(folder, &["--accept"]).exits(0);
+    night(folder, &[]).exits(0);
+
+    let history = |more: &[&str]| {
+        let db = folder.join("history.db");
+        mapper(["history", "--db", db.to_str().unwrap()].iter().chain(more)).exits(0)
+    };
+    let runs = |more: &[&str]| history(more).json()["runs"].as_array().unwrap().len();
+    assert_eq!(runs(&["--json"]), 24);
+    assert_eq!(runs(&["--json", "--method", "steady"]), 12);
+    assert_eq!(runs(&["--json", "--machine", "nightly_a"]), 24);
+    assert_eq!(runs(&["--json", "--since", "2999-01-01"]), 0);
+    let svg = folder.join("trend.svg");
+    let listed = history(&["--figure", "eta_mean", "--svg", svg.to_str().unwrap()]);
+    assert!(listed.stdout.contains("eta_mean %") && listed.stdout.contains("accepted"), "{}", listed.stdout);
+    assert!(std::fs::read_to_string(svg).unwrap().starts_with("<svg"));
+}
+
+#[test]
+fn two_nights_at_once_are_both_kept() {
+    let scratch = scratch();
+    write_nightly(scratch.path(), AS_SHIPPED);
+    let start =
+        || mapper_command(arguments(scratch.path())).stdout(std::process::Stdio::null()).spawn().unwrap();
+    let both = [start(), start()];
+    for mut night in both {
+        assert!(night.wait().unwrap().success());
+    }
+    let db = scratch.path().join("history.db");
+    let listed = mapper(["history", "--json", "--db", db.to_str().unwrap()]).exits(0).json();
+    assert_eq!(listed["runs"].as_array().unwrap().len(), 8);
+}
+
+#[test]
+fn mistakes_are_told_before_anything_runs() {
+    let scratch = scratch();
+    let folder = scratch.path();
+    for (text, word) in [
+        ("nightly: a\nruns: [{campaign: none.yaml}]\n", "none.yaml"),
+        ("nightly: a\nruns: []\n", "0 runs"),
+        ("nightly: a\nruns: [{campaign: small.yaml, seeds: [1, 1]}]\n", "twice"),
+        ("nightly: a\nruns: [{campaign: small.yaml, methods: [magic]}]\n", "magic"),
+        ("nightly: a\nnight: b\nruns: [{campaign: small.yaml}]\n", "night"),
+        ("nightly: a\nband: {nights: 0}\nruns: [{campaign: small.yaml}]\n", "nights"),
+    ] {
+        write_nightly(folder, AS_SHIPPED);
+        std::fs::write(folder.join("nightly.yaml"), text).unwrap();
+        let finished = night(folder, &[]);
+        assert!(matches!(finished.code, Some(1 | 3)), "{:?}: {}", finished.code, finished.stderr);
+        assert!(finished.stderr.contains(word), "{word}: {}", finished.stderr);
+        assert!(!folder.join("history.db").exists(), "{text}");
+    }
+    let missing = mapper(["history", "--db", folder.join("no.db").to_str().unwrap()]).exits(1);
+    assert!(missing.stderr.contains("mapper nightly"), "{}", missing.stderr);
+}
+
+#[test]
+fn the_shipped_nightly_and_its_installation_name_files_that_are_there() {
+    let nightly = repository().join("campaigns/nightly.yaml");
+    let text = std::fs::read_to_string(&nightly).unwrap();
+    for campaign in text.lines().filter_map(|line| line.trim().strip_prefix("- campaign: ")) {
+        mapper(["check", nightly.with_file_name(campaign).to_str().unwrap()]).exits(0);
+    }
+    let folder = repository().join("examples/nightly");
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    for name in ["nightly.yml", "mapper-nightly.service", "mapper-nightly.timer"] {
+        assert!(read("nightly.yml").contains("examples/nightly/") && !read(name).is_empty());
+    }
+    let service = read("mapper-nightly.service");
+    for named in ["examples/nightly/mapper-nightly.timer", "examples/nightly/mapper-nightly.service"] {
+        assert!(service.contains(named) && repository().join(named).is_file(), "{named}");
+    }
+    // What workflow and service start exists.
+    for text in [service, read("nightly.yml")] {
+        assert!(text.contains("mapper nightly campaigns/nightly.yaml"), "{text}");
+    }
+}

@@ -27,8 +27,14 @@ fn main() {
         if noise + offset > 0.0 {
             config.declared = declared;
         }
-        if std::env::var("DECLARE").is_ok() { config.declared = measured(&clean.recording, 1.0, 1.0, &mut rng).1; }
-        if std::env::var("SIMPLE").is_ok() { config.joint.probe = mapper_identify::Choice::Fixed; config.joint.direction = mapper_identify::Choice::Fixed; config.joint.alpha_area = mapper_identify::Choice::Fixed; }
+        if std::env::var("DECLARE").is_ok() {
+            config.declared = measured(&clean.recording, 1.0, 1.0, &mut rng).1;
+        }
+        if std::env::var("SIMPLE").is_ok() {
+            config.joint.probe = mapper_identify::Choice::Fixed;
+            config.joint.direction = mapper_identify::Choice::Fixed;
+            config.joint.alpha_area = mapper_identify::Choice::Fixed;
+        }
         let found = identify_recording(&recording, &config).unwrap();
         let dynamic =
             identify_recording(&recording, &IdentifyConfig { method: Method::Dynamic, ..config.clone() })

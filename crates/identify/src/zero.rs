@@ -70,7 +70,9 @@ pub enum NoZero {
         needed_s: f64,
     },
     /// A temperature still moves.
-    #[error("{channel} still drifts by {drift_k_min:+.2} K/min in the soak (limit {limit_k_min:.2}): soak longer")]
+    #[error(
+        "{channel} still drifts by {drift_k_min:+.2} K/min in the soak (limit {limit_k_min:.2}): soak longer"
+    )]
     Drifts {
         /// The channel.
         channel: Channel,
@@ -163,7 +165,8 @@ pub fn zeroed(
         if let Some(series) = recording.series.get_mut(channel) {
             series.values.iter_mut().for_each(|value| *value -= offset);
         }
-        if let (Some(declared), Some(left)) = (config.declared.get_mut(channel), zero.left_sigma.get(channel)) {
+        if let (Some(declared), Some(left)) = (config.declared.get_mut(channel), zero.left_sigma.get(channel))
+        {
             *declared = DeclaredUncertainty { offset_sigma: *left, ..*declared };
         }
     }

@@ -9,8 +9,8 @@ pub(crate) mod cleaning;
 pub(crate) mod explained;
 pub(crate) mod judge;
 pub(crate) mod model;
-pub(crate) mod parsimony;
 pub(crate) mod parameters;
+pub(crate) mod parsimony;
 pub(crate) mod probe;
 pub(crate) mod rows;
 pub(crate) mod shared;
@@ -128,12 +128,10 @@ fn fitted(
     steps: &[rows::StepRows],
     config: &IdentifyConfig,
 ) -> Option<Covariance> {
-    for round in 0..ROUNDS {
+    for _ in 0..ROUNDS {
         problem.minimise()?;
         start::refine(problem, steps, config);
-        if round > 0 {
-            judge::exclude(problem);
-        }
+        judge::exclude(problem);
         // A probe that came to rest on its bound may leave it under better weights.
         problem.active[PROBE_MM2] = problem.probe_fitted;
     }

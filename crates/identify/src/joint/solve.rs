@@ -3,7 +3,9 @@
 
 use crate::joint::explained::Explained;
 use crate::joint::model::{Course, Setting};
-use crate::joint::parameters::{ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, SHARED, SURFACE, SharedVector};
+use crate::joint::parameters::{
+    ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, SHARED, SURFACE, SharedVector,
+};
 use crate::joint::whitening::Whitening;
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 
@@ -97,8 +99,9 @@ impl Covariance {
 impl Problem<'_> {
     /// All shared parameters that are not known, offsets last.
     fn unknown(&self) -> Vec<usize> {
-        let (carried, mut sought): (Vec<usize>, Vec<usize>) =
-            (0..SHARED).filter(|index| self.active[*index]).partition(|index| (OFFSETS..SURFACE).contains(index));
+        let (carried, mut sought): (Vec<usize>, Vec<usize>) = (0..SHARED)
+            .filter(|index| self.active[*index])
+            .partition(|index| (OFFSETS..SURFACE).contains(index));
         sought.extend(carried);
         sought
     }
@@ -191,8 +194,7 @@ impl Problem<'_> {
                     block.right[i] += prior.weight() * (prior.mean - member.local[i]);
                 }
             }
-            let off =
-                member.off_surface(&self.shared, &member.local);
+            let off = member.off_surface(&self.shared, &member.local);
             block.own[(ETA, ETA)] += surface_weight;
             block.right[ETA] -= surface_weight * off;
             if member.shares {

@@ -110,7 +110,7 @@ pub fn isothermal_zero(
 ) -> Result<IsothermalZero, NoZero> {
     let (start_s, end_s) = at_rest(recording);
     let no_soak = NoZero::NoSoak { found_s: (end_s - start_s).max(0.0), needed_s: settings.shortest_s };
-    if !(end_s - start_s >= settings.shortest_s) {
+    if (end_s - start_s).is_nan() || end_s - start_s < settings.shortest_s {
         return Err(no_soak);
     }
     let start_s = start_s.max(end_s - settings.longest_s);

@@ -104,7 +104,7 @@ pub(crate) fn estimate(
             dt2_k: change(|row| row.t2_k),
             dtc_k: change(|row| row.tc_k),
         };
-        judge::judge_step(&problem, i, step, eta.combined_standard_error(), config, own);
+        judge::judge_step(&problem, i, eta.combined_standard_error(), config, own);
         if !jump::begins_with_jump(&recording.steps, step.position) {
             let message =
                 "no jump leads to this step: its efficiency rests on what the points share".to_owned();

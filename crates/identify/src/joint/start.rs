@@ -54,7 +54,7 @@ pub(crate) fn steps(
         let after_s = if config.declared.is_empty() { START_S } else { START_WITH_NOISE_S };
         let start_s = jump::commands_settled_s(recording, step).max(step.start_s) + after_s;
         let window = Window { start_s, end_s: step.end_s };
-        if !(start_s < step.end_s) {
+        if start_s.is_nan() || start_s >= step.end_s {
             let message =
                 format!("the commands changed until {:.1} s before the step's end", step.end_s - start_s);
             own.refuse(code::TOO_FEW_SAMPLES, message);
@@ -220,9 +220,9 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
         .iter()
         .map(|channel| config.declared.get(channel).map_or(0.0, |declared| declared.noise_sigma))
         .collect();
-    for i in 0..problem.members.len() {
+    for (i, step) in steps.iter().enumerate().take(problem.members.len()) {
         let member = &problem.members[i];
-        let slopes = problem.setting.sensitivities(&steps[i].end, &problem.shared, &member.local);
+        let slopes = problem.setting.sensitivities(&step.end, &problem.shared, &member.local);
         let expected: f64 = slopes.iter().zip(&declared).map(|(slope, sigma)| (slope * sigma).powi(2)).sum();
         // Without a declaration the residual itself says what noise there is; 0.3 mK is what block means cost.
         let sigma_k = if expected > 0.0 {
@@ -239,7 +239,7 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
                 member.measured_k.iter().zip(&prediction.t2_k).skip(1).map(|(a, b)| (a - b).powi(2)).sum();
             (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(3e-4)
         };
-        let by_eta = problem.setting.by_efficiency(&steps[i].end, &problem.shared, &member.local);
+        let by_eta = problem.setting.by_efficiency(&step.end, &problem.shared, &member.local);
         let coupled: Vec<f64> =
             slopes.iter().take(OFFSET_CHANNELS.len()).map(|slope| -slope / by_eta).collect();
         if problem.setting.shaped && coupled.iter().all(|x| x.is_finite()) {
@@ -249,7 +249,7 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
         let terms = &problem.members[i].course.terms;
         let surface = crate::joint::model::surface_of(&problem.shared);
         let shape_k = |row: usize| terms.get(row).map_or(0.0, |terms| by_eta * dot(terms, surface));
-        let new = whitening(&steps[i], config, sigma_k, white_sigma_k, shape_k);
+        let new = whitening(step, config, sigma_k, white_sigma_k, shape_k);
         problem.members[i].whitening = new;
     }
     problem.explained = explained::explained(problem, steps, config);

@@ -1,4 +1,6 @@
-//! Study.
+//! Error and coverage of the joint method over seeded campaigns of the lumped model:
+//! `cargo run --release -p mapper-identify --example joint_study -- ALPHA PROBE_MM DIRECTION NOISE OFFSETS SEEDS`
+//! (noise and offsets in multiples of a good rig's).
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -7,89 +9,71 @@ mod lab;
 
 use lab::{Machine, campaign, eighteen, measured};
 use mapper_core::Method;
-use mapper_identify::{IdentifyConfig, WindowRule, identify_recording};
+use mapper_identify::{IdentifyConfig, WindowRule, identify, identify_recording};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 fn main() {
-    let arg = |i: usize, d: f64| std::env::args().nth(i).and_then(|a| a.parse().ok()).unwrap_or(d);
-    let machine = Machine { alpha: arg(1, 0.0), probe_m: arg(2, 0.0) * 1e-3, direction: arg(3, 1.0) };
-    let (noise, offset, seeds) = (arg(4, 0.0), arg(5, 0.0), arg(6, 1.0) as u64);
+    let argument = |i: usize, otherwise: f64| {
+        std::env::args().nth(i).and_then(|text| text.parse().ok()).unwrap_or(otherwise)
+    };
+    let machine =
+        Machine { alpha: argument(1, 0.0), probe_m: 1e-3 * argument(2, 0.0), direction: argument(3, 1.0) };
+    let (noise, offsets, seeds) = (argument(4, 1.0), argument(5, 1.0), argument(6, 20.0) as u64);
     let clean = campaign(&eighteen(), 120.0, machine);
+    let (mut held, mut count, mut joint_sum, mut dynamic_sum) = (0.0, 0.0, 0.0, 0.0);
     for seed in 0..seeds {
-        let mut rng = Pcg64::seed_from_u64(seed);
-        let (recording, declared) = measured(&clean.recording, noise, offset, &mut rng);
-        let mut config = IdentifyConfig {
-            method: Method::Joint,
-            window: WindowRule::Fixed { start_s: arg(7, 10.0), end_s: arg(8, 110.0) },
-            ..IdentifyConfig::default()
-        };
-        if noise + offset > 0.0 {
+        let (recording, declared) =
+            measured(&clean.recording, noise, offsets, &mut Pcg64::seed_from_u64(seed));
+        let window = WindowRule::Fixed { start_s: 10.0, end_s: 110.0 };
+        let mut config = IdentifyConfig { method: Method::Joint, window, ..IdentifyConfig::default() };
+        if noise + offsets > 0.0 {
             config.declared = declared;
-        }
-        if std::env::var("DECLARE").is_ok() {
-            config.declared = measured(&clean.recording, 1.0, 1.0, &mut rng).1;
-        }
-        if std::env::var("SIMPLE").is_ok() {
-            config.joint.probe = mapper_identify::Choice::Fixed;
-            config.joint.direction = mapper_identify::Choice::Fixed;
-            config.joint.alpha_area = mapper_identify::Choice::Fixed;
         }
         let found = identify_recording(&recording, &config).unwrap();
         let dynamic =
-            identify_recording(&recording, &IdentifyConfig { method: Method::Dynamic, ..config.clone() })
-                .unwrap();
-        let (mut rms, mut rmsd, mut held, mut n) = (0.0, 0.0, 0.0, 0.0);
-        for ((p, d), t) in found.points.iter().zip(&dynamic.points).zip(&clean.truth) {
-            let (p, d) = (p.as_ref().unwrap(), d.as_ref().unwrap());
-            if let Some(eta) = p.eta {
-                let u = p.eta_uncertainty.unwrap_or_default();
-                if seeds < 4 {
-                    println!(
-                        "{:3} v{} {:6.0} rpm eta {:.5} err {:+.3} pts (noise {:.3} bias {:.3}) dyn {:+.3}  h {:+.2} % (se {:.2} %)",
-                        p.step,
-                        p.valve_opening_ratio,
-                        p.speed_rpm,
-                        eta,
-                        100.0 * (eta - t.eta),
-                        100.0 * u.noise_standard_error,
-                        100.0 * u.bias_standard_error,
-                        100.0 * (d.eta.unwrap_or(f64::NAN) - t.eta),
-                        100.0 * (p.h_w_m2k.unwrap() / t.h_w_m2k - 1.0),
-                        100.0 * p.h_uncertainty.unwrap_or_default().combined_standard_error() / t.h_w_m2k
-                    );
-                }
-                if let Some(de) = d.eta {
-                    rms += (eta - t.eta).powi(2);
-                    rmsd += (de - t.eta).powi(2);
-                    n += 1.0;
-                    held += f64::from(u8::from(((eta - t.eta) / u.combined_standard_error()).abs() < 1.96));
-                }
-            }
+            identify(&recording, &IdentifyConfig { method: Method::Dynamic, ..config.clone() }).unwrap();
+        let (mut own_held, mut own_count, mut joint_square, mut dynamic_square) = (0.0, 0.0, 0.0, 0.0);
+        for ((point, dynamic), truth) in found.points.iter().zip(&dynamic).zip(&clean.truth) {
+            let point = point.as_ref().unwrap();
+            let (Some(eta), Some(other)) = (point.eta, dynamic.eta) else { continue };
+            let interval = point.eta_low.unwrap()..=point.eta_high.unwrap();
+            own_held += f64::from(u8::from(interval.contains(&truth.eta)));
+            own_count += 1.0;
+            joint_square += (eta - truth.eta).powi(2);
+            dynamic_square += (other - truth.eta).powi(2);
         }
-        println!(
-            "seed {seed}: rms joint {:.3} dyn {:.3} points, held {:.2}",
-            100.0 * f64::sqrt(rms / n),
-            100.0 * f64::sqrt(rmsd / n),
-            held / n
+        let points = |square: f64| 100.0 * f64::sqrt(square / own_count);
+        print!(
+            "seed {seed}: joint {:.3}, dynamic {:.3} points rms, held {:.2}",
+            points(joint_square),
+            points(dynamic_square),
+            own_held / own_count
         );
-        if let Some(t) = &found.thermal {
-            let show = |v: &mapper_core::SharedValue| {
-                format!("{:?}±{:.5}", v.value, v.uncertainty.combined_standard_error())
+        if let Some(thermal) = &found.thermal {
+            let shown = |value: &mapper_core::SharedValue| {
+                format!(
+                    "{:.4} +/- {:.4}",
+                    value.value.unwrap_or(f64::NAN),
+                    value.uncertainty.combined_standard_error()
+                )
             };
-            println!(
-                "[] law {:?} alpha {} probe {} f {} doubts {:?} offsets {:.3?}",
-                t.convection.map(|c| (
-                    c.exponent.value,
-                    c.exponent.uncertainty.combined_standard_error(),
-                    c.deviation_ratio
-                )),
-                show(&t.alpha_area_ratio),
-                show(&t.probe_diameter_m),
-                show(&t.direction_factor),
-                t.doubts,
-                t.offsets.values().map(|v| v.value.unwrap_or(0.0)).collect::<Vec<_>>()
+            print!(
+                "; alpha_A {}, probe {} m, direction {}, doubts {}",
+                shown(&thermal.alpha_area_ratio),
+                shown(&thermal.probe_diameter_m),
+                shown(&thermal.direction_factor),
+                thermal.doubts.len()
             );
         }
+        println!();
+        (held, count) = (held + own_held, count + own_count);
+        (joint_sum, dynamic_sum) = (joint_sum + joint_square, dynamic_sum + dynamic_square);
     }
+    println!(
+        "all: joint {:.3}, dynamic {:.3} points rms, intervals hold {:.3}",
+        100.0 * f64::sqrt(joint_sum / count),
+        100.0 * f64::sqrt(dynamic_sum / count),
+        held / count
+    );
 }

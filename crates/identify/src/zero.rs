@@ -70,7 +70,9 @@ pub enum NoZero {
         needed_s: f64,
     },
     /// A temperature still moves.
-    #[error("{channel} still drifts by {drift_k_min:+.2} K/min in the soak (limit {limit_k_min:.2}): soak longer")]
+    #[error(
+        "{channel} still drifts by {drift_k_min:+.2} K/min in the soak (limit {limit_k_min:.2}): soak longer"
+    )]
     Drifts {
         /// The channel.
         channel: Channel,
@@ -108,7 +110,7 @@ pub fn isothermal_zero(
 ) -> Result<IsothermalZero, NoZero> {
     let (start_s, end_s) = at_rest(recording);
     let no_soak = NoZero::NoSoak { found_s: (end_s - start_s).max(0.0), needed_s: settings.shortest_s };
-    if !(end_s - start_s >= settings.shortest_s) {
+    if (end_s - start_s).is_nan() || end_s - start_s < settings.shortest_s {
         return Err(no_soak);
     }
     let start_s = start_s.max(end_s - settings.longest_s);
@@ -163,7 +165,8 @@ pub fn zeroed(
         if let Some(series) = recording.series.get_mut(channel) {
             series.values.iter_mut().for_each(|value| *value -= offset);
         }
-        if let (Some(declared), Some(left)) = (config.declared.get_mut(channel), zero.left_sigma.get(channel)) {
+        if let (Some(declared), Some(left)) = (config.declared.get_mut(channel), zero.left_sigma.get(channel))
+        {
             *declared = DeclaredUncertainty { offset_sigma: *left, ..*declared };
         }
     }

@@ -21,7 +21,8 @@ fn with_soak(recording: &Recording, soak_s: f64) -> Recording {
             Channel::P1 | Channel::P2 => 100e3,
             _ => 0.0,
         };
-        let t_s = (0..count).map(|i| f64::from(i) * 0.1).chain(series.t_s.iter().map(|t| t + soak_s)).collect();
+        let t_s =
+            (0..count).map(|i| f64::from(i) * 0.1).chain(series.t_s.iter().map(|t| t + soak_s)).collect();
         let values = std::iter::repeat_n(rest, count as usize).chain(series.values.iter().copied()).collect();
         soaked.series.insert(*channel, Series { t_s, values });
     }
@@ -53,13 +54,20 @@ fn a_soak_brings_low_speed_within_reach() {
             }
             let off = (point.eta.unwrap() - truth.eta).abs();
             within += f64::from(u8::from(off < 0.012));
-            held += f64::from(u8::from(point.eta_low.unwrap() <= truth.eta && truth.eta <= point.eta_high.unwrap()));
+            held += f64::from(u8::from(
+                point.eta_low.unwrap() <= truth.eta && truth.eta <= point.eta_high.unwrap(),
+            ));
             without += (plain.eta.unwrap() - truth.eta).powi(2);
             count += 1.0;
         }
     }
     // 24 points, three of one campaign alike: 95 % of eight campaigns allow for one that is off.
-    assert!(within / count >= 0.85 && held / count >= 0.85, "within {}, held {}", within / count, held / count);
+    assert!(
+        within / count >= 0.85 && held / count >= 0.85,
+        "within {}, held {}",
+        within / count,
+        held / count
+    );
     // Without the zero they are off by what offsets of 0.25 K cost: 7.2, 5.7 and 3.2 points for each kelvin.
     assert!((without / count).sqrt() > 0.012);
 }

@@ -3,7 +3,6 @@
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
-use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Member, Problem};
 use crate::samples::mean;
 
@@ -52,14 +51,13 @@ pub(crate) fn exclude(problem: &mut Problem<'_>) -> bool {
 pub(crate) fn judge_step(
     problem: &Problem<'_>,
     index: usize,
-    step: &StepRows,
     sigma_eta: f64,
     config: &IdentifyConfig,
     findings: &mut Findings,
 ) {
     let Some(member) = problem.members.get(index) else { return };
     let eta = member.local[ETA];
-    if eta > 1.0 || eta < 0.05 {
+    if !(0.05..=1.0).contains(&eta) {
         let message =
             format!("the fitted efficiency is {eta:.3}: something that the model does not know is at work");
         findings.refuse(code::POOR_FIT, message);
@@ -95,7 +93,6 @@ pub(crate) fn judge_step(
             format!("h lies {:+.1} % off the law that the other points follow", 100.0 * deviation.exp_m1());
         findings.doubt(code::OFF_THE_LAW, message);
     }
-    let _ = step;
 }
 
 /// What speaks against the model as a whole, one sentence each.

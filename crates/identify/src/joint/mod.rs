@@ -104,7 +104,7 @@ pub(crate) fn estimate(
             dt2_k: change(|row| row.t2_k),
             dtc_k: change(|row| row.tc_k),
         };
-        judge::judge_step(&problem, i, step, eta.combined_standard_error(), config, own);
+        judge::judge_step(&problem, i, eta.combined_standard_error(), config, own);
         if !jump::begins_with_jump(&recording.steps, step.position) {
             let message =
                 "no jump leads to this step: its efficiency rests on what the points share".to_owned();
@@ -128,12 +128,10 @@ fn fitted(
     steps: &[rows::StepRows],
     config: &IdentifyConfig,
 ) -> Option<Covariance> {
-    for round in 0..ROUNDS {
+    for _ in 0..ROUNDS {
         problem.minimise()?;
         start::refine(problem, steps, config);
-        if round > 0 {
-            judge::exclude(problem);
-        }
+        judge::exclude(problem);
         // A probe that came to rest on its bound may leave it under better weights.
         problem.active[PROBE_MM2] = problem.probe_fitted;
     }

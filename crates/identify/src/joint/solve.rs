@@ -306,8 +306,8 @@ impl Problem<'_> {
             let Some((shared, locals, cost)) = accepted else { break };
             // A parameter on its bound rests there as long as the others are searched.
             fitted.retain(|index| shared[*index] > self.lowest[*index]);
-            for index in 0..SHARED {
-                self.active[index] &= shared[index] > self.lowest[index];
+            for (active, (value, lowest)) in self.active.iter_mut().zip(shared.iter().zip(&self.lowest)) {
+                *active &= value > lowest;
             }
             self.shared = shared;
             for (member, local) in self.members.iter_mut().zip(locals) {

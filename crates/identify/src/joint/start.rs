@@ -12,18 +12,27 @@ use crate::joint::parameters::{
 };
 use crate::joint::rows::{StepRows, condensed};
 use crate::joint::solve::{Member, Problem};
-use crate::joint::surface::{SurfaceScale, TERM_COUNT};
-use crate::joint::whitening::Whitening;
+use crate::joint::surface::{SurfaceScale, TERM_COUNT, dot};
+use crate::joint::whitening::{RowNoise, Whitening};
 use crate::samples::Samples;
+use crate::window::median;
 use crate::{IdentifyConfig, jump};
 use mapper_core::{Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, Window};
 use mapper_physics::air;
 
 /// Start of what is used of a step, after the last change of a command, s: h and efficiency are followed while the
-/// operating point settles, and the first seconds after a jump tell most of the probe.
-const JOINT_START_S: f64 = 1.5;
+/// operating point settles. Where noise could pass for a slow probe the seconds right after the jump are needed, which
+/// tell the two apart by tens of kelvin; without noise they only show where the surface is none.
+const START_S: f64 = 3.0;
+const START_WITH_NOISE_S: f64 = 1.5;
 /// Least spread of the points' efficiencies about the surface: maps are no polynomials.
-const LEAST_SURFACE_SIGMA: f64 = 1e-3;
+const LEAST_SURFACE_SIGMA: f64 = 3e-3;
+/// Share of what the surface moves a prediction by that is wrong: surfaces through a few points bend otherwise than maps.
+const SHAPE_ERROR_RATIO: f64 = 0.03;
+/// Residual of a step on its own, over that of the median step and in K, beyond which it is kept out until it has shown
+/// that it fits the others.
+const SUSPECT_RATIO: f64 = 6.0;
+const SUSPECT_K: f64 = 0.5;
 /// Least spread of the points' h about the law, ratio.
 const LEAST_LAW_SIGMA: f64 = 3e-3;
 /// Standard deviation of a sample of T2 where nothing is declared, K; refined from the residual.
@@ -42,9 +51,10 @@ pub(crate) fn steps(
         else {
             continue;
         };
-        let start_s = jump::commands_settled_s(recording, step).max(step.start_s) + JOINT_START_S;
+        let after_s = if config.declared.is_empty() { START_S } else { START_WITH_NOISE_S };
+        let start_s = jump::commands_settled_s(recording, step).max(step.start_s) + after_s;
         let window = Window { start_s, end_s: step.end_s };
-        if !(start_s < step.end_s) {
+        if start_s.is_nan() || start_s >= step.end_s {
             let message =
                 format!("the commands changed until {:.1} s before the step's end", step.end_s - start_s);
             own.refuse(code::TOO_FEW_SAMPLES, message);
@@ -130,6 +140,10 @@ pub(crate) fn problem<'a>(
         active[SURFACE + k] = shaped;
     }
 
+    let mut residuals: Vec<f64> =
+        steps.iter().filter_map(|step| alone.get(step.position)?.residual_rms_k).collect();
+    let suspect_k =
+        median(&mut residuals).map_or(f64::INFINITY, |middle| (SUSPECT_RATIO * middle).max(SUSPECT_K));
     let members = steps
         .iter()
         .map(|step| {
@@ -161,11 +175,11 @@ pub(crate) fn problem<'a>(
             Member {
                 course: Course { rows: &step.rows, terms },
                 measured_k: step.rows.iter().map(|row| row.t2_k).collect(),
-                whitening: whitening(step, config, UNDECLARED_NOISE_K, UNDECLARED_NOISE_K),
+                whitening: whitening(step, config, UNDECLARED_NOISE_K, UNDECLARED_NOISE_K, |_| 0.0),
                 coupling: std::array::from_fn(|i| i.checked_sub(SURFACE).map_or(0.0, |k| end_terms[k])),
                 local,
                 priors: own,
-                shares: true,
+                shares: found.and_then(|found| found.residual_rms_k).is_none_or(|rms_k| rms_k <= suspect_k),
             }
         })
         .collect();
@@ -183,14 +197,20 @@ pub(crate) fn problem<'a>(
     })
 }
 
-fn whitening(step: &StepRows, config: &IdentifyConfig, sigma_k: f64, white_sigma_k: f64) -> Whitening {
-    Whitening::new(
-        step.rows.iter().map(|row| row.t_s),
-        step.rows.iter().map(|row| row.noise),
-        config.noise_colour,
-        sigma_k,
-        white_sigma_k,
-    )
+/// `shape_k`: how far the surface moves the prediction at each row, K; part of that is wrong, and as slow as itself.
+fn whitening(
+    step: &StepRows,
+    config: &IdentifyConfig,
+    sigma_k: f64,
+    white_sigma_k: f64,
+    shape_k: impl Fn(usize) -> f64,
+) -> Whitening {
+    let noise = step.rows.iter().enumerate().map(|(i, row)| {
+        let wrong = SHAPE_ERROR_RATIO * shape_k(i) / sigma_k;
+        RowNoise { first_order: row.noise.first_order + wrong * wrong, ..row.noise }
+    });
+    let t_s = step.rows.iter().map(|row| row.t_s);
+    Whitening::new(t_s, noise, config.noise_colour, sigma_k, white_sigma_k)
 }
 
 /// Takes the noise of each step and the spreads of the points about surface and law from what was found.
@@ -200,9 +220,9 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
         .iter()
         .map(|channel| config.declared.get(channel).map_or(0.0, |declared| declared.noise_sigma))
         .collect();
-    for i in 0..problem.members.len() {
+    for (i, step) in steps.iter().enumerate().take(problem.members.len()) {
         let member = &problem.members[i];
-        let slopes = problem.setting.sensitivities(&steps[i].end, &problem.shared, &member.local);
+        let slopes = problem.setting.sensitivities(&step.end, &problem.shared, &member.local);
         let expected: f64 = slopes.iter().zip(&declared).map(|(slope, sigma)| (slope * sigma).powi(2)).sum();
         // Without a declaration the residual itself says what noise there is; 0.3 mK is what block means cost.
         let sigma_k = if expected > 0.0 {
@@ -219,28 +239,32 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
                 member.measured_k.iter().zip(&prediction.t2_k).skip(1).map(|(a, b)| (a - b).powi(2)).sum();
             (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(3e-4)
         };
-        let by_eta = problem.setting.by_efficiency(&steps[i].end, &problem.shared, &member.local);
+        let by_eta = problem.setting.by_efficiency(&step.end, &problem.shared, &member.local);
         let coupled: Vec<f64> =
             slopes.iter().take(OFFSET_CHANNELS.len()).map(|slope| -slope / by_eta).collect();
         if problem.setting.shaped && coupled.iter().all(|x| x.is_finite()) {
             problem.members[i].coupling[OFFSETS..FLOW_GAIN].copy_from_slice(&coupled);
         }
         let white_sigma_k = if expected > 0.0 { declared[1].max(0.1 * sigma_k) } else { sigma_k };
-        problem.members[i].whitening = whitening(&steps[i], config, sigma_k, white_sigma_k);
+        let terms = &problem.members[i].course.terms;
+        let surface = crate::joint::model::surface_of(&problem.shared);
+        let shape_k = |row: usize| terms.get(row).map_or(0.0, |terms| by_eta * dot(terms, surface));
+        let new = whitening(step, config, sigma_k, white_sigma_k, shape_k);
+        problem.members[i].whitening = new;
     }
     problem.explained = explained::explained(problem, steps, config);
-    let n = (problem.members.len() as f64).max(1.0);
-    let (mut off_surface, mut off_law) = (0.0, 0.0);
-    for member in &problem.members {
-        let off = member.off_surface(&problem.shared, &member.local);
-        off_surface += off * off / n;
-        off_law += member.local[LN_DEVIATION].powi(2) / n;
-    }
+    // Medians: one bad step must not make room for itself.
+    let spread = |off: &dyn Fn(&Member<'_>) -> f64| {
+        let mut sizes: Vec<f64> = problem.members.iter().map(|member| off(member).abs()).collect();
+        median(&mut sizes).unwrap_or(0.0) / 0.6745
+    };
+    let off_surface = spread(&|member| member.off_surface(&problem.shared, &member.local));
+    let off_law = spread(&|member| member.local[LN_DEVIATION]);
     if problem.setting.shaped {
-        problem.surface_sigma = off_surface.sqrt().clamp(LEAST_SURFACE_SIGMA, 0.02);
+        problem.surface_sigma = off_surface.clamp(LEAST_SURFACE_SIGMA, 0.02);
     }
     if problem.setting.with_law {
-        let sigma = off_law.sqrt().clamp(LEAST_LAW_SIGMA, 0.1);
+        let sigma = off_law.clamp(LEAST_LAW_SIGMA, 0.1);
         for member in &mut problem.members {
             member.priors[LN_DEVIATION].sigma = sigma;
         }

@@ -153,7 +153,7 @@ fn values_that_mean_nothing_are_refused_and_leave_the_rig_alone() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig::with_cases(16))]
 
     /// The order in which two effects are put in does not matter.
     #[test]

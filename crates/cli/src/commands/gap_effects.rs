@@ -7,7 +7,7 @@ use serde_json::json;
 
 /// Lists the catalogue.
 pub fn effects(arguments: &EffectsArguments) -> Result<(), Failure> {
-    let effects = registry::effects();
+    let effects = registry::effects_with(&arguments.effects)?;
     if arguments.json {
         let list: Vec<_> = effects.iter().map(|effect| effect.info().clone()).collect();
         return output::print_json(&json!({ "effects": list }));

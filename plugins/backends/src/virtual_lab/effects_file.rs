@@ -76,10 +76,8 @@ fn read(parameter: &EffectParameter, value: &ValueText) -> Result<f64, String> {
         ValueText::Number(number) if ratio => Ok(*number),
         ValueText::Number(number) => Err(format!("{number} lacks its unit: write `{number} {unit}`")),
         ValueText::Text(text) => {
-            if let Some(number) = text.trim().strip_suffix(unit) {
-                if let Ok(number) = number.trim().parse() {
-                    return Ok(number);
-                }
+            if let Some(Ok(number)) = text.trim().strip_suffix(unit).map(|number| number.trim().parse()) {
+                return Ok(number);
             }
             let kind = match unit {
                 "m" => Kind::Length,

@@ -327,8 +327,12 @@ impl Armed {
                 for crossing in crossings {
                     self.report(settings, crossing, end_s);
                 }
-                result
-                    .map_err(|error| BackendError::Simulation { t_s: start_s, message: error.to_string() })?;
+                result.map_err(|error| {
+                    // A hook cannot fail by itself: it gives NaN and keeps the reason.
+                    let reason =
+                        settings.model.hooks.fault().map_or_else(String::new, |fault| format!(": {fault}"));
+                    BackendError::Simulation { t_s: start_s, message: format!("{error}{reason}") }
+                })?;
                 Ok(end_s)
             }
             Some(Machine::Standstill { state, t_s: state_s }) => {

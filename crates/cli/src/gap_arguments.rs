@@ -33,6 +33,9 @@ pub struct DiagnoseArguments {
     /// Where a recording made by another program holds the rig's channels (YAML)
     #[arg(long, value_name = "MAP")]
     pub channels: Option<PathBuf>,
+    /// Also try a suspected effect written in rhai; may be repeated
+    #[arg(long = "effect", value_name = "FILE")]
+    pub effects: Vec<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,

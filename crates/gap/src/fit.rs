@@ -315,8 +315,8 @@ fn bounded_step(
         let at = coordinate.of(*value);
         let ends = [coordinate.of(coordinate.low), coordinate.of(coordinate.high)];
         (
-            (ends[0].min(ends[1]) - at).max(-MOST_STEPS).min(0.0),
-            (ends[0].max(ends[1]) - at).min(MOST_STEPS).max(0.0),
+            (ends[0].min(ends[1]) - at).clamp(-MOST_STEPS, 0.0),
+            (ends[0].max(ends[1]) - at).clamp(0.0, MOST_STEPS),
         )
     }));
     let mut held: Vec<Option<f64>> = vec![None; room.len()];

@@ -6,7 +6,6 @@ use crate::failure::Failure;
 use crate::gap_arguments::DiagnoseArguments;
 use crate::{output, registry, run_directory};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use mapper_core::NoiseColour;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::declared::Declared;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question};
@@ -35,7 +34,7 @@ pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
         mapper_campaign::nominal_model(&campaign).map_err(|error| Failure::new(Code::BadInput, error))?;
     let declared = Declared {
         sensors: campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
-        noise_colour: map.noise_colour.unwrap_or(NoiseColour::default()),
+        noise_colour: map.noise_colour.unwrap_or_default(),
         tolerances: campaign.tolerances,
         nominal: campaign.boundary,
     };
@@ -48,7 +47,7 @@ pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
         recording: &report.recording,
         declared,
         model,
-        effects: registry::effects(),
+        effects: registry::effects_with(&arguments.effects)?,
         calibration: Calibration::shipped().map_err(|error| Failure::new(Code::Failure, error))?,
         progress: &progress,
     });

@@ -53,7 +53,7 @@ pub fn page(title: &str, done: &Diagnosed) -> String {
         html += "<h2>Before and after</h2>";
         html += &traces(done);
     }
-    let _ = write!(html, "<h2>In words</h2><pre>{}</pre></html>\n", escape(&gap_text::page(diagnosis)));
+    let _ = writeln!(html, "<h2>In words</h2><pre>{}</pre></html>", escape(&gap_text::page(diagnosis)));
     html
 }
 

@@ -60,8 +60,12 @@ pub(crate) fn report(
 }
 
 fn reason(decision: &Decision, verdict: DriftVerdict) -> String {
+    let left_out = match decision.left_out {
+        (0, _) => String::new(),
+        (count, all) => format!("; {count} of {all} stretches are left out, the model cannot follow them"),
+    };
     let compared = format!(
-        "the best cause has an evidence of {:.1}, one drift-free campaign in a hundred reaches {:.1}",
+        "the best cause has an evidence of {:.1}, one drift-free campaign in a hundred reaches {:.1}{left_out}",
         decision.evidence, decision.threshold
     );
     if verdict == DriftVerdict::None {
@@ -212,7 +216,9 @@ fn corrected_points(
         .enumerate()
         .filter_map(|(position, step)| {
             let drift = decision.size * decision.course.at(step.end_s + step.offset_s);
-            let (mut eta, mut h_w_m2k) = *readings.step_ends.get(position)?;
+            // A step that the model cannot follow has no point.
+            let (mut eta, mut h_w_m2k) =
+                *readings.step_ends.get(position).filter(|(eta, _)| eta.is_finite())?;
             for (constant, size) in constants.iter().zip(sizes.iter()) {
                 eta += constant.eta[position] * size;
                 h_w_m2k += constant.h_w_m2k[position] * size;

@@ -21,6 +21,11 @@ const FALSE_ALARMS: f64 = 0.01;
 const SELDOM: f64 = 0.25;
 /// A cause less probable than this is not called by its name alone.
 const CLEAR: f64 = 0.5;
+/// A stretch stands out when it lies so many times as far from the model as the middle one.
+const FAR_OUT: f64 = 5.0;
+const LEAVE_OUT_ROUNDS: usize = 4;
+/// Factor on the variance of what is left out.
+const AS_GOOD_AS_NOTHING: f64 = 1e8;
 /// 95 % quantile of chi-square with one degree of freedom.
 const CHI2_95: f64 = 3.841_458_820_694_124;
 /// Half width of a 95 % interval in standard deviations.
@@ -47,6 +52,8 @@ pub(crate) struct Decision {
     /// No drift and all causes, most probable first.
     pub probabilities: Vec<Alternative>,
     pub limits: Vec<DetectionLimit>,
+    /// Stretches that the model cannot follow, and all.
+    pub left_out: (usize, usize),
     /// Noise as found, for the constants.
     pub noise: LowRank,
     /// Readings less model, whitened.
@@ -92,6 +99,7 @@ pub(crate) fn decide(
     });
     let difference = DMatrix::from_column_slice(readings.difference.len(), 1, &readings.difference);
 
+    let left_out = leave_out(&mut own, readings, columns, &difference, &shown)?;
     // Twice: the noise that the best explanation leaves says how much more there is than declared.
     let mut noise = LowRank::new(&own, columns)?;
     inflate(&mut own, readings, &noise, &difference, &shown);
@@ -158,6 +166,7 @@ pub(crate) fn decide(
         threshold,
         probabilities,
         limits,
+        left_out: (left_out, readings.blocks.len()),
         whitened_cause: fine_shown.columns(peak, 1).into_owned(),
         noise,
         whitened,
@@ -315,19 +324,49 @@ fn limits(
         .collect()
 }
 
-/// Raises each channel's own noise to what the best explanation leaves.
-fn inflate(
+/// Leaves out stretches that stand far out of all others even beside the best explanation: the model cannot follow the
+/// machine there (surge, a valve at its stop). Gives their number.
+fn leave_out(
     own: &mut [DMatrix<f64>],
     readings: &Readings,
-    noise: &LowRank,
+    columns: &DMatrix<f64>,
     difference: &DMatrix<f64>,
     shown: &DMatrix<f64>,
-) {
+) -> Result<usize, DriftError> {
+    let count = readings.columns.len();
+    let mut out = vec![false; own.len()];
+    for _ in 0..LEAVE_OUT_ROUNDS {
+        let noise = LowRank::new(own, columns)?;
+        let left = unexplained(&noise, difference, shown);
+        let sizes: Vec<f64> = (0..own.len())
+            .map(|block| {
+                left.rows(block * count, count).iter().map(|value| value * value).sum::<f64>() / count as f64
+            })
+            .collect();
+        let mut kept: Vec<f64> =
+            (0..own.len()).filter(|block| !out[*block]).map(|block| sizes[block]).collect();
+        kept.sort_by(f64::total_cmp);
+        let usual = kept.get(kept.len() / 2).copied().unwrap_or(1.0).max(1.0);
+        let far: Vec<usize> = (0..own.len())
+            .filter(|block| !out[*block] && sizes[*block] > FAR_OUT * FAR_OUT * usual)
+            .collect();
+        if far.is_empty() {
+            break;
+        }
+        for block in far {
+            out[block] = true;
+            own[block] *= AS_GOOD_AS_NOTHING;
+        }
+    }
+    Ok(out.iter().filter(|out| **out).count())
+}
+
+/// What constants and the best cause leave, whitened.
+fn unexplained(noise: &LowRank, difference: &DMatrix<f64>, shown: &DMatrix<f64>) -> DMatrix<f64> {
     let whitened = noise.whiten(difference.clone());
     let whitened_shown = noise.whiten(shown.clone());
     let inverse_difference = noise.inverse_times(&whitened);
     let along = whitened_shown.tr_mul(&inverse_difference);
-    // The information of each would cost as much as the whole search: the length after taking out the constants.
     let inverse_shown = noise.inverse_times(&whitened_shown);
     let mut best = (0.0, 0, 0.0);
     for index in 0..shown.ncols() {
@@ -340,7 +379,18 @@ fn inflate(
         }
     }
     let explained = &whitened - whitened_shown.columns(best.1, 1) * best.2;
-    let left = noise.inverse_times(&explained);
+    noise.inverse_times(&explained)
+}
+
+/// Raises each channel's own noise to what the best explanation leaves.
+fn inflate(
+    own: &mut [DMatrix<f64>],
+    readings: &Readings,
+    noise: &LowRank,
+    difference: &DMatrix<f64>,
+    shown: &DMatrix<f64>,
+) {
+    let left = unexplained(noise, difference, shown);
     let count = readings.columns.len();
     let rows = left.nrows() as f64;
     // Constants take their share of the degrees of freedom.

@@ -35,22 +35,20 @@ impl Inputs for RecordedInputs {
     }
 }
 
-/// The inputs of a recording. `jumps_s` are the times at which commands change, rising.
+/// The inputs of a recording. `jumps` are the times at which commands change, rising, s, with the valve from then on: the
+/// recorded command itself may show a change one sample late.
 pub(crate) fn recorded(
     recording: &Recording,
     nominal: &BoundaryConditions,
-    start_s: f64,
+    jumps: &[(f64, f64)],
     end_s: f64,
-    jumps_s: &[f64],
 ) -> Result<RecordedInputs, InputsError> {
-    let mut edges: Vec<f64> = jumps_s.iter().copied().filter(|t| *t > start_s && *t < end_s).collect();
-    edges.insert(0, start_s);
-    edges.push(end_s);
     let mut inputs = RecordedInputs { starts_s: Vec::new(), levels: Vec::new() };
-    for (index, pair) in edges.windows(2).enumerate() {
+    for (index, (start_s, valve_opening_ratio)) in jumps.iter().enumerate() {
+        let next_s = jumps.get(index + 1).map_or(end_s, |next| next.0);
         let mut nodes = Nodes { recording, nominal, t_s: Vec::new(), rows: Vec::new() };
-        nodes.level(pair[0], pair[1], index > 0);
-        inputs.starts_s.push(pair[0]);
+        nodes.level(*start_s, next_s, *valve_opening_ratio, index > 0);
+        inputs.starts_s.push(*start_s);
         inputs.levels.push(InterpolatedInputs::new(nodes.t_s, nodes.rows)?);
     }
     Ok(inputs)
@@ -65,9 +63,8 @@ struct Nodes<'a> {
 
 impl Nodes<'_> {
     /// Nodes from one jump to the next.
-    fn level(&mut self, start_s: f64, end_s: f64, after_jump: bool) {
+    fn level(&mut self, start_s: f64, end_s: f64, valve: f64, after_jump: bool) {
         let raw_end_s = if after_jump { (start_s + RAW_S).min(end_s) } else { start_s };
-        let valve = self.command(Channel::ValveCommand, start_s).unwrap_or(self.nominal.valve_opening_ratio);
         if after_jump {
             let t_s = self
                 .recording

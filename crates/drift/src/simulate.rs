@@ -18,7 +18,7 @@ const SAMPLE_S: f64 = 2.5;
 /// Longest steps after a jump: up to so many seconds, steps of at most so many seconds.
 const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.0), (f64::INFINITY, 3.0)];
 /// A jump that the model cannot follow (deep beyond the surge line) is left out for this long, s: shaft and outlet then
-/// stand where they were read, the metal where it was.
+/// stand where they were read, the metal as far from where it was as its sensors say.
 const LEFT_OUT_S: f64 = 5.0;
 /// Readings this long before the start say what state it is in, s.
 const BEFORE_S: f64 = 2.0;
@@ -47,13 +47,28 @@ pub(crate) struct Drive<'a> {
 struct Stretch {
     start_s: f64,
     end_s: f64,
-    /// Shaft and outlet as read [`LEFT_OUT_S`] after the jump.
+    /// The state as read just before the jump.
+    read_first: Option<State>,
+    /// The state as read [`LEFT_OUT_S`] after the jump.
     read_later: Option<State>,
-    /// Whether the jump itself is left out.
-    left_out: bool,
+    /// The state as read at the end.
+    read_last: Option<State>,
+    /// How far the model can follow it.
+    followed: Followed,
     /// Times at which the model is read, and where each reading belongs.
     times_s: Vec<f64>,
     places: Vec<Place>,
+}
+
+/// How far the model can follow a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Followed {
+    /// From the jump on.
+    Whole,
+    /// From [`LEFT_OUT_S`] after the jump on, shaft and outlet as read there.
+    AfterJump,
+    /// Not at all: the next step begins with what was read at the end of this one.
+    No,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -78,8 +93,9 @@ impl<'a> Drive<'a> {
         let (Some((_, first)), Some((_, last))) = (of_run.first(), of_run.last()) else {
             return Err(unusable("it has no steps; commands that change make steps".to_owned()));
         };
-        let jumps_s: Vec<f64> = of_run.iter().map(|(_, step)| step.start_s).collect();
-        let inputs = inputs::recorded(recording, nominal, first.start_s, last.end_s, &jumps_s)
+        let jumps: Vec<(f64, f64)> =
+            of_run.iter().map(|(_, step)| (step.start_s, step.valve_opening_ratio)).collect();
+        let inputs = inputs::recorded(recording, nominal, &jumps, last.end_s)
             .map_err(|error| unusable(format!("its inputs cannot be used: {error}")))?;
         let start = start_state(run, recording, model, &inputs, first.start_s)?;
         let mut block_count = 0;
@@ -88,8 +104,10 @@ impl<'a> Drive<'a> {
             let mut stretch = Stretch {
                 start_s: step.start_s,
                 end_s: step.end_s,
+                read_first: read_state(recording, step.start_s - 0.6),
                 read_later: read_state(recording, step.start_s + LEFT_OUT_S),
-                left_out: false,
+                read_last: read_state(recording, step.end_s - 1.0),
+                followed: Followed::Whole,
                 times_s: Vec::new(),
                 places: Vec::new(),
             };
@@ -133,10 +151,16 @@ impl<'a> Drive<'a> {
         let mut counts = vec![0_usize; self.blocks];
         for (index, stretch) in self.stretches.iter().enumerate() {
             let mut start_s = stretch.start_s;
-            if let Some(read) = stretch.read_later.filter(|_| stretch.left_out) {
-                start_s += LEFT_OUT_S;
-                state.shaft_speed_rad_s = read.shaft_speed_rad_s;
-                state.p2_pa = read.p2_pa;
+            match (stretch.followed, stretch.read_later, stretch.read_last) {
+                (Followed::AfterJump, Some(read), _) => {
+                    start_s += LEFT_OUT_S;
+                    state = carried(state, stretch.read_first, read);
+                }
+                (Followed::No, _, Some(read)) => {
+                    state = carried(state, stretch.read_first, read);
+                    continue;
+                }
+                _ => {}
             }
             let grid = FrozenGrid::new(start_s, stretch.end_s, &[], &nodes_s(stretch, start_s));
             state = drive(
@@ -160,7 +184,8 @@ impl<'a> Drive<'a> {
             .map_err(|error| (index, error))?;
         }
         for (means, count) in prediction.means.iter_mut().zip(counts) {
-            means.iter_mut().for_each(|sum| *sum /= count.max(1) as f64);
+            // Nothing was said of a stretch that was not followed.
+            means.iter_mut().for_each(|sum| *sum /= count as f64);
         }
         Ok(prediction)
     }
@@ -173,10 +198,12 @@ impl<'a> Drive<'a> {
                 Ok(predictions) => return Ok(predictions),
                 Err(failed) => failed,
             };
-            match self.stretches.get_mut(index) {
-                Some(stretch) if !stretch.left_out && stretch.read_later.is_some() => stretch.left_out = true,
+            let Some(stretch) = self.stretches.get_mut(index) else { return Err(error) };
+            stretch.followed = match stretch.followed {
+                Followed::Whole if stretch.read_later.is_some() => Followed::AfterJump,
+                Followed::Whole | Followed::AfterJump if stretch.read_last.is_some() => Followed::No,
                 _ => return Err(error),
-            }
+            };
         }
     }
 
@@ -205,6 +232,13 @@ impl<'a> Drive<'a> {
     }
 }
 
+/// The state as read later, the metal by the change that was read: offsets of its sensors stay out.
+fn carried(state: State, first: Option<State>, later: State) -> State {
+    let first = first.unwrap_or(State { tc_k: state.tc_k, tt_k: state.tt_k, ..later });
+    let tc_k = state.tc_k + later.tc_k - first.tc_k;
+    State { tc_k, inner_k: tc_k, tt_k: state.tt_k + later.tt_k - first.tt_k, ..later }
+}
+
 /// Ends of the integration's steps: fine after the jump, coarse where only metal moves.
 fn nodes_s(stretch: &Stretch, start_s: f64) -> Vec<f64> {
     let mut nodes = Vec::new();
@@ -219,7 +253,7 @@ fn nodes_s(stretch: &Stretch, start_s: f64) -> Vec<f64> {
     nodes
 }
 
-/// Shaft and outlet as read around a time; the metal's temperatures are not used.
+/// The state as read around a time.
 fn read_state(recording: &Recording, t_s: f64) -> Option<State> {
     let mean = |channel: Channel| {
         let values = recording.series.get(&channel)?.slice(t_s - 0.5, t_s + 0.5).1;
@@ -227,7 +261,8 @@ fn read_state(recording: &Recording, t_s: f64) -> Option<State> {
         (!values.is_empty() && mean.is_finite() && mean > 0.0).then_some(mean)
     };
     let speed_rpm = mean(Channel::ShaftSpeed)?;
-    Some(State::new(rad_s_of_rpm(speed_rpm), mean(Channel::P2)?, 300.0, 300.0, mean(Channel::T2)?))
+    let (tc_k, tt_k) = (mean(Channel::Tc)?, mean(Channel::Tt)?);
+    Some(State::new(rad_s_of_rpm(speed_rpm), mean(Channel::P2)?, tc_k, tt_k, mean(Channel::T2)?))
 }
 
 /// State at the start: as measured just before it, or at rest under the first inputs where nothing was recorded before.

@@ -205,10 +205,10 @@ fn read(
                 (turned.means[block][column] - base.means[block][column]) / knob.step()
             }),
             eta: (0..steps.len())
-                .map(|step| (turned.step_ends[step].0 - base.step_ends[step].0) / knob.step())
+                .map(|step| finite((turned.step_ends[step].0 - base.step_ends[step].0) / knob.step()))
                 .collect(),
             h_w_m2k: (0..steps.len())
-                .map(|step| (turned.step_ends[step].1 - base.step_ends[step].1) / knob.step())
+                .map(|step| finite((turned.step_ends[step].1 - base.step_ends[step].1) / knob.step()))
                 .collect(),
         })
         .collect();
@@ -237,6 +237,11 @@ fn read(
         steps,
         all,
     })
+}
+
+/// 0 for steps that the model cannot follow, which have no point.
+fn finite(value: f64) -> f64 {
+    if value.is_finite() { value } else { 0.0 }
 }
 
 fn append(all: &mut Prediction, own: Prediction) {

@@ -1,0 +1,94 @@
+//! Time of a joint fit of 30 points at 10 Hz on one core, the identification alone:
+//! `cargo run --release -p mapper-identify --example joint_timing -- ROUNDS DIRECTORY`
+//! With a directory it writes the samples (`samples.csv`) and what was found (`found.csv`, `points.csv`) there for
+//! `benches/peers/joint_scipy.py`.
+#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[path = "../tests/common/lab.rs"]
+mod lab;
+
+use lab::{Machine, campaign, measured};
+use mapper_core::{Channel, Method};
+use mapper_identify::{IdentifyConfig, identify_recording};
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+use std::fmt::Write;
+use std::time::Instant;
+
+/// Five valve openings, at each six speeds in zigzag.
+fn thirty() -> Vec<(f64, f64)> {
+    let speeds = [90e3, 150e3, 50e3, 130e3, 70e3, 110e3];
+    [0.5, 0.6, 0.7, 0.85, 1.0].into_iter().flat_map(|valve| speeds.map(|speed| (valve, speed))).collect()
+}
+
+fn main() {
+    let rounds: usize = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(5).max(1);
+    let machine = Machine { alpha: 0.2, probe_m: 1.5e-3, direction: 1.0 };
+    let clean = campaign(&thirty(), 120.0, machine);
+    let (recording, declared) = measured(&clean.recording, 1.0, 0.0, &mut Pcg64::seed_from_u64(1));
+    let config = IdentifyConfig { method: Method::Joint, declared, ..IdentifyConfig::default() };
+    let samples = recording.series[&Channel::T2].t_s.len();
+    let mut times_s = Vec::new();
+    let mut last = None;
+    for _ in 0..rounds {
+        let start = Instant::now();
+        last = Some(identify_recording(&recording, &config).unwrap());
+        times_s.push(start.elapsed().as_secs_f64());
+    }
+    let found = last.unwrap();
+    times_s.sort_by(f64::total_cmp);
+    println!(
+        "{} points, {samples} samples: fastest {:.3} s, median {:.3} s of {rounds}",
+        found.points.len(),
+        times_s[0],
+        times_s[times_s.len() / 2]
+    );
+    let thermal = found.thermal.unwrap();
+    let value = |shared: &mapper_core::SharedValue| shared.value.unwrap_or(f64::NAN);
+    let (alpha, probe_m) = (value(&thermal.alpha_area_ratio), value(&thermal.probe_diameter_m));
+    let etas: Vec<f64> = found.points.iter().map(|point| point.as_ref().unwrap().eta.unwrap()).collect();
+    let square: f64 =
+        etas.iter().zip(&clean.truth).map(|(eta, truth)| (eta - truth.eta).powi(2)).sum::<f64>();
+    println!(
+        "alpha_A {alpha:.4}, probe {:.3} mm, eta off by {:.3} points rms",
+        1e3 * probe_m,
+        100.0 * (square / etas.len() as f64).sqrt()
+    );
+    let Some(directory) = std::env::args().nth(2) else { return };
+    let directory = std::path::Path::new(&directory);
+    let mut text = "step,t_s,speed_rpm,flow_kg_s,p1_pa,t1_k,p2_pa,t2_k,tc_k\n".to_owned();
+    let channels = [
+        Channel::ShaftSpeed,
+        Channel::CompressorFlow,
+        Channel::P1,
+        Channel::T1,
+        Channel::P2,
+        Channel::T2,
+        Channel::Tc,
+    ];
+    for step in &recording.steps {
+        let t_s = &recording.series[&Channel::T2].t_s;
+        let from = t_s.partition_point(|t| *t < step.start_s);
+        let to = t_s.partition_point(|t| *t < step.end_s);
+        for i in from..to {
+            write!(text, "{},{}", step.index, t_s[i] - step.start_s).unwrap();
+            for channel in channels {
+                write!(text, ",{}", recording.series[&channel].values[i]).unwrap();
+            }
+            text.push('\n');
+        }
+    }
+    std::fs::write(directory.join("samples.csv"), text).unwrap();
+    let found = format!(
+        "alpha_area_ratio,probe_diameter_m,fastest_s,median_s\n{alpha},{probe_m},{},{}\n",
+        times_s[0],
+        times_s[times_s.len() / 2]
+    );
+    std::fs::write(directory.join("found.csv"), found).unwrap();
+    let mut points = "eta,truth_eta\n".to_owned();
+    for (eta, truth) in etas.iter().zip(&clean.truth) {
+        writeln!(points, "{eta},{}", truth.eta).unwrap();
+    }
+    std::fs::write(directory.join("points.csv"), points).unwrap();
+}

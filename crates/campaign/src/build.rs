@@ -3,7 +3,7 @@
 use crate::campaign::{
     BackendChoice, Campaign, DisplayUnits, Identification, Jump, Limits, Machine, MapSource, OnDrift, Order,
     OutputFormat, Outputs, Repeats, Report, SensorDeclaration, SequenceSource, Stabilisation, Timing,
-    WindowChoice,
+    WindowChoice, Zero,
 };
 use crate::consistency::{beside, rounded};
 use crate::file::{
@@ -62,6 +62,10 @@ pub(crate) fn build(
         tolerances: tolerances(file.tolerances.unwrap_or_default()),
         backend: BackendChoice { name, settings },
         timing: timing(&file.timing),
+        zero: file.zero.map(|zero| Zero {
+            soak_s: zero.soak.inside,
+            oil_temperature_k: or(zero.oil_temperature, file.boundary.inlet_temperature.inside),
+        }),
         identification: identification(
             &file.identification.unwrap_or_default(),
             machine.params.compressor.alpha_area_ratio,

@@ -34,6 +34,9 @@ pub struct Campaign {
     pub points: Vec<OperatingPoint>,
     /// How long things take.
     pub timing: Timing,
+    /// The rest before the warm-up, for a zero of the sensors, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zero: Option<Zero>,
     /// How points are identified.
     pub identification: Identification,
     /// Order of the points.
@@ -122,6 +125,15 @@ pub struct Timing {
     pub cool_down_s: f64,
     /// Time at each point, jump included, s, > 0.
     pub dwell_s: f64,
+}
+
+/// The machine at rest before a run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Zero {
+    /// Time at rest, s, > 0.
+    pub soak_s: f64,
+    /// Oil inlet temperature in the meantime, K.
+    pub oil_temperature_k: f64,
 }
 
 /// How points are identified.

@@ -26,6 +26,7 @@ mod sequence_run;
 mod table;
 mod test_report;
 mod thermal_text;
+mod zero;
 
 use clap::Parser;
 use std::process::ExitCode;

@@ -6,6 +6,7 @@ use crate::repeated_jumps::{self, RepeatedJump};
 use crate::table::{self, Display, number};
 use crate::test_report;
 use crate::thermal_text::thermal_text;
+use crate::zero::{self, Zero};
 use crate::{assembly_line, output, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, assemble};
 use mapper_campaign::Campaign;
@@ -31,6 +32,7 @@ pub struct Results {
     repeats: Vec<RepeatedJump>,
     /// What the points share (joint method).
     thermal: Option<ThermalModel>,
+    zero: Zero,
     remarks: Vec<String>,
 }
 
@@ -47,7 +49,8 @@ pub fn make(
     let mut remarks: Vec<String> = read.warnings.iter().map(ToString::to_string).collect();
     let mut config = assembly_line::identification(campaign);
     config.method = campaign.identification.method;
-    let identified = mapper_identify::identify_recording(&read.recording, &config)
+    let (recorded, config, zero) = zero::apply(read.recording, config, campaign);
+    let identified = mapper_identify::identify_recording(&recorded, &config)
         .map_err(|error| Failure::new(Code::BadRecording, error))?;
     let thermal = identified.thermal;
     let points: Vec<IdentifiedPoint> = identified.points.into_iter().filter_map(Result::ok).collect();
@@ -76,22 +79,22 @@ pub fn make(
         }
         Err(error) => remarks.push(format!("there is no map: {error}")),
     }
-    let points = mapper_score::score(recording, &read.recording.steps, points)
+    let points = mapper_score::score(recording, &recorded.steps, points)
         .map_err(|error| Failure::new(Code::BadRecording, error))?;
     let score = mapper_score::summarise(&points);
     output::write_new(
         &directory.join(run_directory::POINTS),
-        (output::to_json(&json!({"reference": config.reference, "points": points, "thermal": thermal}))?
+        (output::to_json(&json!({"reference": config.reference, "points": points, "thermal": thermal, "zero": zero.json()}))?
             + "\n")
             .as_bytes(),
     )?;
     let report = directory.join(run_directory::REPORT);
-    let repeats = repeated_jumps::repeated_jumps(&read.recording.steps, &points);
+    let repeats = repeated_jumps::repeated_jumps(&recorded.steps, &points);
     let text = test_report::markdown(
         campaign,
         plan,
         outcome,
-        &read.recording.events,
+        &recorded.events,
         &points,
         &repeats,
         score.as_ref(),
@@ -107,6 +110,7 @@ pub fn make(
         score,
         repeats,
         thermal,
+        zero,
         remarks,
     })
 }
@@ -138,6 +142,7 @@ impl Results {
             "score": self.score,
             "repeats": self.repeats,
             "thermal": self.thermal,
+            "zero": self.zero.json(),
             "remarks": self.remarks,
         })
     }
@@ -149,6 +154,7 @@ impl Results {
         if let Some(thermal) = &self.thermal {
             text.push_str(&thermal_text(thermal));
         }
+        text.push_str(&self.zero.text());
         for remark in &self.remarks {
             let _ = writeln!(text, "{remark}");
         }

@@ -14,6 +14,10 @@ pub enum EventKind {
     OverspeedEntered,
     /// The shaft came back below the overspeed limit.
     OverspeedLeft,
+    /// The machine was put to rest for a zero of its sensors.
+    SoakStarted,
+    /// That rest is over.
+    SoakEnded,
     /// A guard of the runner tripped.
     GuardTripped,
     /// The rig was put into its safe state.

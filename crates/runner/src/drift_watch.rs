@@ -1,5 +1,6 @@
 //! Watches the repeats of a run while it goes on: a difference beyond what is declared is looked at again, then acted upon.
 
+use crate::soak::Soak;
 use crate::source::{StepSource, StepSourceError};
 use mapper_core::{Channel, DeclaredUncertainty, OperatingPoint, PlanStep, SampleBatch, StepMarker};
 use std::collections::{BTreeMap, VecDeque};
@@ -113,6 +114,10 @@ impl<'a> DriftWatch<'a> {
 }
 
 impl StepSource for DriftWatch<'_> {
+    fn soak(&self) -> Option<Soak> {
+        self.inner.soak()
+    }
+
     fn warm_up_s(&self) -> f64 {
         self.inner.warm_up_s()
     }

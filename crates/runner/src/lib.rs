@@ -8,10 +8,12 @@ mod drift_watch;
 mod guard;
 mod observer;
 mod run;
+mod soak;
 mod source;
 
 pub use drift_watch::{DriftWatch, OnDrift};
 pub use guard::{Guard, LimitGuard, SilenceGuard, SurgeGuard, Trip};
 pub use observer::{ObserverError, RunObserver};
 pub use run::{RunEnd, RunError, Runner};
+pub use soak::{Soak, Soaked};
 pub use source::{PlanSteps, StepSource, StepSourceError};

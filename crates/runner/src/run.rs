@@ -2,6 +2,7 @@
 
 use crate::guard::{Guard, Trip};
 use crate::observer::{ObserverError, RunObserver};
+use crate::soak::Soak;
 use crate::source::{StepSource, StepSourceError};
 use mapper_core::{Backend, BackendError, Clock, Event, EventKind, PlanStep, RigMode, Setpoints, StepMarker};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -93,8 +94,12 @@ impl Runner<'_> {
         let mut next = self.steps.next_step()?;
         self.pass_notes(*now_s)?;
         if let Some(first) = &next {
+            if let Some(soak) = self.steps.soak() {
+                self.rest(first, soak, now_s)?;
+            }
             self.backend.set(&setpoints(first))?;
-            self.watch(now_s, self.steps.warm_up_s(), false)?;
+            let warm_s = *now_s + self.steps.warm_up_s();
+            self.watch(now_s, warm_s, false)?;
         }
         while let Some(step) = next {
             let mut marker = StepMarker {
@@ -120,6 +125,26 @@ impl Runner<'_> {
         self.backend.make_safe()?;
         let end_s = *now_s + self.steps.cool_down_s();
         self.watch(now_s, end_s, false)
+    }
+
+    /// Keeps the machine at rest for as long as the soak asks; events mark both ends.
+    fn rest(&mut self, first: &PlanStep, soak: Soak, now_s: &mut f64) -> Result<(), Halt> {
+        let at_rest = Setpoints {
+            mode: RigMode::Standstill,
+            oil_temperature_k: soak.oil_temperature_k,
+            ..setpoints(first)
+        };
+        self.backend.set(&at_rest)?;
+        let message = format!(
+            "soak for {:.0} s: air off, oil at {:.2} K",
+            soak.duration_s, soak.oil_temperature_k
+        );
+        self.observer.on_event(&Event { t_s: *now_s, kind: EventKind::SoakStarted, message })?;
+        let end_s = *now_s + soak.duration_s;
+        self.watch(now_s, end_s, false)?;
+        let message = "the soak is over, air on".to_owned();
+        self.observer.on_event(&Event { t_s: *now_s, kind: EventKind::SoakEnded, message })?;
+        Ok(())
     }
 
     /// Hands the source's notes to the observer.

@@ -1,5 +1,6 @@
 //! Where the steps of a run come from: a plan, or something that decides as it goes.
 
+use crate::soak::Soak;
 use mapper_core::{Plan, PlanStep, SampleBatch, StepMarker};
 
 /// Why a source has no next step though it should; the run ends in its safe state.
@@ -15,6 +16,11 @@ pub struct StepSourceError {
 
 /// Yields steps one by one, and sees what becomes of them. Guards and observers look on all the same.
 pub trait StepSource {
+    /// How the machine rests before the warm-up; not at all by default.
+    fn soak(&self) -> Option<Soak> {
+        None
+    }
+
     /// Time at the first point before its step, s.
     fn warm_up_s(&self) -> f64;
 

@@ -9,6 +9,7 @@ mod grid;
 mod machine;
 mod sensors;
 mod tolerances;
+mod zero;
 
 pub(crate) use choices::{
     ChoiceName, ConvectionName, DisplayFile, DriftFile, EfficiencyName, FormatName, IdentificationFile, JointFile,
@@ -22,6 +23,7 @@ pub(crate) use grid::{GridFile, PointFile};
 pub(crate) use machine::{GeometryFile, MachineFile, MapFile, NusseltFile};
 pub(crate) use sensors::{CALIBRATED, SensorsFile, TapName};
 pub(crate) use tolerances::TolerancesFile;
+pub(crate) use zero::ZeroFile;
 
 use crate::units::{Fraction, Quantity};
 use schemars::JsonSchema;
@@ -53,6 +55,8 @@ pub(crate) struct CampaignFile {
     pub grid: GridFile,
     /// How long things take.
     pub timing: TimingFile,
+    /// The isothermal zero before the first point; none where it is left out.
+    pub zero: Option<ZeroFile>,
     /// How efficiency and heat-transfer coefficient are found.
     pub identification: Option<IdentificationFile>,
     /// Order of the points. `sum_gradient`, the default, makes the thermal gradients large in all, `worst_gradient` the smallest of them; `information` makes the predicted error of the efficiency small; `time` makes the campaign short and chooses each dwell; `greedy` looks one step ahead; `listed` keeps the order of the grid.

@@ -30,7 +30,8 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
         mapper_sequence::check(&script).map_err(|error| Failure::new(Code::BadInput, error))?;
     }
     let timing = &campaign.timing;
-    let duration_s = timing.warm_up_s + campaign.points.len() as f64 * timing.dwell_s + timing.cool_down_s;
+    let soak_s = campaign.zero.map_or(0.0, |zero| zero.soak_s);
+    let duration_s = soak_s + timing.warm_up_s + campaign.points.len() as f64 * timing.dwell_s + timing.cool_down_s;
     if arguments.json {
         return output::print_json(&json!({
             "campaign": campaign.name,

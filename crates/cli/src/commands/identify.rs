@@ -6,7 +6,8 @@ use crate::failure::Failure;
 use crate::results;
 use crate::thermal_text;
 use crate::{assembly_line, output, run_directory};
-use mapper_campaign::campaign::DisplayUnits;
+use crate::zero::{self, Zero};
+use mapper_campaign::Campaign;
 use mapper_core::ReferenceState;
 use mapper_identify::{IdentifyConfig, WindowRule};
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, RecordError, read_recording};
@@ -21,21 +22,27 @@ pub fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
         None => ChannelMap::native(),
     };
     let report = read_recording(&path, &map, &ReadOptions::default()).map_err(bad_recording)?;
-    let (mut config, display) = config(arguments, &map, &report)?;
+    let (mut config, campaign) = config(arguments, &map, &report)?;
     if let Some(method) = arguments.method {
         config.method = method.into();
     }
-    let identified = mapper_identify::identify_recording(&report.recording, &config)
+    let display = campaign.as_ref().map(|campaign| campaign.display.clone()).unwrap_or_default();
+    let (recording, config, zero) = match &campaign {
+        Some(campaign) => zero::apply(report.recording, config, campaign),
+        None => (report.recording, config, Zero::NotAsked),
+    };
+    let identified = mapper_identify::identify_recording(&recording, &config)
         .map_err(|error| Failure::new(Code::BadRecording, error))?;
     let thermal = identified.thermal;
     let points = identified.points.into_iter().filter_map(Result::ok).collect();
-    let points = mapper_score::score(&path, &report.recording.steps, points).map_err(bad_recording)?;
+    let points = mapper_score::score(&path, &recording.steps, points).map_err(bad_recording)?;
     if arguments.json {
         return output::print_json(&json!({
             "recording": path,
             "reference": config.reference,
             "points": points,
             "thermal": thermal,
+            "zero": zero.json(),
             "score": mapper_score::summarise(&points),
             "recording_warnings": report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
         }));
@@ -44,6 +51,7 @@ pub fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
     if let Some(thermal) = &thermal {
         text.push_str(&thermal_text::thermal_text(thermal));
     }
+    text.push_str(&zero.text());
     for warning in &report.warnings {
         text.push_str(&format!("recording: {warning}\n"));
     }
@@ -81,10 +89,10 @@ fn config(
     arguments: &IdentifyArguments,
     map: &ChannelMap,
     report: &ReadReport,
-) -> Result<(IdentifyConfig, DisplayUnits), Failure> {
+) -> Result<(IdentifyConfig, Option<Campaign>), Failure> {
     if let Some(path) = &arguments.campaign {
         let campaign = mapper_campaign::load(path).map_err(Failure::of_campaign)?;
-        return Ok((assembly_line::identification(&campaign), campaign.display));
+        return Ok((assembly_line::identification(&campaign), Some(campaign)));
     }
     if let Some(machine) = &map.machine {
         let config = IdentifyConfig {
@@ -99,14 +107,14 @@ fn config(
             noise_colour: map.noise_colour.unwrap_or_default(),
             ..IdentifyConfig::default()
         };
-        return Ok((config, DisplayUnits::default()));
+        return Ok((config, None));
     }
     if let Some(text) = &report.campaign_text {
         let origin = arguments.recording.join(run_directory::CAMPAIGN);
         let campaign = mapper_campaign::check(text, &origin, &read_beside).map_err(|findings| {
             Failure::of_campaign(mapper_campaign::CampaignError::Mistakes(Box::new(findings)))
         })?;
-        return Ok((assembly_line::identification(&campaign), campaign.display));
+        return Ok((assembly_line::identification(&campaign), Some(campaign)));
     }
     Err(Failure::new(
         Code::BadInput,

@@ -12,7 +12,7 @@ use crate::{assembly_line, interrupt, output, run_directory};
 use mapper_campaign::Campaign;
 use mapper_core::{Backend, Plan, UnpacedClock};
 use mapper_record::{RecordingHeader, RecordingWriter};
-use mapper_runner::{PlanSteps, RunEnd, RunError, RunObserver, Runner, StepSource};
+use mapper_runner::{PlanSteps, RunEnd, RunError, RunObserver, Runner, Soak, Soaked, StepSource};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -157,6 +157,15 @@ fn drive(
     let stop = interrupt::stop_flag()?;
     let guards = assembly_line::guards(campaign, &backend.describe().channels);
     let mut progress = Progress::new(plan);
+    let mut soaked;
+    let steps: &mut dyn StepSource = match campaign.zero {
+        None => steps,
+        Some(zero) => {
+            let soak = Soak { duration_s: zero.soak_s, oil_temperature_k: zero.oil_temperature_k };
+            soaked = Soaked::new(steps, soak);
+            &mut soaked
+        }
+    };
     let end = {
         let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut progress];
         Runner {

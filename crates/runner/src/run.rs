@@ -135,10 +135,8 @@ impl Runner<'_> {
             ..setpoints(first)
         };
         self.backend.set(&at_rest)?;
-        let message = format!(
-            "soak for {:.0} s: air off, oil at {:.2} K",
-            soak.duration_s, soak.oil_temperature_k
-        );
+        let message =
+            format!("soak for {:.0} s: air off, oil at {:.2} K", soak.duration_s, soak.oil_temperature_k);
         self.observer.on_event(&Event { t_s: *now_s, kind: EventKind::SoakStarted, message })?;
         let end_s = *now_s + soak.duration_s;
         self.watch(now_s, end_s, false)?;

@@ -17,3 +17,4 @@ mod recordings;
 mod sequences;
 mod shipped_campaign;
 mod sources;
+mod zero;

@@ -12,9 +12,9 @@ mod tolerances;
 mod zero;
 
 pub(crate) use choices::{
-    ChoiceName, ConvectionName, DisplayFile, DriftFile, EfficiencyName, FormatName, IdentificationFile, JointFile,
-    MethodName, NamedRepeats, OnDriftName, OrderName, OutputsFile, RepeatedJumpFile, RepeatsFile, ReportFile,
-    WindowFile,
+    ChoiceName, ConvectionName, DisplayFile, DriftFile, EfficiencyName, FormatName, IdentificationFile,
+    JointFile, MethodName, NamedRepeats, OnDriftName, OrderName, OutputsFile, RepeatedJumpFile, RepeatsFile,
+    ReportFile, WindowFile,
 };
 pub(crate) use conditions::{
     BoundaryFile, FollowerName, LimitsFile, NamedReference, ReferenceFile, TimingFile,

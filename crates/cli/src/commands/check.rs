@@ -31,7 +31,8 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     }
     let timing = &campaign.timing;
     let soak_s = campaign.zero.map_or(0.0, |zero| zero.soak_s);
-    let duration_s = soak_s + timing.warm_up_s + campaign.points.len() as f64 * timing.dwell_s + timing.cool_down_s;
+    let duration_s =
+        soak_s + timing.warm_up_s + campaign.points.len() as f64 * timing.dwell_s + timing.cool_down_s;
     if arguments.json {
         return output::print_json(&json!({
             "campaign": campaign.name,

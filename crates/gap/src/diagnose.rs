@@ -224,7 +224,7 @@ fn weigh(study: &Study, calibration: &Calibration, null: &Fit, fits: &[Fit], lef
             effects: names(study, fit),
             probability: inside * weights[place + 1] / total,
             parameters: estimates(study, calibration, fit),
-            equivalent: if place == 0 { equivalents(study, calibration, fits, &scores) } else { Vec::new() },
+            equivalent: if place == 0 && named { equivalents(study, calibration, fits, &scores) } else { Vec::new() },
         })
         .collect();
     Weighed { candidates, none, outside_probability: outside, outside, named, scores }

@@ -10,11 +10,11 @@ use crate::file::{
     BoundaryFile, CampaignFile, DisplayFile, FormatName, GeometryFile, GridFile, IdentificationFile,
     LimitsFile, MachineFile, MapFile, MethodName, NamedReference, NamedRepeats, NusseltFile, OnDriftName,
     OrderName, OutputsFile, PointFile, ReferenceFile, RepeatsFile, ReportFile, SensorsFile, TapName,
-    TimingFile, WindowFile,
+    TimingFile, TolerancesFile, WindowFile,
 };
 use crate::tree::{Step, steps};
 use crate::units::{Dimension, Fraction, Quantity};
-use mapper_core::{Channel, DeclaredUncertainty, Method, OperatingPoint, ReferenceState};
+use mapper_core::{Channel, DeclaredUncertainty, Method, ModelTolerances, OperatingPoint, ReferenceState};
 use mapper_physics::params::{BoundaryConditions, Params};
 use std::collections::{BTreeMap, HashSet};
 use std::io;
@@ -53,6 +53,7 @@ pub(crate) fn build(
         description: file.description,
         boundary: boundary(&file.boundary),
         sensors: sensors(&file.sensors),
+        tolerances: tolerances(file.tolerances.unwrap_or_default()),
         backend: BackendChoice { name, settings },
         timing: timing(&file.timing),
         identification: identification(
@@ -94,6 +95,21 @@ fn or<D: Dimension>(quantity: Option<Quantity<D>>, default: f64) -> f64 {
 /// Overwrites a default with what the file says.
 fn set<D: Dimension>(target: &mut f64, quantity: Option<Quantity<D>>) {
     *target = or(quantity, *target);
+}
+
+fn tolerances(file: TolerancesFile) -> ModelTolerances {
+    let mut tolerances = ModelTolerances::default();
+    set(&mut tolerances.flow_meter_gain_ratio, file.flow_meter_gain);
+    set(&mut tolerances.flow_map_ratio, file.flow_map);
+    set(&mut tolerances.compressor_efficiency_ratio, file.compressor_efficiency);
+    set(&mut tolerances.efficiency_shape_ratio, file.efficiency_shape);
+    set(&mut tolerances.turbine_efficiency_ratio, file.turbine_efficiency);
+    set(&mut tolerances.valve_area_ratio, file.valve_area);
+    set(&mut tolerances.convection_ratio, file.convection);
+    set(&mut tolerances.external_convection_ratio, file.external_convection);
+    set(&mut tolerances.oil_conductance_ratio, file.oil_conductance);
+    set(&mut tolerances.actuator_lag_s, file.actuator_lag);
+    tolerances
 }
 
 fn set_number(target: &mut f64, number: Option<f64>) {

@@ -1,6 +1,6 @@
 //! A checked campaign, units resolved and defaults filled in.
 
-use mapper_core::{Channel, DeclaredUncertainty, Method, OperatingPoint, ReferenceState};
+use mapper_core::{Channel, DeclaredUncertainty, Method, ModelTolerances, OperatingPoint, ReferenceState};
 use mapper_physics::params::{BoundaryConditions, Params};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -21,6 +21,8 @@ pub struct Campaign {
     pub boundary: BoundaryConditions,
     /// Declared uncertainty of each channel that has a sensor.
     pub sensors: BTreeMap<Channel, SensorDeclaration>,
+    /// Declared tolerances of the nominal model.
+    pub tolerances: ModelTolerances,
     /// The rig.
     pub backend: BackendChoice,
     /// The grid in the order of the file, no point twice: `points` as listed, or for each opening all speeds.

@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::exit_code;
+use crate::gap_arguments::GapArguments;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mapper_campaign::units::{Kind, parse};
 use mapper_core::{Method, OperatingPoint};
@@ -35,6 +36,8 @@ pub enum Command {
     Nightly(NightlyArguments),
     /// List, filter and draw what the nightly runs gave
     History(HistoryArguments),
+    /// Diagnose the gap between nominal model and rig, and check that diagnosis on withheld data
+    Gap(GapArguments),
     /// Redo the paper's figures 5 to 10 and 12 on the nominal model, beside what the paper states
     Reproduce(ReproduceArguments),
 }

@@ -9,6 +9,7 @@ mod commands;
 mod exit_code;
 mod failure;
 mod history_picture;
+mod gap_arguments;
 mod interrupt;
 mod nightly_run;
 mod observers;

@@ -1,11 +1,16 @@
 //! The one place that names plug-ins.
 
+use crate::exit_code::Code;
+use crate::failure::Failure;
 use mapper_backends::{replay, virtual_lab};
 use mapper_campaign::Campaign;
 use mapper_core::{Backend, BackendError};
+use mapper_effects::ScriptEffect;
+use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What a backend is made from.
 pub struct BackendContext<'a> {
@@ -42,6 +47,32 @@ pub fn make_backend(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, Ba
     }
 }
 
+/// Every effect of the catalogue.
+pub fn effects() -> Vec<Arc<dyn Effect>> {
+    mapper_effects::catalogue()
+}
+
+/// Every effect of the catalogue, and those that scripts define.
+///
+/// # Errors
+/// A script that cannot be read, is no effect, or takes the name of another.
+pub fn effects_with(scripts: &[PathBuf]) -> Result<Vec<Arc<dyn Effect>>, Failure> {
+    let mut effects = effects();
+    for path in scripts {
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| Failure::new(Code::Failure, format!("{}: {error}", path.display())))?;
+        let scripted = ScriptEffect::new(&text, path).map_err(|error| Failure::new(Code::BadInput, error))?;
+        let id = &scripted.info().id;
+        if effects.iter().any(|effect| effect.info().id == *id) {
+            let message =
+                format!("{}: there is an effect `{id}` already; choose another name", path.display());
+            return Err(Failure::new(Code::BadInput, message));
+        }
+        effects.push(Arc::new(scripted));
+    }
+    Ok(effects)
+}
+
 fn make_virtual_lab(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, BackendError> {
     let campaign = context.campaign;
     let nominal = virtual_lab::NominalRig {
@@ -54,6 +85,8 @@ fn make_virtual_lab(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, Ba
             .iter()
             .filter_map(|(channel, sensor)| Some((*channel, sensor.static_tap_pipe_diameter_m?)))
             .collect(),
+        tolerances: campaign.tolerances,
+        effects: effects(),
         seed: campaign.seed,
     };
     let settings = virtual_lab::read_settings(&campaign.backend.settings, nominal)?;

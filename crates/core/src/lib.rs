@@ -16,6 +16,7 @@ mod declared_uncertainty;
 mod event;
 mod identified;
 mod map;
+mod model_tolerances;
 mod operating_point;
 mod plan;
 mod recording;
@@ -32,6 +33,7 @@ pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
 };
 pub use map::{CompressorMap, MapPoint, SpeedLine};
+pub use model_tolerances::ModelTolerances;
 pub use operating_point::OperatingPoint;
 pub use plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
 pub use recording::{Recording, RecordingError, Series};

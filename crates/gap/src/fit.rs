@@ -261,17 +261,18 @@ impl Normal {
         Normal { matrix, right }
     }
 
-    /// The step of the unknowns that are free, and what it promises in the cost.
-    fn solve(&self, free: &[bool]) -> Option<(DVector<f64>, f64)> {
-        let kept: Vec<usize> = (0..free.len()).filter(|i| free[*i]).collect();
-        let matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| self.matrix[(kept[i], kept[j])]);
-        let right = DVector::from_fn(kept.len(), |i, _| self.right[kept[i]]);
+    /// The step with some unknowns held to given steps, and what it promises in the cost.
+    fn solve(&self, held: &[Option<f64>]) -> Option<(DVector<f64>, f64)> {
+        let free: Vec<usize> = (0..held.len()).filter(|i| held[*i].is_none()).collect();
+        let mut step = DVector::from_fn(held.len(), |i, _| held[i].unwrap_or(0.0));
+        let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| self.matrix[(free[i], free[j])]);
+        let pushed = &self.matrix * &step;
+        let right = DVector::from_fn(free.len(), |i, _| self.right[free[i]] - pushed[free[i]]);
         let part = matrix.cholesky()?.solve(&right);
-        let promised = part.dot(&right);
-        let mut step = DVector::zeros(free.len());
-        for (place, index) in kept.iter().enumerate() {
+        for (place, index) in free.iter().enumerate() {
             step[*index] = part[place];
         }
+        let promised = 2.0 * step.dot(&self.right) - step.dot(&(&self.matrix * &step));
         Some((step, promised))
     }
 
@@ -294,40 +295,53 @@ fn covariance_of_effects(cholesky: &Cholesky<f64, Dyn>, nuisances: usize) -> DMa
     inverse.view((nuisances, nuisances), (effects, effects)).into_owned()
 }
 
-/// A step that stays within the parameters' ranges: those at a bound that would leave it are held there.
+/// Six sigma of a declared tolerance is no tolerance any more.
+const MOST_SIGMAS: f64 = 6.0;
+/// Most typical steps an effect moves in one iteration: effects bend.
+const MOST_STEPS: f64 = 2.0;
+
+/// The step to the least cost within all bounds: unknowns that would leave theirs are held there, and the others
+/// solved for again.
 fn bounded_step(
     normal: &Normal,
     hypothesis: &Hypothesis,
     coordinates: &[Coordinate],
 ) -> Option<(DVector<f64>, f64)> {
-    let n = hypothesis.nuisances.len();
     let values = parameters(hypothesis);
-    let mut free = vec![true; n + coordinates.len()];
-    loop {
-        let (step, promised) = normal.solve(&free)?;
-        let leaves = coordinates.iter().enumerate().position(|(j, coordinate)| {
-            let at = coordinate.of(values[j]);
-            let held = coordinate.of(coordinate.value(at + step[n + j].signum() * 1e-6));
-            free[n + j] && step[n + j] != 0.0 && (held - at).abs() < 1e-9
-        });
-        match leaves {
-            Some(j) => free[n + j] = false,
-            None => return Some((step, promised)),
+    // Room below and above.
+    let mut room: Vec<(f64, f64)> =
+        hypothesis.nuisances.iter().map(|u| (-MOST_SIGMAS - u, MOST_SIGMAS - u)).collect();
+    room.extend(coordinates.iter().zip(&values).map(|(coordinate, value)| {
+        let at = coordinate.of(*value);
+        let ends = [coordinate.of(coordinate.low), coordinate.of(coordinate.high)];
+        (
+            (ends[0].min(ends[1]) - at).clamp(-MOST_STEPS, 0.0),
+            (ends[0].max(ends[1]) - at).clamp(0.0, MOST_STEPS),
+        )
+    }));
+    let mut held: Vec<Option<f64>> = vec![None; room.len()];
+    for _ in 0..room.len() {
+        let (step, promised) = normal.solve(&held)?;
+        let outside = |i: usize| step[i] < room[i].0 - 1e-9 || step[i] > room[i].1 + 1e-9;
+        let leaving: Vec<usize> = (0..room.len()).filter(|i| held[*i].is_none() && outside(*i)).collect();
+        if leaving.is_empty() {
+            return Some((step, promised));
+        }
+        for i in leaving {
+            held[i] = Some(step[i].clamp(room[i].0.min(0.0), room[i].1.max(0.0)));
         }
     }
+    None
 }
 
 fn moved(hypothesis: &Hypothesis, step: &DVector<f64>, share: f64, coordinates: &[Coordinate]) -> Hypothesis {
     let n = hypothesis.nuisances.len();
     let mut moved = hypothesis.clone();
     for (i, nuisance) in moved.nuisances.iter_mut().enumerate() {
-        // Six sigma of a declared tolerance is no tolerance any more.
-        *nuisance = (*nuisance + share * step[i]).clamp(-6.0, 6.0);
+        *nuisance = (*nuisance + share * step[i]).clamp(-MOST_SIGMAS, MOST_SIGMAS);
     }
     for (j, (coordinate, value)) in coordinates.iter().zip(parameters(hypothesis)).enumerate() {
-        // At most two typical steps at once: effects bend.
-        let change = (share * step[n + j]).clamp(-2.0, 2.0);
-        set_parameter(&mut moved, j, coordinate.value(coordinate.of(value) + change));
+        set_parameter(&mut moved, j, coordinate.value(coordinate.of(value) + share * step[n + j]));
     }
     moved
 }

@@ -36,6 +36,8 @@ pub enum NuisanceKind {
     CompressorEfficiency,
     /// Efficiency of the turbine.
     TurbineEfficiency,
+    /// Drop of the gas temperature through the turbine against the power at the shaft.
+    TurbineDrop,
     /// Area of the valve.
     ValveArea,
     /// Convection inside the compressor housing.
@@ -67,6 +69,9 @@ pub struct Nuisance {
 
 /// Ambient temperature is measured somewhere in the cell, not at each wall, K.
 const AMBIENT_SIGMA_K: f64 = 1.0;
+/// The gas behind a turbine swirls and is not mixed, and what the shaft gets is less than what the gas gives by what
+/// bearings take: T4 tells the turbine's work within this, and no more.
+const TURBINE_DROP_RATIO: f64 = 0.03;
 /// The rig may not have rested before the recording, K.
 const START_SIGMA_K: f64 = 5.0;
 /// Clocks of one rig agree within a fraction of a sample, s.
@@ -81,6 +86,7 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
         (K::FlowMap, t.flow_map_ratio),
         (K::CompressorEfficiency, t.compressor_efficiency_ratio),
         (K::TurbineEfficiency, t.turbine_efficiency_ratio),
+        (K::TurbineDrop, TURBINE_DROP_RATIO),
         (K::ValveArea, t.valve_area_ratio),
         (K::Convection, t.convection_ratio),
         (K::ExternalConvection, t.external_convection_ratio),
@@ -106,6 +112,8 @@ pub struct Circumstances {
     pub start_tc_k: f64,
     /// Turbine housing above rest at the start, K.
     pub start_tt_k: f64,
+    /// Drop of temperature through the turbine larger by, ratio.
+    pub t4_drop_ratio: f64,
     /// Coefficients of the efficiency map's shape.
     pub shape: [f64; SHAPES],
     /// Clocks late by, s.
@@ -122,6 +130,7 @@ pub fn apply(kind: NuisanceKind, value: f64, rig: &mut Rig, circumstances: &mut 
         K::FlowMap => params.compressor.flow_scale_ratio *= 1.0 + value,
         K::CompressorEfficiency => params.compressor.efficiency_scale_ratio *= 1.0 + value,
         K::TurbineEfficiency => params.turbine.peak_efficiency *= 1.0 + value,
+        K::TurbineDrop => circumstances.t4_drop_ratio += value,
         K::ValveArea => params.outlet.valve_area_m2 *= 1.0 + value,
         K::Convection => params.compressor.nusselt_coefficient *= 1.0 + value,
         K::ExternalConvection => params.external_convection_ratio *= 1.0 + value,

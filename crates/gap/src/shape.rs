@@ -34,7 +34,11 @@ fn basis(speed_corrected_rpm: f64, surge_position_ratio: f64) -> [f64; SHAPES] {
     let speed = speed_corrected_rpm / 100_000.0;
     let position = surge_position_ratio.clamp(0.0, 1.0);
     let way = (1.0 - position * position).sqrt();
-    let bump = |away: f64, width: f64| (-0.5 * (away / width) * (away / width)).exp();
+    // Beyond four widths a bump is below 4e-4: not worth an exponential.
+    let bump = |away: f64, width: f64| {
+        let widths = away / width;
+        if widths.abs() > 4.0 { 0.0 } else { (-0.5 * widths * widths).exp() }
+    };
     let over_speed = SPEEDS.map(|at| bump(speed - at, SPEED_WIDTH));
     let over_way = WAYS.map(|at| bump(way - at, WAY_WIDTH));
     std::array::from_fn(|i| over_speed[i / WAYS.len()] * over_way[i % WAYS.len()])

@@ -58,6 +58,19 @@ pub struct Prediction {
     pub slopes: Vec<f64>,
 }
 
+/// The model at the end of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PointState {
+    /// Shaft speed, rpm.
+    pub speed_rpm: f64,
+    /// Isentropic efficiency, fraction.
+    pub efficiency: f64,
+    /// Heat-transfer coefficient, W/(m2 K).
+    pub h_w_m2k: f64,
+    /// Place on the speed line: 0 choke, 1 surge.
+    pub surge_position_ratio: f64,
+}
+
 /// Why no prediction can be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PredictError {
@@ -117,7 +130,8 @@ impl Study {
         model: Model,
         effects: Vec<Arc<dyn Effect>>,
     ) -> Result<Study, InputError> {
-        let nominal = Rig::new(model);
+        let mut nominal = Rig::new(model);
+        nominal.instruments.p3_lag_s = declared.tolerances.actuator_lag_s;
         let first_s = table.t_s.first().copied().unwrap_or(0.0);
         let steps: Vec<StudyStep> = recording
             .steps
@@ -258,6 +272,12 @@ impl Study {
                 } else {
                     true_value(*channel, prepared, state, outputs).unwrap_or(f64::NAN)
                 };
+                // T4 is what is left of T3' after a drop that is known to a few per cent only.
+                let seen = if *channel == Channel::T4 {
+                    seen - circumstances.t4_drop_ratio * (outputs.turbine.t3_prime_k - outputs.turbine.t4_k)
+                } else {
+                    seen
+                };
                 let reading = followers[output].read(t_s, seen);
                 let Some((step, block)) = place else { continue };
                 let Some(row) = self.rows[step][block][output] else { continue };
@@ -275,6 +295,30 @@ impl Study {
             }
         }
         Ok(Prediction { values, slopes })
+    }
+
+    /// The model at the end of each step.
+    ///
+    /// # Errors
+    /// [`PredictError`].
+    pub fn points(&self, hypothesis: &Hypothesis) -> Result<Vec<PointState>, PredictError> {
+        let (rig, circumstances, inputs) = self.rig(hypothesis)?;
+        let start = self.start(&rig, &inputs, &circumstances)?;
+        let times_s: Vec<f64> = self
+            .steps
+            .iter()
+            .map(|step| step.blocks.last().map_or(step.marker.end_s, |block| block.mean_s + block.spread_s))
+            .collect();
+        let mut points = vec![PointState::default(); times_s.len()];
+        drive(&rig.model, &inputs, start, &self.grid, &times_s, |index, _, state, outputs| {
+            points[index] = PointState {
+                speed_rpm: state.shaft_speed_rpm(),
+                efficiency: outputs.efficiency,
+                h_w_m2k: outputs.h_w_m2k,
+                surge_position_ratio: outputs.surge_position_ratio,
+            };
+        })?;
+        Ok(points)
     }
 
     /// Slopes of predicted values, from block to block.

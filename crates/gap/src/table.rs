@@ -95,7 +95,9 @@ pub struct Block {
 
 /// Length of blocks after a jump: up to so many seconds, blocks of so many seconds.
 const LENGTHS_S: [(f64, f64); 6] =
-    [(1.0, 0.1), (3.0, 0.2), (6.0, 0.5), (14.0, 1.0), (30.0, 2.0), (f64::INFINITY, 5.0)];
+    [(1.0, 0.1), (3.0, 0.2), (6.0, 1.0), (14.0, 2.0), (30.0, 4.0), (f64::INFINITY, LONGEST_S)];
+/// Length of blocks where only metal moves, s.
+const LONGEST_S: f64 = 10.0;
 
 /// Blocks from `start_s` to `end_s`; fine after the jump at `start_s` when there is one.
 pub fn blocks(table: &Table, start_s: f64, end_s: f64, jumped: bool) -> Vec<Block> {
@@ -104,9 +106,9 @@ pub fn blocks(table: &Table, start_s: f64, end_s: f64, jumped: bool) -> Vec<Bloc
     while at_s < end_s - 1e-9 {
         let since_s = at_s - start_s;
         let length_s = if jumped {
-            LENGTHS_S.iter().find(|(until_s, _)| since_s < until_s - 1e-9).map_or(5.0, |(_, l)| *l)
+            LENGTHS_S.iter().find(|(until_s, _)| since_s < until_s - 1e-9).map_or(LONGEST_S, |(_, l)| *l)
         } else {
-            5.0
+            LONGEST_S
         };
         let length_s = length_s.max(table.interval_s);
         // What is left over at the end goes to the last block.

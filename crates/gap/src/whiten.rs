@@ -31,7 +31,7 @@ impl Linearised {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
         let changes = changes(study, &nothing, &base);
-        let factors = Arc::new(factors(study, &changes));
+        let factors = Arc::new(factors(study, &nothing, &changes));
         Ok(Linearised::with(study, base, changes, factors))
     }
 
@@ -60,6 +60,11 @@ impl Linearised {
         for (group, factor) in study.groups.iter().zip(self.factors.iter()) {
             factor.whiten(&mut values[group.rows.clone()]);
         }
+    }
+
+    /// Whitens values of one group, in place.
+    pub fn whiten_group(&self, group: usize, values: &mut [f64]) {
+        self.factors[group].whiten(values);
     }
 
     /// Whitened residual of a prediction.
@@ -131,7 +136,21 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-fn factors(study: &Study, changes: &[Vec<f64>]) -> Vec<Factor> {
+/// Beyond this place on the speed line a jump leads along or across the surge line, where flow and outlet pressure
+/// during the jump hang on everything: they say nothing there.
+const NEAR_SURGE: f64 = 0.975;
+/// Length of a jump, s.
+const JUMP_S: f64 = 3.0;
+
+/// For each step, whether its jump starts or ends near surge.
+fn surge_jumps(study: &Study, nothing: &Hypothesis) -> Vec<bool> {
+    let Ok(points) = study.points(nothing) else { return vec![false; study.steps.len()] };
+    let near = |step: usize| points.get(step).is_none_or(|p| p.surge_position_ratio > NEAR_SURGE);
+    (0..study.steps.len()).map(|step| near(step) || (step > 0 && near(step - 1))).collect()
+}
+
+fn factors(study: &Study, nothing: &Hypothesis, changes: &[Vec<f64>]) -> Vec<Factor> {
+    let surge_jumps = surge_jumps(study, nothing);
     let inputs = study.inputs.noise();
     // Response of every value to a unit of each input, from that of its offset.
     let responses: Vec<(f64, f64, Option<&Vec<f64>>, f64)> = DRIVERS
@@ -170,6 +189,13 @@ fn factors(study: &Study, changes: &[Vec<f64>]) -> Vec<Factor> {
                             let apart_s = (blocks[i].mean_s - blocks[j].mean_s).abs();
                             covariance[(i, j)] += gain[i] * gain[j] * (-apart_s / correlation_s).exp();
                         }
+                    }
+                }
+            }
+            if surge_jumps[group.step] && matches!(OUTPUTS[group.output], Channel::CompressorFlow | Channel::P2) {
+                for (i, block) in blocks.iter().enumerate() {
+                    if study.steps[group.step].jumped && block.since_jump_s < JUMP_S {
+                        covariance[(i, i)] += 1e4 * sigma * sigma;
                     }
                 }
             }

@@ -197,3 +197,55 @@ impl<const N: usize, I: Inputs> OdeSystem<N> for DrivenSystem<'_, I> {
         Some(std::array::from_fn(|i| (moved[i] - rates[i]) / ahead_s))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{Simulator, Watch};
+    use crate::steady::hold_speed;
+
+    /// A jump of P3 on the frozen grid against the adaptive integrator at a tight tolerance.
+    #[test]
+    fn the_frozen_grid_follows_the_adaptive_integrator() {
+        let model = Model::nominal();
+        let boundary = BoundaryConditions { valve_opening_ratio: 0.8, ..BoundaryConditions::default() };
+        let start = hold_speed(&model, 110e3, &boundary).unwrap().state;
+        let target = hold_speed(&model, 70e3, &boundary).unwrap().boundary;
+        let times_s: Vec<f64> = (1..=240).map(|i| 0.5 * f64::from(i)).collect();
+        let grid = FrozenGrid::new(0.0, 120.0, &[0.0], &times_s);
+        let mut driven = Vec::new();
+        drive(&model, &target, start, &grid, &times_s, |_, _, state, outputs| driven.push((*state, outputs.t2_k)))
+            .unwrap();
+        let mut place = 0;
+        let mut simulator = Simulator::new(&model, 0.0, start, 1e-8, Watch::default());
+        let check = |t_s: f64, state: &State, outputs: &Outputs| {
+            let (here, t2_k) = driven[place];
+            // A tenth of the noise of one sample on a rig: 3 rpm, 0.01 K.
+            assert!((here.shaft_speed_rpm() - state.shaft_speed_rpm()).abs() < 3.0, "N at {t_s} s");
+            assert!((here.tc_k - state.tc_k).abs() < 0.01, "Tc at {t_s} s");
+            assert!((t2_k - outputs.t2_k).abs() < 0.01, "T2 at {t_s} s");
+            place += 1;
+        };
+        simulator.run_to(120.0, &target, times_s.iter().copied(), check, |_| {}).unwrap();
+    }
+
+    #[test]
+    fn settling_finds_the_steady_state() {
+        let model = Model::nominal();
+        let steady =
+            hold_speed(&model, 90e3, &BoundaryConditions { valve_opening_ratio: 0.8, ..BoundaryConditions::default() })
+                .unwrap();
+        let guess = State { tc_k: steady.state.tc_k - 30.0, tt_k: steady.state.tt_k + 60.0, ..steady.state };
+        let settled = settle(&model, &steady.boundary, guess).unwrap();
+        assert!((settled.tc_k - steady.state.tc_k).abs() < 1e-3, "{} K", settled.tc_k);
+        assert!((settled.tt_k - steady.state.tt_k).abs() < 1e-3, "{} K", settled.tt_k);
+    }
+
+    #[test]
+    fn inputs_beyond_the_model_are_an_error_and_no_panic() {
+        let model = Model::nominal();
+        let steady = hold_speed(&model, 90e3, &BoundaryConditions::default()).unwrap();
+        let bad = BoundaryConditions { t3_k: f64::NAN, ..steady.boundary };
+        assert!(settle(&model, &bad, steady.state).is_err());
+    }
+}

@@ -15,3 +15,15 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.instruments.p3_lag_s += values[0] - NOMINAL_P3_LAG_S,
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    #[test]
+    fn the_lag_is_the_one_asked_for() {
+        assert!((Instant::with(&effect(), &[1.2]).rig.instruments.p3_lag_s - 1.2).abs() < 1e-12);
+        assert_eq!(Instant::nominal().rig.instruments.p3_lag_s, 0.3);
+    }
+}

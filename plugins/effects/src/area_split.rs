@@ -14,3 +14,19 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.model.params.compressor.alpha_area_ratio += values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{CP1_J_KGK, Instant, T1_K};
+
+    /// Eq. 1 by hand: 12 % of 29e-3 m2, the housing 42 K warmer than the inlet.
+    #[test]
+    fn gas_before_the_wheel_takes_heat_from_its_share_of_the_area() {
+        let (nominal, warm) = (Instant::nominal(), Instant::with(&effect(), &[0.12]));
+        let heat_w = warm.outputs.h_w_m2k * 0.12 * 29e-3 * (warm.state.tc_k - T1_K);
+        let rise_k = heat_w / (warm.outputs.flow_kg_s * CP1_J_KGK);
+        assert!((warm.outputs.t1_prime_k - T1_K - rise_k).abs() < 1e-9, "{rise_k} K");
+        assert_eq!(nominal.outputs.t1_prime_k, T1_K);
+    }
+}

@@ -14,3 +14,18 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.model.params.bearing_friction_w_s2 += values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    /// 1.5e-6 (110e3 pi/30)^2 = 199.04 W.
+    #[test]
+    fn power_goes_with_the_square_of_speed() {
+        let at = Instant::with(&effect(), &[1.5e-6]);
+        assert!((at.outputs.friction_power_w - 199.04).abs() < 0.01, "{}", at.outputs.friction_power_w);
+        let balance_w = |at: &Instant| at.rig.model.prepare(&at.boundary).shaft_balance_w(&at.outputs);
+        assert!((balance_w(&Instant::nominal()) - balance_w(&at) - 199.04).abs() < 0.01);
+    }
+}

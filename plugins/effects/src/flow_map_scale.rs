@@ -14,3 +14,16 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.model.params.compressor.flow_scale_ratio *= values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    #[test]
+    fn flow_is_multiplied_at_equal_efficiency() {
+        let (nominal, other) = (Instant::nominal().outputs, Instant::with(&effect(), &[1.03]).outputs);
+        assert!((other.flow_kg_s / nominal.flow_kg_s - 1.03).abs() < 1e-12);
+        assert_eq!(other.efficiency, nominal.efficiency);
+    }
+}

@@ -15,3 +15,16 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.instruments.path_mut(Channel::CompressorFlow).gain_ratio *= values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    #[test]
+    fn the_reading_is_multiplied_and_the_flow_is_not() {
+        let at = Instant::with(&effect(), &[1.03]);
+        assert!((at.reading(Channel::CompressorFlow) / at.outputs.flow_kg_s - 1.03).abs() < 1e-12);
+        assert_eq!(at.outputs.flow_kg_s, Instant::nominal().outputs.flow_kg_s);
+    }
+}

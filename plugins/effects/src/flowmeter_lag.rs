@@ -15,3 +15,19 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.instruments.path_mut(Channel::CompressorFlow).lag_s += values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+    use mapper_physics::instruments::ChannelFollower;
+
+    /// A flow that rises by 1 g/s each second is read 2 g/s low by a meter of 2 s, once it has settled.
+    #[test]
+    fn a_rising_flow_is_read_late() {
+        let at = Instant::with(&effect(), &[2.0]);
+        let mut meter = ChannelFollower::new(*at.rig.instruments.path(Channel::CompressorFlow));
+        let readings = (0..600).map(|i| meter.read(f64::from(i) * 0.1, f64::from(i) * 1e-4));
+        assert!((readings.last().unwrap() - (599e-4 - 2e-3)).abs() < 1e-12);
+    }
+}

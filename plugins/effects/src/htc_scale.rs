@@ -14,3 +14,15 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.model.params.compressor.nusselt_coefficient *= values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    #[test]
+    fn h_is_multiplied() {
+        let ratio = Instant::with(&effect(), &[1.2]).outputs.h_w_m2k / Instant::nominal().outputs.h_w_m2k;
+        assert!((ratio - 1.2).abs() < 1e-12);
+    }
+}

@@ -14,3 +14,28 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.model.params.compressor.humidity_kg_kg += values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{CP1_J_KGK, Instant, T1_K};
+    use mapper_physics::model::Outputs;
+
+    /// The mixture rules themselves, with R = 461.5 and cp = 1850 J/(kg K) of vapour, per kg of moist air: the linear forms
+    /// agree with them within second order, w^2 = 1e-4.
+    #[test]
+    fn constants_are_those_of_the_mixture_and_flow_falls() {
+        let w = 0.01;
+        let (nominal, moist) = (Instant::nominal().outputs, Instant::with(&effect(), &[w]).outputs);
+        let gas_constant = (287.05 + w * 461.5) / (1.0 + w);
+        let flow_ratio = moist.flow_kg_s / nominal.flow_kg_s;
+        assert!((flow_ratio - (287.05 / gas_constant).sqrt()).abs() < 1e-4, "{flow_ratio}");
+        // kappa = R/cp: ln(1 + rise) over ln PR.
+        let kappa = |at: &Outputs| {
+            ((at.t2_prime_k / T1_K - 1.0) * at.efficiency).ln_1p() / at.pressure_ratio.ln()
+        };
+        let cp_ratio = (1.0 + w * 1850.0 / CP1_J_KGK) / (1.0 + w);
+        let expected = gas_constant / 287.05 / cp_ratio;
+        assert!((kappa(&moist) / kappa(&nominal) - expected).abs() < 2e-4);
+    }
+}

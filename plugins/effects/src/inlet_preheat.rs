@@ -14,3 +14,18 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.model.params.compressor.inlet_conductance_w_k += values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{CP1_J_KGK, Instant, T1_K};
+
+    /// 2 W/K between 340 K and the inlet: the housing gives 2 (340 - 298.15) = 83.7 W to the gas.
+    #[test]
+    fn the_housing_gives_what_the_gas_takes() {
+        let (nominal, warm) = (Instant::nominal(), Instant::with(&effect(), &[2.0]));
+        let rise_w = (warm.outputs.t1_prime_k - T1_K) * warm.outputs.flow_kg_s * CP1_J_KGK;
+        assert!((rise_w - 83.7).abs() < 1e-6, "{rise_w} W");
+        assert!(warm.outputs.compressor_heat_w < nominal.outputs.compressor_heat_w);
+    }
+}

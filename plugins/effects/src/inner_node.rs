@@ -21,3 +21,27 @@ pub(crate) fn effect() -> Catalogued {
         },
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+    use mapper_physics::steady;
+
+    #[test]
+    fn at_rest_the_wall_passes_what_the_gas_gives_whatever_its_share_of_the_mass() {
+        let rest = |phi: f64, g_w_k: f64| {
+            let at = Instant::with(&effect(), &[phi, g_w_k]);
+            steady::hold_speed(&at.rig.model, 110e3, &at.boundary).unwrap()
+        };
+        let (thin, thick) = (rest(0.2, 15.0), rest(0.6, 15.0));
+        // The steady state is solved to rounding of some 1e-9 W.
+        assert!((thin.state.tc_k - thick.state.tc_k).abs() < 1e-6);
+        let through_w = 15.0 * (thin.state.inner_k - thin.state.tc_k);
+        assert!((thin.outputs.compressor_heat_w - through_w).abs() < 1e-6 && through_w.abs() > 1.0);
+        // As 1/G goes to 0 the two nodes become one.
+        let one = steady::hold_speed(&Instant::nominal().rig.model, 110e3, &Instant::nominal().boundary).unwrap();
+        let apart_k = |g_w_k: f64| (rest(0.4, g_w_k).state.tc_k - one.state.tc_k).abs();
+        assert!(apart_k(500.0) < 0.06 * apart_k(20.0) && apart_k(20.0) > 0.1);
+    }
+}

@@ -5,6 +5,11 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod catalogued;
+mod script;
+#[cfg(test)]
+mod testing;
+
+pub use script::{HOOK_NAMES, ScriptEffect, ScriptEffectError};
 
 use mapper_physics::effect::Effect;
 use std::sync::Arc;

@@ -15,3 +15,15 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.instruments.path_mut(Channel::P2).offset += values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    #[test]
+    fn the_reading_is_shifted() {
+        let shifted = Instant::with(&effect(), &[-700.0]).reading(Channel::P2);
+        assert!((shifted - Instant::nominal().reading(Channel::P2) - -700.0).abs() < 1e-9);
+    }
+}

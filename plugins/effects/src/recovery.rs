@@ -14,3 +14,20 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.model.params.t2_probe_recovery_ratio += values[0] - 1.0,
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    /// Without recovery the probe reads v^2/(2 cp) less, v from the continuity of an ideal gas in a pipe of 35 mm.
+    #[test]
+    fn a_probe_without_recovery_reads_the_static_temperature() {
+        let at = Instant::with(&effect(), &[0.0]);
+        let density_kg_m3 = at.state.p2_pa / (287.05 * at.outputs.t2_k);
+        let velocity_m_s = at.outputs.flow_kg_s / (density_kg_m3 * std::f64::consts::PI / 4.0 * 0.035 * 0.035);
+        let cp = 1002.5 + 275e-6 * (at.outputs.t2_k - 200.0).powi(2);
+        let missing_k = velocity_m_s * velocity_m_s / (2.0 * cp);
+        assert!((at.outputs.t2_k - at.outputs.t2_probe_k - missing_k).abs() < 1e-9 && missing_k > 0.1);
+    }
+}

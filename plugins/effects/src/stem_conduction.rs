@@ -14,3 +14,17 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.model.params.t2_probe_stem_ratio += values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    #[test]
+    fn the_reading_moves_its_share_of_the_way_to_the_housing() {
+        let at = Instant::with(&effect(), &[0.1]);
+        let expected_k = 0.9 * at.outputs.t2_k + 0.1 * at.state.tc_k;
+        assert!((at.outputs.t2_probe_k - expected_k).abs() < 1e-9);
+        assert_eq!(at.outputs.t2_k, Instant::nominal().outputs.t2_k);
+    }
+}

@@ -15,3 +15,15 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.instruments.path_mut(Channel::T1).offset += values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    #[test]
+    fn the_reading_is_shifted() {
+        let shifted = Instant::with(&effect(), &[0.8]).reading(Channel::T1);
+        assert!((shifted - Instant::nominal().reading(Channel::T1) - 0.8).abs() < 1e-9);
+    }
+}

@@ -15,3 +15,15 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.instruments.path_mut(Channel::Tc).offset += values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    #[test]
+    fn the_reading_is_shifted() {
+        let shifted = Instant::with(&effect(), &[2.0]).reading(Channel::Tc);
+        assert!((shifted - Instant::nominal().reading(Channel::Tc) - 2.0).abs() < 1e-9);
+    }
+}

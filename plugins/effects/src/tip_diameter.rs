@@ -14,3 +14,27 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.model.params.t2_probe_diameter_m += values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+    use mapper_physics::steady;
+    use mapper_physics::simulate::{Simulator, Watch};
+    use mapper_physics::model::State;
+
+    /// A tip that is 10 K off is off by 10/e K after its own time constant: nothing in the machine depends on it.
+    #[test]
+    fn the_tip_forgets_within_its_time_constant() {
+        let mut at = Instant::with(&effect(), &[3e-3]);
+        let rest = steady::hold_speed(&at.rig.model, 110e3, &at.boundary).unwrap();
+        let tau_s = rest.outputs.t2_probe_time_constant_s;
+        at.state = State { t2_tip_k: rest.outputs.t2_k + 10.0, ..rest.state };
+        let mut simulator = Simulator::new(&at.rig.model, 0.0, at.state, 1e-9, Watch::default());
+        simulator.run_to(tau_s, &rest.boundary, [], |_, _, _| {}, |_| {}).unwrap();
+        let off_k = simulator.state().t2_tip_k - rest.outputs.t2_k;
+        // The integration keeps 1e-9 of 300 K.
+        assert!((off_k - 10.0 / std::f64::consts::E).abs() < 1e-4, "{off_k} K after {tau_s} s");
+        assert!(tau_s > 1.0 && tau_s < 12.0);
+    }
+}

@@ -14,3 +14,16 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.model.params.turbine.peak_efficiency *= values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    #[test]
+    fn the_drop_over_the_wheel_is_multiplied() {
+        let drop_k = |at: Instant| at.outputs.turbine.t3_prime_k - at.outputs.turbine.t4_k;
+        let ratio = drop_k(Instant::with(&effect(), &[0.96])) / drop_k(Instant::nominal());
+        assert!((ratio - 0.96).abs() < 1e-12);
+    }
+}

@@ -14,3 +14,16 @@ pub(crate) fn effect() -> Catalogued {
         |values, rig| rig.model.params.outlet.valve_area_m2 *= values[0],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    #[test]
+    fn the_valve_passes_in_proportion() {
+        let flow_kg_s = |at: Instant| at.outputs.valve_flow_kg_s;
+        let ratio = flow_kg_s(Instant::with(&effect(), &[1.05])) / flow_kg_s(Instant::nominal());
+        assert!((ratio - 1.05).abs() < 1e-12);
+    }
+}

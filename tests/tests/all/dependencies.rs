@@ -19,6 +19,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-identify",  &["core", "physics"]),
     ("mapper-assemble",  &["core", "identify"]),
     ("mapper-drift",     &["core", "physics", "identify"]),
+    ("mapper-gap",       &["core", "physics"]),
     ("mapper-score",     &["core", "record"]),
     ("mapper-history",   &[]),
     ("mapper-reproduce", &["core", "physics", "identify", "chart"]),
@@ -26,8 +27,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-backends",  &["core", "physics", "units"]),
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-exporters", &["core", "physics", "chart"]),
+    // Draws cases on the virtual lab; above it, like the program.
+    ("mapper-blind",     &["core", "physics", "campaign", "record", "backends", "effects"]),
     // The program sees all; nothing sees the program.
-    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "assemble", "score", "history", "drift", "reproduce", "backends", "exporters"]),
+    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "drift", "history", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),
@@ -38,6 +41,7 @@ const NEVER_IN_TESTS: &[(&str, &[&str])] = &[
     ("mapper-identify", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
     ("mapper-assemble", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
     ("mapper-drift", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
+    ("mapper-gap", &["mapper-backends", "mapper-blind", "mapper-score", "mapper-cli"]),
 ];
 
 /// Libraries that only some packages may use.

@@ -8,6 +8,7 @@ mod conditions;
 mod grid;
 mod machine;
 mod sensors;
+mod tolerances;
 
 pub(crate) use choices::{
     DisplayFile, DriftFile, FormatName, IdentificationFile, MethodName, NamedRepeats, OnDriftName, OrderName,
@@ -17,6 +18,7 @@ pub(crate) use conditions::{BoundaryFile, LimitsFile, NamedReference, ReferenceF
 pub(crate) use grid::{GridFile, PointFile};
 pub(crate) use machine::{GeometryFile, MachineFile, MapFile, NusseltFile};
 pub(crate) use sensors::{CALIBRATED, SensorsFile, TapName};
+pub(crate) use tolerances::TolerancesFile;
 
 use crate::units::{Fraction, Quantity};
 use schemars::JsonSchema;
@@ -39,6 +41,8 @@ pub(crate) struct CampaignFile {
     pub boundary: BoundaryFile,
     /// Declared uncertainty of each measured channel, by its symbol.
     pub sensors: SensorsFile,
+    /// Declared tolerances of the nominal model; the defaults where none are given.
+    pub tolerances: Option<TolerancesFile>,
     /// The rig, by the name of its backend, with the backend's own settings below it, e.g. `virtual_lab: {}`. What stands there is checked by the backend.
     #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"virtual_lab": {}}))]
     pub backend: BTreeMap<String, serde_json::Value>,

@@ -3,6 +3,12 @@
 mod check;
 mod drift;
 mod history;
+mod gap;
+mod gap_blind;
+mod gap_diagnose;
+mod gap_page;
+mod gap_text;
+mod gap_effects;
 mod identify;
 mod nightly;
 mod plan;
@@ -26,6 +32,7 @@ pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {
         Command::Drift(arguments) => drift::drift(arguments),
         Command::Nightly(arguments) => nightly::nightly(arguments),
         Command::History(arguments) => history::history(arguments),
+        Command::Gap(arguments) => gap::gap(arguments),
         Command::Reproduce(arguments) => reproduce::reproduce(arguments),
     }
 }

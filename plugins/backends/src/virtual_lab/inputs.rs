@@ -1,17 +1,20 @@
 //! The lab's boundary conditions: what the cell gives, and what the actuators make of the commands.
 
 use super::actuator::Actuator;
+use super::weather::Weather;
 use mapper_physics::inputs::Inputs;
 use mapper_physics::params::BoundaryConditions;
 
 /// The air supply never falls to P4 while the model runs: it divides by the turbine's flow.
 pub const LOWEST_EXPANSION_RATIO: f64 = 1.0005;
 
-/// Actuators over fixed conditions of the cell.
-#[derive(Debug, Clone, Copy)]
+/// Actuators over the conditions of the cell.
+#[derive(Debug, Clone)]
 pub struct LabInputs {
     /// T1, P1, P4 and the ambient temperature.
     pub cell: BoundaryConditions,
+    /// How they wander.
+    pub weather: Weather,
     /// Turbine inlet pressure, Pa.
     pub p3: Actuator,
     /// Turbine inlet temperature, K.
@@ -30,13 +33,18 @@ impl LabInputs {
 
 impl Inputs for LabInputs {
     fn at(&self, t_s: f64) -> BoundaryConditions {
-        BoundaryConditions {
-            p3_pa: self.p3.value(t_s).max(self.cell.p4_pa * LOWEST_EXPANSION_RATIO),
+        let mut boundary = BoundaryConditions {
+            p3_pa: self.p3.value(t_s),
             t3_k: self.t3.value(t_s),
             valve_opening_ratio: self.valve.value(t_s),
             oil_temperature_k: self.oil.value(t_s),
             ..self.cell
+        };
+        if !self.weather.is_calm() {
+            boundary = self.weather.over(boundary, t_s);
         }
+        boundary.p3_pa = boundary.p3_pa.max(boundary.p4_pa * LOWEST_EXPANSION_RATIO);
+        boundary
     }
 
     fn next_kink_s(&self, t_s: f64) -> f64 {
@@ -44,6 +52,6 @@ impl Inputs for LabInputs {
     }
 
     fn is_constant_after(&self, t_s: f64) -> bool {
-        self.actuators().iter().all(|actuator| actuator.has_arrived(t_s))
+        self.weather.is_calm() && self.actuators().iter().all(|actuator| actuator.has_arrived(t_s))
     }
 }

@@ -10,7 +10,8 @@ use mapper_core::{
     SampleBatch, Setpoints,
 };
 use mapper_physics::inputs::Inputs;
-use mapper_physics::model::{Outputs, State, rad_s_of_rpm};
+use mapper_physics::instruments::{self, ChannelFollower};
+use mapper_physics::model::{Outputs, PreparedModel, State, rad_s_of_rpm};
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::pressure_tap;
 use mapper_physics::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, Simulator, Watch};
@@ -47,6 +48,7 @@ struct Armed {
     wanted: RigMode,
     tripped: bool,
     sensors: Vec<(Channel, Sensor)>,
+    followers: Vec<ChannelFollower>,
     commands: Option<Setpoints>,
     now_s: f64,
     next_sequence: u64,
@@ -69,11 +71,16 @@ fn channels() -> Vec<Channel> {
 struct Instant<'a> {
     boundary: BoundaryConditions,
     speed_rpm: f64,
-    p2_pa: f64,
     tc_k: f64,
     tt_k: f64,
     /// `None` at standstill.
-    outputs: Option<&'a Outputs>,
+    running: Option<(&'a State, &'a Outputs)>,
+}
+
+impl Instant<'_> {
+    fn outputs(&self) -> Option<&Outputs> {
+        self.running.map(|(_, outputs)| outputs)
+    }
 }
 
 impl VirtualLab {
@@ -119,6 +126,7 @@ impl Backend for VirtualLab {
         self.armed = Some(Armed {
             inputs: LabInputs {
                 cell,
+                weather: settings.weather.clone(),
                 p3: Actuator::at_rest(settings.p3_actuator, cell.p4_pa * LOWEST_EXPANSION_RATIO),
                 t3: Actuator::at_rest(settings.t3_actuator, cell.t3_k),
                 valve: Actuator::at_rest(settings.valve_actuator, cell.valve_opening_ratio),
@@ -131,6 +139,10 @@ impl Backend for VirtualLab {
             wanted: RigMode::Standstill,
             tripped: false,
             sensors,
+            followers: CHANNELS
+                .iter()
+                .map(|row| ChannelFollower::new(*settings.instruments.path(row.channel)))
+                .collect(),
             commands: None,
             now_s: 0.0,
             next_sequence: 0,
@@ -287,7 +299,7 @@ impl Armed {
         let first_index = self.next_sequence + batch.t_s.len() as u64;
         let rate_hz = settings.sample_rate_hz;
         let sample_times_s = (first_index..).map(|index| index as f64 / rate_hz).take_while(|t| *t <= end_s);
-        let Armed { inputs, machine, sensors, commands, .. } = self;
+        let Armed { inputs, machine, sensors, followers, commands, .. } = self;
         match machine {
             None => Err(BackendError::OutOfOrder {
                 call: "poll",
@@ -304,20 +316,23 @@ impl Armed {
                         let instant = Instant {
                             boundary: inputs.at(t_s),
                             speed_rpm: state.shaft_speed_rpm(),
-                            p2_pa: state.p2_pa,
                             tc_k: state.tc_k,
                             tt_k: state.tt_k,
-                            outputs: Some(outputs),
+                            running: Some((state, outputs)),
                         };
-                        batch.push(t_s, &instant, commands.as_ref(), sensors, settings);
+                        batch.push(t_s, &instant, commands.as_ref(), sensors, followers, settings);
                     },
                     |event| crossings.push(event),
                 );
                 for crossing in crossings {
                     self.report(settings, crossing, end_s);
                 }
-                result
-                    .map_err(|error| BackendError::Simulation { t_s: start_s, message: error.to_string() })?;
+                result.map_err(|error| {
+                    // A hook cannot fail by itself: it gives NaN and keeps the reason.
+                    let reason =
+                        settings.model.hooks.fault().map_or_else(String::new, |fault| format!(": {fault}"));
+                    BackendError::Simulation { t_s: start_s, message: format!("{error}{reason}") }
+                })?;
                 Ok(end_s)
             }
             Some(Machine::Standstill { state, t_s: state_s }) => {
@@ -334,15 +349,8 @@ impl Armed {
                 for t_s in sample_times_s {
                     let StandstillState { tc_k, tt_k } = relax_to(t_s);
                     let boundary = inputs.at(t_s);
-                    let instant = Instant {
-                        speed_rpm: 0.0,
-                        p2_pa: boundary.p1_pa,
-                        boundary,
-                        tc_k,
-                        tt_k,
-                        outputs: None,
-                    };
-                    batch.push(t_s, &instant, commands.as_ref(), sensors, settings);
+                    let instant = Instant { speed_rpm: 0.0, boundary, tc_k, tt_k, running: None };
+                    batch.push(t_s, &instant, commands.as_ref(), sensors, followers, settings);
                 }
                 relax_to(end_s);
                 Ok(end_s)
@@ -409,25 +417,28 @@ impl BatchBuilder {
         instant: &Instant<'_>,
         commands: Option<&Setpoints>,
         sensors: &mut [(Channel, Sensor)],
+        followers: &mut [ChannelFollower],
         settings: &LabSettings,
     ) {
         self.t_s.push(t_s);
-        let surging = instant.outputs.is_some_and(|outputs| outputs.surge_position_ratio >= 1.0);
+        let surging = instant.outputs().is_some_and(|outputs| outputs.surge_position_ratio >= 1.0);
         let swing = if surging {
             settings.surge_swing_ratio * (2.0 * std::f64::consts::PI * SURGE_FREQUENCY_HZ * t_s).sin()
         } else {
             0.0
         };
-        for (row, column) in CHANNELS.iter().zip(&mut self.columns) {
-            let total = true_value(row.channel, instant, commands, swing);
+        let prepared = instant.running.map(|_| settings.model.prepare(&instant.boundary));
+        for ((row, column), follower) in CHANNELS.iter().zip(&mut self.columns).zip(followers) {
+            let total = true_value(row.channel, instant, prepared.as_ref(), commands, swing);
             let truth = match settings.static_tap_pipe_diameters_m.get(&row.channel) {
                 Some(pipe_diameter_m) => at_the_wall_pa(row.channel, total, *pipe_diameter_m, instant),
                 None => total,
             };
+            let truth = follower.read(t_s, truth);
             let sensor = sensors.iter_mut().find(|(channel, _)| *channel == row.channel);
             column.push(sensor.map_or(truth, |(_, sensor)| sensor.read(truth)));
         }
-        self.truth.push(instant.speed_rpm, instant.tc_k, instant.tt_k, instant.outputs);
+        self.truth.push(instant.speed_rpm, instant.tc_k, instant.tt_k, instant.outputs());
     }
 
     fn finish(self) -> SampleBatch {
@@ -444,7 +455,7 @@ impl BatchBuilder {
 
 /// Static pressure at the wall of the pipe of one of the four stations; the total one where the pipe would choke.
 fn at_the_wall_pa(channel: Channel, total_pa: f64, pipe_diameter_m: f64, instant: &Instant<'_>) -> f64 {
-    let Some(outputs) = instant.outputs else { return total_pa };
+    let Some(outputs) = instant.outputs() else { return total_pa };
     let (flow_kg_s, temperature_k) = match channel {
         Channel::P1 => (outputs.flow_kg_s, instant.boundary.t1_k),
         Channel::P2 => (outputs.flow_kg_s, outputs.t2_k),
@@ -455,32 +466,41 @@ fn at_the_wall_pa(channel: Channel, total_pa: f64, pipe_diameter_m: f64, instant
     pressure_tap::total_to_static_pa(total_pa, flow_kg_s, temperature_k, pipe_diameter_m).unwrap_or(total_pa)
 }
 
-fn true_value(channel: Channel, instant: &Instant<'_>, commands: Option<&Setpoints>, swing: f64) -> f64 {
+fn true_value(
+    channel: Channel,
+    instant: &Instant<'_>,
+    prepared: Option<&PreparedModel<'_>>,
+    commands: Option<&Setpoints>,
+    swing: f64,
+) -> f64 {
     let boundary = &instant.boundary;
     let command = |value: fn(&Setpoints) -> f64| commands.map_or(f64::NAN, value);
-    // At rest every gas probe sees the cell.
-    let gas = |value: fn(&Outputs) -> f64, at_rest: f64| instant.outputs.map_or(at_rest, value);
     match channel {
-        Channel::ShaftSpeed => instant.speed_rpm,
-        Channel::CompressorFlow => gas(|outputs| outputs.flow_kg_s, 0.0) * (1.0 + swing),
-        Channel::P1 => boundary.p1_pa,
+        Channel::P3Command => return command(|setpoints| setpoints.p3_pa),
+        Channel::T3Command => return command(|setpoints| setpoints.t3_k),
+        Channel::ValveCommand => return command(|setpoints| setpoints.valve_opening_ratio),
+        Channel::TOilCommand => return command(|setpoints| setpoints.oil_temperature_k),
+        _ => {}
+    }
+    if let (Some((state, outputs)), Some(prepared)) = (instant.running, prepared) {
+        let value = instruments::true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
+        return match channel {
+            Channel::CompressorFlow => value * (1.0 + swing),
+            // The pressure swings less than the flow: it is the volume's.
+            Channel::P2 => value * (1.0 + 0.2 * swing),
+            _ => value,
+        };
+    }
+    // At rest every gas probe but T1's sees the cell.
+    match channel {
+        Channel::ShaftSpeed | Channel::CompressorFlow | Channel::TurbineFlow => 0.0,
+        Channel::P1 | Channel::P2 => boundary.p1_pa,
         Channel::T1 => boundary.t1_k,
-        // The pressure swings less than the flow: it is the volume's.
-        Channel::P2 => instant.p2_pa * (1.0 + 0.2 * swing),
-        Channel::T2 => gas(|outputs| outputs.t2_probe_k, boundary.ambient_temperature_k),
         Channel::Tc => instant.tc_k,
-        Channel::TurbineFlow => gas(|outputs| outputs.turbine_flow_kg_s, 0.0),
-        Channel::P3 => boundary.p3_pa,
-        Channel::T3 if instant.outputs.is_none() => boundary.ambient_temperature_k,
-        Channel::T3 => boundary.t3_k,
-        Channel::P4 => boundary.p4_pa,
-        Channel::T4 => gas(|outputs| outputs.turbine.t4_k, boundary.ambient_temperature_k),
         Channel::Tt => instant.tt_k,
+        Channel::P3 => boundary.p3_pa,
+        Channel::P4 => boundary.p4_pa,
         Channel::TOil => boundary.oil_temperature_k,
-        Channel::TAmb => boundary.ambient_temperature_k,
-        Channel::P3Command => command(|setpoints| setpoints.p3_pa),
-        Channel::T3Command => command(|setpoints| setpoints.t3_k),
-        Channel::ValveCommand => command(|setpoints| setpoints.valve_opening_ratio),
-        Channel::TOilCommand => command(|setpoints| setpoints.oil_temperature_k),
+        _ => boundary.ambient_temperature_k,
     }
 }

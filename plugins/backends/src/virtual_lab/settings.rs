@@ -2,7 +2,10 @@
 
 use super::actuator::ActuatorDynamics;
 use super::sensor::SensorErrors;
+use super::weather::Weather;
 use mapper_core::Channel;
+use mapper_physics::effect::Rig;
+use mapper_physics::instruments::Instruments;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use std::collections::BTreeMap;
@@ -21,7 +24,11 @@ pub enum Start {
 pub struct LabSettings {
     /// The machine as it truly is; may differ from the one that the campaign declares.
     pub model: Model,
-    /// T1, P1, P4 and ambient temperature hold throughout; the other values are the state at arming.
+    /// Lags, gains and offsets before the sensors' own errors; the lag of P3 is [`LabSettings::p3_actuator`]'s.
+    pub instruments: Instruments,
+    /// How cell and supplies wander.
+    pub weather: Weather,
+    /// T1, P1, P4 and ambient temperature hold throughout but for the weather; the other values are the state at arming.
     pub cell: BoundaryConditions,
     /// Sample rate, Hz.
     pub sample_rate_hz: f64,
@@ -48,11 +55,21 @@ pub struct LabSettings {
 }
 
 impl LabSettings {
+    /// Takes machine and instruments from a rig; what its P3 is slower than declared, the actuator is.
+    pub fn take(&mut self, rig: Rig) {
+        let slower_s = rig.instruments.p3_lag_s - mapper_physics::instruments::NOMINAL_P3_LAG_S;
+        self.p3_actuator.lag_s = (self.p3_actuator.lag_s + slower_s).max(0.0);
+        self.model = rig.model;
+        self.instruments = rig.instruments;
+    }
+
     /// A lab without any sensor error whose actuators act at once: the model itself.
     pub fn ideal(model: Model, cell: BoundaryConditions) -> Self {
         let at_once = ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY };
         LabSettings {
             model,
+            instruments: Instruments::default(),
+            weather: Weather::default(),
             cell,
             sample_rate_hz: 10.0,
             start: Start::Settled,

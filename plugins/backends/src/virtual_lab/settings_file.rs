@@ -1,10 +1,15 @@
 //! The lab's settings as a campaign writes them below `backend: {virtual_lab: ...}`.
 
 use super::actuator::ActuatorDynamics;
+use super::effects_file::{EffectValues, put_in};
 use super::lab::NAME;
 use super::sensor::SensorErrors;
 use super::settings::{LabSettings, Start};
-use mapper_core::{BackendError, Channel, DeclaredUncertainty};
+use super::tolerances::draw_tolerances;
+use super::weather::Weather;
+use mapper_core::{BackendError, Channel, DeclaredUncertainty, ModelTolerances};
+use mapper_physics::effect::{Effect, Rig};
+use mapper_physics::instruments::Instruments;
 use mapper_physics::model::Model;
 use mapper_physics::params::{BoundaryConditions, Params};
 use mapper_units::{
@@ -16,6 +21,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// What the campaign declares; the lab deviates from it as its settings say.
 #[derive(Debug, Clone)]
@@ -30,7 +36,11 @@ pub struct NominalRig {
     pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
     /// Declared static taps with the inner diameters of their pipes, m.
     pub static_tap_pipe_diameters_m: BTreeMap<Channel, f64>,
-    /// Seed of all noise and of the offsets that are drawn.
+    /// Declared tolerances of the model.
+    pub tolerances: ModelTolerances,
+    /// Effects that the machine may be given by their ids.
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// Seed of all noise and of all that is drawn.
     pub seed: u64,
 }
 
@@ -48,6 +58,12 @@ struct SettingsFile {
     offsets: OffsetsName,
     /// Offsets of single channels, in their own units, instead of drawn ones.
     offset_of: BTreeMap<Channel, String>,
+    /// What the machine has that the declared one has not.
+    effects: BTreeMap<String, EffectValues>,
+    /// `calm` (the default) or `wandering`.
+    weather: WeatherName,
+    /// `drawn` from the campaign's tolerances, or `none` (the default).
+    tolerances: TolerancesName,
     /// How the actuators follow.
     actuators: ActuatorsFile,
     /// Where the true machine differs from the declared one.
@@ -79,6 +95,22 @@ enum NoiseName {
 enum OffsetsName {
     #[default]
     Drawn,
+    None,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum WeatherName {
+    #[default]
+    Calm,
+    Wandering,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum TolerancesName {
+    Drawn,
+    #[default]
     None,
 }
 
@@ -143,9 +175,19 @@ pub fn read_settings(settings: &serde_json::Value, nominal: NominalRig) -> Resul
     if !(0.0..=1.0).contains(&surge_swing_ratio) {
         return Err(wrong("surge_swing", "write a share between 0 % and 100 %".to_owned()));
     }
+    let mut rig = Rig::new(model);
+    if file.tolerances == TolerancesName::Drawn {
+        draw_tolerances(&mut rig, &nominal.tolerances, nominal.seed);
+    }
+    put_in(&mut rig, &file.effects, &nominal.effects).map_err(|(path, message)| wrong(&path, message))?;
     let actuators = &file.actuators;
-    Ok(LabSettings {
-        model,
+    let mut lab = LabSettings {
+        model: rig.model.clone(),
+        instruments: Instruments::default(),
+        weather: match file.weather {
+            WeatherName::Calm => Weather::default(),
+            WeatherName::Wandering => Weather::drawn(nominal.seed),
+        },
         cell: nominal.boundary,
         sample_rate_hz,
         start: match file.start {
@@ -161,7 +203,9 @@ pub fn read_settings(settings: &serde_json::Value, nominal: NominalRig) -> Resul
         trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.inside),
         surge_swing_ratio,
         seed: nominal.seed,
-    })
+    };
+    lab.take(rig);
+    Ok(lab)
 }
 
 impl<Rate: Dimension> ActuatorFile<Rate> {
@@ -273,8 +317,30 @@ mod tests {
             speed_max_rpm: 180e3,
             sensors: [(Channel::T1, declared), (Channel::T2, declared)].into(),
             static_tap_pipe_diameters_m: BTreeMap::new(),
+            tolerances: ModelTolerances::default(),
+            effects: mapper_effects::catalogue(),
             seed: 5,
         }
+    }
+
+    #[test]
+    fn effects_are_put_in_by_their_ids_and_values_with_units() {
+        let settings = json!({
+            "start": "settled", "weather": "wandering",
+            "effects": {
+                "area_split": 0.12, "tip_diameter": "1.5 mm", "inner_node": {"phi": 0.35, "G": "15 W/K"},
+                "bearing_friction": "1.5e-6 W s2/rad2", "flowmeter_lag": "2 s", "actuator_lag": "1.1 s", "t2_offset": "-1 K",
+            },
+        });
+        let lab = read_settings(&settings, nominal()).unwrap();
+        let params = lab.model.params;
+        assert_eq!((params.compressor.alpha_area_ratio, params.t2_probe_diameter_m), (0.12, 1.5e-3));
+        let inner = (params.compressor.inner_capacity_ratio, params.compressor.inner_conductance_w_k);
+        assert_eq!((inner, params.bearing_friction_w_s2), ((0.35, 15.0), 1.5e-6));
+        assert_eq!(lab.instruments.path(Channel::CompressorFlow).lag_s, 2.0);
+        assert_eq!(lab.instruments.path(Channel::T2).offset, -1.0);
+        assert!((lab.p3_actuator.lag_s - 1.1).abs() < 1e-12);
+        assert!(!lab.weather.is_calm());
     }
 
     #[test]
@@ -317,6 +383,11 @@ mod tests {
             (json!({"machine": {"alpha_area": 2}}), "machine.alpha_area"),
             (json!({"offset_of": {"T2": "1 kPa"}}), "offset_of.T2"),
             (json!({"actuators": {"valve": {"slew": "0 1/s"}}}), "actuators.valve.slew"),
+            (json!({"effects": {"area_spilt": 0.1}}), "area_split"),
+            (json!({"effects": {"area_split": 2.0}}), "is not between 0 and 0.6"),
+            (json!({"effects": {"tip_diameter": 1.5}}), "lacks its unit"),
+            (json!({"effects": {"inner_node": {"phi": 0.3}}}), "G: a value in W/K"),
+            (json!({"effects": {"inner_node": {"psi": 0.3}}}), "effects.inner_node.psi"),
         ] {
             let error = read_settings(&settings, nominal()).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");

@@ -1,0 +1,81 @@
+//! What can go wrong with blind cases.
+
+use mapper_core::BackendError;
+use mapper_physics::effect::EffectError;
+use mapper_physics::steady::SteadyError;
+use mapper_record::RecordError;
+use std::path::PathBuf;
+
+/// Why cases cannot be made or scored.
+#[derive(Debug, thiserror::Error)]
+pub enum BlindError {
+    /// A file or directory cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file does not hold what it should.
+    #[error("{} holds no {what}: {message}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What it should hold.
+        what: &'static str,
+        /// Why it does not.
+        message: String,
+    },
+    /// The answers are not those that were sealed.
+    #[error(
+        "{} has SHA-256 {found}, but {expected} was printed when the cases were made: the answers have been changed",
+        path.display()
+    )]
+    Seal {
+        /// The file of answers.
+        path: PathBuf,
+        /// Its hash.
+        found: String,
+        /// The hash it had.
+        expected: String,
+    },
+    /// The lab stopped.
+    #[error("case {name}: {source}")]
+    Lab {
+        /// The case.
+        name: String,
+        /// Why.
+        source: BackendError,
+    },
+    /// A point of the campaign that the nominal model cannot hold.
+    #[error(transparent)]
+    Point(#[from] SteadyError),
+    /// An effect that cannot be put in; a fault of the draw.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// A recording cannot be written.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// No nominal model.
+    #[error("{message}")]
+    Model {
+        /// Why.
+        message: String,
+    },
+    /// More cases than anyone needs.
+    #[error("{cases} cases were asked for; between 1 and {most} can be made")]
+    Cases {
+        /// Number asked for.
+        cases: usize,
+        /// Most that can be made at once.
+        most: usize,
+    },
+}
+
+impl BlindError {
+    pub(crate) fn file(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| BlindError::File { path, source }
+    }
+}

@@ -1,0 +1,32 @@
+//! What a case is a case of.
+
+use serde::{Deserialize, Serialize};
+
+/// How many causes a recording has, and whether the diagnosis could know them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CaseKind {
+    /// Nothing beyond the declared tolerances.
+    None,
+    /// One effect of the catalogue.
+    Single,
+    /// Two effects of the catalogue.
+    Pair,
+    /// A cause that is no candidate.
+    Outside,
+}
+
+impl CaseKind {
+    /// All kinds.
+    pub const ALL: [CaseKind; 4] = [CaseKind::None, CaseKind::Single, CaseKind::Pair, CaseKind::Outside];
+
+    /// Its name in files and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            CaseKind::None => "none",
+            CaseKind::Single => "single",
+            CaseKind::Pair => "pair",
+            CaseKind::Outside => "outside",
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! The check of the gap diagnosis on withheld data: draws cases on the virtual lab, seals their causes, scores diagnoses.
+//!
+//! [`make`] writes recordings and sealed answers, [`score`](score::score) opens them. What diagnoses is not this crate's
+//! business: it sees recordings alone. The causes reserved as "outside" live here and are no part of the catalogue.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod case;
+mod error;
+mod interval;
+mod kind;
+mod lab;
+mod make;
+mod outside;
+mod place;
+pub mod score;
+mod seal;
+mod truth;
+
+pub use case::{Case, Cause, Draw};
+pub use error::BlindError;
+pub use interval::{Share, clopper_pearson_95};
+pub use kind::CaseKind;
+pub use make::{Made, make};
+pub use outside::{OutsideUse, outside_kinds};
+pub use seal::{ANSWERS_NAME, MANIFEST_NAME, Manifest};
+pub use truth::{Truth, TruthPoint};

@@ -1,0 +1,113 @@
+//! Makes a directory of blind cases.
+
+use crate::case::{Case, Draw};
+use crate::lab::Schedule;
+use crate::seal::{ANSWERS_NAME, MANIFEST_NAME, Manifest, sha256};
+use crate::{BlindError, Truth};
+use mapper_campaign::{Campaign, nominal_model};
+use mapper_physics::effect::Effect;
+use mapper_record::RecordingHeader;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Most cases of one directory.
+const MOST_CASES: usize = 100_000;
+
+/// What was made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Made {
+    /// What the directory says of itself.
+    pub manifest: Manifest,
+    /// Answers in the order of the cases; for calibration, which may know them.
+    pub answers: Vec<Truth>,
+}
+
+/// Draws cases from `catalogue` and the outside causes, runs each on the virtual lab of `campaign`, and leaves in
+/// `directory`, which must not hold cases yet, NAME.mcap for each, the answers, and a manifest with their hash.
+///
+/// `done` is told the number of finished cases. Equal arguments give equal bytes.
+///
+/// # Errors
+/// [`BlindError`] where the campaign has no nominal model, a point cannot be held, or a file cannot be written.
+pub fn make(
+    campaign: &Campaign,
+    catalogue: &[Arc<dyn Effect>],
+    draw: &Draw,
+    directory: &Path,
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Made, BlindError> {
+    if !(1..=MOST_CASES).contains(&draw.cases) {
+        return Err(BlindError::Cases { cases: draw.cases, most: MOST_CASES });
+    }
+    let nominal =
+        nominal_model(campaign).map_err(|error| BlindError::Model { message: error.to_string() })?;
+    let schedule = Schedule::new(campaign, &nominal)?;
+    let cases = draw.cases(catalogue);
+    std::fs::create_dir_all(directory).map_err(BlindError::file(directory))?;
+    let answers = run_all(&schedule, campaign, &cases, directory, done)?;
+    let bytes = json(&answers, &directory.join(ANSWERS_NAME))?;
+    let manifest = Manifest {
+        campaign: campaign.name.clone(),
+        cases: cases.into_iter().map(|case| case.name).collect(),
+        answers_sha256: sha256(&bytes),
+    };
+    json(&manifest, &directory.join(MANIFEST_NAME))?;
+    Ok(Made { manifest, answers })
+}
+
+/// Runs the cases on all cores; each is independent of the others.
+fn run_all(
+    schedule: &Schedule<'_>,
+    campaign: &Campaign,
+    cases: &[Case],
+    directory: &Path,
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Vec<Truth>, BlindError> {
+    let next = AtomicUsize::new(0);
+    let finished = AtomicUsize::new(0);
+    let results: Mutex<Vec<Option<Result<Truth, BlindError>>>> =
+        Mutex::new(cases.iter().map(|_| None).collect());
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(cases.len());
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                while let Some((index, case)) = {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    cases.get(index).map(|case| (index, case))
+                } {
+                    let header = RecordingHeader {
+                        library: concat!("mapper ", env!("CARGO_PKG_VERSION")).to_owned(),
+                        metadata: [("campaign".to_owned(), campaign.name.clone())].into(),
+                        ..RecordingHeader::default()
+                    };
+                    let result = schedule.run(case, &directory.join(format!("{}.mcap", case.name)), &header);
+                    let failed = result.is_err();
+                    if let Ok(mut results) = results.lock() {
+                        results[index] = Some(result);
+                    }
+                    done(finished.fetch_add(1, Ordering::Relaxed) + 1);
+                    if failed {
+                        // No case is worth starting any more.
+                        next.store(cases.len(), Ordering::Relaxed);
+                    }
+                }
+            });
+        }
+    });
+    let results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    // A case without a result comes behind the failure that stopped the others.
+    results.into_iter().flatten().collect()
+}
+
+fn json(value: &impl serde::Serialize, path: &Path) -> Result<Vec<u8>, BlindError> {
+    let bytes = serde_json::to_vec_pretty(value).map_err(|error| BlindError::Content {
+        path: path.to_owned(),
+        what: "JSON",
+        message: error.to_string(),
+    })?;
+    let mut file = std::fs::File::create_new(path).map_err(BlindError::file(path))?;
+    std::io::Write::write_all(&mut file, &bytes).map_err(BlindError::file(path))?;
+    Ok(bytes)
+}

@@ -1,0 +1,307 @@
+//! Holds diagnoses against opened answers.
+
+use crate::interval::Share;
+use crate::place;
+use crate::seal::{MANIFEST_NAME, Manifest, open, read_json};
+use crate::{BlindError, CaseKind, Truth};
+use mapper_effects::catalogue;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// What is read of a diagnosis; the rest of its JSON is for people.
+#[derive(Debug, Clone, Default, Deserialize)]
+struct Diagnosis {
+    verdict: String,
+    #[serde(default, rename = "where")]
+    places: Vec<Place>,
+    #[serde(default)]
+    candidates: Vec<Candidate>,
+    #[serde(default)]
+    probability_none: Option<f64>,
+    #[serde(default)]
+    probability_outside: Option<f64>,
+    #[serde(default)]
+    gap: Option<Gap>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct Place {
+    submodel: String,
+}
+
+#[derive(Debug, Clone, Default, Deserialize)]
+struct Candidate {
+    effects: BTreeSet<String>,
+    #[serde(default)]
+    probability: f64,
+    #[serde(default)]
+    parameters: BTreeMap<String, Estimate>,
+    #[serde(default)]
+    equivalent: Vec<BTreeSet<String>>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct Estimate {
+    value: f64,
+    low: Option<f64>,
+    high: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct Gap {
+    shrink: Option<f64>,
+}
+
+/// One case as it came out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScoredCase {
+    /// Its name.
+    pub name: String,
+    /// What it is a case of.
+    pub kind: CaseKind,
+    /// Its causes.
+    pub causes: BTreeSet<String>,
+    /// What the diagnosis said; `None` where there is none.
+    pub verdict: Option<String>,
+    /// The causes it named.
+    pub named: BTreeSet<String>,
+    /// Probability it gave to them.
+    pub probability: Option<f64>,
+    /// Whether that is right.
+    pub right: bool,
+}
+
+/// The table, as `score.py` prints it.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Score {
+    /// Case by case.
+    pub cases: Vec<ScoredCase>,
+    /// Recordings without effect that were left alone.
+    pub none: Share,
+    /// Single effects that were named, in a set of at most three.
+    pub single: Share,
+    /// Pairs of which both were named.
+    pub pair: Share,
+    /// Pairs of which at least one was named.
+    pub one_of_pair: Share,
+    /// Outside causes that were said to be so.
+    pub outside: Share,
+    /// Outside causes that were explained by the catalogue.
+    pub falsely_explained: Share,
+    /// Effects whose place was among the first two.
+    pub place: Share,
+    /// Parameters whose 95 % interval holds the truth.
+    pub covered: Share,
+    /// Median error of a parameter over its distance from neutral; `None` where none was named.
+    pub parameter_error_median: Option<f64>,
+    /// Median share of the gap that was removed; `None` where nothing was named.
+    pub shrink_median: Option<f64>,
+    /// Mean of the squared miss of the probability given to the truth; `None` without cases.
+    pub squared_miss_mean: Option<f64>,
+    /// Mean number of explanations that could not be told apart; `None` without diagnoses.
+    pub set_size_mean: Option<f64>,
+}
+
+/// Opens the seal of `directory` and holds NAME.diagnosis.json of each case against its answer.
+///
+/// # Errors
+/// [`BlindError`] where the directory holds no cases or the answers have been changed. A missing or broken diagnosis is
+/// a wrong one, not an error.
+pub fn score(directory: &Path) -> Result<Score, BlindError> {
+    let manifest = Manifest::read(&directory.join(MANIFEST_NAME))?;
+    let truths = open(directory, &manifest)?;
+    Ok(score_truths(&truths, |name| {
+        read_json::<Diagnosis>(&directory.join(format!("{name}.diagnosis.json")), "diagnosis").ok()
+    }))
+}
+
+/// Writes NAME.truth.json of each answer beside its recording, for `score.py`.
+///
+/// # Errors
+/// As [`score`], and where a file cannot be written.
+pub fn open_answers(directory: &Path) -> Result<usize, BlindError> {
+    let manifest = Manifest::read(&directory.join(MANIFEST_NAME))?;
+    let truths = open(directory, &manifest)?;
+    for truth in &truths {
+        // Names come from the answers, which are sealed, but a name must not lead out of the directory.
+        if !manifest.cases.contains(&truth.name) || truth.name.contains(['/', '\\']) {
+            continue;
+        }
+        let path = directory.join(format!("{}.truth.json", truth.name));
+        let bytes = serde_json::to_vec_pretty(truth).map_err(|error| BlindError::Content {
+            path: path.clone(),
+            what: "JSON",
+            message: error.to_string(),
+        })?;
+        std::fs::write(&path, bytes).map_err(BlindError::file(&path))?;
+    }
+    Ok(truths.len())
+}
+
+fn kind_of(truth: &Truth) -> CaseKind {
+    if truth.effects.keys().any(|id| id.starts_with("X_") || id == "outside_catalogue") {
+        return CaseKind::Outside;
+    }
+    match truth.effects.len() {
+        0 => CaseKind::None,
+        1 => CaseKind::Single,
+        _ => CaseKind::Pair,
+    }
+}
+
+fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosis>) -> Score {
+    let neutral: BTreeMap<String, f64> = catalogue()
+        .iter()
+        .filter_map(|effect| match effect.info().parameters.as_slice() {
+            [only] => Some((effect.info().id.to_string(), only.neutral)),
+            _ => None,
+        })
+        .collect();
+    let mut score = Score::default();
+    let (mut errors, mut shrinks, mut squared_misses, mut set_sizes) = (vec![], vec![], vec![], vec![]);
+    for truth in truths {
+        let causes: BTreeSet<String> = truth.effects.keys().cloned().collect();
+        let kind = kind_of(truth);
+        let diagnosis = diagnosis_of(&truth.name);
+        let judged = diagnosis.as_ref().map(|diagnosis| Judged::new(kind, &causes, diagnosis));
+        let right = judged.as_ref().is_some_and(|judged| judged.right);
+        let verdict = diagnosis.as_ref().map(|diagnosis| diagnosis.verdict.as_str());
+        match kind {
+            CaseKind::None => score.none.count(right),
+            CaseKind::Single => score.single.count(right),
+            CaseKind::Pair => {
+                score.pair.count(right);
+                let one = judged.as_ref().is_some_and(|judged| !judged.named.is_disjoint(&causes));
+                score.one_of_pair.count(one);
+            }
+            CaseKind::Outside => {
+                score.outside.count(right);
+                score.falsely_explained.count(verdict == Some("explained"));
+            }
+        }
+        let p_truth = judged.as_ref().map_or(0.0, |judged| judged.p_truth);
+        squared_misses.push((1.0 - p_truth.min(1.0)).powi(2));
+        if let (Some(diagnosis), Some(judged)) = (&diagnosis, &judged) {
+            set_sizes.push(judged.set_size as f64);
+            if matches!(kind, CaseKind::Single | CaseKind::Pair) {
+                let first_two = diagnosis.places.iter().take(2);
+                let right = first_two
+                    .flat_map(|place| causes.iter().map(|id| place::is_right(id, &place.submodel)))
+                    .any(|right| right);
+                score.place.count(right);
+                if judged.named == causes {
+                    let estimates = diagnosis.candidates.first().map(|first| &first.parameters);
+                    for (id, value) in &truth.effects {
+                        let estimate = estimates.and_then(|estimates| estimates.get(id));
+                        let (Some(value), Some(neutral), Some(estimate)) =
+                            (value.as_f64(), neutral.get(id), estimate)
+                        else {
+                            continue;
+                        };
+                        errors.push((estimate.value - value).abs() / (value - neutral).abs());
+                        let (low, high) =
+                            (estimate.low.unwrap_or(f64::NAN), estimate.high.unwrap_or(f64::NAN));
+                        score.covered.count(low <= value && value <= high);
+                    }
+                    shrinks.extend(diagnosis.gap.and_then(|gap| gap.shrink));
+                }
+            }
+        }
+        score.cases.push(ScoredCase {
+            name: truth.name.clone(),
+            kind,
+            causes,
+            verdict: verdict.map(str::to_owned),
+            probability: diagnosis
+                .as_ref()
+                .and_then(|diagnosis| Some(diagnosis.candidates.first()?.probability)),
+            named: judged.map_or_else(BTreeSet::new, |judged| judged.named),
+            right,
+        });
+    }
+    score.parameter_error_median = median(errors);
+    score.shrink_median = median(shrinks);
+    score.squared_miss_mean = mean(&squared_misses);
+    score.set_size_mean = mean(&set_sizes);
+    score
+}
+
+/// A diagnosis held against the truth.
+struct Judged {
+    named: BTreeSet<String>,
+    set_size: usize,
+    right: bool,
+    p_truth: f64,
+}
+
+impl Judged {
+    fn new(kind: CaseKind, causes: &BTreeSet<String>, diagnosis: &Diagnosis) -> Self {
+        let verdict = diagnosis.verdict.as_str();
+        let first = diagnosis.candidates.first();
+        let names = matches!(verdict, "explained" | "partly_explained");
+        let named = first.filter(|_| names).map_or_else(BTreeSet::new, |first| first.effects.clone());
+        let equivalent = first.map_or(&[][..], |first| &first.equivalent);
+        let set_size = 1 + equivalent.len();
+        let in_set = named == *causes || equivalent.contains(causes);
+        let right = match kind {
+            CaseKind::None => verdict == "within_tolerance",
+            CaseKind::Outside => matches!(verdict, "unexplained" | "partly_explained"),
+            CaseKind::Single | CaseKind::Pair => verdict != "within_tolerance" && in_set && set_size <= 3,
+        };
+        let p_truth = match kind {
+            CaseKind::None => diagnosis.probability_none.unwrap_or(0.0),
+            CaseKind::Outside => diagnosis.probability_outside.unwrap_or(0.0),
+            CaseKind::Single | CaseKind::Pair => diagnosis
+                .candidates
+                .iter()
+                .filter(|candidate| candidate.effects == *causes || candidate.equivalent.contains(causes))
+                .map(|candidate| candidate.probability)
+                .sum(),
+        };
+        Judged { named, set_size, right, p_truth }
+    }
+}
+
+/// The upper of the two middle values, as `score.py` takes it.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+impl Score {
+    /// Labels and values of the table, in its order.
+    pub fn rows(&self) -> Vec<(&'static str, String)> {
+        let number = |value: Option<f64>, decimals: usize| {
+            value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+        };
+        let percent = self.parameter_error_median.map(|error| 100.0 * error);
+        vec![
+            ("no effect, left alone", self.none.to_string()),
+            ("single effect named", self.single.to_string()),
+            ("both of two named", self.pair.to_string()),
+            ("  at least one of two", self.one_of_pair.to_string()),
+            ("outside, said so", self.outside.to_string()),
+            ("  falsely explained", self.falsely_explained.to_string()),
+            ("place right (first two)", self.place.to_string()),
+            ("parameter error, median", format!("{} %", number(percent, 1))),
+            ("95 % interval covers truth", self.covered.to_string()),
+            ("shrink, median", number(self.shrink_median, 3)),
+            ("mean squared miss of p", number(self.squared_miss_mean, 3)),
+            ("set size, mean", number(self.set_size_mean, 2)),
+        ]
+    }
+}
+
+/// A diagnosis as JSON, read as scoring reads it; for tests of what diagnoses.
+///
+/// # Errors
+/// What is missing or of the wrong type.
+pub fn check_diagnosis(value: &Value) -> Result<(), String> {
+    serde_json::from_value::<Diagnosis>(value.clone()).map(drop).map_err(|error| error.to_string())
+}

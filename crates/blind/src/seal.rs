@@ -1,0 +1,78 @@
+//! Answers under seal: a hash printed before anything is diagnosed.
+
+use crate::{BlindError, Truth};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::path::Path;
+
+/// File of the answers, within the directory of the cases.
+pub const ANSWERS_NAME: &str = "answers.json";
+/// File that says what the directory holds.
+pub const MANIFEST_NAME: &str = "manifest.json";
+
+/// What a directory of cases says of itself; nothing of the answers but their hash.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Name of the campaign.
+    pub campaign: String,
+    /// Names of the cases; each has a recording NAME.mcap.
+    pub cases: Vec<String>,
+    /// SHA-256 of the file of answers.
+    pub answers_sha256: String,
+}
+
+impl Manifest {
+    /// Reads a manifest.
+    ///
+    /// # Errors
+    /// [`BlindError`] where there is none.
+    pub fn read(path: &Path) -> Result<Manifest, BlindError> {
+        read_json(path, "manifest of blind cases")
+    }
+}
+
+/// Largest file that is read, bytes: far more than any number of answers.
+const LARGEST_BYTES: u64 = 256 << 20;
+
+pub(crate) fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Reads a JSON file.
+pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, what: &'static str) -> Result<T, BlindError> {
+    let bytes = read(path)?;
+    serde_json::from_slice(&bytes).map_err(|error| BlindError::Content {
+        path: path.to_owned(),
+        what,
+        message: error.to_string(),
+    })
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
+    let size = std::fs::metadata(path).map_err(BlindError::file(path))?.len();
+    if size > LARGEST_BYTES {
+        let message = format!("{size} bytes are more than the {LARGEST_BYTES} that are read");
+        return Err(BlindError::Content { path: path.to_owned(), what: "answers", message });
+    }
+    std::fs::read(path).map_err(BlindError::file(path))
+}
+
+/// Opens the seal: the answers, if they are still those that were made.
+///
+/// # Errors
+/// [`BlindError::Seal`] where they are not.
+pub(crate) fn open(directory: &Path, manifest: &Manifest) -> Result<Vec<Truth>, BlindError> {
+    let path = directory.join(ANSWERS_NAME);
+    let bytes = read(&path)?;
+    let found = sha256(&bytes);
+    if found != manifest.answers_sha256 {
+        return Err(BlindError::Seal { path, found, expected: manifest.answers_sha256.clone() });
+    }
+    serde_json::from_slice(&bytes).map_err(|error| BlindError::Content {
+        path,
+        what: "answers",
+        message: error.to_string(),
+    })
+}

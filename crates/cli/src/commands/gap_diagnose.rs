@@ -1,0 +1,81 @@
+//! `mapper gap diagnose`: where a recording leaves the nominal model, why, how far that closes the gap, what is next.
+
+use super::{gap_page, gap_text};
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::gap_arguments::DiagnoseArguments;
+use crate::{output, registry, run_directory};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use mapper_gap::calibration::Calibration;
+use mapper_gap::declared::Declared;
+use mapper_gap::diagnose::{Diagnosed, GapError, Question};
+use mapper_record::{ChannelMap, ReadOptions, ReadReport, RecordError, read_recording};
+use std::io::IsTerminal;
+
+/// Diagnoses one recording.
+pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
+    let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
+    let map = match &arguments.channels {
+        Some(file) => {
+            let text = std::fs::read_to_string(file).map_err(|error| {
+                Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display()))
+            })?;
+            ChannelMap::from_yaml(&text)
+                .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", file.display())))?
+        }
+        None => ChannelMap::native(),
+    };
+    let path = run_directory::recording_of(&arguments.recording);
+    let report = read_recording(&path, &map, &ReadOptions::default()).map_err(|error| {
+        let code = if matches!(error, RecordError::Read { .. }) { Code::Failure } else { Code::BadRecording };
+        Failure::new(code, error)
+    })?;
+    let model = mapper_campaign::nominal_model(&campaign)
+        .map_err(|error| Failure::new(Code::BadInput, error))?;
+    let declared = Declared {
+        sensors: campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
+        noise_colour: map.noise_colour.unwrap_or_default(),
+        tolerances: campaign.tolerances,
+        nominal: campaign.boundary,
+    };
+    let bar = bar();
+    let progress = |share: f64, what: &str| {
+        bar.set_position((share * 100.0) as u64);
+        bar.set_message(what.to_owned());
+    };
+    let done = mapper_gap::diagnose::diagnose(Question {
+        recording: &report.recording,
+        declared,
+        model,
+        effects: registry::effects_with(&arguments.effects)?,
+        calibration: Calibration::shipped().map_err(|error| Failure::new(Code::Failure, error))?,
+        progress: &progress,
+    });
+    bar.finish_and_clear();
+    let mut done = done.map_err(|error: GapError| Failure::new(Code::BadRecording, error))?;
+    note_reading(&report, &mut done);
+    if let Some(file) = &arguments.html {
+        let title = path.display().to_string();
+        output::write_new(file, gap_page::page(&title, &done).as_bytes())?;
+    }
+    if arguments.json {
+        return output::print_json(&done.diagnosis);
+    }
+    output::print(&gap_text::page(&done.diagnosis))
+}
+
+/// What was wrong with the file belongs to what is said about it.
+fn note_reading(report: &ReadReport, done: &mut Diagnosed) {
+    done.diagnosis.warnings.extend(report.warnings.iter().map(ToString::to_string));
+}
+
+/// A bar that draws on a terminal alone.
+fn bar() -> ProgressBar {
+    let terminal = std::io::stderr().is_terminal();
+    let target = if terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let bar = ProgressBar::with_draw_target(Some(100), target);
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} % {msg}") {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -1,0 +1,120 @@
+//! A diagnosis as a page with pictures: one HTML file that needs nothing else.
+
+use super::gap_text;
+use mapper_chart::{Axis, Figure, Line, Panel, palette};
+use mapper_gap::diagnose::Diagnosed;
+use mapper_gap::nuisance::OUTPUTS;
+use std::fmt::Write;
+
+/// The page.
+pub fn page(title: &str, done: &Diagnosed) -> String {
+    let diagnosis = &done.diagnosis;
+    let mut html = String::from(
+        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>gap diagnosis</title>\
+         <style>body{font:15px/1.5 sans-serif;max-width:1100px;margin:2em auto;color:#222}\
+         table{border-collapse:collapse}td,th{padding:.2em .6em;text-align:right}\
+         td:first-child,th:first-child{text-align:left}.bar{background:#4477aa;height:1em;display:inline-block}\
+         svg{max-width:100%;height:auto}pre{background:#f4f4f4;padding:1em;overflow:auto}</style>",
+    );
+    let _ = write!(html, "<h1>{}</h1><p>{}</p>", escape(&gap_text::headline(diagnosis)), escape(title));
+    html += "<h2>Which</h2><table><tr><th>cause</th><th>probability</th><th></th></tr>";
+    let mut row = |name: &str, probability: f64| {
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td>{:.1} %</td><td style=\"text-align:left\"><span class=\"bar\" style=\"width:{:.0}px\"></span></td></tr>",
+            escape(name),
+            100.0 * probability,
+            300.0 * probability.clamp(0.0, 1.0)
+        );
+    };
+    for candidate in diagnosis.candidates.iter().take(8) {
+        row(&candidate.effects.join(" + "), candidate.probability);
+    }
+    row("nothing beyond tolerance", diagnosis.probability_none);
+    row("a cause outside the catalogue", diagnosis.probability_outside);
+    html += "</table><h2>Where</h2><table><tr><th>part</th><th>share</th><th>sigma</th><th>channel</th><th>phase</th><th>region</th></tr>";
+    for place in &diagnosis.r#where {
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td>{:.0} %</td><td>{:.0}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            escape(&place.submodel),
+            100.0 * place.share,
+            place.sigma,
+            escape(&place.channel),
+            escape(&place.phase),
+            escape(&place.region)
+        );
+    }
+    html += "</table><h2>Residuals of the nominal model, step by channel, in sigma</h2>";
+    html += &heat_map(done, &done.null.residual);
+    if let Some(best) = done.fits.first() {
+        html += "<h2>The same with the first cause</h2>";
+        html += &heat_map(done, &best.residual);
+        html += "<h2>Before and after</h2>";
+        html += &traces(done);
+    }
+    let _ = writeln!(html, "<h2>In words</h2><pre>{}</pre></html>", escape(&gap_text::page(diagnosis)));
+    html
+}
+
+/// Root mean square of the whitened residual of each step and channel, as a table of colours with its numbers.
+fn heat_map(done: &Diagnosed, residual: &[f64]) -> String {
+    let mut html = String::from("<table><tr><th>channel</th>");
+    for step in 0..done.study.steps.len() {
+        let _ = write!(html, "<th>{}</th>", step + 1);
+    }
+    html += "</tr>";
+    for (output, channel) in OUTPUTS.iter().enumerate() {
+        let _ = write!(html, "<tr><td>{channel}</td>");
+        for step in 0..done.study.steps.len() {
+            let group = done.study.groups.iter().find(|g| g.step == step && g.output == output);
+            let Some(group) = group else {
+                html += "<td>-</td>";
+                continue;
+            };
+            let here = &residual[group.rows.clone()];
+            let rms = (here.iter().map(|r| r * r).sum::<f64>() / here.len().max(1) as f64).sqrt();
+            // White at 1, red from 30 on, evenly in the logarithm.
+            let heat = (rms.max(1.0).ln() / 30f64.ln()).clamp(0.0, 1.0);
+            let fade = (255.0 * (1.0 - heat)) as u8;
+            let _ = write!(html, "<td style=\"background:rgb(255,{fade},{fade})\">{rms:.1}</td>");
+        }
+        html += "</tr>";
+    }
+    html + "</table>"
+}
+
+/// Measured minus predicted over time, before and after, for the four channels with the largest gap.
+fn traces(done: &Diagnosed) -> String {
+    let Some(best) = done.fits.first() else { return String::new() };
+    let energy = |output: usize| {
+        let groups = done.study.groups.iter().filter(|g| g.output == output);
+        groups.flat_map(|g| &done.null.residual[g.rows.clone()]).map(|r| r * r).sum::<f64>()
+    };
+    let mut order: Vec<usize> = (0..OUTPUTS.len()).collect();
+    order.sort_by(|a, b| energy(*b).total_cmp(&energy(*a)));
+    let mut figure = Figure::new("Measured minus predicted").columns(1).panel_size_px(900.0, 180.0);
+    for output in order.into_iter().take(4) {
+        let points = |values: &[f64]| {
+            let of_output = done.study.groups.iter().filter(|g| g.output == output);
+            of_output
+                .flat_map(|g| {
+                    g.rows.clone().zip(&g.blocks).map(|(row, block)| {
+                        let t_s = done.study.steps[g.step].blocks[*block].mean_s;
+                        (t_s / 60.0, done.study.measured[row] - values[row])
+                    })
+                })
+                .collect::<Vec<(f64, f64)>>()
+        };
+        let channel = OUTPUTS[output];
+        let panel = Panel::new(Axis::new("time, min"), Axis::new(format!("{channel}, {}", channel.unit())))
+            .with(Line::new(points(&done.null.prediction.values), palette::VERMILLION).label("nominal model"))
+            .with(Line::new(points(&best.prediction.values), palette::BLUE).label("with the first cause"));
+        figure = figure.panel(panel);
+    }
+    figure.to_svg()
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

@@ -1,0 +1,47 @@
+//! What a campaign declares of its nominal model.
+
+use serde::{Deserialize, Serialize};
+
+/// One-sigma tolerances of the nominal model, ratios to the nominal value: a deviation within them is no effect.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ModelTolerances {
+    /// Gain of the compressor's flow meter.
+    pub flow_meter_gain_ratio: f64,
+    /// Flow of the compressor map.
+    pub flow_map_ratio: f64,
+    /// Efficiency of the compressor map, everywhere alike.
+    pub compressor_efficiency_ratio: f64,
+    /// Error of the efficiency map that changes smoothly over it.
+    pub efficiency_shape_ratio: f64,
+    /// Efficiency of the turbine.
+    pub turbine_efficiency_ratio: f64,
+    /// Area of the back-pressure valve.
+    pub valve_area_ratio: f64,
+    /// Convection between gas and compressor housing.
+    pub convection_ratio: f64,
+    /// Convection of both housings to the cell.
+    pub external_convection_ratio: f64,
+    /// Conductance to the oil.
+    pub oil_conductance_ratio: f64,
+    /// Lag of P3 behind its command as declared, s: a value, not a tolerance.
+    pub actuator_lag_s: f64,
+}
+
+impl Default for ModelTolerances {
+    /// What a careful gas stand declares: half a percent for what is calibrated, more for heat.
+    fn default() -> Self {
+        ModelTolerances {
+            flow_meter_gain_ratio: 0.005,
+            flow_map_ratio: 0.005,
+            compressor_efficiency_ratio: 0.005,
+            efficiency_shape_ratio: 0.003,
+            turbine_efficiency_ratio: 0.01,
+            valve_area_ratio: 0.005,
+            convection_ratio: 0.03,
+            external_convection_ratio: 0.10,
+            oil_conductance_ratio: 0.05,
+            actuator_lag_s: 0.3,
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Whether what a fit leaves is noise. A misfit is smooth: it is looked for where it can be, in few directions, so that
+//! thousands of noisy values do not hide it.
+
+use crate::fit::{Fit, Selection};
+use crate::study::Study;
+use crate::whiten::{Linearised, dot, rows_of_step};
+
+/// Time constants of the smooth basis after a jump, s; a step belongs to it too.
+const BASIS_S: [f64; 4] = [5.0, 20.0, 60.0, 200.0];
+/// Directions in each group.
+pub const DIRECTIONS: usize = BASIS_S.len() + 1;
+
+/// What a fit leaves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adequacy {
+    /// Energy in the smooth basis, beyond its expectation, in its standard deviations.
+    pub smooth_sigma: f64,
+    /// Energy in the smooth basis beyond its expectation.
+    pub smooth_excess: f64,
+    /// Scatter of the effect's parameters from step to step, beyond expectation, in standard deviations; 0 without
+    /// effects.
+    pub scatter_sigma: f64,
+    /// What one more effect of the catalogue would take off the cost at most.
+    pub one_more: f64,
+    /// Mean squared whitened residual.
+    pub mean_square: f64,
+}
+
+/// Energy of a whitened residual in each group's smooth basis.
+pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64]) -> Vec<f64> {
+    study
+        .groups
+        .iter()
+        .enumerate()
+        .map(|(index, group)| {
+            let here = &residual[group.rows.clone()];
+            let mut directions: Vec<Vec<f64>> = Vec::new();
+            for basis in 0..DIRECTIONS.min(here.len()) {
+                let mut direction: Vec<f64> = group
+                    .blocks
+                    .iter()
+                    .map(|block| {
+                        let since_s = study.steps[group.step].blocks[*block].since_jump_s;
+                        basis.checked_sub(1).map_or(1.0, |b| (-since_s / BASIS_S[b]).exp())
+                    })
+                    .collect();
+                linearised.whiten_group(index, &mut direction);
+                // Gram and Schmidt.
+                for before in &directions {
+                    let along = dot(&direction, before);
+                    for (d, b) in direction.iter_mut().zip(before) {
+                        *d -= along * b;
+                    }
+                }
+                let length = dot(&direction, &direction).sqrt();
+                if length > 1e-6 {
+                    directions.push(direction.into_iter().map(|d| d / length).collect());
+                }
+            }
+            directions.iter().map(|direction| dot(direction, here).powi(2)).sum()
+        })
+        .collect()
+}
+
+/// Looks at what a fit leaves on all steps. `one_more` is the largest gain of a further effect.
+pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit, one_more: f64) -> Adequacy {
+    let energies = smooth_energies(study, linearised, &fit.residual);
+    let expected: f64 = study.groups.iter().map(|group| DIRECTIONS.min(group.rows.len()) as f64).sum();
+    let smooth_excess = energies.iter().sum::<f64>() - expected;
+    let all = Selection::all(study);
+    let mut scatter_sigma: f64 = 0.0;
+    for column in &fit.effect_columns {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for rows in all.rows(study) {
+            let own = dot(&column[rows.clone()], &column[rows.clone()]);
+            if own > 1.0 {
+                sum += dot(&column[rows.clone()], &fit.residual[rows]).powi(2) / own;
+                count += 1.0;
+            }
+        }
+        if count > 1.0 {
+            scatter_sigma = scatter_sigma.max((sum - count) / (2.0f64 * count).sqrt());
+        }
+    }
+    let mean_square = dot(&fit.residual, &fit.residual) / fit.residual.len().max(1) as f64;
+    Adequacy {
+        smooth_sigma: smooth_excess / (2.0 * expected.max(1.0)).sqrt(),
+        smooth_excess,
+        scatter_sigma,
+        one_more,
+        mean_square,
+    }
+}
+
+/// Misfit of each step: `(|r|^2 - n)/n`.
+pub fn misfit_of_steps(study: &Study, residual: &[f64]) -> Vec<f64> {
+    (0..study.steps.len())
+        .map(|step| {
+            let rows = rows_of_step(study, step);
+            let n = rows.len().max(1) as f64;
+            (dot(&residual[rows.clone()], &residual[rows]) - n) / n
+        })
+        .collect()
+}

@@ -1,0 +1,48 @@
+//! Numbers that turn scores into probabilities: found on simulated campaigns, kept in a data file with the seed and
+//! the command that made it.
+
+use serde::{Deserialize, Serialize};
+
+/// What was calibrated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibration {
+    /// The command that made it, with its seed.
+    pub made_by: String,
+    /// A cause is named where its score exceeds that of nothing by more than this.
+    pub threshold: f64,
+    /// Divides the differences of scores.
+    pub temperature: f64,
+    /// Prior of nothing.
+    pub prior_none: f64,
+    /// Prior of all singles together.
+    pub prior_single: f64,
+    /// Prior of all pairs together.
+    pub prior_pair: f64,
+    /// Widens the parameters' standard errors.
+    pub interval_factor: f64,
+    /// Logistic of an outside cause: offset, and slopes of the smooth misfit's and the scatter's sigmas and of the gain
+    /// of one more effect.
+    pub outside: [f64; 4],
+}
+
+/// The data file.
+const TEXT: &str = include_str!("../calibration.json");
+
+impl Calibration {
+    /// The calibration that ships.
+    ///
+    /// # Errors
+    /// The parser's, where the data file was spoilt.
+    pub fn shipped() -> Result<Calibration, serde_json::Error> {
+        serde_json::from_str(TEXT)
+    }
+
+    /// Probability of an outside cause by what the best fit leaves.
+    pub fn outside(&self, smooth_sigma: f64, scatter_sigma: f64, one_more: f64) -> f64 {
+        let [offset, smooth, scatter, more] = self.outside;
+        let squash = |x: f64| x.clamp(-5.0, 100.0);
+        let x = offset + smooth * squash(smooth_sigma) + scatter * squash(scatter_sigma) + more * squash(one_more);
+        1.0 / (1.0 + (-x).exp())
+    }
+}

@@ -1,0 +1,168 @@
+//! What a diagnosis says, as machines read it.
+
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The word on the whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Nothing beyond what is declared.
+    WithinTolerance,
+    /// An effect or pair of the catalogue leaves nothing but noise.
+    Explained,
+    /// An effect or pair removes most, and what is left is more than tolerance.
+    PartlyExplained,
+    /// Nothing of the catalogue removes most of it.
+    Unexplained,
+}
+
+/// A diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// The word on the whole.
+    pub verdict: Verdict,
+    /// Places of the gap, largest first.
+    pub r#where: Vec<Place>,
+    /// Causes, best first.
+    pub candidates: Vec<Candidate>,
+    /// Probability that nothing is beyond tolerance.
+    pub probability_none: f64,
+    /// Probability that the cause is outside the catalogue.
+    pub probability_outside: f64,
+    /// The gap before and after.
+    pub gap: Gap,
+    /// What to do next; `None` where nothing is left to settle.
+    pub next: Option<Next>,
+    /// What could not be used, and what to know before believing the rest; one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// A place of the gap.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Place {
+    /// Part of the model.
+    pub submodel: String,
+    /// Channel in which it shows most.
+    pub channel: String,
+    /// Phase of the step in which it shows most.
+    pub phase: String,
+    /// Region of the map in which it shows most.
+    pub region: String,
+    /// Share of the whole gap's energy, 0..1.
+    pub share: f64,
+    /// Size in standard deviations of what is declared.
+    pub sigma: f64,
+    /// Root mean square in the channel's unit.
+    pub size: f64,
+    /// That unit.
+    pub unit: String,
+}
+
+/// A parameter with its 95 % interval.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Best value.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// A cause: one effect or several together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Candidate {
+    /// Ids of its effects.
+    pub effects: Vec<String>,
+    /// Calibrated probability.
+    pub probability: f64,
+    /// Parameters; `inner_node.phi` where an effect has several.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// Causes that the data cannot tell apart from this one.
+    pub equivalent: Vec<Vec<String>>,
+}
+
+/// Root mean square residual of a channel.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelGap {
+    /// With the nominal model, tolerances fitted.
+    pub before: f64,
+    /// With the best cause.
+    pub after: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// Efficiency and heat transfer at the end of a step.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PointGap {
+    /// Shaft speed, rpm.
+    pub speed_rpm: f64,
+    /// Valve opening.
+    pub valve: f64,
+    /// Efficiency by the nominal model, tolerances fitted.
+    pub eta_before: f64,
+    /// Efficiency with the best cause.
+    pub eta_after: f64,
+    /// Heat-transfer coefficient by the nominal model, tolerances fitted, W/(m2 K).
+    pub h_before_w_m2k: f64,
+    /// Heat-transfer coefficient with the best cause, W/(m2 K).
+    pub h_after_w_m2k: f64,
+}
+
+/// The gap on steps used neither to select nor to fit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gap {
+    /// Mean of `(|r|^2 - n)/n` over the held-out steps, nominal model with tolerances fitted.
+    pub before: f64,
+    /// The same with the best cause.
+    pub after: f64,
+    /// Share removed.
+    pub shrink: f64,
+    /// 95 % interval of the share: lower end.
+    pub shrink_low: f64,
+    /// Upper end.
+    pub shrink_high: f64,
+    /// Steps held out, by index.
+    pub held_out_steps: Vec<usize>,
+    /// Each channel.
+    pub channels: BTreeMap<String, ChannelGap>,
+    /// Each operating point.
+    pub points: Vec<PointGap>,
+}
+
+/// An operating point of a jump.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct JumpPoint {
+    /// Shaft speed, rpm.
+    pub speed_rpm: f64,
+    /// Valve opening.
+    pub valve: f64,
+}
+
+/// What to do next.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Next {
+    /// The jump that separates the remaining candidates best.
+    Jump {
+        /// Where it starts.
+        from: JumpPoint,
+        /// Where it goes.
+        to: JumpPoint,
+        /// Probability expected for the best candidate after it.
+        expected_probability: f64,
+        /// Its length, min.
+        minutes: f64,
+    },
+    /// The sensor that would.
+    Sensor {
+        /// Which.
+        sensor: String,
+        /// Why.
+        reason: String,
+    },
+}

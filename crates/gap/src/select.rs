@@ -1,0 +1,388 @@
+//! Which effects, alone or two together, explain a recording best.
+//!
+//! Every single effect is fitted with runs of the model. What a second effect would add is first estimated in closed
+//! form beside the best singles; the most promising pairs are then fitted likewise.
+
+use crate::fit::{Coordinate, Effort, Fit, Selection, dot_over, fit, nuisance_products};
+use crate::parallel;
+use crate::study::{Hypothesis, PredictError, Study};
+use crate::whiten::Linearised;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// All hypotheses that were fitted, the empty one first, then best first.
+#[derive(Debug)]
+pub struct Found {
+    /// Nothing but tolerances.
+    pub null: Fit,
+    /// Singles and pairs, best score first.
+    pub fits: Vec<Fit>,
+    /// Linearised beside the best single, where the nominal point is far from it.
+    pub anew: Option<Linearised>,
+}
+
+/// A single must take at least this off the cost to be worth a second look.
+const WORTH: f64 = 6.0;
+/// Above this share of the number of values, the null's cost says that something strong is there, and nuisances are
+/// linearised anew beside the best single.
+const STRONG: f64 = 2.0;
+
+/// What the search works with.
+#[derive(Clone, Copy)]
+pub struct Search<'a> {
+    /// The recording.
+    pub study: &'a Study,
+    /// Linearised where nothing is off.
+    pub linearised: &'a Linearised,
+    /// Steps that count.
+    pub selection: &'a Selection,
+    /// Told the share done, and what comes.
+    pub progress: &'a (dyn Fn(f64, &str) + Sync),
+}
+
+/// Searches singles and pairs on the steps of the selection.
+///
+/// # Errors
+/// [`PredictError`] where the nominal model cannot follow the recording.
+pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
+    let Search { study, selection, progress, .. } = search;
+    let null = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
+    progress(0.15, "single effects");
+    let mut singles = singles(search, &null);
+    let strong = null.cost > STRONG * study.measured.len() as f64;
+    let anew = match singles.first() {
+        Some(best) if strong => search.linearised.at(study, &best.hypothesis).ok(),
+        _ => None,
+    };
+    let linearised = anew.as_ref().unwrap_or(search.linearised);
+    let beside = Search { linearised, ..search };
+    if anew.is_some() {
+        refit(beside, &mut singles, 4, Effort::default());
+    }
+    progress(0.5, "pairs");
+    let mut fits = if singles.first().is_some_and(|first| null.cost - first.cost > WORTH) {
+        pairs(beside, &singles)
+    } else {
+        Vec::new()
+    };
+    fits.append(&mut singles);
+    sort(&mut fits);
+    Ok(Found { null, fits, anew })
+}
+
+/// Fits of all single effects, best first.
+fn singles(search: Search<'_>, null: &Fit) -> Vec<Fit> {
+    let Search { study, linearised, selection, .. } = search;
+    let mut starts: Vec<Hypothesis> = Vec::new();
+    for index in 0..study.effects.len() {
+        starts.extend(starts_of(study, &study.nothing(), index));
+    }
+    let quick = Effort { iterations: 3, enough: 1.0 };
+    let tried = parallel::map(&starts, |start| {
+        let started = linear_start(study, linearised, selection, start, null)?;
+        fit(study, linearised, &started, selection, quick).ok()
+    });
+    let mut singles: Vec<Fit> = Vec::new();
+    for fitted in tried.into_iter().flatten() {
+        keep_best(&mut singles, fitted);
+    }
+    sort(&mut singles);
+    refit(search, &mut singles, 7, Effort { iterations: 6, enough: 0.2 });
+    singles
+}
+
+/// Fits the best few more thoroughly.
+pub fn refit(search: Search<'_>, fits: &mut Vec<Fit>, count: usize, effort: Effort) {
+    let best: Vec<Hypothesis> = fits.iter().take(count).map(|f| f.hypothesis.clone()).collect();
+    let again = parallel::map(&best, |start| fit(search.study, search.linearised, start, search.selection, effort));
+    for fitted in again.into_iter().flatten() {
+        keep_best(fits, fitted);
+    }
+    sort(fits);
+}
+
+/// Fits of the most promising pairs: beside the best singles, and beside the partners that these ask for.
+fn pairs(search: Search<'_>, singles: &[Fit]) -> Vec<Fit> {
+    let Search { study, linearised, selection, progress } = search;
+    let mut wanted: Vec<Wanted> = Vec::new();
+    let mut bases: Vec<usize> = (0..singles.len().min(2)).collect();
+    for round in 0..2 {
+        let found = parallel::map(&bases, |base| additions(study, linearised, selection, &singles[*base]));
+        for (base, added) in bases.iter().zip(found) {
+            for addition in added {
+                let cost = singles[*base].cost - addition.gain;
+                let mut names = vec![singles[*base].hypothesis.effects[0].0, addition.effect];
+                names.sort_unstable();
+                let candidate = Wanted { cost, names, partner: addition.effect, start: addition.start };
+                match wanted.iter_mut().find(|other| other.names == candidate.names) {
+                    Some(other) if other.cost <= cost => {}
+                    Some(other) => *other = candidate,
+                    None => wanted.push(candidate),
+                }
+            }
+        }
+        wanted.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        if round == 0 {
+            let place = |effect: usize| singles.iter().position(|f| f.hypothesis.effects[0].0 == effect);
+            let mut next: Vec<usize> = Vec::new();
+            for base in wanted.iter().take(8).filter_map(|w| place(w.partner)) {
+                if !next.contains(&base) && !bases.contains(&base) && next.len() < 2 {
+                    next.push(base);
+                }
+            }
+            bases = next;
+        }
+    }
+    progress(0.65, "pairs");
+    let starts: Vec<Hypothesis> = wanted.into_iter().take(6).map(|w| w.start).collect();
+    let effort = Effort { iterations: 5, enough: 0.5 };
+    let fitted = parallel::map(&starts, |start| fit(study, linearised, start, selection, effort));
+    let mut pairs = Vec::new();
+    for fitted in fitted.into_iter().flatten() {
+        keep_best(&mut pairs, fitted);
+    }
+    sort(&mut pairs);
+    refit(search, &mut pairs, 2, Effort::default());
+    swap(search, &mut pairs);
+    pairs
+}
+
+/// Above this share of the number of values, the best pair's cost says that it is not the right one.
+const INADEQUATE: f64 = 1.1;
+
+/// Where even the best pair leaves too much, what a third effect would do beside it may be what one of the two should
+/// have done: each member in turn gives way to the three that promise most.
+fn swap(search: Search<'_>, pairs: &mut Vec<Fit>) {
+    let Search { study, linearised, selection, .. } = search;
+    let values: usize = selection.rows(study).iter().map(ExactSizeIterator::len).sum();
+    let Some(best) = pairs.first().filter(|best| best.cost > INADEQUATE * values as f64) else { return };
+    let mut thirds = additions(study, linearised, selection, best);
+    thirds.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut starts: Vec<Hypothesis> = Vec::new();
+    for third in thirds.into_iter().take(3) {
+        for dropped in members(&best.hypothesis) {
+            let mut start = third.start.clone();
+            start.effects.retain(|(index, _)| *index != dropped);
+            starts.push(start);
+        }
+    }
+    let effort = Effort { iterations: 6, enough: 0.5 };
+    for fitted in parallel::map(&starts, |start| fit(study, linearised, start, selection, effort)).into_iter().flatten() {
+        keep_best(pairs, fitted);
+    }
+    sort(pairs);
+    refit(search, pairs, 2, Effort::default());
+}
+
+/// A pair worth a fit.
+struct Wanted {
+    cost: f64,
+    names: Vec<usize>,
+    partner: usize,
+    start: Hypothesis,
+}
+
+/// Best score first.
+pub fn sort(fits: &mut [Fit]) {
+    fits.sort_by(|a, b| b.score.total_cmp(&a.score));
+}
+
+/// Names of a hypothesis' effects, by index, in order.
+pub fn members(hypothesis: &Hypothesis) -> Vec<usize> {
+    let mut members: Vec<usize> = hypothesis.effects.iter().map(|(index, _)| *index).collect();
+    members.sort_unstable();
+    members
+}
+
+/// Keeps one fit for each set of effects: the better.
+pub fn keep_best(fits: &mut Vec<Fit>, fitted: Fit) {
+    let names = members(&fitted.hypothesis);
+    match fits.iter_mut().find(|other| members(&other.hypothesis) == names) {
+        Some(other) if other.cost <= fitted.cost => {}
+        Some(other) => *other = fitted,
+        None => fits.push(fitted),
+    }
+}
+
+/// Where the search for an effect begins: a typical step from neutral, and where two parameters work together, several.
+fn starts_of(study: &Study, base: &Hypothesis, index: usize) -> Vec<Hypothesis> {
+    let parameters = &study.effects[index].info().parameters;
+    let with = |values: Vec<f64>| {
+        let mut start = base.clone();
+        start.effects.push((index, values));
+        start
+    };
+    if let [parameter] = parameters.as_slice() {
+        let value = parameter.neutral + parameter.typical_step;
+        return vec![with(vec![value.clamp(parameter.low, parameter.high)])];
+    }
+    // Corners of the inner part of each range.
+    let places = |p: &mapper_physics::effect::EffectParameter| {
+        let coordinate = Coordinate::new(p);
+        let (low, high) = (coordinate.of(p.low), coordinate.of(p.high));
+        [0.33, 0.6].map(|share| coordinate.value(low + share * (high - low)))
+    };
+    let mut corners: Vec<Vec<f64>> = vec![Vec::new()];
+    for parameter in parameters {
+        corners = corners
+            .into_iter()
+            .flat_map(|corner| places(parameter).map(|value| [corner.clone(), vec![value]].concat()))
+            .collect();
+    }
+    corners.into_iter().map(with).collect()
+}
+
+/// Solves the nuisances' part of the normal equations again and again.
+struct Projector<'a> {
+    linearised: &'a Linearised,
+    rows: Vec<std::ops::Range<usize>>,
+    cholesky: Cholesky<f64, Dyn>,
+    /// Columns besides the nuisances' that are free as well.
+    others: &'a [Vec<f64>],
+}
+
+impl<'a> Projector<'a> {
+    fn new(
+        study: &Study,
+        linearised: &'a Linearised,
+        selection: &Selection,
+        others: &'a [Vec<f64>],
+    ) -> Option<Projector<'a>> {
+        let rows = selection.rows(study);
+        let n = study.nuisances.len();
+        let mut matrix = DMatrix::zeros(n + others.len(), n + others.len());
+        matrix.view_mut((0, 0), (n, n)).copy_from(&nuisance_products(study, linearised, selection));
+        for i in 0..n {
+            matrix[(i, i)] += 1.0;
+        }
+        for (j, other) in others.iter().enumerate() {
+            for i in 0..n {
+                let product = dot_over(&rows, &linearised.columns[i], other);
+                matrix[(i, n + j)] = product;
+                matrix[(n + j, i)] = product;
+            }
+            for (l, third) in others.iter().enumerate() {
+                matrix[(n + j, n + l)] = dot_over(&rows, other, third);
+            }
+            matrix[(n + j, n + j)] += 1e-6;
+        }
+        Some(Projector { linearised, rows, cholesky: matrix.cholesky()?, others })
+    }
+
+    fn right(&self, column: &[f64]) -> DVector<f64> {
+        let n = self.linearised.columns.len();
+        DVector::from_fn(n + self.others.len(), |i, _| {
+            let other = if i < n { &self.linearised.columns[i] } else { &self.others[i - n] };
+            dot_over(&self.rows, other, column)
+        })
+    }
+
+    /// Product of two columns with the span of the free ones (softened by their priors) taken out.
+    fn product(&self, a: &[f64], right_a: &DVector<f64>, b: &[f64], right_b: &DVector<f64>) -> f64 {
+        dot_over(&self.rows, a, b) - right_a.dot(&self.cholesky.solve(right_b))
+    }
+}
+
+/// The start of a single, moved to where a straight line says its best lies.
+fn linear_start(
+    study: &Study,
+    linearised: &Linearised,
+    selection: &Selection,
+    start: &Hypothesis,
+    null: &Fit,
+) -> Option<Hypothesis> {
+    let (index, values) = start.effects.first()?;
+    let parameters = &study.effects[*index].info().parameters;
+    let [parameter] = parameters.as_slice() else { return Some(start.clone()) };
+    let step = values[0] - parameter.neutral;
+    if step == 0.0 {
+        return Some(start.clone());
+    }
+    let there = study.predict(start).ok()?;
+    let mut change: Vec<f64> =
+        there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
+    linearised.whiten(study, &mut change);
+    let projector = Projector::new(study, linearised, selection, &[])?;
+    let residual = linearised.residual(study, &linearised.base);
+    let right = projector.right(&change);
+    let own = projector.product(&change, &right, &change, &right);
+    let seen = projector.product(&change, &right, &residual, &projector.right(&residual));
+    let share = if own > 1e-9 { (seen / own).clamp(-4.0, 4.0) } else { 0.0 };
+    // Where the line says nothing, stand a little off neutral: at neutral some effects have no slope.
+    let share = if share.abs() < 0.1 { 0.1 * if share < 0.0 { -1.0 } else { 1.0 } } else { share };
+    let mut moved = study.nothing();
+    let value = (parameter.neutral + share * step).clamp(parameter.low, parameter.high);
+    let value = if value == parameter.neutral {
+        (parameter.neutral + 0.1 * step).clamp(parameter.low, parameter.high)
+    } else {
+        value
+    };
+    moved.effects = vec![(*index, vec![value])];
+    // Small effects start best where the null's nuisances stand, large ones where nothing is off.
+    if null.cost < 2.0 * study.measured.len() as f64 {
+        moved.nuisances = null.hypothesis.nuisances.clone();
+    }
+    Some(moved)
+}
+
+/// What one more effect would do beside a fit.
+pub struct Addition {
+    /// Which.
+    pub effect: usize,
+    /// What it would take off the cost, in a straight line.
+    pub gain: f64,
+    /// Where to start a fit.
+    pub start: Hypothesis,
+}
+
+/// Every further effect beside a fit, in closed form from one run each.
+pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> Vec<Addition> {
+    let Some(projector) = Projector::new(study, linearised, selection, &base.effect_columns) else {
+        return Vec::new();
+    };
+    let right_residual = projector.right(&base.residual);
+    let used = members(&base.hypothesis);
+    let mut starts: Vec<(usize, Hypothesis)> = Vec::new();
+    for index in (0..study.effects.len()).filter(|index| !used.contains(index)) {
+        starts.extend(starts_of(study, &base.hypothesis, index).into_iter().map(|start| (index, start)));
+    }
+    let mut best: Vec<Addition> = Vec::new();
+    for (index, start) in starts {
+        // A whole typical step: some effects have no slope where they vanish.
+        let parameters = &study.effects[index].info().parameters;
+        let single = parameters.len() == 1;
+        let mut near = start.clone();
+        if let (true, Some((_, values))) = (single, near.effects.last_mut()) {
+            let (neutral, step) = (parameters[0].neutral, values[0] - parameters[0].neutral);
+            values[0] = (neutral + step).clamp(parameters[0].low, parameters[0].high);
+        }
+        let Ok(there) = study.predict(&near) else { continue };
+        let mut change: Vec<f64> =
+            there.values.iter().zip(&base.prediction.values).map(|(t, b)| t - b).collect();
+        linearised.whiten(study, &mut change);
+        let right = projector.right(&change);
+        let own = projector.product(&change, &right, &change, &right);
+        let seen = projector.product(&change, &right, &base.residual, &right_residual);
+        let mut share = if own > 1e-9 { seen / own } else { 0.0 };
+        let mut addition = Addition { effect: index, gain: 0.0, start };
+        if single {
+            let parameter = &parameters[0];
+            let step = parameter.typical_step;
+            // The straight estimate, kept within the range; not far beyond the step that was taken, for effects bend.
+            let value = (parameter.neutral + share.clamp(-3.0, 3.0) * step).clamp(parameter.low, parameter.high);
+            share = (value - parameter.neutral) / step;
+            let value = if value == parameter.neutral { parameter.neutral + 0.1 * step } else { value };
+            if let Some((_, values)) = addition.start.effects.last_mut() {
+                values[0] = value.clamp(parameter.low, parameter.high);
+            }
+            addition.gain = 2.0 * share * seen - share * share * own;
+        } else {
+            addition.gain = if share > 0.0 { seen * seen / own } else { 0.0 };
+        }
+        match best.iter_mut().find(|other| other.effect == index) {
+            Some(other) if other.gain >= addition.gain => {}
+            Some(other) => *other = addition,
+            None => best.push(addition),
+        }
+    }
+    best
+}

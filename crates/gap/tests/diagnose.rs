@@ -1,0 +1,222 @@
+//! The diagnosis on recordings of the adaptive simulator, which shares the equations with the driven model but neither
+//! its grid, its inputs nor its noise.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, StepKind, StepMarker};
+use mapper_gap::calibration::Calibration;
+use mapper_gap::declared::Declared;
+use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
+use mapper_gap::report::Verdict;
+use mapper_physics::effect::{Effect, Rig, add};
+use mapper_physics::inputs::InterpolatedInputs;
+use mapper_physics::instruments::{ChannelFollower, true_value};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::simulate::{Simulator, Watch};
+use mapper_physics::steady::hold_speed;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+const DWELL_S: f64 = 60.0;
+const SPEEDS_RPM: [f64; 7] = [90e3, 140e3, 60e3, 120e3, 70e3, 130e3, 80e3];
+
+/// Noise of a sample of each channel, and offset, one sigma.
+const SENSORS: [(Channel, f64, f64); 14] = [
+    (Channel::ShaftSpeed, 30.0, 0.0),
+    (Channel::CompressorFlow, 1.5e-4, 0.0),
+    (Channel::P1, 20.0, 50.0),
+    (Channel::T1, 0.1, 0.25),
+    (Channel::P2, 60.0, 100.0),
+    (Channel::T2, 0.1, 0.25),
+    (Channel::Tc, 0.15, 0.3),
+    (Channel::TurbineFlow, 1.5e-4, 0.0),
+    (Channel::P3, 80.0, 150.0),
+    (Channel::T3, 0.5, 0.5),
+    (Channel::P4, 30.0, 50.0),
+    (Channel::T4, 0.3, 0.5),
+    (Channel::Tt, 0.3, 0.5),
+    (Channel::TOil, 0.2, 0.5),
+];
+
+fn boundary() -> BoundaryConditions {
+    BoundaryConditions { valve_opening_ratio: 0.9, ..BoundaryConditions::default() }
+}
+
+/// Seven points at one opening, a jump between each two, noise and offsets drawn from what is declared.
+fn record(effect: Option<(&str, &[f64])>, seed: u64) -> Recording {
+    let mut rig = Rig::new(Model::nominal());
+    if let Some((id, values)) = effect {
+        add(&mut rig, mapper_effects::find(id).unwrap().as_ref(), values).unwrap();
+    }
+    let nominal = Model::nominal();
+    let p3_pa: Vec<f64> =
+        SPEEDS_RPM.iter().map(|n| hold_speed(&nominal, *n, &boundary()).unwrap().boundary.p3_pa).collect();
+    let end_s = DWELL_S * SPEEDS_RPM.len() as f64;
+    let times_s: Vec<f64> = (0..(end_s / 0.1) as usize).map(|i| 0.1 * i as f64).collect();
+    let mut held_pa = p3_pa[0];
+    let lagged: Vec<f64> = times_s
+        .iter()
+        .map(|t| {
+            let wanted = p3_pa[(((t - 1e-6) / DWELL_S).max(0.0) as usize).min(p3_pa.len() - 1)];
+            held_pa = wanted + (held_pa - wanted) * (-0.1f64 / 0.3).exp();
+            held_pa
+        })
+        .collect();
+    let rows = lagged.iter().map(|p3_pa| BoundaryConditions { p3_pa: *p3_pa, ..boundary() }).collect();
+    let inputs = InterpolatedInputs::new(times_s.clone(), rows).unwrap();
+    let at_rest = BoundaryConditions { p3_pa: p3_pa[0], ..boundary() };
+    let guess = hold_speed(&nominal, SPEEDS_RPM[0], &boundary()).unwrap().state;
+    let start = mapper_physics::driven::settle(&rig.model, &at_rest, guess).unwrap();
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut normal = move || -> f64 { random.sample(StandardNormal) };
+    let offsets: Vec<f64> = SENSORS.iter().map(|(_, _, offset)| offset * normal()).collect();
+    let mut followers: Vec<ChannelFollower> =
+        SENSORS.iter().map(|(channel, ..)| ChannelFollower::new(*rig.instruments.path(*channel))).collect();
+    let mut slow = vec![0.0; SENSORS.len()];
+    let mut values: Vec<Vec<f64>> = vec![Vec::new(); SENSORS.len()];
+    let decay = (-0.1f64 / 2.0).exp();
+    let mut simulator = Simulator::new(&rig.model, 0.0, start, 1e-6, Watch::default());
+    let sample = |t_s: f64, state: &mapper_physics::model::State, outputs: &mapper_physics::model::Outputs| {
+        let at = mapper_physics::inputs::Inputs::at(&inputs, t_s);
+        let prepared = rig.model.prepare(&at);
+        for (i, (channel, noise, _)) in SENSORS.iter().enumerate() {
+            let seen = followers[i].read(t_s, true_value(*channel, &prepared, state, outputs).unwrap());
+            slow[i] = decay * slow[i] + (1.0 - decay * decay).sqrt() * normal();
+            values[i].push(seen + offsets[i] + noise * (0.8 * normal() + 0.6 * slow[i]));
+        }
+    };
+    simulator.run_to(end_s, &inputs, times_s.iter().copied(), sample, |_| {}).unwrap();
+    let series: BTreeMap<Channel, Series> = SENSORS
+        .iter()
+        .zip(values)
+        .map(|((channel, ..), values)| (*channel, Series { t_s: times_s.clone(), values }))
+        .collect();
+    let steps = (0..SPEEDS_RPM.len())
+        .map(|index| StepMarker {
+            index,
+            kind: StepKind::Point,
+            start_s: DWELL_S * index as f64,
+            end_s: DWELL_S * (index + 1) as f64,
+            from: None,
+            to: None,
+            p3_pa: p3_pa[index],
+            valve_opening_ratio: boundary().valve_opening_ratio,
+        })
+        .collect();
+    Recording { series, steps, events: Vec::new() }
+}
+
+fn declared() -> Declared {
+    let sensors = SENSORS
+        .iter()
+        .map(|(channel, noise_sigma, offset_sigma)| {
+            let declared =
+                DeclaredUncertainty { noise_sigma: *noise_sigma, offset_sigma: *offset_sigma, gain_sigma_ratio: 0.0 };
+            (*channel, declared)
+        })
+        .collect();
+    Declared {
+        sensors,
+        noise_colour: Default::default(),
+        tolerances: Default::default(),
+        nominal: boundary(),
+    }
+}
+
+/// With a few candidates only: the search over all of them is checked by `mapper gap blind`.
+fn ask(recording: &Recording) -> Result<Diagnosed, GapError> {
+    let candidates = ["tip_diameter", "stem_conduction", "bearing_friction", "flowmeter_gain"];
+    let effects: Vec<Arc<dyn Effect>> = candidates.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
+    diagnose(Question {
+        recording,
+        declared: declared(),
+        model: Model::nominal(),
+        effects,
+        calibration: Calibration::shipped().unwrap(),
+        progress: &|_, _| {},
+    })
+}
+
+#[test]
+fn nothing_is_called_nothing() {
+    let diagnosed = ask(&record(None, 5)).unwrap();
+    let diagnosis = &diagnosed.diagnosis;
+    assert_eq!(diagnosis.verdict, Verdict::WithinTolerance);
+    let sum = diagnosis.probability_none
+        + diagnosis.probability_outside
+        + diagnosis.candidates.iter().map(|c| c.probability).sum::<f64>();
+    assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+    // Mean square of whitened noise: 1 within four standard deviations (sqrt(2/n)), and a little less, for what the
+    // uncertainty of the inputs and of jumps near surge adds to the noise.
+    let n = diagnosed.null.residual.len() as f64;
+    let mean_square = diagnosed.null.residual.iter().map(|r| r * r).sum::<f64>() / n;
+    assert!((0.8..1.0 + 4.0 * (2.0 / n).sqrt()).contains(&mean_square), "{mean_square}");
+}
+
+#[test]
+fn a_probe_of_two_millimetres_is_named_measured_and_closes_the_gap() {
+    let diagnosed = ask(&record(Some(("tip_diameter", &[2e-3])), 6)).unwrap();
+    let diagnosis = &diagnosed.diagnosis;
+    assert_eq!(diagnosis.verdict, Verdict::Explained);
+    assert_eq!(diagnosis.candidates[0].effects, ["tip_diameter"]);
+    let estimate = &diagnosis.candidates[0].parameters["tip_diameter"];
+    // Three times the half width of its own interval.
+    let room = 1.5 * (estimate.high - estimate.low);
+    assert!((estimate.value - 2e-3).abs() < room && room < 2e-4, "{estimate:?}");
+    assert_eq!(diagnosis.r#where[0].submodel, "t2_probe");
+    assert_eq!(diagnosis.r#where[0].channel, "T2");
+    // Held-out steps: what is left is noise, of which nothing can be removed.
+    assert!(diagnosis.gap.shrink > 0.9 && !diagnosis.gap.held_out_steps.is_empty());
+    assert!(diagnosis.gap.channels["T2"].after < 0.2 * diagnosis.gap.channels["T2"].before);
+}
+
+#[test]
+fn bad_recordings_get_a_clear_word_and_no_culprit() {
+    let good = record(None, 7);
+    let word = |recording: &Recording| ask(recording).map(|d| d.diagnosis.verdict).unwrap_err().to_string();
+    let mut kpa = good.clone();
+    for value in &mut kpa.series.get_mut(&Channel::P2).unwrap().values {
+        *value *= 1e-3;
+    }
+    assert!(word(&kpa).contains("kPa labelled Pa"), "{}", word(&kpa));
+    let mut celsius = good.clone();
+    for value in &mut celsius.series.get_mut(&Channel::T2).unwrap().values {
+        *value -= 273.15;
+    }
+    assert!(word(&celsius).contains("degC labelled K"), "{}", word(&celsius));
+    let mut still = good.clone();
+    still.steps.truncate(1);
+    assert!(word(&still).contains("no jump"), "{}", word(&still));
+    let mut blind = good.clone();
+    blind.series.remove(&Channel::T3);
+    assert!(word(&blind).contains("T3"), "{}", word(&blind));
+    let mut elsewhere = good.clone();
+    for step in &mut elsewhere.steps {
+        step.p3_pa *= 1.4;
+    }
+    assert!(word(&elsewhere).contains("do not belong together"), "{}", word(&elsewhere));
+    assert!(word(&Recording::default()).contains("no measured channel"), "{}", word(&Recording::default()));
+}
+
+#[test]
+fn what_is_not_recorded_is_said_and_the_rest_is_diagnosed() {
+    let mut recording = record(Some(("tip_diameter", &[2e-3])), 8);
+    recording.series.remove(&Channel::T4);
+    recording.series.remove(&Channel::TurbineFlow);
+    // And a gap of five seconds.
+    for series in recording.series.values_mut() {
+        let keep: Vec<usize> =
+            (0..series.t_s.len()).filter(|i| !(200.0..205.0).contains(&series.t_s[*i])).collect();
+        series.values = keep.iter().map(|i| series.values[*i]).collect();
+        series.t_s = keep.iter().map(|i| series.t_s[*i]).collect();
+    }
+    let diagnosis = ask(&recording).unwrap().diagnosis;
+    assert_eq!(diagnosis.candidates[0].effects, ["tip_diameter"]);
+    for said in ["T4", "m_t", "gap"] {
+        assert!(diagnosis.warnings.iter().any(|w| w.contains(said)), "{said}: {:?}", diagnosis.warnings);
+    }
+}

@@ -1,0 +1,62 @@
+//! A suspected effect written in rhai: a header that names it, and functions for the places where it takes part.
+//!
+//! A script computes with numbers: it has arithmetic, comparison and mathematics, no arrays, maps, files or clock, and a
+//! bound on its work, so that it does the same on every machine and ends.
+
+mod engine;
+mod error;
+mod header;
+mod hooks;
+
+pub use error::ScriptEffectError;
+pub use hooks::HOOK_NAMES;
+
+use engine::Program;
+use hooks::ScriptHooks;
+use mapper_physics::effect::{Effect, EffectInfo, Rig};
+use mapper_physics::hooks::TooManyExtraStates;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Longest script, bytes.
+const SCRIPT_LIMIT: usize = 64 << 10;
+
+/// An effect made of a script.
+#[derive(Debug, Clone)]
+pub struct ScriptEffect {
+    info: EffectInfo,
+    program: Arc<Program>,
+}
+
+impl ScriptEffect {
+    /// Reads a script; `path` stands for it in messages.
+    ///
+    /// # Errors
+    /// [`ScriptEffectError`] with the line: a header without id, submodel or parameter, a mistake in the script, or a script
+    /// that defines none of the hooks.
+    pub fn new(text: &str, path: &Path) -> Result<Self, ScriptEffectError> {
+        let fail = |line: Option<usize>, message: String| ScriptEffectError::new(path, text, line, message);
+        if text.len() > SCRIPT_LIMIT {
+            return Err(fail(None, format!("{} bytes are more than {SCRIPT_LIMIT}", text.len())));
+        }
+        let info = header::read(text).map_err(|(line, message)| fail(line, message))?;
+        let names: Vec<String> = info.parameters.iter().map(|parameter| parameter.name.to_string()).collect();
+        let program = Program::new(text, names).map_err(|(line, message)| fail(line, message))?;
+        Ok(ScriptEffect { info, program: Arc::new(program) })
+    }
+}
+
+impl Effect for ScriptEffect {
+    fn info(&self) -> &EffectInfo {
+        &self.info
+    }
+
+    fn prepare(&self, values: &[f64], rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        let parameters = &self.info.parameters;
+        // At neutral it is not there, however the script rounds.
+        if parameters.iter().zip(values).all(|(parameter, value)| parameter.neutral == *value) {
+            return Ok(());
+        }
+        rig.hook(ScriptHooks::new(self.program.clone(), values))
+    }
+}

@@ -1,0 +1,208 @@
+//! The engine of a script: what it lacks, how much it may do, and one per thread.
+
+use super::header::Mistake;
+use super::hooks::HOOK_NAMES;
+use mapper_core::Channel;
+use mapper_physics::hooks::Site;
+use rhai::packages::{ArithmeticPackage, BasicMathPackage, LogicPackage, Package};
+use rhai::{AST, CallFnOptions, Dynamic, Engine, FuncArgs, ParseError, Position, Scope};
+use std::cell::RefCell;
+use std::collections::{BTreeSet, HashMap};
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Operations of one call: a place is asked some million times in a run.
+const OPERATION_LIMIT: u64 = 10_000;
+const CALL_DEPTH_LIMIT: usize = 8;
+const EXPRESSION_DEPTH_LIMIT: usize = 64;
+const STRING_LIMIT: usize = 256;
+const VARIABLE_LIMIT: usize = 64;
+const FUNCTION_LIMIT: usize = 64;
+/// Engines that a thread keeps.
+const KEPT_ENGINES: usize = 32;
+
+/// What a script sees of the machine: `at.tc_k` and so on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct At {
+    values: [f64; FIELDS.len()],
+}
+
+/// Reads one value of the machine.
+type Field = fn(&Site<'_>) -> f64;
+
+/// What a script sees, by its name. Values that come later in the gas path than a hook are NaN there.
+const FIELDS: [(&str, Field); 22] = [
+    ("speed_rad_s", |site| site.state.shaft_speed_rad_s),
+    ("speed_rpm", |site| site.state.shaft_speed_rpm()),
+    ("p1_pa", |site| site.boundary.p1_pa),
+    ("p2_pa", |site| site.state.p2_pa),
+    ("p3_pa", |site| site.boundary.p3_pa),
+    ("p4_pa", |site| site.boundary.p4_pa),
+    ("t1_k", |site| site.boundary.t1_k),
+    ("t1_prime_k", |site| site.t1_prime_k),
+    ("t2_prime_k", |site| site.t2_prime_k),
+    ("t2_k", |site| site.t2_k),
+    ("t3_k", |site| site.boundary.t3_k),
+    ("tc_k", |site| site.state.tc_k),
+    ("tt_k", |site| site.state.tt_k),
+    ("wall_k", |site| site.wall_k),
+    ("bearing_k", |site| site.bearing_k),
+    ("oil_k", |site| site.boundary.oil_temperature_k),
+    ("ambient_k", |site| site.boundary.ambient_temperature_k),
+    ("valve_opening", |site| site.boundary.valve_opening_ratio),
+    ("pressure_ratio", |site| site.pressure_ratio),
+    ("flow_kg_s", |site| site.flow_kg_s),
+    ("efficiency", |site| site.efficiency),
+    ("h_w_m2k", |site| site.h_w_m2k),
+];
+
+impl At {
+    pub(super) fn new(site: &Site<'_>) -> Self {
+        At { values: FIELDS.map(|(_, read)| read(site)) }
+    }
+}
+
+/// The values of a script's parameters: `p.G`.
+#[derive(Debug, Clone)]
+pub(super) struct Values(pub(super) Arc<[f64]>);
+
+/// A script that compiles, told apart from every other.
+#[derive(Debug)]
+pub(super) struct Program {
+    id: u64,
+    text: String,
+    parameters: Vec<String>,
+    /// Hooks it defines.
+    defined: BTreeSet<String>,
+}
+
+struct Compiled {
+    engine: Engine,
+    ast: AST,
+}
+
+thread_local! {
+    /// rhai's engines stay on their thread, so that scripts run on all cores without waiting for each other.
+    static COMPILED: RefCell<HashMap<u64, Rc<Compiled>>> = RefCell::new(HashMap::new());
+}
+
+impl Program {
+    /// Compiles a script to see that it can be.
+    pub(super) fn new(text: &str, parameters: Vec<String>) -> Result<Self, Mistake> {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        let Compiled { ast, .. } = compile(text, &parameters)?;
+        let mut defined = BTreeSet::new();
+        for function in ast.iter_functions() {
+            let name = function.name;
+            let reading = name.strip_prefix("reading_");
+            if let Some(Err(unknown)) = reading.map(str::parse::<Channel>) {
+                return Err((None, format!("function {name}: {unknown}")));
+            }
+            let hook = HOOK_NAMES.iter().find(|(hook, _)| *hook == name);
+            let Some(arguments) = reading.map(|_| 3).or(hook.map(|(_, arguments)| *arguments)) else {
+                continue;
+            };
+            if function.params.len() != arguments {
+                let form = if arguments == 3 { "(at, p, value)" } else { "(at, p)" };
+                return Err((
+                    None,
+                    format!("`{name}` takes {} arguments; write {name}{form}", function.params.len()),
+                ));
+            }
+            defined.insert(name.to_owned());
+        }
+        if defined.is_empty() {
+            let names: Vec<&str> = HOOK_NAMES.iter().map(|(name, _)| *name).collect();
+            let message = format!(
+                "it takes part nowhere: define one of {}, reading_T2 (or another channel)",
+                names.join(", ")
+            );
+            return Err((None, message));
+        }
+        let id = NEXT.fetch_add(1, Ordering::Relaxed);
+        Ok(Program { id, text: text.to_owned(), parameters, defined })
+    }
+
+    pub(super) fn defines(&self, name: &str) -> bool {
+        self.defined.contains(name)
+    }
+
+    /// Calls a function; what goes wrong is kept in `fault`, and the result is NaN.
+    pub(super) fn call(&self, name: &str, arguments: impl FuncArgs, fault: &OnceLock<String>) -> f64 {
+        match self.try_call(name, arguments) {
+            Ok(value) => value,
+            Err(message) => {
+                fault.get_or_init(|| message);
+                f64::NAN
+            }
+        }
+    }
+
+    fn try_call(&self, name: &str, arguments: impl FuncArgs) -> Result<f64, String> {
+        let compiled = self.on_this_thread()?;
+        let options = CallFnOptions::new().eval_ast(false);
+        let result: Dynamic = compiled
+            .engine
+            .call_fn_with_options(options, &mut Scope::new(), &compiled.ast, name, arguments)
+            .map_err(|error| error.to_string())?;
+        result
+            .as_float()
+            .or_else(|_| result.as_int().map(|value| value as f64))
+            .map_err(|kind| format!("`{name}` gave a value of type {kind}; it must give a number"))
+    }
+
+    fn on_this_thread(&self) -> Result<Rc<Compiled>, String> {
+        COMPILED.with_borrow_mut(|kept| {
+            if let Some(compiled) = kept.get(&self.id) {
+                return Ok(compiled.clone());
+            }
+            if kept.len() >= KEPT_ENGINES {
+                kept.clear();
+            }
+            let compiled = Rc::new(compile(&self.text, &self.parameters).map_err(|(_, message)| message)?);
+            kept.insert(self.id, compiled.clone());
+            Ok(compiled)
+        })
+    }
+}
+
+fn compile(text: &str, parameters: &[String]) -> Result<Compiled, Mistake> {
+    let engine = engine(parameters);
+    let of_parse = |error: ParseError| (line_of(error.1), error.0.to_string());
+    let ast = engine.compile(text).map_err(of_parse)?;
+    Ok(Compiled { engine, ast })
+}
+
+fn line_of(position: Position) -> Option<usize> {
+    position.line()
+}
+
+fn engine(parameters: &[String]) -> Engine {
+    let mut engine = Engine::new_raw();
+    ArithmeticPackage::new().register_into_engine(&mut engine);
+    LogicPackage::new().register_into_engine(&mut engine);
+    BasicMathPackage::new().register_into_engine(&mut engine);
+    // Numbers only: without arrays and maps nothing can grow.
+    for symbol in ["eval", "this", "[", "#{"] {
+        engine.disable_symbol(symbol);
+    }
+    engine
+        .set_max_operations(OPERATION_LIMIT)
+        .set_max_call_levels(CALL_DEPTH_LIMIT)
+        .set_max_expr_depths(EXPRESSION_DEPTH_LIMIT, EXPRESSION_DEPTH_LIMIT)
+        .set_max_string_size(STRING_LIMIT)
+        .set_max_variables(VARIABLE_LIMIT)
+        .set_max_functions(FUNCTION_LIMIT)
+        .set_strict_variables(true);
+    engine.register_type_with_name::<At>("machine").register_type_with_name::<Values>("parameters");
+    for (index, (name, _)) in FIELDS.iter().enumerate() {
+        engine.register_get(*name, move |at: &mut At| at.values[index]);
+    }
+    for (index, name) in parameters.iter().enumerate() {
+        engine
+            .register_get(name, move |values: &mut Values| values.0.get(index).copied().unwrap_or(f64::NAN));
+    }
+    engine
+}

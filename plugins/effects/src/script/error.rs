@@ -1,0 +1,41 @@
+//! What is wrong with a script.
+
+use std::path::{Path, PathBuf};
+
+/// Longest line and message that are shown, characters.
+const SHOWN_LIMIT: usize = 200;
+
+/// A script that is no effect.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{}{}: {message}{}", path.display(), place(*line), shown(source_line))]
+pub struct ScriptEffectError {
+    /// The script's file.
+    pub path: PathBuf,
+    /// Line, from 1; `None` where the whole script is meant.
+    pub line: Option<usize>,
+    /// The line itself.
+    pub source_line: String,
+    /// What is wrong and what would be right.
+    pub message: String,
+}
+
+impl ScriptEffectError {
+    pub(super) fn new(path: &Path, text: &str, line: Option<usize>, message: String) -> Self {
+        let source_line = line.and_then(|line| text.lines().nth(line.checked_sub(1)?)).unwrap_or_default();
+        let clean = |text: &str| text.chars().filter(|c| !c.is_control()).take(SHOWN_LIMIT).collect();
+        ScriptEffectError {
+            path: path.to_owned(),
+            line,
+            source_line: clean(source_line),
+            message: clean(&message),
+        }
+    }
+}
+
+fn place(line: Option<usize>) -> String {
+    line.map_or_else(String::new, |line| format!(":{line}"))
+}
+
+fn shown(source_line: &str) -> String {
+    if source_line.is_empty() { String::new() } else { format!("\n  | {source_line}") }
+}

@@ -1,0 +1,122 @@
+//! The header of a script: lines `//! key: value` that say what the effect is.
+
+use mapper_physics::effect::{EffectInfo, EffectParameter, Submodel};
+use std::borrow::Cow;
+
+/// A line, from 1, where one is meant, and what is wrong.
+pub(super) type Mistake = (Option<usize>, String);
+
+/// Most parameters of a script: each is a dimension of the fit.
+const PARAMETER_LIMIT: usize = 4;
+
+/// How a parameter is written.
+const PARAMETER_FORM: &str = "//! parameter: NAME [UNIT] LOW .. HIGH, neutral VALUE, step VALUE";
+
+pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
+    let (mut id, mut description, mut equation, mut source) = (None, None, None, None);
+    let mut submodel = None;
+    let mut parameters: Vec<EffectParameter> = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let Some(header) = line.trim_start().strip_prefix("//!") else { continue };
+        let here = |message: String| (Some(index + 1), message);
+        let Some((key, value)) = header.split_once(':') else { continue };
+        let value = value.trim();
+        let owned = || Some(Cow::<'static, str>::Owned(value.to_owned()));
+        match key.trim() {
+            "effect" if is_name(value) => id = owned(),
+            "effect" => {
+                return Err(here(format!(
+                    "`{value}` is no name: use lower-case letters, digits and _, at most 40"
+                )));
+            }
+            "description" => description = owned(),
+            "equation" => equation = owned(),
+            "source" => source = owned(),
+            "submodel" => match Submodel::ALL.iter().find(|submodel| submodel.name() == value) {
+                Some(found) => submodel = Some(*found),
+                None => {
+                    let names: Vec<&str> = Submodel::ALL.iter().map(|submodel| submodel.name()).collect();
+                    return Err(here(format!("`{value}` is no submodel; there are {}", names.join(", "))));
+                }
+            },
+            "parameter" => {
+                let parameter = parameter(value).ok_or_else(|| here(format!("write `{PARAMETER_FORM}`")))?;
+                check(&parameter, &parameters).map_err(here)?;
+                parameters.push(parameter);
+            }
+            other => {
+                let keys = "effect, description, equation, source, submodel, parameter";
+                return Err(here(format!("`{other}` is no key of an effect; there are {keys}")));
+            }
+        }
+    }
+    let missing = |line: &str| (None, format!("the header lacks `{line}`"));
+    if parameters.is_empty() {
+        return Err(missing(PARAMETER_FORM));
+    }
+    let id = id.ok_or_else(|| missing("//! effect: NAME"))?;
+    Ok(EffectInfo {
+        description: description.unwrap_or_else(|| id.clone()),
+        equation: equation.unwrap_or(Cow::Borrowed("as in its script")),
+        source: source.unwrap_or(Cow::Borrowed("suspected by the user")),
+        submodel: submodel.ok_or_else(|| missing("//! submodel: NAME"))?,
+        id,
+        parameters,
+    })
+}
+
+fn is_name(text: &str) -> bool {
+    (1..=40).contains(&text.len())
+        && text.starts_with(|c: char| c.is_ascii_lowercase())
+        && text.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+}
+
+fn is_identifier(text: &str) -> bool {
+    (1..=40).contains(&text.len())
+        && text.starts_with(|c: char| c.is_ascii_alphabetic())
+        && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+}
+
+/// `G [W/K] 0 .. 20, neutral 0, step 1.5`.
+fn parameter(text: &str) -> Option<EffectParameter> {
+    let (name, rest) = text.split_once('[')?;
+    let (unit, rest) = rest.split_once(']')?;
+    let mut parts = rest.split(',').map(str::trim);
+    let (low, high) = parts.next()?.split_once("..")?;
+    let neutral = parts.next()?.strip_prefix("neutral")?;
+    let step = parts.next()?.strip_prefix("step")?;
+    if parts.next().is_some() {
+        return None;
+    }
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    Some(EffectParameter {
+        name: Cow::Owned(name.trim().to_owned()),
+        unit: Cow::Owned(unit.trim().to_owned()),
+        low: number(low)?,
+        high: number(high)?,
+        neutral: number(neutral)?,
+        typical_step: number(step)?,
+    })
+}
+
+fn check(parameter: &EffectParameter, others: &[EffectParameter]) -> Result<(), String> {
+    let EffectParameter { name, low, high, neutral, typical_step, .. } = parameter;
+    if !is_identifier(name) {
+        return Err(format!("`{name}` is no name of a parameter: use letters, digits and _"));
+    }
+    if others.iter().any(|other| other.name == *name) {
+        return Err(format!("there are two parameters `{name}`"));
+    }
+    if others.len() >= PARAMETER_LIMIT {
+        return Err(format!("more than {PARAMETER_LIMIT} parameters cannot be told apart"));
+    }
+    if !(low < high && (low..=high).contains(&neutral)) {
+        return Err(format!("{low} .. {high} must rise and hold the neutral value {neutral}"));
+    }
+    if *typical_step == 0.0 || !(*low..=*high).contains(&(neutral + typical_step)) {
+        return Err(format!(
+            "the step {typical_step} must lead from {neutral} to another value of {low} .. {high}"
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,52 @@
+//! One instant of the machine with an effect, for the effects' known answers.
+
+use crate::catalogued::Catalogued;
+use mapper_core::Channel;
+use mapper_physics::effect::{self, Rig};
+use mapper_physics::instruments::{ChannelFollower, true_value};
+use mapper_physics::model::{Model, Outputs, State, rad_s_of_rpm};
+use mapper_physics::params::BoundaryConditions;
+
+/// Inlet temperature of the instant, K.
+pub(crate) const T1_K: f64 = 298.15;
+/// Heat capacity of dry air there by the model's closed form, J/(kg K).
+pub(crate) const CP1_J_KGK: f64 = 1002.5 + 275e-6 * 98.15 * 98.15;
+
+/// A machine at 110 krpm and pressure ratio 1.55, its housings at 340 K and 500 K.
+pub(crate) struct Instant {
+    pub(crate) rig: Rig,
+    pub(crate) boundary: BoundaryConditions,
+    pub(crate) state: State,
+    pub(crate) outputs: Outputs,
+}
+
+impl Instant {
+    pub(crate) fn nominal() -> Self {
+        Self::of(Rig::new(Model::nominal()))
+    }
+
+    pub(crate) fn with(effect: &Catalogued, values: &[f64]) -> Self {
+        let mut rig = Rig::new(Model::nominal());
+        effect::add(&mut rig, effect, values).unwrap();
+        Self::of(rig)
+    }
+
+    fn of(rig: Rig) -> Self {
+        let boundary = BoundaryConditions { p3_pa: 165e3, ..BoundaryConditions::default() };
+        let state = State::new(rad_s_of_rpm(110e3), 155e3, 340.0, 500.0, 370.0);
+        let outputs = rig.model.prepare(&boundary).evaluate(&state);
+        Instant { rig, boundary, state, outputs }
+    }
+
+    /// Evaluates again after a change of the state.
+    pub(crate) fn evaluate(&mut self) {
+        self.outputs = self.rig.model.prepare(&self.boundary).evaluate(&self.state);
+    }
+
+    /// What the sensor of a channel shows at once.
+    pub(crate) fn reading(&self, channel: Channel) -> f64 {
+        let prepared = self.rig.model.prepare(&self.boundary);
+        let value = true_value(channel, &prepared, &self.state, &self.outputs).unwrap();
+        ChannelFollower::new(*self.rig.instruments.path(channel)).read(0.0, value)
+    }
+}

@@ -1,0 +1,170 @@
+//! What every effect must hold to, alone and with others.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_core::{CHANNELS, Channel};
+use mapper_physics::effect::{self, Effect, EffectError, Rig};
+use mapper_physics::instruments::{ChannelFollower, true_value};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::simulate::{Simulator, Watch};
+use mapper_physics::steady;
+use proptest::prelude::*;
+use std::sync::Arc;
+
+fn nominal() -> Rig {
+    Rig::new(Model::nominal())
+}
+
+/// 110 -> 70 krpm at opening 0.7, P3 behind its command: every channel's readings, each second for a minute.
+fn readings(rig: &Rig) -> Vec<f64> {
+    let at = |speed_rpm: f64| {
+        let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..Default::default() };
+        steady::hold_speed(&Model::nominal(), speed_rpm, &boundary).unwrap().boundary
+    };
+    let (from, to) = (at(110e3), at(70e3));
+    let start = steady::settle_under(&rig.model, &from).unwrap().state;
+    // The actuator as a table fine enough for its lag.
+    let times: Vec<f64> = (0..=100).map(|i| f64::from(i) * 0.05).collect();
+    let p3_pa = |t_s: f64| {
+        to.p3_pa
+            + (from.p3_pa - to.p3_pa)
+                * if t_s == 0.0 { 1.0 } else { (-t_s / rig.instruments.p3_lag_s.max(1e-9)).exp() }
+    };
+    let rows = times.iter().map(|t_s| BoundaryConditions { p3_pa: p3_pa(*t_s), ..to }).collect();
+    let inputs = mapper_physics::inputs::InterpolatedInputs::new(times, rows).unwrap();
+    let measured: Vec<Channel> = CHANNELS[..15].iter().map(|row| row.channel).collect();
+    let mut followers: Vec<ChannelFollower> =
+        measured.iter().map(|channel| ChannelFollower::new(*rig.instruments.path(*channel))).collect();
+    let mut simulator = Simulator::new(&rig.model, 0.0, start, 1e-9, Watch::default());
+    let mut readings = Vec::new();
+    simulator
+        .run_to(
+            60.0,
+            &inputs,
+            (0..=60).map(f64::from),
+            |t_s, state, outputs| {
+                use mapper_physics::inputs::Inputs;
+                let boundary = inputs.at(t_s);
+                let prepared = rig.model.prepare(&boundary);
+                for (channel, follower) in measured.iter().zip(&mut followers) {
+                    let value = true_value(*channel, &prepared, state, outputs).unwrap();
+                    readings.push(follower.read(t_s, value));
+                }
+            },
+            |_| {},
+        )
+        .unwrap();
+    readings
+}
+
+fn neutral(effect: &dyn Effect) -> Vec<f64> {
+    effect.info().parameters.iter().map(|parameter| parameter.neutral).collect()
+}
+
+fn stepped(effect: &dyn Effect, share: f64) -> Vec<f64> {
+    effect
+        .info()
+        .parameters
+        .iter()
+        .map(|parameter| parameter.neutral + share * parameter.typical_step)
+        .collect()
+}
+
+fn with(effects: &[(&Arc<dyn Effect>, Vec<f64>)]) -> Rig {
+    let effects = effects.iter().map(|(effect, values)| (effect.as_ref(), values.as_slice()));
+    effect::compose(&nominal(), effects).unwrap()
+}
+
+/// Largest difference over all readings, relative to each reading.
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| ((a - b) / b).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn ids_are_unique_and_every_entry_is_whole() {
+    let catalogue = mapper_effects::catalogue();
+    assert_eq!(catalogue.len(), 25);
+    for effect in &catalogue {
+        let info = effect.info();
+        assert_eq!(catalogue.iter().filter(|other| other.info().id == info.id).count(), 1);
+        assert!(info.id.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_'));
+        assert!(!info.description.is_empty() && !info.equation.is_empty() && !info.source.is_empty());
+        for parameter in &info.parameters {
+            let stepped = parameter.neutral + parameter.typical_step;
+            assert!((parameter.low..=parameter.high).contains(&parameter.neutral), "{}", info.id);
+            assert!((parameter.low..=parameter.high).contains(&stepped) && parameter.typical_step != 0.0);
+        }
+        assert!(mapper_effects::find(&info.id).is_some());
+    }
+}
+
+#[test]
+fn at_neutral_nothing_changes_and_away_from_it_something_does() {
+    let without = readings(&nominal());
+    for effect in mapper_effects::catalogue() {
+        let id = &effect.info().id;
+        // To the bit: effects only multiply by 1 or add 0.
+        assert_eq!(readings(&with(&[(&effect, neutral(effect.as_ref()))])), without, "{id}");
+        // No sensor sees a change of a ten thousandth.
+        let change = apart(&readings(&with(&[(&effect, stepped(effect.as_ref(), 1.0))])), &without);
+        assert!(change > 1e-4, "{id} moves readings by {change:e} only");
+    }
+}
+
+/// Diagnosis differentiates by differences around neutral: half the step must give half the change.
+#[test]
+fn changes_are_smooth_in_every_parameter_around_neutral() {
+    let without = readings(&nominal());
+    for effect in mapper_effects::catalogue().iter().filter(|effect| effect.info().id != "inner_node") {
+        let change = |share: f64| {
+            let values = readings(&with(&[(effect, stepped(effect.as_ref(), share))]));
+            let differences: Vec<f64> = values.iter().zip(&without).map(|(a, b)| (a - b) / b).collect();
+            differences.iter().map(|difference| difference * difference).sum::<f64>().sqrt()
+        };
+        let ratio = change(0.01) / change(0.005);
+        // One percent of a plain step: what is left of the next order is of that size. The probe's time constant goes with
+        // d^2 over a Nusselt number of 2 and a part with sqrt(d): its order lies between 1.5 and 2.
+        let right = if effect.info().id == "tip_diameter" { 2.8..4.0 } else { 1.9..2.1 };
+        assert!(right.contains(&ratio), "{}: {ratio}", effect.info().id);
+    }
+}
+
+#[test]
+fn all_at_once_make_a_machine_that_runs() {
+    let catalogue = mapper_effects::catalogue();
+    let all: Vec<_> = catalogue.iter().map(|effect| (effect, stepped(effect.as_ref(), 0.3))).collect();
+    assert!(readings(&with(&all)).iter().all(|reading| reading.is_finite()));
+}
+
+#[test]
+fn values_that_mean_nothing_are_refused_and_leave_the_rig_alone() {
+    let area_split = mapper_effects::find("area_split").unwrap();
+    let mut rig = nominal();
+    for (values, expected) in [
+        (vec![], "0 values"),
+        (vec![0.1, 0.2], "2 values"),
+        (vec![-0.1], "not between 0 and 0.6"),
+        (vec![f64::NAN], "NaN"),
+    ] {
+        let error: EffectError = effect::add(&mut rig, area_split.as_ref(), &values).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+        assert_eq!(rig.model.params, nominal().model.params);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// The order in which two effects are put in does not matter.
+    #[test]
+    fn two_effects_commute(first in 0usize..25, second in 0usize..25) {
+        let catalogue = mapper_effects::catalogue();
+        let (a, b) = (&catalogue[first], &catalogue[second]);
+        prop_assume!(first != second);
+        let values = |effect: &Arc<dyn Effect>| stepped(effect.as_ref(), 0.5);
+        let one = with(&[(a, values(a)), (b, values(b))]);
+        let other = with(&[(b, values(b)), (a, values(a))]);
+        // Roundings of a product apart.
+        prop_assert!(apart(&readings(&one), &readings(&other)) < 1e-9);
+    }
+}

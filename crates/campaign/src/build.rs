@@ -10,8 +10,8 @@ use crate::file::{
     BoundaryFile, CampaignFile, ChoiceName, ConvectionName, DisplayFile, EfficiencyName, FollowerName,
     FormatName, GeometryFile, GridFile, IdentificationFile, JointFile, LimitsFile, MachineFile, MapFile,
     MethodName, NamedReference, NamedRepeats, NusseltFile, OnDriftName, OrderName, OutputsFile, PointFile,
-    ReferenceFile, RepeatedJumpFile, RepeatsFile, ReportFile, SensorsFile, TapName, TimingFile, TolerancesFile,
-    WindowFile,
+    ReferenceFile, RepeatedJumpFile, RepeatsFile, ReportFile, SensorsFile, TapName, TimingFile,
+    TolerancesFile, WindowFile,
 };
 use crate::tree::{Step, steps};
 use crate::units::{Dimension, Fraction, Quantity};

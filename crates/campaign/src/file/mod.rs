@@ -11,9 +11,9 @@ mod sensors;
 mod tolerances;
 
 pub(crate) use choices::{
-    ChoiceName, ConvectionName, DisplayFile, DriftFile, EfficiencyName, FormatName, IdentificationFile, JointFile,
-    MethodName, NamedRepeats, OnDriftName, OrderName, OutputsFile, RepeatedJumpFile, RepeatsFile, ReportFile,
-    WindowFile,
+    ChoiceName, ConvectionName, DisplayFile, DriftFile, EfficiencyName, FormatName, IdentificationFile,
+    JointFile, MethodName, NamedRepeats, OnDriftName, OrderName, OutputsFile, RepeatedJumpFile, RepeatsFile,
+    ReportFile, WindowFile,
 };
 pub(crate) use conditions::{
     BoundaryFile, FollowerName, LimitsFile, NamedReference, ReferenceFile, TimingFile,

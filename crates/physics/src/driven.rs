@@ -35,7 +35,10 @@ impl FrozenGrid {
         wanted.push(end_s);
         wanted.sort_by(f64::total_cmp);
         let mut nodes_s = vec![start_s];
-        let (mut at_s, mut jump_s) = (start_s, f64::NEG_INFINITY);
+        let before_start = |jump_s: &f64| *jump_s <= start_s;
+        let mut jump_s =
+            jumps_s.iter().copied().filter(before_start).fold(f64::NEG_INFINITY, f64::max);
+        let mut at_s = start_s;
         for until_s in wanted {
             while until_s - at_s > 1e-9 {
                 let since_s = at_s - jump_s;

@@ -92,7 +92,8 @@ fn singles(search: Search<'_>) -> Vec<Fit> {
 /// Fits the best few more thoroughly.
 pub fn refit(search: Search<'_>, fits: &mut Vec<Fit>, count: usize, effort: Effort) {
     let best: Vec<Hypothesis> = fits.iter().take(count).map(|f| f.hypothesis.clone()).collect();
-    let again = parallel::map(&best, |start| fit(search.study, search.linearised, start, search.selection, effort));
+    let again =
+        parallel::map(&best, |start| fit(search.study, search.linearised, start, search.selection, effort));
     for fitted in again.into_iter().flatten() {
         keep_best(fits, fitted);
     }
@@ -165,7 +166,9 @@ fn swap(search: Search<'_>, pairs: &mut Vec<Fit>) {
         }
     }
     let effort = Effort { iterations: 6, enough: 0.5 };
-    for fitted in parallel::map(&starts, |start| fit(study, linearised, start, selection, effort)).into_iter().flatten() {
+    for fitted in
+        parallel::map(&starts, |start| fit(study, linearised, start, selection, effort)).into_iter().flatten()
+    {
         keep_best(pairs, fitted);
     }
     sort(pairs);
@@ -296,8 +299,7 @@ fn linear_start(
         return Some(start.clone());
     }
     let there = study.predict(start).ok()?;
-    let mut change: Vec<f64> =
-        there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
+    let mut change: Vec<f64> = there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
     linearised.whiten(study, &mut change);
     let projector = Projector::new(study, linearised, selection, &[])?;
     let residual = linearised.residual(study, &linearised.base);
@@ -363,7 +365,8 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
             let parameter = &parameters[0];
             let step = parameter.typical_step;
             // The straight estimate, kept within the range; not far beyond the step that was taken, for effects bend.
-            let value = (parameter.neutral + share.clamp(-3.0, 3.0) * step).clamp(parameter.low, parameter.high);
+            let value =
+                (parameter.neutral + share.clamp(-3.0, 3.0) * step).clamp(parameter.low, parameter.high);
             share = (value - parameter.neutral) / step;
             let value = if value == parameter.neutral { parameter.neutral + 0.1 * step } else { value };
             if let Some((_, values)) = addition.start.effects.last_mut() {

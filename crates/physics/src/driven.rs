@@ -36,16 +36,17 @@ impl FrozenGrid {
         wanted.sort_by(f64::total_cmp);
         let mut nodes_s = vec![start_s];
         let before_start = |jump_s: &f64| *jump_s <= start_s;
-        let mut jump_s =
-            jumps_s.iter().copied().filter(before_start).fold(f64::NEG_INFINITY, f64::max);
+        let mut jump_s = jumps_s.iter().copied().filter(before_start).fold(f64::NEG_INFINITY, f64::max);
         let mut at_s = start_s;
         for until_s in wanted {
             while until_s - at_s > 1e-9 {
                 let since_s = at_s - jump_s;
-                let limit_s = STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(6.0, |(_, step)| *step);
+                let limit_s =
+                    STEPS_S.iter().find(|(end, _)| since_s < end - 1e-9).map_or(6.0, |(_, step)| *step);
                 // Equal parts, each within the limit.
                 let parts = ((until_s - at_s) / limit_s - 1e-6).ceil().max(1.0);
-                at_s = if parts <= 1.0 { until_s } else { at_s + ((until_s - at_s) / parts).max(limit_s * 0.5) };
+                at_s =
+                    if parts <= 1.0 { until_s } else { at_s + ((until_s - at_s) / parts).max(limit_s * 0.5) };
                 nodes_s.push(at_s);
             }
             if jumps_s.contains(&until_s) {
@@ -130,7 +131,13 @@ where
         let boundary = inputs.at(pair[0]);
         boundary.check().map_err(|_| failed)?;
         let before_end_s = end_s - 1e-9 * (end_s - pair[0]);
-        let mut system = DrivenSystem { model, inputs, last_s: before_end_s, boundary_s: pair[0], prepared: model.prepare(&boundary) };
+        let mut system = DrivenSystem {
+            model,
+            inputs,
+            last_s: before_end_s,
+            boundary_s: pair[0],
+            prepared: model.prepare(&boundary),
+        };
         // The speed line has a corner on the surge line, with an infinite slope on one side: short steps across it.
         let fast = end_s - pair[0] < 0.11;
         let surge_before = if fast { system.surge_position(&integrator.y) } else { 0.0 };
@@ -217,8 +224,10 @@ mod tests {
         let times_s: Vec<f64> = (1..=240).map(|i| 0.5 * f64::from(i)).collect();
         let grid = FrozenGrid::new(0.0, 120.0, &[0.0], &times_s);
         let mut driven = Vec::new();
-        drive(&model, &target, start, &grid, &times_s, |_, _, state, outputs| driven.push((*state, outputs.t2_k)))
-            .unwrap();
+        drive(&model, &target, start, &grid, &times_s, |_, _, state, outputs| {
+            driven.push((*state, outputs.t2_k))
+        })
+        .unwrap();
         let mut place = 0;
         let mut simulator = Simulator::new(&model, 0.0, start, 1e-8, Watch::default());
         let check = |t_s: f64, state: &State, outputs: &Outputs| {
@@ -235,9 +244,12 @@ mod tests {
     #[test]
     fn settling_finds_the_steady_state() {
         let model = Model::nominal();
-        let steady =
-            hold_speed(&model, 90e3, &BoundaryConditions { valve_opening_ratio: 0.8, ..BoundaryConditions::default() })
-                .unwrap();
+        let steady = hold_speed(
+            &model,
+            90e3,
+            &BoundaryConditions { valve_opening_ratio: 0.8, ..BoundaryConditions::default() },
+        )
+        .unwrap();
         let guess = State { tc_k: steady.state.tc_k - 30.0, tt_k: steady.state.tt_k + 60.0, ..steady.state };
         let settled = settle(&model, &steady.boundary, guess).unwrap();
         assert!((settled.tc_k - steady.state.tc_k).abs() < 1e-3, "{} K", settled.tc_k);

@@ -30,8 +30,8 @@ pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
         let code = if matches!(error, RecordError::Read { .. }) { Code::Failure } else { Code::BadRecording };
         Failure::new(code, error)
     })?;
-    let model = mapper_campaign::nominal_model(&campaign)
-        .map_err(|error| Failure::new(Code::BadInput, error))?;
+    let model =
+        mapper_campaign::nominal_model(&campaign).map_err(|error| Failure::new(Code::BadInput, error))?;
     let declared = Declared {
         sensors: campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
         noise_colour: map.noise_colour.unwrap_or_default(),

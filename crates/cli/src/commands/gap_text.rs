@@ -77,7 +77,9 @@ pub fn cause(candidate: &Candidate) -> String {
     let parameters: Vec<String> = candidate
         .parameters
         .iter()
-        .map(|(name, e)| format!("{name} = {} {} ({} .. {})", figures(e.value), e.unit, figures(e.low), figures(e.high)))
+        .map(|(name, e)| {
+            format!("{name} = {} {} ({} .. {})", figures(e.value), e.unit, figures(e.low), figures(e.high))
+        })
         .collect();
     format!("{}: {}", candidate.effects.join(" + "), parameters.join(", "))
 }
@@ -100,7 +102,11 @@ fn how_far(gap: &Gap) -> String {
         );
     }
     let largest = |of: fn(&mapper_gap::report::PointGap) -> f64| {
-        gap.points.iter().map(of).filter(|d| d.is_finite()).fold(0.0f64, |most, d| if d.abs() > most.abs() { d } else { most })
+        gap.points
+            .iter()
+            .map(of)
+            .filter(|d| d.is_finite())
+            .fold(0.0f64, |most, d| if d.abs() > most.abs() { d } else { most })
     };
     text += &format!(
         "  efficiency changes by up to {:+.2} points, h by up to {:+.0} W/(m2 K)\n",

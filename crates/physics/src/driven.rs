@@ -35,8 +35,9 @@ impl FrozenGrid {
         wanted.push(end_s);
         wanted.sort_by(f64::total_cmp);
         let mut nodes_s = vec![start_s];
+        let before_start = |jump_s: &f64| *jump_s <= start_s;
+        let mut jump_s = jumps_s.iter().copied().filter(before_start).fold(f64::NEG_INFINITY, f64::max);
         let mut at_s = start_s;
-        let mut jump_s = if jumps_s.contains(&start_s) { start_s } else { f64::NEG_INFINITY };
         for until_s in wanted {
             while until_s - at_s > 1e-9 {
                 let since_s = at_s - jump_s;

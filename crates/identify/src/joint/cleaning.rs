@@ -65,15 +65,22 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
 }
 
 fn spikes_of(column: &[f64], smallest: f64) -> Vec<usize> {
-    let mut scratch = Vec::with_capacity(2 * NEIGHBOURS + 1);
-    let last = column.len().saturating_sub(1);
-    let off: Vec<f64> = (0..column.len())
-        .map(|i| {
-            scratch.clear();
-            scratch.extend_from_slice(&column[i.saturating_sub(NEIGHBOURS)..=(i + NEIGHBOURS).min(last)]);
-            column[i] - median(&mut scratch).unwrap_or(column[i])
-        })
-        .collect();
+    // The neighbours in order; from one sample to the next one of them comes and one goes.
+    let mut sorted: Vec<f64> = Vec::with_capacity(2 * NEIGHBOURS + 2);
+    let place = |sorted: &[f64], value: f64| sorted.partition_point(|other| other.total_cmp(&value).is_lt());
+    for value in column.iter().take(NEIGHBOURS) {
+        sorted.insert(place(&sorted, *value), *value);
+    }
+    let mut off = Vec::with_capacity(column.len());
+    for (i, value) in column.iter().enumerate() {
+        if let Some(coming) = column.get(i + NEIGHBOURS) {
+            sorted.insert(place(&sorted, *coming), *coming);
+        }
+        if let Some(going) = i.checked_sub(NEIGHBOURS + 1).and_then(|before| column.get(before)) {
+            sorted.remove(place(&sorted, *going));
+        }
+        off.push(value - sorted.get(sorted.len() / 2).copied().unwrap_or(*value));
+    }
     let mut sizes: Vec<f64> = off.iter().map(|off| off.abs()).collect();
     let Some(middle) = median(&mut sizes) else { return Vec::new() };
     let limit = (SIGMAS * middle / 0.6745).max(smallest);

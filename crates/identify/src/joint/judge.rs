@@ -3,7 +3,7 @@
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
-use crate::joint::solve::{Covariance, Member, Problem};
+use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
 use crate::samples::mean;
 
 /// Whitened mean square above which a step is doubted.
@@ -25,7 +25,7 @@ const SPLIT_SIGMAS: f64 = 4.0;
 
 /// Mean square of a step's whitened residual.
 pub(crate) fn mean_square(problem: &Problem<'_>, member: &Member<'_>) -> f64 {
-    let (residual, _) = problem.residual(member, &problem.shared, &member.local, false);
+    let (residual, _) = problem.residual(member, &problem.shared, &member.local, None);
     residual.iter().map(|r| r * r).sum::<f64>() / (residual.len() as f64).max(1.0)
 }
 
@@ -156,13 +156,11 @@ fn split_doubt(problem: &Problem<'_>) -> Option<String> {
     };
     let half = |rising: bool| {
         let mut half = problem.clone();
-        for member in &mut half.members {
-            member.shares &= rises(member) == rising;
-        }
-        if half.members.iter().filter(|member| member.shares).count() < 4 {
+        half.members.retain(|member| member.shares && rises(member) == rising);
+        if half.members.len() < 4 {
             return None;
         }
-        half.minimise()?;
+        half.minimise(ROUGHLY)?;
         let covariance = half.covariance()?;
         Some((half.shared, covariance))
     };

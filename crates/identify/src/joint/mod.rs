@@ -26,7 +26,7 @@ use crate::findings::{Findings, code};
 use crate::joint::parameters::{
     ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, PROBE_MM2, SHARED, SURFACE,
 };
-use crate::joint::solve::{Covariance, Problem};
+use crate::joint::solve::{Covariance, FULLY, Problem, ROUGHLY};
 use crate::samples::mean;
 use crate::{IdentifyConfig, jump};
 use mapper_core::{EstimateUncertainty, JointSettings, Recording, ThermalModel, Window};
@@ -129,13 +129,13 @@ fn fitted(
     config: &IdentifyConfig,
 ) -> Option<Covariance> {
     for _ in 0..ROUNDS {
-        problem.minimise()?;
+        problem.minimise(ROUGHLY)?;
         start::refine(problem, steps, config);
         judge::exclude(problem);
         // A probe that came to rest on its bound may leave it under better weights.
         problem.active[PROBE_MM2] = problem.probe_fitted;
     }
-    problem.minimise()?;
+    problem.minimise(FULLY)?;
     parsimony::settle(problem)?;
     problem.covariance()
 }

@@ -244,12 +244,17 @@ impl Setting {
     /// The probe's lag from row to row, for the square of its diameter.
     pub(crate) fn lags(&self, rows: &[Row], gas_k: &[f64], square_mm2: f64) -> Vec<Lag> {
         let diameter_m = 1e-3 * square_mm2.max(0.0).sqrt();
-        let tau_s = |i: usize| {
-            thermocouple::time_constant_s(diameter_m, self.outlet_diameter_m, rows[i].flow_kg_s, gas_k[i])
-        };
-        (1..rows.len())
-            .map(|i| Lag::of(rows[i].t_s - rows[i - 1].t_s, 0.5 * (tau_s(i - 1) + tau_s(i))))
-            .collect()
+        let mut before: Option<(f64, f64)> = None;
+        let mut lags = Vec::with_capacity(rows.len());
+        for (row, gas_k) in rows.iter().zip(gas_k) {
+            let tau_s =
+                thermocouple::time_constant_s(diameter_m, self.outlet_diameter_m, row.flow_kg_s, *gas_k);
+            if let Some((before_s, before_tau_s)) = before {
+                lags.push(Lag::of(row.t_s - before_s, 0.5 * (before_tau_s + tau_s)));
+            }
+            before = Some((row.t_s, tau_s));
+        }
+        lags
     }
 
     /// Lets the probe follow the gas, and every derivative with it.

@@ -6,7 +6,7 @@
 //! Bayes Factors, 1995) says what is left of it; mean and variance of the mixture then make the prior of the last fit.
 
 use crate::joint::parameters::{ALPHA, LN_DIRECTION, PROBE_MM2, Prior};
-use crate::joint::solve::Problem;
+use crate::joint::solve::{FULLY, Problem};
 
 /// The refinements.
 const REFINEMENTS: [usize; 3] = [PROBE_MM2, LN_DIRECTION, ALPHA];
@@ -31,7 +31,7 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<()> {
         let Some((index, _, prior)) = judged.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { break };
         left.retain(|other| *other != index && problem.active[*other]);
         problem.priors[index] = prior;
-        problem.minimise()?;
+        problem.minimise(FULLY)?;
     }
     Some(())
 }

@@ -9,7 +9,12 @@ use mapper_core::{Channel, Recording, Window};
 
 /// Block over which samples are averaged before they are fitted, s: a quarter of what sensor noise remembers, and far
 /// below anything that moves in a window.
-pub(crate) const BLOCK_S: f64 = 0.5;
+const BLOCK_S: f64 = 0.5;
+/// The same with noise when nothing but the housing moves any more, s: half of what sensor noise remembers, which loses
+/// next to none of what a row knows. Without noise it would cost a thousandth of alpha_A behind a slow probe.
+const LATE_BLOCK_S: f64 = 1.0;
+/// Time from the first sample on after which that holds, s: several times what a probe and the speed need to settle.
+const LATE_S: f64 = 20.0;
 
 /// Means over one block.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,7 +56,9 @@ pub(crate) fn condensed(
     while start < samples.len() {
         let start_s = samples.t_s[start];
         // Half a nanosecond: times of samples are rounded.
-        let end = samples.t_s.partition_point(|t| *t < start_s + BLOCK_S - 5e-10).max(start + 1);
+        let late = !config.declared.is_empty() && start_s - samples.t_s[0] >= LATE_S;
+        let block_s = if late { LATE_BLOCK_S } else { BLOCK_S };
+        let end = samples.t_s.partition_point(|t| *t < start_s + block_s - 5e-10).max(start + 1);
         let of = |column: &[f64]| mean(&column[start..end]).unwrap_or(f64::NAN);
         let t_s = of(&samples.t_s);
         let (first_s, last_s) = (samples.t_s[start], samples.t_s[end - 1]);

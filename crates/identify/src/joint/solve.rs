@@ -13,6 +13,11 @@ use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 const MOST_ITERATIONS: usize = 60;
 /// Relative decrease of the cost below which the search ends.
 const ENOUGH_RATIO: f64 = 1e-10;
+/// Decrease in squares of standard deviations that is enough for a fit that only leads to another, or is held against
+/// standard errors.
+pub(crate) const ROUGHLY: f64 = 1e-4;
+/// The same for the last fit: noise-free recordings are told by less than any standard error.
+pub(crate) const FULLY: f64 = 0.0;
 
 /// One step in the fit.
 #[derive(Debug, Clone)]
@@ -112,15 +117,20 @@ impl Problem<'_> {
         (0..SHARED).filter(|index| self.active[*index] && !(OFFSETS..SURFACE).contains(index)).collect()
     }
 
-    /// Whitened residuals of a step (measured less predicted), and derivatives of the prediction.
+    /// Whitened residuals of a step (measured less predicted), and derivatives of the prediction by its own parameters
+    /// and by the shared ones named in `by`.
     pub(crate) fn residual(
         &self,
         member: &Member<'_>,
         shared: &SharedVector,
         local: &LocalVector,
-        derivatives: bool,
+        by: Option<&[bool; SHARED]>,
     ) -> (Vec<f64>, Vec<Vec<f64>>) {
-        let prediction = self.setting.predict(&member.course, shared, local, &self.active, derivatives);
+        // Where a sought probe rests at 0 it still has its first reading.
+        let mut none = [false; SHARED];
+        none[PROBE_MM2] = self.active[PROBE_MM2];
+        let prediction =
+            self.setting.predict(&member.course, shared, local, by.unwrap_or(&none), by.is_some());
         let mut residual: Vec<f64> = member
             .measured_k
             .iter()
@@ -136,7 +146,7 @@ impl Problem<'_> {
     }
 
     fn local_cost(&self, member: &Member<'_>, shared: &SharedVector, local: &LocalVector) -> f64 {
-        let (residual, _) = self.residual(member, shared, local, false);
+        let (residual, _) = self.residual(member, shared, local, None);
         let mut cost: f64 = residual.iter().map(|r| r * r).sum();
         for (index, prior) in member.priors.iter().enumerate() {
             if index != ETA {
@@ -173,8 +183,13 @@ impl Problem<'_> {
             }
         }
         let surface_weight = 1.0 / (self.surface_sigma * self.surface_sigma);
+        // What is only carried costs as many evaluations of the model as what is sought: not while searching.
+        let mut wanted = [false; SHARED];
+        for index in fitted {
+            wanted[*index] = true;
+        }
         for member in &self.members {
-            let (residual, columns) = self.residual(member, &self.shared, &member.local, true);
+            let (residual, columns) = self.residual(member, &self.shared, &member.local, Some(&wanted));
             let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
             let mut block =
                 Block { own: Matrix4::zeros(), mixed: Matrix4xX::zeros(m), right: Vector4::zeros() };
@@ -265,8 +280,9 @@ impl Problem<'_> {
             + members.map(|(member, local)| self.local_cost(member, shared, local)).sum::<f64>()
     }
 
-    /// Finds the minimum from where the parameters stand; `None` where it comes to no finite end.
-    pub(crate) fn minimise(&mut self) -> Option<f64> {
+    /// Finds the minimum from where the parameters stand; `None` where it comes to no finite end. `enough_square`: see
+    /// [`ROUGHLY`] and [`FULLY`].
+    pub(crate) fn minimise(&mut self, enough_square: f64) -> Option<f64> {
         let mut fitted = self.fitted();
         let mut damping = 1e-4;
         let mut best = f64::INFINITY;
@@ -315,7 +331,7 @@ impl Problem<'_> {
             }
             let decrease = best - cost;
             best = cost;
-            if decrease <= ENOUGH_RATIO * cost.max(1e-12) {
+            if decrease <= (ENOUGH_RATIO * cost.max(1e-12)).max(enough_square) {
                 break;
             }
         }

@@ -17,7 +17,9 @@ fn every_shipped_campaign_is_right() {
     let mut count = 0;
     for entry in std::fs::read_dir(directory()).unwrap() {
         let path = entry.unwrap().path();
-        if path.extension().is_some_and(|extension| extension == "yaml") {
+        // A nightly file lists campaigns and is none.
+        let nightly = path.file_stem().is_some_and(|stem| stem == "nightly");
+        if !nightly && path.extension().is_some_and(|extension| extension == "yaml") {
             load(&path).unwrap_or_else(|error| panic!("{error}"));
             count += 1;
         }

@@ -3,7 +3,7 @@
 use crate::low_rank::LowRank;
 use crate::report::{Alternative, DetectionLimit};
 use crate::study::Readings;
-use crate::{Cause, Course, CourseKind, DriftError};
+use crate::{Cause, CauseKind, Course, CourseKind, DriftError};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -26,6 +26,9 @@ const FAR_OUT: f64 = 5.0;
 const LEAVE_OUT_ROUNDS: usize = 4;
 /// Factor on the variance of what is left out.
 const AS_GOOD_AS_NOTHING: f64 = 1e8;
+/// How far, relative, the size of a change of the machine may be off: its signature is that of a small change that has
+/// always been there, while the metal lags behind a real one and answers to a large one differently.
+const MACHINE_SIZE_ERROR: f64 = 0.12;
 /// 95 % quantile of chi-square with one degree of freedom.
 const CHI2_95: f64 = 3.841_458_820_694_124;
 /// Half width of a 95 % interval in standard deviations.
@@ -151,6 +154,15 @@ pub(crate) fn decide(
     let extreme = |value: &dyn Fn(usize) -> f64, sign: f64| {
         sign * within.iter().map(|index| sign * value(*index)).fold(f64::NEG_INFINITY, f64::max)
     };
+    let (mut low, mut high) = (
+        extreme(&|index| profile.size[index] - Z_975 * profile.sigma[index], -1.0),
+        extreme(&|index| profile.size[index] + Z_975 * profile.sigma[index], 1.0),
+    );
+    if top.kind() == CauseKind::Machine {
+        let size = profile.size[peak];
+        let wider = |end: f64| size + (end - size).signum() * (end - size).hypot(MACHINE_SIZE_ERROR * size);
+        (low, high) = (wider(low), wider(high));
+    }
     let limits = limits(&causes, &candidates, &weighed, threshold, start_s, end_s);
     Ok(Decision {
         flagged,
@@ -158,8 +170,8 @@ pub(crate) fn decide(
         cause: top,
         course: fine[peak].course,
         size: profile.size[peak],
-        low: extreme(&|index| profile.size[index] - Z_975 * profile.sigma[index], -1.0),
-        high: extreme(&|index| profile.size[index] + Z_975 * profile.sigma[index], 1.0),
+        low,
+        high,
         onset_low_s: extreme(&|index| fine[index].course.onset_s, -1.0),
         onset_high_s: extreme(&|index| fine[index].course.onset_s, 1.0),
         evidence,

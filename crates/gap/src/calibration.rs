@@ -42,7 +42,10 @@ impl Calibration {
     pub fn outside(&self, smooth_sigma: f64, scatter_sigma: f64, one_more: f64) -> f64 {
         let [offset, smooth, scatter, more] = self.outside;
         let squash = |x: f64| x.clamp(-5.0, 100.0);
-        let x = offset + smooth * squash(smooth_sigma) + scatter * squash(scatter_sigma) + more * squash(one_more);
+        let x = offset
+            + smooth * squash(smooth_sigma)
+            + scatter * squash(scatter_sigma)
+            + more * squash(one_more);
         1.0 / (1.0 + (-x).exp())
     }
 }

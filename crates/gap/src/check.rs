@@ -20,7 +20,9 @@ pub enum Problem {
         steps: usize,
     },
     /// Too few outputs.
-    #[error("too little is measured: of N, m_c, P2, T2, Tc, m_t, T4 and Tt only {present}; at least N, P2 and T2 are needed")]
+    #[error(
+        "too little is measured: of N, m_c, P2, T2, Tc, m_t, T4 and Tt only {present}; at least N, P2 and T2 are needed"
+    )]
     TooFewOutputs {
         /// What is there.
         present: String,
@@ -69,7 +71,9 @@ pub fn check(recording: &Recording, table: &Table, declared: &Declared) -> Resul
     for needed in [Channel::ShaftSpeed, Channel::P2, Channel::T2] {
         if !present.contains(&needed) {
             let present = present.iter().map(|c| c.symbol()).collect::<Vec<_>>().join(", ");
-            return Err(Problem::TooFewOutputs { present: if present.is_empty() { "none".into() } else { present } });
+            return Err(Problem::TooFewOutputs {
+                present: if present.is_empty() { "none".into() } else { present },
+            });
         }
     }
     for channel in [Channel::P3, Channel::T3, Channel::T1, Channel::P1] {
@@ -91,7 +95,8 @@ pub fn check(recording: &Recording, table: &Table, declared: &Declared) -> Resul
         return Err(Problem::NoJumps { steps: recording.steps.len() });
     }
     commanded(recording, table)?;
-    for channel in OUTPUTS.into_iter().filter(|channel| *channel != Channel::P3 && !present.contains(channel)) {
+    for channel in OUTPUTS.into_iter().filter(|channel| *channel != Channel::P3 && !present.contains(channel))
+    {
         warnings.push(format!(
             "{channel} ({}) is not recorded: what shows in it alone cannot be found",
             channel.info().description
@@ -135,7 +140,9 @@ fn units(table: &Table) -> Result<(), Problem> {
                 return refuse("it looks like bar labelled Pa; correct the unit in the channel map");
             }
             Dimension::Pressure if !(30e3..2e6).contains(&value) => {
-                return refuse("an absolute pressure between 30 kPa and 2 MPa is expected; check unit and sensor");
+                return refuse(
+                    "an absolute pressure between 30 kPa and 2 MPa is expected; check unit and sensor",
+                );
             }
             Dimension::Temperature if (0.0..200.0).contains(&value) => {
                 return refuse("it looks like degC labelled K; correct the unit in the channel map");
@@ -150,7 +157,9 @@ fn units(table: &Table) -> Result<(), Problem> {
                 return refuse("a turbocharger turns between 5 and 500 krpm; check unit and sensor");
             }
             Dimension::MassFlow if value > 2.0 => {
-                return refuse("it looks like g/s or kg/h labelled kg/s; correct the unit in the channel map");
+                return refuse(
+                    "it looks like g/s or kg/h labelled kg/s; correct the unit in the channel map",
+                );
             }
             Dimension::MassFlow if value < 1e-4 => {
                 return refuse("no flow is measured; check unit and sensor");
@@ -185,6 +194,8 @@ fn gaps(table: &Table) -> Option<String> {
     let missing_s: f64 = table.t_s.windows(2).filter(|pair| gap(pair)).map(|pair| pair[1] - pair[0]).sum();
     let count = table.t_s.windows(2).filter(|pair| gap(pair)).count();
     (count > 0).then(|| {
-        format!("the recording has {count} gap(s), {missing_s:.1} s in all; blocks without samples are left out")
+        format!(
+            "the recording has {count} gap(s), {missing_s:.1} s in all; blocks without samples are left out"
+        )
     })
 }

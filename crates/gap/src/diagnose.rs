@@ -90,8 +90,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     for step in &held_out {
         training.steps[*step] = false;
     }
-    let found =
-        search(Search { study: &study, linearised: &linearised, selection: &training, progress })?;
+    let found = search(Search { study: &study, linearised: &linearised, selection: &training, progress })?;
     progress(0.75, "all steps");
     let everywhere = Selection::all(&study);
     let beside = found.anew.as_ref().unwrap_or(&linearised);
@@ -144,8 +143,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     let trained = found.fits.iter().find(|f| members(&f.hypothesis) == members(&best.hypothesis));
     let after = if named { trained.unwrap_or(&found.null) } else { &found.null };
     let gap = how_far(&study, &found.null, after, &held_out, 7);
-    let mut gains: Vec<Gain<'_>> =
-        fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
+    let mut gains: Vec<Gain<'_>> = fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
     let counted = training.steps.iter().filter(|counts| **counts).count().max(1);
     let whole = study.steps.len() as f64 / counted as f64;
     for fit in &found.fits {
@@ -224,7 +222,11 @@ fn weigh(study: &Study, calibration: &Calibration, null: &Fit, fits: &[Fit], lef
             effects: names(study, fit),
             probability: inside * weights[place + 1] / total,
             parameters: estimates(study, calibration, fit),
-            equivalent: if place == 0 { equivalents(study, calibration, fits, &scores) } else { Vec::new() },
+            equivalent: if place == 0 && named {
+                equivalents(study, calibration, fits, &scores)
+            } else {
+                Vec::new()
+            },
         })
         .collect();
     Weighed { candidates, none, outside_probability: outside, outside, named, scores }

@@ -69,7 +69,8 @@ fn channels(study: &Study, before: &Fit, after: &Fit, steps: &[usize]) -> BTreeM
         }
         let rms = |fit: &Fit| {
             let squares = groups().flat_map(|g| g.rows.clone());
-            let sum: f64 = squares.map(|row| (study.measured[row] - fit.prediction.values[row]).powi(2)).sum();
+            let sum: f64 =
+                squares.map(|row| (study.measured[row] - fit.prediction.values[row]).powi(2)).sum();
             (sum / count as f64).sqrt()
         };
         let row = ChannelGap { before: rms(before), after: rms(after), unit: channel.unit().to_owned() };

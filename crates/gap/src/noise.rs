@@ -24,7 +24,8 @@ pub fn block_covariance(t_s: &[f64], blocks: &[Block], colour: NoiseColour) -> D
             } else {
                 // Blocks do not overlap: the exponential of the distance factors.
                 let from = |times: &[f64], mean_s: f64, sign: f64| {
-                    times.iter().map(|t| (sign * (t - mean_s) / tau_s).exp()).sum::<f64>() / times.len() as f64
+                    times.iter().map(|t| (sign * (t - mean_s) / tau_s).exp()).sum::<f64>()
+                        / times.len() as f64
                 };
                 (-apart_s / tau_s).exp()
                     * from(of_i, blocks[i].mean_s, -1.0)
@@ -95,7 +96,8 @@ mod tests {
                 let mut sum = 0.0;
                 for k in a.samples.clone() {
                     for l in b.samples.clone() {
-                        sum += 0.36 * (-(t_s[k] - t_s[l]).abs() / 2.0).exp() + if k == l { 0.64 } else { 0.0 };
+                        sum +=
+                            0.36 * (-(t_s[k] - t_s[l]).abs() / 2.0).exp() + if k == l { 0.64 } else { 0.0 };
                     }
                 }
                 let direct = sum / (a.samples.len() * b.samples.len()) as f64;

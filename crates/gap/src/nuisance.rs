@@ -2,7 +2,7 @@
 //! with its declared size as prior, in every hypothesis.
 
 use crate::declared::Declared;
-use crate::shape::{SHAPES, SHAPE_SUM};
+use crate::shape::{SHAPE_SUM, SHAPES};
 use mapper_core::Channel;
 use mapper_physics::effect::Rig;
 

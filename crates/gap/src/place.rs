@@ -37,7 +37,13 @@ struct Part<'a> {
 
 /// Places of the gap, largest first. `fits` are single effects and pairs, best first; where `named` is set, the first of
 /// them is the cause, and its parts come first.
-pub fn places(study: &Study, linearised: &Linearised, null: &Fit, fits: &[Gain<'_>], named: bool) -> Vec<Place> {
+pub fn places(
+    study: &Study,
+    linearised: &Linearised,
+    null: &Fit,
+    fits: &[Gain<'_>],
+    named: bool,
+) -> Vec<Place> {
     // What no hypothesis gets below is noise.
     let excess = fits.iter().map(|f| f.gain).fold(1.0, f64::max);
     let submodel = |effect: usize| study.effects[effect].info().submodel;
@@ -57,7 +63,10 @@ pub fn places(study: &Study, linearised: &Linearised, null: &Fit, fits: &[Gain<'
         if let [effect] = members(&candidate.fit.hypothesis)[..] {
             let part = submodel(effect);
             if first.iter().all(|other| other.submodel != part) {
-                offer(&mut singles, Part { submodel: part, gain: candidate.gain, fit: candidate.fit, effect });
+                offer(
+                    &mut singles,
+                    Part { submodel: part, gain: candidate.gain, fit: candidate.fit, effect },
+                );
             }
         }
     }
@@ -102,7 +111,13 @@ struct Shown {
 }
 
 /// Where one effect of a fit shows most: its signature against the same fit without it.
-fn show(study: &Study, linearised: &Linearised, fit: &Fit, effect: usize, points: &[PointState]) -> Option<Shown> {
+fn show(
+    study: &Study,
+    linearised: &Linearised,
+    fit: &Fit,
+    effect: usize,
+    points: &[PointState],
+) -> Option<Shown> {
     let mut without = fit.hypothesis.clone();
     without.effects.retain(|(index, _)| *index != effect);
     let there = study.predict(&without).ok()?;
@@ -124,14 +139,15 @@ fn show(study: &Study, linearised: &Linearised, fit: &Fit, effect: usize, points
         }
         (whole, (squares / count.max(1) as f64).sqrt())
     };
-    let largest = |candidates: usize, of: &dyn Fn(usize) -> f64| (0..candidates).max_by(|a, b| of(*a).total_cmp(&of(*b)));
+    let largest = |candidates: usize, of: &dyn Fn(usize) -> f64| {
+        (0..candidates).max_by(|a, b| of(*a).total_cmp(&of(*b)))
+    };
     let output = largest(OUTPUTS.len(), &|o| energy(&|output, _, _| output == o).0)?;
     let in_phase = |phase: usize, since_s: f64| {
         let end_s = PHASES.get(phase + 1).map_or(f64::INFINITY, |(_, start_s)| *start_s);
         (PHASES[phase].1..end_s).contains(&since_s)
     };
-    let phase =
-        largest(PHASES.len(), &|p| energy(&|o, _, since_s| o == output && in_phase(p, since_s)).0)?;
+    let phase = largest(PHASES.len(), &|p| energy(&|o, _, since_s| o == output && in_phase(p, since_s)).0)?;
     let step = largest(study.steps.len(), &|s| energy(&|o, step, _| o == output && step == s).0)?;
     let region = points.get(step).map_or_else(String::new, region);
     Some(Shown {

@@ -22,9 +22,9 @@ pub struct Found {
 
 /// A single must take at least this off the cost to be worth a second look.
 const WORTH: f64 = 6.0;
-/// Above this share of the number of values, the null's cost says that something strong is there, and nuisances are
-/// linearised anew beside the best single.
-const STRONG: f64 = 2.0;
+/// Where a single takes at least this off the cost, nuisances are linearised anew beside it: tolerances of what an
+/// effect changes act otherwise beside it than where nothing is off.
+const STRONG: f64 = 30.0;
 
 /// What the search works with.
 #[derive(Clone, Copy)]
@@ -47,10 +47,9 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
     let Search { study, selection, progress, .. } = search;
     let null = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
     progress(0.15, "single effects");
-    let mut singles = singles(search, &null);
-    let strong = null.cost > STRONG * study.measured.len() as f64;
+    let mut singles = singles(search);
     let anew = match singles.first() {
-        Some(best) if strong => search.linearised.at(study, &best.hypothesis).ok(),
+        Some(best) if null.cost - best.cost > STRONG => search.linearised.at(study, &best.hypothesis).ok(),
         _ => None,
     };
     let linearised = anew.as_ref().unwrap_or(search.linearised);
@@ -70,7 +69,7 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
 }
 
 /// Fits of all single effects, best first.
-fn singles(search: Search<'_>, null: &Fit) -> Vec<Fit> {
+fn singles(search: Search<'_>) -> Vec<Fit> {
     let Search { study, linearised, selection, .. } = search;
     let mut starts: Vec<Hypothesis> = Vec::new();
     for index in 0..study.effects.len() {
@@ -78,7 +77,7 @@ fn singles(search: Search<'_>, null: &Fit) -> Vec<Fit> {
     }
     let quick = Effort { iterations: 3, enough: 1.0 };
     let tried = parallel::map(&starts, |start| {
-        let started = linear_start(study, linearised, selection, start, null)?;
+        let started = linear_start(study, linearised, selection, start)?;
         fit(study, linearised, &started, selection, quick).ok()
     });
     let mut singles: Vec<Fit> = Vec::new();
@@ -93,7 +92,8 @@ fn singles(search: Search<'_>, null: &Fit) -> Vec<Fit> {
 /// Fits the best few more thoroughly.
 pub fn refit(search: Search<'_>, fits: &mut Vec<Fit>, count: usize, effort: Effort) {
     let best: Vec<Hypothesis> = fits.iter().take(count).map(|f| f.hypothesis.clone()).collect();
-    let again = parallel::map(&best, |start| fit(search.study, search.linearised, start, search.selection, effort));
+    let again =
+        parallel::map(&best, |start| fit(search.study, search.linearised, start, search.selection, effort));
     for fitted in again.into_iter().flatten() {
         keep_best(fits, fitted);
     }
@@ -166,7 +166,9 @@ fn swap(search: Search<'_>, pairs: &mut Vec<Fit>) {
         }
     }
     let effort = Effort { iterations: 6, enough: 0.5 };
-    for fitted in parallel::map(&starts, |start| fit(study, linearised, start, selection, effort)).into_iter().flatten() {
+    for fitted in
+        parallel::map(&starts, |start| fit(study, linearised, start, selection, effort)).into_iter().flatten()
+    {
         keep_best(pairs, fitted);
     }
     sort(pairs);
@@ -288,7 +290,6 @@ fn linear_start(
     linearised: &Linearised,
     selection: &Selection,
     start: &Hypothesis,
-    null: &Fit,
 ) -> Option<Hypothesis> {
     let (index, values) = start.effects.first()?;
     let parameters = &study.effects[*index].info().parameters;
@@ -298,8 +299,7 @@ fn linear_start(
         return Some(start.clone());
     }
     let there = study.predict(start).ok()?;
-    let mut change: Vec<f64> =
-        there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
+    let mut change: Vec<f64> = there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
     linearised.whiten(study, &mut change);
     let projector = Projector::new(study, linearised, selection, &[])?;
     let residual = linearised.residual(study, &linearised.base);
@@ -317,10 +317,7 @@ fn linear_start(
         value
     };
     moved.effects = vec![(*index, vec![value])];
-    // Small effects start best where the null's nuisances stand, large ones where nothing is off.
-    if null.cost < 2.0 * study.measured.len() as f64 {
-        moved.nuisances = null.hypothesis.nuisances.clone();
-    }
+    // From where nothing is off, not from the null's nuisances, which may have bent far to stand in for the effect.
     Some(moved)
 }
 
@@ -368,7 +365,8 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
             let parameter = &parameters[0];
             let step = parameter.typical_step;
             // The straight estimate, kept within the range; not far beyond the step that was taken, for effects bend.
-            let value = (parameter.neutral + share.clamp(-3.0, 3.0) * step).clamp(parameter.low, parameter.high);
+            let value =
+                (parameter.neutral + share.clamp(-3.0, 3.0) * step).clamp(parameter.low, parameter.high);
             share = (value - parameter.neutral) / step;
             let value = if value == parameter.neutral { parameter.neutral + 0.1 * step } else { value };
             if let Some((_, values)) = addition.start.effects.last_mut() {

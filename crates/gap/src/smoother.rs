@@ -133,8 +133,17 @@ impl Filter<'_> {
         let transition = self.transition();
         let (d, q) = (BIN_S, intensity);
         let coloured = self.coloured_variance * (1.0 - self.coloured_decay * self.coloured_decay);
-        let drive =
-            Matrix3::new(q * d * d * d / 3.0, q * d * d / 2.0, 0.0, q * d * d / 2.0, q * d, 0.0, 0.0, 0.0, coloured);
+        let drive = Matrix3::new(
+            q * d * d * d / 3.0,
+            q * d * d / 2.0,
+            0.0,
+            q * d * d / 2.0,
+            q * d,
+            0.0,
+            0.0,
+            0.0,
+            coloured,
+        );
         let see = RowVector3::new(1.0, 0.0, 1.0);
         let wide = 1e3 * self.noise_sigma;
         let mut mean = Vector3::new(self.first, 0.0, 0.0);

@@ -8,8 +8,8 @@ use crate::table::{Block, Table, block_mean, blocks};
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_physics::driven::{DriveError, FrozenGrid, drive, settle};
 use mapper_physics::effect::{Effect, EffectError, Rig, add};
-use mapper_physics::instruments::{ChannelFollower, true_value};
 use mapper_physics::inputs::Inputs;
+use mapper_physics::instruments::{ChannelFollower, true_value};
 use mapper_physics::model::{Model, State, rad_s_of_rpm};
 use std::sync::Arc;
 
@@ -141,7 +141,8 @@ impl Study {
                 let jumped = index > 0;
                 // Half a sample beyond the last one, which is the next step's first where steps follow each other.
                 let end_s = recording.steps.get(index + 1).map_or(marker.end_s, |next| next.start_s);
-                let start_s = if jumped { marker.start_s } else { marker.start_s.max(end_s - HOLD_S).max(first_s) };
+                let start_s =
+                    if jumped { marker.start_s } else { marker.start_s.max(end_s - HOLD_S).max(first_s) };
                 StudyStep { marker: *marker, jumped, blocks: blocks(&table, start_s, end_s, jumped) }
             })
             .collect();
@@ -349,7 +350,8 @@ impl Study {
         let boundary = inputs.at(start_s);
         let first = |channel: Channel, otherwise: f64| {
             let column = self.table.column(channel);
-            let early = column.map(|c| c.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>());
+            let early =
+                column.map(|c| c.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>());
             early.filter(|v| !v.is_empty()).map_or(otherwise, |v| v.iter().sum::<f64>() / v.len() as f64)
         };
         let guess = State::new(

@@ -45,12 +45,18 @@ impl Linearised {
         Ok(Linearised::with(study, base, changes, self.factors.clone()))
     }
 
-    fn with(study: &Study, base: Prediction, mut columns: Vec<Vec<f64>>, factors: Arc<Vec<Factor>>) -> Linearised {
+    fn with(
+        study: &Study,
+        base: Prediction,
+        mut columns: Vec<Vec<f64>>,
+        factors: Arc<Vec<Factor>>,
+    ) -> Linearised {
         let mut linearised = Linearised { base, factors, columns: Vec::new(), products: Vec::new() };
         for column in &mut columns {
             linearised.whiten(study, column);
         }
-        linearised.products = (0..study.steps.len()).map(|step| products_of_step(study, &columns, step)).collect();
+        linearised.products =
+            (0..study.steps.len()).map(|step| products_of_step(study, &columns, step)).collect();
         linearised.columns = columns;
         linearised
     }
@@ -103,7 +109,9 @@ fn changes(study: &Study, here: &Hypothesis, base: &Prediction) -> Vec<Vec<f64>>
         let step = if here.nuisances[*index] > 0.0 { -1.0 } else { 1.0 };
         moved.nuisances[*index] += step;
         match study.predict(&moved) {
-            Ok(there) => there.values.iter().zip(&base.values).map(|(there, here)| (there - here) / step).collect(),
+            Ok(there) => {
+                there.values.iter().zip(&base.values).map(|(there, here)| (there - here) / step).collect()
+            }
             // A tolerance that stops the model says nothing: it stays where it is.
             Err(_) => vec![0.0; base.values.len()],
         }
@@ -192,7 +200,9 @@ fn factors(study: &Study, nothing: &Hypothesis, changes: &[Vec<f64>]) -> Vec<Fac
                     }
                 }
             }
-            if surge_jumps[group.step] && matches!(OUTPUTS[group.output], Channel::CompressorFlow | Channel::P2) {
+            if surge_jumps[group.step]
+                && matches!(OUTPUTS[group.output], Channel::CompressorFlow | Channel::P2)
+            {
                 for (i, block) in blocks.iter().enumerate() {
                     if study.steps[group.step].jumped && block.since_jump_s < JUMP_S {
                         covariance[(i, i)] += 1e4 * sigma * sigma;

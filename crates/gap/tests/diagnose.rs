@@ -80,15 +80,16 @@ fn record(effect: Option<(&str, &[f64])>, seed: u64) -> Recording {
     let mut values: Vec<Vec<f64>> = vec![Vec::new(); SENSORS.len()];
     let decay = (-0.1f64 / 2.0).exp();
     let mut simulator = Simulator::new(&rig.model, 0.0, start, 1e-6, Watch::default());
-    let sample = |t_s: f64, state: &mapper_physics::model::State, outputs: &mapper_physics::model::Outputs| {
-        let at = mapper_physics::inputs::Inputs::at(&inputs, t_s);
-        let prepared = rig.model.prepare(&at);
-        for (i, (channel, noise, _)) in SENSORS.iter().enumerate() {
-            let seen = followers[i].read(t_s, true_value(*channel, &prepared, state, outputs).unwrap());
-            slow[i] = decay * slow[i] + (1.0 - decay * decay).sqrt() * normal();
-            values[i].push(seen + offsets[i] + noise * (0.8 * normal() + 0.6 * slow[i]));
-        }
-    };
+    let sample =
+        |t_s: f64, state: &mapper_physics::model::State, outputs: &mapper_physics::model::Outputs| {
+            let at = mapper_physics::inputs::Inputs::at(&inputs, t_s);
+            let prepared = rig.model.prepare(&at);
+            for (i, (channel, noise, _)) in SENSORS.iter().enumerate() {
+                let seen = followers[i].read(t_s, true_value(*channel, &prepared, state, outputs).unwrap());
+                slow[i] = decay * slow[i] + (1.0 - decay * decay).sqrt() * normal();
+                values[i].push(seen + offsets[i] + noise * (0.8 * normal() + 0.6 * slow[i]));
+            }
+        };
     simulator.run_to(end_s, &inputs, times_s.iter().copied(), sample, |_| {}).unwrap();
     let series: BTreeMap<Channel, Series> = SENSORS
         .iter()
@@ -114,8 +115,11 @@ fn declared() -> Declared {
     let sensors = SENSORS
         .iter()
         .map(|(channel, noise_sigma, offset_sigma)| {
-            let declared =
-                DeclaredUncertainty { noise_sigma: *noise_sigma, offset_sigma: *offset_sigma, gain_sigma_ratio: 0.0 };
+            let declared = DeclaredUncertainty {
+                noise_sigma: *noise_sigma,
+                offset_sigma: *offset_sigma,
+                gain_sigma_ratio: 0.0,
+            };
             (*channel, declared)
         })
         .collect();
@@ -130,7 +134,8 @@ fn declared() -> Declared {
 /// With a few candidates only: the search over all of them is checked by `mapper gap blind`.
 fn ask(recording: &Recording) -> Result<Diagnosed, GapError> {
     let candidates = ["tip_diameter", "stem_conduction", "bearing_friction", "flowmeter_gain"];
-    let effects: Vec<Arc<dyn Effect>> = candidates.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
+    let effects: Vec<Arc<dyn Effect>> =
+        candidates.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
     diagnose(Question {
         recording,
         declared: declared(),

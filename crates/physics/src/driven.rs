@@ -35,7 +35,9 @@ impl FrozenGrid {
         wanted.push(end_s);
         wanted.sort_by(f64::total_cmp);
         let mut nodes_s = vec![start_s];
-        let (mut at_s, mut jump_s) = (start_s, f64::NEG_INFINITY);
+        let before_start = |jump_s: &f64| *jump_s <= start_s;
+        let mut jump_s = jumps_s.iter().copied().filter(before_start).fold(f64::NEG_INFINITY, f64::max);
+        let mut at_s = start_s;
         for until_s in wanted {
             while until_s - at_s > 1e-9 {
                 let since_s = at_s - jump_s;
@@ -222,8 +224,10 @@ mod tests {
         let times_s: Vec<f64> = (1..=240).map(|i| 0.5 * f64::from(i)).collect();
         let grid = FrozenGrid::new(0.0, 120.0, &[0.0], &times_s);
         let mut driven = Vec::new();
-        drive(&model, &target, start, &grid, &times_s, |_, _, state, outputs| driven.push((*state, outputs.t2_k)))
-            .unwrap();
+        drive(&model, &target, start, &grid, &times_s, |_, _, state, outputs| {
+            driven.push((*state, outputs.t2_k))
+        })
+        .unwrap();
         let mut place = 0;
         let mut simulator = Simulator::new(&model, 0.0, start, 1e-8, Watch::default());
         let check = |t_s: f64, state: &State, outputs: &Outputs| {
@@ -240,9 +244,12 @@ mod tests {
     #[test]
     fn settling_finds_the_steady_state() {
         let model = Model::nominal();
-        let steady =
-            hold_speed(&model, 90e3, &BoundaryConditions { valve_opening_ratio: 0.8, ..BoundaryConditions::default() })
-                .unwrap();
+        let steady = hold_speed(
+            &model,
+            90e3,
+            &BoundaryConditions { valve_opening_ratio: 0.8, ..BoundaryConditions::default() },
+        )
+        .unwrap();
         let guess = State { tc_k: steady.state.tc_k - 30.0, tt_k: steady.state.tt_k + 60.0, ..steady.state };
         let settled = settle(&model, &steady.boundary, guess).unwrap();
         assert!((settled.tc_k - steady.state.tc_k).abs() < 1e-3, "{} K", settled.tc_k);

@@ -45,4 +45,4 @@ pub use recording::{Recording, RecordingError, Series};
 pub use reference_state::{NAMED_REFERENCES, NamedReference, ReferenceState, usual_references};
 pub use sample::{ChannelColumn, SampleBatch, TruthColumn};
 pub use step_marker::StepMarker;
-pub use thermal_model::{ConvectionLaw, Entangled, Origin, SharedValue, ThermalModel};
+pub use thermal_model::{ConvectionLaw, Entangled, Origin, ProfilePoint, SharedValue, ThermalModel};

@@ -74,6 +74,16 @@ pub struct Entangled {
     pub correlation: f64,
 }
 
+/// One point of a profile: a number held at a value, all others fitted anew.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ProfilePoint {
+    /// The value, unit of the number.
+    pub value: f64,
+    /// Sum of squared residuals in standard deviations, less that of the best point of the profile: below 3.84 the
+    /// recording allows the value at 95 %.
+    pub square: f64,
+}
+
 /// Result of a joint identification that belongs to no single point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ThermalModel {
@@ -83,6 +93,9 @@ pub struct ThermalModel {
     pub internal_area_m2: f64,
     /// Share of the internal area before compression, alpha_A.
     pub alpha_area_ratio: SharedValue,
+    /// How much worse everything else fits with alpha_A held at a value; empty where it was not fitted.
+    #[serde(default)]
+    pub alpha_area_profile: Vec<ProfilePoint>,
     /// Tip diameter of the T2 probe (eqs. 11-12), m; 0 is an ideal probe.
     pub probe_diameter_m: SharedValue,
     /// Factor on the coefficient where the metal is hotter than the gas it touches.

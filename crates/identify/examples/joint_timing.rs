@@ -71,8 +71,8 @@ fn main() {
         let t_s = &recording.series[&Channel::T2].t_s;
         let from = t_s.partition_point(|t| *t < step.start_s);
         let to = t_s.partition_point(|t| *t < step.end_s);
-        for i in from..to {
-            write!(text, "{},{}", step.index, t_s[i] - step.start_s).unwrap();
+        for (i, t_s) in t_s.iter().enumerate().take(to).skip(from) {
+            write!(text, "{},{}", step.index, t_s - step.start_s).unwrap();
             for channel in channels {
                 write!(text, ",{}", recording.series[&channel].values[i]).unwrap();
             }

@@ -144,6 +144,13 @@ fn with_noise_on_t2_the_share_is_found() {
         config.declared.insert(Channel::T2, noise);
         let (points, thermal) = found(&recording, &config);
         alpha_squares += (value(&thermal.alpha_area_ratio) - 0.2).powi(2);
+        // A standard error of 0.006 lets 0.1 stand out by some 17 of them; three are asked for, as squares.
+        let profile = &thermal.alpha_area_profile;
+        assert_eq!(profile.len(), 9);
+        for point in profile {
+            let at_truth = (point.value - 0.2).abs() < 1e-9;
+            assert!(if at_truth { point.square == 0.0 } else { point.square > 9.0 }, "{profile:?}");
+        }
         for (point, truth) in points.iter().zip(&campaign.truth) {
             eta_squares += (point.eta.unwrap() - truth.eta).powi(2);
             held += f64::from(u8::from(

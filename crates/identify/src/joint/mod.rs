@@ -12,6 +12,7 @@ pub(crate) mod model;
 pub(crate) mod parameters;
 pub(crate) mod parsimony;
 pub(crate) mod probe;
+pub(crate) mod profile;
 pub(crate) mod rows;
 pub(crate) mod shared;
 pub(crate) mod smoothing;

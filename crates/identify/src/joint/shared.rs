@@ -2,6 +2,7 @@
 
 use crate::IdentifyConfig;
 use crate::joint::judge;
+use crate::joint::profile;
 use crate::joint::parameters::{
     ALPHA, EXPONENT, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS,
     PROBE_MM2, SURFACE, symbol,
@@ -60,6 +61,7 @@ pub(crate) fn thermal_model(
         convection,
         internal_area_m2: problem.setting.internal_area_m2,
         alpha_area_ratio: of(ALPHA, &|x| x),
+        alpha_area_profile: profile::alpha_area(problem),
         probe_diameter_m: probe(problem, covariance),
         direction_factor: of(LN_DIRECTION, &f64::exp),
         offsets: OFFSET_CHANNELS

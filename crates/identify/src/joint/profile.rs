@@ -1,0 +1,32 @@
+//! The profile of alpha_A: how much worse everything else fits when it is held at a value.
+
+use crate::joint::parameters::ALPHA;
+use crate::joint::solve::Problem;
+use mapper_core::ProfilePoint;
+
+/// Values at which it is held: the range that a compressor may have.
+const GRID: [f64; 9] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
+
+/// Decrease of the sum of squares that is enough: a profile is read against 3.84.
+const ENOUGH_SQUARE: f64 = 0.1;
+
+/// All others fitted anew at each value, without what was believed of alpha_A beforehand; empty where it is not fitted
+/// or a fit comes to no end.
+pub(crate) fn alpha_area(problem: &Problem<'_>) -> Vec<ProfilePoint> {
+    if !problem.active[ALPHA] {
+        return Vec::new();
+    }
+    let mut held = problem.clone();
+    held.active[ALPHA] = false;
+    let mut profile = Vec::with_capacity(GRID.len());
+    for value in GRID {
+        held.shared[ALPHA] = value;
+        let Some(square) = held.minimise(ENOUGH_SQUARE) else { return Vec::new() };
+        profile.push(ProfilePoint { value, square });
+    }
+    let best = profile.iter().map(|point| point.square).fold(f64::INFINITY, f64::min);
+    for point in &mut profile {
+        point.square -= best;
+    }
+    profile
+}

@@ -40,12 +40,19 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
         );
     }
     // Values that the recording allows at 95 %, by the profile: three and more of them are no answer.
-    let allowed: Vec<f64> =
-        thermal.alpha_area_profile.iter().filter(|point| point.square < 3.84).map(|point| point.value).collect();
+    let allowed: Vec<f64> = thermal
+        .alpha_area_profile
+        .iter()
+        .filter(|point| point.square < 3.84)
+        .map(|point| point.value)
+        .collect();
     if let [first, _, .., last] = allowed.as_slice()
         && last - first > 0.15
     {
-        let _ = writeln!(text, "  the profile of alpha_A is flat: {first:.1} to {last:.1} fit the recording alike");
+        let _ = writeln!(
+            text,
+            "  the profile of alpha_A is flat: {first:.1} to {last:.1} fit the recording alike"
+        );
     }
     for pair in &thermal.entangled {
         let _ = writeln!(

@@ -2,11 +2,11 @@
 
 use crate::IdentifyConfig;
 use crate::joint::judge;
-use crate::joint::profile;
 use crate::joint::parameters::{
     ALPHA, EXPONENT, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS,
     PROBE_MM2, SURFACE, symbol,
 };
+use crate::joint::profile;
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
 use mapper_core::{ConvectionLaw, Entangled, EstimateUncertainty, Origin, SharedValue, ThermalModel};

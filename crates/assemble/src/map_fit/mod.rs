@@ -3,6 +3,7 @@
 mod crossing;
 mod error;
 mod leave_out;
+mod line_errors;
 mod line_shape;
 mod nearest;
 mod observations;
@@ -13,6 +14,7 @@ mod table;
 pub use error::MapFitError;
 pub use leave_out::leave_out;
 
+use line_errors::LineErrors;
 use line_shape::LineShape;
 use mapper_core::{CompressorMap, FittedMap};
 use nearest::{Scales, nearest};
@@ -56,6 +58,10 @@ pub struct NearestPlace {
     pub distance_ratio: f64,
     /// Efficiency of the line at the nearest place, fraction.
     pub eta: f64,
+    /// One standard error of the line there, across it, in units of the line's scales.
+    pub distance_standard_error: f64,
+    /// One standard error of the efficiency, fraction.
+    pub eta_standard_error: f64,
 }
 
 impl MapFit {
@@ -102,7 +108,13 @@ impl MapFit {
             (foot.place.flow_kg_s - point.0) / scales.flow_kg_s,
             (foot.place.pressure_ratio - point.1) / scales.ratio,
         );
-        NearestPlace { distance_ratio: x.hypot(y), eta: foot.place.eta }
+        let error = LineErrors::new(&self.solution, speed_ratio).at(foot.angle_rad, scales);
+        NearestPlace {
+            distance_ratio: x.hypot(y),
+            eta: self.believed(foot.place.eta, self.outside(speed_ratio)),
+            distance_standard_error: error.distance,
+            eta_standard_error: error.eta,
+        }
     }
 
     /// The fit as a table.
@@ -119,6 +131,16 @@ impl MapFit {
 
     fn shape(&self, speed_corrected_rpm: f64) -> LineShape {
         self.solution.shape(self.speed_ratio(speed_corrected_rpm))
+    }
+
+    /// Whether a speed lies beyond the slowest or the fastest measured one.
+    fn outside(&self, speed_ratio: f64) -> bool {
+        self.solution.splines.shape.outside(speed_ratio) > 1e-9
+    }
+
+    /// Efficiency as it is answered: where nothing was measured, no better than the best that was.
+    fn believed(&self, eta: f64, extrapolated: bool) -> f64 {
+        if extrapolated { eta.min(self.solution.best_eta) } else { eta }
     }
 
     fn speed_bounds_rpm(&self) -> (f64, f64) {

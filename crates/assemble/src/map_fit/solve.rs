@@ -24,10 +24,19 @@ const LINE_OFFSETS: [&[usize]; 3] = [&[CHOKE_FLOW], &[ZERO_SLOPE_HEAD, WORK], &[
 const MOST_KNOTS: usize = 10;
 /// Rounds with everything fixed but the parameters, rounds that estimate the variances, and rounds to settle.
 const ROUNDS: [usize; 3] = [8, 22, 15];
+/// Largest relative change of a variance component at which the estimation has settled.
+const SETTLED: f64 = 0.05;
 /// Standard errors beyond which a residual loses weight.
 const ROBUST: f64 = 3.0;
 /// Standard deviations of the level of each parameter about its starting value: wide for what points determine.
 const LEVEL_SD: Parameters = [2.0, 2.0, 0.7, 0.25, 0.4, 0.4, 0.03, 0.03, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5];
+/// Scatter of whole lines where the estimation starts: small, since on a map of few lines what begins as scatter is never
+/// found to be shape.
+const SCATTER: f64 = 0.003;
+/// Scales of the residuals where the estimation starts: the first always, the others where it ends [`FAR`] off.
+const START_SCALES: [f64; 3] = [0.01, 0.003, 0.02];
+/// Root mean square of distance or efficiency beyond which a fit is tried from other scales.
+const FAR: f64 = 0.006;
 /// Roughness of each parameter over speed where the estimation starts.
 const ROUGHNESS: Parameters = [0.5, 0.5, 3.0, 1.0, 1.5, 1.5, 0.15, 0.15, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
 
@@ -88,6 +97,10 @@ pub(crate) struct Solution {
     pub line_scatter: [f64; 3],
     /// Root mean squares of distance and efficiency.
     pub rms: [f64; 2],
+    /// Minus twice the logarithm of the marginal likelihood by Laplace's approximation, but for a constant of the data.
+    improbability: f64,
+    /// Highest efficiency of the fit at the points, fraction.
+    pub best_eta: f64,
     /// Angles of the feet, in the order of the points.
     pub angles_rad: Vec<f64>,
 }
@@ -103,18 +116,23 @@ impl Solution {
         LineShape::new(&self.parameters(speed_ratio), self.frame)
     }
 
-    /// Covariance of the parameters at a speed: of the surface, of a line about it, and of what may happen beyond the
-    /// outermost knots (an integrated random walk).
+    /// Covariance of the parameters at a speed: of the surface, of a line about it, and of what may happen between the
+    /// knots and beyond them.
     pub(crate) fn covariance(&self, speed_ratio: f64) -> DMatrix<f64> {
         let (rows, knots) = (self.splines.rows(speed_ratio), self.splines.len());
+        // The roughness was estimated on this many second differences: Student's quantile over the normal one (first
+        // terms of its Cornish-Fisher series at 97.5 %), squared.
+        let freedom = knots.saturating_sub(2).max(1) as f64;
+        let few = (1.0 + 1.21 / freedom + 1.44 / freedom.powi(2)).powi(2);
+        let open =
+            (self.splines.shape.open_variance(speed_ratio), self.splines.work.open_variance(speed_ratio));
         let mut out = DMatrix::zeros(PARAMETERS, PARAMETERS);
         for a in 0..PARAMETERS {
             for b in 0..PARAMETERS {
                 let block = self.covariance.view((a * knots, b * knots), (knots, knots));
                 out[(a, b)] = (rows.of(a).transpose() * block * rows.of(b))[(0, 0)];
             }
-            let outside = self.splines.of(a).outside(speed_ratio).min(1.0);
-            out[(a, a)] += outside.powi(3) / 3.0 * self.roughness_variance[a];
+            out[(a, a)] += if a < WORK { open.0 } else { open.1 } * self.roughness_variance[a] * few;
         }
         for (index, together) in LINE_OFFSETS.iter().enumerate() {
             for (a, b) in together.iter().flat_map(|a| together.iter().map(move |b| (*a, *b))) {
@@ -149,18 +167,47 @@ struct Precisions {
     scales: [f64; 2],
 }
 
+/// What a round of the fit is for.
+enum Phase {
+    /// The parameters come near, the variances stand.
+    Free,
+    /// The variances are estimated.
+    Estimate,
+    /// The parameters follow the last variances.
+    Settle,
+}
+
 /// Fits. `stiffness` (1 or more) is the factor on the least penalty that the estimation may choose.
+///
+/// Where the points end far from their lines, the estimation may have settled on scatter where there is shape, or on
+/// outliers where there are none: then it is made again from other scales, and the most probable is kept.
 pub(crate) fn solve(data: &Observations, stiffness: f64) -> Result<Solution, MapFitError> {
+    let [first, others @ ..] = START_SCALES;
+    let mut best = solve_from(data, stiffness, first)?;
+    if best.rms[0] > FAR || best.rms[1] > FAR {
+        for scale in others {
+            if let Ok(other) = solve_from(data, stiffness, scale)
+                && other.improbability < best.improbability
+            {
+                best = other;
+            }
+        }
+    }
+    Ok(best)
+}
+
+fn solve_from(data: &Observations, stiffness: f64, start_scale: f64) -> Result<Solution, MapFitError> {
     let mut problem = Problem::new(data);
     let start_rough: Parameters = ROUGHNESS.map(|r| stiffness / (r * r));
-    let mut precisions = Precisions { rough: start_rough, lines: [1e4; 3], scales: [0.01; 2] };
+    let mut precisions =
+        Precisions { rough: start_rough, lines: [1.0 / SCATTER.powi(2); 3], scales: [start_scale; 2] };
     let mut unknowns = problem.initial()?;
     problem.start =
         std::array::from_fn(|q| if q < WORK { problem.start[q] } else { unknowns.values[(q, 0)] });
     let mut feet = problem.feet(&unknowns, None);
     let mut damping = 1e-2;
     let [free, estimate, settle] = ROUNDS;
-    let mut covariance = DMatrix::zeros(0, 0);
+    let mut phase = Phase::Free;
     for round in 0..free + estimate + settle {
         let residuals = problem.residuals(&feet);
         let weights = problem.weights(&residuals, &precisions.scales);
@@ -170,9 +217,10 @@ pub(crate) fn solve(data: &Observations, stiffness: f64) -> Result<Solution, Map
             2 * residuals.len(),
             residuals.iter().zip(&weights).flat_map(|(r, w)| [r[0] * w[0].sqrt(), r[1] * w[1].sqrt()]),
         );
-        let gradient = jacobian.tr_mul(&scaled) + gradient;
-        let information = jacobian.tr_mul(&jacobian);
-        let normal_matrix = &information + &penalty;
+        let transposed = jacobian.transpose();
+        let gradient = &transposed * scaled + gradient;
+        // Not tr_mul: a product of two matrices goes through matrixmultiply's kernels.
+        let normal_matrix = transposed * &jacobian + &penalty;
         let cost = problem.cost(&residuals, &weights) + problem.penalty_value(&unknowns, &precisions);
         let mut better = None;
         for _ in 0..6 {
@@ -198,26 +246,38 @@ pub(crate) fn solve(data: &Observations, stiffness: f64) -> Result<Solution, Map
             (unknowns, feet) = (next, next_feet);
             damping = (damping / 5.0).max(1e-9);
         }
-        let inverse = normal_matrix.cholesky().ok_or(MapFitError::Singular)?.inverse();
-        if (free..free + estimate).contains(&round) {
-            let residuals = problem.residuals(&feet);
-            problem.update(&mut precisions, &unknowns, &inverse, &jacobian, &residuals, &start_rough);
-        }
-        covariance = inverse;
-        if round == free + estimate / 2 {
-            // A foot may have been caught on a wrong part of the line: look at the whole line once more.
-            feet = problem.feet(&unknowns, None);
-        }
-        if round >= free + estimate && gain < 1e-4 * cost {
-            break;
+        match phase {
+            Phase::Free if round + 1 >= free || gain < 1e-2 * cost => phase = Phase::Estimate,
+            Phase::Estimate => {
+                let inverse = normal_matrix.cholesky().ok_or(MapFitError::Singular)?.inverse();
+                let residuals = problem.residuals(&feet);
+                let change =
+                    problem.update(&mut precisions, &unknowns, &inverse, &jacobian, &residuals, &start_rough);
+                if round + 1 >= free + estimate || (change < SETTLED && gain < 1e-3 * cost) {
+                    // A foot may have been caught on a wrong part of the line: look at the whole line once more.
+                    feet = problem.feet(&unknowns, None);
+                    phase = Phase::Settle;
+                }
+            }
+            Phase::Settle if gain < 1e-4 * cost => break,
+            _ => {}
         }
     }
+    let residuals = problem.residuals(&feet);
+    let jacobian = problem.jacobian(&unknowns, &feet, &problem.weights(&residuals, &precisions.scales));
+    let information = jacobian.transpose() * &jacobian + problem.penalty(&unknowns, &precisions).0;
+    let factor = information.cholesky().ok_or(MapFitError::Singular)?;
+    let improbability = problem.improbability(&unknowns, &precisions, &residuals)
+        + 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+    let covariance = factor.inverse();
     // As a user meets the map: points against the smooth surface, without the lines' own offsets.
     let smooth =
         Unknowns { offsets: DMatrix::zeros(LINE_OFFSETS.len(), data.lines_rpm.len()), ..unknowns.clone() };
     let smooth_feet = problem.feet(&smooth, Some(&feet));
     Ok(Solution {
         rms: problem.rms(&problem.residuals(&smooth_feet)),
+        improbability,
+        best_eta: smooth_feet.iter().map(|foot| foot.place.eta).fold(0.0, f64::max),
         angles_rad: smooth_feet.iter().map(|foot| foot.angle_rad).collect(),
         splines: problem.splines,
         frame: problem.frame,
@@ -232,7 +292,7 @@ impl<'a> Problem<'a> {
     fn new(data: &'a Observations) -> Self {
         let mut ratios: Vec<f64> =
             data.lines_rpm.iter().map(|speed| speed / data.nominal_speed_rpm).collect();
-        ratios.dedup_by(|b, a| *b < *a * (1.0 + 1e-3));
+        ratios.dedup_by(|b, a| *b < *a * 1.02);
         let splines = Splines::new(&if ratios.len() <= MOST_KNOTS { ratios } else { thinned(&ratios) });
         let rows = data.points.iter().map(|p| splines.rows(p.speed_ratio)).collect();
         let mut flows: Vec<f64> = data.points.iter().map(Observation::flow).collect();
@@ -355,13 +415,23 @@ impl<'a> Problem<'a> {
             let (nx, ny) = normal(&foot.slope);
             let length = (foot.slope[0].powi(2) + foot.slope[1].powi(2)).max(1e-12);
             let root = weights[i].map(f64::sqrt);
+            let shape = LineShape::new(&parameters, self.frame);
+            let here = shape.at(foot.angle_rad);
+            let work_terms = shape.work_terms(here.flow, here.head);
             for q in 0..PARAMETERS {
-                let mut moved = parameters;
-                moved[q] += STEP;
-                let place = LineShape::new(&moved, self.frame).physical(foot.angle_rad, p.speed_ratio);
-                let x = (place.flow_kg_s - foot.place.flow_kg_s) / p.flow_scale_kg_s / STEP;
-                let y = (place.pressure_ratio - foot.place.pressure_ratio) / p.ratio_scale / STEP;
-                let eta = (place.eta - foot.place.eta) / STEP;
+                let (x, y, eta) = if q >= WORK {
+                    // Work moves nothing but efficiency.
+                    (0.0, 0.0, -foot.place.eta * work_terms[q - WORK])
+                } else {
+                    let mut moved = parameters;
+                    moved[q] += STEP;
+                    let place = LineShape::new(&moved, self.frame).physical(foot.angle_rad, p.speed_ratio);
+                    (
+                        (place.flow_kg_s - foot.place.flow_kg_s) / p.flow_scale_kg_s / STEP,
+                        (place.pressure_ratio - foot.place.pressure_ratio) / p.ratio_scale / STEP,
+                        (place.eta - foot.place.eta) / STEP,
+                    )
+                };
                 // The foot moves along the line as the line moves.
                 let along = (x * foot.slope[0] + y * foot.slope[1]) / length;
                 let derivative = [-(x * nx + y * ny), -(eta - foot.slope[2] * along)];
@@ -420,6 +490,24 @@ impl<'a> Problem<'a> {
         sum
     }
 
+    /// [`Solution::improbability`] without the determinant of the information.
+    fn improbability(&self, unknowns: &Unknowns, precisions: &Precisions, residuals: &[[f64; 2]]) -> f64 {
+        let mut sum = self.penalty_value(unknowns, precisions);
+        for (p, r) in self.data.points.iter().zip(residuals) {
+            let scales = precisions.scales.map(|s| s * s);
+            let loss = |variance: f64, r: f64| {
+                variance.ln() + ROBUST * ROBUST * (r * r / variance / (ROBUST * ROBUST)).ln_1p()
+            };
+            sum += loss(scales[0], r[0]);
+            if p.eta.is_some() {
+                sum += loss(scales[1] + p.eta_error * p.eta_error, r[1]);
+            }
+        }
+        let free = self.splines.len().saturating_sub(2) as f64;
+        sum -= precisions.rough.iter().map(|p| free * p.ln()).sum::<f64>();
+        sum - precisions.lines.iter().map(|p| self.data.lines_rpm.len() as f64 * p.ln()).sum::<f64>()
+    }
+
     fn level_precision(&self, parameter: usize) -> f64 {
         1.0 / (LEVEL_SD[parameter].powi(2) * self.splines.len() as f64)
     }
@@ -442,6 +530,7 @@ impl<'a> Problem<'a> {
         next
     }
 
+    /// One step of the variance components; the largest relative change of one.
     fn update(
         &self,
         precisions: &mut Precisions,
@@ -450,8 +539,13 @@ impl<'a> Problem<'a> {
         jacobian: &DMatrix<f64>,
         residuals: &[[f64; 2]],
         start_rough: &Parameters,
-    ) {
+    ) -> f64 {
         let (knots, lines) = (self.splines.len(), self.data.lines_rpm.len());
+        let mut change = 0.0f64;
+        let mut set = |precision: &mut f64, next: f64| {
+            change = change.max((next / *precision - 1.0).abs());
+            *precision = next;
+        };
         for (q, start) in start_rough.iter().enumerate() {
             let values = unknowns.values.row(q).transpose();
             let block = inverse.view((q * knots, q * knots), (knots, knots));
@@ -461,7 +555,8 @@ impl<'a> Problem<'a> {
             let step = (wanted / precisions.rough[q]).clamp(0.3, 3.0);
             // Twenty times stiffer than where it starts is a straight line to the eye; more would only make errors too
             // sure beyond the measured lines.
-            precisions.rough[q] = (precisions.rough[q] * step).clamp(0.03 * start, 20.0 * start);
+            let next = (precisions.rough[q] * step).clamp(0.03 * start, 20.0 * start);
+            set(&mut precisions.rough[q], next);
         }
         for (index, precision) in precisions.lines.iter_mut().enumerate() {
             let first = PARAMETERS * knots + index * lines;
@@ -469,7 +564,8 @@ impl<'a> Problem<'a> {
             let wanted = (lines as f64 - *precision * trace).max(0.01)
                 / (unknowns.offsets.row(index).norm_squared() + 1e-9);
             // Between 0.05 % and 3 %: less is no error of speed, more is another machine.
-            *precision = (*precision * (wanted / *precision).clamp(0.5, 2.0)).clamp(1.0 / 9e-4, 4e6);
+            let next = (*precision * (wanted / *precision).clamp(0.5, 2.0)).clamp(1.0 / 9e-4, 4e6);
+            set(precision, next);
         }
         let projected = jacobian * inverse;
         for c in 0..2 {
@@ -491,8 +587,9 @@ impl<'a> Problem<'a> {
             let degrees = (sum[1] - sum[2]).max(0.25 * sum[1]).max(1e-9);
             let wanted = (sum[0] / degrees).sqrt();
             let scale = precisions.scales[c];
-            precisions.scales[c] = wanted.clamp((0.7 * scale).max(1e-3), (1.2 * scale).min(0.03));
+            set(&mut precisions.scales[c], wanted.clamp((0.7 * scale).max(1e-3), (1.2 * scale).min(0.03)));
         }
+        change
     }
 
     fn rms(&self, residuals: &[[f64; 2]]) -> [f64; 2] {

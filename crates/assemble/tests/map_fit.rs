@@ -219,3 +219,23 @@ fn two_maps_are_compared_in_units_and_in_their_uncertainty() {
     let turned = compare(&first, &second.at_reference(mapper_core::ReferenceState::GARRETT)).unwrap();
     assert!((turned.eta_rms - same.eta_rms).abs() < 2e-3 && turned.distance_rms_ratio < 0.01);
 }
+
+#[test]
+fn end_lines_whose_speeds_differ_by_a_hair_are_compared() {
+    let first = turbo_a(0.002, 21);
+    for factor in [0.999, 1.001] {
+        let mut second = turbo_a(0.002, 22);
+        for line in &mut second.lines {
+            line.speed_corrected_rpm *= factor;
+            line.points.iter_mut().for_each(|p| p.identified.speed_corrected_rpm *= factor);
+        }
+        let both = compare(&first, &second).unwrap();
+        assert!(both.not_compared_rpm.is_empty(), "{:?}", both.not_compared_rpm);
+        assert_eq!(both.lines.len(), 9);
+        assert!(both.lines.iter().all(|line| !line.places.is_empty()));
+    }
+    // A line that only one map has is named.
+    let mut short = turbo_a(0.002, 22);
+    short.lines.remove(0);
+    assert_eq!(compare(&first, &short).unwrap().not_compared_rpm, vec![50e3]);
+}

@@ -1,6 +1,6 @@
 //! The fitted surface in the picture: lines, contours, surge and choke, and grey where it is extrapolated.
 
-use crate::surface::across;
+use crate::surface::{SUBDIVISIONS, across};
 use crate::svg::{contour_levels, krpm, percent};
 use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, StructuredGrid, palette};
 use mapper_core::{FittedLine, FittedMap, FittedNode, confidence_interval_95};
@@ -77,9 +77,23 @@ fn runs(points: impl Iterator<Item = ((f64, f64), bool)>, extrapolated: bool) ->
     (0..all.len()).map(|i| if belongs(i) { all[i].0 } else { (f64::NAN, f64::NAN) }).collect()
 }
 
-/// Grey between neighbouring lines wherever a corner is extrapolated, one polygon for each run of nodes.
+/// Grey between neighbouring lines wherever a corner is extrapolated, one polygon for each run of nodes. From line to line
+/// it is bounded by the curves that bound the contours, so that nothing stays white between the two.
 fn add_shade(panel: &mut Panel, fitted: &FittedMap) {
-    for pair in fitted.lines.windows(2) {
+    let speeds: Vec<f64> = fitted.lines.iter().map(|line| line.speed_corrected_rpm).collect();
+    if speeds.len() < 2 || !speeds.windows(2).all(|w| w[1] > w[0]) {
+        return;
+    }
+    let side = |column: usize, pair: usize| -> Vec<(f64, f64)> {
+        let over_speed = |value: fn(&FittedNode) -> f64| {
+            let values: Vec<f64> =
+                fitted.lines.iter().map(|line| line.nodes.get(column).map_or(f64::NAN, value)).collect();
+            across(&speeds, &values)
+        };
+        let (flow, ratio) = (over_speed(|n| n.flow_corrected_kg_s), over_speed(|n| n.pressure_ratio));
+        (pair * SUBDIVISIONS..=(pair + 1) * SUBDIVISIONS).map(|i| (flow[i], ratio[i])).collect()
+    };
+    for (index, pair) in fitted.lines.windows(2).enumerate() {
         let (low, high) = (&pair[0].nodes, &pair[1].nodes);
         let grey = |i: usize| [&low[i], &low[i + 1], &high[i], &high[i + 1]].iter().any(|n| n.extrapolated);
         let cells = low.len().min(high.len()).saturating_sub(1);
@@ -91,7 +105,9 @@ fn add_shade(panel: &mut Panel, fitted: &FittedMap) {
             }
             let end = (start..cells).take_while(|i| grey(*i)).last().unwrap_or(start) + 1;
             let mut outline: Vec<(f64, f64)> = low[start..=end].iter().map(place).collect();
+            outline.extend(side(end, index));
             outline.extend(high[start..=end].iter().rev().map(place));
+            outline.extend(side(start, index).into_iter().rev());
             panel
                 .add(Polygon { opacity: 0.16, ..Polygon::new(outline, palette::GREY).label("extrapolated") });
             start = end;

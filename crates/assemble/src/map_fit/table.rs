@@ -100,8 +100,18 @@ impl Ends {
         Ends { spline, surge: deviation.add_scalar(mean), measured }
     }
 
+    /// Surge-side end: smooth over speed, so that a line without points there ends where its neighbours do, but never
+    /// before the last point that was measured.
     fn surge_rad(&self, speed_ratio: f64) -> f64 {
-        self.spline.row(speed_ratio).dot(&self.surge).clamp(0.2, ANGLE_RANGE.1)
+        let smooth = |speed: f64| self.spline.row(speed).dot(&self.surge);
+        let (Some(first), Some(last)) = (self.measured.first(), self.measured.last()) else {
+            return smooth(speed_ratio).clamp(0.2, ANGLE_RANGE.1);
+        };
+        // Beyond the measured speeds as far over the smooth end as at the outermost line.
+        let at = speed_ratio.clamp(first.0, last.0);
+        let measured = self.supported(at).map_or(f64::NEG_INFINITY, |(_, surge)| surge);
+        let over = (measured - smooth(at)).max(0.0);
+        (smooth(speed_ratio) + over).clamp(0.2, ANGLE_RANGE.1)
     }
 
     /// Smallest and largest angle that points support; `None` outside the measured speeds.

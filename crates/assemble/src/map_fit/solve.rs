@@ -32,7 +32,7 @@ const ROBUST: f64 = 3.0;
 const LEVEL_SD: Parameters = [2.0, 2.0, 0.7, 0.25, 0.4, 0.4, 0.03, 0.03, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5];
 /// Scatter of whole lines where the estimation starts: small, since on a map of few lines what begins as scatter is never
 /// found to be shape.
-const SCATTER: f64 = 0.003;
+const SCATTER: f64 = 0.005;
 /// Scales of the residuals where the estimation starts: the first always, the others where it ends [`FAR`] off.
 const START_SCALES: [f64; 3] = [0.01, 0.003, 0.02];
 /// Root mean square of distance or efficiency beyond which a fit is tried from other scales.

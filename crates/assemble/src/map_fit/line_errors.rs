@@ -2,7 +2,7 @@
 
 use super::line_shape::{FlowFrame, LineShape, PARAMETERS, Parameters, WORK};
 use super::nearest::{Scales, normal};
-use super::solve::Solution;
+use super::solution::Solution;
 use nalgebra::{DMatrix, DVector};
 
 /// One standard error of a place.

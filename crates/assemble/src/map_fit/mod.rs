@@ -7,9 +7,13 @@ mod line_errors;
 mod line_shape;
 mod nearest;
 mod observations;
+mod problem;
+mod solution;
 mod solve;
 mod speed_spline;
+mod splines;
 mod table;
+mod variances;
 
 pub use error::MapFitError;
 pub use leave_out::leave_out;
@@ -19,7 +23,8 @@ use line_shape::LineShape;
 use mapper_core::{CompressorMap, FittedMap};
 use nearest::{Scales, nearest};
 use observations::Observations;
-use solve::{Solution, solve};
+use solution::Solution;
+use solve::solve;
 
 /// Lowest and highest speed that a fit answers for, over the slowest and the fastest measured speed.
 const SPEED_REACH: (f64, f64) = (0.1, 1.3);

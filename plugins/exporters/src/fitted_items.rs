@@ -23,6 +23,12 @@ pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap) {
         let colour = if line.measured { palette::INK } else { palette::GREY };
         panel.add(Line::new(runs(all(), true), palette::GREY).width_px(1.0).dash(Dash::Dashed));
         panel.add(Line::new(runs(all(), false), colour).width_px(1.3));
+    }
+    // Where two speeds would be written upon each other the first stays: that of a measured line.
+    let (measured, others): (Vec<&FittedLine>, Vec<&FittedLine>) =
+        fitted.lines.iter().partition(|line| line.measured);
+    for line in measured.into_iter().chain(others) {
+        let colour = if line.measured { palette::INK } else { palette::GREY };
         // An invisible line of the last visible node carries the speed.
         let end = line.nodes.iter().find(|n| !n.extrapolated).or_else(|| middle(line)).map(place);
         panel.add(

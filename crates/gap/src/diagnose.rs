@@ -2,12 +2,13 @@
 
 use crate::adequacy::{Adequacy, adequacy};
 use crate::calibration::Calibration;
-use crate::check::{Problem, check};
+use crate::check::{Problem, check, same_machine};
 use crate::declared::Declared;
 use crate::fit::{Effort, Fit, Selection, coordinates, fit, parameters};
 use crate::how_far::{held_out, how_far};
 use crate::inputs::InputError;
-use crate::next::next;
+use crate::next::{Rivals, next};
+use crate::outlook::Jump;
 use crate::parallel;
 use crate::place::{Gain, places};
 use crate::report::{Candidate, Diagnosis, Estimate, Verdict};
@@ -45,6 +46,8 @@ pub struct Question<'a> {
     pub model: Model,
     /// Candidate effects.
     pub effects: Vec<Arc<dyn Effect>>,
+    /// Jumps that the planner allows on this machine, for what to do next; those of the recording where there are none.
+    pub jumps: Vec<Jump>,
     /// Numbers behind the probabilities.
     pub calibration: Calibration,
     /// Told the share done, and what comes.
@@ -78,12 +81,13 @@ const MOST: f64 = 0.5;
 /// # Errors
 /// [`GapError`] with a clear word where no diagnosis can be made.
 pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
-    let Question { recording, declared, model, effects, calibration, progress } = question;
+    let Question { recording, declared, model, effects, jumps, calibration, progress } = question;
     progress(0.0, "reading");
     let table = Table::new(recording).ok_or(Problem::Empty)?;
     let warnings = check(recording, &table, &declared)?;
     let study = Study::new(recording, table, declared, model, effects)?;
     let linearised = Linearised::new(&study)?;
+    same_machine(&study, &linearised.base.values)?;
     // Hold-outs are chosen by place, before anything is fitted.
     let held_out = held_out(&study);
     let mut training = Selection::all(&study);
@@ -156,9 +160,8 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     } else {
         places(&study, &linearised, &null, &gains, named)
     };
-    let next = rivals(&weighed, &fits)
-        .filter(|_| named)
-        .and_then(|(first, second, odds)| next(&study, &linearised, first, second, odds));
+    progress(0.95, "what next");
+    let next = rivals(&weighed, &fits).filter(|_| named).and_then(|rivals| next(&study, rivals, &jumps));
     progress(1.0, "done");
     let diagnosis = Diagnosis {
         verdict,
@@ -284,16 +287,21 @@ fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> BTreeMap<St
     estimates
 }
 
-/// The best cause and its strongest rival that is no mere addition to it, with the logarithm of their odds; `None`
-/// where there is none, or it is settled.
-fn rivals<'a>(weighed: &Weighed, fits: &'a [Fit]) -> Option<(&'a Fit, &'a Fit, f64)> {
+/// The causes that are still open, best first; `None` where the first is settled. A mere addition to the best is no
+/// rival of it.
+fn rivals<'a>(weighed: &Weighed, fits: &'a [Fit]) -> Option<Rivals<'a>> {
     let first = fits.first()?;
     let of_first = members(&first.hypothesis);
-    let (place, second) = fits.iter().enumerate().skip(1).find(|(_, fit)| {
+    let rival = |place: usize, fit: &Fit| {
         let others = members(&fit.hypothesis);
-        !of_first.iter().all(|effect| others.contains(effect))
-    })?;
-    let odds = weighed.scores[1] - weighed.scores[place + 1];
-    // Odds of e^12 are settled.
-    (odds < 12.0).then_some((first, second, odds))
+        // Odds of e^12 are settled.
+        weighed.scores[1] - weighed.scores[place + 1] < 12.0
+            && !of_first.iter().all(|effect| others.contains(effect))
+    };
+    let open: Vec<usize> =
+        (0..fits.len()).filter(|place| *place == 0 || rival(*place, &fits[*place])).collect();
+    (open.len() > 1).then(|| Rivals {
+        fits: open.iter().map(|place| &fits[*place]).collect(),
+        probabilities: open.iter().map(|place| weighed.candidates[*place].probability.max(1e-6)).collect(),
+    })
 }

@@ -1,9 +1,12 @@
 //! A diagnosis as a page with pictures: one HTML file that needs nothing else.
 
 use super::gap_text;
-use mapper_chart::{Axis, Figure, Line, Panel, palette};
+use mapper_chart::palette::{self, Colour};
+use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
+use mapper_core::Channel;
 use mapper_gap::diagnose::Diagnosed;
 use mapper_gap::nuisance::OUTPUTS;
+use mapper_gap::study::Study;
 use std::fmt::Write;
 
 /// The page.
@@ -45,7 +48,9 @@ pub fn page(title: &str, done: &Diagnosed) -> String {
             escape(&place.region)
         );
     }
-    html += "</table><h2>Residuals of the nominal model, step by channel, in sigma</h2>";
+    html += "</table>";
+    html += &map_of_where(done);
+    html += "<h2>Residuals of the nominal model, step by channel, in sigma</h2>";
     html += &heat_map(done, &done.null.residual);
     if let Some(best) = done.fits.first() {
         html += "<h2>The same with the first cause</h2>";
@@ -55,6 +60,58 @@ pub fn page(title: &str, done: &Diagnosed) -> String {
     }
     let _ = writeln!(html, "<h2>In words</h2><pre>{}</pre></html>", escape(&gap_text::page(diagnosis)));
     html
+}
+
+/// Classes of residuals in the map of where: up to so many sigma, colour and name.
+const CLASSES: [(f64, Colour, &str); 4] = [
+    (1.3, palette::GREY, "noise"),
+    (3.0, palette::SKY, "up to 3 sigma"),
+    (10.0, palette::ORANGE, "up to 10 sigma"),
+    (f64::INFINITY, palette::VERMILLION, "beyond 10 sigma"),
+];
+
+/// Where on the compressor map the steps end, coloured by their residual, before and after.
+fn map_of_where(done: &Diagnosed) -> String {
+    let mut figure = Figure::new("Where on the map").columns(2).panel_size_px(430.0, 300.0);
+    let after = done.fits.first().map(|fit| ("with the first cause", &fit.residual));
+    for (title, residual) in [("nominal model", &done.null.residual)].into_iter().chain(after) {
+        let mut classes: [Vec<(f64, f64)>; CLASSES.len()] = Default::default();
+        for step in 0..done.study.steps.len() {
+            let Some(place) = place_on_map(&done.study, step) else { continue };
+            let here: Vec<f64> = done
+                .study
+                .groups
+                .iter()
+                .filter(|group| group.step == step)
+                .flat_map(|group| &residual[group.rows.clone()])
+                .map(|r| r * r)
+                .collect();
+            let rms = (here.iter().sum::<f64>() / here.len().max(1) as f64).sqrt();
+            let class = CLASSES.iter().position(|(up_to, ..)| rms <= *up_to).unwrap_or(CLASSES.len() - 1);
+            classes[class].push(place);
+        }
+        let mut panel =
+            Panel::new(Axis::new("compressor flow, g/s"), Axis::new("pressure ratio P2/P1")).title(title);
+        for ((_, colour, name), points) in CLASSES.iter().zip(classes) {
+            if !points.is_empty() {
+                panel.add(Scatter::new(points, *colour).size_px(9.0).label(*name));
+            }
+        }
+        figure = figure.panel(panel);
+    }
+    figure.to_svg()
+}
+
+/// Flow in g/s and pressure ratio as measured in the last 10 s of a step.
+fn place_on_map(study: &Study, step: usize) -> Option<(f64, f64)> {
+    let end_s = study.steps[step].marker.end_s;
+    let mean = |channel: Channel| {
+        let values = &study.table.column(channel)?[study.table.range(end_s - 10.0, end_s)];
+        let values: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    let p1_pa = mean(Channel::P1).unwrap_or(study.declared.nominal.p1_pa);
+    Some((1e3 * mean(Channel::CompressorFlow)?, mean(Channel::P2)? / p1_pa))
 }
 
 /// Root mean square of the whitened residual of each step and channel, as a table of colours with its numbers.

@@ -13,7 +13,7 @@ use crate::parallel;
 use crate::place::{Gain, places};
 use crate::report::{Candidate, Diagnosis, Estimate, Verdict};
 use crate::select::{Search, additions, keep_best, members, refit, search};
-use crate::study::{PredictError, Study};
+use crate::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::table::Table;
 use crate::whiten::Linearised;
 use mapper_core::Recording;
@@ -63,6 +63,9 @@ pub struct Diagnosed {
     pub study: Study,
     /// Tolerances alone, on all steps.
     pub null: Fit,
+    /// Prediction and whitened residual of the nominal model with the tolerances of the best fit, but without its cause:
+    /// in [`Diagnosed::null`] tolerances are strained to stand in for it. The null itself where no cause is named.
+    pub without_cause: (Prediction, Vec<f64>),
     /// Best fits on all steps, best first.
     pub fits: Vec<Fit>,
     /// What the best leaves.
@@ -173,7 +176,20 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         next,
         warnings,
     };
-    Ok(Diagnosed { diagnosis, study, null, fits, adequacy: left, linearised })
+    let without_cause = without_cause(&study, &linearised, fits.first().filter(|_| named))
+        .unwrap_or_else(|| (null.prediction.clone(), null.residual.clone()));
+    Ok(Diagnosed { diagnosis, study, null, without_cause, fits, adequacy: left, linearised })
+}
+
+fn without_cause(
+    study: &Study,
+    linearised: &Linearised,
+    named: Option<&Fit>,
+) -> Option<(Prediction, Vec<f64>)> {
+    let bare = Hypothesis { nuisances: named?.hypothesis.nuisances.clone(), effects: Vec::new() };
+    let prediction = study.predict(&bare).ok()?;
+    let residual = linearised.residual(study, &prediction);
+    Some((prediction, residual))
 }
 
 /// Scores turned into probabilities.

@@ -7,6 +7,8 @@ use crate::study::{Hypothesis, Study};
 use crate::table::Table;
 use crate::whiten::{Linearised, dot};
 use mapper_core::{Channel, OperatingPoint, Recording, Series, StepKind, StepMarker};
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::steady::hold_speed;
 use nalgebra::{DMatrix, DVector};
 
 /// A jump that may be run.
@@ -56,14 +58,18 @@ impl Imagined {
             marker(0, 0.0, HOLD_S, jump.from_p3_pa, jump.from),
             marker(1, HOLD_S, HOLD_S + dwell_s, jump.to_p3_pa, jump.to),
         ];
-        let nominal = &recorded.declared.nominal;
-        // Guesses for the rest at the start; the inputs are those of the campaign.
+        // The rest at the start, as a first guess; the inputs are those of the campaign.
+        let boundary = BoundaryConditions {
+            valve_opening_ratio: jump.from.valve_opening_ratio,
+            ..recorded.declared.nominal
+        };
+        let rest = hold_speed(&recorded.nominal.model, jump.from.speed_rpm, &boundary).ok()?.state;
         let level = |channel: Channel| match channel {
             Channel::ShaftSpeed => jump.from.speed_rpm,
-            Channel::P2 => 1.5 * nominal.p1_pa,
-            Channel::Tc => nominal.t1_k + 40.0,
-            Channel::Tt => 0.5 * (nominal.t3_k + nominal.t1_k),
-            Channel::T2 => nominal.t1_k + 50.0,
+            Channel::P2 => rest.p2_pa,
+            Channel::Tc => rest.tc_k,
+            Channel::Tt => rest.tt_k,
+            Channel::T2 => rest.t2_tip_k,
             _ => 0.0,
         };
         let series = |channel: Channel| {

@@ -273,9 +273,10 @@ fn a_jump_tells_a_slow_probe_from_its_rival_and_from_itself_nothing() {
     assert!(long[0][0].abs() < 1e-9 && long[1][1].abs() < 1e-9);
     // A probe's lag shows where the temperature jumps; 80 krpm are some 100 K, one krpm is two.
     assert!(long[0][1] > 10.0 * short[0][1], "{long:?} {short:?}");
-    // Fitting the rival again can only bring it nearer.
+    // Fitting the rival again can only bring it nearer; a close look takes five times as many samples, which hold at
+    // most five times as much.
     let blunt = apart_at_first_sight(&diagnosed.study, &jump(60e3, 140e3), &fits).unwrap();
-    assert!(long[0][1] < 1.5 * blunt[0][1], "{long:?} {blunt:?}");
+    assert!(long[0][1] < 5.0 * blunt[0][1], "{long:?} {blunt:?}");
 }
 
 /// A user's suspicion, tried beside the built-in effects: the example that ships, on a rig that has it.

@@ -17,7 +17,7 @@ pub fn page(title: &str, done: &Diagnosed) -> String {
          <style>body{font:15px/1.5 sans-serif;max-width:1100px;margin:2em auto;color:#222}\
          table{border-collapse:collapse}td,th{padding:.2em .6em;text-align:right}\
          td:first-child,th:first-child{text-align:left}.bar{background:#4477aa;height:1em;display:inline-block}\
-         svg{max-width:100%;height:auto}pre{background:#f4f4f4;padding:1em;overflow:auto}</style>",
+         svg{max-width:100%;height:auto}pre{background:#f4f4f4;padding:1em;overflow:auto;white-space:pre-wrap}</style>",
     );
     let _ = write!(html, "<h1>{}</h1><p>{}</p>", escape(&gap_text::headline(diagnosis)), escape(title));
     html += "<h2>Which</h2><table><tr><th>cause</th><th>probability</th><th></th></tr>";
@@ -50,10 +50,10 @@ pub fn page(title: &str, done: &Diagnosed) -> String {
     }
     html += "</table>";
     html += &map_of_where(done);
-    html += "<h2>Residuals of the nominal model, step by channel, in sigma</h2>";
-    html += &heat_map(done, &done.null.residual);
+    html += "<h2>Residuals without the cause, step by channel, in sigma</h2><p>Each number is the root mean square of a step and channel in units of what is declared: 1 is noise. Tolerances are those fitted together with the first cause.</p>";
+    html += &heat_map(done, &done.without_cause.1);
     if let Some(best) = done.fits.first() {
-        html += "<h2>The same with the first cause</h2>";
+        html += "<h2>Residuals with the first cause</h2>";
         html += &heat_map(done, &best.residual);
         html += "<h2>Before and after</h2>";
         html += &traces(done);
@@ -74,7 +74,7 @@ const CLASSES: [(f64, Colour, &str); 4] = [
 fn map_of_where(done: &Diagnosed) -> String {
     let mut figure = Figure::new("Where on the map").columns(2).panel_size_px(430.0, 300.0);
     let after = done.fits.first().map(|fit| ("with the first cause", &fit.residual));
-    for (title, residual) in [("nominal model", &done.null.residual)].into_iter().chain(after) {
+    for (title, residual) in [("without the cause", &done.without_cause.1)].into_iter().chain(after) {
         let mut classes: [Vec<(f64, f64)>; CLASSES.len()] = Default::default();
         for step in 0..done.study.steps.len() {
             let Some(place) = place_on_map(&done.study, step) else { continue };
@@ -134,7 +134,12 @@ fn heat_map(done: &Diagnosed, residual: &[f64]) -> String {
             // White at 1, red from 30 on, evenly in the logarithm.
             let heat = (rms.max(1.0).ln() / 30f64.ln()).clamp(0.0, 1.0);
             let fade = (255.0 * (1.0 - heat)) as u8;
-            let _ = write!(html, "<td style=\"background:rgb(255,{fade},{fade})\">{rms:.1}</td>");
+            let ink = if heat > 0.6 { "#fff" } else { "#222" };
+            let _ = write!(
+                html,
+                "<td style=\"color:{ink};background:rgb({},{fade},{fade})\">{rms:.1}</td>",
+                255 - (60.0 * heat) as u8
+            );
         }
         html += "</tr>";
     }
@@ -146,7 +151,7 @@ fn traces(done: &Diagnosed) -> String {
     let Some(best) = done.fits.first() else { return String::new() };
     let energy = |output: usize| {
         let groups = done.study.groups.iter().filter(|g| g.output == output);
-        groups.flat_map(|g| &done.null.residual[g.rows.clone()]).map(|r| r * r).sum::<f64>()
+        groups.flat_map(|g| &done.without_cause.1[g.rows.clone()]).map(|r| r * r).sum::<f64>()
     };
     let mut order: Vec<usize> = (0..OUTPUTS.len()).collect();
     order.sort_by(|a, b| energy(*b).total_cmp(&energy(*a)));
@@ -165,7 +170,10 @@ fn traces(done: &Diagnosed) -> String {
         };
         let channel = OUTPUTS[output];
         let panel = Panel::new(Axis::new("time, min"), Axis::new(format!("{channel}, {}", channel.unit())))
-            .with(Line::new(points(&done.null.prediction.values), palette::VERMILLION).label("nominal model"))
+            .with(
+                Line::new(points(&done.without_cause.0.values), palette::VERMILLION)
+                    .label("without the cause"),
+            )
             .with(Line::new(points(&best.prediction.values), palette::BLUE).label("with the first cause"));
         figure = figure.panel(panel);
     }

@@ -7,7 +7,7 @@ use crate::declared::Declared;
 use crate::fit::{Effort, Fit, Selection, coordinates, fit, parameters};
 use crate::how_far::{held_out, how_far};
 use crate::inputs::InputError;
-use crate::next::{Rivals, next};
+use crate::next::{Rivals, next, sensor_beside};
 use crate::outlook::Jump;
 use crate::parallel;
 use crate::place::{Gain, places};
@@ -164,7 +164,13 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         places(&study, &linearised, &null, &gains, named)
     };
     progress(0.95, "what next");
-    let next = rivals(&weighed, &fits).filter(|_| named).and_then(|rivals| next(&study, rivals, &jumps));
+    let next = match verdict {
+        Verdict::WithinTolerance => None,
+        Verdict::Unexplained => sensor_beside(&r#where),
+        Verdict::Explained | Verdict::PartlyExplained => {
+            rivals(&weighed, &fits).and_then(|rivals| next(&study, rivals, &jumps))
+        }
+    };
     progress(1.0, "done");
     let diagnosis = Diagnosis {
         verdict,
@@ -202,8 +208,6 @@ struct Weighed {
     outside: f64,
     /// Whether a cause is named at all.
     named: bool,
-    /// Logarithms of the odds of nothing and of each fit, before the temperature.
-    scores: Vec<f64>,
 }
 
 /// Logarithm of what is known of a cause before any data: pairs are rarer than singles, and many.
@@ -248,7 +252,7 @@ fn weigh(study: &Study, calibration: &Calibration, null: &Fit, fits: &[Fit], lef
             },
         })
         .collect();
-    Weighed { candidates, none, outside_probability: outside, outside, named, scores }
+    Weighed { candidates, none, outside_probability: outside, outside, named }
 }
 
 fn names(study: &Study, fit: &Fit) -> Vec<String> {
@@ -303,21 +307,20 @@ fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> BTreeMap<St
     estimates
 }
 
+/// Share of the first among the causes that are open from which on it is settled.
+const SETTLED: f64 = 0.95;
+
 /// The causes that are still open, best first; `None` where the first is settled. A mere addition to the best is no
 /// rival of it.
 fn rivals<'a>(weighed: &Weighed, fits: &'a [Fit]) -> Option<Rivals<'a>> {
-    let first = fits.first()?;
-    let of_first = members(&first.hypothesis);
-    let rival = |place: usize, fit: &Fit| {
+    let of_first = members(&fits.first()?.hypothesis);
+    let rival = |fit: &Fit| {
         let others = members(&fit.hypothesis);
-        // Odds of e^12 are settled.
-        weighed.scores[1] - weighed.scores[place + 1] < 12.0
-            && !of_first.iter().all(|effect| others.contains(effect))
+        !of_first.iter().all(|effect| others.contains(effect))
     };
-    let open: Vec<usize> =
-        (0..fits.len()).filter(|place| *place == 0 || rival(*place, &fits[*place])).collect();
-    (open.len() > 1).then(|| Rivals {
-        fits: open.iter().map(|place| &fits[*place]).collect(),
-        probabilities: open.iter().map(|place| weighed.candidates[*place].probability.max(1e-6)).collect(),
-    })
+    let open: Vec<usize> = (0..fits.len()).filter(|place| *place == 0 || rival(&fits[*place])).collect();
+    let probabilities: Vec<f64> = open.iter().map(|place| weighed.candidates[*place].probability).collect();
+    let total: f64 = probabilities.iter().sum();
+    (open.len() > 1 && probabilities[0] < SETTLED * total)
+        .then(|| Rivals { fits: open.iter().map(|place| &fits[*place]).collect(), probabilities })
 }

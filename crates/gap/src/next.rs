@@ -3,7 +3,7 @@
 use crate::fit::Fit;
 use crate::outlook::{Jump, apart, apart_at_first_sight, recorded_jumps, recorded_points};
 use crate::parallel;
-use crate::report::{JumpPoint, Next};
+use crate::report::{JumpPoint, Next, Place};
 use crate::study::Study;
 use mapper_core::OperatingPoint;
 use mapper_physics::effect::Submodel;
@@ -71,6 +71,19 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Jump]) -> Option<N
             })
         }
     }
+}
+
+/// The sensor that would look into the part where most of an unexplained gap lies.
+pub fn sensor_beside(places: &[Place]) -> Option<Next> {
+    let place = places.first()?;
+    let part = Submodel::ALL.into_iter().find(|part| part.name() == place.submodel)?;
+    Some(Next::Sensor {
+        sensor: sensor_for(part).to_owned(),
+        reason: format!(
+            "no effect of the catalogue explains the gap, and most of it lies in {}: write a suspected effect in rhai and give it by --effect, or measure there",
+            place.submodel
+        ),
+    })
 }
 
 fn point(point: OperatingPoint) -> JumpPoint {

@@ -35,74 +35,81 @@ const FINE_S: f64 = 0.1;
 const MOST_S: f64 = 600.0;
 
 /// A jump made ready like a recording, of rest at its start and its dwell, with nothing in it but its inputs.
-struct Imagined {
-    study: Study,
+fn imagined(recorded: &Study, jump: &Jump, interval_s: f64) -> Option<Study> {
+    let dwell_s = jump.dwell_s.clamp(10.0, MOST_S);
+    let count = ((HOLD_S + dwell_s) / interval_s) as usize;
+    let t_s: Vec<f64> = (0..count).map(|i| interval_s * i as f64).collect();
+    let marker = |index: usize, from: f64, to: f64, p3_pa: f64, point: OperatingPoint| StepMarker {
+        index,
+        kind: StepKind::Repeat,
+        start_s: from,
+        end_s: to,
+        from: None,
+        to: Some(point),
+        p3_pa,
+        valve_opening_ratio: point.valve_opening_ratio,
+    };
+    let steps = vec![
+        marker(0, 0.0, HOLD_S, jump.from_p3_pa, jump.from),
+        marker(1, HOLD_S, HOLD_S + dwell_s, jump.to_p3_pa, jump.to),
+    ];
+    // The rest at the start, as a first guess; the inputs are those of the campaign.
+    let boundary = BoundaryConditions {
+        valve_opening_ratio: jump.from.valve_opening_ratio,
+        ..recorded.declared.nominal
+    };
+    let rest = hold_speed(&recorded.nominal.model, jump.from.speed_rpm, &boundary).ok()?.state;
+    let level = |channel: Channel| match channel {
+        Channel::ShaftSpeed => jump.from.speed_rpm,
+        Channel::P2 => rest.p2_pa,
+        Channel::Tc => rest.tc_k,
+        Channel::Tt => rest.tt_k,
+        Channel::T2 => rest.t2_tip_k,
+        _ => 0.0,
+    };
+    let series =
+        |channel: Channel| (channel, Series { t_s: t_s.clone(), values: vec![level(channel); t_s.len()] });
+    // What drives the model comes from the campaign; what the rig measured would be measured again.
+    let measured = OUTPUTS
+        .into_iter()
+        .filter(|channel| *channel != Channel::P3 && recorded.table.column(*channel).is_some());
+    let recording = Recording { series: measured.map(series).collect(), steps, events: Vec::new() };
+    let table = Table::new(&recording)?;
+    Study::new(
+        &recording,
+        table,
+        recorded.declared.clone(),
+        recorded.nominal.model.clone(),
+        recorded.effects.clone(),
+    )
+    .ok()
 }
 
-impl Imagined {
-    fn new(recorded: &Study, jump: &Jump, interval_s: f64) -> Option<Imagined> {
-        let dwell_s = jump.dwell_s.clamp(10.0, MOST_S);
-        let count = ((HOLD_S + dwell_s) / interval_s) as usize;
-        let t_s: Vec<f64> = (0..count).map(|i| interval_s * i as f64).collect();
-        let marker = |index: usize, from: f64, to: f64, p3_pa: f64, point: OperatingPoint| StepMarker {
-            index,
-            kind: StepKind::Repeat,
-            start_s: from,
-            end_s: to,
-            from: None,
-            to: Some(point),
-            p3_pa,
-            valve_opening_ratio: point.valve_opening_ratio,
-        };
-        let steps = vec![
-            marker(0, 0.0, HOLD_S, jump.from_p3_pa, jump.from),
-            marker(1, HOLD_S, HOLD_S + dwell_s, jump.to_p3_pa, jump.to),
-        ];
-        // The rest at the start, as a first guess; the inputs are those of the campaign.
-        let boundary = BoundaryConditions {
-            valve_opening_ratio: jump.from.valve_opening_ratio,
-            ..recorded.declared.nominal
-        };
-        let rest = hold_speed(&recorded.nominal.model, jump.from.speed_rpm, &boundary).ok()?.state;
-        let level = |channel: Channel| match channel {
-            Channel::ShaftSpeed => jump.from.speed_rpm,
-            Channel::P2 => rest.p2_pa,
-            Channel::Tc => rest.tc_k,
-            Channel::Tt => rest.tt_k,
-            Channel::T2 => rest.t2_tip_k,
-            _ => 0.0,
-        };
-        let series = |channel: Channel| {
-            (channel, Series { t_s: t_s.clone(), values: vec![level(channel); t_s.len()] })
-        };
-        // What drives the model comes from the campaign; what the rig measured would be measured again.
-        let measured = OUTPUTS
-            .into_iter()
-            .filter(|channel| *channel != Channel::P3 && recorded.table.column(*channel).is_some());
-        let recording = Recording { series: measured.map(series).collect(), steps, events: Vec::new() };
-        let table = Table::new(&recording)?;
-        let study = Study::new(
-            &recording,
-            table,
-            recorded.declared.clone(),
-            recorded.nominal.model.clone(),
-            recorded.effects.clone(),
-        )
-        .ok()?;
-        Some(Imagined { study })
+/// A fit's hypothesis at a new start, of which its own start says nothing.
+fn anew(study: &Study, fit: &Fit) -> Hypothesis {
+    let mut hypothesis = fit.hypothesis.clone();
+    for (nuisance, sigmas) in study.nuisances.iter().zip(&mut hypothesis.nuisances) {
+        if is_start(nuisance.kind) {
+            *sigmas = 0.0;
+        }
     }
+    hypothesis
+}
+
+fn is_start(kind: NuisanceKind) -> bool {
+    matches!(kind, NuisanceKind::StartTc | NuisanceKind::StartTt)
 }
 
 /// How far apart two candidates' predictions of a jump are, in squared sigmas of the noise alone: a first look.
 ///
 /// `None` where the model cannot make the jump.
 pub fn apart_at_first_sight(recorded: &Study, jump: &Jump, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
-    let study = Imagined::new(recorded, jump, COARSE_S)?.study;
+    let study = imagined(recorded, jump, COARSE_S)?;
     let linearised = Linearised::of_noise_alone(&study).ok()?;
     let predictions: Option<Vec<Vec<f64>>> = fits
         .iter()
         .map(|fit| {
-            let mut values = study.predict(&fit.hypothesis).ok()?.values;
+            let mut values = study.predict(&anew(&study, fit)).ok()?.values;
             linearised.whiten(&study, &mut values);
             Some(values)
         })
@@ -118,16 +125,17 @@ pub fn apart_at_first_sight(recorded: &Study, jump: &Jump, fits: &[&Fit]) -> Opt
 /// With `D` the difference of the predictions, `J` the derivatives of `j`'s prediction by its nuisances and parameters
 /// and `L` the precision in which the recording leaves them: `D'D - D'J (L + J'J)^-1 J'D`, all whitened.
 pub fn apart(recorded: &Study, jump: &Jump, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
-    let study = Imagined::new(recorded, jump, FINE_S)?.study;
+    let study = imagined(recorded, jump, FINE_S)?;
     let nominal = Linearised::new(&study).ok()?;
     let mut predicted = Vec::new();
     for fit in fits {
-        let here = nominal.at(&study, &fit.hypothesis).ok()?;
+        let hypothesis = anew(&study, fit);
+        let here = nominal.at(&study, &hypothesis).ok()?;
         let mut values = here.base.values.clone();
         nominal.whiten(&study, &mut values);
-        let coordinates = coordinates(&study, &fit.hypothesis);
+        let coordinates = coordinates(&study, &hypothesis);
         let mut columns = here.columns.clone();
-        columns.extend(effect_changes(&study, &nominal, &fit.hypothesis, &here.base, &coordinates));
+        columns.extend(effect_changes(&study, &nominal, &hypothesis, &here.base, &coordinates));
         predicted.push((values, columns, precision(&study, fit)));
     }
     let mut rows = Vec::new();
@@ -163,7 +171,7 @@ fn misfit(difference: &[f64], columns: &[Vec<f64>], precision: &DMatrix<f64>) ->
 fn precision(study: &Study, fit: &Fit) -> DMatrix<f64> {
     let mut precision = fit.precision.clone();
     for (index, nuisance) in study.nuisances.iter().enumerate() {
-        if matches!(nuisance.kind, NuisanceKind::StartTc | NuisanceKind::StartTt) {
+        if is_start(nuisance.kind) {
             precision.row_mut(index).fill(0.0);
             precision.column_mut(index).fill(0.0);
             precision[(index, index)] = 1.0;

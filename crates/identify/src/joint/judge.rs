@@ -4,6 +4,7 @@ use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
 use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
+use crate::joint::smoothness::Smoothed;
 use crate::samples::mean;
 
 /// Whitened mean square above which a step is doubted.
@@ -20,6 +21,8 @@ const OUTSIDE_SIGMAS: f64 = 2.0;
 const EXPONENT_RANGE: (f64, f64) = (0.5, 1.5);
 /// Largest tip of a probe that anyone would put into a compressor's outlet, mm.
 const LARGEST_PROBE_MM: f64 = 4.0;
+/// Declared standard deviations by which the offsets may have to be moved for a smooth map.
+const STRAIN_SIGMAS: f64 = 3.0;
 /// Standard errors by which rising and falling steps may differ.
 const SPLIT_SIGMAS: f64 = 4.0;
 
@@ -96,7 +99,12 @@ pub(crate) fn judge_step(
 }
 
 /// What speaks against the model as a whole, one sentence each.
-pub(crate) fn doubts(problem: &Problem<'_>, covariance: &Covariance, config: &IdentifyConfig) -> Vec<String> {
+pub(crate) fn doubts(
+    problem: &Problem<'_>,
+    covariance: &Covariance,
+    smoothed: &Smoothed,
+    config: &IdentifyConfig,
+) -> Vec<String> {
     let mut doubts = Vec::new();
     let squares: Vec<f64> = problem
         .members
@@ -143,6 +151,12 @@ pub(crate) fn doubts(problem: &Problem<'_>, covariance: &Covariance, config: &Id
     let scatter = mean(&deviations).unwrap_or(0.0).sqrt();
     if problem.setting.with_law && scatter > LAW_SCATTER_RATIO {
         doubts.push(format!("the points scatter by {:.1} % about the convection law", 100.0 * scatter));
+    }
+    if smoothed.strain > STRAIN_SIGMAS {
+        doubts.push(format!(
+            "the efficiencies bend towards low speed as no map does; taken for offsets they are {:.1} times the declared ones",
+            smoothed.strain
+        ));
     }
     doubts.extend(split_doubt(problem));
     doubts

@@ -80,6 +80,8 @@ pub(crate) struct Covariance {
     pub(crate) shared: DMatrix<f64>,
     /// For each step: own covariance with the shared ones free, and own by shared.
     pub(crate) own: Vec<(Matrix4<f64>, Matrix4xX<f64>)>,
+    /// For each step: how its own parameters answer to the shared ones.
+    pub(crate) answers: Vec<Matrix4xX<f64>>,
 }
 
 impl Member<'_> {
@@ -396,16 +398,16 @@ impl Problem<'_> {
         shared.view_mut((0, sought), (sought, carried)).copy_from(&mixed);
         shared.view_mut((sought, 0), (carried, sought)).copy_from(&mixed.transpose());
         shared.view_mut((sought, sought), (carried, carried)).copy_from(&spread);
-        let own = normal
-            .blocks
+        let answers: Vec<Matrix4xX<f64>> =
+            normal.blocks.iter().zip(&inverses).map(|(block, inverse)| -(inverse * &block.mixed)).collect();
+        let own = answers
             .iter()
             .zip(&inverses)
-            .map(|(block, inverse)| {
-                let spread = inverse * &block.mixed;
-                let own = inverse + &spread * &shared * spread.transpose();
-                (own, -(spread * &shared))
+            .map(|(answer, inverse)| {
+                let mixed = answer * &shared;
+                (inverse + &mixed * answer.transpose(), mixed)
             })
             .collect();
-        Some(Covariance { fitted, shared, own })
+        Some(Covariance { fitted, shared, own, answers })
     }
 }

@@ -113,6 +113,18 @@ pub(crate) fn doubts(
         .map(|member| mean_square(problem, member))
         .collect();
     let overall = mean(&squares).unwrap_or(0.0);
+    if std::env::var("JDEBUG").is_ok() {
+        let (mut e, mut ne, mut l, mut nl) = (0.0, 0.0, 0.0, 0.0);
+        let mut slow = 0.0; let mut ns = 0.0;
+        for m in problem.members.iter().filter(|m| m.shares) {
+            let (r, _) = problem.residual(m, &problem.shared, &m.local, None);
+            for (row, r) in m.course.rows.iter().zip(&r) {
+                if row.t_s < m.course.rows[0].t_s + 8.5 { e += r * r; ne += 1.0 } else { l += r * r; nl += 1.0 }
+            }
+            for c in r.chunks(10) { let s: f64 = c.iter().sum(); slow += s * s / c.len() as f64; ns += 1.0; }
+        }
+        eprintln!("overall {overall:.3} early {:.3} late {:.3} slow {:.3} ({ns})", e / ne, l / nl, slow / ns);
+    }
     if !config.declared.is_empty() && overall > MODEL_SQUARE {
         doubts.push(format!(
             "all steps together leave {:.2} times the declared noise: something that the model does not know is at work",

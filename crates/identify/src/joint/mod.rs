@@ -26,11 +26,11 @@ use crate::dynamic::{self, Estimate};
 use crate::end_state::EndState;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{PROBE_MM2, SHARED};
-use crate::joint::smoothness::Judged;
+use crate::joint::smoothness::{Judged, Smoothed};
 use crate::joint::solve::{Covariance, FULLY, Problem, ROUGHLY};
 use crate::samples::mean;
 use crate::{IdentifyConfig, jump};
-use mapper_core::{EstimateUncertainty, JointSettings, Recording, ThermalModel, Window};
+use mapper_core::{Choice, EstimateUncertainty, JointSettings, Recording, ThermalModel, Window};
 
 /// Fits before the last one.
 const ROUNDS: usize = 3;
@@ -65,16 +65,22 @@ pub(crate) fn estimate(
     }
     let nothing = || Joint { estimates: vec![Estimate::default(); recording.steps.len()], thermal: None };
     let steps = start::steps(recording, end_states, config, findings);
-    let Some(mut problem) = start::problem(&steps, &alone, config) else { return nothing() };
-    let Some(covariance) = fitted(&mut problem, &steps, config) else {
+    let Some(mut attempt) = Attempt::new(&steps, &alone, config) else {
         for step in &steps {
             let message = "least squares over all steps came to no end".to_owned();
             findings[step.position].refuse(code::FIT_FAILED, message);
         }
         return nothing();
     };
-    let smoothed = smoothness::smoothed(&problem, &covariance, &steps, config.reference);
-    let thermal = shared::thermal_model(&problem, &covariance, &smoothed, &steps, config);
+    let careful = carefully(config);
+    let late: Vec<rows::StepRows> = steps.iter().map(rows::StepRows::settled).collect();
+    if !attempt.thermal.doubts.is_empty()
+        && careful.joint != config.joint
+        && let Some(other) = Attempt::new(&late, &alone, &careful)
+    {
+        attempt = other.instead_of(attempt);
+    }
+    let Attempt { problem, smoothed, thermal } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
         let own = &mut findings[step.position];
@@ -124,6 +130,43 @@ pub(crate) fn estimate(
         }
     }
     Joint { estimates, thermal: Some(thermal) }
+}
+
+/// A fit with what is made of it.
+struct Attempt<'a> {
+    problem: Problem<'a>,
+    smoothed: Smoothed,
+    thermal: ThermalModel,
+}
+
+impl<'a> Attempt<'a> {
+    fn new(steps: &'a [rows::StepRows], alone: &[Estimate], config: &IdentifyConfig) -> Option<Self> {
+        let mut problem = start::problem(steps, alone, config)?;
+        let covariance = fitted(&mut problem, steps, config)?;
+        let smoothed = smoothness::smoothed(&problem, &covariance, steps, config.reference);
+        let thermal = shared::thermal_model(&problem, &covariance, &smoothed, steps, config);
+        Some(Attempt { problem, smoothed, thermal })
+    }
+
+    /// This one after another was doubted: the doubts remain.
+    fn instead_of(mut self, doubted: Attempt<'_>) -> Self {
+        let mut doubts: Vec<String> = doubted
+            .thermal
+            .doubts
+            .into_iter()
+            .map(|doubt| format!("{doubt}; so all refinements are held as declared"))
+            .collect();
+        doubts.extend(self.thermal.doubts);
+        self.thermal.doubts = doubts;
+        self
+    }
+}
+
+/// The refinements held as declared.
+fn carefully(config: &IdentifyConfig) -> IdentifyConfig {
+    let held =
+        JointSettings { alpha_area: Choice::Fixed, probe: Choice::Fixed, direction: Choice::Fixed, ..config.joint };
+    IdentifyConfig { joint: held, ..config.clone() }
 }
 
 /// Fits, learns from the fit how noisy steps are and how far points may scatter, leaves out what fits far worse, and

@@ -53,6 +53,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) explained: Explained,
     /// Whether the probe is sought, be it on its bound for now.
     pub(crate) probe_fitted: bool,
+    /// Variance of shared parameters beyond that of the fit: whether they are at work at all.
+    pub(crate) extra_variances: SharedVector,
 }
 
 /// A step's part of the normal equations.
@@ -381,14 +383,20 @@ impl Problem<'_> {
         };
         let answer = -(&inverse * reduced.view((0, sought), (sought, carried)));
         // The noise of the inputs pulls the probe beyond what least squares knows of.
-        let inverse = match fitted[..sought].iter().position(|index| *index == PROBE_MM2) {
-            None => inverse,
-            Some(row) => {
-                let pulled = inverse.column(row).into_owned();
-                let variance = self.explained.pull_variance(self.shared[PROBE_MM2]);
-                inverse + variance * &pulled * pulled.transpose()
+        let mut inverse = inverse;
+        for (row, index) in fitted[..sought].iter().enumerate() {
+            let pulled = inverse.column(row).into_owned();
+            let pull = if *index == PROBE_MM2 {
+                self.explained.pull_variance(self.shared[PROBE_MM2])
+            } else {
+                0.0
+            };
+            let variance = pull + self.extra_variances[*index] / pulled[row].powi(2);
+            if variance > 0.0 {
+                inverse += variance * &pulled * pulled.transpose();
             }
-        };
+        }
+        let inverse = inverse;
         let spread = DMatrix::from_diagonal(&DVector::from_iterator(
             carried,
             fitted[sought..].iter().map(|index| self.priors[*index].sigma.powi(2)),

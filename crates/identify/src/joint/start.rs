@@ -10,6 +10,7 @@ use crate::joint::parameters::{
     ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL,
     OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior, SHARED, SLOPE, SURFACE,
 };
+use crate::joint::parsimony::NO_EXTRA;
 use crate::joint::rows::{StepRows, condensed};
 use crate::joint::solve::{Member, Problem};
 use crate::joint::surface::{SurfaceScale, TERM_COUNT, dot};
@@ -194,6 +195,7 @@ pub(crate) fn problem<'a>(
         surface_sigma,
         explained: Explained::default(),
         probe_fitted: choice.probe == Choice::Fitted,
+        extra_variances: NO_EXTRA,
     })
 }
 

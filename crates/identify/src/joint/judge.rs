@@ -13,6 +13,11 @@ const DOUBT_SQUARE: f64 = 2.0;
 const EXCLUDE_SQUARE: f64 = 4.0;
 /// Whitened mean square of all steps above which the model itself is doubted.
 const MODEL_SQUARE: f64 = 1.4;
+/// The same for the sums over [`STRETCH_ROWS`] rows: smoothed inputs and fitted numbers leave about 0.8 of 1 where the model
+/// has what the rig has.
+const SLOW_SQUARE: f64 = 1.3;
+/// Rows of a stretch, 5 to 10 s: what the model does not know is slower than noise.
+const STRETCH_ROWS: usize = 10;
 /// Scatter of the points about the convection law above which it is no law, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;
 /// Standard errors by which a number must lie outside its range to count against the model.
@@ -30,6 +35,16 @@ const SPLIT_SIGMAS: f64 = 4.0;
 pub(crate) fn mean_square(problem: &Problem<'_>, member: &Member<'_>) -> f64 {
     let (residual, _) = problem.residual(member, &problem.shared, &member.local, None);
     residual.iter().map(|r| r * r).sum::<f64>() / (residual.len() as f64).max(1.0)
+}
+
+/// Mean square of sums over stretches of a step's whitened residual, over that of independent ones.
+fn slow_square(problem: &Problem<'_>, member: &Member<'_>) -> Option<f64> {
+    let (residual, _) = problem.residual(member, &problem.shared, &member.local, None);
+    let stretches: Vec<f64> = residual
+        .chunks(STRETCH_ROWS)
+        .map(|stretch| stretch.iter().sum::<f64>().powi(2) / stretch.len() as f64)
+        .collect();
+    mean(&stretches)
 }
 
 /// Takes steps that fit far worse than the others out of what is shared; true where that changed anything.
@@ -113,22 +128,19 @@ pub(crate) fn doubts(
         .map(|member| mean_square(problem, member))
         .collect();
     let overall = mean(&squares).unwrap_or(0.0);
-    if std::env::var("JDEBUG").is_ok() {
-        let (mut e, mut ne, mut l, mut nl) = (0.0, 0.0, 0.0, 0.0);
-        let mut slow = 0.0; let mut ns = 0.0;
-        for m in problem.members.iter().filter(|m| m.shares) {
-            let (r, _) = problem.residual(m, &problem.shared, &m.local, None);
-            for (row, r) in m.course.rows.iter().zip(&r) {
-                if row.t_s < m.course.rows[0].t_s + 8.5 { e += r * r; ne += 1.0 } else { l += r * r; nl += 1.0 }
-            }
-            for c in r.chunks(10) { let s: f64 = c.iter().sum(); slow += s * s / c.len() as f64; ns += 1.0; }
-        }
-        eprintln!("overall {overall:.3} early {:.3} late {:.3} slow {:.3} ({ns})", e / ne, l / nl, slow / ns);
-    }
+    let slow: Vec<f64> =
+        problem.members.iter().filter(|member| member.shares).filter_map(|m| slow_square(problem, m)).collect();
+    let slow = mean(&slow).unwrap_or(0.0);
     if !config.declared.is_empty() && overall > MODEL_SQUARE {
         doubts.push(format!(
             "all steps together leave {:.2} times the declared noise: something that the model does not know is at work",
             overall.sqrt()
+        ));
+    }
+    if !config.declared.is_empty() && slow > SLOW_SQUARE {
+        doubts.push(format!(
+            "what all steps leave of T2 has a shape: its slow part is {:.2} times that of the declared noise",
+            slow.sqrt()
         ));
     }
     let error = |index: usize| covariance.error_of(index);

@@ -7,7 +7,7 @@
 //! the weights that the points give them. On a map that bends much by itself the offsets then keep their declared spread;
 //! on a flat one they lose about half of it. Everything that errs with the efficiencies is corrected along with them.
 
-use crate::joint::parameters::{ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SURFACE};
+use crate::joint::parameters::{ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SURFACE, SharedVector};
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
 use crate::joint::surface::SurfaceScale;
@@ -194,10 +194,19 @@ fn quantities(
             let (own, mixed) = &covariance.own[i];
             let mut weights = [0.0; SHARED];
             if problem.setting.with_law {
-                let (_, ln_re) =
-                    problem.setting.h_at_end(&steps[i].end, &problem.shared, &problem.members[i].local);
+                let at = |shared: &SharedVector| {
+                    problem.setting.h_at_end(&steps[i].end, shared, &problem.members[i].local)
+                };
+                let (h_w_m2k, ln_re) = at(&problem.shared);
                 weights[LN_COEFFICIENT] = 1.0;
                 weights[EXPONENT] = ln_re;
+                // The law is evaluated at the readings: an error of the flow is one of h by itself.
+                for index in covariance.fitted.iter().copied().filter(|index| is_offset(*index)) {
+                    let step = 0.1 * problem.priors[index].sigma;
+                    let mut moved = problem.shared;
+                    moved[index] += step;
+                    weights[index] = (at(&moved).0 / h_w_m2k).ln() / step;
+                }
             }
             let weights =
                 DVector::from_iterator(covariance.fitted.len(), covariance.fitted.iter().map(|k| weights[*k]));

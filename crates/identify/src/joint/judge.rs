@@ -4,7 +4,7 @@ use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
 use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
-use crate::joint::smoothness::Smoothed;
+use crate::joint::smoothness::{STRAIN_SIGMAS, Smoothed};
 use crate::samples::mean;
 
 /// Whitened mean square above which a step is doubted.
@@ -26,8 +26,6 @@ const OUTSIDE_SIGMAS: f64 = 2.0;
 const EXPONENT_RANGE: (f64, f64) = (0.5, 1.5);
 /// Largest tip of a probe that anyone would put into a compressor's outlet, mm.
 const LARGEST_PROBE_MM: f64 = 4.0;
-/// Declared standard deviations by which the offsets may have to be moved for a smooth map.
-const STRAIN_SIGMAS: f64 = 3.0;
 /// Standard errors by which rising and falling steps may differ.
 const SPLIT_SIGMAS: f64 = 4.0;
 

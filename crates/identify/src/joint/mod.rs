@@ -25,7 +25,7 @@ pub(crate) mod whitening;
 use crate::dynamic::{self, Estimate};
 use crate::end_state::EndState;
 use crate::findings::{Findings, code};
-use crate::joint::parameters::{PROBE_MM2, SHARED};
+use crate::joint::parameters::{FLOW_GAIN, OFFSETS, PROBE_MM2, SHARED};
 use crate::joint::smoothness::{Judged, Smoothed};
 use crate::joint::solve::{Covariance, FULLY, Problem, ROUGHLY};
 use crate::samples::mean;
@@ -143,7 +143,16 @@ impl<'a> Attempt<'a> {
     fn new(steps: &'a [rows::StepRows], alone: &[Estimate], config: &IdentifyConfig) -> Option<Self> {
         let mut problem = start::problem(steps, alone, config)?;
         let covariance = fitted(&mut problem, steps, config)?;
-        let smoothed = smoothness::smoothed(&problem, &covariance, steps, config.reference);
+        let mut smoothed = smoothness::smoothed(&problem, &covariance, steps, config.reference);
+        if smoothed.strain > smoothness::STRAIN_SIGMAS {
+            // The declaration does not hold: the offsets then have the spread that they show.
+            let strain = smoothed.strain;
+            for prior in &mut problem.priors[OFFSETS..FLOW_GAIN] {
+                prior.sigma *= strain;
+            }
+            smoothed = smoothness::smoothed(&problem, &problem.covariance()?, steps, config.reference);
+            smoothed.strain = strain;
+        }
         let thermal = shared::thermal_model(&problem, &covariance, &smoothed, steps, config);
         Some(Attempt { problem, smoothed, thermal })
     }

@@ -37,6 +37,9 @@ const FAR_SIGMAS: f64 = 4.0;
 /// Share of the weight below which amplitude and lengths are not worth a solution.
 const LEAST_WEIGHT: f64 = 0.01;
 
+/// Declared standard deviations by which the offsets may have to be moved for a smooth map.
+pub(crate) const STRAIN_SIGMAS: f64 = 3.0;
+
 /// A number with its error by origin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Judged {

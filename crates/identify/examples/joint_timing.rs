@@ -2,7 +2,8 @@
 //! `cargo run --release -p mapper-identify --example joint_timing -- ROUNDS DIRECTORY`
 //! With a directory it writes the samples (`samples.csv`) and what was found (`found.csv`, `points.csv`) there for
 //! `benches/peers/joint_scipy.py`.
-#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
+#![allow(clippy::unwrap_used, reason = "it times recordings that it makes itself: what fails is to stop it")]
+#![allow(clippy::print_stdout, missing_docs, reason = "what it prints is all it is for")]
 #[path = "../tests/common/mod.rs"]
 mod common;
 #[path = "../tests/common/lab.rs"]

@@ -3,8 +3,8 @@
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
-use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
 use crate::joint::smoothness::{STRAIN_SIGMAS, Smoothed};
+use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
 use crate::samples::mean;
 
 /// Whitened mean square above which a step is doubted.
@@ -126,8 +126,12 @@ pub(crate) fn doubts(
         .map(|member| mean_square(problem, member))
         .collect();
     let overall = mean(&squares).unwrap_or(0.0);
-    let slow: Vec<f64> =
-        problem.members.iter().filter(|member| member.shares).filter_map(|m| slow_square(problem, m)).collect();
+    let slow: Vec<f64> = problem
+        .members
+        .iter()
+        .filter(|member| member.shares)
+        .filter_map(|m| slow_square(problem, m))
+        .collect();
     let slow = mean(&slow).unwrap_or(0.0);
     if !config.declared.is_empty() && overall > MODEL_SQUARE {
         doubts.push(format!(

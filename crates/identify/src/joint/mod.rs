@@ -63,23 +63,27 @@ pub(crate) fn estimate(
     if config.joint == JointSettings::all_off() {
         return Joint { estimates: alone, thermal: None };
     }
-    let nothing = || Joint { estimates: vec![Estimate::default(); recording.steps.len()], thermal: None };
     let steps = start::steps(recording, end_states, config, findings);
-    let Some(mut attempt) = Attempt::new(&steps, &alone, config) else {
-        for step in &steps {
-            let message = "least squares over all steps came to no end".to_owned();
-            findings[step.position].refuse(code::FIT_FAILED, message);
-        }
-        return nothing();
-    };
     let careful = carefully(config);
     let late: Vec<rows::StepRows> = steps.iter().map(rows::StepRows::settled).collect();
-    if !attempt.thermal.doubts.is_empty()
-        && careful.joint != config.joint
-        && let Some(other) = Attempt::new(&late, &alone, &careful)
-    {
-        attempt = other.instead_of(attempt);
-    }
+    let attempt = match Attempt::new(&steps, &alone, config) {
+        Some(attempt) if attempt.thermal.doubts.is_empty() || careful.joint == config.joint => Some(attempt),
+        first => match Attempt::new(&late, &alone, &careful) {
+            Some(other) => Some(other.instead_of(first)),
+            None => first,
+        },
+    };
+    let Some(attempt) = attempt else {
+        // Each step on its own is better than nothing.
+        let mut estimates = vec![Estimate::default(); recording.steps.len()];
+        for step in &steps {
+            let message =
+                "least squares over all steps came to no end: this step stands for itself alone".to_owned();
+            findings[step.position].doubt(code::FIT_FAILED, message);
+            estimates[step.position] = alone[step.position];
+        }
+        return Joint { estimates, thermal: None };
+    };
     let Attempt { problem, smoothed, thermal } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
@@ -158,10 +162,12 @@ impl<'a> Attempt<'a> {
     }
 
     /// This one after another was doubted: the doubts remain.
-    fn instead_of(mut self, doubted: Attempt<'_>) -> Self {
-        let mut doubts: Vec<String> = doubted
-            .thermal
-            .doubts
+    fn instead_of(mut self, doubted: Option<Attempt<'_>>) -> Self {
+        let doubts = match doubted {
+            Some(doubted) => doubted.thermal.doubts,
+            None => vec!["least squares over all steps came to no end".to_owned()],
+        };
+        let mut doubts: Vec<String> = doubts
             .into_iter()
             .map(|doubt| format!("{doubt}; so all refinements are held as declared"))
             .collect();
@@ -173,8 +179,12 @@ impl<'a> Attempt<'a> {
 
 /// The refinements held as declared.
 fn carefully(config: &IdentifyConfig) -> IdentifyConfig {
-    let held =
-        JointSettings { alpha_area: Choice::Fixed, probe: Choice::Fixed, direction: Choice::Fixed, ..config.joint };
+    let held = JointSettings {
+        alpha_area: Choice::Fixed,
+        probe: Choice::Fixed,
+        direction: Choice::Fixed,
+        ..config.joint
+    };
     IdentifyConfig { joint: held, ..config.clone() }
 }
 

@@ -71,7 +71,8 @@ fn at_work(found: &[f64], sigmas: &[f64], spread: &DMatrix<f64>) -> Vec<f64> {
             let without: Vec<usize> = (0..count).filter(|i| off >> i & 1 == 1).collect();
             let before: f64 = without.iter().map(|i| sigmas[*i].ln()).sum();
             let odds = without.len() as f64 * (DECLARED_HOLDS / (1.0 - DECLARED_HOLDS)).ln();
-            let part = DMatrix::from_fn(without.len(), without.len(), |a, b| spread[(without[a], without[b])]);
+            let part =
+                DMatrix::from_fn(without.len(), without.len(), |a, b| spread[(without[a], without[b])]);
             let distance = DVector::from_iterator(without.len(), without.iter().map(|i| found[*i]));
             if without.is_empty() {
                 return 0.0;

@@ -7,7 +7,9 @@
 //! the weights that the points give them. On a map that bends much by itself the offsets then keep their declared spread;
 //! on a flat one they lose about half of it. Everything that errs with the efficiencies is corrected along with them.
 
-use crate::joint::parameters::{ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SURFACE, SharedVector};
+use crate::joint::parameters::{
+    ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SURFACE, SharedVector,
+};
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
 use crate::joint::surface::SurfaceScale;
@@ -111,7 +113,8 @@ pub(crate) fn smoothed(
                 let sigma2 = covariance.shared[(*row, *row)];
                 let mut share = quantity.by_shared[*row];
                 if let Some(pull) = pull {
-                    share -= pull.iter().zip(&etas).map(|(pull, eta)| pull * eta.by_shared[*row]).sum::<f64>();
+                    share -=
+                        pull.iter().zip(&etas).map(|(pull, eta)| pull * eta.by_shared[*row]).sum::<f64>();
                 }
                 share * share / sigma2
             })
@@ -187,7 +190,8 @@ fn quantities(
         .map(|i| {
             let (own, mixed) = &covariance.own[i];
             let by_shared: DVector<f64> = mixed.row(ETA).transpose();
-            let mut by_eta = DVector::from_iterator(count, answers.iter().map(|answer| answer.dot(&by_shared)));
+            let mut by_eta =
+                DVector::from_iterator(count, answers.iter().map(|answer| answer.dot(&by_shared)));
             by_eta[i] = own[(ETA, ETA)];
             Quantity { value: problem.members[i].local[ETA], by_eta, variance: own[(ETA, ETA)], by_shared }
         })
@@ -211,11 +215,14 @@ fn quantities(
                     weights[index] = (at(&moved).0 / h_w_m2k).ln() / step;
                 }
             }
-            let weights =
-                DVector::from_iterator(covariance.fitted.len(), covariance.fitted.iter().map(|k| weights[*k]));
+            let weights = DVector::from_iterator(
+                covariance.fitted.len(),
+                covariance.fitted.iter().map(|k| weights[*k]),
+            );
             let deviation: DVector<f64> = mixed.row(LN_DEVIATION).transpose();
             let by_shared = &deviation + &covariance.shared * &weights;
-            let mut by_eta = DVector::from_iterator(count, answers.iter().map(|answer| answer.dot(&by_shared)));
+            let mut by_eta =
+                DVector::from_iterator(count, answers.iter().map(|answer| answer.dot(&by_shared)));
             by_eta[i] = own[(LN_DEVIATION, ETA)] + mixed.row(ETA).transpose().dot(&weights);
             let variance = own[(LN_DEVIATION, LN_DEVIATION)] + weights.dot(&(&by_shared + &deviation));
             Quantity { value: 0.0, by_eta, variance, by_shared }

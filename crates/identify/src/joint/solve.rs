@@ -329,9 +329,22 @@ impl Problem<'_> {
             for (active, (value, lowest)) in self.active.iter_mut().zip(shared.iter().zip(&self.lowest)) {
                 *active &= value > lowest;
             }
+            // A step without a say is not in the cost: it moves only where it fits better.
+            let moves: Vec<bool> = self
+                .members
+                .iter()
+                .zip(&locals)
+                .map(|(member, local)| {
+                    member.shares
+                        || self.local_cost(member, &shared, local)
+                            <= self.local_cost(member, &shared, &member.local)
+                })
+                .collect();
             self.shared = shared;
-            for (member, local) in self.members.iter_mut().zip(locals) {
-                member.local = local;
+            for ((member, local), moves) in self.members.iter_mut().zip(locals).zip(moves) {
+                if moves {
+                    member.local = local;
+                }
             }
             let decrease = best - cost;
             best = cost;
@@ -386,11 +399,8 @@ impl Problem<'_> {
         let mut inverse = inverse;
         for (row, index) in fitted[..sought].iter().enumerate() {
             let pulled = inverse.column(row).into_owned();
-            let pull = if *index == PROBE_MM2 {
-                self.explained.pull_variance(self.shared[PROBE_MM2])
-            } else {
-                0.0
-            };
+            let pull =
+                if *index == PROBE_MM2 { self.explained.pull_variance(self.shared[PROBE_MM2]) } else { 0.0 };
             let variance = pull + self.extra_variances[*index] / pulled[row].powi(2);
             if variance > 0.0 {
                 inverse += variance * &pulled * pulled.transpose();

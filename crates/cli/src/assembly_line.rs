@@ -83,6 +83,7 @@ pub fn with_plan_request<T>(
                 .p3_stroke_s
                 .map(|stroke_s| (limits.p3_max_pa - limits.p3_min_pa) / stroke_s),
         },
+        appended: None,
         repeats: campaign.repeats.map(|repeats| Repeats {
             jump: repeats.jump.map(|jump| (jump.from, jump.to)),
             every_steps: repeats.every_steps,

@@ -8,14 +8,19 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod blocks;
+mod candidates;
 mod cause;
 mod correct;
 mod course;
 mod decide;
+mod fit;
 mod inputs;
 mod knob;
+mod leftovers;
 mod low_rank;
 mod nuisance;
+mod planted;
+mod refine;
 mod repeats;
 mod report;
 mod request;

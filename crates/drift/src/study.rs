@@ -1,19 +1,20 @@
 //! From recordings to the answer.
 
 use crate::blocks::{self, Block, CampaignStep, OUTPUTS};
-use crate::decide::{self, Decision};
+use crate::decide;
 use crate::knob::{INPUTS, Knob};
-use crate::low_rank::LowRank;
 use crate::nuisance::{self, Constant};
-use crate::report::{DriftReport, RateOrStep};
+use crate::planted::Planted;
+use crate::refine::{Refined, refine};
+use crate::report::DriftReport;
 use crate::simulate::{Drive, Prediction};
-use crate::{Cause, CourseKind, DriftError, DriftRequest, correct, repeats};
+use crate::{Cause, DriftError, DriftRequest, correct, repeats};
 use mapper_core::{Channel, DeclaredUncertainty, Dimension, Recording};
 use nalgebra::DMatrix;
 
 /// Stretches closer to the surge line are left out: there a hundredth of P2 is a third of the flow, and no parameter's
 /// effect is linear.
-const SURGE_LIMIT: f64 = 0.97;
+pub(crate) const SURGE_LIMIT: f64 = 0.97;
 /// Noise of a sample where none is declared.
 fn usual_noise(channel: Channel) -> f64 {
     match channel.info().dimension {
@@ -46,7 +47,11 @@ pub(crate) struct Readings {
     pub step_ends: Vec<(f64, f64)>,
     /// Mean of each of [`INPUTS`].
     pub input_levels: Vec<f64>,
-    /// Every stretch with its readings and the model's, those that are not compared included.
+    /// Highest place on the speed line within each stretch that is compared; 1 is the surge line.
+    pub surge_position_ratio: Vec<f64>,
+    /// Positions of the stretches that are compared among all.
+    kept: Vec<usize>,
+    /// Every stretch with its readings and the nominal model's, those that are not compared included.
     pub all: Vec<(Block, [Option<f64>; OUTPUTS.len()], [f64; OUTPUTS.len()])>,
 }
 
@@ -80,6 +85,7 @@ impl Readings {
                 readings: times(&answer.readings),
                 eta: times(&answer.eta),
                 h_w_m2k: times(&answer.h_w_m2k),
+                turn: None,
             })
         };
         match cause {
@@ -109,8 +115,68 @@ impl Readings {
                     })
                     .collect();
                 let steps = self.steps.len();
-                Some(Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] })
+                Some(Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps], turn: None })
             }
+        }
+    }
+
+    /// The same readings beside another prediction; `None` where it does not say all that the first one said.
+    pub fn around(&self, base: Prediction, turned: &[Prediction]) -> Option<Readings> {
+        let columns = &self.columns;
+        let rows = |values: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
+            self.kept
+                .iter()
+                .flat_map(|block| columns.iter().map(move |column| values(*block, *column)))
+                .collect()
+        };
+        let answers = Knob::ALL
+            .iter()
+            .zip(turned)
+            .map(|(knob, turned)| Constant {
+                readings: rows(&|block, column| {
+                    (turned.means[block][column] - base.means[block][column]) / knob.step()
+                }),
+                eta: (0..self.steps.len())
+                    .map(|step| finite((turned.step_ends[step].0 - base.step_ends[step].0) / knob.step()))
+                    .collect(),
+                h_w_m2k: (0..self.steps.len())
+                    .map(|step| finite((turned.step_ends[step].1 - base.step_ends[step].1) / knob.step()))
+                    .collect(),
+                turn: None,
+            })
+            .collect();
+        let readings = Readings {
+            runs: self.runs,
+            steps: self.steps.clone(),
+            blocks: self.blocks.clone(),
+            columns: self.columns.clone(),
+            difference: rows(&|block, column| {
+                self.all[block].1[column].unwrap_or(f64::NAN) - base.means[block][column]
+            }),
+            model: rows(&|block, column| base.means[block][column]),
+            answers,
+            surge_position_ratio: self.kept.iter().map(|block| base.surge_position_ratio[*block]).collect(),
+            step_ends: base.step_ends,
+            input_levels: self.input_levels.clone(),
+            kept: self.kept.clone(),
+            all: self.all.clone(),
+        };
+        readings.difference.iter().all(|value| value.is_finite()).then_some(readings)
+    }
+
+    /// Takes a linear part out of the model: as large as `of_row` says in the readings, as `of_step` at the steps' ends.
+    pub fn give_back(
+        &mut self,
+        part: &Constant,
+        of_row: &dyn Fn(usize) -> f64,
+        of_step: &dyn Fn(usize) -> f64,
+    ) {
+        for (row, (difference, shown)) in self.difference.iter_mut().zip(&part.readings).enumerate() {
+            *difference += shown * of_row(row);
+        }
+        for (step, (eta, h_w_m2k)) in self.step_ends.iter_mut().enumerate() {
+            *eta -= part.eta[step] * of_step(step);
+            *h_w_m2k -= part.h_w_m2k[step] * of_step(step);
         }
     }
 }
@@ -130,7 +196,7 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     if let Some(reason) = repeats::refusal(request.runs, &steps, &groups) {
         return Ok(DriftReport::without_verdict(reason));
     }
-    let readings = read(request, &recordings, steps)?;
+    let (readings, mut drives) = read(request, &recordings, steps)?;
     let declared =
         |channel: Channel| request.identification.declared.get(&channel).copied().unwrap_or_default();
     let constants = nuisance::constants(&readings, &declared);
@@ -138,16 +204,37 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     let columns = DMatrix::from_fn(readings.difference.len(), constants.len(), |row, column| {
         constants[column].readings[row]
     });
-    let decision = decide::decide(&readings, own, &columns, request.seed)?;
-    correct::report(request, &recordings, &readings, &constants, &groups, &decision)
+    let (mut decision, first) = decide::decide(&readings, own, &columns, request.seed)?;
+    let refined = if decision.flagged {
+        refine(&mut drives, &declared, readings, constants, &mut decision, first)
+    } else {
+        Refined { readings, constants, fit: first }
+    };
+    correct::report(request, &recordings, &refined, &groups, &decision)
+}
+
+/// What the model says of all runs with what is planted, and with each knob turned beside it.
+pub(crate) fn predict(
+    drives: &mut [Drive<'_>],
+    planted: &Planted,
+) -> Result<(Prediction, Vec<Prediction>), DriftError> {
+    let mut base = Prediction { means: Vec::new(), surge_position_ratio: Vec::new(), step_ends: Vec::new() };
+    let mut turned: Vec<Prediction> = vec![base.clone(); Knob::ALL.len()];
+    for (run, drive) in drives.iter_mut().enumerate() {
+        let (own_base, own_turned) =
+            drive.predict_all(planted).map_err(|source| DriftError::Drive { run, source })?;
+        append(&mut base, own_base);
+        turned.iter_mut().zip(own_turned).for_each(|(all, own)| append(all, own));
+    }
+    Ok((base, turned))
 }
 
 /// Reads all stretches and drives the model through all runs.
-fn read(
-    request: &DriftRequest<'_>,
+fn read<'a>(
+    request: &DriftRequest<'a>,
     recordings: &[&Recording],
     steps: Vec<CampaignStep>,
-) -> Result<Readings, DriftError> {
+) -> Result<(Readings, Vec<Drive<'a>>), DriftError> {
     for (run, recording) in recordings.iter().enumerate() {
         let missing: Vec<&str> = [Channel::ShaftSpeed, Channel::P2, Channel::T2, Channel::T1]
             .into_iter()
@@ -166,15 +253,14 @@ fn read(
         .filter(|output| recordings.iter().all(|recording| recording.require(OUTPUTS[*output]).is_ok()))
         .collect();
     let all_blocks = blocks::blocks(&steps);
-    let mut base = Prediction { means: Vec::new(), surge_position_ratio: Vec::new(), step_ends: Vec::new() };
-    let mut turned: Vec<Prediction> = vec![base.clone(); Knob::ALL.len()];
-    for (run, recording) in recordings.iter().enumerate() {
-        let mut drive = Drive::new(run, recording, request.model, &request.boundary, &steps, &all_blocks)?;
-        let (own_base, own_turned) =
-            drive.predict_all().map_err(|source| DriftError::Drive { run, source })?;
-        append(&mut base, own_base);
-        turned.iter_mut().zip(own_turned).for_each(|(all, own)| append(all, own));
-    }
+    let mut drives: Vec<Drive<'a>> = recordings
+        .iter()
+        .enumerate()
+        .map(|(run, recording)| {
+            Drive::new(run, recording, request.model, &request.boundary, &steps, &all_blocks)
+        })
+        .collect::<Result<_, _>>()?;
+    let (base, turned) = predict(&mut drives, &Planted::default())?;
     let all: Vec<_> = all_blocks
         .iter()
         .zip(&base.means)
@@ -194,24 +280,6 @@ fn read(
                     .all(|column| all[*index].1[*column].is_some() && all[*index].2[*column].is_finite())
         })
         .collect();
-    let rows = |values: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
-        kept.iter().flat_map(|block| columns.iter().map(move |column| values(*block, *column))).collect()
-    };
-    let answers = Knob::ALL
-        .iter()
-        .zip(&turned)
-        .map(|(knob, turned)| Constant {
-            readings: rows(&|block, column| {
-                (turned.means[block][column] - base.means[block][column]) / knob.step()
-            }),
-            eta: (0..steps.len())
-                .map(|step| finite((turned.step_ends[step].0 - base.step_ends[step].0) / knob.step()))
-                .collect(),
-            h_w_m2k: (0..steps.len())
-                .map(|step| finite((turned.step_ends[step].1 - base.step_ends[step].1) / knob.step()))
-                .collect(),
-        })
-        .collect();
     let input_levels = INPUTS
         .iter()
         .map(|channel| {
@@ -223,20 +291,24 @@ fn read(
             if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
         })
         .collect();
-    Ok(Readings {
+    let frame = Readings {
         runs: recordings.len(),
         blocks: kept.iter().map(|index| all_blocks[*index]).collect(),
-        difference: rows(&|block, column| {
-            all[block].1[column].unwrap_or(f64::NAN) - base.means[block][column]
-        }),
-        model: rows(&|block, column| base.means[block][column]),
-        answers,
-        step_ends: base.step_ends,
+        difference: Vec::new(),
+        model: Vec::new(),
+        answers: Vec::new(),
+        step_ends: Vec::new(),
+        surge_position_ratio: Vec::new(),
         input_levels,
         columns,
         steps,
+        kept,
         all,
-    })
+    };
+    let readings = frame.around(base, &turned).ok_or_else(|| DriftError::Numbers {
+        message: "a reading or the model's answer is not finite".to_owned(),
+    })?;
+    Ok((readings, drives))
 }
 
 /// 0 for steps that the model cannot follow, which have no point.
@@ -292,17 +364,4 @@ fn own_covariances(
             covariance
         })
         .collect()
-}
-
-/// Rate or step of a decision.
-pub(crate) fn size(decision: &Decision) -> RateOrStep {
-    match decision.course.kind {
-        CourseKind::Ramp => RateOrStep::RatePerH(decision.size),
-        CourseKind::Step => RateOrStep::Step(decision.size),
-    }
-}
-
-/// The low-rank noise of a decision, for the constants after it.
-pub(crate) fn noise_of(decision: &Decision) -> &LowRank {
-    &decision.noise
 }

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 const FAR_OUT: f64 = 5.0;
 const LEAVE_OUT_ROUNDS: usize = 4;
 /// Factor on the variance of what is left out.
-pub(crate) const AS_GOOD_AS_NOTHING: f64 = 1e8;
+const AS_GOOD_AS_NOTHING: f64 = 1e8;
 
 /// Leaves out stretches that stand far out of all others even beside the best explanation: the model cannot follow the
 /// machine there (surge, a valve at its stop). Gives their number.

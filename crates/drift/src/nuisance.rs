@@ -2,7 +2,6 @@
 
 use crate::blocks::OUTPUTS;
 use crate::knob::Knob;
-use crate::planted::Over;
 use crate::study::Readings;
 use mapper_core::{Channel, DeclaredUncertainty, Dimension};
 
@@ -15,8 +14,6 @@ pub(crate) struct Constant {
     pub eta: Vec<f64>,
     /// Heat-transfer coefficient at the end of each step, W/(m2 K).
     pub h_w_m2k: Vec<f64>,
-    /// What it turns in the model, where, and by how much; `None` for what sensors have, or the weather.
-    pub turn: Option<(Knob, Over, f64)>,
 }
 
 /// Deviations of each operating point from the smooth model, shared by its repeats: one standard deviation.
@@ -58,8 +55,8 @@ pub(crate) fn constants(
         }
         let of_runs = matches!(knob, Knob::InitialTc | Knob::InitialTt);
         for run in 0..if of_runs { readings.runs } else { 1 } {
-            let over = if of_runs { Over::Run(run) } else { Over::Campaign };
-            constants.push(scaled(readings, answer, (*knob, over, sigma)));
+            let holds = |step: usize| !of_runs || readings.steps[step].run == run;
+            constants.push(scaled(readings, answer, sigma, &holds));
         }
     }
     for (column, channel) in OUTPUTS.iter().enumerate() {
@@ -79,7 +76,7 @@ pub(crate) fn constants(
         let here = |step: usize| readings.steps[step].condition == condition;
         for (knob, sigma) in OWN_DEVIATIONS {
             if let Some(answer) = readings.answer(knob) {
-                constants.push(scaled(readings, answer, (knob, Over::Condition(condition), sigma)));
+                constants.push(scaled(readings, answer, sigma, &here));
             }
         }
         for (column, channel) in OUTPUTS.iter().enumerate() {
@@ -126,7 +123,7 @@ fn wander(readings: &Readings, constants: &mut Vec<Constant>) {
                 })
                 .map(|(row, column, size)| if size > 0.0 { size * value(row, column) } else { 0.0 })
                 .collect();
-            Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps], turn: None }
+            Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] }
         };
         if let Some(ambient) = readings.answer(Knob::Ambient) {
             constants.push(course(&|row, _| AMBIENT_WANDER_K * ambient.readings[row]));
@@ -139,10 +136,8 @@ fn wander(readings: &Readings, constants: &mut Vec<Constant>) {
     }
 }
 
-fn scaled(readings: &Readings, answer: &Constant, turn: (Knob, Over, f64)) -> Constant {
+fn scaled(readings: &Readings, answer: &Constant, sigma: f64, holds: &dyn Fn(usize) -> bool) -> Constant {
     let columns = readings.columns.len();
-    let (_, over, sigma) = turn;
-    let holds = |step: usize| readings.steps.get(step).is_some_and(|step| over.holds(step));
     let of_step = |values: &[f64]| {
         values.iter().enumerate().map(|(step, value)| if holds(step) { sigma * value } else { 0.0 }).collect()
     };
@@ -155,7 +150,6 @@ fn scaled(readings: &Readings, answer: &Constant, turn: (Knob, Over, f64)) -> Co
             .collect(),
         eta: of_step(&answer.eta),
         h_w_m2k: of_step(&answer.h_w_m2k),
-        turn: Some(turn),
     }
 }
 
@@ -175,5 +169,5 @@ fn channel_constant(
         }
     }
     let steps = readings.steps.len();
-    Constant { readings: values, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps], turn: None }
+    Constant { readings: values, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] }
 }

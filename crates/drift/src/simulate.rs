@@ -137,12 +137,11 @@ impl<'a> Drive<'a> {
     /// follow.
     fn predict(
         &self,
-        planted: &Planted,
+        planted: Option<Planted>,
         turned: Option<(Knob, f64)>,
     ) -> Result<Prediction, (usize, DriveError)> {
         let mut state = self.start;
-        let first = self.stretches.first().into_iter().flat_map(|first| planted.at(&first.step));
-        for (knob, by) in first.chain(turned) {
+        if let Some((knob, by)) = turned {
             match knob {
                 Knob::InitialTc => {
                     state.tc_k += by;
@@ -171,15 +170,17 @@ impl<'a> Drive<'a> {
                 }
                 _ => {}
             }
-            let turns: Vec<(Knob, f64)> = planted.at(&stretch.step).chain(turned).collect();
-            let inputs =
-                Turned { inputs: &self.inputs, turns: &turns, planted, offset_s: stretch.step.offset_s };
+            let offset_s = stretch.step.offset_s;
+            let inputs = Turned { inputs: &self.inputs, turned, planted, offset_s };
             let nodes = nodes_s(stretch, start_s);
             for (from_s, to_s) in parts(stretch, start_s, planted) {
                 let mut model = self.model.clone();
-                turns.iter().for_each(|(knob, by)| knob.turn(&mut model.params, *by));
-                let offset_s = stretch.step.offset_s;
-                planted.drift_machine(&mut model.params, from_s + offset_s, to_s + offset_s);
+                if let Some((knob, by)) = turned {
+                    knob.turn(&mut model.params, by);
+                }
+                if let Some(planted) = planted {
+                    planted.drift_machine(&mut model.params, from_s + offset_s, to_s + offset_s);
+                }
                 let before = stretch.times_s.partition_point(|t_s| *t_s < from_s);
                 let times_s = &stretch.times_s[before..];
                 let times_s = &times_s[..times_s.partition_point(|t_s| *t_s < to_s)];
@@ -209,7 +210,10 @@ impl<'a> Drive<'a> {
     }
 
     /// The run with what is planted, and with each knob turned beside it, over all cores.
-    pub fn predict_all(&mut self, planted: &Planted) -> Result<(Prediction, Vec<Prediction>), DriveError> {
+    pub fn predict_all(
+        &mut self,
+        planted: Option<Planted>,
+    ) -> Result<(Prediction, Vec<Prediction>), DriveError> {
         loop {
             // What is left out is left out in all, so that their differences stay smooth.
             let (index, error) = match self.try_all(planted) {
@@ -225,7 +229,10 @@ impl<'a> Drive<'a> {
         }
     }
 
-    fn try_all(&self, planted: &Planted) -> Result<(Prediction, Vec<Prediction>), (usize, DriveError)> {
+    fn try_all(
+        &self,
+        planted: Option<Planted>,
+    ) -> Result<(Prediction, Vec<Prediction>), (usize, DriveError)> {
         let base = self.predict(planted, None)?;
         let next = AtomicUsize::new(0);
         let done = Mutex::new(Vec::new());
@@ -272,9 +279,9 @@ fn nodes_s(stretch: &Stretch, start_s: f64) -> Vec<f64> {
 }
 
 /// Parts of a stretch in each of which the machine is one and the same: the whole of it, but for a machine that drifts.
-fn parts(stretch: &Stretch, start_s: f64, planted: &Planted) -> Vec<(f64, f64)> {
+fn parts(stretch: &Stretch, start_s: f64, planted: Option<Planted>) -> Vec<(f64, f64)> {
     let mut edges = vec![start_s];
-    if let Some((_, course, _)) = planted.drift.filter(|_| planted.machine_changes()) {
+    if let Some(Planted { course, .. }) = planted.filter(Planted::machine_changes) {
         let count = ((stretch.end_s - start_s) / PART_S).ceil().clamp(1.0, MOST_PARTS);
         edges.extend(
             (1..count as usize).map(|part| start_s + (stretch.end_s - start_s) * part as f64 / count),
@@ -338,11 +345,11 @@ fn start_state(
     Ok(if has_metal { State { tc_k, inner_k: tc_k, tt_k, ..settled } } else { settled })
 }
 
-/// Inputs, some of them turned.
+/// Inputs with one of them turned, and the drift of a sensor taken off.
 struct Turned<'a> {
     inputs: &'a RecordedInputs,
-    turns: &'a [(Knob, f64)],
-    planted: &'a Planted,
+    turned: Option<(Knob, f64)>,
+    planted: Option<Planted>,
     /// What is added to run time for the time of the campaign, s.
     offset_s: f64,
 }
@@ -350,10 +357,12 @@ struct Turned<'a> {
 impl Inputs for Turned<'_> {
     fn at(&self, t_s: f64) -> BoundaryConditions {
         let mut boundary = self.inputs.at(t_s);
-        for (knob, by) in self.turns {
-            knob.shift(&mut boundary, *by);
+        if let Some((knob, by)) = self.turned {
+            knob.shift(&mut boundary, by);
         }
-        self.planted.undrift(&mut boundary, t_s + self.offset_s);
+        if let Some(planted) = self.planted {
+            planted.undrift(&mut boundary, t_s + self.offset_s);
+        }
         boundary
     }
 
@@ -362,6 +371,6 @@ impl Inputs for Turned<'_> {
     }
 
     fn is_constant_after(&self, t_s: f64) -> bool {
-        self.planted.drifting_input().is_none() && self.inputs.is_constant_after(t_s)
+        !self.planted.is_some_and(|planted| planted.input_drifts()) && self.inputs.is_constant_after(t_s)
     }
 }

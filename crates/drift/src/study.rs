@@ -5,7 +5,7 @@ use crate::decide;
 use crate::knob::{INPUTS, Knob};
 use crate::nuisance::{self, Constant};
 use crate::planted::Planted;
-use crate::refine::{Refined, refine};
+use crate::refine::Refined;
 use crate::report::DriftReport;
 use crate::simulate::{Drive, Prediction};
 use crate::{Cause, DriftError, DriftRequest, correct, repeats};
@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 
 /// Stretches closer to the surge line are left out: there a hundredth of P2 is a third of the flow, and no parameter's
 /// effect is linear.
-pub(crate) const SURGE_LIMIT: f64 = 0.97;
+const SURGE_LIMIT: f64 = 0.97;
 /// Noise of a sample where none is declared.
 fn usual_noise(channel: Channel) -> f64 {
     match channel.info().dimension {
@@ -47,8 +47,6 @@ pub(crate) struct Readings {
     pub step_ends: Vec<(f64, f64)>,
     /// Mean of each of [`INPUTS`].
     pub input_levels: Vec<f64>,
-    /// Highest place on the speed line within each stretch that is compared; 1 is the surge line.
-    pub surge_position_ratio: Vec<f64>,
     /// Positions of the stretches that are compared among all.
     kept: Vec<usize>,
     /// Every stretch with its readings and the nominal model's, those that are not compared included.
@@ -85,7 +83,6 @@ impl Readings {
                 readings: times(&answer.readings),
                 eta: times(&answer.eta),
                 h_w_m2k: times(&answer.h_w_m2k),
-                turn: None,
             })
         };
         match cause {
@@ -115,7 +112,7 @@ impl Readings {
                     })
                     .collect();
                 let steps = self.steps.len();
-                Some(Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps], turn: None })
+                Some(Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] })
             }
         }
     }
@@ -142,7 +139,6 @@ impl Readings {
                 h_w_m2k: (0..self.steps.len())
                     .map(|step| finite((turned.step_ends[step].1 - base.step_ends[step].1) / knob.step()))
                     .collect(),
-                turn: None,
             })
             .collect();
         let readings = Readings {
@@ -155,7 +151,6 @@ impl Readings {
             }),
             model: rows(&|block, column| base.means[block][column]),
             answers,
-            surge_position_ratio: self.kept.iter().map(|block| base.surge_position_ratio[*block]).collect(),
             step_ends: base.step_ends,
             input_levels: self.input_levels.clone(),
             kept: self.kept.clone(),
@@ -164,19 +159,14 @@ impl Readings {
         readings.difference.iter().all(|value| value.is_finite()).then_some(readings)
     }
 
-    /// Takes a linear part out of the model: as large as `of_row` says in the readings, as `of_step` at the steps' ends.
-    pub fn give_back(
-        &mut self,
-        part: &Constant,
-        of_row: &dyn Fn(usize) -> f64,
-        of_step: &dyn Fn(usize) -> f64,
-    ) {
-        for (row, (difference, shown)) in self.difference.iter_mut().zip(&part.readings).enumerate() {
-            *difference += shown * of_row(row);
+    /// Takes a linear part out of the model, as large as `of_rows` says in the readings, as `of_steps` at the steps' ends.
+    pub fn give_back(&mut self, part: &Constant, of_rows: &[f64], of_steps: &[f64]) {
+        for ((difference, shown), size) in self.difference.iter_mut().zip(&part.readings).zip(of_rows) {
+            *difference += shown * size;
         }
-        for (step, (eta, h_w_m2k)) in self.step_ends.iter_mut().enumerate() {
-            *eta -= part.eta[step] * of_step(step);
-            *h_w_m2k -= part.h_w_m2k[step] * of_step(step);
+        for (step, ((eta, h_w_m2k), size)) in self.step_ends.iter_mut().zip(of_steps).enumerate() {
+            *eta -= part.eta[step] * size;
+            *h_w_m2k -= part.h_w_m2k[step] * size;
         }
     }
 }
@@ -204,19 +194,18 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     let columns = DMatrix::from_fn(readings.difference.len(), constants.len(), |row, column| {
         constants[column].readings[row]
     });
-    let (mut decision, first) = decide::decide(&readings, own, &columns, request.seed)?;
-    let refined = if decision.flagged {
-        refine(&mut drives, &declared, readings, constants, &mut decision, first)
-    } else {
-        Refined { readings, constants, fit: first }
-    };
+    let (decision, fit) = decide::decide(&readings, own, &columns, request.seed)?;
+    let mut refined = Refined { readings, constants, fit };
+    if decision.flagged {
+        refined = refined.around(&mut drives, &declared, &decision);
+    }
     correct::report(request, &recordings, &refined, &groups, &decision)
 }
 
 /// What the model says of all runs with what is planted, and with each knob turned beside it.
 pub(crate) fn predict(
     drives: &mut [Drive<'_>],
-    planted: &Planted,
+    planted: Option<Planted>,
 ) -> Result<(Prediction, Vec<Prediction>), DriftError> {
     let mut base = Prediction { means: Vec::new(), surge_position_ratio: Vec::new(), step_ends: Vec::new() };
     let mut turned: Vec<Prediction> = vec![base.clone(); Knob::ALL.len()];
@@ -260,7 +249,7 @@ fn read<'a>(
             Drive::new(run, recording, request.model, &request.boundary, &steps, &all_blocks)
         })
         .collect::<Result<_, _>>()?;
-    let (base, turned) = predict(&mut drives, &Planted::default())?;
+    let (base, turned) = predict(&mut drives, None)?;
     let all: Vec<_> = all_blocks
         .iter()
         .zip(&base.means)
@@ -280,6 +269,11 @@ fn read<'a>(
                     .all(|column| all[*index].1[*column].is_some() && all[*index].2[*column].is_finite())
         })
         .collect();
+    if kept.is_empty() {
+        let message = "no stretch of it can be compared with the model: readings are missing or no numbers, or all of it lies \
+                       at the surge line. Look at its channels and their units, and whether the campaign names the machine";
+        return Err(DriftError::Unusable { run: 0, message: message.to_owned() });
+    }
     let input_levels = INPUTS
         .iter()
         .map(|channel| {
@@ -298,7 +292,6 @@ fn read<'a>(
         model: Vec::new(),
         answers: Vec::new(),
         step_ends: Vec::new(),
-        surge_position_ratio: Vec::new(),
         input_levels,
         columns,
         steps,

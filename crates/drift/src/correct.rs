@@ -8,7 +8,7 @@ use crate::report::{
     CorrectedPoint, DriftReport, DriftVerdict, RateOrStep, RepeatGroup, Visit, VisitChannel,
 };
 use crate::study::Readings;
-use crate::{Cause, CourseKind, DriftError, DriftRequest, blocks};
+use crate::{Cause, Course, CourseKind, DriftError, DriftRequest, blocks};
 use mapper_core::{Channel, IdentifiedPoint, Recording};
 use mapper_identify::identify_each;
 use nalgebra::DVector;
@@ -263,10 +263,29 @@ fn mean_speed_rpm(recording: &Recording, step: &CampaignStep) -> f64 {
 
 /// The recording with the drift of one sensor taken off.
 fn undrifted(recording: &Recording, channel: Channel, offset_s: f64, fit: &Fit) -> Recording {
+    take_off(recording, channel, &|t_s| fit.drift_at(t_s + offset_s))
+}
+
+/// The first recording with the drift of its sensor, as reported, taken off; `None` where no sensor was found to drift.
+pub fn without_drift(recording: &Recording, report: &DriftReport) -> Option<Recording> {
+    let (Some(Cause::Sensor(channel)), Some(onset_s), Some(size)) =
+        (report.cause, report.onset_s, report.size)
+    else {
+        return None;
+    };
+    let (kind, size) = match size {
+        RateOrStep::RatePerH(rate) => (CourseKind::Ramp, rate),
+        RateOrStep::Step(step) => (CourseKind::Step, step),
+    };
+    let course = Course { kind, onset_s };
+    Some(take_off(recording, channel, &|t_s| size * course.at(t_s)))
+}
+
+fn take_off(recording: &Recording, channel: Channel, drift_at: &dyn Fn(f64) -> f64) -> Recording {
     let mut recording = recording.clone();
     if let Some(series) = recording.series.get_mut(&channel) {
         for (t_s, value) in series.t_s.iter().zip(&mut series.values) {
-            let drift = fit.drift_at(t_s + offset_s);
+            let drift = drift_at(*t_s);
             *value = if Cause::Sensor(channel).is_gain() { *value / (1.0 + drift) } else { *value - drift };
         }
     }

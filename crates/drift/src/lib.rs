@@ -28,6 +28,7 @@ mod simulate;
 mod study;
 
 pub use cause::{Cause, CauseKind};
+pub use correct::without_drift;
 pub use course::{Course, CourseKind};
 pub use report::{
     Alternative, CorrectedPoint, DetectionLimit, DriftReport, DriftVerdict, RateOrStep, RepeatGroup, Visit,

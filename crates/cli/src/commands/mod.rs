@@ -5,6 +5,7 @@ mod drift;
 mod gap;
 mod gap_blind;
 mod gap_diagnose;
+mod gap_drift;
 mod gap_effects;
 mod gap_page;
 mod gap_text;

@@ -156,7 +156,7 @@ fn drive(
 ) -> Result<Driven, Failure> {
     let stop = interrupt::stop_flag()?;
     let guards = assembly_line::guards(campaign, &backend.describe().channels);
-    let mut progress = Progress::new(plan);
+    let mut progress = Progress::new(plan, campaign.zero.map_or(0.0, |zero| zero.soak_s));
     let mut soaked;
     let steps: &mut dyn StepSource = match campaign.zero {
         None => steps,
@@ -249,11 +249,13 @@ fn dry_run(
             "dry_run": true,
             "rig": rig,
             "would_write": would_write,
+            "soak_s": campaign.zero.map(|zero| zero.soak_s),
             "plan": plan,
         }));
     }
     let text = plan_command::text(campaign, plan);
-    let samples = plan.duration_s() * rig.sample_rate_hz;
+    let soak_s = campaign.zero.map_or(0.0, |zero| zero.soak_s);
+    let samples = (soak_s + plan.duration_s()) * rig.sample_rate_hz;
     output::print(&format!(
         "{text}Dry run: nothing was touched. The rig would be `{}` {}, {} channels at {} Hz ({samples:.0} samples), the \
          results would go to {}.\n",

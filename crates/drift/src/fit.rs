@@ -8,6 +8,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// Onsets on the fine grid of the cause that is found.
 const FINE_ONSETS: usize = 280;
+/// Evidence that is no difference.
+const AS_GOOD: f64 = 0.1;
 /// 95 % quantile of chi-square with one degree of freedom.
 const CHI2_95: f64 = 3.841_458_820_694_124;
 /// Half width of a 95 % interval in standard deviations.
@@ -61,9 +63,14 @@ pub(crate) fn fit(
     let difference = DMatrix::from_column_slice(readings.difference.len(), 1, &readings.difference);
     let whitened = noise.whiten(difference);
     let profile = weigh(&[(cause, signature.readings)], &fine, &whitened, &shown, &inverse);
-    let peak = (0..fine.len())
+    let best = (0..fine.len())
         .max_by(|a, b| profile.evidence[*a].total_cmp(&profile.evidence[*b]))
         .ok_or_else(nothing)?;
+    // Where nothing is read for a while, all onsets within are equally good: the middle one is the least wrong.
+    let as_good = |index: &usize| profile.evidence[*index] > profile.evidence[best] - AS_GOOD;
+    let first = (0..=best).rev().take_while(as_good).last().unwrap_or(best);
+    let last = (best..fine.len()).take_while(as_good).last().unwrap_or(best);
+    let peak = first.midpoint(last);
     let within: Vec<usize> =
         (0..fine.len()).filter(|index| profile.evidence[*index] > profile.evidence[peak] - CHI2_95).collect();
     let extreme = |value: &dyn Fn(usize) -> f64, sign: f64| {

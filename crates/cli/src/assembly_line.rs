@@ -5,11 +5,12 @@ use crate::failure::Failure;
 use crate::predicted_method::Dynamic;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{self, Order, WindowChoice};
-use mapper_core::{Channel, Method, Plan};
+use mapper_core::{Channel, DeclaredUncertainty, Method, Plan};
 use mapper_identify::{IdentifyConfig, PressureTap, Stabilisation, WindowRule};
 use mapper_physics::model::Model;
 use mapper_planner::{PlanLimits, PlanRequest, PlanTiming, Repeats, SettleBands, VisitOrder, make_plan};
 use mapper_runner::{DriftWatch, Guard, LimitGuard, OnDrift, SilenceGuard, StepSource, SurgeGuard};
+use std::collections::BTreeMap;
 
 /// Surge longer than this ends a run, s: a jump may touch the line, a point may not stay beyond it.
 const SURGE_ALLOWED_S: f64 = 5.0;
@@ -126,7 +127,12 @@ pub fn drift_watch<'a>(campaign: &Campaign, steps: &'a mut dyn StepSource) -> Op
         campaign::OnDrift::Continue => OnDrift::Continue,
         campaign::OnDrift::Zero => OnDrift::Zero,
     };
-    let declared = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    let mut declared: BTreeMap<Channel, DeclaredUncertainty> =
+        campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    // The gain of the flow meter may stand with the model's tolerances.
+    if let Some(flow) = declared.get_mut(&Channel::CompressorFlow) {
+        flow.gain_sigma_ratio = flow.gain_sigma_ratio.max(campaign.tolerances.flow_meter_gain_ratio);
+    }
     Some(DriftWatch::new(steps, on_drift, declared))
 }
 

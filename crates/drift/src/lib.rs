@@ -20,6 +20,7 @@ mod leftovers;
 mod low_rank;
 mod nuisance;
 mod planted;
+mod plausible;
 mod refine;
 mod repeats;
 mod report;

@@ -8,7 +8,7 @@ use crate::planted::Planted;
 use crate::refine::Refined;
 use crate::report::DriftReport;
 use crate::simulate::{Drive, Prediction};
-use crate::{Cause, DriftError, DriftRequest, correct, repeats};
+use crate::{Cause, DriftError, DriftRequest, correct, plausible, repeats};
 use mapper_core::{Channel, DeclaredUncertainty, Dimension, Recording};
 use nalgebra::DMatrix;
 
@@ -235,6 +235,9 @@ fn read<'a>(
                 "it has no {}; drift is judged by all of N, P2, T1, T2, the more the better",
                 missing.join(", ")
             );
+            return Err(DriftError::Unusable { run, message });
+        }
+        if let Some(message) = plausible::implausible(recording) {
             return Err(DriftError::Unusable { run, message });
         }
     }

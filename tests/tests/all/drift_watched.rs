@@ -8,7 +8,9 @@ use std::path::Path;
 fn campaign(more: &str, drift: &str) -> CampaignFile {
     let every = 4;
     let speeds = "[90 krpm, 130 krpm, 70 krpm]";
-    DriftCampaign { drift, speeds, every, more, ..DriftCampaign::default() }.write()
+    // The watch knows no model: a cell that wanders beyond what is declared of the sensors would be drift to it.
+    let replaced = &[("    weather: wandering\n", "    weather: calm\n")];
+    DriftCampaign { drift, speeds, every, more, replaced, ..DriftCampaign::default() }.write()
 }
 
 const STEP: &str = "{cause: T2, change: 4 K, from: 9 min}";
@@ -22,7 +24,7 @@ fn run(campaign: &CampaignFile, out: &Path, more: &[&str]) -> Finished {
 fn a_run_whose_repeats_differ_does_as_the_campaign_says() {
     let scratch = scratch();
     let steps = |on_drift: &str, drift: &str, code: i32| {
-        let campaign = campaign(&format!("on_drift: {on_drift}\n"), drift);
+        let campaign = campaign(&format!("drift: {{on_drift: {on_drift}}}\n"), drift);
         let out = scratch.path().join(format!("{on_drift}{}", drift.len()));
         let result = run(&campaign, &out, &["--json"]).exits(code).json();
         let directory = result["run"].as_str().unwrap().to_owned();
@@ -33,10 +35,10 @@ fn a_run_whose_repeats_differ_does_as_the_campaign_says() {
     // The step is finished, the jump made again, two steps more.
     let (went_on, _) = steps("continue", STEP, 0);
     assert_eq!(went_on, quiet + 2);
-    let (held, report) = steps("hold", STEP, 6);
+    let (held, report) = steps("hold", STEP, 5);
     assert!(held < quiet, "{held} steps of {quiet}");
     assert!(report.contains("held"), "{report}");
-    let (zero, report) = steps("zero", STEP, 6);
+    let (zero, report) = steps("zero", STEP, 5);
     assert_eq!(zero, held);
     assert!(report.contains("zero the sensors"), "{report}");
 }

@@ -72,10 +72,13 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         None => &mut planned,
     };
     let recorder = Recorder::new(writer);
+    let mut drifted = None;
     let (end, recorder) = if campaign.on_drift.is_some()
         && let Some(mut watch) = assembly_line::drift_watch(&campaign, steps)
     {
-        drive(&campaign, &plan, &mut watch, backend.as_mut(), recorder)?
+        let driven = drive(&campaign, &plan, &mut watch, backend.as_mut(), recorder)?;
+        drifted = watch.ended_by_drift().map(str::to_owned);
+        driven
     } else {
         drive(&campaign, &plan, steps, backend.as_mut(), recorder)?
     };
@@ -91,7 +94,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     });
     let completed = matches!(end, Ok(RunEnd::Completed));
     // Whatever ended the run, what was recorded is identified.
-    let made = plan.and_then(|plan| results::make(&campaign, &plan, &outcome(&end), &directory, &recording));
+    let outcome = match &drifted {
+        Some(reason) => format!("Stopped ({reason}): the map is not complete."),
+        None => outcome(&end),
+    };
+    let made = plan.and_then(|plan| results::make(&campaign, &plan, &outcome, &directory, &recording));
     match made {
         Ok(results) if arguments.json => output::print_json(&results.json())?,
         Ok(results) => output::print(&results.text(&campaign))?,
@@ -103,7 +110,12 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Err(_) => {}
     }
     match end {
-        Ok(RunEnd::Completed) => Ok(()),
+        Ok(RunEnd::Completed) => match drifted {
+            None => Ok(()),
+            Some(reason) => {
+                Err(Failure::new(Code::Rig, format!("{reason}. The rig is safe and the recording is kept")))
+            }
+        },
         Ok(RunEnd::Interrupted { t_s }) => Err(Failure::new(
             Code::Interrupted,
             format!("stopped by the operator at {t_s:.0} s; the rig is safe and the recording is kept"),

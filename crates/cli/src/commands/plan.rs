@@ -2,6 +2,7 @@
 
 use crate::arguments::PlanArguments;
 use crate::commands::scripted;
+use crate::drive::soak_s;
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::table::{self, Display, number};
@@ -185,7 +186,7 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
         "ETA".to_owned(),
     ]);
     // The machine rests before the plan begins.
-    let soak_s = campaign.zero.map_or(0.0, |zero| zero.soak_s);
+    let soak_s = soak_s(campaign);
     for step in &plan.steps {
         let predicted = &step.predicted;
         steps.add_row([

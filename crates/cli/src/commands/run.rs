@@ -2,6 +2,7 @@
 
 use crate::arguments::RunArguments;
 use crate::commands::plan as plan_command;
+use crate::drive::{self, soak_s};
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::observers::{Progress, Recorder};
@@ -10,9 +11,9 @@ use crate::results;
 use crate::sequence_run::{ScriptedSteps, rehearse};
 use crate::{assembly_line, interrupt, output, run_directory};
 use mapper_campaign::Campaign;
-use mapper_core::{Backend, Plan, UnpacedClock};
+use mapper_core::{Backend, Plan};
 use mapper_record::{RecordingHeader, RecordingWriter};
-use mapper_runner::{PlanSteps, RunEnd, RunError, RunObserver, Runner, Soak, Soaked, StepSource};
+use mapper_runner::{PlanSteps, RunEnd, RunError, RunObserver, StepSource};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -76,11 +77,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let (end, recorder) = if campaign.on_drift.is_some()
         && let Some(mut watch) = assembly_line::drift_watch(&campaign, steps)
     {
-        let driven = drive(&campaign, &plan, &mut watch, backend.as_mut(), recorder)?;
+        let driven = drive_and_show(&campaign, &plan, &mut watch, backend.as_mut(), recorder)?;
         drifted = watch.ended_by_drift().map(str::to_owned);
         driven
     } else {
-        drive(&campaign, &plan, steps, backend.as_mut(), recorder)?
+        drive_and_show(&campaign, &plan, steps, backend.as_mut(), recorder)?
     };
     let finished = recorder.finish();
     if matches!(end, Ok(RunEnd::Completed)) {
@@ -159,7 +160,7 @@ fn outcome(end: &Result<RunEnd, RunError>) -> String {
 
 type Driven = (Result<RunEnd, RunError>, Recorder);
 
-fn drive(
+fn drive_and_show(
     campaign: &Campaign,
     plan: &Plan,
     steps: &mut dyn StepSource,
@@ -167,29 +168,10 @@ fn drive(
     mut recorder: Recorder,
 ) -> Result<Driven, Failure> {
     let stop = interrupt::stop_flag()?;
-    let guards = assembly_line::guards(campaign, &backend.describe().channels);
-    let mut progress = Progress::new(plan, campaign.zero.map_or(0.0, |zero| zero.soak_s));
-    let mut soaked;
-    let steps: &mut dyn StepSource = match campaign.zero {
-        None => steps,
-        Some(zero) => {
-            let soak = Soak { duration_s: zero.soak_s, oil_temperature_k: zero.oil_temperature_k };
-            soaked = Soaked::new(steps, soak);
-            &mut soaked
-        }
-    };
+    let mut progress = Progress::new(plan, soak_s(campaign));
     let end = {
         let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut progress];
-        Runner {
-            steps,
-            backend,
-            // Every backend so far has simulated time.
-            clock: &mut UnpacedClock,
-            guards,
-            observer: &mut observers,
-            stop: &stop,
-        }
-        .run()
+        drive::drive(campaign, steps, backend, &mut observers, &stop)
     };
     progress.clear();
     Ok((end, recorder))
@@ -266,8 +248,7 @@ fn dry_run(
         }));
     }
     let text = plan_command::text(campaign, plan);
-    let soak_s = campaign.zero.map_or(0.0, |zero| zero.soak_s);
-    let samples = (soak_s + plan.duration_s()) * rig.sample_rate_hz;
+    let samples = (soak_s(campaign) + plan.duration_s()) * rig.sample_rate_hz;
     output::print(&format!(
         "{text}Dry run: nothing was touched. The rig would be `{}` {}, {} channels at {} Hz ({samples:.0} samples), the \
          results would go to {}.\n",

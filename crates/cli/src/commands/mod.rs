@@ -24,7 +24,6 @@ mod scripted;
 
 use crate::arguments::{Arguments, Command, MapCommand};
 use crate::failure::Failure;
-pub use history::median as history_median;
 
 /// Runs the command that was asked for.
 pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {

@@ -1,6 +1,6 @@
 //! The command line of `mapper gap`.
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
 /// `mapper gap`.
@@ -89,12 +89,34 @@ pub struct BlindMakeArguments {
     /// Number of cases
     #[arg(long)]
     pub cases: usize,
+    /// Draw cases of this kind alone; may be repeated
+    #[arg(long = "kind", value_name = "KIND")]
+    pub kinds: Vec<BlindKind>,
+    /// Shortest signature of a cause, in sigmas
+    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_blind::SIGMA_RANGE[0])]
+    pub least_sigma: f64,
+    /// Longest signature of a cause, in sigmas
+    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_blind::SIGMA_RANGE[1])]
+    pub most_sigma: f64,
     /// Draw outside causes from those kept for calibration, not from those reserved for the check
     #[arg(long)]
     pub calibration: bool,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+}
+
+/// What a blind case is a case of.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum BlindKind {
+    /// Nothing beyond the declared tolerances.
+    None,
+    /// One effect of the catalogue.
+    Single,
+    /// Two effects of the catalogue.
+    Pair,
+    /// A cause outside the catalogue.
+    Outside,
 }
 
 /// `mapper gap blind run`.

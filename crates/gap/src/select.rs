@@ -5,6 +5,7 @@
 
 use crate::fit::{Coordinate, Effort, Fit, Selection, dot_over, fit, nuisance_products};
 use crate::parallel;
+use crate::screen::{Screened, screen};
 use crate::study::{Hypothesis, PredictError, Study};
 use crate::whiten::Linearised;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -16,8 +17,8 @@ pub struct Found {
     pub null: Fit,
     /// Singles and pairs, best score first.
     pub fits: Vec<Fit>,
-    /// Linearised beside the best single, where the nominal point is far from it.
-    pub anew: Option<Linearised>,
+    /// Linearised beside the best single, where the nominal point is far from it, and that single.
+    pub anew: Option<(Linearised, Vec<usize>)>,
 }
 
 /// A single must take at least this off the cost to be worth a second look.
@@ -32,6 +33,8 @@ pub struct Search<'a> {
     /// The recording.
     pub study: &'a Study,
     /// Linearised where nothing is off.
+    pub nominal: &'a Linearised,
+    /// Linearised where the fits begin: there too, or beside the best so far.
     pub linearised: &'a Linearised,
     /// Steps that count.
     pub selection: &'a Selection,
@@ -49,10 +52,13 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
     progress(0.15, "single effects");
     let mut singles = singles(search);
     let anew = match singles.first() {
-        Some(best) if null.cost - best.cost > STRONG => search.linearised.at(study, &best.hypothesis).ok(),
+        Some(best) if null.cost - best.cost > STRONG => {
+            let beside = search.linearised.at(study, &best.hypothesis).ok();
+            beside.map(|linearised| (linearised, members(&best.hypothesis)))
+        }
         _ => None,
     };
-    let linearised = anew.as_ref().unwrap_or(search.linearised);
+    let linearised = anew.as_ref().map_or(search.linearised, |(linearised, _)| linearised);
     let beside = Search { linearised, ..search };
     if anew.is_some() {
         refit(beside, &mut singles, 4, Effort::default());
@@ -100,9 +106,14 @@ pub fn refit(search: Search<'_>, fits: &mut Vec<Fit>, count: usize, effort: Effo
     sort(fits);
 }
 
+/// Pairs that are fitted because they promise most beside the best singles.
+const BESIDE: usize = 6;
+/// Pairs that are fitted because the closed form promises most of them, whatever their members do alone.
+const SCREENED: usize = 3;
+
 /// Fits of the most promising pairs: beside the best singles, and beside the partners that these ask for.
 fn pairs(search: Search<'_>, singles: &[Fit]) -> Vec<Fit> {
-    let Search { study, linearised, selection, progress } = search;
+    let Search { study, linearised, selection, progress, .. } = search;
     let mut wanted: Vec<Wanted> = Vec::new();
     let mut bases: Vec<usize> = (0..singles.len().min(2)).collect();
     for round in 0..2 {
@@ -133,7 +144,25 @@ fn pairs(search: Search<'_>, singles: &[Fit]) -> Vec<Fit> {
         }
     }
     progress(0.65, "pairs");
-    let starts: Vec<Hypothesis> = wanted.into_iter().take(6).map(|w| w.start).collect();
+    // Pairs that neither of the best singles is a member of: by the straight line from where nothing is off.
+    let known = |s: &Screened| wanted.iter().take(BESIDE).any(|w| w.names == s.names);
+    let mut screened = screen(study, search.nominal, selection, singles);
+    screened.retain(|s| !known(s));
+    wanted.truncate(BESIDE);
+    wanted.extend(screened.into_iter().take(SCREENED).map(|s| Wanted {
+        cost: s.cost,
+        partner: s.names[1],
+        names: s.names,
+        start: s.start,
+    }));
+    // A second effect that promises nothing beside the best single costs time; two show what pairs there are.
+    let least = singles.first().map_or(f64::INFINITY, |best| best.cost - WORTH);
+    let starts: Vec<Hypothesis> = wanted
+        .into_iter()
+        .enumerate()
+        .filter(|(place, w)| *place < 2 || w.cost < least)
+        .map(|(_, w)| w.start)
+        .collect();
     let effort = Effort { iterations: 5, enough: 0.5 };
     let fitted = parallel::map(&starts, |start| fit(study, linearised, start, selection, effort));
     let mut pairs = Vec::new();
@@ -234,7 +263,7 @@ fn starts_of(study: &Study, base: &Hypothesis, index: usize) -> Vec<Hypothesis> 
 }
 
 /// Solves the nuisances' part of the normal equations again and again.
-struct Projector<'a> {
+pub(crate) struct Projector<'a> {
     linearised: &'a Linearised,
     rows: Vec<std::ops::Range<usize>>,
     cholesky: Cholesky<f64, Dyn>,
@@ -243,7 +272,7 @@ struct Projector<'a> {
 }
 
 impl<'a> Projector<'a> {
-    fn new(
+    pub(crate) fn new(
         study: &Study,
         linearised: &'a Linearised,
         selection: &Selection,
@@ -270,7 +299,7 @@ impl<'a> Projector<'a> {
         Some(Projector { linearised, rows, cholesky: matrix.cholesky()?, others })
     }
 
-    fn right(&self, column: &[f64]) -> DVector<f64> {
+    pub(crate) fn right(&self, column: &[f64]) -> DVector<f64> {
         let n = self.linearised.columns.len();
         DVector::from_fn(n + self.others.len(), |i, _| {
             let other = if i < n { &self.linearised.columns[i] } else { &self.others[i - n] };
@@ -279,7 +308,7 @@ impl<'a> Projector<'a> {
     }
 
     /// Product of two columns with the span of the free ones (softened by their priors) taken out.
-    fn product(&self, a: &[f64], right_a: &DVector<f64>, b: &[f64], right_b: &DVector<f64>) -> f64 {
+    pub(crate) fn product(&self, a: &[f64], right_a: &DVector<f64>, b: &[f64], right_b: &DVector<f64>) -> f64 {
         dot_over(&self.rows, a, b) - right_a.dot(&self.cholesky.solve(right_b))
     }
 }

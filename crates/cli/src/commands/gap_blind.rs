@@ -2,10 +2,10 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::gap_arguments::{BlindMakeArguments, BlindRunArguments, BlindScoreArguments};
+use crate::gap_arguments::{BlindKind, BlindMakeArguments, BlindRunArguments, BlindScoreArguments};
 use crate::{output, registry};
 use indicatif::{ProgressBar, ProgressDrawTarget};
-use mapper_blind::{BlindError, Draw, MANIFEST_NAME, Manifest, OutsideUse};
+use mapper_blind::{BlindError, CaseKind, Draw, MANIFEST_NAME, Manifest, OutsideUse};
 use serde_json::json;
 use std::io::IsTerminal;
 use std::path::Path;
@@ -14,10 +14,11 @@ use std::process::{Command, Stdio};
 /// Draws, records and seals cases.
 pub fn make(arguments: &BlindMakeArguments) -> Result<(), Failure> {
     let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
+    let outside = if arguments.calibration { OutsideUse::Calibration } else { OutsideUse::Check };
     let draw = Draw {
-        seed: arguments.seed,
-        cases: arguments.cases,
-        outside: if arguments.calibration { OutsideUse::Calibration } else { OutsideUse::Check },
+        kinds: arguments.kinds.iter().map(|kind| kind_of(*kind)).collect(),
+        sigma_range: [arguments.least_sigma, arguments.most_sigma],
+        ..Draw::new(arguments.seed, arguments.cases, outside)
     };
     let bar = bar(arguments.cases);
     let made = mapper_blind::make(&campaign, &registry::effects(), &draw, &arguments.out, &|done| {
@@ -38,6 +39,15 @@ pub fn make(arguments: &BlindMakeArguments) -> Result<(), Failure> {
         arguments.out.display(),
         made.manifest.answers_sha256,
     ))
+}
+
+fn kind_of(kind: BlindKind) -> CaseKind {
+    match kind {
+        BlindKind::None => CaseKind::None,
+        BlindKind::Single => CaseKind::Single,
+        BlindKind::Pair => CaseKind::Pair,
+        BlindKind::Outside => CaseKind::Outside,
+    }
 }
 
 /// Diagnoses each recording in a process of its own, as anybody would: `mapper gap diagnose ... --json`.
@@ -95,10 +105,11 @@ pub fn score(arguments: &BlindScoreArguments) -> Result<(), Failure> {
             if ids.is_empty() { "-".to_owned() } else { ids.iter().cloned().collect::<Vec<_>>().join(" + ") }
         };
         text += &format!(
-            "{}: {} {} -> {} {} {}\n",
+            "{}: {} {}{} -> {} {} {}\n",
             case.name,
             case.kind.name(),
             list(&case.causes),
+            case.sigma.map_or_else(String::new, |sigma| format!(" ({sigma:.0} sigma)")),
             case.verdict.as_deref().unwrap_or("no diagnosis"),
             list(&case.named),
             if case.right { "ok" } else { "WRONG" },
@@ -107,6 +118,13 @@ pub fn score(arguments: &BlindScoreArguments) -> Result<(), Failure> {
     text += "\n";
     for (label, value) in score.rows() {
         text += &format!("{label:28}{value}\n");
+    }
+    text += "\n";
+    for row in score.class_rows() {
+        for cell in row {
+            text += &format!("{cell:>20}");
+        }
+        text += "\n";
     }
     text += "Brackets are exact 95 % intervals of the share.\n";
     output::print(&text)

@@ -9,6 +9,7 @@ use crate::{BlindError, CaseKind, OutsideUse, outside_kinds};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, Question, diagnose, prior};
+use mapper_gap::report::Verdict;
 use mapper_gap::select::members;
 use mapper_physics::effect::Effect;
 use serde::Serialize;
@@ -33,6 +34,8 @@ pub struct Observed {
     pub kind: CaseKind,
     /// Ids of its causes.
     pub causes: BTreeSet<String>,
+    /// What the diagnosis said with the calibration before.
+    pub verdict: Verdict,
     /// Length of the shortest of their signatures, sigmas.
     pub sigma: Option<f64>,
     /// Score of nothing, prior included.
@@ -120,6 +123,7 @@ fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Obs
     Observed {
         kind: case.kind,
         causes,
+        verdict: diagnosis.verdict,
         sigma: case.sigmas.iter().copied().reduce(f64::min),
         nothing: null.score + prior(calibration, study, null),
         candidates: fits
@@ -198,6 +202,7 @@ mod tests {
         Observed {
             kind,
             causes: if kind == CaseKind::None { BTreeSet::new() } else { set("a") },
+            verdict: Verdict::Explained,
             sigma: (kind != CaseKind::None).then_some(30.0),
             nothing: 0.0,
             candidates: vec![(set("a"), truth), (set("b"), rival)],

@@ -19,6 +19,10 @@ const LOOKS: usize = 6;
 /// Share of the housing that an inner wall takes.
 const INNER_SHARE: std::ops::Range<f64> = 0.15..0.6;
 
+/// Weakest and strongest draw in the effect's typical steps, whatever its signature: from what somebody might look for to
+/// what breaks a test.
+const STEPS: std::ops::RangeInclusive<f64> = 0.02..=4.0;
+
 /// Values of an effect in the direction `sign` of its typical step whose signature alone is `sigma` long, or as long as its
 /// range allows.
 pub(crate) fn strength(
@@ -46,6 +50,7 @@ pub(crate) fn strength(
         return parameters.iter().map(|p| value_at(p, sign * 0.5)).collect();
     };
     let steps = search(0.5, sigma, |steps| length(vec![value_at(parameter, sign * steps)]));
+    let steps = steps.clamp(*STEPS.start(), *STEPS.end());
     vec![value_at(parameter, sign * steps)]
 }
 

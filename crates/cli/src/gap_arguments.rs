@@ -72,6 +72,8 @@ pub enum BlindCommand {
     Run(BlindRunArguments),
     /// Open the seal and print how often the diagnoses are right
     Score(BlindScoreArguments),
+    /// Find the numbers behind the probabilities on cases of its own, with outside causes that the check does not use
+    Calibrate(BlindCalibrateArguments),
 }
 
 /// `mapper gap blind make`.
@@ -140,4 +142,27 @@ pub struct BlindScoreArguments {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+}
+
+/// `mapper gap blind calibrate`.
+#[derive(Debug, Args)]
+pub struct BlindCalibrateArguments {
+    /// Campaign that says machine, schedule, declared uncertainties and tolerances (YAML)
+    #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
+    pub campaign: PathBuf,
+    /// Seed of everything that is drawn
+    #[arg(long)]
+    pub seed: u64,
+    /// Number of cases without a cause, which set the threshold
+    #[arg(long)]
+    pub nulls: usize,
+    /// Number of cases of the other kinds
+    #[arg(long)]
+    pub cases: usize,
+    /// New file for the calibration (JSON)
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Also write what each case gave to this new file (JSON)
+    #[arg(long, value_name = "FILE")]
+    pub observed: Option<PathBuf>,
 }

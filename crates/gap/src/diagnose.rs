@@ -11,7 +11,7 @@ use crate::next::next;
 use crate::parallel;
 use crate::place::{Gain, places};
 use crate::report::{Candidate, Diagnosis, Estimate, Verdict};
-use crate::select::{Search, additions, keep_best, members, refit, search};
+use crate::select::{Search, additions, does_something, keep_best, members, refit, search};
 use crate::study::{PredictError, Study};
 use crate::table::Table;
 use crate::whiten::Linearised;
@@ -126,6 +126,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     for fitted in again.into_iter().flatten() {
         keep_best(&mut fits, fitted);
     }
+    fits.retain(|fit| does_something(&study, fit));
     by_weight(&calibration, &study, &mut fits);
     // Close races are run where the best stands, not where nothing is off.
     let anew = match (fits.first(), &found.anew) {

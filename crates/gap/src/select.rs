@@ -69,6 +69,7 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
     } else {
         Vec::new()
     };
+    fits.retain(|pair| does_something(study, pair));
     fits.append(&mut singles);
     sort(&mut fits);
     Ok(Found { null, fits, anew })
@@ -223,6 +224,19 @@ pub fn members(hypothesis: &Hypothesis) -> Vec<usize> {
     members.sort_unstable();
     members
 }
+
+/// Whether each effect of a fit does something: one that the fit left at its neutral value explains nothing, and a pair with
+/// it is no pair.
+pub fn does_something(study: &Study, fitted: &Fit) -> bool {
+    fitted.hypothesis.effects.iter().all(|(index, values)| {
+        study.effects[*index].info().parameters.iter().zip(values).any(|(parameter, value)| {
+            (value - parameter.neutral).abs() > NEUTRAL_STEPS * parameter.typical_step.abs()
+        })
+    })
+}
+
+/// This near to neutral, in typical steps, an effect is not there.
+const NEUTRAL_STEPS: f64 = 1e-3;
 
 /// Keeps one fit for each set of effects: the better.
 pub fn keep_best(fits: &mut Vec<Fit>, fitted: Fit) {

@@ -2,9 +2,10 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::gap_arguments::{BlindKind, BlindMakeArguments, BlindRunArguments, BlindScoreArguments};
+use crate::gap_arguments::{BlindCalibrateArguments, BlindKind, BlindMakeArguments, BlindRunArguments, BlindScoreArguments};
 use crate::{output, registry};
 use indicatif::{ProgressBar, ProgressDrawTarget};
+use mapper_blind::calibrate::{Observed, Plan};
 use mapper_blind::{BlindError, CaseKind, Draw, MANIFEST_NAME, Manifest, OutsideUse};
 use serde_json::json;
 use std::io::IsTerminal;
@@ -128,6 +129,44 @@ pub fn score(arguments: &BlindScoreArguments) -> Result<(), Failure> {
     }
     text += "Brackets are exact 95 % intervals of the share.\n";
     output::print(&text)
+}
+
+/// Draws, records and diagnoses cases of its own, and writes the calibration that fits them.
+pub fn calibrate(arguments: &BlindCalibrateArguments) -> Result<(), Failure> {
+    let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
+    let plan = Plan { seed: arguments.seed, nulls: arguments.nulls, others: arguments.cases };
+    let made_by = format!(
+        "mapper gap blind calibrate --campaign {} --seed {} --nulls {} --cases {}",
+        arguments.campaign.display(),
+        plan.seed,
+        plan.nulls,
+        plan.others
+    );
+    let bar = bar(plan.nulls + plan.others);
+    let found = mapper_blind::calibrate::calibrate(
+        &campaign,
+        &registry::effects(),
+        &plan,
+        made_by,
+        &|_: &Observed| bar.inc(1),
+    );
+    bar.finish_and_clear();
+    let (calibration, observed) = found.map_err(|error| of_blind(&error))?;
+    let json = |value: serde_json::Result<Vec<u8>>| {
+        value.map_err(|error| Failure::new(Code::Failure, error)).map(|mut bytes| {
+            bytes.push(b'\n');
+            bytes
+        })
+    };
+    output::write_new(&arguments.out, &json(serde_json::to_vec_pretty(&calibration))?)?;
+    if let Some(file) = &arguments.observed {
+        output::write_new(file, &json(serde_json::to_vec_pretty(&observed))?)?;
+    }
+    output::print(&format!(
+        "calibration from {} diagnoses in {}\n",
+        observed.len(),
+        arguments.out.display()
+    ))
 }
 
 fn manifest(directory: &Path) -> Result<Manifest, Failure> {

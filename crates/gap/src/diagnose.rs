@@ -119,7 +119,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
             finalists.extend(alone.filter(|f| !finalists.iter().any(|other| std::ptr::eq(*other, *f))));
         }
     }
-    let effort = Effort { iterations: 5, enough: 0.1 };
+    let effort = Effort { iterations: 5, enough: 0.1, ..Effort::default() };
     let null = fit(&study, &linearised, &found.null.hypothesis, &everywhere, Effort::default())?;
     let mut fits: Vec<Fit> = Vec::new();
     let again = parallel::map(&finalists, |f| fit(&study, beside, &f.hypothesis, &everywhere, effort));

@@ -82,7 +82,7 @@ fn singles(search: Search<'_>) -> Vec<Fit> {
     for index in 0..study.effects.len() {
         starts.extend(starts_of(study, &study.nothing(), index));
     }
-    let quick = Effort { iterations: 3, enough: 1.0 };
+    let quick = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0 };
     let tried = parallel::map(&starts, |start| {
         let started = linear_start(study, linearised, selection, start)?;
         fit(study, linearised, &started, selection, quick).ok()
@@ -92,7 +92,7 @@ fn singles(search: Search<'_>) -> Vec<Fit> {
         keep_best(&mut singles, fitted);
     }
     sort(&mut singles);
-    refit(search, &mut singles, 7, Effort { iterations: 6, enough: 0.2 });
+    refit(search, &mut singles, 7, Effort { iterations: 6, enough: 0.2, ..Effort::default() });
     singles
 }
 
@@ -164,7 +164,7 @@ fn pairs(search: Search<'_>, singles: &[Fit]) -> Vec<Fit> {
         .filter(|(place, w)| *place < 2 || w.cost < least)
         .map(|(_, w)| w.start)
         .collect();
-    let effort = Effort { iterations: 5, enough: 0.5 };
+    let effort = Effort { iterations: 5, enough: 0.5, ..Effort::default() };
     let fitted = parallel::map(&starts, |start| fit(study, linearised, start, selection, effort));
     let mut pairs = Vec::new();
     for fitted in fitted.into_iter().flatten() {
@@ -195,7 +195,7 @@ fn swap(search: Search<'_>, pairs: &mut Vec<Fit>) {
             starts.push(start);
         }
     }
-    let effort = Effort { iterations: 6, enough: 0.5 };
+    let effort = Effort { iterations: 6, enough: 0.5, ..Effort::default() };
     for fitted in
         parallel::map(&starts, |start| fit(study, linearised, start, selection, effort)).into_iter().flatten()
     {
@@ -337,19 +337,34 @@ fn linear_start(
     let (index, values) = start.effects.first()?;
     let parameters = &study.effects[*index].info().parameters;
     let [parameter] = parameters.as_slice() else { return Some(start.clone()) };
-    let step = values[0] - parameter.neutral;
+    let projector = Projector::new(study, linearised, selection, &[])?;
+    let residual = linearised.residual(study, &linearised.base);
+    let right_residual = projector.right(&residual);
+    // How many times `step` a straight line through neutral and it asks for.
+    let share_of = |step: f64| -> Option<f64> {
+        let mut there = start.clone();
+        there.effects = vec![(*index, vec![parameter.neutral + step])];
+        let there = study.predict(&there).ok()?;
+        let mut change: Vec<f64> =
+            there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
+        linearised.whiten(study, &mut change);
+        let right = projector.right(&change);
+        let own = projector.product(&change, &right, &change, &right);
+        let seen = projector.product(&change, &right, &residual, &right_residual);
+        Some(if own > 1e-9 { (seen / own).clamp(-4.0, 4.0) } else { 0.0 })
+    };
+    let mut step = values[0] - parameter.neutral;
     if step == 0.0 {
         return Some(start.clone());
     }
-    let there = study.predict(start).ok()?;
-    let mut change: Vec<f64> = there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
-    linearised.whiten(study, &mut change);
-    let projector = Projector::new(study, linearised, selection, &[])?;
-    let residual = linearised.residual(study, &linearised.base);
-    let right = projector.right(&change);
-    let own = projector.product(&change, &right, &change, &right);
-    let seen = projector.product(&change, &right, &residual, &projector.right(&residual));
-    let share = if own > 1e-9 { (seen / own).clamp(-4.0, 4.0) } else { 0.0 };
+    let mut share = share_of(step)?;
+    let opposite = (parameter.neutral - step).clamp(parameter.low, parameter.high) - parameter.neutral;
+    if share < -0.1 && opposite != 0.0 {
+        // Effects bend: the line is drawn on the side it points to.
+        if let Some(there) = share_of(opposite).filter(|there| *there > 0.0) {
+            (step, share) = (opposite, there);
+        }
+    }
     // Where the line says nothing, stand a little off neutral: at neutral some effects have no slope.
     let share = if share.abs() < 0.1 { 0.1 * if share < 0.0 { -1.0 } else { 1.0 } } else { share };
     let mut moved = study.nothing();

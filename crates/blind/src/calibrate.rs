@@ -9,10 +9,12 @@ use crate::{BlindError, CaseKind, OutsideUse, outside_kinds};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, Question, diagnose, prior};
+use mapper_gap::fit::{Fit, coordinates};
 use mapper_gap::report::Verdict;
 use mapper_gap::select::members;
+use mapper_gap::study::Study;
 use mapper_physics::effect::Effect;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -28,7 +30,7 @@ pub struct Plan {
 }
 
 /// What one diagnosis gave, as far as the calibration needs it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Observed {
     /// What the case is a case of.
     pub kind: CaseKind,
@@ -99,40 +101,40 @@ pub fn calibrate(
 fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Observed {
     let Diagnosed { study, null, fits, adequacy, diagnosis, .. } = diagnosed;
     let causes: BTreeSet<String> = case.causes.iter().map(|c| c.effect.info().id.to_string()).collect();
-    let names = |fit: &mapper_gap::fit::Fit| -> BTreeSet<String> {
+    let names = |fit: &Fit| -> BTreeSet<String> {
         members(&fit.hypothesis).into_iter().map(|i| study.effects[i].info().id.to_string()).collect()
     };
-    let mut errors_sigma = Vec::new();
-    if let Some(first) = diagnosis.candidates.first().filter(|first| causes.iter().eq(&first.effects)) {
-        for cause in &case.causes {
-            let (Some(estimate), [truth]) =
-                (first.parameters.get(cause.effect.info().id.as_ref()), cause.values.as_slice())
-            else {
-                continue;
-            };
-            let half = if *truth > estimate.value {
-                estimate.high - estimate.value
-            } else {
-                estimate.value - estimate.low
-            };
-            if half > 0.0 {
-                errors_sigma.push((truth - estimate.value) / (half / 1.96 / calibration.interval_factor));
-            }
-        }
-    }
+    let named = fits.first().filter(|fit| names(fit) == causes);
     Observed {
         kind: case.kind,
         causes,
         verdict: diagnosis.verdict,
         sigma: case.sigmas.iter().copied().reduce(f64::min),
         nothing: null.score + prior(calibration, study, null),
-        candidates: fits
-            .iter()
-            .map(|fit| (names(fit), fit.score + prior(calibration, study, fit)))
-            .collect(),
+        candidates: fits.iter().map(|fit| (names(fit), fit.score + prior(calibration, study, fit))).collect(),
         features: adequacy.features(),
-        errors_sigma,
+        errors_sigma: named.map_or_else(Vec::new, |fit| errors_sigma(case, study, fit)),
     }
+}
+
+/// Error of each parameter in its own standard errors, in the coordinate in which it was searched.
+fn errors_sigma(case: &Case, study: &Study, fit: &Fit) -> Vec<f64> {
+    let coordinates = coordinates(study, &fit.hypothesis);
+    let mut place = 0;
+    let mut errors = Vec::new();
+    for (index, values) in &fit.hypothesis.effects {
+        let id = &study.effects[*index].info().id;
+        let truth = case.causes.iter().find(|cause| cause.effect.info().id == *id).map(|cause| &cause.values);
+        for (number, value) in values.iter().enumerate() {
+            let (coordinate, variance) = (&coordinates[place], fit.covariance[(place, place)]);
+            if let Some(truth) = truth.and_then(|truth| truth.get(number)) {
+                errors.push((coordinate.of(*truth) - coordinate.of(*value)) / variance.sqrt());
+            }
+            place += 1;
+        }
+    }
+    errors.retain(|error| error.is_finite());
+    errors
 }
 
 /// Share of the effect-free cases that stay below the threshold.
@@ -149,12 +151,10 @@ pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Cali
     margins.sort_by(f64::total_cmp);
     let quiet = quantile(&margins, QUIET).map_or(before.threshold, |margin| margin.max(LEAST_THRESHOLD));
     let seen = |o: &&Observed| o.sigma.is_none_or(|sigma| sigma >= SEEN_SIGMA);
-    let inside: Vec<&Observed> = observed.iter().filter(|o| o.kind != CaseKind::Outside).filter(seen).collect();
-    let rows: Vec<([f64; 3], bool)> = observed
-        .iter()
-        .filter(seen)
-        .map(|o| (o.features, o.kind == CaseKind::Outside))
-        .collect();
+    let inside: Vec<&Observed> =
+        observed.iter().filter(|o| o.kind != CaseKind::Outside).filter(seen).collect();
+    let rows: Vec<([f64; 3], bool)> =
+        observed.iter().filter(seen).map(|o| (o.features, o.kind == CaseKind::Outside)).collect();
     let mut errors: Vec<f64> = observed.iter().flat_map(|o| &o.errors_sigma).map(|z| z.abs()).collect();
     errors.sort_by(f64::total_cmp);
     Calibration {

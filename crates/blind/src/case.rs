@@ -165,7 +165,8 @@ mod tests {
         // Dealt, not drawn: forty singles hold every effect of the catalogue with each of its signs.
         let singles = Draw { kinds: vec![CaseKind::Single], cases: 40, ..Draw::new(5, 1, OutsideUse::Check) }
             .cases(&catalogue, &Even);
-        let seen: BTreeSet<String> = singles.iter().map(|c| c.causes[0].effect.info().id.to_string()).collect();
+        let seen: BTreeSet<String> =
+            singles.iter().map(|c| c.causes[0].effect.info().id.to_string()).collect();
         assert_eq!(seen.len(), catalogue.len());
     }
 

@@ -8,7 +8,8 @@ use mapper_backends::virtual_lab::{
 };
 use mapper_campaign::Campaign;
 use mapper_core::{
-    Backend, Channel, NoiseColour, OperatingPoint, Recording, RigMode, SampleBatch, Setpoints, StepKind, StepMarker,
+    Backend, Channel, NoiseColour, OperatingPoint, Recording, RigMode, SampleBatch, Setpoints, StepKind,
+    StepMarker,
 };
 use mapper_physics::effect::{self, Rig};
 use mapper_physics::model::Model;

@@ -65,8 +65,9 @@ mod tests {
     /// Two classes told apart by the first feature alone, half way between 2 and 6; the others say nothing.
     #[test]
     fn the_boundary_lies_between_the_classes() {
-        let rows: Vec<([f64; 3], bool)> =
-            (0..40).map(|i| ([if i % 2 == 0 { 2.0 } else { 6.0 }, f64::from(i / 2 % 3), 1.0], i % 2 == 1)).collect();
+        let rows: Vec<([f64; 3], bool)> = (0..40)
+            .map(|i| ([if i % 2 == 0 { 2.0 } else { 6.0 }, f64::from(i / 2 % 3), 1.0], i % 2 == 1))
+            .collect();
         let weights = logistic(&rows).unwrap();
         assert!(argument(&weights, &[2.0, 1.0, 1.0]) < -2.0 && argument(&weights, &[6.0, 1.0, 1.0]) > 2.0);
         assert!(weights[2] < 0.1, "{weights:?}");

@@ -148,7 +148,10 @@ pub fn fit(
         if iteration + 1 == effort.iterations.max(1) {
             break;
         }
-        let Some((step, promised)) = bounded_step(&normal, &hypothesis, &coordinates, effort.most_sigmas) else { break };
+        let Some((step, promised)) = bounded_step(&normal, &hypothesis, &coordinates, effort.most_sigmas)
+        else {
+            break;
+        };
         if promised < effort.enough {
             break;
         }

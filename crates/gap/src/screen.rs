@@ -67,8 +67,7 @@ pub fn screen(
             let mut a = within((seen_a * own_b - seen_b * both) / determinant, range_a);
             let b = within((seen_b - a * both) / own_b, range_b);
             a = within((seen_a - b * both) / own_a, range_a);
-            let gain = 2.0 * (a * seen_a + b * seen_b)
-                - (a * a * own_a + b * b * own_b + 2.0 * a * b * both);
+            let gain = 2.0 * (a * seen_a + b * seen_b) - (a * a * own_a + b * b * own_b + 2.0 * a * b * both);
             let mut start = study.nothing();
             start.effects =
                 vec![(*first, vec![neutral_a + a * away_a]), (*second, vec![neutral_b + b * away_b])];

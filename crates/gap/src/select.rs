@@ -322,7 +322,13 @@ impl<'a> Projector<'a> {
     }
 
     /// Product of two columns with the span of the free ones (softened by their priors) taken out.
-    pub(crate) fn product(&self, a: &[f64], right_a: &DVector<f64>, b: &[f64], right_b: &DVector<f64>) -> f64 {
+    pub(crate) fn product(
+        &self,
+        a: &[f64],
+        right_a: &DVector<f64>,
+        b: &[f64],
+        right_b: &DVector<f64>,
+    ) -> f64 {
         dot_over(&self.rows, a, b) - right_a.dot(&self.cholesky.solve(right_b))
     }
 }

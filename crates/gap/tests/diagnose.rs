@@ -192,7 +192,8 @@ fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {
     // The gain of both beside that of the meter alone, and beside nothing.
     let meter = 3;
     let study = &diagnosed.study;
-    let alone = mapper_gap::signature::lengths(study, &diagnosed.linearised, &vec![(meter, vec![1.02])]).unwrap();
+    let alone =
+        mapper_gap::signature::lengths(study, &diagnosed.linearised, &vec![(meter, vec![1.02])]).unwrap();
     let fits = |wanted: &[usize]| {
         let named = |f: &&mapper_gap::fit::Fit| mapper_gap::select::members(&f.hypothesis) == wanted;
         diagnosed.fits.iter().find(named).map(|f| f.cost)

@@ -2,7 +2,9 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::gap_arguments::{BlindCalibrateArguments, BlindKind, BlindMakeArguments, BlindRunArguments, BlindScoreArguments};
+use crate::gap_arguments::{
+    BlindCalibrateArguments, BlindKind, BlindMakeArguments, BlindRunArguments, BlindScoreArguments,
+};
 use crate::{output, registry};
 use indicatif::{ProgressBar, ProgressDrawTarget};
 use mapper_blind::calibrate::{Observed, Plan};
@@ -162,11 +164,7 @@ pub fn calibrate(arguments: &BlindCalibrateArguments) -> Result<(), Failure> {
     if let Some(file) = &arguments.observed {
         output::write_new(file, &json(serde_json::to_vec_pretty(&observed))?)?;
     }
-    output::print(&format!(
-        "calibration from {} diagnoses in {}\n",
-        observed.len(),
-        arguments.out.display()
-    ))
+    output::print(&format!("calibration from {} diagnoses in {}\n", observed.len(), arguments.out.display()))
 }
 
 fn manifest(directory: &Path) -> Result<Manifest, Failure> {

@@ -141,8 +141,9 @@ fn errors_sigma(case: &Case, study: &Study, fit: &Fit) -> Vec<f64> {
 const QUIET: f64 = 0.985;
 /// Least threshold: odds of e^3 for the cause, whatever the effect-free cases say.
 const LEAST_THRESHOLD: f64 = 3.0;
-/// Weakest signature that the temperature and the logistic are fitted to, sigmas: below it nothing but honesty is asked.
-const SEEN_SIGMA: f64 = 6.0;
+/// Weakest signature that temperature and logistic are fitted to, sigmas: an outside cause that can hardly be seen cannot be
+/// told from one inside, and would teach the logistic to doubt everything.
+const SEEN_SIGMA: f64 = 12.0;
 
 /// The calibration that fits what was observed.
 pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {

@@ -5,7 +5,7 @@ use mapper_gap::calibration::squash;
 /// Iterations of Newton's method at most; it needs some ten.
 const ITERATIONS: usize = 100;
 /// Precision of the prior on slopes: keeps them finite where the classes do not overlap.
-const PRIOR: f64 = 0.05;
+const PRIOR: f64 = 0.5;
 
 /// Offset and slopes of the logistic that tells the rows marked `true` from the others, slopes not negative: more misfit
 /// never speaks against an outside cause. Both classes weigh alike. `None` where one of them is empty.

@@ -400,7 +400,12 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
     let Some(projector) = Projector::new(study, linearised, selection, &base.effect_columns) else {
         return Vec::new();
     };
-    let right_residual = projector.right(&base.residual);
+    // At the fit's best what the residual asks of the nuisances is what their priors ask back: a tolerance that stands far
+    // out pulls for the effect that would let it go.
+    let mut right_residual = projector.right(&base.residual);
+    for (right, nuisance) in right_residual.iter_mut().zip(&base.hypothesis.nuisances) {
+        *right -= nuisance;
+    }
     let used = members(&base.hypothesis);
     let mut starts: Vec<(usize, Hypothesis)> = Vec::new();
     for index in (0..study.effects.len()).filter(|index| !used.contains(index)) {

@@ -271,7 +271,7 @@ fn what_is_not_recorded_is_said_and_the_rest_is_diagnosed() {
 /// What a jump would show, for a slow probe and a probe that conducts along its stem, both fitted to a slow probe.
 #[test]
 fn a_jump_tells_a_slow_probe_from_its_rival_and_from_itself_nothing() {
-    let diagnosed = ask(&record(Some(("tip_diameter", &[1e-3])), 9)).unwrap();
+    let diagnosed = ask(&record(&[("tip_diameter", &[1e-3])], 9)).unwrap();
     let of = |id: &str| {
         diagnosed
             .fits

@@ -128,7 +128,12 @@ pub fn drift_watch<'a>(campaign: &Campaign, steps: &'a mut dyn StepSource) -> Op
         campaign::OnDrift::Continue => OnDrift::Continue,
         campaign::OnDrift::Zero => OnDrift::Zero,
     };
-    let declared = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    let mut declared: BTreeMap<Channel, DeclaredUncertainty> =
+        campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    // The gain of the flow meter may stand with the model's tolerances.
+    if let Some(flow) = declared.get_mut(&Channel::CompressorFlow) {
+        flow.gain_sigma_ratio = flow.gain_sigma_ratio.max(campaign.tolerances.flow_meter_gain_ratio);
+    }
     Some(DriftWatch::new(steps, on_drift, declared))
 }
 

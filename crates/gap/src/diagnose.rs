@@ -12,7 +12,7 @@ use crate::outlook::Jump;
 use crate::parallel;
 use crate::place::{Gain, places};
 use crate::report::{Candidate, Diagnosis, Estimate, Verdict};
-use crate::select::{Search, additions, keep_best, members, refit, search};
+use crate::select::{Search, additions, does_something, keep_best, members, refit, search};
 use crate::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::table::Table;
 use crate::whiten::Linearised;
@@ -76,6 +76,8 @@ pub struct Diagnosed {
 
 /// Fits of the search that are made again on all steps.
 const FINALISTS: usize = 7;
+/// Of these, beyond the first three, a fit this far behind the best in the logarithm of the evidence is left out.
+const HOPELESS: f64 = 60.0;
 /// Share of the null's misfit that a cause must remove to explain a gap in part.
 const MOST: f64 = 0.5;
 
@@ -97,11 +99,26 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     for step in &held_out {
         training.steps[*step] = false;
     }
-    let found = search(Search { study: &study, linearised: &linearised, selection: &training, progress })?;
+    let found = search(Search {
+        study: &study,
+        nominal: &linearised,
+        linearised: &linearised,
+        selection: &training,
+        progress,
+    })?;
     progress(0.75, "all steps");
     let everywhere = Selection::all(&study);
-    let beside = found.anew.as_ref().unwrap_or(&linearised);
-    let mut finalists: Vec<&Fit> = found.fits.iter().take(FINALISTS).collect();
+    let beside = found.anew.as_ref().map_or(&linearised, |(linearised, _)| linearised);
+    // Far behind the best without the held-out steps is far behind it with them.
+    let hopeless = |f: &&Fit| found.fits.first().is_some_and(|best| best.score - f.score > HOPELESS);
+    let mut finalists: Vec<&Fit> = found
+        .fits
+        .iter()
+        .take(FINALISTS)
+        .enumerate()
+        .filter(|(place, f)| *place < 3 || !hopeless(f))
+        .map(|(_, f)| f)
+        .collect();
     // Whatever a pair adds, its members alone must have lost on all steps likewise.
     if let Some(best) = found.fits.first() {
         for effect in members(&best.hypothesis) {
@@ -109,22 +126,31 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
             finalists.extend(alone.filter(|f| !finalists.iter().any(|other| std::ptr::eq(*other, *f))));
         }
     }
-    let effort = Effort { iterations: 5, enough: 0.1 };
+    let effort = Effort { iterations: 5, enough: 0.1, ..Effort::default() };
     let null = fit(&study, &linearised, &found.null.hypothesis, &everywhere, Effort::default())?;
     let mut fits: Vec<Fit> = Vec::new();
     let again = parallel::map(&finalists, |f| fit(&study, beside, &f.hypothesis, &everywhere, effort));
     for fitted in again.into_iter().flatten() {
         keep_best(&mut fits, fitted);
     }
+    fits.retain(|fit| does_something(&study, fit));
     by_weight(&calibration, &study, &mut fits);
     // Close races are run where the best stands, not where nothing is off.
     let anew = match (fits.first(), &found.anew) {
-        (Some(best), Some(_)) => linearised.at(&study, &best.hypothesis).ok(),
+        (Some(best), Some((_, there))) if members(&best.hypothesis) != *there => {
+            linearised.at(&study, &best.hypothesis).ok()
+        }
         _ => None,
     };
     let beside = anew.as_ref().unwrap_or(beside);
     if anew.is_some() {
-        let finals = Search { study: &study, linearised: beside, selection: &everywhere, progress };
+        let finals = Search {
+            study: &study,
+            nominal: &linearised,
+            linearised: beside,
+            selection: &everywhere,
+            progress,
+        };
         refit(finals, &mut fits, 4, effort);
         by_weight(&calibration, &study, &mut fits);
     }
@@ -211,7 +237,7 @@ struct Weighed {
 }
 
 /// Logarithm of what is known of a cause before any data: pairs are rarer than singles, and many.
-fn prior(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
+pub fn prior(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
     let count = study.effects.len().max(2) as f64;
     match fit.hypothesis.effects.len() {
         0 => calibration.prior_none.ln(),
@@ -234,7 +260,7 @@ fn weigh(study: &Study, calibration: &Calibration, null: &Fit, fits: &[Fit], lef
     let total: f64 = weights.iter().sum();
     let best_cause = scores.iter().skip(1).copied().fold(f64::NEG_INFINITY, f64::max);
     let named = best_cause - scores[0] > calibration.threshold;
-    let outside = calibration.outside(left.smooth_sigma, left.scatter_sigma, left.one_more);
+    let outside = calibration.outside(left.features());
     // Where nothing is named, an inadequate fit speaks for an outside cause likewise.
     let inside = 1.0 - outside;
     let none = inside * weights[0] / total;
@@ -259,7 +285,11 @@ fn names(study: &Study, fit: &Fit) -> Vec<String> {
     fit.hypothesis.effects.iter().map(|(index, _)| study.effects[*index].info().id.to_string()).collect()
 }
 
-/// Other causes whose scores the data do not tell from the best's; a cause that only adds to the best is none.
+/// Most causes named beside the first: a longer list helps nobody.
+const MOST_EQUIVALENT: usize = 2;
+
+/// Other causes whose scores the data do not tell from the best's, the nearest first; a cause that only adds to the best is
+/// none.
 fn equivalents(study: &Study, calibration: &Calibration, fits: &[Fit], scores: &[f64]) -> Vec<Vec<String>> {
     let Some(best) = fits.first() else { return Vec::new() };
     let of_best = members(&best.hypothesis);
@@ -272,6 +302,7 @@ fn equivalents(study: &Study, calibration: &Calibration, fits: &[Fit], scores: &
             close && !of_best.iter().all(|effect| others.contains(effect))
         })
         .map(|(_, fit)| names(study, fit))
+        .take(MOST_EQUIVALENT)
         .collect()
 }
 

@@ -48,9 +48,9 @@ fn boundary() -> BoundaryConditions {
 }
 
 /// Seven points at one opening, a jump between each two, noise and offsets drawn from what is declared.
-fn record(effect: Option<(&str, &[f64])>, seed: u64) -> Recording {
+fn record(effects: &[(&str, &[f64])], seed: u64) -> Recording {
     let mut rig = Rig::new(Model::nominal());
-    if let Some((id, values)) = effect {
+    for (id, values) in effects {
         add(&mut rig, mapper_effects::find(id).unwrap().as_ref(), values).unwrap();
     }
     record_of(&rig, seed)
@@ -159,7 +159,7 @@ fn ask_beside(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Di
 
 #[test]
 fn nothing_is_called_nothing() {
-    let diagnosed = ask(&record(None, 5)).unwrap();
+    let diagnosed = ask(&record(&[], 5)).unwrap();
     let diagnosis = &diagnosed.diagnosis;
     assert_eq!(diagnosis.verdict, Verdict::WithinTolerance);
     let sum = diagnosis.probability_none
@@ -175,7 +175,7 @@ fn nothing_is_called_nothing() {
 
 #[test]
 fn a_probe_of_two_millimetres_is_named_measured_and_closes_the_gap() {
-    let diagnosed = ask(&record(Some(("tip_diameter", &[2e-3])), 6)).unwrap();
+    let diagnosed = ask(&record(&[("tip_diameter", &[2e-3])], 6)).unwrap();
     let diagnosis = &diagnosed.diagnosis;
     assert_eq!(diagnosis.verdict, Verdict::Explained);
     assert_eq!(diagnosis.candidates[0].effects, ["tip_diameter"]);
@@ -190,9 +190,34 @@ fn a_probe_of_two_millimetres_is_named_measured_and_closes_the_gap() {
     assert!(diagnosis.gap.channels["T2"].after < 0.2 * diagnosis.gap.channels["T2"].before);
 }
 
+/// Neither hides the other, and what a signature is long is what its effect takes off the misfit.
+#[test]
+fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {
+    let truth: [(&str, &[f64]); 2] = [("stem_conduction", &[0.03]), ("flowmeter_gain", &[1.02])];
+    let diagnosed = ask(&record(&truth, 9)).unwrap();
+    let diagnosis = &diagnosed.diagnosis;
+    assert_eq!(diagnosis.verdict, Verdict::Explained);
+    let mut named = diagnosis.candidates[0].effects.clone();
+    named.sort();
+    assert_eq!(named, ["flowmeter_gain", "stem_conduction"]);
+    // The gain of both beside that of the meter alone, and beside nothing.
+    let meter = 3;
+    let study = &diagnosed.study;
+    let alone =
+        mapper_gap::signature::lengths(study, &diagnosed.linearised, &vec![(meter, vec![1.02])]).unwrap();
+    let fits = |wanted: &[usize]| {
+        let named = |f: &&mapper_gap::fit::Fit| mapper_gap::select::members(&f.hypothesis) == wanted;
+        diagnosed.fits.iter().find(named).map(|f| f.cost)
+    };
+    let (both, stem) = (fits(&[1, meter]).unwrap(), fits(&[1]).unwrap());
+    // A gain of d^2 has a standard deviation of 2 d, so its root one of 1; four of them.
+    let gained = (stem - both).sqrt();
+    assert!((gained - alone[0]).abs() < 4.0, "{gained} for {}", alone[0]);
+}
+
 #[test]
 fn bad_recordings_get_a_clear_word_and_no_culprit() {
-    let good = record(None, 7);
+    let good = record(&[], 7);
     let word = |recording: &Recording| ask(recording).map(|d| d.diagnosis.verdict).unwrap_err().to_string();
     let mut kpa = good.clone();
     for value in &mut kpa.series.get_mut(&Channel::P2).unwrap().values {
@@ -226,7 +251,7 @@ fn bad_recordings_get_a_clear_word_and_no_culprit() {
 
 #[test]
 fn what_is_not_recorded_is_said_and_the_rest_is_diagnosed() {
-    let mut recording = record(Some(("tip_diameter", &[2e-3])), 8);
+    let mut recording = record(&[("tip_diameter", &[2e-3])], 8);
     recording.series.remove(&Channel::T4);
     recording.series.remove(&Channel::TurbineFlow);
     // And a gap of five seconds.
@@ -246,7 +271,7 @@ fn what_is_not_recorded_is_said_and_the_rest_is_diagnosed() {
 /// What a jump would show, for a slow probe and a probe that conducts along its stem, both fitted to a slow probe.
 #[test]
 fn a_jump_tells_a_slow_probe_from_its_rival_and_from_itself_nothing() {
-    let diagnosed = ask(&record(Some(("tip_diameter", &[1e-3])), 9)).unwrap();
+    let diagnosed = ask(&record(&[("tip_diameter", &[1e-3])], 9)).unwrap();
     let of = |id: &str| {
         diagnosed
             .fits

@@ -5,6 +5,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod dependencies;
+mod drift;
+mod drift_refusals;
+mod drift_watched;
 mod full_disk;
 mod help;
 mod interrupted;

@@ -41,7 +41,10 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     // The rig's backend settings are truth, which the diagnosis does not read: it has to find the effect.
     assert!(diagnosed.stdout.contains("stem_conduction"), "{}", diagnosed.stdout);
 
-    let browsed = Command::new(option_env!("MAPPER_TEST_CHROMIUM").unwrap())
+    let Some(chromium) = option_env!("MAPPER_TEST_CHROMIUM") else {
+        panic!("needs Chromium: run `cargo xtask test`")
+    };
+    let browsed = Command::new(chromium)
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--dump-dom"])
         .arg(format!("--user-data-dir={}", scratch.path().join("profile").display()))
         .arg(format!("file://{}", page.display()))

@@ -1,6 +1,6 @@
 //! `mapper gap diagnose`: where a recording leaves the nominal model, why, how far that closes the gap, what is next.
 
-use super::{gap_page, gap_text};
+use super::{gap_drift, gap_page, gap_text};
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::gap_arguments::DiagnoseArguments;
@@ -46,13 +46,15 @@ pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
         nominal: campaign.boundary,
     };
     let jumps = allowed_jumps(&campaign, &model)?;
+    let drift = gap_drift::of(&report, &path, &campaign, &map);
+    let recording = gap_drift::taken_off(report.recording.clone(), drift.as_ref());
     let bar = bar();
     let progress = |share: f64, what: &str| {
         bar.set_position((share * 100.0) as u64);
         bar.set_message(what.to_owned());
     };
     let done = mapper_gap::diagnose::diagnose(Question {
-        recording: &report.recording,
+        recording: &recording,
         declared,
         model,
         effects: registry::effects_with(&arguments.effects)?,
@@ -63,12 +65,13 @@ pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
     bar.finish_and_clear();
     let mut done = done.map_err(|error: GapError| Failure::new(Code::BadRecording, error))?;
     note_reading(&report, &mut done);
+    gap_drift::note(&mut done.diagnosis, drift.as_ref());
     if let Some(file) = &arguments.html {
         let title = path.display().to_string();
         output::write_new(file, gap_page::page(&title, &done).as_bytes())?;
     }
     if arguments.json {
-        return output::print_json(&done.diagnosis);
+        return output::print_json(&gap_drift::json(&done.diagnosis, drift.as_ref())?);
     }
     output::print(&gap_text::page(&done.diagnosis))
 }

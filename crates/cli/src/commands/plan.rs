@@ -2,6 +2,7 @@
 
 use crate::arguments::PlanArguments;
 use crate::commands::scripted;
+use crate::drive::soak_s;
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::table::{self, Display, number};
@@ -55,6 +56,9 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
         let mut value = serde_json::to_value(&plan).map_err(|error| Failure::new(Code::Failure, error))?;
         if let (Some(object), Some(comparison)) = (value.as_object_mut(), &comparison) {
             object.insert("comparison".to_owned(), comparison_json(comparison));
+        }
+        if let (Some(object), Some(zero)) = (value.as_object_mut(), campaign.zero) {
+            object.insert("soak_s".to_owned(), serde_json::json!(zero.soak_s));
         }
         return output::print_json(&value);
     }
@@ -190,6 +194,8 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
         "min".to_owned(),
         "ETA".to_owned(),
     ]);
+    // The machine rests before the plan begins.
+    let soak_s = soak_s(campaign);
     for step in &plan.steps {
         let predicted = &step.predicted;
         steps.add_row([
@@ -210,7 +216,7 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
             percent(predicted.sigma_h_rel, 1),
             number(predicted.settle_s, 1),
             format!("{:.1}", predicted.minutes),
-            table::eta(step.start_s + step.dwell_s),
+            table::eta(soak_s + step.start_s + step.dwell_s),
         ]);
     }
     let figures = &plan.figures;
@@ -218,11 +224,12 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
     // Writing to a String cannot fail.
     let _ = writeln!(
         text,
-        "{}: {} steps, order {}, {} in all (warm-up {}, cool-down {}).",
+        "{}: {} steps, order {}, {} in all ({}warm-up {}, cool-down {}).",
         plan.campaign,
         plan.steps.len(),
         plan.objective,
-        table::duration(plan.duration_s()),
+        table::duration(soak_s + plan.duration_s()),
+        campaign.zero.map_or_else(String::new, |zero| format!("soak {}, ", table::duration(zero.soak_s))),
         table::duration(plan.warm_up_s),
         table::duration(plan.cool_down_s),
     );

@@ -66,3 +66,41 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{Entangled, ProfilePoint};
+
+    /// What the recording cannot tell reaches people and programs.
+    #[test]
+    fn what_can_not_be_told_apart_is_said() {
+        let unknown =
+            SharedValue { value: None, origin: Origin::NotIdentifiable, ..SharedValue::assumed(0.0) };
+        let thermal = ThermalModel {
+            convection: None,
+            internal_area_m2: 29e-3,
+            alpha_area_ratio: unknown,
+            alpha_area_profile: [(0.0, 0.0), (0.1, 0.5), (0.2, 1.1), (0.3, 9.0)]
+                .map(|(value, square)| ProfilePoint { value, square })
+                .to_vec(),
+            probe_diameter_m: SharedValue::assumed(0.0),
+            direction_factor: SharedValue::assumed(1.0),
+            offsets: std::collections::BTreeMap::new(),
+            entangled: vec![Entangled {
+                first: "alpha_A".to_owned(),
+                second: "direction factor".to_owned(),
+                correlation: 0.97,
+            }],
+            doubts: Vec::new(),
+        };
+        let text = thermal_text(&thermal);
+        assert!(text.contains("the recording can not tell"), "{text}");
+        assert!(text.contains("flat: 0.0 to 0.2"), "{text}");
+        assert!(text.contains("alpha_A and direction factor are hardly told apart"), "{text}");
+        let json = serde_json::to_value(&thermal).unwrap_or_default();
+        assert_eq!(json["alpha_area_profile"][3]["value"], 0.3);
+        assert_eq!(json["entangled"][0]["correlation"], 0.97);
+        assert_eq!(json["alpha_area_ratio"]["value"], serde_json::Value::Null);
+    }
+}

@@ -3,7 +3,7 @@
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
-use crate::joint::smoothness::{STRAIN_SIGMAS, Smoothed};
+use crate::joint::smoothness::{Judged, STRAIN_SIGMAS, Smoothed};
 use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
 use crate::samples::mean;
 
@@ -26,6 +26,8 @@ const OUTSIDE_SIGMAS: f64 = 2.0;
 const EXPONENT_RANGE: (f64, f64) = (0.5, 1.5);
 /// Largest tip of a probe that anyone would put into a compressor's outlet, mm.
 const LARGEST_PROBE_MM: f64 = 4.0;
+/// Isentropic efficiency, total to total, beyond what any compressor of a turbocharger reaches (the best stay below 0.85).
+const HIGHEST_EFFICIENCY: f64 = 0.88;
 /// Standard errors by which rising and falling steps may differ.
 const SPLIT_SIGMAS: f64 = 4.0;
 
@@ -177,6 +179,15 @@ pub(crate) fn doubts(
     let scatter = mean(&deviations).unwrap_or(0.0).sqrt();
     if problem.setting.with_law && scatter > LAW_SCATTER_RATIO {
         doubts.push(format!("the points scatter by {:.1} % about the convection law", 100.0 * scatter));
+    }
+    let above = |judged: &&Judged| {
+        judged.value - OUTSIDE_SIGMAS * judged.uncertainty.combined_standard_error() > HIGHEST_EFFICIENCY
+    };
+    let above = smoothed.eta.iter().filter(above).count();
+    if above > 0 {
+        doubts.push(format!(
+            "the efficiency comes out above {HIGHEST_EFFICIENCY:.2} at {above} points, which no turbocharger's compressor reaches"
+        ));
     }
     if smoothed.strain > STRAIN_SIGMAS {
         doubts.push(format!(

@@ -83,8 +83,7 @@ fn a_machine_that_changes_much_is_sized_as_it_changed() {
         let report = judge(&campaign(seed, Some(Planted { cause, course, size })).recording);
         assert_eq!(report.cause, Some(cause), "{}", report.reason);
         let Some(RateOrStep::RatePerH(rate)) = report.size else { panic!("{:?}", report.size) };
-        // Thirty times the limit: noise leaves 1 to 2 %, tolerances of the machine as much. The signature of a small change
-        // of a nominal machine is off by ten and more.
+        // Thirty times the limit: noise leaves 1 to 2 %, tolerances of the machine as much.
         assert!((rate / size - 1.0).abs() < 0.05, "{cause}: {rate} of {size}");
     }
 }

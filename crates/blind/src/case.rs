@@ -1,7 +1,9 @@
 //! Draws what a case has: which causes, how strong.
 
+use crate::strength::{Ruler, strength};
 use crate::{CaseKind, OutsideUse, outside_kinds};
-use mapper_physics::effect::{Effect, EffectParameter};
+use mapper_physics::effect::Effect;
+use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::sync::Arc;
@@ -24,89 +26,132 @@ pub struct Case {
     pub kind: CaseKind,
     /// Its causes.
     pub causes: Vec<Cause>,
+    /// Length of each cause's signature beside the others, in sigmas.
+    pub sigmas: Vec<f64>,
     /// Seed of its noise, offsets, tolerances and weather.
     pub seed: u64,
 }
 
 /// How cases are drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Draw {
     /// Seed of everything.
     pub seed: u64,
     /// Number of cases.
     pub cases: usize,
+    /// Kinds to draw from; all where empty.
+    pub kinds: Vec<CaseKind>,
     /// Which outside causes are drawn from.
     pub outside: OutsideUse,
+    /// Weakest and strongest signature of a single cause, in sigmas.
+    pub sigma_range: [f64; 2],
 }
 
-/// Weakest and strongest draw, in the effect's own plain steps: from barely visible to gross.
-const STRENGTH_RANGE: [f64; 2] = [0.15, 2.5];
+/// From what can hardly be seen to what nobody overlooks.
+pub const SIGMA_RANGE: [f64; 2] = [6.0, 400.0];
 
 impl Draw {
-    /// The cases: kinds by turns in random order, causes and strengths at random. Equal draws give equal cases.
-    pub fn cases(&self, catalogue: &[Arc<dyn Effect>]) -> Vec<Case> {
+    /// The usual draw: all kinds, strengths from barely visible to gross.
+    pub fn new(seed: u64, cases: usize, outside: OutsideUse) -> Draw {
+        Draw { seed, cases, kinds: Vec::new(), outside, sigma_range: SIGMA_RANGE }
+    }
+
+    /// The cases: kinds in random order, causes dealt so that each effect and each sign of it comes before any comes again,
+    /// lengths of the signatures even in their logarithm. Equal draws give equal cases.
+    pub fn cases(&self, catalogue: &[Arc<dyn Effect>], ruler: &dyn Ruler) -> Vec<Case> {
         let mut random = Pcg64::seed_from_u64(self.seed);
-        let outside = outside_kinds(self.outside);
+        let mut catalogue = Deck::new(catalogue);
+        let mut outside = Deck::new(&outside_kinds(self.outside));
+        let kinds = if self.kinds.is_empty() { &CaseKind::ALL[..] } else { &self.kinds[..] };
         (0..self.cases)
             .map(|index| {
-                let kind = CaseKind::ALL[random.random_range(0..CaseKind::ALL.len())];
-                let from: &[Arc<dyn Effect>] = if kind == CaseKind::Outside { &outside } else { catalogue };
+                let kind = kinds[random.random_range(0..kinds.len())];
+                let deck = if kind == CaseKind::Outside { &mut outside } else { &mut catalogue };
                 let wanted = match kind {
                     CaseKind::None => 0,
                     CaseKind::Single | CaseKind::Outside => 1,
                     CaseKind::Pair => 2,
                 };
                 let mut causes: Vec<Cause> = Vec::new();
-                while causes.len() < wanted.min(from.len()) {
-                    let effect = from[random.random_range(0..from.len())].clone();
+                while causes.len() < wanted.min(deck.effects.len()) {
+                    let (effect, sign) = deck.deal(&mut random);
                     if causes.iter().all(|cause| cause.effect.info().id != effect.info().id) {
-                        let values = strength(&effect, &mut random);
+                        let [weak, strong] = self.sigma_range;
+                        let sigma = weak * (strong / weak).powf(random.random());
+                        let values = strength(&effect, sign, sigma, ruler, &mut random);
                         causes.push(Cause { effect, values });
                     }
                 }
+                let sigmas = ruler.lengths(&causes);
                 // A seed of its own, from the whole range, so that no two draws share noise.
-                Case { name: format!("case_{index:04}"), kind, causes, seed: random.random() }
+                Case { name: format!("case_{index:04}"), kind, causes, sigmas, seed: random.random() }
             })
             .collect()
     }
 }
 
-fn strength(effect: &Arc<dyn Effect>, random: &mut Pcg64) -> Vec<f64> {
-    let parameters = &effect.info().parameters;
-    if let [phi, conductance] = parameters.as_slice() {
-        // The inner wall: a share that is there at all, and a conductance of the order of the gas's own.
-        let phi = random.random_range(0.15..0.6f64).clamp(phi.low, phi.high);
-        let conductance_w_k = 8.0 * 5.0f64.powf(random.random());
-        return vec![phi, conductance_w_k.clamp(conductance.low, conductance.high)];
-    }
-    parameters.iter().map(|parameter| one_strength(parameter, random)).collect()
+/// Effects with each sign they have, dealt without repeats until none is left.
+struct Deck {
+    effects: Vec<Arc<dyn Effect>>,
+    left: Vec<(usize, f64)>,
 }
 
-fn one_strength(parameter: &EffectParameter, random: &mut Pcg64) -> f64 {
-    let [weak, strong] = STRENGTH_RANGE;
-    let steps = weak * (strong / weak).powf(random.random());
-    let EffectParameter { low, high, neutral, typical_step, .. } = *parameter;
-    let sign = if random.random() { 1.0 } else { -1.0 };
-    let wanted = neutral + sign * steps * typical_step;
-    // Where the effect has one sign only, that one.
-    if (low..=high).contains(&wanted) { wanted } else { (neutral + steps * typical_step).clamp(low, high) }
+impl Deck {
+    fn new(effects: &[Arc<dyn Effect>]) -> Deck {
+        Deck { effects: effects.to_vec(), left: Vec::new() }
+    }
+
+    fn deal(&mut self, random: &mut Pcg64) -> (Arc<dyn Effect>, f64) {
+        if self.left.is_empty() {
+            self.left = self
+                .effects
+                .iter()
+                .enumerate()
+                .flat_map(|(index, effect)| signs(effect).into_iter().map(move |sign| (index, sign)))
+                .collect();
+            self.left.shuffle(random);
+        }
+        let (index, sign) = self.left.pop().unwrap_or((0, 1.0));
+        (self.effects[index].clone(), sign)
+    }
+}
+
+/// Directions, along its typical step and against it, in which an effect can go.
+fn signs(effect: &Arc<dyn Effect>) -> Vec<f64> {
+    let [parameter] = effect.info().parameters.as_slice() else { return vec![1.0] };
+    let has = |sign: &f64| {
+        let beside = parameter.neutral + 0.01 * sign * parameter.typical_step;
+        (parameter.low..=parameter.high).contains(&beside)
+    };
+    [1.0, -1.0].into_iter().filter(has).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
 
-    fn draw(seed: u64) -> Draw {
-        Draw { seed, cases: 400, outside: OutsideUse::Check }
+    /// A rig on which every typical step is 50 sigmas long.
+    struct Even;
+
+    impl Ruler for Even {
+        fn lengths(&self, causes: &[Cause]) -> Vec<f64> {
+            let of = |cause: &Cause| {
+                let parameter = &cause.effect.info().parameters[0];
+                50.0 * ((cause.values[0] - parameter.neutral) / parameter.typical_step).abs()
+            };
+            causes.iter().map(of).collect()
+        }
     }
 
     #[test]
     fn cases_are_repeatable_within_range_and_never_neutral() {
         let catalogue = mapper_effects::catalogue();
-        let cases = draw(3).cases(&catalogue);
+        let drawn = |seed| Draw::new(seed, 400, OutsideUse::Check).cases(&catalogue, &Even);
+        let cases = drawn(3);
         let print = |cases: &[Case]| format!("{cases:?}");
-        assert_eq!(print(&cases), print(&draw(3).cases(&catalogue)));
-        assert_ne!(print(&cases), print(&draw(4).cases(&catalogue)));
+        assert_eq!(print(&cases), print(&drawn(3)));
+        assert_ne!(print(&cases), print(&drawn(4)));
         for kind in CaseKind::ALL {
             // A quarter of 400, with a standard deviation of 9.
             let count = cases.iter().filter(|case| case.kind == kind).count();
@@ -117,6 +162,12 @@ mod tests {
                 assert!((parameter.low..=parameter.high).contains(value) && *value != parameter.neutral);
             }
         }
+        // Dealt, not drawn: forty singles hold every effect of the catalogue with each of its signs.
+        let singles = Draw { kinds: vec![CaseKind::Single], cases: 40, ..Draw::new(5, 1, OutsideUse::Check) }
+            .cases(&catalogue, &Even);
+        let seen: BTreeSet<String> =
+            singles.iter().map(|c| c.causes[0].effect.info().id.to_string()).collect();
+        assert_eq!(seen.len(), catalogue.len());
     }
 
     /// What is reserved is no candidate, and what calibrates is not what is checked.

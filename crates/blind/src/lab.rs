@@ -8,7 +8,8 @@ use mapper_backends::virtual_lab::{
 };
 use mapper_campaign::Campaign;
 use mapper_core::{
-    Backend, Channel, NoiseColour, OperatingPoint, RigMode, SampleBatch, Setpoints, StepKind, StepMarker,
+    Backend, Channel, NoiseColour, OperatingPoint, Recording, RigMode, SampleBatch, Setpoints, StepKind,
+    StepMarker,
 };
 use mapper_physics::effect::{self, Rig};
 use mapper_physics::model::Model;
@@ -110,9 +111,25 @@ impl<'a> Schedule<'a> {
         file: &Path,
         header: &RecordingHeader,
     ) -> Result<Truth, BlindError> {
+        let mut writer = RecordingWriter::create(file, header)?;
+        let points = self.drive(case, &mut writer)?;
+        writer.finish()?;
+        Ok(Truth::new(case, points))
+    }
+
+    /// Runs a case into memory.
+    ///
+    /// # Errors
+    /// Where the lab stops.
+    pub(crate) fn record(&self, case: &Case) -> Result<Recording, BlindError> {
+        let mut recording = Recording::default();
+        self.drive(case, &mut recording)?;
+        Ok(recording)
+    }
+
+    fn drive(&self, case: &Case, keeper: &mut impl Keeper) -> Result<Vec<TruthPoint>, BlindError> {
         let of_lab = |source| BlindError::Lab { name: case.name.clone(), source };
         let mut lab = self.lab(case)?;
-        let mut writer = RecordingWriter::create(file, header)?;
         lab.arm().map_err(of_lab)?;
         let timing = &self.campaign.timing;
         let mut truths = Vec::with_capacity(self.points.len());
@@ -124,7 +141,7 @@ impl<'a> Schedule<'a> {
                 now_s += timing.warm_up_s;
                 let mut batch = lab.poll(now_s).map_err(of_lab)?;
                 batch.truth.clear();
-                writer.write_batch(&batch)?;
+                keeper.batch(&batch)?;
             }
             let step = StepMarker {
                 index,
@@ -136,18 +153,51 @@ impl<'a> Schedule<'a> {
                 p3_pa: setpoints.p3_pa,
                 valve_opening_ratio: setpoints.valve_opening_ratio,
             };
-            writer.write_step(&step, StepPhase::Start)?;
+            keeper.step(&step, StepPhase::Start)?;
             now_s = step.end_s;
             let mut batch = lab.poll(now_s).map_err(of_lab)?;
             truths.push(truth_at_end(&batch, point));
             // Truth is what the answers hold; a recording that is to be diagnosed has none.
             batch.truth.clear();
-            writer.write_batch(&batch)?;
-            writer.write_step(&step, StepPhase::End)?;
+            keeper.batch(&batch)?;
+            keeper.step(&step, StepPhase::End)?;
         }
         lab.disarm().map_err(of_lab)?;
-        writer.finish()?;
-        Ok(Truth::new(case, truths))
+        Ok(truths)
+    }
+}
+
+/// Where a run goes.
+trait Keeper {
+    fn batch(&mut self, batch: &SampleBatch) -> Result<(), BlindError>;
+    fn step(&mut self, step: &StepMarker, phase: StepPhase) -> Result<(), BlindError>;
+}
+
+impl Keeper for RecordingWriter {
+    fn batch(&mut self, batch: &SampleBatch) -> Result<(), BlindError> {
+        Ok(self.write_batch(batch)?)
+    }
+
+    fn step(&mut self, step: &StepMarker, phase: StepPhase) -> Result<(), BlindError> {
+        Ok(self.write_step(step, phase)?)
+    }
+}
+
+impl Keeper for Recording {
+    fn batch(&mut self, batch: &SampleBatch) -> Result<(), BlindError> {
+        for column in &batch.columns {
+            let series = self.series.entry(column.channel).or_default();
+            series.t_s.extend(&batch.t_s);
+            series.values.extend(&column.values);
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, step: &StepMarker, phase: StepPhase) -> Result<(), BlindError> {
+        if phase == StepPhase::End {
+            self.steps.push(*step);
+        }
+        Ok(())
     }
 }
 

@@ -5,23 +5,28 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod calibrate;
 mod case;
 mod error;
 mod interval;
 mod kind;
 mod lab;
+mod logistic;
 mod make;
 mod outside;
 mod place;
+mod ruler;
 pub mod score;
 mod seal;
+mod strength;
 mod truth;
 
-pub use case::{Case, Cause, Draw};
+pub use case::{Case, Cause, Draw, SIGMA_RANGE};
 pub use error::BlindError;
 pub use interval::{Share, clopper_pearson_95};
 pub use kind::CaseKind;
 pub use make::{Made, make};
 pub use outside::{OutsideUse, outside_kinds};
 pub use seal::{ANSWERS_NAME, MANIFEST_NAME, Manifest};
+pub use strength::Ruler;
 pub use truth::{Truth, TruthPoint};

@@ -2,8 +2,9 @@
 
 use crate::case::{Case, Draw};
 use crate::lab::Schedule;
+use crate::ruler::StudyRuler;
 use crate::seal::{ANSWERS_NAME, MANIFEST_NAME, Manifest, sha256};
-use crate::{BlindError, Truth};
+use crate::{BlindError, Truth, outside_kinds};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_physics::effect::Effect;
 use mapper_record::RecordingHeader;
@@ -44,7 +45,10 @@ pub fn make(
     let nominal =
         nominal_model(campaign).map_err(|error| BlindError::Model { message: error.to_string() })?;
     let schedule = Schedule::new(campaign, &nominal)?;
-    let cases = draw.cases(catalogue);
+    let mut known = catalogue.to_vec();
+    known.extend(outside_kinds(draw.outside));
+    let ruler = StudyRuler::new(campaign, &schedule, &nominal, known, draw.seed)?;
+    let cases = draw.cases(catalogue, &ruler);
     std::fs::create_dir_all(directory).map_err(BlindError::file(directory))?;
     let answers = run_all(&schedule, campaign, &cases, directory, done)?;
     let bytes = json(&answers, &directory.join(ANSWERS_NAME))?;

@@ -71,6 +71,29 @@ pub struct ScoredCase {
     pub probability: Option<f64>,
     /// Whether that is right.
     pub right: bool,
+    /// Length of the signature of the cause that shows least, beside the others, in sigmas; `None` without causes, and
+    /// where the answers do not say.
+    pub sigma: Option<f64>,
+}
+
+/// Ends of the classes of signature length, sigmas.
+const CLASSES_SIGMA: [f64; 3] = [12.0, 24.0, f64::INFINITY];
+
+/// Cases whose causes show about equally plainly.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct SigmaClass {
+    /// Shortest signature of the class, sigmas.
+    pub from_sigma: f64,
+    /// Single effects that were named.
+    pub single: Share,
+    /// Pairs of which both were named.
+    pub pair: Share,
+    /// Pairs of which at least one was named.
+    pub one_of_pair: Share,
+    /// Outside causes that were said to be so.
+    pub outside: Share,
+    /// Outside causes that were explained by the catalogue.
+    pub falsely_explained: Share,
 }
 
 /// The table, as `score.py` prints it.
@@ -78,6 +101,8 @@ pub struct ScoredCase {
 pub struct Score {
     /// Case by case.
     pub cases: Vec<ScoredCase>,
+    /// The cases by how plainly the cause that shows least does.
+    pub classes: [SigmaClass; CLASSES_SIGMA.len()],
     /// Recordings without effect that were left alone.
     pub none: Share,
     /// Single effects that were named, in a set of at most three.
@@ -160,6 +185,9 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
         })
         .collect();
     let mut score = Score::default();
+    for (class, from_sigma) in score.classes.iter_mut().zip(std::iter::once(&0.0).chain(&CLASSES_SIGMA)) {
+        class.from_sigma = *from_sigma;
+    }
     let (mut errors, mut shrinks, mut squared_misses, mut set_sizes) = (vec![], vec![], vec![], vec![]);
     for truth in truths {
         let causes: BTreeSet<String> = truth.effects.keys().cloned().collect();
@@ -168,17 +196,34 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
         let judged = diagnosis.as_ref().map(|diagnosis| Judged::new(kind, &causes, diagnosis));
         let right = judged.as_ref().is_some_and(|judged| judged.right);
         let verdict = diagnosis.as_ref().map(|diagnosis| diagnosis.verdict.as_str());
+        let sigma = truth.sigmas.values().copied().reduce(f64::min);
+        let mut unsaid = SigmaClass::default();
+        let of_class = sigma.and_then(|sigma| CLASSES_SIGMA.iter().position(|end| sigma < *end));
+        let class = of_class.map_or(&mut unsaid, |place| &mut score.classes[place]);
         match kind {
             CaseKind::None => score.none.count(right),
-            CaseKind::Single => score.single.count(right),
+            CaseKind::Single => {
+                score.single.count(right);
+                class.single.count(right);
+            }
             CaseKind::Pair => {
-                score.pair.count(right);
                 let one = judged.as_ref().is_some_and(|judged| !judged.named.is_disjoint(&causes));
-                score.one_of_pair.count(one);
+                for (both, at_least) in
+                    [(&mut score.pair, &mut score.one_of_pair), (&mut class.pair, &mut class.one_of_pair)]
+                {
+                    both.count(right);
+                    at_least.count(one);
+                }
             }
             CaseKind::Outside => {
-                score.outside.count(right);
-                score.falsely_explained.count(verdict == Some("explained"));
+                let falsely = verdict == Some("explained");
+                for (said, explained) in [
+                    (&mut score.outside, &mut score.falsely_explained),
+                    (&mut class.outside, &mut class.falsely_explained),
+                ] {
+                    said.count(right);
+                    explained.count(falsely);
+                }
             }
         }
         let p_truth = judged.as_ref().map_or(0.0, |judged| judged.p_truth);
@@ -219,6 +264,7 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
                 .and_then(|diagnosis| Some(diagnosis.candidates.first()?.probability)),
             named: judged.map_or_else(BTreeSet::new, |judged| judged.named),
             right,
+            sigma,
         });
     }
     score.parameter_error_median = median(errors);
@@ -275,6 +321,26 @@ fn mean(values: &[f64]) -> Option<f64> {
 }
 
 impl Score {
+    /// The classes of signature length: a heading, and a row each.
+    pub fn class_rows(&self) -> Vec<[String; 6]> {
+        let heading =
+            ["signature", "single", "both of two", "one of two", "outside, said so", "falsely explained"];
+        let ends = CLASSES_SIGMA.iter();
+        let rows = self.classes.iter().zip(ends).map(|(class, end)| {
+            let range = if end.is_finite() {
+                format!("{:.0} to {end:.0} sigma", class.from_sigma)
+            } else {
+                format!("{:.0} sigma and more", class.from_sigma)
+            };
+            let share = |share: Share| format!("{}/{}", share.hits, share.trials);
+            let shares =
+                [class.single, class.pair, class.one_of_pair, class.outside, class.falsely_explained];
+            let [single, pair, one, outside, falsely] = shares.map(share);
+            [range, single, pair, one, outside, falsely]
+        });
+        std::iter::once(heading.map(str::to_owned)).chain(rows).collect()
+    }
+
     /// Labels and values of the table, in its order.
     pub fn rows(&self) -> Vec<(&'static str, String)> {
         let number = |value: Option<f64>, decimals: usize| {

@@ -3,6 +3,7 @@
 use crate::case::Case;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 
 /// The answer of one case, in the form that `score.py` reads as NAME.truth.json.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -11,6 +12,9 @@ pub struct Truth {
     pub name: String,
     /// Cause by cause its strength: a number, an object by parameter, or for outside causes a sentence.
     pub effects: Map<String, Value>,
+    /// Cause by cause the length of its signature beside the others, in sigmas, on a recording of the same campaign.
+    #[serde(default)]
+    pub sigmas: BTreeMap<String, f64>,
     /// The points in order.
     pub points: Vec<TruthPoint>,
 }
@@ -53,6 +57,8 @@ impl Truth {
                 (info.id.to_string(), value)
             })
             .collect();
-        Truth { name: case.name.clone(), effects, points }
+        let ids = case.causes.iter().map(|cause| cause.effect.info().id.to_string());
+        let sigmas = ids.zip(case.sigmas.iter().copied()).collect();
+        Truth { name: case.name.clone(), effects, sigmas, points }
     }
 }

@@ -17,7 +17,7 @@ fn campaign() -> Campaign {
 }
 
 fn made(seed: u64, cases: usize, directory: &Path) -> Made {
-    let draw = Draw { seed, cases, outside: OutsideUse::Check };
+    let draw = Draw::new(seed, cases, OutsideUse::Check);
     make(&campaign(), &mapper_effects::catalogue(), &draw, directory, &|_| {}).unwrap()
 }
 
@@ -32,7 +32,7 @@ fn the_same_seed_gives_the_same_files_and_the_seal() {
         assert!(std::fs::read(a.join(&file)).unwrap() == std::fs::read(b.join(&file)).unwrap());
     }
     // A directory with cases is not overwritten.
-    let draw = Draw { seed: 6, cases: 1, outside: OutsideUse::Check };
+    let draw = Draw::new(6, 1, OutsideUse::Check);
     assert!(make(&campaign(), &mapper_effects::catalogue(), &draw, &a, &|_| {}).is_err());
     // Answers that were changed are not opened.
     let answers = a.join(ANSWERS_NAME);

@@ -83,6 +83,7 @@ pub fn with_plan_request<T>(
                 .p3_stroke_s
                 .map(|stroke_s| (limits.p3_max_pa - limits.p3_min_pa) / stroke_s),
         },
+        appended: None,
         repeats: campaign.repeats.map(|repeats| Repeats {
             jump: repeats.jump.map(|jump| (jump.from, jump.to)),
             every_steps: repeats.every_steps,
@@ -165,7 +166,19 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         reference: campaign.reference,
         inlet_tap: tap(Channel::P1),
         outlet_tap: tap(Channel::P2),
-        declared: campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
+        declared: declared(campaign),
         ..IdentifyConfig::default()
     }
+}
+
+/// What is declared of the sensors; a flow meter without a gain of its own has that of the tolerances.
+fn declared(campaign: &Campaign) -> BTreeMap<Channel, DeclaredUncertainty> {
+    let mut declared: BTreeMap<Channel, DeclaredUncertainty> =
+        campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    if let Some(flow) = declared.get_mut(&Channel::CompressorFlow)
+        && flow.gain_sigma_ratio == 0.0
+    {
+        flow.gain_sigma_ratio = campaign.tolerances.flow_meter_gain_ratio;
+    }
+    declared
 }

@@ -1,6 +1,6 @@
 //! The command line of `mapper gap`.
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
 /// `mapper gap`.
@@ -72,6 +72,8 @@ pub enum BlindCommand {
     Run(BlindRunArguments),
     /// Open the seal and print how often the diagnoses are right
     Score(BlindScoreArguments),
+    /// Find the numbers behind the probabilities on cases of its own, with outside causes that the check does not use
+    Calibrate(BlindCalibrateArguments),
 }
 
 /// `mapper gap blind make`.
@@ -89,12 +91,34 @@ pub struct BlindMakeArguments {
     /// Number of cases
     #[arg(long)]
     pub cases: usize,
+    /// Draw cases of this kind alone; may be repeated
+    #[arg(long = "kind", value_name = "KIND")]
+    pub kinds: Vec<BlindKind>,
+    /// Shortest signature of a cause, in sigmas
+    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_blind::SIGMA_RANGE[0])]
+    pub least_sigma: f64,
+    /// Longest signature of a cause, in sigmas
+    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_blind::SIGMA_RANGE[1])]
+    pub most_sigma: f64,
     /// Draw outside causes from those kept for calibration, not from those reserved for the check
     #[arg(long)]
     pub calibration: bool,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+}
+
+/// What a blind case is a case of.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum BlindKind {
+    /// Nothing beyond the declared tolerances.
+    None,
+    /// One effect of the catalogue.
+    Single,
+    /// Two effects of the catalogue.
+    Pair,
+    /// A cause outside the catalogue.
+    Outside,
 }
 
 /// `mapper gap blind run`.
@@ -118,4 +142,27 @@ pub struct BlindScoreArguments {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+}
+
+/// `mapper gap blind calibrate`.
+#[derive(Debug, Args)]
+pub struct BlindCalibrateArguments {
+    /// Campaign that says machine, schedule, declared uncertainties and tolerances (YAML)
+    #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
+    pub campaign: PathBuf,
+    /// Seed of everything that is drawn
+    #[arg(long)]
+    pub seed: u64,
+    /// Number of cases without a cause, which set the threshold
+    #[arg(long)]
+    pub nulls: usize,
+    /// Number of cases of the other kinds
+    #[arg(long)]
+    pub cases: usize,
+    /// New file for the calibration (JSON)
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Also write what each case gave to this new file (JSON)
+    #[arg(long, value_name = "FILE")]
+    pub observed: Option<PathBuf>,
 }

@@ -26,6 +26,13 @@ pub struct Adequacy {
     pub mean_square: f64,
 }
 
+impl Adequacy {
+    /// What the probability of an outside cause is made of.
+    pub fn features(&self) -> [f64; 3] {
+        [self.smooth_sigma, self.scatter_sigma, self.one_more]
+    }
+}
+
 /// Energy of a whitened residual in each group's smooth basis.
 pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64]) -> Vec<f64> {
     study

@@ -39,13 +39,14 @@ impl Calibration {
     }
 
     /// Probability of an outside cause by what the best fit leaves.
-    pub fn outside(&self, smooth_sigma: f64, scatter_sigma: f64, one_more: f64) -> f64 {
-        let [offset, smooth, scatter, more] = self.outside;
-        let squash = |x: f64| x.clamp(-5.0, 100.0);
-        let x = offset
-            + smooth * squash(smooth_sigma)
-            + scatter * squash(scatter_sigma)
-            + more * squash(one_more);
+    pub fn outside(&self, features: [f64; 3]) -> f64 {
+        let [offset, slopes @ ..] = self.outside;
+        let x = offset + slopes.iter().zip(features).map(|(slope, x)| slope * squash(x)).sum::<f64>();
         1.0 / (1.0 + (-x).exp())
     }
+}
+
+/// What a feature counts as in the logistic: gross misfits are all alike.
+pub fn squash(feature: f64) -> f64 {
+    feature.clamp(-5.0, 100.0)
 }

@@ -26,6 +26,8 @@ pub struct Fit {
     pub effect_columns: Vec<Vec<f64>>,
     /// Covariance of the effects' search coordinates, nuisances free.
     pub covariance: DMatrix<f64>,
+    /// Precision of nuisances and the effects' search coordinates, priors included.
+    pub precision: DMatrix<f64>,
 }
 
 /// Prior width of an effect's parameter, in typical steps.
@@ -111,11 +113,14 @@ pub struct Effort {
     pub iterations: usize,
     /// Stop where an iteration promises less than this in the cost.
     pub enough: f64,
+    /// Most sigmas that a nuisance may move: few while an effect is far from its best, so that tolerances do not run into
+    /// its place.
+    pub most_sigmas: f64,
 }
 
 impl Default for Effort {
     fn default() -> Self {
-        Effort { iterations: 10, enough: 0.02 }
+        Effort { iterations: 10, enough: 0.02, most_sigmas: MOST_SIGMAS }
     }
 }
 
@@ -145,14 +150,17 @@ pub fn fit(
         if iteration + 1 == effort.iterations.max(1) {
             break;
         }
-        let Some((step, promised)) = bounded_step(&normal, &hypothesis, &coordinates) else { break };
+        let Some((step, promised)) = bounded_step(&normal, &hypothesis, &coordinates, effort.most_sigmas)
+        else {
+            break;
+        };
         if promised < effort.enough {
             break;
         }
         let mut accepted = false;
         let mut share = 1.0;
         for _ in 0..5 {
-            let moved = moved(&hypothesis, &step, share, &coordinates);
+            let moved = moved(&hypothesis, &step, share, &coordinates, effort.most_sigmas);
             if let Ok(there) = study.predict(&moved) {
                 let there_residual = linearised.residual(study, &there);
                 let there_cost = cost_of(&rows, &there_residual, &moved);
@@ -170,7 +178,16 @@ pub fn fit(
     }
     let nuisances = hypothesis.nuisances.len();
     let (score, covariance) = normal.evidence(cost, nuisances);
-    Ok(Fit { hypothesis, cost, score, residual, prediction, effect_columns, covariance })
+    Ok(Fit {
+        hypothesis,
+        cost,
+        score,
+        residual,
+        prediction,
+        effect_columns,
+        covariance,
+        precision: normal.matrix,
+    })
 }
 
 fn cost_of(rows: &[std::ops::Range<usize>], residual: &[f64], hypothesis: &Hypothesis) -> f64 {
@@ -296,7 +313,7 @@ fn covariance_of_effects(cholesky: &Cholesky<f64, Dyn>, nuisances: usize) -> DMa
 }
 
 /// Six sigma of a declared tolerance is no tolerance any more.
-const MOST_SIGMAS: f64 = 6.0;
+pub const MOST_SIGMAS: f64 = 6.0;
 /// Most typical steps an effect moves in one iteration: effects bend.
 const MOST_STEPS: f64 = 2.0;
 
@@ -306,11 +323,12 @@ fn bounded_step(
     normal: &Normal,
     hypothesis: &Hypothesis,
     coordinates: &[Coordinate],
+    most_sigmas: f64,
 ) -> Option<(DVector<f64>, f64)> {
     let values = parameters(hypothesis);
     // Room below and above.
     let mut room: Vec<(f64, f64)> =
-        hypothesis.nuisances.iter().map(|u| (-MOST_SIGMAS - u, MOST_SIGMAS - u)).collect();
+        hypothesis.nuisances.iter().map(|u| (-most_sigmas - u, most_sigmas - u)).collect();
     room.extend(coordinates.iter().zip(&values).map(|(coordinate, value)| {
         let at = coordinate.of(*value);
         let ends = [coordinate.of(coordinate.low), coordinate.of(coordinate.high)];
@@ -334,11 +352,17 @@ fn bounded_step(
     None
 }
 
-fn moved(hypothesis: &Hypothesis, step: &DVector<f64>, share: f64, coordinates: &[Coordinate]) -> Hypothesis {
+fn moved(
+    hypothesis: &Hypothesis,
+    step: &DVector<f64>,
+    share: f64,
+    coordinates: &[Coordinate],
+    most_sigmas: f64,
+) -> Hypothesis {
     let n = hypothesis.nuisances.len();
     let mut moved = hypothesis.clone();
     for (i, nuisance) in moved.nuisances.iter_mut().enumerate() {
-        *nuisance = (*nuisance + share * step[i]).clamp(-MOST_SIGMAS, MOST_SIGMAS);
+        *nuisance = (*nuisance + share * step[i]).clamp(-most_sigmas, most_sigmas);
     }
     for (j, (coordinate, value)) in coordinates.iter().zip(parameters(hypothesis)).enumerate() {
         set_parameter(&mut moved, j, coordinate.value(coordinate.of(value) + share * step[n + j]));

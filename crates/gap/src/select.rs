@@ -5,6 +5,7 @@
 
 use crate::fit::{Coordinate, Effort, Fit, Selection, dot_over, fit, nuisance_products};
 use crate::parallel;
+use crate::screen::{Screened, screen};
 use crate::study::{Hypothesis, PredictError, Study};
 use crate::whiten::Linearised;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -16,8 +17,8 @@ pub struct Found {
     pub null: Fit,
     /// Singles and pairs, best score first.
     pub fits: Vec<Fit>,
-    /// Linearised beside the best single, where the nominal point is far from it.
-    pub anew: Option<Linearised>,
+    /// Linearised beside the best single, where the nominal point is far from it, and that single.
+    pub anew: Option<(Linearised, Vec<usize>)>,
 }
 
 /// A single must take at least this off the cost to be worth a second look.
@@ -32,6 +33,8 @@ pub struct Search<'a> {
     /// The recording.
     pub study: &'a Study,
     /// Linearised where nothing is off.
+    pub nominal: &'a Linearised,
+    /// Linearised where the fits begin: there too, or beside the best so far.
     pub linearised: &'a Linearised,
     /// Steps that count.
     pub selection: &'a Selection,
@@ -49,10 +52,13 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
     progress(0.15, "single effects");
     let mut singles = singles(search);
     let anew = match singles.first() {
-        Some(best) if null.cost - best.cost > STRONG => search.linearised.at(study, &best.hypothesis).ok(),
+        Some(best) if null.cost - best.cost > STRONG => {
+            let beside = search.linearised.at(study, &best.hypothesis).ok();
+            beside.map(|linearised| (linearised, members(&best.hypothesis)))
+        }
         _ => None,
     };
-    let linearised = anew.as_ref().unwrap_or(search.linearised);
+    let linearised = anew.as_ref().map_or(search.linearised, |(linearised, _)| linearised);
     let beside = Search { linearised, ..search };
     if anew.is_some() {
         refit(beside, &mut singles, 4, Effort::default());
@@ -63,6 +69,7 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
     } else {
         Vec::new()
     };
+    fits.retain(|pair| does_something(study, pair));
     fits.append(&mut singles);
     sort(&mut fits);
     Ok(Found { null, fits, anew })
@@ -75,7 +82,7 @@ fn singles(search: Search<'_>) -> Vec<Fit> {
     for index in 0..study.effects.len() {
         starts.extend(starts_of(study, &study.nothing(), index));
     }
-    let quick = Effort { iterations: 3, enough: 1.0 };
+    let quick = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0 };
     let tried = parallel::map(&starts, |start| {
         let started = linear_start(study, linearised, selection, start)?;
         fit(study, linearised, &started, selection, quick).ok()
@@ -85,7 +92,7 @@ fn singles(search: Search<'_>) -> Vec<Fit> {
         keep_best(&mut singles, fitted);
     }
     sort(&mut singles);
-    refit(search, &mut singles, 7, Effort { iterations: 6, enough: 0.2 });
+    refit(search, &mut singles, 7, Effort { iterations: 6, enough: 0.2, ..Effort::default() });
     singles
 }
 
@@ -100,9 +107,14 @@ pub fn refit(search: Search<'_>, fits: &mut Vec<Fit>, count: usize, effort: Effo
     sort(fits);
 }
 
+/// Pairs that are fitted because they promise most beside the best singles.
+const BESIDE: usize = 6;
+/// Pairs that are fitted because the closed form promises most of them, whatever their members do alone.
+const SCREENED: usize = 3;
+
 /// Fits of the most promising pairs: beside the best singles, and beside the partners that these ask for.
 fn pairs(search: Search<'_>, singles: &[Fit]) -> Vec<Fit> {
-    let Search { study, linearised, selection, progress } = search;
+    let Search { study, linearised, selection, progress, .. } = search;
     let mut wanted: Vec<Wanted> = Vec::new();
     let mut bases: Vec<usize> = (0..singles.len().min(2)).collect();
     for round in 0..2 {
@@ -133,8 +145,26 @@ fn pairs(search: Search<'_>, singles: &[Fit]) -> Vec<Fit> {
         }
     }
     progress(0.65, "pairs");
-    let starts: Vec<Hypothesis> = wanted.into_iter().take(6).map(|w| w.start).collect();
-    let effort = Effort { iterations: 5, enough: 0.5 };
+    // Pairs that neither of the best singles is a member of: by the straight line from where nothing is off.
+    let known = |s: &Screened| wanted.iter().take(BESIDE).any(|w| w.names == s.names);
+    let mut screened = screen(study, search.nominal, selection, singles);
+    screened.retain(|s| !known(s));
+    wanted.truncate(BESIDE);
+    wanted.extend(screened.into_iter().take(SCREENED).map(|s| Wanted {
+        cost: s.cost,
+        partner: s.names[1],
+        names: s.names,
+        start: s.start,
+    }));
+    // A second effect that promises nothing beside the best single costs time; two show what pairs there are.
+    let least = singles.first().map_or(f64::INFINITY, |best| best.cost - WORTH);
+    let starts: Vec<Hypothesis> = wanted
+        .into_iter()
+        .enumerate()
+        .filter(|(place, w)| *place < 2 || w.cost < least)
+        .map(|(_, w)| w.start)
+        .collect();
+    let effort = Effort { iterations: 5, enough: 0.5, ..Effort::default() };
     let fitted = parallel::map(&starts, |start| fit(study, linearised, start, selection, effort));
     let mut pairs = Vec::new();
     for fitted in fitted.into_iter().flatten() {
@@ -165,7 +195,7 @@ fn swap(search: Search<'_>, pairs: &mut Vec<Fit>) {
             starts.push(start);
         }
     }
-    let effort = Effort { iterations: 6, enough: 0.5 };
+    let effort = Effort { iterations: 6, enough: 0.5, ..Effort::default() };
     for fitted in
         parallel::map(&starts, |start| fit(study, linearised, start, selection, effort)).into_iter().flatten()
     {
@@ -194,6 +224,19 @@ pub fn members(hypothesis: &Hypothesis) -> Vec<usize> {
     members.sort_unstable();
     members
 }
+
+/// Whether each effect of a fit does something: one that the fit left at its neutral value explains nothing, and a pair with
+/// it is no pair.
+pub fn does_something(study: &Study, fitted: &Fit) -> bool {
+    fitted.hypothesis.effects.iter().all(|(index, values)| {
+        study.effects[*index].info().parameters.iter().zip(values).any(|(parameter, value)| {
+            (value - parameter.neutral).abs() > NEUTRAL_STEPS * parameter.typical_step.abs()
+        })
+    })
+}
+
+/// This near to neutral, in typical steps, an effect is not there.
+const NEUTRAL_STEPS: f64 = 1e-3;
 
 /// Keeps one fit for each set of effects: the better.
 pub fn keep_best(fits: &mut Vec<Fit>, fitted: Fit) {
@@ -234,7 +277,7 @@ fn starts_of(study: &Study, base: &Hypothesis, index: usize) -> Vec<Hypothesis> 
 }
 
 /// Solves the nuisances' part of the normal equations again and again.
-struct Projector<'a> {
+pub(crate) struct Projector<'a> {
     linearised: &'a Linearised,
     rows: Vec<std::ops::Range<usize>>,
     cholesky: Cholesky<f64, Dyn>,
@@ -243,7 +286,7 @@ struct Projector<'a> {
 }
 
 impl<'a> Projector<'a> {
-    fn new(
+    pub(crate) fn new(
         study: &Study,
         linearised: &'a Linearised,
         selection: &Selection,
@@ -270,7 +313,7 @@ impl<'a> Projector<'a> {
         Some(Projector { linearised, rows, cholesky: matrix.cholesky()?, others })
     }
 
-    fn right(&self, column: &[f64]) -> DVector<f64> {
+    pub(crate) fn right(&self, column: &[f64]) -> DVector<f64> {
         let n = self.linearised.columns.len();
         DVector::from_fn(n + self.others.len(), |i, _| {
             let other = if i < n { &self.linearised.columns[i] } else { &self.others[i - n] };
@@ -279,7 +322,13 @@ impl<'a> Projector<'a> {
     }
 
     /// Product of two columns with the span of the free ones (softened by their priors) taken out.
-    fn product(&self, a: &[f64], right_a: &DVector<f64>, b: &[f64], right_b: &DVector<f64>) -> f64 {
+    pub(crate) fn product(
+        &self,
+        a: &[f64],
+        right_a: &DVector<f64>,
+        b: &[f64],
+        right_b: &DVector<f64>,
+    ) -> f64 {
         dot_over(&self.rows, a, b) - right_a.dot(&self.cholesky.solve(right_b))
     }
 }
@@ -294,19 +343,34 @@ fn linear_start(
     let (index, values) = start.effects.first()?;
     let parameters = &study.effects[*index].info().parameters;
     let [parameter] = parameters.as_slice() else { return Some(start.clone()) };
-    let step = values[0] - parameter.neutral;
+    let projector = Projector::new(study, linearised, selection, &[])?;
+    let residual = linearised.residual(study, &linearised.base);
+    let right_residual = projector.right(&residual);
+    // How many times `step` a straight line through neutral and it asks for.
+    let share_of = |step: f64| -> Option<f64> {
+        let mut there = start.clone();
+        there.effects = vec![(*index, vec![parameter.neutral + step])];
+        let there = study.predict(&there).ok()?;
+        let mut change: Vec<f64> =
+            there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
+        linearised.whiten(study, &mut change);
+        let right = projector.right(&change);
+        let own = projector.product(&change, &right, &change, &right);
+        let seen = projector.product(&change, &right, &residual, &right_residual);
+        Some(if own > 1e-9 { (seen / own).clamp(-4.0, 4.0) } else { 0.0 })
+    };
+    let mut step = values[0] - parameter.neutral;
     if step == 0.0 {
         return Some(start.clone());
     }
-    let there = study.predict(start).ok()?;
-    let mut change: Vec<f64> = there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
-    linearised.whiten(study, &mut change);
-    let projector = Projector::new(study, linearised, selection, &[])?;
-    let residual = linearised.residual(study, &linearised.base);
-    let right = projector.right(&change);
-    let own = projector.product(&change, &right, &change, &right);
-    let seen = projector.product(&change, &right, &residual, &projector.right(&residual));
-    let share = if own > 1e-9 { (seen / own).clamp(-4.0, 4.0) } else { 0.0 };
+    let mut share = share_of(step)?;
+    let opposite = (parameter.neutral - step).clamp(parameter.low, parameter.high) - parameter.neutral;
+    if share < -0.1 && opposite != 0.0 {
+        // Effects bend: the line is drawn on the side it points to.
+        if let Some(there) = share_of(opposite).filter(|there| *there > 0.0) {
+            (step, share) = (opposite, there);
+        }
+    }
     // Where the line says nothing, stand a little off neutral: at neutral some effects have no slope.
     let share = if share.abs() < 0.1 { 0.1 * if share < 0.0 { -1.0 } else { 1.0 } } else { share };
     let mut moved = study.nothing();
@@ -336,7 +400,12 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
     let Some(projector) = Projector::new(study, linearised, selection, &base.effect_columns) else {
         return Vec::new();
     };
-    let right_residual = projector.right(&base.residual);
+    // At the fit's best what the residual asks of the nuisances is what their priors ask back: a tolerance that stands far
+    // out pulls for the effect that would let it go.
+    let mut right_residual = projector.right(&base.residual);
+    for (right, nuisance) in right_residual.iter_mut().zip(&base.hypothesis.nuisances) {
+        *right -= nuisance;
+    }
     let used = members(&base.hypothesis);
     let mut starts: Vec<(usize, Hypothesis)> = Vec::new();
     for index in (0..study.effects.len()).filter(|index| !used.contains(index)) {

@@ -21,6 +21,8 @@ const STEPS_S: [(f64, f64); 7] =
 /// Within this of the surge line, in places on the speed line, a fast step is taken in parts.
 const SURGE_CORNER: f64 = 0.01;
 const CORNER_PARTS: u32 = 5;
+/// Parts of a step that gave no state a machine can have.
+const RESCUE_PARTS: u32 = 40;
 
 /// Times between which the integration takes single steps.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,16 +102,20 @@ pub fn drive(
 /// # Errors
 /// [`DriveError`] where it does not rest.
 pub fn settle(model: &Model, boundary: &BoundaryConditions, guess: State) -> Result<State, DriveError> {
-    // Steps that grow by half: a step far longer than every time constant of an L-stable method lands at rest.
-    let mut nodes_s = vec![0.0];
-    let mut step_s = 0.02;
-    let mut at_s = 0.0;
-    while at_s < 36_000.0 {
-        at_s += step_s;
-        step_s *= 1.5;
-        nodes_s.push(at_s);
-    }
-    drive(model, boundary, guess, &FrozenGrid { nodes_s }, &[], |_, _, _, _| {})
+    // Steps that grow: one far longer than every time constant of an L-stable method lands at rest. Where the guess lies
+    // beyond the surge line the first step is too long for the outlet volume: again, from its own milliseconds.
+    let gently = |first_s: f64, growth: f64| {
+        let mut nodes_s = vec![0.0];
+        let mut step_s = first_s;
+        let mut at_s = 0.0;
+        while at_s < 36_000.0 {
+            at_s += step_s;
+            step_s *= growth;
+            nodes_s.push(at_s);
+        }
+        drive(model, boundary, guess, &FrozenGrid { nodes_s }, &[], |_, _, _, _| {})
+    };
+    gently(0.02, 1.5).or_else(|_| gently(1e-4, 1.2))
 }
 
 fn run<const N: usize>(
@@ -144,24 +150,35 @@ where
         // The speed line has a corner on the surge line, with an infinite slope on one side: short steps across it.
         let fast = end_s - pair[0] < 0.11;
         let surge_before = if fast { system.surge_position(&integrator.y) } else { 0.0 };
-        let kept = fast.then(|| integrator.clone());
-        let mut step = integrator.step_on_grid(&mut system, end_s).map_err(|_| failed)?;
-        if let Some(kept) = kept {
-            let surge_after = system.surge_position(&step.y1);
-            let near = (surge_before - 1.0).abs().min((surge_after - 1.0).abs()) < SURGE_CORNER;
-            if near || (surge_before < 1.0) != (surge_after < 1.0) {
-                integrator = kept;
-                for part in 1..=CORNER_PARTS {
-                    let share = f64::from(part) / f64::from(CORNER_PARTS);
-                    let last = part == CORNER_PARTS;
-                    let part_end_s = if last { end_s } else { pair[0] + share * (end_s - pair[0]) };
-                    step = integrator.step_on_grid(&mut system, part_end_s).map_err(|_| failed)?;
-                }
+        let kept = integrator.clone();
+        let whole = integrator.step_on_grid(&mut system, end_s).ok().filter(|step| is_physical(&step.y1));
+        let parts = match whole {
+            // A step that leads nowhere: many short ones may not.
+            None => RESCUE_PARTS,
+            Some(step) if fast => {
+                let surge_after = system.surge_position(&step.y1);
+                let near = (surge_before - 1.0).abs().min((surge_after - 1.0).abs()) < SURGE_CORNER;
+                if near || (surge_before < 1.0) != (surge_after < 1.0) { CORNER_PARTS } else { 1 }
             }
-        }
-        if !(step.y1[0] > 0.0 && step.y1[1] > 0.0) {
-            return Err(failed);
-        }
+            Some(_) => 1,
+        };
+        let step = match whole {
+            Some(step) if parts == 1 => step,
+            _ => {
+                integrator = kept;
+                let mut last = None;
+                for part in 1..=parts {
+                    let share = f64::from(part) / f64::from(parts);
+                    let part_end_s = if part == parts { end_s } else { pair[0] + share * (end_s - pair[0]) };
+                    let step = integrator.step_on_grid(&mut system, part_end_s).map_err(|_| failed)?;
+                    if !is_physical(&step.y1) {
+                        return Err(failed);
+                    }
+                    last = Some(step);
+                }
+                last.ok_or(failed)?
+            }
+        };
         while let Some(t_s) = times_s.get(next).filter(|t| **t <= end_s) {
             system.prepare_for(*t_s);
             let state = State::from_array(&step.at(*t_s));
@@ -170,6 +187,11 @@ where
         }
     }
     Ok(State::from_array(&integrator.y))
+}
+
+/// Whether the shaft turns and the outlet holds a pressure.
+fn is_physical<const N: usize>(y: &[f64; N]) -> bool {
+    y[0] > 0.0 && y[1] > 0.0
 }
 
 struct DrivenSystem<'a, I: Inputs> {
@@ -286,6 +308,22 @@ mod tests {
         let settled = settle(&model, &steady.boundary, guess).unwrap();
         assert!((settled.tc_k - steady.state.tc_k).abs() < 1e-3, "{} K", settled.tc_k);
         assert!((settled.tt_k - steady.state.tt_k).abs() < 1e-3, "{} K", settled.tt_k);
+    }
+
+    /// A machine told 20 K too much at its inlet, from the state at the right temperature, which then lies beyond the surge
+    /// line.
+    #[test]
+    fn settling_starts_beyond_the_surge_line_too() {
+        let model = Model::nominal();
+        let at = BoundaryConditions { valve_opening_ratio: 0.5, ..BoundaryConditions::default() };
+        let steady = hold_speed(&model, 90e3, &at).unwrap();
+        for t1_k in [at.t1_k - 20.0, at.t1_k + 20.0] {
+            let boundary = BoundaryConditions { t1_k, ..steady.boundary };
+            let guess = State { p2_pa: 1.05 * steady.state.p2_pa, ..steady.state };
+            let settled = settle(&model, &boundary, guess).unwrap();
+            let again = settle(&model, &boundary, settled).unwrap();
+            assert!((settled.p2_pa - again.p2_pa).abs() < 1.0, "{} Pa", settled.p2_pa - again.p2_pa);
+        }
     }
 
     #[test]

@@ -28,8 +28,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-exporters", &["core", "physics", "chart"]),
     ("mapper-importers", &["core", "physics"]),
-    // Draws cases on the virtual lab; above it, like the program.
-    ("mapper-blind",     &["core", "physics", "campaign", "record", "backends", "effects"]),
+    // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
+    ("mapper-blind",     &["core", "physics", "campaign", "record", "gap", "backends", "effects"]),
     // The program sees all; nothing sees the program.
     ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "drift", "history", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters", "importers"]),
     // Tests run the program and read its files; chores know nothing of it.

@@ -12,6 +12,7 @@ pub fn gap(arguments: &GapArguments) -> Result<(), Failure> {
             BlindCommand::Make(arguments) => gap_blind::make(arguments),
             BlindCommand::Run(arguments) => gap_blind::run(arguments),
             BlindCommand::Score(arguments) => gap_blind::score(arguments),
+            BlindCommand::Calibrate(arguments) => gap_blind::calibrate(arguments),
         },
         GapCommand::Effects(arguments) => gap_effects::effects(arguments),
     }

@@ -2,10 +2,13 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::gap_arguments::{BlindMakeArguments, BlindRunArguments, BlindScoreArguments};
+use crate::gap_arguments::{
+    BlindCalibrateArguments, BlindKind, BlindMakeArguments, BlindRunArguments, BlindScoreArguments,
+};
 use crate::{output, registry};
 use indicatif::{ProgressBar, ProgressDrawTarget};
-use mapper_blind::{BlindError, Draw, MANIFEST_NAME, Manifest, OutsideUse};
+use mapper_blind::calibrate::{Observed, Plan};
+use mapper_blind::{BlindError, CaseKind, Draw, MANIFEST_NAME, Manifest, OutsideUse};
 use serde_json::json;
 use std::io::IsTerminal;
 use std::path::Path;
@@ -14,10 +17,11 @@ use std::process::{Command, Stdio};
 /// Draws, records and seals cases.
 pub fn make(arguments: &BlindMakeArguments) -> Result<(), Failure> {
     let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
+    let outside = if arguments.calibration { OutsideUse::Calibration } else { OutsideUse::Check };
     let draw = Draw {
-        seed: arguments.seed,
-        cases: arguments.cases,
-        outside: if arguments.calibration { OutsideUse::Calibration } else { OutsideUse::Check },
+        kinds: arguments.kinds.iter().map(|kind| kind_of(*kind)).collect(),
+        sigma_range: [arguments.least_sigma, arguments.most_sigma],
+        ..Draw::new(arguments.seed, arguments.cases, outside)
     };
     let bar = bar(arguments.cases);
     let made = mapper_blind::make(&campaign, &registry::effects(), &draw, &arguments.out, &|done| {
@@ -38,6 +42,15 @@ pub fn make(arguments: &BlindMakeArguments) -> Result<(), Failure> {
         arguments.out.display(),
         made.manifest.answers_sha256,
     ))
+}
+
+fn kind_of(kind: BlindKind) -> CaseKind {
+    match kind {
+        BlindKind::None => CaseKind::None,
+        BlindKind::Single => CaseKind::Single,
+        BlindKind::Pair => CaseKind::Pair,
+        BlindKind::Outside => CaseKind::Outside,
+    }
 }
 
 /// Diagnoses each recording in a process of its own, as anybody would: `mapper gap diagnose ... --json`.
@@ -95,10 +108,11 @@ pub fn score(arguments: &BlindScoreArguments) -> Result<(), Failure> {
             if ids.is_empty() { "-".to_owned() } else { ids.iter().cloned().collect::<Vec<_>>().join(" + ") }
         };
         text += &format!(
-            "{}: {} {} -> {} {} {}\n",
+            "{}: {} {}{} -> {} {} {}\n",
             case.name,
             case.kind.name(),
             list(&case.causes),
+            case.sigma.map_or_else(String::new, |sigma| format!(" ({sigma:.0} sigma)")),
             case.verdict.as_deref().unwrap_or("no diagnosis"),
             list(&case.named),
             if case.right { "ok" } else { "WRONG" },
@@ -108,8 +122,49 @@ pub fn score(arguments: &BlindScoreArguments) -> Result<(), Failure> {
     for (label, value) in score.rows() {
         text += &format!("{label:28}{value}\n");
     }
+    text += "\n";
+    for row in score.class_rows() {
+        for cell in row {
+            text += &format!("{cell:>20}");
+        }
+        text += "\n";
+    }
     text += "Brackets are exact 95 % intervals of the share.\n";
     output::print(&text)
+}
+
+/// Draws, records and diagnoses cases of its own, and writes the calibration that fits them.
+pub fn calibrate(arguments: &BlindCalibrateArguments) -> Result<(), Failure> {
+    let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
+    let plan = Plan { seed: arguments.seed, nulls: arguments.nulls, others: arguments.cases };
+    let made_by = format!(
+        "mapper gap blind calibrate --campaign {} --seed {} --nulls {} --cases {}",
+        arguments.campaign.display(),
+        plan.seed,
+        plan.nulls,
+        plan.others
+    );
+    let bar = bar(plan.nulls + plan.others);
+    let found = mapper_blind::calibrate::calibrate(
+        &campaign,
+        &registry::effects(),
+        &plan,
+        made_by,
+        &|_: &Observed| bar.inc(1),
+    );
+    bar.finish_and_clear();
+    let (calibration, observed) = found.map_err(|error| of_blind(&error))?;
+    let json = |value: serde_json::Result<Vec<u8>>| {
+        value.map_err(|error| Failure::new(Code::Failure, error)).map(|mut bytes| {
+            bytes.push(b'\n');
+            bytes
+        })
+    };
+    output::write_new(&arguments.out, &json(serde_json::to_vec_pretty(&calibration))?)?;
+    if let Some(file) = &arguments.observed {
+        output::write_new(file, &json(serde_json::to_vec_pretty(&observed))?)?;
+    }
+    output::print(&format!("calibration from {} diagnoses in {}\n", observed.len(), arguments.out.display()))
 }
 
 fn manifest(directory: &Path) -> Result<Manifest, Failure> {

@@ -17,6 +17,10 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
     let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
     let model = assembly_line::nominal_model(&campaign)?;
     if let Some(source) = &campaign.sequence {
+        if !(arguments.why.is_empty() && arguments.append.is_empty()) {
+            let message = "this campaign's steps come from its script: write the jump there; --why and --append are for campaigns with a grid";
+            return Err(Failure::new(Code::BadInput, message));
+        }
         return scripted::plan(arguments, &campaign, &model, source);
     }
     if let [from, to] = arguments.why.as_slice() {
@@ -27,7 +31,12 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
         });
     }
     let plan = assembly_line::with_plan_request(&campaign, &model, |request| {
-        let request = PlanRequest { effort: arguments.effort.unwrap_or(request.effort), ..request.clone() };
+        let appended = match arguments.append.as_slice() {
+            [from, to] => Some((*from, *to)),
+            _ => None,
+        };
+        let effort = arguments.effort.unwrap_or(request.effort);
+        let request = PlanRequest { effort, appended, ..request.clone() };
         mapper_planner::make_plan(&request).map_err(|error| Failure::new(Code::NoPlan, error))
     })?;
     if let Some(path) = &arguments.out {

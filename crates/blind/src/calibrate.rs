@@ -1,0 +1,237 @@
+//! Calibrates the diagnosis: draws cases of its own, with outside causes that the check does not use, diagnoses them, and
+//! finds the numbers that turn scores into probabilities.
+
+use crate::case::{Case, Draw};
+use crate::lab::Schedule;
+use crate::logistic::logistic;
+use crate::ruler::{StudyRuler, declared};
+use crate::{BlindError, CaseKind, OutsideUse, outside_kinds};
+use mapper_campaign::{Campaign, nominal_model};
+use mapper_gap::calibration::Calibration;
+use mapper_gap::diagnose::{Diagnosed, Question, diagnose, prior};
+use mapper_gap::fit::{Fit, coordinates};
+use mapper_gap::report::Verdict;
+use mapper_gap::select::members;
+use mapper_gap::study::Study;
+use mapper_physics::effect::Effect;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// Which cases calibrate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Plan {
+    /// Seed of everything.
+    pub seed: u64,
+    /// Cases without a cause, which set the threshold.
+    pub nulls: usize,
+    /// Cases of all other kinds.
+    pub others: usize,
+}
+
+/// What one diagnosis gave, as far as the calibration needs it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Observed {
+    /// What the case is a case of.
+    pub kind: CaseKind,
+    /// Ids of its causes.
+    pub causes: BTreeSet<String>,
+    /// What the diagnosis said with the calibration before.
+    pub verdict: Verdict,
+    /// Length of the shortest of their signatures, sigmas.
+    pub sigma: Option<f64>,
+    /// Score of nothing, prior included.
+    pub nothing: f64,
+    /// Each candidate with its score, prior included.
+    pub candidates: Vec<(BTreeSet<String>, f64)>,
+    /// Features of the logistic of an outside cause.
+    pub features: [f64; 3],
+    /// Error of each parameter in its own standard errors, where the causes were found.
+    pub errors_sigma: Vec<f64>,
+}
+
+impl Observed {
+    /// By how much the best cause beats nothing.
+    fn margin(&self) -> f64 {
+        self.candidates.iter().map(|(_, score)| *score).fold(f64::NEG_INFINITY, f64::max) - self.nothing
+    }
+}
+
+/// Draws the cases, diagnoses them and fits. `done` is told each diagnosis.
+///
+/// # Errors
+/// [`BlindError`] where a case cannot be run; a recording that cannot be diagnosed is left out.
+pub fn calibrate(
+    campaign: &Campaign,
+    catalogue: &[Arc<dyn Effect>],
+    plan: &Plan,
+    made_by: String,
+    done: &dyn Fn(&Observed),
+) -> Result<(Calibration, Vec<Observed>), BlindError> {
+    let of_model = |message: String| BlindError::Model { message };
+    let nominal = nominal_model(campaign).map_err(|error| of_model(error.to_string()))?;
+    let before = Calibration::shipped().map_err(|error| of_model(error.to_string()))?;
+    let schedule = Schedule::new(campaign, &nominal)?;
+    let mut known = catalogue.to_vec();
+    known.extend(outside_kinds(OutsideUse::Calibration));
+    let ruler = StudyRuler::new(campaign, &schedule, &nominal, known, plan.seed)?;
+    let draw = |cases, kinds, seed| Draw { kinds, ..Draw::new(seed, cases, OutsideUse::Calibration) };
+    let others = vec![CaseKind::Single, CaseKind::Pair, CaseKind::Outside];
+    let mut cases = draw(plan.others, others, plan.seed).cases(catalogue, &ruler);
+    cases.extend(draw(plan.nulls, vec![CaseKind::None], plan.seed.wrapping_add(1)).cases(catalogue, &ruler));
+    let mut observed = Vec::with_capacity(cases.len());
+    for case in &cases {
+        let recording = schedule.record(case)?;
+        let diagnosed = diagnose(Question {
+            jumps: Vec::new(),
+            recording: &recording,
+            declared: declared(campaign),
+            model: nominal.clone(),
+            effects: catalogue.to_vec(),
+            calibration: before.clone(),
+            progress: &|_, _| {},
+        });
+        let Ok(diagnosed) = diagnosed else { continue };
+        let one = observe(case, &before, &diagnosed);
+        done(&one);
+        observed.push(one);
+    }
+    Ok((fit(&before, &observed, made_by), observed))
+}
+
+fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Observed {
+    let Diagnosed { study, null, fits, adequacy, diagnosis, .. } = diagnosed;
+    let causes: BTreeSet<String> = case.causes.iter().map(|c| c.effect.info().id.to_string()).collect();
+    let names = |fit: &Fit| -> BTreeSet<String> {
+        members(&fit.hypothesis).into_iter().map(|i| study.effects[i].info().id.to_string()).collect()
+    };
+    let named = fits.first().filter(|fit| names(fit) == causes);
+    Observed {
+        kind: case.kind,
+        causes,
+        verdict: diagnosis.verdict,
+        sigma: case.sigmas.iter().copied().reduce(f64::min),
+        nothing: null.score + prior(calibration, study, null),
+        candidates: fits.iter().map(|fit| (names(fit), fit.score + prior(calibration, study, fit))).collect(),
+        features: adequacy.features(),
+        errors_sigma: named.map_or_else(Vec::new, |fit| errors_sigma(case, study, fit)),
+    }
+}
+
+/// Error of each parameter in its own standard errors, in the coordinate in which it was searched.
+fn errors_sigma(case: &Case, study: &Study, fit: &Fit) -> Vec<f64> {
+    let coordinates = coordinates(study, &fit.hypothesis);
+    let mut place = 0;
+    let mut errors = Vec::new();
+    for (index, values) in &fit.hypothesis.effects {
+        let id = &study.effects[*index].info().id;
+        let truth = case.causes.iter().find(|cause| cause.effect.info().id == *id).map(|cause| &cause.values);
+        for (number, value) in values.iter().enumerate() {
+            let (coordinate, variance) = (&coordinates[place], fit.covariance[(place, place)]);
+            if let Some(truth) = truth.and_then(|truth| truth.get(number)) {
+                errors.push((coordinate.of(*truth) - coordinate.of(*value)) / variance.sqrt());
+            }
+            place += 1;
+        }
+    }
+    errors.retain(|error| error.is_finite());
+    errors
+}
+
+/// Share of the effect-free cases that stay below the threshold.
+const QUIET: f64 = 0.985;
+/// Least threshold: odds of e^3 for the cause, whatever the effect-free cases say.
+const LEAST_THRESHOLD: f64 = 3.0;
+/// Weakest signature that temperature and logistic are fitted to, sigmas: an outside cause that can hardly be seen cannot be
+/// told from one inside, and would teach the logistic to doubt everything.
+const SEEN_SIGMA: f64 = 12.0;
+
+/// The calibration that fits what was observed.
+pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {
+    let mut margins: Vec<f64> =
+        observed.iter().filter(|o| o.kind == CaseKind::None).map(Observed::margin).collect();
+    margins.sort_by(f64::total_cmp);
+    let quiet = quantile(&margins, QUIET).map_or(before.threshold, |margin| margin.max(LEAST_THRESHOLD));
+    let seen = |o: &&Observed| o.sigma.is_none_or(|sigma| sigma >= SEEN_SIGMA);
+    let inside: Vec<&Observed> =
+        observed.iter().filter(|o| o.kind != CaseKind::Outside).filter(seen).collect();
+    let rows: Vec<([f64; 3], bool)> =
+        observed.iter().filter(seen).map(|o| (o.features, o.kind == CaseKind::Outside)).collect();
+    let mut errors: Vec<f64> = observed.iter().flat_map(|o| &o.errors_sigma).map(|z| z.abs()).collect();
+    errors.sort_by(f64::total_cmp);
+    Calibration {
+        made_by,
+        threshold: quiet,
+        temperature: temperature(&inside),
+        // Never narrower than the fit says: a few cases are no ground for more confidence.
+        interval_factor: quantile(&errors, 0.95).map_or(before.interval_factor, |z| (z / 1.96).max(1.0)),
+        outside: logistic(&rows).unwrap_or(before.outside),
+        ..before.clone()
+    }
+}
+
+fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    sorted.get((share * sorted.len() as f64) as usize).or(sorted.last()).copied()
+}
+
+/// The temperature under which the truth of the cases has the largest probability.
+fn temperature(cases: &[&Observed]) -> f64 {
+    let cost = |temperature: f64| -> f64 {
+        cases
+            .iter()
+            .filter_map(|case| {
+                let truth = match case.kind {
+                    CaseKind::None => Some(case.nothing),
+                    _ => case.candidates.iter().find(|(names, _)| *names == case.causes).map(|(_, s)| *s),
+                };
+                let all = case.candidates.iter().map(|(_, score)| *score).chain([case.nothing]);
+                let top = all.clone().fold(f64::NEG_INFINITY, f64::max);
+                let sum: f64 = all.map(|score| ((score - top) / temperature).exp()).sum();
+                truth.map(|score| sum.ln() - (score - top) / temperature)
+            })
+            .sum()
+    };
+    let grid = (0..=60).map(|i| 1.0 * 30f64.powf(f64::from(i) / 60.0));
+    grid.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn observed(kind: CaseKind, truth: f64, rival: f64) -> Observed {
+        let set = |id: &str| BTreeSet::from([id.to_owned()]);
+        Observed {
+            kind,
+            causes: if kind == CaseKind::None { BTreeSet::new() } else { set("a") },
+            verdict: Verdict::Explained,
+            sigma: (kind != CaseKind::None).then_some(30.0),
+            nothing: 0.0,
+            candidates: vec![(set("a"), truth), (set("b"), rival)],
+            features: [0.0; 3],
+            errors_sigma: Vec::new(),
+        }
+    }
+
+    /// Two candidates whose scores differ by x are right in a share s of the cases: the likeliest temperature is that at
+    /// which the better has probability s, x/ln(s/(1-s)).
+    #[test]
+    fn the_temperature_is_that_of_the_share_that_is_right() {
+        let mut cases: Vec<Observed> = (0..80).map(|_| observed(CaseKind::Single, 40.0, 36.0)).collect();
+        cases.extend((0..20).map(|_| observed(CaseKind::Single, 36.0, 40.0)));
+        let found = temperature(&cases.iter().collect::<Vec<_>>());
+        let expected = 4.0 / 4f64.ln();
+        // The grid's own steps are 6 %.
+        assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected}");
+    }
+
+    #[test]
+    fn the_threshold_lets_most_effect_free_cases_pass() {
+        let before = Calibration::shipped().unwrap();
+        let cases: Vec<Observed> =
+            (0..200).map(|i| observed(CaseKind::None, f64::from(i) / 20.0, -50.0)).collect();
+        let found = fit(&before, &cases, String::new());
+        let alarms = cases.iter().filter(|case| case.margin() > found.threshold).count();
+        assert_eq!(alarms, 2);
+    }
+}

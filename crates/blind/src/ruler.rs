@@ -1,0 +1,72 @@
+//! The ruler of the diagnosis itself, laid on a recording without causes.
+
+use crate::case::{Case, Cause};
+use crate::lab::Schedule;
+use crate::strength::Ruler;
+use crate::{BlindError, CaseKind};
+use mapper_campaign::Campaign;
+use mapper_core::NoiseColour;
+use mapper_gap::declared::Declared;
+use mapper_gap::signature::lengths;
+use mapper_gap::study::{EffectValues, Study};
+use mapper_gap::table::Table;
+use mapper_gap::whiten::Linearised;
+use mapper_physics::effect::Effect;
+use mapper_physics::model::Model;
+use std::sync::Arc;
+
+/// Measures signatures on one recording of the campaign that has noise, offsets, tolerances and weather, and no cause.
+/// Those of other recordings of the same campaign differ by the weather, some per cent.
+pub(crate) struct StudyRuler {
+    study: Study,
+    linearised: Linearised,
+}
+
+/// What the campaign declares.
+pub(crate) fn declared(campaign: &Campaign) -> Declared {
+    Declared {
+        sensors: campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
+        noise_colour: NoiseColour::default(),
+        tolerances: campaign.tolerances,
+        nominal: campaign.boundary,
+    }
+}
+
+impl StudyRuler {
+    /// Records a case without causes, and makes it ready.
+    pub(crate) fn new(
+        campaign: &Campaign,
+        schedule: &Schedule<'_>,
+        nominal: &Model,
+        effects: Vec<Arc<dyn Effect>>,
+        seed: u64,
+    ) -> Result<StudyRuler, BlindError> {
+        let case = Case {
+            name: "ruler".to_owned(),
+            kind: CaseKind::None,
+            causes: Vec::new(),
+            sigmas: Vec::new(),
+            seed,
+        };
+        let recording = schedule.record(&case)?;
+        let of_model = |message: String| BlindError::Model { message };
+        let table = Table::new(&recording)
+            .ok_or_else(|| of_model("the campaign records nothing to measure signatures by".to_owned()))?;
+        let study = Study::new(&recording, table, declared(campaign), nominal.clone(), effects)
+            .map_err(|error| of_model(error.to_string()))?;
+        let linearised = Linearised::new(&study).map_err(|error| of_model(error.to_string()))?;
+        Ok(StudyRuler { study, linearised })
+    }
+}
+
+impl Ruler for StudyRuler {
+    fn lengths(&self, causes: &[Cause]) -> Vec<f64> {
+        let place = |cause: &Cause| {
+            self.study.effects.iter().position(|effect| effect.info().id == cause.effect.info().id)
+        };
+        let values: Option<EffectValues> =
+            causes.iter().map(|cause| Some((place(cause)?, cause.values.clone()))).collect();
+        let measured = values.and_then(|values| lengths(&self.study, &self.linearised, &values).ok());
+        measured.unwrap_or_else(|| vec![0.0; causes.len()])
+    }
+}

@@ -35,7 +35,7 @@ const CAUSES: [Cause; 8] = [
 struct Row {
     cause: Option<Cause>,
     found: Option<Cause>,
-    clear: bool,
+    probability: f64,
     onset_right: bool,
     size_right: bool,
     /// Size found over size planted, where the course is of the same kind.
@@ -151,7 +151,7 @@ fn one(
     Row {
         cause,
         found: report.cause,
-        clear: report.probability >= 0.5,
+        probability: report.probability,
         onset_right,
         size_right: planted.is_some_and(|planted| {
             let same_kind = matches!(
@@ -204,7 +204,25 @@ fn print(rows: Vec<Row>) {
             median(&|row| row.shrink[2]),
         );
     }
-    for row in rows.iter().filter(|row| row.found != row.cause || (row.found.is_some() && !row.clear)) {
+    calibration(&rows);
+    for row in
+        rows.iter().filter(|row| row.found != row.cause || (row.found.is_some() && row.probability < 0.5))
+    {
         eprintln!("{}", row.said);
+    }
+}
+
+/// Of the causes that were named: how probable they were said to be, and how often they were right.
+fn calibration(rows: &[Row]) {
+    println!("\n| said to be probable | named | mean probability | right |\n|---|---:|---:|---:|");
+    for (low, high) in [(0.0, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)] {
+        let named: Vec<&Row> =
+            rows.iter().filter(|row| row.found.is_some() && (low..high).contains(&row.probability)).collect();
+        if named.is_empty() {
+            continue;
+        }
+        let mean = named.iter().map(|row| row.probability).sum::<f64>() / named.len() as f64;
+        let right = named.iter().filter(|row| row.found == row.cause).count();
+        println!("| {low:.2} to {:.2} | {} | {mean:.2} | {right} |", f64::min(high, 1.0), named.len());
     }
 }

@@ -77,6 +77,18 @@ fn a_machine_that_fouls_is_told_from_its_sensors() {
 }
 
 #[test]
+fn a_machine_that_changes_much_is_sized_as_it_changed() {
+    let course = Course { kind: CourseKind::Ramp, onset_s: 0.0 };
+    for (seed, cause, size) in [(16, Cause::Fouling, -0.03), (17, Cause::BearingFriction, 9e-7)] {
+        let report = judge(&campaign(seed, Some(Planted { cause, course, size })).recording);
+        assert_eq!(report.cause, Some(cause), "{}", report.reason);
+        let Some(RateOrStep::RatePerH(rate)) = report.size else { panic!("{:?}", report.size) };
+        // Thirty times the limit: noise leaves 1 to 2 %, tolerances of the machine as much.
+        assert!((rate / size - 1.0).abs() < 0.05, "{cause}: {rate} of {size}");
+    }
+}
+
+#[test]
 fn a_step_over_two_nights_is_dated_within_two_repeats() {
     // The second night follows the first on the campaign's axis of time; the gain of the flow meter steps at its begin.
     let course = Course { kind: CourseKind::Step, onset_s: 0.0 };

@@ -81,7 +81,13 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
             })
             .collect();
         let alone = parallel::map(&starts, |start| {
-            fit(study, linearised, start, selection, Effort { iterations: 6, enough: 0.2, ..Effort::default() })
+            fit(
+                study,
+                linearised,
+                start,
+                selection,
+                Effort { iterations: 6, enough: 0.2, ..Effort::default() },
+            )
         });
         for fitted in alone.into_iter().flatten() {
             keep_best(&mut singles, fitted);

@@ -22,7 +22,8 @@ pub fn lengths(
     let mut told = study.clone();
     told.measured = study.predict(&with)?.values;
     // By runs of the model, not by a straight line: a tolerance that acts as the effect does follows it round every bend.
-    let effort = Effort { iterations: 5, enough: 0.5, ..Effort::default() };
+    // As far as it has to: what is priced by its declared size needs no other bound here.
+    let effort = Effort { iterations: 5, enough: 0.5, most_sigmas: 60.0 };
     let everywhere = Selection::all(study);
     (0..effects.len())
         .map(|place| {

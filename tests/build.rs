@@ -4,7 +4,11 @@
 //! shows it as left out instead of passed.
 
 fn main() {
-    for (name, flag) in [("MAPPER_TEST_PYTHON", "with_python"), ("MAPPER_TEST_TMPFS", "with_tmpfs")] {
+    for (name, flag) in [
+        ("MAPPER_TEST_PYTHON", "with_python"),
+        ("MAPPER_TEST_TMPFS", "with_tmpfs"),
+        ("MAPPER_TEST_CHROMIUM", "with_chromium"),
+    ] {
         println!("cargo::rerun-if-env-changed={name}");
         println!("cargo::rustc-check-cfg=cfg({flag})");
         if let Ok(value) = std::env::var(name) {

@@ -46,13 +46,21 @@ def npss(path):
 
 def pycycle(path):
     m = runpy.run_path(path)["compressor"]
-    shape = (m.alphaMap.size, m.NcMap.size, m.RlineMap.size)
-    for table in (m.WcMap, m.PRmap, m.effMap):
+    # As pyCycle 4 reads it (pycycle/elements/compressor_map.py): names, values, defaults and units from two lists.
+    axes = {p["name"]: p["values"] for p in m.param_data}
+    assert list(axes) == ["alphaMap", "NcMap", "RlineMap"]
+    for p in m.param_data:
+        assert p["values"][0] <= p["default"] <= p["values"][-1], p["name"]
+    units = {d["name"]: d["units"] for d in m.param_data + m.output_data}
+    assert units == {"alphaMap": None, "NcMap": "rpm", "RlineMap": None, "WcMap": "kg/s", "effMap": None, "PRmap": None}
+    outputs = {o["name"]: o["values"] for o in m.output_data}
+    shape = tuple(a.size for a in axes.values())
+    for table in outputs.values():
         assert table.shape == shape, (table.shape, shape)
     assert m.RlineStall == m.RlineMap[0] and np.all(np.diff(m.RlineMap) > 0)
     # Rline 1 at surge, 3 at choke; beta 1 at surge, 0 at choke.
     betas = (3.0 - m.RlineMap) / 2.0
-    return m.NcMap, betas[::-1], [t[0][:, ::-1] for t in (m.WcMap, m.PRmap, m.effMap)]
+    return m.NcMap, betas[::-1], [outputs[n][0][:, ::-1] for n in ("WcMap", "PRmap", "effMap")]
 
 
 def simscape(path):

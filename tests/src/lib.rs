@@ -3,10 +3,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod campaign;
+mod drift_campaign;
 mod program;
 mod python;
 
 pub use campaign::{CampaignFile, SHIPPED, SHORT_GRID};
+pub use drift_campaign::DriftCampaign;
 pub use program::{Finished, mapper, mapper_command, mapper_in};
 pub use python::python;
 

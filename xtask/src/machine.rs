@@ -28,6 +28,7 @@ const TOOLS: &[Tool] = &[
     Tool { name: "clippy", used_for: "lints", probe: &["cargo", "clippy", "--version"], source: Source::Rustup(&["clippy"]) },
     Tool { name: "python3 with venv", used_for: "reads recordings independently", probe: &["python3", "-c", "import venv, ensurepip"], source: Source::Debian(&["python3", "python3-venv"]) },
     Tool { name: "unshare", used_for: "gives the test of a full disk a file system of its own", probe: &["unshare", "--version"], source: Source::Debian(&["util-linux", "mount"]) },
+    Tool { name: "chromium", used_for: "opens the pages that the program writes", probe: &["chromium", "--version"], source: Source::Debian(&["chromium"]) },
 ];
 
 /// Makes sure that every tool is there, installing what is missing.

@@ -59,6 +59,7 @@ impl Offered {
     /// A command that knows of it. All commands that build get the same, so that nothing is built again.
     fn to(&self, mut command: Command) -> Command {
         command.env("MAPPER_TEST_PYTHON", &self.python);
+        command.env("MAPPER_TEST_CHROMIUM", "chromium");
         if self.mountable {
             command.env("MAPPER_TEST_TMPFS", "1");
         }

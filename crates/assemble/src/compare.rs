@@ -6,6 +6,8 @@ use serde::Serialize;
 
 /// Nodes compared on each line.
 const NODES: usize = 25;
+/// How far apart the end lines of two maps may be and still count as one speed, ratio: a speed is held within a percent.
+const END_SLACK: f64 = 0.01;
 
 /// A place of the second map beside the nearest place of the first at equal corrected speed. Differences: second less
 /// first.
@@ -88,9 +90,13 @@ pub fn compare(first: &CompressorMap, second: &CompressorMap) -> Result<MapCompa
     let bounds =
         speeds.each_ref().map(|s| (s.first().copied().unwrap_or(0.0), s.last().copied().unwrap_or(0.0)));
     let (low, high) = (bounds[0].0.max(bounds[1].0), bounds[0].1.min(bounds[1].1));
-    // The slack is that of a reference state's rounding.
-    let within = |speed: &f64| *speed >= low * (1.0 - 1e-6) && *speed <= high * (1.0 + 1e-6);
-    let mut all: Vec<f64> = speeds.iter().flatten().copied().collect();
+    let within = |speed: &f64| *speed >= low && *speed <= high;
+    // An end line that is a hair beyond the other map's is compared at that map's end.
+    let to_common = |speed: &f64| {
+        let nearest = speed.max(low).min(high);
+        if (speed - nearest).abs() <= END_SLACK * nearest { nearest } else { *speed }
+    };
+    let mut all: Vec<f64> = speeds.iter().flatten().map(to_common).collect();
     all.sort_by(f64::total_cmp);
     // Two measured lines less than half a percent apart say the same.
     all.dedup_by(|b, a| *b <= *a * 1.005);

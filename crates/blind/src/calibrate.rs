@@ -83,6 +83,7 @@ pub fn calibrate(
     for case in &cases {
         let recording = schedule.record(case)?;
         let diagnosed = diagnose(Question {
+            jumps: Vec::new(),
             recording: &recording,
             declared: declared(campaign),
             model: nominal.clone(),

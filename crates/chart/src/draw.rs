@@ -24,6 +24,8 @@ struct LateText {
     at: (f64, f64),
     text: String,
     style: TextStyle,
+    /// Whether it stands at the end of a line.
+    at_line_end: bool,
 }
 
 pub(crate) fn figure(figure: &Figure) -> String {
@@ -70,7 +72,7 @@ fn panel(svg: &mut Svg, placed: &PlacedPanel<'_>) {
     svg.close_group();
 }
 
-/// What texts on contour lines keep away from: markers and arrow heads.
+/// What texts on contour lines keep away from: markers, arrow heads and texts at the ends of lines.
 fn obstacles(frame: &Frame, items: &[Item]) -> Vec<(f64, f64)> {
     let mut out = Vec::new();
     for item in items {
@@ -80,6 +82,11 @@ fn obstacles(frame: &Frame, items: &[Item]) -> Vec<(f64, f64)> {
                 let middle =
                     |pair: &[(f64, f64)]| (0.5 * (pair[0].0 + pair[1].0), 0.5 * (pair[0].1 + pair[1].1));
                 out.extend(line.points.windows(2).map(|pair| frame.px(middle(pair))));
+            }
+            Item::Line(line) => {
+                let half = line.end_label.as_ref().map_or(0.0, |label| 0.5 * width_px(&label.text, LABEL_PX));
+                let text = end_label_at(frame, line);
+                out.extend(text.iter().flat_map(|at| [-half, 0.0, half].map(|dx| (at.0 + dx, at.1))));
             }
             _ => {}
         }
@@ -137,7 +144,24 @@ fn line(svg: &mut Svg, frame: &Frame, line: &Line, late: &mut Vec<LateText>) {
             }
         }
     }
-    let Some(label) = &line.end_label else { return };
+    let (Some(label), Some(at)) = (&line.end_label, end_label_at(frame, line)) else { return };
+    let width = width_px(&label.text, LABEL_PX);
+    // Two texts upon each other say nothing: the earlier one stays.
+    let covered = |earlier: &LateText| {
+        (earlier.at.0 - at.0).abs() < 0.5 * (width + width_px(&earlier.text, LABEL_PX))
+            && (earlier.at.1 - at.1).abs() < LABEL_PX
+    };
+    if !late.iter().filter(|text| text.at_line_end).any(covered) {
+        let style = TextStyle::new(LABEL_PX, line.colour, TextAnchor::Middle).halo().bold();
+        late.push(LateText { at, text: label.text.clone(), style, at_line_end: true });
+    }
+}
+
+/// Middle of the text at a line's end.
+fn end_label_at(frame: &Frame, line: &Line) -> Option<(f64, f64)> {
+    let label = line.end_label.as_ref()?;
+    let points: Vec<_> = line.points.iter().map(|p| frame.px(*p)).collect();
+    let pieces = clip::polyline(&points, &frame.rect);
     let ends = match label.end {
         LineEnd::First => pieces.first().map(|p| (p[1], p[0])),
         LineEnd::Last => pieces.last().map(|p| (p[p.len() - 2], p[p.len() - 1])),
@@ -145,7 +169,7 @@ fn line(svg: &mut Svg, frame: &Frame, line: &Line, late: &mut Vec<LateText>) {
     // A line of one visible point still gets its text.
     let single =
         points.iter().copied().find(|p| p.0.is_finite() && p.1.is_finite() && frame.rect.contains(*p));
-    let Some((inner, end)) = ends.or(single.map(|p| ((p.0 - 1.0, p.1), p))) else { return };
+    let (inner, end) = ends.or(single.map(|p| ((p.0 - 1.0, p.1), p)))?;
     let length = (end.0 - inner.0).hypot(end.1 - inner.1).max(1e-9);
     let (ux, uy) = ((end.0 - inner.0) / length, (end.1 - inner.1) / length);
     let half_width = 0.5 * width_px(&label.text, LABEL_PX);
@@ -155,12 +179,7 @@ fn line(svg: &mut Svg, frame: &Frame, line: &Line, late: &mut Vec<LateText>) {
     // No room above or below: beside the end instead of on it.
     let x = if y == centre.1 { centre.0 } else { end.0 - half_width - 9.0 };
     let leftmost = frame.rect.left + half_width + 2.0;
-    let x = x.clamp(leftmost, leftmost.max(frame.rect.right - half_width - 2.0));
-    late.push(LateText {
-        at: (x, y),
-        text: label.text.clone(),
-        style: TextStyle::new(LABEL_PX, line.colour, TextAnchor::Middle).halo().bold(),
-    });
+    Some((x.clamp(leftmost, leftmost.max(frame.rect.right - half_width - 2.0)), y))
 }
 
 fn scatter(svg: &mut Svg, frame: &Frame, scatter: &Scatter) {
@@ -257,6 +276,7 @@ fn contours(
                     text: level.label.clone(),
                     style: TextStyle::new(LABEL_PX, contours.colour, TextAnchor::Middle)
                         .turned(place.turn_deg),
+                    at_line_end: false,
                 });
             }
         }
@@ -274,6 +294,6 @@ fn annotation(frame: &Frame, item: &Annotation, late: &mut Vec<LateText>) {
     let at = (at.0 + item.shift_px.0, at.1 - item.shift_px.1);
     if at.0.is_finite() && at.1.is_finite() && frame.rect.contains(at) {
         let style = TextStyle::new(LABEL_PX, item.colour, item.anchor).halo();
-        late.push(LateText { at, text: item.text.clone(), style });
+        late.push(LateText { at, text: item.text.clone(), style, at_line_end: false });
     }
 }

@@ -32,6 +32,10 @@ impl Entry {
     pub(crate) fn width_px(&self) -> f64 {
         SWATCH_PX + 6.0 + width_px(&self.text, FONT_PX) + GAP_PX
     }
+
+    fn has_area(&self) -> bool {
+        self.swatches.iter().any(|swatch| matches!(swatch, Swatch::Area(..)))
+    }
 }
 
 /// One entry per text, in order of first appearance.
@@ -65,6 +69,8 @@ pub(crate) fn entries(panel: &Panel) -> Vec<Entry> {
         let Some(label) = label else { continue };
         let text = cut(label, FONT_PX, LONGEST_TEXT_PX);
         match entries.iter_mut().find(|entry| entry.text == text) {
+            // Areas are translucent: one upon another in a swatch would be darker than any in the picture.
+            Some(entry) if matches!(swatch, Swatch::Area(..)) && entry.has_area() => {}
             Some(entry) => entry.swatches.push(swatch),
             None => entries.push(Entry { text, swatches: vec![swatch] }),
         }

@@ -146,6 +146,30 @@ fn items_of_one_label_share_a_legend_entry() {
 }
 
 #[test]
+fn of_two_texts_at_one_line_end_the_earlier_stays() {
+    let line = |y: f64, text: &str| {
+        Line::new(vec![(0.0, y), (1.0, y)], palette::BLUE).end_label(text, LineEnd::Last)
+    };
+    let panel = Panel::new(Axis::new("x"), Axis::new("y"))
+        .with(line(1.0, "100 krpm"))
+        .with(line(1.0001, "101 krpm"))
+        .with(line(2.0, "200 krpm"));
+    let svg = Figure::new("").panel(panel).to_svg();
+    let shown = |text: &str| check(&svg).descendants().any(|n| n.text() == Some(text));
+    assert!(shown("100 krpm") && shown("200 krpm") && !shown("101 krpm"));
+}
+
+#[test]
+fn an_area_s_legend_has_the_shade_of_the_picture() {
+    let area =
+        |x: f64| Polygon::new(vec![(x, 0.0), (x + 1.0, 0.0), (x, 1.0)], palette::GREY).label("extrapolated");
+    let panel = Panel::new(Axis::new("x"), Axis::new("y")).with(area(0.0)).with(area(2.0)).with(area(4.0));
+    let svg = Figure::new("").panel(panel).to_svg();
+    // Three areas and one swatch: a swatch of three would be darker than any of them.
+    assert_eq!(check(&svg).descendants().filter(|n| n.attribute("fill-opacity").is_some()).count(), 4);
+}
+
+#[test]
 fn pixels_show_the_texts_without_fonts_of_the_machine() {
     let bare = Figure::new("").panel(Panel::new(Axis::new(""), Axis::new("")));
     let titled = Figure::new("Compressor map").panel(Panel::new(Axis::new("flow, kg/s"), Axis::new("P2/P1")));

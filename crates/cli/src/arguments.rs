@@ -178,6 +178,9 @@ pub struct PlanArguments {
     /// Also compare with conventional mapping and with the same points along speed lines
     #[arg(long)]
     pub compare: bool,
+    /// Make this jump after all else, e.g. the one that a gap diagnosis asks for: 130krpm@0.5 50krpm@0.7
+    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], value_parser = operating_point)]
+    pub append: Vec<OperatingPoint>,
     /// Say what the jump between two points gives and what forbids it, e.g. 110krpm@0.5 50krpm@0.7
     #[arg(long, num_args = 2, value_names = ["FROM", "TO"], value_parser = operating_point)]
     pub why: Vec<OperatingPoint>,

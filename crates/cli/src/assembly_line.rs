@@ -5,11 +5,12 @@ use crate::failure::Failure;
 use crate::predicted_method::Dynamic;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{self, Order, WindowChoice};
-use mapper_core::{Channel, Method, Plan};
+use mapper_core::{Channel, DeclaredUncertainty, Method, Plan};
 use mapper_identify::{IdentifyConfig, PressureTap, Stabilisation, WindowRule};
 use mapper_physics::model::Model;
 use mapper_planner::{PlanLimits, PlanRequest, PlanTiming, Repeats, SettleBands, VisitOrder, make_plan};
 use mapper_runner::{DriftWatch, Guard, LimitGuard, OnDrift, SilenceGuard, StepSource, SurgeGuard};
+use std::collections::BTreeMap;
 
 /// Surge longer than this ends a run, s: a jump may touch the line, a point may not stay beyond it.
 const SURGE_ALLOWED_S: f64 = 5.0;
@@ -82,6 +83,7 @@ pub fn with_plan_request<T>(
                 .p3_stroke_s
                 .map(|stroke_s| (limits.p3_max_pa - limits.p3_min_pa) / stroke_s),
         },
+        appended: None,
         repeats: campaign.repeats.map(|repeats| Repeats {
             jump: repeats.jump.map(|jump| (jump.from, jump.to)),
             every_steps: repeats.every_steps,
@@ -126,7 +128,12 @@ pub fn drift_watch<'a>(campaign: &Campaign, steps: &'a mut dyn StepSource) -> Op
         campaign::OnDrift::Continue => OnDrift::Continue,
         campaign::OnDrift::Zero => OnDrift::Zero,
     };
-    let declared = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    let mut declared: BTreeMap<Channel, DeclaredUncertainty> =
+        campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    // The gain of the flow meter may stand with the model's tolerances.
+    if let Some(flow) = declared.get_mut(&Channel::CompressorFlow) {
+        flow.gain_sigma_ratio = flow.gain_sigma_ratio.max(campaign.tolerances.flow_meter_gain_ratio);
+    }
     Some(DriftWatch::new(steps, on_drift, declared))
 }
 
@@ -159,7 +166,19 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         reference: campaign.reference,
         inlet_tap: tap(Channel::P1),
         outlet_tap: tap(Channel::P2),
-        declared: campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
+        declared: declared(campaign),
         ..IdentifyConfig::default()
     }
+}
+
+/// What is declared of the sensors; a flow meter without a gain of its own has that of the tolerances.
+fn declared(campaign: &Campaign) -> BTreeMap<Channel, DeclaredUncertainty> {
+    let mut declared: BTreeMap<Channel, DeclaredUncertainty> =
+        campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    if let Some(flow) = declared.get_mut(&Channel::CompressorFlow)
+        && flow.gain_sigma_ratio == 0.0
+    {
+        flow.gain_sigma_ratio = campaign.tolerances.flow_meter_gain_ratio;
+    }
+    declared
 }

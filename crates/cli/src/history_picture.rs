@@ -1,8 +1,7 @@
 //! Trends of the nights: a panel a figure, a line a campaign and method.
 
-use crate::commands::history_median as median;
 use mapper_chart::{Axis, Colour, Figure as Picture, Line, Panel, Scatter};
-use mapper_history::{Figure, ListedRun};
+use mapper_history::{Figure, ListedRun, median};
 use std::collections::{BTreeMap, BTreeSet};
 
 const COLOURS: [Colour; 8] = [
@@ -51,8 +50,8 @@ pub fn svg(runs: &[ListedRun], figures: &[Figure]) -> String {
                 night.1.extend(listed.run.figures.get(figure));
             }
             let mut places = Vec::new();
-            for ((started_ms, _), (moved, values)) in nights {
-                let Some(value) = median(values) else { continue };
+            for ((started_ms, _), (moved, mut values)) in nights {
+                let Some(value) = median(&mut values) else { continue };
                 places.push((day(started_ms), factor * value));
                 if moved {
                     rings.push((day(started_ms), factor * value));

@@ -6,6 +6,7 @@
 mod arguments;
 mod assembly_line;
 mod commands;
+mod drive;
 mod exit_code;
 mod failure;
 mod gap_arguments;

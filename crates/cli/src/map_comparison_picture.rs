@@ -6,6 +6,9 @@ use mapper_chart::{
 };
 use mapper_core::CompressorMap;
 
+/// Every how many places the second panel draws an error bar.
+const BAR_EVERY: usize = 5;
+
 /// Points of both maps with the places compared, and the difference of efficiency with its 95 % interval.
 pub fn figure(
     first: &CompressorMap,
@@ -81,9 +84,11 @@ fn eta_panel(comparison: &MapComparison) -> Panel {
         let points: Vec<ScatterPoint> = line
             .places
             .iter()
-            .map(|p| {
+            .enumerate()
+            .map(|(place, p)| {
                 let (y, half) = (100.0 * p.eta_difference, 196.0 * p.eta_standard_error);
-                let y_interval = Some((y - half, y + half));
+                // Bars vary slowly along a line: a few of them, on another place of each line, stay legible.
+                let y_interval = (place % BAR_EVERY == index % BAR_EVERY).then_some((y - half, y + half));
                 ScatterPoint { x: p.flow_corrected_kg_s, y, x_interval: None, y_interval }
             })
             .collect();

@@ -1,16 +1,17 @@
 //! One run of the night: the assembly line of `mapper run`, in this process, its files in a directory of its own.
 
+use crate::drive::drive;
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::observers::Recorder;
 use crate::registry::{BackendContext, make_backend};
-use crate::{assembly_line, output, run_directory};
+use crate::{assembly_line, output, run_directory, zero};
 use mapper_campaign::Campaign;
-use mapper_core::{Plan, UnpacedClock, Verdict};
+use mapper_core::{Plan, Verdict};
 use mapper_history::{Figure, PointRow, RunKey, RunRow};
 use mapper_physics::model::Model;
 use mapper_record::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, read_recording};
-use mapper_runner::{PlanSteps, RunEnd, Runner};
+use mapper_runner::{PlanSteps, RunEnd};
 use mapper_score::ScoredPoint;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -76,16 +77,8 @@ impl NightlyRun {
         };
         let failed = |error| Failure::new(Code::Failure, error);
         let mut recorder = Recorder::new(RecordingWriter::create(recording, &header).map_err(failed)?);
-        let end = Runner {
-            steps: &mut PlanSteps::new(plan),
-            guards: assembly_line::guards(&self.campaign, &backend.describe().channels),
-            backend: backend.as_mut(),
-            clock: &mut UnpacedClock,
-            observer: &mut recorder,
-            stop,
-        }
-        .run()
-        .map_err(|error| Failure::new(Code::Rig, error))?;
+        let end = drive(&self.campaign, &mut PlanSteps::new(plan), backend.as_mut(), &mut recorder, stop)
+            .map_err(|error| Failure::new(Code::Rig, error))?;
         recorder.finish().map_err(failed)?;
         Ok(end)
     }
@@ -93,10 +86,11 @@ impl NightlyRun {
     fn identify(&self, recording: &Path) -> Result<Vec<ScoredPoint>, Failure> {
         let bad = |error| Failure::new(Code::BadRecording, error);
         let read = read_recording(recording, &ChannelMap::native(), &ReadOptions::default()).map_err(bad)?;
-        let points =
-            mapper_identify::identify(&read.recording, &assembly_line::identification(&self.campaign))
-                .map_err(|error| Failure::new(Code::BadRecording, error))?;
-        mapper_score::score(recording, &read.recording.steps, points).map_err(bad)
+        let config = assembly_line::identification(&self.campaign);
+        let (recorded, config, _) = zero::apply(read.recording, config, &self.campaign);
+        let points = mapper_identify::identify(&recorded, &config)
+            .map_err(|error| Failure::new(Code::BadRecording, error))?;
+        mapper_score::score(recording, &recorded.steps, points).map_err(bad)
     }
 }
 

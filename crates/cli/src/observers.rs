@@ -49,20 +49,20 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// A bar for this plan.
-    pub fn new(plan: &Plan) -> Self {
+    /// A bar for this plan, after a soak of so many seconds.
+    pub fn new(plan: &Plan, soak_s: f64) -> Self {
         let target = if std::io::stderr().is_terminal() {
             ProgressDrawTarget::stderr()
         } else {
             ProgressDrawTarget::hidden()
         };
-        let bar = ProgressBar::with_draw_target(Some(plan.duration_s().ceil() as u64), target);
+        let bar = ProgressBar::with_draw_target(Some((soak_s + plan.duration_s()).ceil() as u64), target);
         let template = "{msg:34} [{wide_bar}] {pos}/{len} s of the rig's time, {eta} left";
         // A template that does not parse leaves the plain style.
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("=> "));
         }
-        bar.set_message("warm-up");
+        bar.set_message(if soak_s > 0.0 { "soak, warm-up" } else { "warm-up" });
         Progress { bar, steps: plan.steps.len() }
     }
 

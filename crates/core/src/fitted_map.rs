@@ -49,6 +49,13 @@ pub struct LeftOutLine {
     /// Median absolute error of efficiency at the nearest place of the fitted line, fraction; `None` without points
     /// that have one.
     pub eta: Option<f64>,
+    /// Share of its points whose distance lies within the 95 % interval of the fitted line and of a point about it;
+    /// `None` in files that do not say.
+    #[serde(default)]
+    pub distance_held_ratio: Option<f64>,
+    /// Share of its efficiencies that lie within theirs; `None` without any.
+    #[serde(default)]
+    pub eta_held_ratio: Option<f64>,
 }
 
 /// A fitted map: a rectangular table over corrected speed and `beta` (0 at the choke end, 1 at the surge end).

@@ -1,16 +1,22 @@
-//! Error rates of the drift decision on simulated campaigns: `drift_study NULLS PER_CAUSE FIRST_SEED [FACTOR]`.
+//! Error rates of the drift decision on simulated campaigns: `drift_study NULLS PER_CAUSE FIRST_SEED [FACTOR [METHOD [CAUSE]]]`.
 //!
 //! Drifts are FACTOR (3) to twice FACTOR times the printed detection limit over the campaign, two of three as rates from
-//! an onset in the first 40 %, one of three as a step in the middle half. Prints a confusion table as Markdown.
+//! an onset in the first 40 %, one of three as a step in the middle half. Points are identified by METHOD (`dynamic`,
+//! `joint` or `steady`). Prints a confusion table as Markdown.
+//!
+//! Each campaign has a twin: same seed, same noise, without the drift. What the points of the drifting one differ by is the
+//! error that the drift makes; what its corrected points still differ by is what the correction leaves of it.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
+// A study stops at the first surprise and says where; it prints its table.
+#![allow(clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use common::{Planted, campaign, draw, judge};
-use mapper_core::Channel;
+use common::{Planted, campaign, draw, identification, judge, judge_by};
+use mapper_core::{Channel, Method};
 use mapper_drift::{Cause, Course, CourseKind, RateOrStep};
+use mapper_identify::{IdentifyConfig, identify_each};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -32,8 +38,11 @@ struct Row {
     clear: bool,
     onset_right: bool,
     size_right: bool,
-    shrink: Option<f64>,
-    shrink_identified: Option<f64>,
+    /// Size found over size planted, where the course is of the same kind.
+    size_ratio: Option<f64>,
+    /// Errors against the truth of `eta`, of `eta_identified`, and of the drift alone in `eta_identified`: over the same
+    /// without correction.
+    shrink: [Option<f64>; 3],
     said: String,
 }
 
@@ -45,12 +54,23 @@ fn main() {
     let (nulls, per_cause, first) =
         (number(0, 20.0) as usize, number(1, 3.0) as usize, number(2, 1000.0) as u64);
     let factor = number(3, 3.0);
+    let method = match arguments.get(4).map(String::as_str) {
+        None | Some("dynamic") => Method::Dynamic,
+        Some("joint") => Method::Joint,
+        Some("steady") => Method::Steady,
+        Some(other) => panic!("{other} is no method"),
+    };
+    let config = IdentifyConfig { method, ..identification() };
     let limits: BTreeMap<Cause, f64> = judge(&campaign(first, None).recording)
         .detection_limits
         .into_iter()
         .map(|limit| (limit.cause, limit.change))
         .collect();
-    let total = nulls + per_cause * CAUSES.len();
+    let causes: Vec<Cause> = CAUSES
+        .into_iter()
+        .filter(|cause| arguments.get(5).is_none_or(|only| cause.name() == only.as_str()))
+        .collect();
+    let total = nulls + per_cause * causes.len();
     let next = AtomicUsize::new(0);
     let rows = Mutex::new(Vec::new());
     let work = || {
@@ -59,21 +79,27 @@ fn main() {
             if index >= total {
                 return;
             }
-            let cause = index.checked_sub(nulls).map(|index| CAUSES[index % CAUSES.len()]);
-            let row = one(first + 1 + index as u64, cause, &limits, factor);
-            rows.lock().unwrap().push((index, row));
+            let cause = index.checked_sub(nulls).map(|index| causes[index % causes.len()]);
+            let row = one(first + 1 + index as u64, cause, &limits, factor, &config);
+            rows.lock().expect("no thread panics while it holds the rows").push((index, row));
         }
     };
     std::thread::scope(|scope| {
         scope.spawn(work);
         scope.spawn(work);
     });
-    let mut rows = rows.into_inner().unwrap();
+    let mut rows = rows.into_inner().expect("threads are joined");
     rows.sort_by_key(|(index, _)| *index);
     print(rows.into_iter().map(|(_, row)| row).collect());
 }
 
-fn one(seed: u64, cause: Option<Cause>, limits: &BTreeMap<Cause, f64>, factor: f64) -> Row {
+fn one(
+    seed: u64,
+    cause: Option<Cause>,
+    limits: &BTreeMap<Cause, f64>,
+    factor: f64,
+    config: &IdentifyConfig,
+) -> Row {
     let mut draw = draw(seed ^ 0xd21f);
     let planted = cause.map(|cause| {
         let kind = if draw() < 1.0 / 3.0 { CourseKind::Step } else { CourseKind::Ramp };
@@ -88,32 +114,40 @@ fn one(seed: u64, cause: Option<Cause>, limits: &BTreeMap<Cause, f64>, factor: f
         let change = sign * factor * (1.0 + draw()) * limits[&cause];
         Planted { cause, course, size: change / course.at(span_s) }
     });
-    let campaign = campaign(seed, planted);
-    let report = judge(&campaign.recording);
+    let (campaign, twin) = (campaign(seed, planted), campaign(seed, None));
+    let report = judge_by(&campaign.recording, config);
+    let of_twin: Vec<Option<f64>> = identify_each(&twin.recording, config)
+        .map(|points| points.into_iter().map(|point| point.ok()?.eta).collect())
+        .unwrap_or_default();
     let within = |low: Option<f64>, high: Option<f64>, value: f64| matches!((low, high), (Some(low), Some(high)) if (low..=high).contains(&value));
     // Two repeats: twice the time between visits of the reference jump.
     let two_repeats_s = 2.0 * 8.0 * common::DWELL_S;
     let onset_right = planted.is_some_and(|planted| {
         report.onset_s.is_some_and(|onset_s| (onset_s - planted.course.onset_s).abs() <= two_repeats_s)
     });
-    let shrink = |eta: &dyn Fn(usize) -> Option<f64>| {
-        let planted = planted?;
-        let mut errors = Vec::new();
-        for (step, (true_eta, point)) in campaign.eta_true.iter().zip(&report.corrected_points).enumerate() {
-            let drift = planted.size * planted.course.at(campaign.recording.steps[step].end_s);
-            let start = if planted.cause == Cause::Fouling { true_eta / (1.0 + drift) } else { *true_eta };
-            // Steps that cannot be identified (the first one, and opening 0.5 near surge) have nothing to compare.
-            if let (Some(now), Some(uncorrected)) = (eta(step), point.eta_uncorrected) {
-                errors.push((now - start, uncorrected - start));
-            }
-        }
-        let rms = |values: Vec<f64>| {
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
-        };
-        let (corrected, uncorrected): (Vec<f64>, Vec<f64>) = errors.into_iter().unzip();
-        Some(rms(corrected) / rms(uncorrected))
+    // The mean is taken out: a constant bias is not the correction's business.
+    let rms = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
     };
+    let shrink = |eta: &dyn Fn(usize) -> Option<f64>, right: &dyn Fn(usize) -> Option<f64>| {
+        let steps = 0..campaign.eta_true.len();
+        // Steps that cannot be identified (the first one, and some near surge) have nothing to compare.
+        let errors = steps.filter_map(|step| {
+            let right = right(step)?;
+            Some((eta(step)? - right, report.corrected_points.get(step)?.eta_uncorrected? - right))
+        });
+        let (corrected, uncorrected): (Vec<f64>, Vec<f64>) = errors.unzip();
+        (!corrected.is_empty()).then(|| rms(&corrected) / rms(&uncorrected))
+    };
+    let planted_at = |step: usize| {
+        planted.map_or(0.0, |planted| planted.size * planted.course.at(campaign.recording.steps[step].end_s))
+    };
+    let fouled = |step: usize| if cause == Some(Cause::Fouling) { 1.0 + planted_at(step) } else { 1.0 };
+    let start = |step: usize| Some(campaign.eta_true[step] / fouled(step));
+    let fitted = |step: usize| Some(report.corrected_points.get(step)?.eta);
+    let identified = |step: usize| report.corrected_points.get(step)?.eta_identified;
+    let undrifted = |step: usize| *of_twin.get(step)?;
     Row {
         cause,
         found: report.cause,
@@ -127,17 +161,22 @@ fn one(seed: u64, cause: Option<Cause>, limits: &BTreeMap<Cause, f64>, factor: f
             );
             same_kind && within(report.low, report.high, planted.size)
         }),
-        shrink: shrink(&|step| Some(report.corrected_points.get(step)?.eta)),
-        shrink_identified: shrink(&|step| report.corrected_points.get(step)?.eta_identified),
+        size_ratio: planted.and_then(|planted| match (report.size?, planted.course.kind) {
+            (RateOrStep::RatePerH(size), CourseKind::Ramp) | (RateOrStep::Step(size), CourseKind::Step) => {
+                Some(size / planted.size)
+            }
+            _ => None,
+        }),
+        shrink: [shrink(&fitted, &start), shrink(&identified, &start), shrink(&identified, &undrifted)],
         said: format!("seed {seed}: {planted:?} -> {} p {:.2}", report.reason, report.probability),
     }
 }
 
 fn print(rows: Vec<Row>) {
     println!(
-        "| planted | campaigns | right cause | other cause | nothing found | onset within two repeats | size in its interval | error of eta left (median) | the same, identified step by step |"
+        "| planted | campaigns | right cause | other cause | nothing found | onset within two repeats | size in its interval | size found over planted (median) | error of `eta` left | of `eta_identified` | of the drift alone |"
     );
-    println!("|---|---:|---:|---:|---:|---:|---:|---:|---:|");
+    println!("|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|");
     let causes = std::iter::once(None).chain(CAUSES.into_iter().map(Some));
     for cause in causes {
         let own: Vec<&Row> = rows.iter().filter(|row| row.cause == cause).collect();
@@ -151,7 +190,7 @@ fn print(rows: Vec<Row>) {
             values.get(values.len() / 2).map_or_else(|| "-".to_owned(), |value| format!("{value:.2}"))
         };
         println!(
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             cause.map_or("nothing", Cause::name),
             own.len(),
             count(&|row| row.found == cause),
@@ -159,8 +198,10 @@ fn print(rows: Vec<Row>) {
             count(&|row| row.found.is_none()),
             count(&|row| row.onset_right),
             count(&|row| row.size_right),
-            median(&|row| row.shrink),
-            median(&|row| row.shrink_identified),
+            median(&|row| row.size_ratio),
+            median(&|row| row.shrink[0]),
+            median(&|row| row.shrink[1]),
+            median(&|row| row.shrink[2]),
         );
     }
     for row in rows.iter().filter(|row| row.found != row.cause || (row.found.is_some() && !row.clear)) {

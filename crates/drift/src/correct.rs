@@ -2,12 +2,13 @@
 
 use crate::blocks::{CampaignStep, OUTPUTS};
 use crate::decide::Decision;
-use crate::nuisance::Constant;
+use crate::fit::Fit;
+use crate::refine::Refined;
 use crate::report::{
     CorrectedPoint, DriftReport, DriftVerdict, RateOrStep, RepeatGroup, Visit, VisitChannel,
 };
-use crate::study::{self, Readings};
-use crate::{Cause, DriftError, DriftRequest, blocks};
+use crate::study::Readings;
+use crate::{Cause, Course, CourseKind, DriftError, DriftRequest, blocks};
 use mapper_core::{Channel, IdentifiedPoint, Recording};
 use mapper_identify::identify_each;
 use nalgebra::DVector;
@@ -16,13 +17,13 @@ use std::collections::BTreeMap;
 pub(crate) fn report(
     request: &DriftRequest<'_>,
     recordings: &[&Recording],
-    readings: &Readings,
-    constants: &[Constant],
+    refined: &Refined,
     groups: &[Vec<usize>],
     decision: &Decision,
 ) -> Result<DriftReport, DriftError> {
     let points: Vec<Vec<IdentifiedPoint>> =
         recordings.iter().map(|recording| identified(recording, request)).collect();
+    let (readings, fit) = (&refined.readings, &refined.fit);
     let groups = groups.iter().map(|visits| group(request, recordings, readings, &points, visits)).collect();
     let verdict = match (decision.flagged, decision.clear) {
         (false, _) => DriftVerdict::None,
@@ -33,7 +34,7 @@ pub(crate) fn report(
     let (own, others): (Vec<_>, Vec<_>) =
         decision.probabilities.iter().copied().partition(|alternative| alternative.cause == found);
     let corrected_points = if decision.flagged {
-        corrected_points(request, recordings, readings, constants, &points, decision)
+        corrected_points(request, recordings, refined, &points, decision.cause)
     } else {
         Vec::new()
     };
@@ -43,14 +44,14 @@ pub(crate) fn report(
         cause: found,
         probability: own.first().map_or(0.0, |alternative| alternative.probability),
         alternatives: others,
-        onset_s: only_found(decision.course.onset_s),
-        onset_low_s: only_found(decision.onset_low_s),
-        onset_high_s: only_found(decision.onset_high_s),
-        size: decision.flagged.then(|| study::size(decision)),
-        low: only_found(decision.low),
-        high: only_found(decision.high),
+        onset_s: only_found(fit.course.onset_s),
+        onset_low_s: only_found(fit.onset_low_s),
+        onset_high_s: only_found(fit.onset_high_s),
+        size: decision.flagged.then(|| size(fit)),
+        low: only_found(fit.low),
+        high: only_found(fit.high),
         unit: found.map(Cause::unit),
-        reason: reason(decision, verdict),
+        reason: reason(decision, fit, verdict),
         evidence: decision.evidence,
         threshold: decision.threshold,
         detection_limits: decision.limits.clone(),
@@ -59,7 +60,7 @@ pub(crate) fn report(
     })
 }
 
-fn reason(decision: &Decision, verdict: DriftVerdict) -> String {
+fn reason(decision: &Decision, fit: &Fit, verdict: DriftVerdict) -> String {
     let left_out = match decision.left_out {
         (0, _) => String::new(),
         (count, all) => format!("; {count} of {all} stretches are left out, the model cannot follow them"),
@@ -72,11 +73,11 @@ fn reason(decision: &Decision, verdict: DriftVerdict) -> String {
         return format!("Nothing drifted: {compared}.");
     }
     let unit = decision.cause.unit();
-    let size = match study::size(decision) {
+    let size = match size(fit) {
         RateOrStep::RatePerH(rate) => format!("drifts by {rate:.4} {unit} per hour from"),
         RateOrStep::Step(step) => format!("steps by {step:.4} {unit} at"),
     };
-    let what = format!("{} {size} {:.0} s on", decision.cause, decision.course.onset_s);
+    let what = format!("{} {size} {:.0} s on", decision.cause, fit.course.onset_s);
     let corrected = match decision.cause {
         Cause::Sensor(channel) => format!(
             "The corrected points have this taken off the reading of {}; the recording is as it was.",
@@ -187,25 +188,30 @@ fn visit_channels(
     OUTPUTS.iter().enumerate().filter_map(entry).collect()
 }
 
+/// Rate or step of a fit.
+fn size(fit: &Fit) -> RateOrStep {
+    match fit.course.kind {
+        CourseKind::Ramp => RateOrStep::RatePerH(fit.size),
+        CourseKind::Step => RateOrStep::Step(fit.size),
+    }
+}
+
 /// All points, the drift taken out.
 fn corrected_points(
     request: &DriftRequest<'_>,
     recordings: &[&Recording],
-    readings: &Readings,
-    constants: &[Constant],
+    refined: &Refined,
     points: &[Vec<IdentifiedPoint>],
-    decision: &Decision,
+    cause: Cause,
 ) -> Vec<CorrectedPoint> {
-    let noise = study::noise_of(decision);
-    let explained = &decision.whitened - &decision.whitened_cause * decision.size;
-    let sizes = noise.constants(&explained);
-    let signature = readings.signature(decision.cause);
+    let Refined { readings, constants, fit } = refined;
+    let signature = readings.signature(cause);
     let corrected: Vec<Vec<IdentifiedPoint>> = (0..recordings.len())
-        .map(|run| match decision.cause {
+        .map(|run| match cause {
             Cause::Sensor(channel) => {
                 let offset_s =
                     readings.steps.iter().find(|step| step.run == run).map_or(0.0, |step| step.offset_s);
-                identified(&undrifted(recordings[run], channel, offset_s, decision), request)
+                identified(&undrifted(recordings[run], channel, offset_s, fit), request)
             }
             Cause::Fouling | Cause::BearingFriction => points[run].clone(),
         })
@@ -215,11 +221,11 @@ fn corrected_points(
         .iter()
         .enumerate()
         .filter_map(|(position, step)| {
-            let drift = decision.size * decision.course.at(step.end_s + step.offset_s);
+            let drift = fit.drift_at(step.end_s + step.offset_s);
             // A step that the model cannot follow has no point.
             let (mut eta, mut h_w_m2k) =
                 *readings.step_ends.get(position).filter(|(eta, _)| eta.is_finite())?;
-            for (constant, size) in constants.iter().zip(sizes.iter()) {
+            for (constant, size) in constants.iter().zip(fit.constants.iter()) {
                 eta += constant.eta[position] * size;
                 h_w_m2k += constant.h_w_m2k[position] * size;
             }
@@ -228,7 +234,7 @@ fn corrected_points(
                 h_w_m2k += signature.h_w_m2k[position] * drift;
             }
             // What the machine at the campaign's start would have had at this operating point.
-            let fouled = if decision.cause == Cause::Fouling { 1.0 + drift } else { 1.0 };
+            let fouled = if cause == Cause::Fouling { 1.0 + drift } else { 1.0 };
             let weights = DVector::from_iterator(constants.len(), constants.iter().map(|c| c.eta[position]));
             let identified = point_of(&corrected, step).and_then(|point| point.eta);
             let recorded = point_of(points, step);
@@ -239,7 +245,7 @@ fn corrected_points(
                     .map_or_else(|| mean_speed_rpm(recordings[step.run], step), |point| point.speed_rpm),
                 valve: step.valve_opening_ratio,
                 eta: eta / fouled,
-                sigma_eta: noise.variance(&weights).max(0.0).sqrt(),
+                sigma_eta: fit.noise.variance(&weights).max(0.0).sqrt(),
                 h_w_m2k,
                 eta_identified: identified.map(|eta| eta / fouled),
                 eta_uncorrected: recorded.and_then(|point| point.eta),
@@ -256,12 +262,31 @@ fn mean_speed_rpm(recording: &Recording, step: &CampaignStep) -> f64 {
 }
 
 /// The recording with the drift of one sensor taken off.
-fn undrifted(recording: &Recording, channel: Channel, offset_s: f64, decision: &Decision) -> Recording {
+fn undrifted(recording: &Recording, channel: Channel, offset_s: f64, fit: &Fit) -> Recording {
+    take_off(recording, channel, &|t_s| fit.drift_at(t_s + offset_s))
+}
+
+/// The first recording with the drift of its sensor, as reported, taken off; `None` where no sensor was found to drift.
+pub fn without_drift(recording: &Recording, report: &DriftReport) -> Option<Recording> {
+    let (Some(Cause::Sensor(channel)), Some(onset_s), Some(size)) =
+        (report.cause, report.onset_s, report.size)
+    else {
+        return None;
+    };
+    let (kind, size) = match size {
+        RateOrStep::RatePerH(rate) => (CourseKind::Ramp, rate),
+        RateOrStep::Step(step) => (CourseKind::Step, step),
+    };
+    let course = Course { kind, onset_s };
+    Some(take_off(recording, channel, &|t_s| size * course.at(t_s)))
+}
+
+fn take_off(recording: &Recording, channel: Channel, drift_at: &dyn Fn(f64) -> f64) -> Recording {
     let mut recording = recording.clone();
     if let Some(series) = recording.series.get_mut(&channel) {
         for (t_s, value) in series.t_s.iter().zip(&mut series.values) {
-            let drift = decision.size * decision.course.at(t_s + offset_s);
-            *value = if decision.cause.is_gain() { *value / (1.0 + drift) } else { *value - drift };
+            let drift = drift_at(*t_s);
+            *value = if Cause::Sensor(channel).is_gain() { *value / (1.0 + drift) } else { *value - drift };
         }
     }
     recording

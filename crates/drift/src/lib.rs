@@ -8,14 +8,20 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod blocks;
+mod candidates;
 mod cause;
 mod correct;
 mod course;
 mod decide;
+mod fit;
 mod inputs;
 mod knob;
+mod leftovers;
 mod low_rank;
 mod nuisance;
+mod planted;
+mod plausible;
+mod refine;
 mod repeats;
 mod report;
 mod request;
@@ -23,6 +29,7 @@ mod simulate;
 mod study;
 
 pub use cause::{Cause, CauseKind};
+pub use correct::without_drift;
 pub use course::{Course, CourseKind};
 pub use report::{
     Alternative, CorrectedPoint, DetectionLimit, DriftReport, DriftVerdict, RateOrStep, RepeatGroup, Visit,

@@ -45,7 +45,7 @@ pub enum DriftError {
     },
     /// The model cannot be driven by what was recorded.
     #[error(
-        "the nominal model cannot follow recording {}: {source} Does the campaign name the machine that was recorded?",
+        "the nominal model cannot follow recording {}: {source}. Does the campaign name the machine that was recorded?",
         .run + 1
     )]
     Drive {

@@ -4,6 +4,7 @@ use crate::DriftError;
 use crate::blocks::{Block, CampaignStep, OUTPUTS};
 use crate::inputs::{self, RecordedInputs};
 use crate::knob::Knob;
+use crate::planted::Planted;
 use mapper_core::{Channel, Recording};
 use mapper_physics::driven::{DriveError, FrozenGrid, drive, settle};
 use mapper_physics::inputs::Inputs;
@@ -20,6 +21,9 @@ const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.
 /// A jump that the model cannot follow (deep beyond the surge line) is left out for this long, s: shaft and outlet then
 /// stand where they were read, the metal as far from where it was as its sensors say.
 const LEFT_OUT_S: f64 = 5.0;
+/// A machine that drifts is taken as constant over this long, s, or over the so-manieth part of a long step.
+const PART_S: f64 = 30.0;
+const MOST_PARTS: f64 = 60.0;
 /// Readings this long before the start say what state it is in, s.
 const BEFORE_S: f64 = 2.0;
 
@@ -45,6 +49,7 @@ pub(crate) struct Drive<'a> {
 
 /// One step of the run.
 struct Stretch {
+    step: CampaignStep,
     start_s: f64,
     end_s: f64,
     /// The state as read just before the jump.
@@ -102,6 +107,7 @@ impl<'a> Drive<'a> {
         let mut stretches = Vec::new();
         for (position, step) in &of_run {
             let mut stretch = Stretch {
+                step: **step,
                 start_s: step.start_s,
                 end_s: step.end_s,
                 read_first: read_state(recording, step.start_s - 0.6),
@@ -127,12 +133,15 @@ impl<'a> Drive<'a> {
         Ok(Drive { model, inputs, start, stretches, blocks: block_count })
     }
 
-    /// The run with one knob turned, or none. An error names the stretch that the model could not follow.
-    fn predict(&self, turned: Option<(Knob, f64)>) -> Result<Prediction, (usize, DriveError)> {
-        let mut model = self.model.clone();
+    /// The run with one knob turned, or none, beside what is planted. An error names the stretch that the model could not
+    /// follow.
+    fn predict(
+        &self,
+        planted: Option<Planted>,
+        turned: Option<(Knob, f64)>,
+    ) -> Result<Prediction, (usize, DriveError)> {
         let mut state = self.start;
         if let Some((knob, by)) = turned {
-            knob.turn(&mut model.params, by);
             match knob {
                 Knob::InitialTc => {
                     state.tc_k += by;
@@ -142,7 +151,6 @@ impl<'a> Drive<'a> {
                 _ => {}
             }
         }
-        let inputs = Turned { inputs: &self.inputs, turned };
         let mut prediction = Prediction {
             means: vec![[0.0; OUTPUTS.len()]; self.blocks],
             surge_position_ratio: vec![f64::NEG_INFINITY; self.blocks],
@@ -162,26 +170,37 @@ impl<'a> Drive<'a> {
                 }
                 _ => {}
             }
-            let grid = FrozenGrid::new(start_s, stretch.end_s, &[], &nodes_s(stretch, start_s));
-            state = drive(
-                &model,
-                &inputs,
-                state,
-                &grid,
-                &stretch.times_s,
-                |reading, prepared, state, outputs| match stretch.places[reading] {
-                    Place::StepEnd => prediction.step_ends[index] = (outputs.efficiency, outputs.h_w_m2k),
-                    Place::Block(block) => {
-                        for (sum, channel) in prediction.means[block].iter_mut().zip(OUTPUTS) {
-                            *sum += true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
+            let offset_s = stretch.step.offset_s;
+            let inputs = Turned { inputs: &self.inputs, turned, planted, offset_s };
+            let nodes = nodes_s(stretch, start_s);
+            for (from_s, to_s) in parts(stretch, start_s, planted) {
+                let mut model = self.model.clone();
+                if let Some((knob, by)) = turned {
+                    knob.turn(&mut model.params, by);
+                }
+                if let Some(planted) = planted {
+                    planted.drift_machine(&mut model.params, from_s + offset_s, to_s + offset_s);
+                }
+                let before = stretch.times_s.partition_point(|t_s| *t_s < from_s);
+                let times_s = &stretch.times_s[before..];
+                let times_s = &times_s[..times_s.partition_point(|t_s| *t_s < to_s)];
+                let grid = FrozenGrid::new(from_s, to_s, &[], &nodes);
+                let step_ends = &mut prediction.step_ends;
+                let (means, highest) = (&mut prediction.means, &mut prediction.surge_position_ratio);
+                state = drive(&model, &inputs, state, &grid, times_s, |reading, prepared, state, outputs| {
+                    match stretch.places[before + reading] {
+                        Place::StepEnd => step_ends[index] = (outputs.efficiency, outputs.h_w_m2k),
+                        Place::Block(block) => {
+                            for (sum, channel) in means[block].iter_mut().zip(OUTPUTS) {
+                                *sum += true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
+                            }
+                            highest[block] = highest[block].max(outputs.surge_position_ratio);
+                            counts[block] += 1;
                         }
-                        let highest = &mut prediction.surge_position_ratio[block];
-                        *highest = highest.max(outputs.surge_position_ratio);
-                        counts[block] += 1;
                     }
-                },
-            )
-            .map_err(|error| (index, error))?;
+                })
+                .map_err(|error| (index, error))?;
+            }
         }
         for (means, count) in prediction.means.iter_mut().zip(counts) {
             // Nothing was said of a stretch that was not followed.
@@ -190,11 +209,14 @@ impl<'a> Drive<'a> {
         Ok(prediction)
     }
 
-    /// The run as it is, and with each knob turned, over all cores.
-    pub fn predict_all(&mut self) -> Result<(Prediction, Vec<Prediction>), DriveError> {
+    /// The run with what is planted, and with each knob turned beside it, over all cores.
+    pub fn predict_all(
+        &mut self,
+        planted: Option<Planted>,
+    ) -> Result<(Prediction, Vec<Prediction>), DriveError> {
         loop {
             // What is left out is left out in all, so that their differences stay smooth.
-            let (index, error) = match self.try_all() {
+            let (index, error) = match self.try_all(planted) {
                 Ok(predictions) => return Ok(predictions),
                 Err(failed) => failed,
             };
@@ -207,15 +229,18 @@ impl<'a> Drive<'a> {
         }
     }
 
-    fn try_all(&self) -> Result<(Prediction, Vec<Prediction>), (usize, DriveError)> {
-        let base = self.predict(None)?;
+    fn try_all(
+        &self,
+        planted: Option<Planted>,
+    ) -> Result<(Prediction, Vec<Prediction>), (usize, DriveError)> {
+        let base = self.predict(planted, None)?;
         let next = AtomicUsize::new(0);
         let done = Mutex::new(Vec::new());
         let work = || {
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
                 let Some(knob) = Knob::ALL.get(index) else { return };
-                let prediction = self.predict(Some((*knob, knob.step())));
+                let prediction = self.predict(planted, Some((*knob, knob.step())));
                 done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((index, prediction));
             }
         };
@@ -251,6 +276,26 @@ fn nodes_s(stretch: &Stretch, start_s: f64) -> Vec<f64> {
         nodes.push(at_s);
     }
     nodes
+}
+
+/// Parts of a stretch in each of which the machine is one and the same: the whole of it, but for a machine that drifts.
+fn parts(stretch: &Stretch, start_s: f64, planted: Option<Planted>) -> Vec<(f64, f64)> {
+    let mut edges = vec![start_s];
+    if let Some(Planted { course, .. }) = planted.filter(Planted::machine_changes) {
+        let count = ((stretch.end_s - start_s) / PART_S).ceil().clamp(1.0, MOST_PARTS);
+        edges.extend(
+            (1..count as usize).map(|part| start_s + (stretch.end_s - start_s) * part as f64 / count),
+        );
+        let onset_s = course.onset_s - stretch.step.offset_s;
+        // Not so close to an end that a part has no length.
+        if (start_s + 0.1..stretch.end_s - 0.1).contains(&onset_s) {
+            edges.push(onset_s);
+        }
+        edges.sort_by(f64::total_cmp);
+        edges.dedup_by(|b, a| *b - *a < 0.05);
+    }
+    edges.push(stretch.end_s);
+    edges.windows(2).map(|pair| (pair[0], pair[1])).collect()
 }
 
 /// The state as read around a time.
@@ -300,10 +345,13 @@ fn start_state(
     Ok(if has_metal { State { tc_k, inner_k: tc_k, tt_k, ..settled } } else { settled })
 }
 
-/// Inputs with one of them turned.
+/// Inputs with one of them turned, and the drift of a sensor taken off.
 struct Turned<'a> {
     inputs: &'a RecordedInputs,
     turned: Option<(Knob, f64)>,
+    planted: Option<Planted>,
+    /// What is added to run time for the time of the campaign, s.
+    offset_s: f64,
 }
 
 impl Inputs for Turned<'_> {
@@ -311,6 +359,9 @@ impl Inputs for Turned<'_> {
         let mut boundary = self.inputs.at(t_s);
         if let Some((knob, by)) = self.turned {
             knob.shift(&mut boundary, by);
+        }
+        if let Some(planted) = self.planted {
+            planted.undrift(&mut boundary, t_s + self.offset_s);
         }
         boundary
     }
@@ -320,6 +371,6 @@ impl Inputs for Turned<'_> {
     }
 
     fn is_constant_after(&self, t_s: f64) -> bool {
-        self.inputs.is_constant_after(t_s)
+        !self.planted.is_some_and(|planted| planted.input_drifts()) && self.inputs.is_constant_after(t_s)
     }
 }

@@ -1,13 +1,14 @@
 //! From recordings to the answer.
 
 use crate::blocks::{self, Block, CampaignStep, OUTPUTS};
-use crate::decide::{self, Decision};
+use crate::decide;
 use crate::knob::{INPUTS, Knob};
-use crate::low_rank::LowRank;
 use crate::nuisance::{self, Constant};
-use crate::report::{DriftReport, RateOrStep};
+use crate::planted::Planted;
+use crate::refine::Refined;
+use crate::report::DriftReport;
 use crate::simulate::{Drive, Prediction};
-use crate::{Cause, CourseKind, DriftError, DriftRequest, correct, repeats};
+use crate::{Cause, DriftError, DriftRequest, correct, plausible, repeats};
 use mapper_core::{Channel, DeclaredUncertainty, Dimension, Recording};
 use nalgebra::DMatrix;
 
@@ -46,7 +47,9 @@ pub(crate) struct Readings {
     pub step_ends: Vec<(f64, f64)>,
     /// Mean of each of [`INPUTS`].
     pub input_levels: Vec<f64>,
-    /// Every stretch with its readings and the model's, those that are not compared included.
+    /// Positions of the stretches that are compared among all.
+    kept: Vec<usize>,
+    /// Every stretch with its readings and the nominal model's, those that are not compared included.
     pub all: Vec<(Block, [Option<f64>; OUTPUTS.len()], [f64; OUTPUTS.len()])>,
 }
 
@@ -113,6 +116,59 @@ impl Readings {
             }
         }
     }
+
+    /// The same readings beside another prediction; `None` where it does not say all that the first one said.
+    pub fn around(&self, base: Prediction, turned: &[Prediction]) -> Option<Readings> {
+        let columns = &self.columns;
+        let rows = |values: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
+            self.kept
+                .iter()
+                .flat_map(|block| columns.iter().map(move |column| values(*block, *column)))
+                .collect()
+        };
+        let answers = Knob::ALL
+            .iter()
+            .zip(turned)
+            .map(|(knob, turned)| Constant {
+                readings: rows(&|block, column| {
+                    (turned.means[block][column] - base.means[block][column]) / knob.step()
+                }),
+                eta: (0..self.steps.len())
+                    .map(|step| finite((turned.step_ends[step].0 - base.step_ends[step].0) / knob.step()))
+                    .collect(),
+                h_w_m2k: (0..self.steps.len())
+                    .map(|step| finite((turned.step_ends[step].1 - base.step_ends[step].1) / knob.step()))
+                    .collect(),
+            })
+            .collect();
+        let readings = Readings {
+            runs: self.runs,
+            steps: self.steps.clone(),
+            blocks: self.blocks.clone(),
+            columns: self.columns.clone(),
+            difference: rows(&|block, column| {
+                self.all[block].1[column].unwrap_or(f64::NAN) - base.means[block][column]
+            }),
+            model: rows(&|block, column| base.means[block][column]),
+            answers,
+            step_ends: base.step_ends,
+            input_levels: self.input_levels.clone(),
+            kept: self.kept.clone(),
+            all: self.all.clone(),
+        };
+        readings.difference.iter().all(|value| value.is_finite()).then_some(readings)
+    }
+
+    /// Takes a linear part out of the model, as large as `of_rows` says in the readings, as `of_steps` at the steps' ends.
+    pub fn give_back(&mut self, part: &Constant, of_rows: &[f64], of_steps: &[f64]) {
+        for ((difference, shown), size) in self.difference.iter_mut().zip(&part.readings).zip(of_rows) {
+            *difference += shown * size;
+        }
+        for (step, ((eta, h_w_m2k), size)) in self.step_ends.iter_mut().zip(of_steps).enumerate() {
+            *eta -= part.eta[step] * size;
+            *h_w_m2k -= part.h_w_m2k[step] * size;
+        }
+    }
 }
 
 /// Says whether anything drifted, and what.
@@ -130,7 +186,7 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     if let Some(reason) = repeats::refusal(request.runs, &steps, &groups) {
         return Ok(DriftReport::without_verdict(reason));
     }
-    let readings = read(request, &recordings, steps)?;
+    let (readings, mut drives) = read(request, &recordings, steps)?;
     let declared =
         |channel: Channel| request.identification.declared.get(&channel).copied().unwrap_or_default();
     let constants = nuisance::constants(&readings, &declared);
@@ -138,16 +194,36 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     let columns = DMatrix::from_fn(readings.difference.len(), constants.len(), |row, column| {
         constants[column].readings[row]
     });
-    let decision = decide::decide(&readings, own, &columns, request.seed)?;
-    correct::report(request, &recordings, &readings, &constants, &groups, &decision)
+    let (decision, fit) = decide::decide(&readings, own, &columns, request.seed)?;
+    let mut refined = Refined { readings, constants, fit };
+    if decision.flagged {
+        refined = refined.around(&mut drives, &declared, &decision);
+    }
+    correct::report(request, &recordings, &refined, &groups, &decision)
+}
+
+/// What the model says of all runs with what is planted, and with each knob turned beside it.
+pub(crate) fn predict(
+    drives: &mut [Drive<'_>],
+    planted: Option<Planted>,
+) -> Result<(Prediction, Vec<Prediction>), DriftError> {
+    let mut base = Prediction { means: Vec::new(), surge_position_ratio: Vec::new(), step_ends: Vec::new() };
+    let mut turned: Vec<Prediction> = vec![base.clone(); Knob::ALL.len()];
+    for (run, drive) in drives.iter_mut().enumerate() {
+        let (own_base, own_turned) =
+            drive.predict_all(planted).map_err(|source| DriftError::Drive { run, source })?;
+        append(&mut base, own_base);
+        turned.iter_mut().zip(own_turned).for_each(|(all, own)| append(all, own));
+    }
+    Ok((base, turned))
 }
 
 /// Reads all stretches and drives the model through all runs.
-fn read(
-    request: &DriftRequest<'_>,
+fn read<'a>(
+    request: &DriftRequest<'a>,
     recordings: &[&Recording],
     steps: Vec<CampaignStep>,
-) -> Result<Readings, DriftError> {
+) -> Result<(Readings, Vec<Drive<'a>>), DriftError> {
     for (run, recording) in recordings.iter().enumerate() {
         let missing: Vec<&str> = [Channel::ShaftSpeed, Channel::P2, Channel::T2, Channel::T1]
             .into_iter()
@@ -161,20 +237,22 @@ fn read(
             );
             return Err(DriftError::Unusable { run, message });
         }
+        if let Some(message) = plausible::implausible(recording) {
+            return Err(DriftError::Unusable { run, message });
+        }
     }
     let columns: Vec<usize> = (0..OUTPUTS.len())
         .filter(|output| recordings.iter().all(|recording| recording.require(OUTPUTS[*output]).is_ok()))
         .collect();
     let all_blocks = blocks::blocks(&steps);
-    let mut base = Prediction { means: Vec::new(), surge_position_ratio: Vec::new(), step_ends: Vec::new() };
-    let mut turned: Vec<Prediction> = vec![base.clone(); Knob::ALL.len()];
-    for (run, recording) in recordings.iter().enumerate() {
-        let mut drive = Drive::new(run, recording, request.model, &request.boundary, &steps, &all_blocks)?;
-        let (own_base, own_turned) =
-            drive.predict_all().map_err(|source| DriftError::Drive { run, source })?;
-        append(&mut base, own_base);
-        turned.iter_mut().zip(own_turned).for_each(|(all, own)| append(all, own));
-    }
+    let mut drives: Vec<Drive<'a>> = recordings
+        .iter()
+        .enumerate()
+        .map(|(run, recording)| {
+            Drive::new(run, recording, request.model, &request.boundary, &steps, &all_blocks)
+        })
+        .collect::<Result<_, _>>()?;
+    let (base, turned) = predict(&mut drives, None)?;
     let all: Vec<_> = all_blocks
         .iter()
         .zip(&base.means)
@@ -194,24 +272,11 @@ fn read(
                     .all(|column| all[*index].1[*column].is_some() && all[*index].2[*column].is_finite())
         })
         .collect();
-    let rows = |values: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
-        kept.iter().flat_map(|block| columns.iter().map(move |column| values(*block, *column))).collect()
-    };
-    let answers = Knob::ALL
-        .iter()
-        .zip(&turned)
-        .map(|(knob, turned)| Constant {
-            readings: rows(&|block, column| {
-                (turned.means[block][column] - base.means[block][column]) / knob.step()
-            }),
-            eta: (0..steps.len())
-                .map(|step| finite((turned.step_ends[step].0 - base.step_ends[step].0) / knob.step()))
-                .collect(),
-            h_w_m2k: (0..steps.len())
-                .map(|step| finite((turned.step_ends[step].1 - base.step_ends[step].1) / knob.step()))
-                .collect(),
-        })
-        .collect();
+    if kept.is_empty() {
+        let message = "no stretch of it can be compared with the model: readings are missing or no numbers, or all of it lies \
+                       at the surge line. Look at its channels and their units, and whether the campaign names the machine";
+        return Err(DriftError::Unusable { run: 0, message: message.to_owned() });
+    }
     let input_levels = INPUTS
         .iter()
         .map(|channel| {
@@ -223,20 +288,23 @@ fn read(
             if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
         })
         .collect();
-    Ok(Readings {
+    let frame = Readings {
         runs: recordings.len(),
         blocks: kept.iter().map(|index| all_blocks[*index]).collect(),
-        difference: rows(&|block, column| {
-            all[block].1[column].unwrap_or(f64::NAN) - base.means[block][column]
-        }),
-        model: rows(&|block, column| base.means[block][column]),
-        answers,
-        step_ends: base.step_ends,
+        difference: Vec::new(),
+        model: Vec::new(),
+        answers: Vec::new(),
+        step_ends: Vec::new(),
         input_levels,
         columns,
         steps,
+        kept,
         all,
-    })
+    };
+    let readings = frame.around(base, &turned).ok_or_else(|| DriftError::Numbers {
+        message: "a reading or the model's answer is not finite".to_owned(),
+    })?;
+    Ok((readings, drives))
 }
 
 /// 0 for steps that the model cannot follow, which have no point.
@@ -292,17 +360,4 @@ fn own_covariances(
             covariance
         })
         .collect()
-}
-
-/// Rate or step of a decision.
-pub(crate) fn size(decision: &Decision) -> RateOrStep {
-    match decision.course.kind {
-        CourseKind::Ramp => RateOrStep::RatePerH(decision.size),
-        CourseKind::Step => RateOrStep::Step(decision.size),
-    }
-}
-
-/// The low-rank noise of a decision, for the constants after it.
-pub(crate) fn noise_of(decision: &Decision) -> &LowRank {
-    &decision.noise
 }

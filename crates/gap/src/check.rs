@@ -2,6 +2,7 @@
 
 use crate::declared::Declared;
 use crate::nuisance::{DRIVERS, OUTPUTS};
+use crate::study::Study;
 use crate::table::Table;
 use mapper_core::{Channel, Dimension, Recording};
 
@@ -26,6 +27,16 @@ pub enum Problem {
     TooFewOutputs {
         /// What is there.
         present: String,
+    },
+    /// Far from what the nominal machine does under the recorded inputs.
+    #[error(
+        "{channel} lies {percent:.0} % off what the nominal machine gives under the recorded P3, T3 and valve, at half of the steps or more: this is a recording of another machine, or a scale is wrong; check machine and map of the campaign"
+    )]
+    OtherMachine {
+        /// The channel that is farthest off.
+        channel: Channel,
+        /// By how much, % of the nominal value (signed).
+        percent: f64,
     },
     /// A channel in another unit than it is said to be.
     #[error("{channel} reads {value:.4} {unit} in the middle, which no rig has; {guess}")]
@@ -198,4 +209,44 @@ fn gaps(table: &Table) -> Option<String> {
             "the recording has {count} gap(s), {missing_s:.1} s in all; blocks without samples are left out"
         )
     })
+}
+
+/// Deviations of a step's end from the nominal machine that no effect of a rig makes: of speed, flows, and the rise of
+/// pressure and temperature through the compressor.
+const ANOTHER_MACHINE_RATIO: [(Channel, f64); 5] = [
+    (Channel::ShaftSpeed, 0.25),
+    (Channel::CompressorFlow, 0.4),
+    (Channel::TurbineFlow, 0.4),
+    (Channel::P2, 0.4),
+    (Channel::T2, 0.6),
+];
+
+/// Refuses a recording that is nowhere near the nominal machine, by its prediction without any deviation.
+///
+/// # Errors
+/// [`Problem::OtherMachine`].
+pub fn same_machine(study: &Study, predicted: &[f64]) -> Result<(), Problem> {
+    let mut worst: Option<(f64, Channel, f64)> = None;
+    for (channel, limit) in ANOTHER_MACHINE_RATIO {
+        let nominal = &study.declared.nominal;
+        // Rises are compared, not levels.
+        let zero = match channel {
+            Channel::P2 => nominal.p1_pa,
+            Channel::T2 => nominal.t1_k,
+            _ => 0.0,
+        };
+        let mut away: Vec<f64> = study
+            .groups
+            .iter()
+            .filter(|group| OUTPUTS[group.output] == channel)
+            .filter_map(|group| group.rows.clone().last())
+            .map(|row| (study.measured[row] - zero) / (predicted[row] - zero).max(1e-9) - 1.0)
+            .collect();
+        away.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let Some(median) = away.get(away.len() / 2) else { continue };
+        if median.abs() > limit && worst.is_none_or(|(most, ..)| median.abs() / limit > most) {
+            worst = Some((median.abs() / limit, channel, 100.0 * median));
+        }
+    }
+    worst.map_or(Ok(()), |(_, channel, percent)| Err(Problem::OtherMachine { channel, percent }))
 }

@@ -2,17 +2,18 @@
 
 use crate::adequacy::{Adequacy, adequacy};
 use crate::calibration::Calibration;
-use crate::check::{Problem, check};
+use crate::check::{Problem, check, same_machine};
 use crate::declared::Declared;
 use crate::fit::{Effort, Fit, Selection, coordinates, fit, parameters};
 use crate::how_far::{held_out, how_far};
 use crate::inputs::InputError;
-use crate::next::next;
+use crate::next::{Rivals, next, sensor_beside};
+use crate::outlook::Jump;
 use crate::parallel;
 use crate::place::{Gain, places};
 use crate::report::{Candidate, Diagnosis, Estimate, Verdict};
 use crate::select::{Search, additions, does_something, keep_best, members, refit, search};
-use crate::study::{PredictError, Study};
+use crate::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::table::Table;
 use crate::whiten::Linearised;
 use mapper_core::Recording;
@@ -45,6 +46,8 @@ pub struct Question<'a> {
     pub model: Model,
     /// Candidate effects.
     pub effects: Vec<Arc<dyn Effect>>,
+    /// Jumps that the planner allows on this machine, for what to do next; those of the recording where there are none.
+    pub jumps: Vec<Jump>,
     /// Numbers behind the probabilities.
     pub calibration: Calibration,
     /// Told the share done, and what comes.
@@ -60,6 +63,9 @@ pub struct Diagnosed {
     pub study: Study,
     /// Tolerances alone, on all steps.
     pub null: Fit,
+    /// Prediction and whitened residual of the nominal model with the tolerances of the best fit, but without its cause:
+    /// in [`Diagnosed::null`] tolerances are strained to stand in for it. The null itself where no cause is named.
+    pub without_cause: (Prediction, Vec<f64>),
     /// Best fits on all steps, best first.
     pub fits: Vec<Fit>,
     /// What the best leaves.
@@ -80,12 +86,13 @@ const MOST: f64 = 0.5;
 /// # Errors
 /// [`GapError`] with a clear word where no diagnosis can be made.
 pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
-    let Question { recording, declared, model, effects, calibration, progress } = question;
+    let Question { recording, declared, model, effects, jumps, calibration, progress } = question;
     progress(0.0, "reading");
     let table = Table::new(recording).ok_or(Problem::Empty)?;
     let warnings = check(recording, &table, &declared)?;
     let study = Study::new(recording, table, declared, model, effects)?;
     let linearised = Linearised::new(&study)?;
+    same_machine(&study, &linearised.base.values)?;
     // Hold-outs are chosen by place, before anything is fitted.
     let held_out = held_out(&study);
     let mut training = Selection::all(&study);
@@ -182,9 +189,14 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     } else {
         places(&study, &linearised, &null, &gains, named)
     };
-    let next = rivals(&weighed, &fits)
-        .filter(|_| named)
-        .and_then(|(first, second, odds)| next(&study, &linearised, first, second, odds));
+    progress(0.95, "what next");
+    let next = match verdict {
+        Verdict::WithinTolerance => None,
+        Verdict::Unexplained => sensor_beside(&r#where),
+        Verdict::Explained | Verdict::PartlyExplained => {
+            rivals(&weighed, &fits).and_then(|rivals| next(&study, rivals, &jumps))
+        }
+    };
     progress(1.0, "done");
     let diagnosis = Diagnosis {
         verdict,
@@ -196,7 +208,20 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         next,
         warnings,
     };
-    Ok(Diagnosed { diagnosis, study, null, fits, adequacy: left, linearised })
+    let without_cause = without_cause(&study, &linearised, fits.first().filter(|_| named))
+        .unwrap_or_else(|| (null.prediction.clone(), null.residual.clone()));
+    Ok(Diagnosed { diagnosis, study, null, without_cause, fits, adequacy: left, linearised })
+}
+
+fn without_cause(
+    study: &Study,
+    linearised: &Linearised,
+    named: Option<&Fit>,
+) -> Option<(Prediction, Vec<f64>)> {
+    let bare = Hypothesis { nuisances: named?.hypothesis.nuisances.clone(), effects: Vec::new() };
+    let prediction = study.predict(&bare).ok()?;
+    let residual = linearised.residual(study, &prediction);
+    Some((prediction, residual))
 }
 
 /// Scores turned into probabilities.
@@ -209,8 +234,6 @@ struct Weighed {
     outside: f64,
     /// Whether a cause is named at all.
     named: bool,
-    /// Logarithms of the odds of nothing and of each fit, before the temperature.
-    scores: Vec<f64>,
 }
 
 /// Logarithm of what is known of a cause before any data: pairs are rarer than singles, and many.
@@ -255,7 +278,7 @@ fn weigh(study: &Study, calibration: &Calibration, null: &Fit, fits: &[Fit], lef
             },
         })
         .collect();
-    Weighed { candidates, none, outside_probability: outside, outside, named, scores }
+    Weighed { candidates, none, outside_probability: outside, outside, named }
 }
 
 fn names(study: &Study, fit: &Fit) -> Vec<String> {
@@ -315,16 +338,20 @@ fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> BTreeMap<St
     estimates
 }
 
-/// The best cause and its strongest rival that is no mere addition to it, with the logarithm of their odds; `None`
-/// where there is none, or it is settled.
-fn rivals<'a>(weighed: &Weighed, fits: &'a [Fit]) -> Option<(&'a Fit, &'a Fit, f64)> {
-    let first = fits.first()?;
-    let of_first = members(&first.hypothesis);
-    let (place, second) = fits.iter().enumerate().skip(1).find(|(_, fit)| {
+/// Share of the first among the causes that are open from which on it is settled.
+const SETTLED: f64 = 0.95;
+
+/// The causes that are still open, best first; `None` where the first is settled. A mere addition to the best is no
+/// rival of it.
+fn rivals<'a>(weighed: &Weighed, fits: &'a [Fit]) -> Option<Rivals<'a>> {
+    let of_first = members(&fits.first()?.hypothesis);
+    let rival = |fit: &Fit| {
         let others = members(&fit.hypothesis);
         !of_first.iter().all(|effect| others.contains(effect))
-    })?;
-    let odds = weighed.scores[1] - weighed.scores[place + 1];
-    // Odds of e^12 are settled.
-    (odds < 12.0).then_some((first, second, odds))
+    };
+    let open: Vec<usize> = (0..fits.len()).filter(|place| *place == 0 || rival(&fits[*place])).collect();
+    let probabilities: Vec<f64> = open.iter().map(|place| weighed.candidates[*place].probability).collect();
+    let total: f64 = probabilities.iter().sum();
+    (open.len() > 1 && probabilities[0] < SETTLED * total)
+        .then(|| Rivals { fits: open.iter().map(|place| &fits[*place]).collect(), probabilities })
 }

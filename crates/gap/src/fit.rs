@@ -26,6 +26,8 @@ pub struct Fit {
     pub effect_columns: Vec<Vec<f64>>,
     /// Covariance of the effects' search coordinates, nuisances free.
     pub covariance: DMatrix<f64>,
+    /// Precision of nuisances and the effects' search coordinates, priors included.
+    pub precision: DMatrix<f64>,
 }
 
 /// Prior width of an effect's parameter, in typical steps.
@@ -181,7 +183,16 @@ pub fn fit(
     }
     let nuisances = hypothesis.nuisances.len();
     let (score, covariance) = normal.evidence(cost, nuisances);
-    Ok(Fit { hypothesis, cost, score, residual, prediction, effect_columns, covariance })
+    Ok(Fit {
+        hypothesis,
+        cost,
+        score,
+        residual,
+        prediction,
+        effect_columns,
+        covariance,
+        precision: normal.matrix,
+    })
 }
 
 fn cost_of(rows: &[std::ops::Range<usize>], residual: &[f64], hypothesis: &Hypothesis) -> f64 {

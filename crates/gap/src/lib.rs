@@ -14,6 +14,7 @@ pub mod inputs;
 pub mod next;
 pub mod noise;
 pub mod nuisance;
+pub mod outlook;
 pub mod parallel;
 pub mod place;
 pub mod report;

@@ -1,48 +1,117 @@
 //! What to do next: the jump that separates the remaining candidates best, or the sensor that would.
 
 use crate::fit::Fit;
-use crate::report::{JumpPoint, Next};
+use crate::outlook::{Jump, apart, apart_at_first_sight, recorded_jumps, recorded_points};
+use crate::parallel;
+use crate::report::{JumpPoint, Next, Place};
 use crate::study::Study;
-use crate::whiten::{Linearised, rows_of_step};
+use mapper_core::OperatingPoint;
 use mapper_physics::effect::Submodel;
 
 /// A further jump of which one learns less than this, in squared sigmas, is not worth its minutes.
 const LEAST_DISCRIMINATION: f64 = 1.0;
+/// Jumps that are looked at closely.
+const CLOSE_LOOKS: usize = 6;
+/// Candidates that are told apart.
+const RIVALS: usize = 4;
 
-/// The jump of the campaign that tells `first` from `second` best for each minute. `odds` is the present logarithm of
-/// the odds between them.
+/// The candidates that are still open, best first, and their probabilities.
+pub struct Rivals<'a> {
+    /// At least two fits; the first is the best.
+    pub fits: Vec<&'a Fit>,
+    /// As many probabilities.
+    pub probabilities: Vec<f64>,
+}
+
+/// The jump that tells the rivals apart best for each minute.
 ///
-/// Both predict what they would for a repeat of each recorded jump; their difference, in sigmas of the noise, is what
-/// a repeat would show. Where no jump shows enough, the sensor beside the part in which the first sits is named.
-pub fn next(study: &Study, linearised: &Linearised, first: &Fit, second: &Fit, odds: f64) -> Option<Next> {
-    let mut difference: Vec<f64> =
-        first.prediction.values.iter().zip(&second.prediction.values).map(|(a, b)| a - b).collect();
-    linearised.whiten(study, &mut difference);
-    let points = study.points(&first.hypothesis).ok()?;
-    let point = |step: usize| JumpPoint {
-        speed_rpm: points[step].speed_rpm,
-        valve: study.steps[step].marker.valve_opening_ratio,
+/// `U = sum over k, j of p_k p_j d_kj^2 / minutes`, with `d_kj^2` by how much the jump would raise the misfit of `j`,
+/// fitted again, were `k` true. All `allowed` jumps are looked at with the candidates as they stand, the most promising
+/// of them with each rival fitted again. Without allowed jumps those of the recording are taken, to be repeated. Where
+/// no jump shows enough, the sensor beside the part in which the first candidate sits is named.
+pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Jump]) -> Option<Next> {
+    rivals.fits.truncate(RIVALS);
+    rivals.probabilities.truncate(RIVALS);
+    let first = *rivals.fits.first()?;
+    let recorded;
+    let jumps = if allowed.is_empty() {
+        recorded = recorded_jumps(study, &recorded_points(study, &first.hypothesis));
+        recorded.as_slice()
+    } else {
+        allowed
     };
-    let best = (1..study.steps.len())
-        .map(|step| {
-            let squares: f64 = difference[rows_of_step(study, step)].iter().map(|d| d * d).sum();
-            let marker = &study.steps[step].marker;
-            (step, squares, ((marker.end_s - marker.start_s) / 60.0).max(0.1))
-        })
-        .max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;
-    let (step, squares, minutes) = best;
-    if squares < LEAST_DISCRIMINATION {
-        let (effect, _) = first.hypothesis.effects.first().or(second.hypothesis.effects.first())?;
-        let part = study.effects[*effect].info().submodel;
-        let reason = format!(
-            "no jump of this campaign shows the two first candidates more than {:.1} sigma apart",
-            squares.sqrt()
-        );
-        return Some(Next::Sensor { sensor: sensor_for(part).to_owned(), reason });
+    let rate = |jump: &Jump, apart: &[Vec<f64>]| gain(&rivals.probabilities, apart) / minutes(jump);
+    let looks = parallel::map(jumps, |jump| {
+        let apart = apart_at_first_sight(study, jump, &rivals.fits)?;
+        Some((rate(jump, &apart), *jump))
+    });
+    let mut looks: Vec<(f64, Jump)> = looks.into_iter().flatten().collect();
+    looks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let close: Vec<Jump> = looks.into_iter().take(CLOSE_LOOKS).map(|(_, jump)| jump).collect();
+    let looked = parallel::map(&close, |jump| Some((*jump, apart(study, jump, &rivals.fits)?)));
+    let best = looked.into_iter().flatten().max_by(|a, b| rate(&a.0, &a.1).total_cmp(&rate(&b.0, &b.1)));
+    let nearest = |apart: &[Vec<f64>]| apart[0].iter().skip(1).copied().fold(f64::INFINITY, f64::min);
+    match best {
+        Some((jump, apart)) if nearest(&apart) >= LEAST_DISCRIMINATION => Some(Next::Jump {
+            from: point(jump.from),
+            to: point(jump.to),
+            expected_probability: settled(&rivals.probabilities, &apart),
+            minutes: minutes(&jump),
+        }),
+        other => {
+            let (effect, _) = rivals.fits.iter().find_map(|fit| fit.hypothesis.effects.first())?;
+            let sigma = other.map_or(0.0, |(_, apart)| nearest(&apart).sqrt());
+            let among = if allowed.is_empty() { "recorded" } else { "allowed" };
+            Some(Next::Sensor {
+                sensor: sensor_for(study.effects[*effect].info().submodel).to_owned(),
+                reason: format!(
+                    "none of the {} {among} jumps shows the first candidates more than {sigma:.1} sigma apart",
+                    jumps.len()
+                ),
+            })
+        }
     }
-    // The logarithm of the odds grows by half the squared distance, if the first is right.
-    let expected_probability = 1.0 / (1.0 + (-(odds + 0.5 * squares)).exp());
-    Some(Next::Jump { from: point(step - 1), to: point(step), expected_probability, minutes })
+}
+
+/// The sensor that would look into the part where most of an unexplained gap lies.
+pub fn sensor_beside(places: &[Place]) -> Option<Next> {
+    let place = places.first()?;
+    let part = Submodel::ALL.into_iter().find(|part| part.name() == place.submodel)?;
+    Some(Next::Sensor {
+        sensor: sensor_for(part).to_owned(),
+        reason: format!(
+            "no effect of the catalogue explains the gap, and most of it lies in {}: write a suspected effect in rhai and give it by --effect, or measure there",
+            place.submodel
+        ),
+    })
+}
+
+fn point(point: OperatingPoint) -> JumpPoint {
+    JumpPoint { speed_rpm: point.speed_rpm, valve: point.valve_opening_ratio }
+}
+
+fn minutes(jump: &Jump) -> f64 {
+    (jump.dwell_s / 60.0).max(0.1)
+}
+
+/// `sum p_k p_j d_kj^2`.
+fn gain(probabilities: &[f64], apart: &[Vec<f64>]) -> f64 {
+    let row = |(p, row): (&f64, &Vec<f64>)| -> f64 {
+        row.iter().zip(probabilities).map(|(d2, q)| p * q * d2).sum::<f64>()
+    };
+    probabilities.iter().zip(apart).map(row).sum()
+}
+
+/// Probability that the true one of the rivals is expected to have after the jump: the odds of `k` over `j` grow by
+/// `exp(d_kj^2/2)` if `k` is true.
+fn settled(probabilities: &[f64], apart: &[Vec<f64>]) -> f64 {
+    let total: f64 = probabilities.iter().sum();
+    let after = |(k, p): (usize, &f64)| {
+        let weights: f64 =
+            probabilities.iter().zip(&apart[k]).map(|(q, d2)| q * (-0.5 * d2).exp()).sum::<f64>();
+        p / total * (p / weights)
+    };
+    probabilities.iter().enumerate().map(after).sum::<f64>().clamp(0.0, 1.0)
 }
 
 /// A sensor that would look into a part directly.
@@ -59,5 +128,23 @@ fn sensor_for(part: Submodel) -> &'static str {
             "a second thermocouple in the compressor housing, near the gas"
         }
         Submodel::TurbineHousing => "thermocouples on both sides of the bearing housing",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_that_shows_nothing_settles_nothing_and_one_that_shows_all_settles_all() {
+        let probabilities = [0.6, 0.3, 0.1];
+        let apart = |d2: f64| -> Vec<Vec<f64>> {
+            (0..3).map(|k| (0..3).map(|j| if k == j { 0.0 } else { d2 }).collect()).collect()
+        };
+        // Without news the true one keeps its own probability: sum of p^2.
+        assert!((settled(&probabilities, &apart(0.0)) - 0.46).abs() < 1e-12);
+        assert!(settled(&probabilities, &apart(100.0)) > 1.0 - 1e-9);
+        let some = settled(&probabilities, &apart(4.0));
+        assert!(some > 0.46 && some < 1.0);
     }
 }

@@ -35,6 +35,17 @@ impl Linearised {
         Ok(Linearised::with(study, base, changes, factors))
     }
 
+    /// Whitening by the noise of the outputs alone, without derivatives.
+    ///
+    /// # Errors
+    /// [`PredictError`] where the nominal model cannot follow the recording.
+    pub fn of_noise_alone(study: &Study) -> Result<Linearised, PredictError> {
+        let nothing = study.nothing();
+        let base = study.predict(&nothing)?;
+        let factors = Arc::new(factors(study, &nothing, &[]));
+        Ok(Linearised { base, factors, columns: Vec::new(), products: Vec::new() })
+    }
+
     /// Linearised anew at a hypothesis; the whitening stays.
     ///
     /// # Errors
@@ -167,7 +178,7 @@ fn factors(study: &Study, nothing: &Hypothesis, changes: &[Vec<f64>]) -> Vec<Fac
         .map(|(channel, noise)| {
             let place = study.nuisances.iter().position(|n| n.kind == NuisanceKind::Offset(*channel));
             let sigma = place.map_or(1.0, |i| study.nuisances[i].sigma);
-            (noise.sigma, noise.correlation_s, place.map(|i| &changes[i]), sigma)
+            (noise.sigma, noise.correlation_s, place.and_then(|i| changes.get(i)), sigma)
         })
         .collect();
     let mut cache: BTreeMap<Vec<(usize, i64)>, DMatrix<f64>> = BTreeMap::new();

@@ -3,10 +3,11 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, StepKind, StepMarker};
+use mapper_core::{Channel, DeclaredUncertainty, OperatingPoint, Recording, Series, StepKind, StepMarker};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::declared::Declared;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
+use mapper_gap::outlook::{Jump, apart, apart_at_first_sight};
 use mapper_gap::report::Verdict;
 use mapper_physics::effect::{Effect, Rig, add};
 use mapper_physics::inputs::InterpolatedInputs;
@@ -52,6 +53,10 @@ fn record(effects: &[(&str, &[f64])], seed: u64) -> Recording {
     for (id, values) in effects {
         add(&mut rig, mapper_effects::find(id).unwrap().as_ref(), values).unwrap();
     }
+    record_of(&rig, seed)
+}
+
+fn record_of(rig: &Rig, seed: u64) -> Recording {
     let nominal = Model::nominal();
     let p3_pa: Vec<f64> =
         SPEEDS_RPM.iter().map(|n| hold_speed(&nominal, *n, &boundary()).unwrap().boundary.p3_pa).collect();
@@ -133,10 +138,16 @@ fn declared() -> Declared {
 
 /// With a few candidates only: the search over all of them is checked by `mapper gap blind`.
 fn ask(recording: &Recording) -> Result<Diagnosed, GapError> {
+    ask_beside(recording, None)
+}
+
+/// The same with one more candidate.
+fn ask_beside(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Diagnosed, GapError> {
     let candidates = ["tip_diameter", "stem_conduction", "bearing_friction", "flowmeter_gain"];
     let effects: Vec<Arc<dyn Effect>> =
-        candidates.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
+        candidates.iter().map(|id| mapper_effects::find(id).unwrap()).chain(more).collect();
     diagnose(Question {
+        jumps: Vec::new(),
         recording,
         declared: declared(),
         model: Model::nominal(),
@@ -229,6 +240,12 @@ fn bad_recordings_get_a_clear_word_and_no_culprit() {
         step.p3_pa *= 1.4;
     }
     assert!(word(&elsewhere).contains("do not belong together"), "{}", word(&elsewhere));
+    // A compressor half as large again at the same speeds and pressures.
+    let mut larger = good.clone();
+    for value in &mut larger.series.get_mut(&Channel::CompressorFlow).unwrap().values {
+        *value *= 1.5;
+    }
+    assert!(word(&larger).contains("another machine"), "{}", word(&larger));
     assert!(word(&Recording::default()).contains("no measured channel"), "{}", word(&Recording::default()));
 }
 
@@ -249,4 +266,61 @@ fn what_is_not_recorded_is_said_and_the_rest_is_diagnosed() {
     for said in ["T4", "m_t", "gap"] {
         assert!(diagnosis.warnings.iter().any(|w| w.contains(said)), "{said}: {:?}", diagnosis.warnings);
     }
+}
+
+/// What a jump would show, for a slow probe and a probe that conducts along its stem, both fitted to a slow probe.
+#[test]
+fn a_jump_tells_a_slow_probe_from_its_rival_and_from_itself_nothing() {
+    let diagnosed = ask(&record(&[("tip_diameter", &[1e-3])], 9)).unwrap();
+    let of = |id: &str| {
+        diagnosed
+            .fits
+            .iter()
+            .find(|fit| {
+                let [(index, _)] = fit.hypothesis.effects.as_slice() else { return false };
+                diagnosed.study.effects[*index].info().id == id
+            })
+            .unwrap()
+    };
+    let fits = [of("tip_diameter"), of("stem_conduction")];
+    let nominal = Model::nominal();
+    let p3_pa = |n_rpm: f64| hold_speed(&nominal, n_rpm, &boundary()).unwrap().boundary.p3_pa;
+    let point = |speed_rpm: f64| OperatingPoint { speed_rpm, valve_opening_ratio: 0.9 };
+    let jump = |from_rpm: f64, to_rpm: f64| Jump {
+        from: point(from_rpm),
+        to: point(to_rpm),
+        from_p3_pa: p3_pa(from_rpm),
+        to_p3_pa: p3_pa(to_rpm),
+        dwell_s: 60.0,
+    };
+    let long = apart(&diagnosed.study, &jump(60e3, 140e3), &fits).unwrap();
+    let short = apart(&diagnosed.study, &jump(90e3, 91e3), &fits).unwrap();
+    assert!(long[0][0].abs() < 1e-9 && long[1][1].abs() < 1e-9);
+    // A probe's lag shows where the temperature jumps; 80 krpm are some 100 K, one krpm is two.
+    assert!(long[0][1] > 10.0 * short[0][1], "{long:?} {short:?}");
+    // Fitting the rival again can only bring it nearer; a close look takes five times as many samples, which hold at
+    // most five times as much.
+    let blunt = apart_at_first_sight(&diagnosed.study, &jump(60e3, 140e3), &fits).unwrap();
+    assert!(long[0][1] < 5.0 * blunt[0][1], "{long:?} {blunt:?}");
+}
+
+/// A user's suspicion, tried beside the built-in effects: the example that ships, on a rig that has it.
+#[test]
+fn a_suspected_effect_in_rhai_is_named_and_measured() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/effects/coolant_passage.rhai");
+    let text = std::fs::read_to_string(path).unwrap();
+    let scripted: Arc<dyn Effect> =
+        Arc::new(mapper_effects::ScriptEffect::new(&text, std::path::Path::new(path)).unwrap());
+    let mut rig = Rig::new(Model::nominal());
+    add(&mut rig, scripted.as_ref(), &[4.0]).unwrap();
+    let recording = record_of(&rig, 11);
+    let blind = ask(&recording).unwrap().diagnosis;
+    assert_ne!(blind.verdict, Verdict::Explained, "{:?}", blind.candidates[0]);
+    let told = ask_beside(&recording, Some(scripted)).unwrap().diagnosis;
+    assert_eq!(told.verdict, Verdict::Explained);
+    assert_eq!(told.candidates[0].effects, ["coolant_passage"]);
+    let estimate = &told.candidates[0].parameters["coolant_passage"];
+    // Three times the half width of its own interval.
+    let room = 1.5 * (estimate.high - estimate.low);
+    assert!((estimate.value - 4.0).abs() < room && room < 1.0, "{estimate:?}");
 }

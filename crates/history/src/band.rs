@@ -52,8 +52,8 @@ impl Band {
     }
 }
 
-/// Median of some numbers, which are sorted by it.
-fn median(values: &mut [f64]) -> Option<f64> {
+/// Median of some numbers, which are sorted by it; `None` of nothing.
+pub fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
     match values.len() {

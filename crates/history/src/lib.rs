@@ -13,7 +13,7 @@ mod night;
 mod quantity;
 mod store;
 
-pub use band::{Band, Floor};
+pub use band::{Band, Floor, median};
 pub use compare::{Comparison, Moved, MovedPoints, Shift, compare};
 pub use error::HistoryError;
 pub use figure::Figure;

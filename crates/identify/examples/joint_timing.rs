@@ -2,7 +2,8 @@
 //! `cargo run --release -p mapper-identify --example joint_timing -- ROUNDS DIRECTORY`
 //! With a directory it writes the samples (`samples.csv`) and what was found (`found.csv`, `points.csv`) there for
 //! `benches/peers/joint_scipy.py`.
-#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
+#![allow(clippy::unwrap_used, reason = "it times recordings that it makes itself: what fails is to stop it")]
+#![allow(clippy::print_stdout, missing_docs, reason = "what it prints is all it is for")]
 #[path = "../tests/common/mod.rs"]
 mod common;
 #[path = "../tests/common/lab.rs"]
@@ -10,7 +11,7 @@ mod lab;
 
 use lab::{Machine, campaign, measured};
 use mapper_core::{Channel, Method};
-use mapper_identify::{IdentifyConfig, identify_recording};
+use mapper_identify::{IdentifyConfig, identify_recording, one_fit};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use std::fmt::Write;
@@ -37,6 +38,18 @@ fn main() {
         times_s.push(start.elapsed().as_secs_f64());
     }
     let found = last.unwrap();
+    let mut fit_s = Vec::new();
+    let alone = one_fit(&recording, &config, |fit| {
+        let mut last = None;
+        for _ in 0..rounds {
+            let start = Instant::now();
+            last = fit();
+            fit_s.push(start.elapsed().as_secs_f64());
+        }
+        last.unwrap()
+    })
+    .unwrap();
+    fit_s.sort_by(f64::total_cmp);
     times_s.sort_by(f64::total_cmp);
     println!(
         "{} points, {samples} samples: fastest {:.3} s, median {:.3} s of {rounds}",
@@ -44,6 +57,7 @@ fn main() {
         times_s[0],
         times_s[times_s.len() / 2]
     );
+    println!("one fit of it: fastest {:.3} s, alpha_A {:.4}", fit_s[0], alone.alpha_area_ratio);
     let thermal = found.thermal.unwrap();
     let value = |shared: &mapper_core::SharedValue| shared.value.unwrap_or(f64::NAN);
     let (alpha, probe_m) = (value(&thermal.alpha_area_ratio), value(&thermal.probe_diameter_m));
@@ -81,14 +95,17 @@ fn main() {
     }
     std::fs::write(directory.join("samples.csv"), text).unwrap();
     let found = format!(
-        "alpha_area_ratio,probe_diameter_m,fastest_s,median_s\n{alpha},{probe_m},{},{}\n",
+        "alpha_area_ratio,probe_diameter_m,fastest_s,median_s,fit_s,fit_alpha_area_ratio,fit_probe_diameter_m\n{alpha},{probe_m},{},{},{},{},{}\n",
         times_s[0],
-        times_s[times_s.len() / 2]
+        times_s[times_s.len() / 2],
+        fit_s[0],
+        alone.alpha_area_ratio,
+        alone.probe_diameter_m
     );
     std::fs::write(directory.join("found.csv"), found).unwrap();
-    let mut points = "eta,truth_eta\n".to_owned();
-    for (eta, truth) in etas.iter().zip(&clean.truth) {
-        writeln!(points, "{eta},{}", truth.eta).unwrap();
+    let mut points = "eta,truth_eta,fit_eta\n".to_owned();
+    for ((eta, truth), fit_eta) in etas.iter().zip(&clean.truth).zip(&alone.etas) {
+        writeln!(points, "{eta},{},{fit_eta}", truth.eta).unwrap();
     }
     std::fs::write(directory.join("points.csv"), points).unwrap();
 }

@@ -115,7 +115,7 @@ pub fn identify_recording(
     Ok(Identified { points, thermal })
 }
 
-fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {
+pub(crate) fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {
     let mut checks = vec![
         (
             "alpha_area_ratio",

@@ -19,6 +19,7 @@ mod flow_drift;
 mod identify;
 mod joint;
 mod jump;
+mod one_fit;
 mod plausible;
 mod samples;
 mod steady;
@@ -35,4 +36,6 @@ pub use findings::code;
 pub use identify::{Identified, identify, identify_each, identify_recording};
 pub use joint::surface::EfficiencySurface;
 pub use mapper_core::{Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings};
+#[doc(hidden)]
+pub use one_fit::{OneFit, one_fit};
 pub use zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};

@@ -2,7 +2,7 @@
 
 use crate::inputs::Inputs;
 use crate::model::{BoundaryError, Model, Outputs, PreparedModel, State};
-use crate::params::BoundaryConditions;
+use crate::params::{BoundaryConditions, Params};
 use crate::rosenbrock::{IntegrationError, Integrator, OdeSystem, Step, Tolerances};
 use crate::state::MAX_STATES;
 use nalgebra::{Const, DimMin};
@@ -146,6 +146,15 @@ impl Simulator {
     /// Steps taken so far.
     pub fn steps(&self) -> usize {
         sized!(&self.integrator, integrator => integrator.steps())
+    }
+
+    /// Goes on as a machine of other parameters, e.g. one that fouls. What states the model has does not change: neither may
+    /// whether it has an inner wall.
+    pub fn change_params(&mut self, params: Params) {
+        if params != self.model.params {
+            self.model.params = params;
+            self.restart();
+        }
     }
 
     /// Forgets the step size; call after a jump of the inputs.

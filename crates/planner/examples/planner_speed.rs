@@ -75,6 +75,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             p3_slew_max_pa_s: None,
         },
         repeats: None,
+        appended: None,
         required_sigma_eta: None,
         method: None,
         effort,

@@ -79,6 +79,8 @@ pub struct Jump {
     pub highest_speed_rpm: f64,
     /// Highest outlet temperature on the way, K.
     pub highest_t2_k: f64,
+    /// Turbine inlet total pressure that the jump commands, Pa.
+    pub p3_pa: f64,
     /// Change of the turbine inlet pressure, Pa (signed).
     pub p3_change_pa: f64,
     /// All that forbids it; empty for an admissible jump.
@@ -142,6 +144,7 @@ pub(crate) fn jump(
         longest_surge_s: forecast.longest_surge_s,
         highest_speed_rpm: forecast.highest_speed_rpm,
         highest_t2_k: forecast.highest_t2_k,
+        p3_pa: target.boundary.p3_pa,
         p3_change_pa,
         rejections: rejections(request, &forecast, p3_change_pa, target.boundary.t3_k),
     })

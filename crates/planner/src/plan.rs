@@ -7,7 +7,7 @@ use crate::graph::rejections;
 use crate::housing::Housing;
 use crate::order::{Ordered, PROOF_TOLERANCE_RATIO, objective, order_on};
 use crate::reach::reachable;
-use crate::repeats::{RepeatedJump, Visit, plain, usual_jumps, with_repeats};
+use crate::repeats::{RepeatedJump, Visit, append, plain, usual_jumps, with_repeats};
 use crate::request::{PlanError, PlanRequest, Repeats, VisitOrder};
 use mapper_core::{OperatingPoint, Plan, PlanBound, PlanFigures, PlanStep, StepKind};
 use mapper_physics::model::State;
@@ -64,19 +64,21 @@ fn plan_with(
     let needs_method = matches!(request.order, VisitOrder::Information | VisitOrder::Time);
     let (mut points, mut targets) = (request.points.to_vec(), reached.to_vec());
     let mut repeated = None;
+    let mut place = |point: OperatingPoint| -> Result<usize, PlanError> {
+        if let Some(known) = points.iter().position(|other| *other == point) {
+            return Ok(known);
+        }
+        targets.extend(reachable(request, &[point])?);
+        points.push(point);
+        Ok(points.len() - 1)
+    };
     if let Some((repeats, (from, to))) = repeats {
-        let mut place = |point: OperatingPoint| -> Result<usize, PlanError> {
-            if let Some(known) = points.iter().position(|other| *other == point) {
-                return Ok(known);
-            }
-            targets.extend(reachable(request, &[point])?);
-            points.push(point);
-            Ok(points.len() - 1)
-        };
         let (from, to) = (place(from)?, place(to)?);
         repeated =
             Some(RepeatedJump { from, to, every_steps: repeats.every_steps, at_least: repeats.at_least });
     }
+    let appended =
+        request.appended.map(|(from, to)| Ok::<_, PlanError>((place(from)?, place(to)?))).transpose()?;
     // Only the search for information needs the method at every start of the reduced housing.
     let without_method = PlanRequest { method: request.method.filter(|_| needs_method), ..request.clone() };
     let mut housing = Housing::of(&without_method, &points, &targets, None)?;
@@ -84,10 +86,13 @@ fn plan_with(
     let mut barred: Vec<String> = Vec::new();
     for _ in 0..ROUNDS {
         let ordered = order_on(&housing, &given, request);
-        let visits = match repeated {
+        let mut visits = match repeated {
             Some(jump) => with_repeats(&housing, &ordered.order, jump, objective(request.order)),
             None => plain(&ordered.order),
         };
+        if let Some((from, to)) = appended {
+            append(&mut visits, from, to);
+        }
         let (steps, forbidden) = walk(request, &points, &targets, &visits, repeated.map(|jump| jump.to))?;
         if forbidden.is_empty() {
             return Ok(finished(request, &housing, &ordered, &visits, repeated, steps));
@@ -226,7 +231,9 @@ fn finished(
         + steps.iter().map(|step| step.dwell_s).sum::<f64>()
         + request.timing.cool_down_s;
     let figures = figures(&steps, duration_s / 60.0);
-    let searched = !matches!(request.order, VisitOrder::Listed | VisitOrder::GreedyGradient);
+    // A bound holds for the points and their repeats, not for what is put behind them.
+    let searched = !matches!(request.order, VisitOrder::Listed | VisitOrder::GreedyGradient)
+        && request.appended.is_none();
     let bound =
         searched.then(|| bound(request, housing, ordered, visits, repeated, &steps, &figures)).flatten();
     Plan {
@@ -238,15 +245,18 @@ fn finished(
         cool_down_s: request.timing.cool_down_s,
         remarks: remarks(request, &steps, repeated_to),
         figures,
-        bound_remark: bound_remark(request.order, bound.as_ref()),
+        bound_remark: bound_remark(request, bound.as_ref()),
         bound,
         steps,
     }
 }
 
 /// What is not known of how good an order could be.
-fn bound_remark(order: VisitOrder, bound: Option<&PlanBound>) -> Option<String> {
-    let text = match order {
+fn bound_remark(request: &PlanRequest<'_>, bound: Option<&PlanBound>) -> Option<String> {
+    if request.appended.is_some() {
+        return Some("none was worked out: a jump was put behind the points".to_owned());
+    }
+    let text = match request.order {
         VisitOrder::Listed | VisitOrder::GreedyGradient => "the order was not searched for",
         VisitOrder::Time => {
             "none is known for the shortest campaign: each dwell is chosen for itself, and bounds hold for one dwell alone"
@@ -268,6 +278,10 @@ fn remarks(request: &PlanRequest<'_>, steps: &[PlanStep], repeated: Option<Opera
         steps.iter().filter(|step| step.kind == StepKind::Repeat && Some(step.to) == repeated).collect();
     if let Some(PlanStep { from: Some(from), to, .. }) = repeats.first() {
         remarks.push(format!("the jump from {from} to {to} is made {} times to show drift", repeats.len()));
+    }
+    if let Some((from, to)) = request.appended {
+        remarks
+            .push(format!("the jump from {from} to {to} is made after all else, and is no point of the map"));
     }
     if let Some(first) = steps.first() {
         let again = steps[1..].iter().any(|step| step.to == first.to);

@@ -131,6 +131,15 @@ pub(crate) fn with_repeats<C: Chain>(
     visits
 }
 
+/// A jump behind all visits; one step less where they end at its start.
+pub(crate) fn append(visits: &mut Vec<Visit>, from: usize, to: usize) {
+    for index in [from, to] {
+        if visits.last().is_none_or(|visit| visit.index != index) {
+            visits.push(Visit { index, kind: StepKind::Repeat });
+        }
+    }
+}
+
 fn put(visits: &[Visit], at: usize, jump: RepeatedJump) -> Vec<Visit> {
     let mut longer = visits[..at].to_vec();
     if longer.last().is_none_or(|visit| visit.index != jump.from) {

@@ -124,6 +124,8 @@ pub struct PlanRequest<'a> {
     pub limits: PlanLimits,
     /// Repeats for drift, if any.
     pub repeats: Option<Repeats>,
+    /// A jump to be made after all else, by its start and its target, e.g. what a gap diagnosis asks for.
+    pub appended: Option<(OperatingPoint, OperatingPoint)>,
     /// Standard error of the efficiency (fraction) that [`VisitOrder::Time`] has to reach.
     pub required_sigma_eta: Option<f64>,
     /// The identification method; without one no errors are predicted.

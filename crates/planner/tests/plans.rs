@@ -149,6 +149,27 @@ fn the_usual_repeat_is_a_jump_that_is_allowed() {
 }
 
 #[test]
+fn an_appended_jump_comes_last_and_changes_nothing_before_it() {
+    let (model, points) = (Model::nominal(), grid());
+    let listed = request(&model, &points, VisitOrder::Listed);
+    let plain = make_plan(&listed).unwrap();
+    let last = plain.steps.last().unwrap().to;
+    // One end is no point of the grid.
+    let off_grid = OperatingPoint { speed_rpm: 60e3, ..points[0] };
+    for from in [points[1], last] {
+        let plan = make_plan(&PlanRequest { appended: Some((from, off_grid)), ..listed.clone() }).unwrap();
+        let (before, behind) = plan.steps.split_at(plain.steps.len());
+        assert_eq!(before, plain.steps);
+        let visited: Vec<OperatingPoint> = behind.iter().map(|step| step.to).collect();
+        // Where the points end at the start of the jump, it is one step.
+        let expected = if from == last { vec![off_grid] } else { vec![from, off_grid] };
+        assert_eq!(visited, expected);
+        assert!(behind.iter().all(|step| step.kind == StepKind::Repeat));
+        assert_eq!(plan.figures.sum_gradient_k, plain.figures.sum_gradient_k);
+    }
+}
+
+#[test]
 fn few_points_are_ordered_best_and_proven_so() {
     let (model, points) = (Model::nominal(), grid());
     let few = [points[0], points[5], points[10], points[15], points[17]];

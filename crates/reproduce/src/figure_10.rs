@@ -3,7 +3,7 @@
 use crate::format::{fixed, range};
 use crate::lab::{JUMPS, Run, run_all};
 use crate::outcome::{Outcome, RUN_S, assuming, extremes, outcomes, rms, worst};
-use crate::picture::{at_speed, equality_panel};
+use crate::picture::{at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel};
 use crate::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Figure, Marker, palette};
 use mapper_core::Channel;
@@ -94,18 +94,8 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
     };
     let svg = Figure::new("Figure 10: heat from the turbine, varied by the oil's cooling")
         .subtitle("model values: mean in the window")
-        .panel(equality_panel(
-            "(a) efficiency",
-            ("model efficiency, %", "identified efficiency, %"),
-            Some((1.0, "1 point off")),
-            series(|o| Some((100.0 * o.eta_mean, 100.0 * o.point.eta?))),
-        ))
-        .panel(equality_panel(
-            "(b) heat-transfer coefficient",
-            ("model h, W/(m2 K)", "identified h, W/(m2 K)"),
-            None,
-            series(|o| Some((o.h_mean_w_m2k, o.point.h_w_m2k?))),
-        ))
+        .panel(efficiency_panel(series(efficiency_pair)))
+        .panel(h_panel(series(h_pair)))
         .to_svg();
     Ok(FigureResult {
         number: "10".to_owned(),

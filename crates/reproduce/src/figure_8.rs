@@ -3,7 +3,9 @@
 use crate::format::{fixed, range};
 use crate::lab::{JUMPS, run_all};
 use crate::outcome::{Outcome, RUN_S, assuming, extremes, outcomes, rms, worst};
-use crate::picture::{at_speed, equality_panel, krpm, speed_colour, target_speeds_rpm};
+use crate::picture::{
+    at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, speed_colour, target_speeds_rpm,
+};
 use crate::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Dash, Figure, Line, Marker, Panel, Rule, RuleAt};
 use mapper_physics::model::Model;
@@ -178,18 +180,8 @@ fn picture(cases: &[Case], right: &[Outcome], wrong: &[Outcome]) -> String {
         .columns(3)
         .panel_size_px(400.0, 340.0)
         .subtitle("(a), (b): machine with alpha_A = 0.2, identified with 0.2 (known) and with 0")
-        .panel(equality_panel(
-            "(a) efficiency",
-            ("model efficiency, %", "identified efficiency, %"),
-            Some((1.0, "1 point off")),
-            series(|o| Some((100.0 * o.eta_mean, 100.0 * o.point.eta?))),
-        ))
-        .panel(equality_panel(
-            "(b) heat-transfer coefficient",
-            ("model h, W/(m2 K)", "identified h, W/(m2 K)"),
-            None,
-            series(|o| Some((o.h_mean_w_m2k, o.point.h_w_m2k?))),
-        ))
+        .panel(efficiency_panel(series(efficiency_pair)))
+        .panel(h_panel(series(h_pair)))
         .panel(over_alpha)
         .to_svg()
 }

@@ -3,7 +3,9 @@
 use crate::format::{fixed, range};
 use crate::lab::{JUMPS, run_all};
 use crate::outcome::{Outcome, RUN_S, WINDOW, assuming, extremes, in_window, outcomes, worst};
-use crate::picture::{at_speed, equality_panel, krpm, speed_colour, target_speeds_rpm};
+use crate::picture::{
+    at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, speed_colour, target_speeds_rpm,
+};
 use crate::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Figure, Line, Marker, Panel, Rule, RuleAt, palette};
 use mapper_core::Verdict as PointVerdict;
@@ -162,18 +164,8 @@ fn picture(cases: &[Case]) -> String {
         .columns(3)
         .panel_size_px(400.0, 340.0)
         .subtitle("model values: mean in the window; fits that failed are not shown; (c): 3 mm at 50 krpm is far off the scale")
-        .panel(equality_panel(
-            "(a) efficiency",
-            ("model efficiency, %", "identified efficiency, %"),
-            Some((1.0, "1 point off")),
-            series(|o| Some((100.0 * o.eta_mean, 100.0 * o.point.eta?))),
-        ))
-        .panel(equality_panel(
-            "(b) heat-transfer coefficient",
-            ("model h, W/(m2 K)", "identified h, W/(m2 K)"),
-            None,
-            series(|o| Some((o.h_mean_w_m2k, o.point.h_w_m2k?))),
-        ))
+        .panel(efficiency_panel(series(efficiency_pair)))
+        .panel(h_panel(series(h_pair)))
         .panel(worst_panel)
         .to_svg()
 }

@@ -51,6 +51,28 @@ pub(crate) fn equality_panel(
     panel
 }
 
+/// Efficiency in %: model (mean in the window) and identified, where it is.
+pub(crate) fn efficiency_pair(outcome: &Outcome) -> Option<(f64, f64)> {
+    Some((100.0 * outcome.eta_mean, 100.0 * outcome.point.eta?))
+}
+
+/// h in W/(m2 K): model (mean in the window) and identified, where it is.
+pub(crate) fn h_pair(outcome: &Outcome) -> Option<(f64, f64)> {
+    Some((outcome.h_mean_w_m2k, outcome.point.h_w_m2k?))
+}
+
+/// Efficiency in %, one point of error marked.
+pub(crate) fn efficiency_panel(series: Vec<Series>) -> Panel {
+    let axis = ("model efficiency, %", "identified efficiency, %");
+    equality_panel("(a) efficiency", axis, Some((1.0, "1 point off")), series)
+}
+
+/// h in W/(m2 K).
+pub(crate) fn h_panel(series: Vec<Series>) -> Panel {
+    let axis = ("model h, W/(m2 K)", "identified h, W/(m2 K)");
+    equality_panel("(b) heat-transfer coefficient", axis, None, series)
+}
+
 /// Identified against model efficiency (mean in the window) of the outcomes that have one.
 pub(crate) fn eta_pairs<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> Vec<(f64, f64)> {
     outcomes.into_iter().filter_map(|o| Some((o.eta_mean, o.point.eta?))).collect()

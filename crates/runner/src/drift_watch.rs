@@ -44,7 +44,8 @@ pub struct DriftWatch<'a> {
     /// Time that inserted steps have added, s.
     later_s: f64,
     notes: Vec<String>,
-    ended: bool,
+    /// Why no further step is handed out.
+    ended: Option<String>,
 }
 
 impl<'a> DriftWatch<'a> {
@@ -67,8 +68,13 @@ impl<'a> DriftWatch<'a> {
             handed_out: 0,
             later_s: 0.0,
             notes: Vec::new(),
-            ended: false,
+            ended: None,
         }
+    }
+
+    /// Why the run was ended before its last step, in words; `None` where drift did not end it.
+    pub fn ended_by_drift(&self) -> Option<&str> {
+        self.ended.as_deref()
     }
 
     /// Means at the end of the step, [`WATCHED`] in order; NaN for what is not delivered.
@@ -106,10 +112,11 @@ impl<'a> DriftWatch<'a> {
             OnDrift::Hold => "the run is held in its safe state; look before going on",
             OnDrift::Zero => "the run is stopped without flow: zero the sensors, then run the rest",
         };
-        self.notes.push(format!("drift: the repeated jump differs again, {differences}; {said}"));
+        let note = format!("drift: the repeated jump differs again, {differences}; {said}");
         if self.on_drift != OnDrift::Continue {
-            self.ended = true;
+            self.ended = Some(note.clone());
         }
+        self.notes.push(note);
     }
 }
 
@@ -127,7 +134,7 @@ impl StepSource for DriftWatch<'_> {
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
-        if self.ended {
+        if self.ended.is_some() {
             return Ok(None);
         }
         let next = match self.inserted.pop_front() {

@@ -1,6 +1,6 @@
 //! The fitted surface in the picture: lines, contours, surge and choke, and grey where it is extrapolated.
 
-use crate::surface::across;
+use crate::surface::{SUBDIVISIONS, across};
 use crate::svg::{contour_levels, krpm, percent};
 use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, StructuredGrid, palette};
 use mapper_core::{FittedLine, FittedMap, FittedNode, confidence_interval_95};
@@ -23,6 +23,12 @@ pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap) {
         let colour = if line.measured { palette::INK } else { palette::GREY };
         panel.add(Line::new(runs(all(), true), palette::GREY).width_px(1.0).dash(Dash::Dashed));
         panel.add(Line::new(runs(all(), false), colour).width_px(1.3));
+    }
+    // Where two speeds would be written upon each other the first stays: that of a measured line.
+    let (measured, others): (Vec<&FittedLine>, Vec<&FittedLine>) =
+        fitted.lines.iter().partition(|line| line.measured);
+    for line in measured.into_iter().chain(others) {
+        let colour = if line.measured { palette::INK } else { palette::GREY };
         // An invisible line of the last visible node carries the speed.
         let end = line.nodes.iter().find(|n| !n.extrapolated).or_else(|| middle(line)).map(place);
         panel.add(
@@ -77,9 +83,23 @@ fn runs(points: impl Iterator<Item = ((f64, f64), bool)>, extrapolated: bool) ->
     (0..all.len()).map(|i| if belongs(i) { all[i].0 } else { (f64::NAN, f64::NAN) }).collect()
 }
 
-/// Grey between neighbouring lines wherever a corner is extrapolated, one polygon for each run of nodes.
+/// Grey between neighbouring lines wherever a corner is extrapolated, one polygon for each run of nodes. From line to line
+/// it is bounded by the curves that bound the contours, so that nothing stays white between the two.
 fn add_shade(panel: &mut Panel, fitted: &FittedMap) {
-    for pair in fitted.lines.windows(2) {
+    let speeds: Vec<f64> = fitted.lines.iter().map(|line| line.speed_corrected_rpm).collect();
+    if speeds.len() < 2 || !speeds.windows(2).all(|w| w[1] > w[0]) {
+        return;
+    }
+    let side = |column: usize, pair: usize| -> Vec<(f64, f64)> {
+        let over_speed = |value: fn(&FittedNode) -> f64| {
+            let values: Vec<f64> =
+                fitted.lines.iter().map(|line| line.nodes.get(column).map_or(f64::NAN, value)).collect();
+            across(&speeds, &values)
+        };
+        let (flow, ratio) = (over_speed(|n| n.flow_corrected_kg_s), over_speed(|n| n.pressure_ratio));
+        (pair * SUBDIVISIONS..=(pair + 1) * SUBDIVISIONS).map(|i| (flow[i], ratio[i])).collect()
+    };
+    for (index, pair) in fitted.lines.windows(2).enumerate() {
         let (low, high) = (&pair[0].nodes, &pair[1].nodes);
         let grey = |i: usize| [&low[i], &low[i + 1], &high[i], &high[i + 1]].iter().any(|n| n.extrapolated);
         let cells = low.len().min(high.len()).saturating_sub(1);
@@ -91,7 +111,9 @@ fn add_shade(panel: &mut Panel, fitted: &FittedMap) {
             }
             let end = (start..cells).take_while(|i| grey(*i)).last().unwrap_or(start) + 1;
             let mut outline: Vec<(f64, f64)> = low[start..=end].iter().map(place).collect();
+            outline.extend(side(end, index));
             outline.extend(high[start..=end].iter().rev().map(place));
+            outline.extend(side(start, index).into_iter().rev());
             panel
                 .add(Polygon { opacity: 0.16, ..Polygon::new(outline, palette::GREY).label("extrapolated") });
             start = end;

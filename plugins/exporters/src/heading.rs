@@ -8,7 +8,7 @@ pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
     format!(
         "{mark} compressor map of {}\n\
          {mark} reference state of corrected flow and speed: {t_ref_k} K, {p_ref_pa} Pa\n",
-        one_line(&map.machine),
+        if map.machine.is_empty() { "unnamed machine".to_owned() } else { one_line(&map.machine) },
     )
 }
 

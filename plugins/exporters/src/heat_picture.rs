@@ -1,4 +1,4 @@
-//! Pictures of what was identified beside the map: h over flow, and error of efficiency over the gradient of T2.
+//! Pictures of what was identified beside the map: h over flow, and error of efficiency over the change of T2.
 
 use mapper_chart::{Axis, Dash, Figure, Line, Marker, Panel, Rule, RuleAt, Scatter, ScatterPoint, palette};
 use mapper_core::{IdentifiedPoint, Verdict};
@@ -55,7 +55,7 @@ pub struct ErrorAtGradient {
     pub verdict: Verdict,
 }
 
-/// Error of efficiency over the gradient of T2 (figure 12): where the truth is known, that is in a simulated run.
+/// Error of efficiency over the change of T2 (figure 12): where the truth is known, that is in a simulated run.
 pub fn error_figure(machine: &str, errors: &[ErrorAtGradient]) -> Figure {
     let mut panel =
         Panel::new(Axis::new("change of T2 in the window, K"), Axis::new("error of efficiency, points"))
@@ -78,8 +78,8 @@ pub fn error_figure(machine: &str, errors: &[ErrorAtGradient]) -> Figure {
         }
     }
     let machine = if machine.is_empty() { "unnamed machine" } else { machine };
-    Figure::new(format!("Error of efficiency over the gradient of T2, {machine}"))
-        .subtitle("Against the simulator's truth; bars are the 95 % intervals that the identification gives.")
+    Figure::new(format!("Error of efficiency over the change of T2, {machine}"))
+        .subtitle("Against the simulator's truth; bars are the 95 % intervals that the identification gives, cut at the frame.")
         .panel(panel)
         .columns(1)
         .panel_size_px(640.0, 420.0)

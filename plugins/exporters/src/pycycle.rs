@@ -44,11 +44,25 @@ pub(crate) fn export(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
         // The same at both vane angles: the machine has none.
         text.push_str("]] * 2)\n");
     }
-    text.push_str(
-        "compressor.Npts = compressor.NcMap.size\ncompressor.units = {'NcMap': 'rpm', 'WcMap': 'kg/s'}\n",
-    );
+    text.push_str(LISTS);
     Ok(text.into_bytes())
 }
+
+/// What pyCycle 4's `CompressorMap` makes its interpolator from.
+const LISTS: &str = "\
+compressor.Npts = compressor.NcMap.size
+compressor.units = {'NcMap': 'rpm', 'WcMap': 'kg/s'}
+compressor.param_data = [
+    {'name': 'alphaMap', 'values': compressor.alphaMap, 'default': 0.0, 'units': None},
+    {'name': 'NcMap', 'values': compressor.NcMap, 'default': compressor.defaults['NcMap'], 'units': 'rpm'},
+    {'name': 'RlineMap', 'values': compressor.RlineMap, 'default': compressor.defaults['RlineMap'], 'units': None},
+]
+compressor.output_data = [
+    {'name': name, 'values': values, 'default': np.mean(values), 'units': compressor.units.get(name)}
+    for name, values in (
+        ('WcMap', compressor.WcMap), ('effMap', compressor.effMap), ('PRmap', compressor.PRmap))
+]
+";
 
 /// Speed and column of the best efficiency: the design point that pyCycle starts from.
 fn best(table: &SimulationTable) -> (usize, usize) {

@@ -18,7 +18,7 @@ use mapper_core::{CompressorMap, MapPoint, SpeedLine};
 /// Nodes along a line.
 const COLUMNS: usize = 49;
 /// Rows from one line to the next.
-const SUBDIVISIONS: usize = 8;
+pub(crate) const SUBDIVISIONS: usize = 8;
 /// Distance below which points count as one, share of the map's diagonal.
 const SAME_PLACE: f64 = 0.01;
 

@@ -1,4 +1,6 @@
 //! SAE text, compressor: `#` comments, then corrected rpm, corrected kg/s, pressure ratio, efficiency in a row.
+//!
+//! Manufacturers' files may begin with a title, a row of two wheel diameters and column names; those are passed over.
 
 use crate::lines::{Row, map_of_rows, room_for_one_more};
 use crate::{ImportError, reference};
@@ -29,9 +31,9 @@ pub(crate) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
                     Row { at, speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, eta: Some(eta) };
                 row.check()?;
                 rows.push(row);
+                heading_allowed = false;
             }
-            // One line of column names.
-            None if heading_allowed => {}
+            None if heading_allowed && is_heading(content) => {}
             None => {
                 let shown: String = content.chars().take(60).collect();
                 let message = format!(
@@ -40,9 +42,14 @@ pub(crate) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
                 return Err(ImportError::Syntax { line: at, message });
             }
         }
-        heading_allowed = false;
     }
     map_of_rows(machine, &rows, found, given)
+}
+
+/// Words, or two numbers as the wheel's diameters; three numbers or five are a broken row.
+fn is_heading(content: &str) -> bool {
+    let numbers = content.split_whitespace().filter(|field| field.parse::<f64>().is_ok()).count();
+    numbers < content.split_whitespace().count() || numbers == 2
 }
 
 fn four_numbers(content: &str) -> Option<[f64; 4]> {

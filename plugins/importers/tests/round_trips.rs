@@ -144,6 +144,8 @@ fn mistakes_are_named_with_their_line() {
     assert_eq!(line("csv", "# a\nrpm,wc,pr,eta\n50000,0.1,1.3,60.0\n"), 3);
     assert_eq!(line("csv", "rpm,flow\n1,2\n"), 1);
     assert_eq!(line("sae", "N m PR Eff\n50000 0.1 1.3 0.6\n50000 0.1 1.3\n"), 3);
+    assert_eq!(line("sae", "title\n50000 0.1 1.3\n"), 2);
+    assert_eq!(line("sae", "50000 0.1 1.3 0.6\n0.6 0.4\n"), 2);
     assert_eq!(line("sae", "50000 -0.1 1.3 0.6\n"), 1);
     assert_eq!(line("sae", "50000 0.1 inf 0.6\n"), 1);
     let bytes = read(find("sae").unwrap(), b"50000 0.1 1.3 0.6\n\xff\xfe", reference);
@@ -164,5 +166,9 @@ fn tables_of_others_are_read_by_their_column_names() {
     assert_eq!(map.lines[0].points[0].flow_corrected_kg_s, 0.04);
     let bare = "\u{feff}50000,0.05,1.3,0.6\n";
     assert_eq!(import("csv", bare, Some(ReferenceState::SAE)).unwrap().lines.len(), 1);
+    // Title and wheel diameters, as manufacturers' files begin, and points from surge to choke.
+    let heading = "ABC   T12\n0.638     0.435\n\n 6000.5 8.2 1.48 0.78\n 6000.5 9.4 1.46 0.80\n";
+    let map = import("sae", heading, Some(ReferenceState::SAE)).unwrap();
+    assert_eq!((map.lines.len(), map.lines[0].points.len()), (1, 2));
     assert!(of_extension("CSV").is_some() && of_extension("xlsx").is_none());
 }

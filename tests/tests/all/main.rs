@@ -1,16 +1,20 @@
 //! The program as a user runs it, and the rules of the source tree.
 //!
-//! Tests that need Python are marked ignored, and shown so, where `cargo xtask test` has not prepared it.
+//! Tests that need Python or Chromium are marked ignored, and shown so, where `cargo xtask test` has not prepared it.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod dependencies;
+mod drift;
+mod drift_refusals;
+mod drift_watched;
 mod full_disk;
 mod help;
 mod interrupted;
 mod maps;
 mod mistakes;
 mod nightly;
+mod pages;
 mod pipes;
 mod plans;
 mod recordings;

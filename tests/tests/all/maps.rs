@@ -1,6 +1,6 @@
 //! Commands on maps, as a user runs them.
 
-use mapper_tests::{mapper, python, repository, scratch};
+use mapper_tests::{CampaignFile, SHORT_GRID, mapper, only_run, python, repository, scratch};
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -127,4 +127,40 @@ fn a_map_differs_from_itself_nowhere() {
     assert!(result["eta_rms"].as_f64().unwrap() < 1e-9);
     assert_eq!(result["lines"].as_array().unwrap().len(), 13);
     assert!(std::fs::read_to_string(picture).unwrap().starts_with("<svg"));
+}
+
+#[test]
+fn a_run_gives_the_turbine_that_the_rig_has_and_its_pictures() {
+    let scratch = scratch();
+    let campaign = CampaignFile::shipped_with(SHORT_GRID);
+    let runs = scratch.path().join("runs");
+    mapper(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), runs.as_os_str()]).exits(0);
+    let (recording, out) = (only_run(&runs), scratch.path().join("rig"));
+    let arguments =
+        || ["rig".as_ref(), recording.as_os_str(), "--out".as_ref(), out.as_os_str(), "--json".as_ref()];
+    let result = run(arguments()).exits(0).json();
+    for name in ["thermal_model.json", "thermal_model.txt", "turbine.txt", "turbine.json"] {
+        assert!(out.join(name).metadata().unwrap().len() > 100, "{name}");
+    }
+    for name in ["heat_transfer.svg", "error.svg"] {
+        assert!(std::fs::read_to_string(out.join(name)).unwrap().starts_with("<svg"), "{name}");
+        let png = std::fs::read(out.join(name).with_extension("png")).unwrap();
+        assert!(png.starts_with(b"\x89PNG"), "{name}");
+    }
+    let turbine = result["turbine"].as_array().unwrap();
+    assert!(!turbine.is_empty());
+    for point in turbine {
+        let number = |key: &str| point[key].as_f64().unwrap();
+        // The simulated rig's swallowing law (docs/physics.md), 0.078 kg/s at 101.325 kPa and 288.15 K; sensors scatter by
+        // some permille.
+        let law = 0.078 * (1.0 - number("expansion_ratio").powf(-1.1)).sqrt() * 288.15f64.sqrt() / 101.325;
+        let flow_parameter = number("flow_parameter_kg_sqrt_k_s_kpa");
+        assert!((flow_parameter / law - 1.0).abs() < 0.01, "{flow_parameter} {law}");
+        // The law's best efficiency is 0.75 of what reaches the wheel.
+        if let Some(efficiency) = point["efficiency"].as_f64() {
+            assert!((0.2..0.76).contains(&efficiency), "{point}");
+        }
+    }
+    // What is there is not replaced.
+    run(arguments()).exits(1);
 }

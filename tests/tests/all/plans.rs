@@ -119,3 +119,21 @@ fn predicted_errors_are_the_scatter_of_seeded_runs() {
         assert!((ratio - 1.0).abs() < 0.5, "step {step}: the scatter is {ratio} of the prediction");
     }
 }
+
+/// What a gap diagnosis asks for can be run: stored behind a plan, run with it, and kept out of the map.
+#[test]
+fn an_appended_jump_is_run_behind_the_points() {
+    let campaign = campaign("listed", &[]);
+    let stored = campaign.directory().join("plan.json");
+    let (file, out) = (campaign.path.as_os_str(), campaign.runs());
+    let append = ["plan".as_ref(), file, "--out".as_ref(), stored.as_os_str(), "--append".as_ref()];
+    let made = mapper(append.into_iter().chain(["140krpm@0.7".as_ref(), "65krpm@1.4".as_ref()])).exits(0);
+    assert!(made.stdout.contains("made after all else"), "{}", made.stdout);
+    let arguments =
+        ["run".as_ref(), file, "--plan".as_ref(), stored.as_os_str(), "--json".as_ref(), "--out".as_ref()];
+    let result = mapper(arguments.into_iter().chain([out.as_os_str()])).exits(0).json();
+    let points = result["points"].as_array().unwrap();
+    let last = points.last().unwrap();
+    assert_eq!(points.len(), 8, "six points, the start of the jump and its target");
+    assert_eq!((last["kind"].as_str(), number(&last["valve"])), (Some("repeat"), 1.4));
+}

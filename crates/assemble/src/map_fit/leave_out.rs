@@ -26,6 +26,9 @@ pub fn leave_out(fit: &MapFit) -> Vec<LeftOutLine> {
 fn left_out(data: &Observations, line: usize, outermost: bool) -> Option<LeftOutLine> {
     let rest = MapFit::of(data.without(line).ok()?).ok()?;
     let (mut distances, mut errors) = (Vec::new(), Vec::new());
+    let (mut distances_held, mut errors_held) = (0usize, 0usize);
+    let [distance_rms, eta_rms] = rest.solution.rms;
+    let held = |off: f64, line: f64, point: f64| usize::from(off <= 1.96 * line.hypot(point));
     for point in data.points.iter().filter(|point| point.line == line) {
         let speed_rpm = point.speed_ratio * data.nominal_speed_rpm;
         let place = rest.nearest(
@@ -36,11 +39,19 @@ fn left_out(data: &Observations, line: usize, outermost: bool) -> Option<LeftOut
             point.ratio_scale,
         );
         distances.push(place.distance_ratio);
-        errors.extend(point.eta.map(|eta| (eta - place.eta).abs()));
+        distances_held += held(place.distance_ratio, place.distance_standard_error, distance_rms);
+        if let Some(eta) = point.eta {
+            let off = (eta - place.eta).abs();
+            errors.push(off);
+            errors_held += held(off, place.eta_standard_error, eta_rms.hypot(point.eta_error));
+        }
     }
+    let share = |held: usize, of: usize| (of > 0).then(|| held as f64 / of as f64);
     Some(LeftOutLine {
         speed_corrected_rpm: data.lines_rpm[line],
         outermost,
+        distance_held_ratio: share(distances_held, distances.len()),
+        eta_held_ratio: share(errors_held, errors.len()),
         distance_ratio: median(&mut distances)?,
         eta: median(&mut errors),
     })

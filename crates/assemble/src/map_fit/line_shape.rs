@@ -116,36 +116,37 @@ impl LineShape {
         };
         let flow = self.zero_slope_flow + (self.choke_flow - self.zero_slope_flow) * x;
         let head = self.choke_head + (self.zero_slope_head - self.choke_head) * y;
-        let z = ((flow - self.frame.middle) / self.frame.half).clamp(-1.6, 1.6);
-        let drop = (1.0 - y).clamp(0.0, 1.0);
-        let terms = [1.0, z, z * z, drop, drop * drop, z * z * z];
-        let log_work: f64 = terms.iter().zip(&self.work).map(|(term, c)| term * c).sum();
+        let log_work: f64 =
+            self.work_terms(flow, head).iter().zip(&self.work).map(|(term, c)| term * c).sum();
         Place { flow, head, work: log_work.clamp(-8.0, 5.0).exp() }
+    }
+
+    /// Derivatives of the logarithm of the work coefficient by its parameters, at a place of the line.
+    pub(crate) fn work_terms(&self, flow: f64, head: f64) -> [f64; WORK_TERMS] {
+        let z = ((flow - self.frame.middle) / self.frame.half).clamp(-1.6, 1.6);
+        let y = (head - self.choke_head) / (self.zero_slope_head - self.choke_head);
+        let drop = (1.0 - y).clamp(0.0, 1.0);
+        [1.0, z, z * z, drop, drop * drop, z * z * z]
     }
 
     /// Distance of the curve from the ellipse's centre, in units of its half axes.
     fn radius(&self, angle_rad: f64, cos: f64, sin: f64) -> f64 {
         let [n, k] = self.exponents;
-        let highest = 1.0 / cos.max(sin);
-        let (mut low, mut high) = (0.3 * highest, highest);
-        let mut r = 0.85 * highest;
-        for _ in 0..40 {
-            let (a, b) = ((r * cos).powf(n), (r * sin).powf(k));
-            let excess = a + b - 1.0;
-            if excess > 0.0 {
-                high = r
-            } else {
-                low = r
-            }
-            // Newton, or halving where it leaves what is known.
-            let next = r - excess * r / (n * a + k * b);
-            let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-            let settled = (next - r).abs() < 1e-13 * highest;
-            r = next;
-            if settled {
+        let (log_cos, log_sin) = (cos.max(1e-300).ln(), sin.max(1e-300).ln());
+        // The ellipse's equation as ln((r cos)^n + (r sin)^k) = 0 in ln r: convex, nearly straight, of slope between n
+        // and k, so that Newton's steps need no guard and few rounds.
+        let mut log_r = -log_cos.max(log_sin) - 0.15;
+        for _ in 0..20 {
+            let (a, b) = ((n * (log_r + log_cos)).exp(), (k * (log_r + log_sin)).exp());
+            let sum = a + b;
+            let step = sum.ln() * sum / (n * a + k * b);
+            log_r -= step;
+            // The error after a step is about the square of the step.
+            if step.abs() < 1e-7 {
                 break;
             }
         }
+        let r = log_r.exp();
         // None at choke, nor its slope: there the line must not lean over.
         let correction: f64 = sin
             * sin

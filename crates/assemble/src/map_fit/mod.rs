@@ -3,21 +3,28 @@
 mod crossing;
 mod error;
 mod leave_out;
+mod line_errors;
 mod line_shape;
 mod nearest;
 mod observations;
+mod problem;
+mod solution;
 mod solve;
 mod speed_spline;
+mod splines;
 mod table;
+mod variances;
 
 pub use error::MapFitError;
 pub use leave_out::leave_out;
 
+use line_errors::LineErrors;
 use line_shape::LineShape;
 use mapper_core::{CompressorMap, FittedMap};
 use nearest::{Scales, nearest};
 use observations::Observations;
-use solve::{Solution, solve};
+use solution::Solution;
+use solve::solve;
 
 /// Lowest and highest speed that a fit answers for, over the slowest and the fastest measured speed.
 const SPEED_REACH: (f64, f64) = (0.1, 1.3);
@@ -56,6 +63,10 @@ pub struct NearestPlace {
     pub distance_ratio: f64,
     /// Efficiency of the line at the nearest place, fraction.
     pub eta: f64,
+    /// One standard error of the line there, across it, in units of the line's scales.
+    pub distance_standard_error: f64,
+    /// One standard error of the efficiency, fraction.
+    pub eta_standard_error: f64,
 }
 
 impl MapFit {
@@ -102,7 +113,13 @@ impl MapFit {
             (foot.place.flow_kg_s - point.0) / scales.flow_kg_s,
             (foot.place.pressure_ratio - point.1) / scales.ratio,
         );
-        NearestPlace { distance_ratio: x.hypot(y), eta: foot.place.eta }
+        let error = LineErrors::new(&self.solution, speed_ratio).at(foot.angle_rad, scales);
+        NearestPlace {
+            distance_ratio: x.hypot(y),
+            eta: self.believed(foot.place.eta, self.outside(speed_ratio)),
+            distance_standard_error: error.distance,
+            eta_standard_error: error.eta,
+        }
     }
 
     /// The fit as a table.
@@ -119,6 +136,16 @@ impl MapFit {
 
     fn shape(&self, speed_corrected_rpm: f64) -> LineShape {
         self.solution.shape(self.speed_ratio(speed_corrected_rpm))
+    }
+
+    /// Whether a speed lies beyond the slowest or the fastest measured one.
+    fn outside(&self, speed_ratio: f64) -> bool {
+        self.solution.splines.shape.outside(speed_ratio) > 1e-9
+    }
+
+    /// Efficiency as it is answered: where nothing was measured, no better than the best that was.
+    fn believed(&self, eta: f64, extrapolated: bool) -> f64 {
+        if extrapolated { eta.min(self.solution.best_eta) } else { eta }
     }
 
     fn speed_bounds_rpm(&self) -> (f64, f64) {

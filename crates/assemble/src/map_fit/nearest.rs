@@ -20,6 +20,8 @@ pub(crate) struct Foot {
     pub distance: f64,
 }
 
+/// How far a foot may move along its line at once, rad.
+const REACH: f64 = 0.12;
 /// Half step of the difference quotients by angle, rad.
 const STEP: f64 = 1e-5;
 
@@ -42,17 +44,47 @@ pub(crate) fn nearest(
         let (x, y) = offset(angle);
         x * x + y * y
     };
-    let (mut low, mut high) = match guess_rad {
-        Some(guess) => (guess - 0.12, guess + 0.12),
-        None => ANGLE_RANGE,
+    let (start, low, high) = match guess_rad {
+        Some(guess) => (guess, guess - REACH, guess + REACH),
+        None => best_of_net(&squared),
     };
-    // Nets of falling mesh; the first is fine enough to tell the flat from the steep part.
-    let mut best = guess_rad.unwrap_or(ANGLE_RANGE.0);
-    let meshes: &[u32] = if guess_rad.is_some() { &[8, 8] } else { &[48, 10, 8] };
-    for mesh in meshes {
-        let step = (high - low) / f64::from(*mesh);
+    // Gauss-Newton in one variable from there, halved where it does not come nearer.
+    let mut foot = describe(shape, speed_ratio, start, offset, scales);
+    let mut least = squared(start);
+    for _ in 0..8 {
+        let (x, y) = offset(foot.angle_rad);
+        let [sx, sy, _] = foot.slope;
+        let length = sx * sx + sy * sy;
+        if length.is_nan() || length <= 1e-12 {
+            break;
+        }
+        let mut step = (foot.angle_rad + (x * sx + y * sy) / length).clamp(low, high) - foot.angle_rad;
+        let mut value = squared(foot.angle_rad + step);
+        while value >= least && step.abs() > 1e-8 {
+            step *= 0.5;
+            value = squared(foot.angle_rad + step);
+        }
+        if value >= least {
+            break;
+        }
+        least = value;
+        foot = describe(shape, speed_ratio, foot.angle_rad + step, offset, scales);
+        if step.abs() < 1e-7 {
+            break;
+        }
+    }
+    foot
+}
+
+/// The best of nets of falling mesh over the whole line, and the last mesh's bounds about it.
+fn best_of_net(squared: &impl Fn(f64) -> f64) -> (f64, f64, f64) {
+    let (mut low, mut high) = ANGLE_RANGE;
+    let mut best = low;
+    // The first is fine enough to tell the flat from the steep part.
+    for mesh in [48, 10] {
+        let step = (high - low) / f64::from(mesh);
         let mut least = f64::INFINITY;
-        for i in 0..=*mesh {
+        for i in 0..=mesh {
             let angle = low + step * f64::from(i);
             let value = squared(angle);
             if value < least {
@@ -61,22 +93,7 @@ pub(crate) fn nearest(
         }
         (low, high) = (best - step, best + step);
     }
-    // Gauss-Newton in one variable from there, inside the last mesh.
-    let mut foot = describe(shape, speed_ratio, best, offset, scales);
-    for _ in 0..4 {
-        let (x, y) = offset(foot.angle_rad);
-        let [sx, sy, _] = foot.slope;
-        let length = sx * sx + sy * sy;
-        if length.is_nan() || length <= 1e-12 {
-            break;
-        }
-        let next = (foot.angle_rad + (x * sx + y * sy) / length).clamp(low, high);
-        if squared(next) >= squared(foot.angle_rad) || (next - foot.angle_rad).abs() < 1e-10 {
-            break;
-        }
-        foot = describe(shape, speed_ratio, next, offset, scales);
-    }
-    foot
+    (best, low, high)
 }
 
 fn describe(

@@ -5,8 +5,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Length over which the slope beyond the outermost knots dies away, as a share of the nominal speed (or its inverse):
-/// far outside, similarity holds, and what is a trend inside must not run away.
+/// Length over which the slope beyond the outermost knots dies away, as a share of the nominal speed (or its inverse),
+/// and at most half of what the knots cover: far outside, similarity holds, and what is a trend inside must not run away.
 const DAMPING: f64 = 0.5;
 
 /// The coordinate of a parameter, of speed over the nominal speed: flow and head change with the Mach number, in
@@ -42,7 +42,10 @@ pub(crate) struct SpeedSpline {
 impl SpeedSpline {
     /// `speed_ratios` of the knots strictly rising, at least one.
     pub(crate) fn new(coordinate: Coordinate, speed_ratios: &[f64]) -> Self {
-        let knots: Vec<f64> = speed_ratios.iter().map(|v| coordinate.of(*v)).collect();
+        SpeedSpline::with_knots(coordinate, speed_ratios.iter().map(|v| coordinate.of(*v)).collect())
+    }
+
+    fn with_knots(coordinate: Coordinate, knots: Vec<f64>) -> Self {
         let n = knots.len();
         let (mut second, mut penalty) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
         if n >= 3 {
@@ -83,7 +86,8 @@ impl SpeedSpline {
         }
         let outside = self.outside(speed_ratio);
         if outside > 0.0 {
-            let reach = DAMPING * (1.0 - (-outside / DAMPING).exp());
+            let damping = DAMPING.min(0.5 * (x[n - 1] - x[0]));
+            let reach = damping * (1.0 - (-outside / damping).exp());
             let (end, inner) = if at < x[0] { (0, 1) } else { (n - 1, n - 2) };
             let h = (x[end] - x[inner]).abs();
             row[end] = 1.0 + reach / h;
@@ -104,6 +108,23 @@ impl SpeedSpline {
                 * ((a * a * a - a) * self.second[(i, k)] + (b * b * b - b) * self.second[(i + 1, k)]);
         }
         row
+    }
+
+    /// Variance of the value at a speed where all knot values are known, for roughness (the variance that the penalty
+    /// is one over of) 1: with that prior the spline is an integrated random walk, and what it does between its knots and
+    /// beyond them is open. 0 at a knot.
+    pub(crate) fn open_variance(&self, speed_ratio: f64) -> f64 {
+        let at = self.coordinate.of(speed_ratio);
+        let place = self.knots.partition_point(|knot| *knot < at);
+        let near = |knot: &f64| (knot - at).abs() < 1e-6 * (1.0 + at.abs());
+        if self.knots[place.saturating_sub(1)..].iter().take(2).any(near) {
+            return 0.0;
+        }
+        let mut knots = self.knots.clone();
+        knots.insert(place, at);
+        // The precision of one value given all others stands on the diagonal.
+        let precision = SpeedSpline::with_knots(self.coordinate, knots).penalty[(place, place)];
+        if precision > 0.0 { 1.0 / precision } else { 0.0 }
     }
 
     /// How far a speed lies outside the knots, in the coordinate; 0 inside.
@@ -136,7 +157,18 @@ mod tests {
             let near = spline.row(at + 1e-6).dot(&values);
             prop_assert!((near - (0.3 + slope * (at + 1e-6))).abs() < 1e-9);
             let far = spline.row(at + 50.0).dot(&values);
-            prop_assert!((far - (0.3 + slope * (at + DAMPING))).abs() < 1e-9);
+            prop_assert!((far - (0.3 + slope * (at + DAMPING.min(0.5 * at)))).abs() < 1e-9);
+        }
+
+        /// A straight line through two knots, a third value in their middle at distance h: the curvature is spread over
+        /// two parabola halves, integral of g''^2 = 3 d^2 / h^3 for a rise d: Green and Silverman, ch. 2.
+        #[test]
+        fn what_lies_between_two_knots_is_open(h in 0.05..2.0f64) {
+            let spline = SpeedSpline::new(Coordinate::Speed, &[0.0, 2.0 * h]);
+            let exact = h.powi(3) / 6.0;
+            prop_assert!((spline.open_variance(h) / exact - 1.0).abs() < 1e-9);
+            prop_assert!(spline.open_variance(2.0 * h) == 0.0);
+            prop_assert!(spline.open_variance(3.0 * h) > spline.open_variance(2.5 * h));
         }
 
         #[test]

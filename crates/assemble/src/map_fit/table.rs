@@ -1,8 +1,9 @@
 //! The fit as a rectangular table with errors and marks of extrapolation.
 
 use super::crossing::crossings;
-use super::line_shape::{ANGLE_RANGE, LOWEST_ANGLE, LineShape, PARAMETERS};
-use super::nearest::normal;
+use super::line_errors::LineErrors;
+use super::line_shape::{ANGLE_RANGE, LOWEST_ANGLE, LineShape};
+use super::nearest::Scales;
 use super::speed_spline::SpeedSpline;
 use super::{MapFit, MapFitError, MapFitOptions, leave_out};
 use mapper_core::{FittedLine, FittedMap, FittedNode};
@@ -99,8 +100,18 @@ impl Ends {
         Ends { spline, surge: deviation.add_scalar(mean), measured }
     }
 
+    /// Surge-side end: smooth over speed, so that a line without points there ends where its neighbours do, but never
+    /// before the last point that was measured.
     fn surge_rad(&self, speed_ratio: f64) -> f64 {
-        self.spline.row(speed_ratio).dot(&self.surge).clamp(0.2, ANGLE_RANGE.1)
+        let smooth = |speed: f64| self.spline.row(speed).dot(&self.surge);
+        let (Some(first), Some(last)) = (self.measured.first(), self.measured.last()) else {
+            return smooth(speed_ratio).clamp(0.2, ANGLE_RANGE.1);
+        };
+        // Beyond the measured speeds as far over the smooth end as at the outermost line.
+        let at = speed_ratio.clamp(first.0, last.0);
+        let measured = self.supported(at).map_or(f64::NEG_INFINITY, |(_, surge)| surge);
+        let over = (measured - smooth(at)).max(0.0);
+        (smooth(speed_ratio) + over).clamp(0.2, ANGLE_RANGE.1)
     }
 
     /// Smallest and largest angle that points support; `None` outside the measured speeds.
@@ -137,15 +148,14 @@ fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Ve
         })
         .collect();
     let largest = |value: fn(&(f64, f64)) -> f64| places.iter().map(value).fold(f64::MIN, f64::max);
-    let scales = (largest(|p| p.0).max(1e-12), (largest(|p| p.1) - 1.0).max(1e-6));
+    let scales = Scales { flow_kg_s: largest(|p| p.0).max(1e-12), ratio: (largest(|p| p.1) - 1.0).max(1e-6) };
     let mut length = vec![0.0];
     for pair in places.windows(2) {
-        let step = ((pair[1].0 - pair[0].0) / scales.0).hypot((pair[1].1 - pair[0].1) / scales.1);
+        let step = ((pair[1].0 - pair[0].0) / scales.flow_kg_s).hypot((pair[1].1 - pair[0].1) / scales.ratio);
         length.push(length[length.len() - 1] + step);
     }
     let total = length[WALK];
-    let covariance = fit.solution.covariance(speed_ratio);
-    let parameters = fit.solution.parameters(speed_ratio);
+    let errors = LineErrors::new(&fit.solution, speed_ratio);
     let supported = ends.supported(speed_ratio);
     (0..count)
         .map(|i| {
@@ -155,18 +165,20 @@ fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Ve
             let share = if gap > 0.0 { ((wanted - length[after - 1]) / gap).clamp(0.0, 1.0) } else { 0.0 };
             let angle = walk[after - 1] + share * (walk[after] - walk[after - 1]);
             let place = shape.physical(angle, speed_ratio);
-            let [flow_error, ratio_error, eta_error] =
-                errors(fit, &parameters, &covariance, angle, speed_ratio, scales);
+            let error = errors.at(angle, scales);
+            // A hair's breadth beyond the last point is no extrapolation.
+            let extrapolated = supported.is_none_or(|(low, high)| angle < low - 0.02 || angle > high + 0.02);
+            let eta = fit.believed(place.eta, extrapolated);
+            let work = shape.at(angle).work * speed_ratio * speed_ratio;
             FittedNode {
                 flow_corrected_kg_s: place.flow_kg_s,
                 pressure_ratio: place.pressure_ratio,
-                eta: place.eta,
-                work_ratio: shape.at(angle).work * speed_ratio * speed_ratio,
-                flow_standard_error_kg_s: flow_error,
-                pressure_ratio_standard_error: ratio_error,
-                eta_standard_error: eta_error,
-                // A hair's breadth beyond the last point is no extrapolation.
-                extrapolated: supported.is_none_or(|(low, high)| angle < low - 0.02 || angle > high + 0.02),
+                eta,
+                work_ratio: if eta < place.eta { work * place.eta / eta } else { work },
+                flow_standard_error_kg_s: error.flow_part * scales.flow_kg_s,
+                pressure_ratio_standard_error: error.ratio_part * scales.ratio,
+                eta_standard_error: error.eta,
+                extrapolated,
             }
         })
         .collect()
@@ -186,37 +198,4 @@ fn choke_end(shape: &LineShape, speed_ratio: f64, surge_rad: f64) -> f64 {
         if ratio(middle) < wanted { low = middle } else { high = middle }
     }
     high
-}
-
-/// One standard error of a place: across the line (flow and pressure-ratio parts), and of efficiency.
-fn errors(
-    fit: &MapFit,
-    parameters: &[f64; PARAMETERS],
-    covariance: &DMatrix<f64>,
-    angle: f64,
-    speed_ratio: f64,
-    (flow_scale, ratio_scale): (f64, f64),
-) -> [f64; 3] {
-    const STEP: f64 = 1e-5;
-    let at = |p: &[f64; PARAMETERS], angle: f64| {
-        let place = LineShape::new(p, fit.solution.frame).physical(angle, speed_ratio);
-        [place.flow_kg_s / flow_scale, place.pressure_ratio / ratio_scale, place.eta]
-    };
-    let (here, next) = (at(parameters, angle), at(parameters, angle + STEP));
-    let slope: [f64; 3] = std::array::from_fn(|i| (next[i] - here[i]) / STEP);
-    let (nx, ny) = normal(&slope);
-    let length = (slope[0].powi(2) + slope[1].powi(2)).max(1e-12);
-    let mut across = DVector::zeros(PARAMETERS);
-    let mut eta = DVector::zeros(PARAMETERS);
-    for q in 0..PARAMETERS {
-        let mut moved = *parameters;
-        moved[q] += STEP;
-        let there = at(&moved, angle);
-        let d: [f64; 3] = std::array::from_fn(|i| (there[i] - here[i]) / STEP);
-        across[q] = d[0] * nx + d[1] * ny;
-        eta[q] = d[2] - slope[2] * (d[0] * slope[0] + d[1] * slope[1]) / length;
-    }
-    let error = |gradient: &DVector<f64>| gradient.dot(&(covariance * gradient)).max(0.0).sqrt();
-    let distance = error(&across);
-    [distance * nx.abs() * flow_scale, distance * ny.abs() * ratio_scale, error(&eta)]
 }

@@ -3,14 +3,16 @@
 use crate::arguments::DriftArguments;
 use crate::exit_code::Code;
 use crate::failure::Failure;
+use crate::zero::Zero;
 use crate::{assembly_line, output, run_directory, table};
 use mapper_campaign::Campaign;
+use mapper_core::Recording;
 use mapper_drift::{DriftError, DriftReport, DriftRequest, RecordedRun, RepeatGroup, diagnose};
-use mapper_identify::WindowRule;
+use mapper_identify::{IdentifyConfig, WindowRule, ZeroSettings, isothermal_zero, zeroed};
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, RecordError, read_recording};
 use serde_json::json;
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Reads, judges, prints.
 pub fn drift(arguments: &DriftArguments) -> Result<(), Failure> {
@@ -22,10 +24,7 @@ pub fn drift(arguments: &DriftArguments) -> Result<(), Failure> {
         Some(campaign) => campaign,
         None => attached_campaign(&read, &files)?,
     };
-    let report = match other_machine(&read, &campaign) {
-        Some(reason) => DriftReport::without_verdict(reason),
-        None => judge(&read, &campaign, &map)?,
-    };
+    let (report, zero) = judge(&read, &files, &campaign, &map)?;
     if let Some(path) = &arguments.corrected {
         output::write_new(path, corrected_csv(&report).as_bytes())?;
     }
@@ -35,11 +34,13 @@ pub fn drift(arguments: &DriftArguments) -> Result<(), Failure> {
         let mut value = serde_json::to_value(&report).map_err(|error| Failure::new(Code::Failure, error))?;
         if let Some(object) = value.as_object_mut() {
             object.insert("recordings".to_owned(), json!(files));
+            object.insert("zero".to_owned(), zero.json());
             object.insert("recording_warnings".to_owned(), json!(warnings));
         }
         return output::print_json(&value);
     }
     let mut text = text(&report);
+    text.push_str(&zero.text());
     for warning in warnings {
         let _ = writeln!(text, "recording: {warning}");
     }
@@ -111,40 +112,27 @@ fn other_machine(read: &[ReadReport], campaign: &Campaign) -> Option<String> {
     None
 }
 
-fn judge(read: &[ReadReport], campaign: &Campaign, map: &ChannelMap) -> Result<DriftReport, Failure> {
-    let model = assembly_line::nominal_model(campaign)?;
-    let mut identification = assembly_line::identification(campaign);
-    // What the channel map says of the sensors of this very recording goes before what the campaign declares.
-    identification.declared.extend(
-        map.sensors
-            .iter()
-            .map(|(channel, declared)| {
-                let gain_sigma_ratio =
-                    identification.declared.get(channel).map_or(0.0, |known| known.gain_sigma_ratio);
-                let gain_sigma_ratio = declared.gain_sigma_ratio.max(gain_sigma_ratio);
-                (*channel, mapper_core::DeclaredUncertainty { gain_sigma_ratio, ..*declared })
-            })
-            .collect::<Vec<_>>(),
-    );
-    identification.noise_colour = map.noise_colour.unwrap_or(identification.noise_colour);
-    if let Some(window) = map.window {
-        identification.window = WindowRule::Fixed { start_s: window.start_s, end_s: window.end_s };
+/// What is said of the recordings, in the order in which they were made, and the zero that was taken off them.
+pub fn judge(
+    read: &[ReadReport],
+    files: &[PathBuf],
+    campaign: &Campaign,
+    map: &ChannelMap,
+) -> Result<(DriftReport, Zero), Failure> {
+    if let Some(reason) = other_machine(read, campaign) {
+        return Ok((DriftReport::without_verdict(reason), Zero::NotAsked));
     }
-    let fingerprints: Vec<Option<String>> = read
-        .iter()
-        .map(|read| {
-            Some(format!("{} {}", read.metadata.get("campaign_sha256")?, read.metadata.get("model_sha256")?))
-        })
-        .collect();
-    let runs: Vec<RecordedRun<'_>> = read
+    let model = assembly_line::nominal_model(campaign)?;
+    let identification = identification(campaign, map);
+    let (recordings, identification, zero) = zeroed_alike(read, identification, campaign);
+    let fingerprints: Vec<Option<String>> =
+        read.iter().zip(files).map(|(read, file)| fingerprint(read, file)).collect();
+    let runs: Vec<RecordedRun<'_>> = recordings
         .iter()
         .zip(&fingerprints)
-        .map(|(read, fingerprint)| RecordedRun {
-            recording: &read.recording,
-            fingerprint: fingerprint.as_deref(),
-        })
+        .map(|(recording, fingerprint)| RecordedRun { recording, fingerprint: fingerprint.as_deref() })
         .collect();
-    diagnose(&DriftRequest {
+    let report = diagnose(&DriftRequest {
         runs: &runs,
         model: &model,
         boundary: campaign.boundary,
@@ -157,7 +145,61 @@ fn judge(read: &[ReadReport], campaign: &Campaign, map: &ChannelMap) -> Result<D
             _ => Code::BadRecording,
         };
         Failure::new(code, error)
-    })
+    })?;
+    Ok((report, zero))
+}
+
+/// What the campaign declares, and what the channel map says of the sensors of this very recording before it.
+fn identification(campaign: &Campaign, map: &ChannelMap) -> IdentifyConfig {
+    let mut identification = assembly_line::identification(campaign);
+    for (channel, declared) in &map.sensors {
+        let known = identification.declared.get(channel).map_or(0.0, |known| known.gain_sigma_ratio);
+        let gain_sigma_ratio = declared.gain_sigma_ratio.max(known);
+        identification
+            .declared
+            .insert(*channel, mapper_core::DeclaredUncertainty { gain_sigma_ratio, ..*declared });
+    }
+    identification.noise_colour = map.noise_colour.unwrap_or(identification.noise_colour);
+    if let Some(window) = map.window {
+        identification.window = WindowRule::Fixed { start_s: window.start_s, end_s: window.end_s };
+    }
+    identification
+}
+
+/// The zero of the first run, taken off all: a zero of its own for each would hide what drifted between them.
+fn zeroed_alike(
+    read: &[ReadReport],
+    config: IdentifyConfig,
+    campaign: &Campaign,
+) -> (Vec<Recording>, IdentifyConfig, Zero) {
+    let as_read = || read.iter().map(|read| read.recording.clone()).collect();
+    let Some(first) = read.first().filter(|_| campaign.zero.is_some()) else {
+        return (as_read(), config, Zero::NotAsked);
+    };
+    match isothermal_zero(&first.recording, &config, &ZeroSettings::default()) {
+        Ok(zero) => {
+            let off = |read: &ReadReport| zeroed(read.recording.clone(), config.clone(), &zero).0;
+            let recordings = read.iter().map(off).collect();
+            let config = zeroed(Recording::default(), config, &zero).1;
+            (recordings, config, Zero::Found(zero))
+        }
+        Err(error) => (as_read(), config, Zero::Refused(error.to_string())),
+    }
+}
+
+/// What has to be the same in all runs: machine, boundary conditions, points and their timing. Seed, name, rig and what is
+/// written may differ from night to night.
+fn fingerprint(read: &ReadReport, file: &Path) -> Option<String> {
+    let of_campaign = |text: &String| {
+        let origin = file.with_file_name(run_directory::CAMPAIGN);
+        let campaign = mapper_campaign::check(text, &origin, &super::identify::read_beside).ok()?;
+        let mapper_campaign::campaign::Timing { dwell_s, .. } = campaign.timing;
+        let same = (&campaign.machine, campaign.boundary, campaign.follow_outlet, &campaign.points, dwell_s);
+        serde_json::to_string(&same).ok()
+    };
+    let of_hashes =
+        || Some(format!("{} {}", read.metadata.get("campaign_sha256")?, read.metadata.get("model_sha256")?));
+    read.campaign_text.as_ref().and_then(of_campaign).or_else(of_hashes)
 }
 
 /// The answer for people.

@@ -1,14 +1,18 @@
 //! `mapper gap diagnose`: where a recording leaves the nominal model, why, how far that closes the gap, what is next.
 
-use super::{gap_page, gap_text};
+use super::{gap_drift, gap_page, gap_text};
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::gap_arguments::DiagnoseArguments;
-use crate::{output, registry, run_directory};
+use crate::{assembly_line, output, registry, run_directory};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use mapper_campaign::Campaign;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::declared::Declared;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question};
+use mapper_gap::outlook::Jump;
+use mapper_physics::model::Model;
+use mapper_planner::PlanRequest;
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, RecordError, read_recording};
 use std::io::IsTerminal;
 
@@ -30,6 +34,9 @@ pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
         let code = if matches!(error, RecordError::Read { .. }) { Code::Failure } else { Code::BadRecording };
         Failure::new(code, error)
     })?;
+    if let Some(message) = other_machine(&report, &campaign) {
+        return Err(Failure::new(Code::BadRecording, message));
+    }
     let model =
         mapper_campaign::nominal_model(&campaign).map_err(|error| Failure::new(Code::BadInput, error))?;
     let declared = Declared {
@@ -38,30 +45,76 @@ pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
         tolerances: campaign.tolerances,
         nominal: campaign.boundary,
     };
+    let jumps = allowed_jumps(&campaign, &model)?;
+    let drift = gap_drift::of(&report, &path, &campaign, &map);
+    let recording = gap_drift::taken_off(report.recording.clone(), drift.as_ref());
     let bar = bar();
     let progress = |share: f64, what: &str| {
         bar.set_position((share * 100.0) as u64);
         bar.set_message(what.to_owned());
     };
     let done = mapper_gap::diagnose::diagnose(Question {
-        recording: &report.recording,
+        recording: &recording,
         declared,
         model,
         effects: registry::effects_with(&arguments.effects)?,
+        jumps,
         calibration: Calibration::shipped().map_err(|error| Failure::new(Code::Failure, error))?,
         progress: &progress,
     });
     bar.finish_and_clear();
     let mut done = done.map_err(|error: GapError| Failure::new(Code::BadRecording, error))?;
     note_reading(&report, &mut done);
+    gap_drift::note(&mut done.diagnosis, drift.as_ref());
     if let Some(file) = &arguments.html {
         let title = path.display().to_string();
         output::write_new(file, gap_page::page(&title, &done).as_bytes())?;
     }
     if arguments.json {
-        return output::print_json(&done.diagnosis);
+        return output::print_json(&gap_drift::json(&done.diagnosis, drift.as_ref())?);
     }
     output::print(&gap_text::page(&done.diagnosis))
+}
+
+/// Points up to which every jump between them is simulated to see whether it is allowed.
+const MOST_POINTS: usize = 40;
+
+/// The jumps that the planner allows between the points of the campaign; none for grids too large to simulate them all,
+/// and for campaigns that are no grid.
+fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<Jump>, Failure> {
+    if campaign.points.len() > MOST_POINTS {
+        return Ok(Vec::new());
+    }
+    assembly_line::with_plan_request(campaign, model, |request| {
+        // Whether a jump is allowed does not hang on what it would tell.
+        let request = PlanRequest { method: None, ..request.clone() };
+        let Ok(graph) = mapper_planner::jump_graph(&request) else { return Ok(Vec::new()) };
+        let allowed = graph.edge_weights().filter(|jump| jump.rejections.is_empty());
+        Ok(allowed
+            .map(|jump| Jump {
+                from: jump.from,
+                to: jump.to,
+                from_p3_pa: jump.p3_pa - jump.p3_change_pa,
+                to_p3_pa: jump.p3_pa,
+                dwell_s: request.timing.dwell_s,
+            })
+            .collect())
+    })
+}
+
+/// Why the campaign's machine is not the one recorded; `None` where it may be.
+fn other_machine(report: &ReadReport, campaign: &Campaign) -> Option<String> {
+    let machine = &campaign.machine;
+    let other = |key: &str, own: Option<&String>| {
+        report.metadata.get(key).filter(|recorded| Some(*recorded) != own && !recorded.is_empty())
+    };
+    let other = other("machine", Some(&machine.name))
+        .or_else(|| other("serial_number", machine.serial_number.as_ref()))?;
+    Some(format!(
+        "the recording was made on machine `{other}`, the campaign is of `{}`{}: diagnose it with the campaign of its own machine",
+        machine.name,
+        machine.serial_number.as_ref().map_or_else(String::new, |number| format!(" ({number})")),
+    ))
 }
 
 /// What was wrong with the file belongs to what is said about it.

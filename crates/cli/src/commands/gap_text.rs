@@ -40,12 +40,16 @@ pub fn page(diagnosis: &Diagnosis) -> String {
         text += "\nwhat next\n";
         text += &match next {
             Next::Jump { from, to, expected_probability, minutes } => format!(
-                "  jump from {:.0} krpm at opening {} to {:.0} krpm at {}: {minutes:.1} min, after which the first cause should have {:.0} %\n",
+                "  jump from {:.0} krpm at opening {} to {:.0} krpm at {}: {minutes:.1} min, after which the true cause should have {:.0} %\n  mapper plan CAMPAIGN --append {:.0}krpm@{} {:.0}krpm@{} --out PLAN puts it behind the points\n",
                 from.speed_rpm / 1e3,
                 from.valve,
                 to.speed_rpm / 1e3,
                 to.valve,
-                100.0 * expected_probability
+                100.0 * expected_probability,
+                from.speed_rpm / 1e3,
+                from.valve,
+                to.speed_rpm / 1e3,
+                to.valve,
             ),
             Next::Sensor { sensor, reason } => format!("  {sensor}: {reason}\n"),
         };

@@ -4,7 +4,7 @@ use crate::arguments::HistoryArguments;
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::{history_picture, output, table};
-use mapper_history::{Figure, Filter, History, ListedRun};
+use mapper_history::{Figure, Filter, History, ListedRun, median};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -107,7 +107,12 @@ fn groups_text(runs: &[ListedRun], figures: &[Figure]) -> String {
         row.extend(figures.iter().map(|figure| {
             shown(
                 *figure,
-                median(group.iter().filter_map(|listed| listed.run.figures.get(figure).copied()).collect()),
+                median(
+                    &mut group
+                        .iter()
+                        .filter_map(|listed| listed.run.figures.get(figure).copied())
+                        .collect::<Vec<f64>>(),
+                ),
             )
         }));
         table.add_row(row);
@@ -137,15 +142,4 @@ fn runs_text(runs: &[ListedRun], figures: &[Figure]) -> String {
         table.add_row(row);
     }
     format!("{table}\n\n{failures}{} runs.\n", runs.len())
-}
-
-/// Median; `None` of nothing.
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => None,
-        count if count % 2 == 1 => Some(values[middle]),
-        _ => Some(0.5 * (values[middle - 1] + values[middle])),
-    }
 }

@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::table::{self, number};
 use crate::{map_file, output};
 use mapper_assemble::{MapFitOptions, fit_map};
-use mapper_core::{CompressorMap, FittedLine, FittedMap};
+use mapper_core::{CompressorMap, FittedLine, FittedMap, LeftOutLine};
 use serde_json::json;
 use std::fmt::Write;
 
@@ -105,6 +105,22 @@ fn describe(map: &CompressorMap, fitted: &FittedMap) -> String {
             100.0 * eta().fold(0.0, f64::max),
         );
     }
+    let points = |line: &LeftOutLine| points_of(map, line.speed_corrected_rpm);
+    let held = |value: fn(&LeftOutLine) -> Option<f64>| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for line in fitted.left_out.iter().filter(|l| !l.outermost) {
+            if let Some(share) = value(line) {
+                (sum, count) = (sum + share * points(line), count + points(line));
+            }
+        }
+        (count > 0.0).then(|| 100.0 * sum / count)
+    };
+    if let (Some(distance), Some(eta)) = (held(|l| l.distance_held_ratio), held(|l| l.eta_held_ratio)) {
+        let _ = writeln!(
+            text,
+            "Of the points of inner lines that were left out, the 95 % intervals hold {distance:.0} % of distances and {eta:.0} % of efficiencies."
+        );
+    }
     if fitted.crossings > 0 {
         let _ = writeln!(
             text,
@@ -115,6 +131,12 @@ fn describe(map: &CompressorMap, fitted: &FittedMap) -> String {
         text.push_str("No speed lines cross.\n");
     }
     text
+}
+
+/// Points of a line, by its speed.
+fn points_of(map: &CompressorMap, speed_corrected_rpm: f64) -> f64 {
+    let line = map.lines.iter().find(|line| line.speed_corrected_rpm == speed_corrected_rpm);
+    line.map_or(0.0, |line| line.points.len() as f64)
 }
 
 fn choke_flow(line: &FittedLine) -> Option<f64> {

@@ -5,6 +5,7 @@ mod drift;
 mod gap;
 mod gap_blind;
 mod gap_diagnose;
+mod gap_drift;
 mod gap_effects;
 mod gap_page;
 mod gap_text;
@@ -23,7 +24,6 @@ mod scripted;
 
 use crate::arguments::{Arguments, Command, MapCommand};
 use crate::failure::Failure;
-pub use history::median as history_median;
 
 /// Runs the command that was asked for.
 pub fn dispatch(arguments: &Arguments) -> Result<(), Failure> {

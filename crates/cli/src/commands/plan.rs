@@ -2,6 +2,7 @@
 
 use crate::arguments::PlanArguments;
 use crate::commands::scripted;
+use crate::drive::soak_s;
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::table::{self, Display, number};
@@ -16,6 +17,10 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
     let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
     let model = assembly_line::nominal_model(&campaign)?;
     if let Some(source) = &campaign.sequence {
+        if !(arguments.why.is_empty() && arguments.append.is_empty()) {
+            let message = "this campaign's steps come from its script: write the jump there; --why and --append are for campaigns with a grid";
+            return Err(Failure::new(Code::BadInput, message));
+        }
         return scripted::plan(arguments, &campaign, &model, source);
     }
     if let [from, to] = arguments.why.as_slice() {
@@ -26,7 +31,12 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
         });
     }
     let plan = assembly_line::with_plan_request(&campaign, &model, |request| {
-        let request = PlanRequest { effort: arguments.effort.unwrap_or(request.effort), ..request.clone() };
+        let appended = match arguments.append.as_slice() {
+            [from, to] => Some((*from, *to)),
+            _ => None,
+        };
+        let effort = arguments.effort.unwrap_or(request.effort);
+        let request = PlanRequest { effort, appended, ..request.clone() };
         mapper_planner::make_plan(&request).map_err(|error| Failure::new(Code::NoPlan, error))
     })?;
     if let Some(path) = &arguments.out {
@@ -46,6 +56,9 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
         let mut value = serde_json::to_value(&plan).map_err(|error| Failure::new(Code::Failure, error))?;
         if let (Some(object), Some(comparison)) = (value.as_object_mut(), &comparison) {
             object.insert("comparison".to_owned(), comparison_json(comparison));
+        }
+        if let (Some(object), Some(zero)) = (value.as_object_mut(), campaign.zero) {
+            object.insert("soak_s".to_owned(), serde_json::json!(zero.soak_s));
         }
         return output::print_json(&value);
     }
@@ -181,6 +194,8 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
         "min".to_owned(),
         "ETA".to_owned(),
     ]);
+    // The machine rests before the plan begins.
+    let soak_s = soak_s(campaign);
     for step in &plan.steps {
         let predicted = &step.predicted;
         steps.add_row([
@@ -201,7 +216,7 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
             percent(predicted.sigma_h_rel, 1),
             number(predicted.settle_s, 1),
             format!("{:.1}", predicted.minutes),
-            table::eta(step.start_s + step.dwell_s),
+            table::eta(soak_s + step.start_s + step.dwell_s),
         ]);
     }
     let figures = &plan.figures;
@@ -209,11 +224,12 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
     // Writing to a String cannot fail.
     let _ = writeln!(
         text,
-        "{}: {} steps, order {}, {} in all (warm-up {}, cool-down {}).",
+        "{}: {} steps, order {}, {} in all ({}warm-up {}, cool-down {}).",
         plan.campaign,
         plan.steps.len(),
         plan.objective,
-        table::duration(plan.duration_s()),
+        table::duration(soak_s + plan.duration_s()),
+        campaign.zero.map_or_else(String::new, |zero| format!("soak {}, ", table::duration(zero.soak_s))),
         table::duration(plan.warm_up_s),
         table::duration(plan.cool_down_s),
     );

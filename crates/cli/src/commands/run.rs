@@ -2,6 +2,7 @@
 
 use crate::arguments::RunArguments;
 use crate::commands::plan as plan_command;
+use crate::drive::{self, soak_s};
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::observers::{Progress, Recorder};
@@ -10,9 +11,9 @@ use crate::results;
 use crate::sequence_run::{ScriptedSteps, rehearse};
 use crate::{assembly_line, interrupt, output, run_directory};
 use mapper_campaign::Campaign;
-use mapper_core::{Backend, Plan, UnpacedClock};
+use mapper_core::{Backend, Plan};
 use mapper_record::{RecordingHeader, RecordingWriter};
-use mapper_runner::{PlanSteps, RunEnd, RunError, RunObserver, Runner, Soak, Soaked, StepSource};
+use mapper_runner::{PlanSteps, RunEnd, RunError, RunObserver, StepSource};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -72,12 +73,15 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         None => &mut planned,
     };
     let recorder = Recorder::new(writer);
+    let mut drifted = None;
     let (end, recorder) = if campaign.on_drift.is_some()
         && let Some(mut watch) = assembly_line::drift_watch(&campaign, steps)
     {
-        drive(&campaign, &plan, &mut watch, backend.as_mut(), recorder)?
+        let driven = drive_and_show(&campaign, &plan, &mut watch, backend.as_mut(), recorder)?;
+        drifted = watch.ended_by_drift().map(str::to_owned);
+        driven
     } else {
-        drive(&campaign, &plan, steps, backend.as_mut(), recorder)?
+        drive_and_show(&campaign, &plan, steps, backend.as_mut(), recorder)?
     };
     let finished = recorder.finish();
     if matches!(end, Ok(RunEnd::Completed)) {
@@ -91,7 +95,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     });
     let completed = matches!(end, Ok(RunEnd::Completed));
     // Whatever ended the run, what was recorded is identified.
-    let made = plan.and_then(|plan| results::make(&campaign, &plan, &outcome(&end), &directory, &recording));
+    let outcome = match &drifted {
+        Some(reason) => format!("Stopped ({reason}): the map is not complete."),
+        None => outcome(&end),
+    };
+    let made = plan.and_then(|plan| results::make(&campaign, &plan, &outcome, &directory, &recording));
     match made {
         Ok(results) if arguments.json => output::print_json(&results.json())?,
         Ok(results) => output::print(&results.text(&campaign))?,
@@ -103,7 +111,12 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Err(_) => {}
     }
     match end {
-        Ok(RunEnd::Completed) => Ok(()),
+        Ok(RunEnd::Completed) => match drifted {
+            None => Ok(()),
+            Some(reason) => {
+                Err(Failure::new(Code::Rig, format!("{reason}. The rig is safe and the recording is kept")))
+            }
+        },
         Ok(RunEnd::Interrupted { t_s }) => Err(Failure::new(
             Code::Interrupted,
             format!("stopped by the operator at {t_s:.0} s; the rig is safe and the recording is kept"),
@@ -147,7 +160,7 @@ fn outcome(end: &Result<RunEnd, RunError>) -> String {
 
 type Driven = (Result<RunEnd, RunError>, Recorder);
 
-fn drive(
+fn drive_and_show(
     campaign: &Campaign,
     plan: &Plan,
     steps: &mut dyn StepSource,
@@ -155,29 +168,10 @@ fn drive(
     mut recorder: Recorder,
 ) -> Result<Driven, Failure> {
     let stop = interrupt::stop_flag()?;
-    let guards = assembly_line::guards(campaign, &backend.describe().channels);
-    let mut progress = Progress::new(plan);
-    let mut soaked;
-    let steps: &mut dyn StepSource = match campaign.zero {
-        None => steps,
-        Some(zero) => {
-            let soak = Soak { duration_s: zero.soak_s, oil_temperature_k: zero.oil_temperature_k };
-            soaked = Soaked::new(steps, soak);
-            &mut soaked
-        }
-    };
+    let mut progress = Progress::new(plan, soak_s(campaign));
     let end = {
         let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut progress];
-        Runner {
-            steps,
-            backend,
-            // Every backend so far has simulated time.
-            clock: &mut UnpacedClock,
-            guards,
-            observer: &mut observers,
-            stop: &stop,
-        }
-        .run()
+        drive::drive(campaign, steps, backend, &mut observers, &stop)
     };
     progress.clear();
     Ok((end, recorder))
@@ -249,11 +243,12 @@ fn dry_run(
             "dry_run": true,
             "rig": rig,
             "would_write": would_write,
+            "soak_s": campaign.zero.map(|zero| zero.soak_s),
             "plan": plan,
         }));
     }
     let text = plan_command::text(campaign, plan);
-    let samples = plan.duration_s() * rig.sample_rate_hz;
+    let samples = (soak_s(campaign) + plan.duration_s()) * rig.sample_rate_hz;
     output::print(&format!(
         "{text}Dry run: nothing was touched. The rig would be `{}` {}, {} channels at {} Hz ({samples:.0} samples), the \
          results would go to {}.\n",

@@ -309,13 +309,22 @@ pub fn judge(recording: &Recording) -> DriftReport {
     judge_all(&[RecordedRun { recording, fingerprint: None }])
 }
 
+/// The same, points identified otherwise.
+pub fn judge_by(recording: &Recording, identification: &IdentifyConfig) -> DriftReport {
+    ask(&[RecordedRun { recording, fingerprint: None }], identification)
+}
+
 /// What is said of some.
 pub fn judge_all(runs: &[RecordedRun<'_>]) -> DriftReport {
+    ask(runs, &identification())
+}
+
+fn ask(runs: &[RecordedRun<'_>], identification: &IdentifyConfig) -> DriftReport {
     diagnose(&DriftRequest {
         runs,
         model: &nominal(),
         boundary: BoundaryConditions::default(),
-        identification: &identification(),
+        identification,
         seed: 1,
     })
     .unwrap()

@@ -3,6 +3,7 @@
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
+use crate::joint::smoothness::{STRAIN_SIGMAS, Smoothed};
 use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
 use crate::samples::mean;
 
@@ -12,6 +13,11 @@ const DOUBT_SQUARE: f64 = 2.0;
 const EXCLUDE_SQUARE: f64 = 4.0;
 /// Whitened mean square of all steps above which the model itself is doubted.
 const MODEL_SQUARE: f64 = 1.4;
+/// The same for the sums over [`STRETCH_ROWS`] rows: smoothed inputs and fitted numbers leave about 0.8 of 1 where the model
+/// has what the rig has.
+const SLOW_SQUARE: f64 = 1.3;
+/// Rows of a stretch, 5 to 10 s: what the model does not know is slower than noise.
+const STRETCH_ROWS: usize = 10;
 /// Scatter of the points about the convection law above which it is no law, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;
 /// Standard errors by which a number must lie outside its range to count against the model.
@@ -27,6 +33,16 @@ const SPLIT_SIGMAS: f64 = 4.0;
 pub(crate) fn mean_square(problem: &Problem<'_>, member: &Member<'_>) -> f64 {
     let (residual, _) = problem.residual(member, &problem.shared, &member.local, None);
     residual.iter().map(|r| r * r).sum::<f64>() / (residual.len() as f64).max(1.0)
+}
+
+/// Mean square of sums over stretches of a step's whitened residual, over that of independent ones.
+fn slow_square(problem: &Problem<'_>, member: &Member<'_>) -> Option<f64> {
+    let (residual, _) = problem.residual(member, &problem.shared, &member.local, None);
+    let stretches: Vec<f64> = residual
+        .chunks(STRETCH_ROWS)
+        .map(|stretch| stretch.iter().sum::<f64>().powi(2) / stretch.len() as f64)
+        .collect();
+    mean(&stretches)
 }
 
 /// Takes steps that fit far worse than the others out of what is shared; true where that changed anything.
@@ -96,7 +112,12 @@ pub(crate) fn judge_step(
 }
 
 /// What speaks against the model as a whole, one sentence each.
-pub(crate) fn doubts(problem: &Problem<'_>, covariance: &Covariance, config: &IdentifyConfig) -> Vec<String> {
+pub(crate) fn doubts(
+    problem: &Problem<'_>,
+    covariance: &Covariance,
+    smoothed: &Smoothed,
+    config: &IdentifyConfig,
+) -> Vec<String> {
     let mut doubts = Vec::new();
     let squares: Vec<f64> = problem
         .members
@@ -105,10 +126,23 @@ pub(crate) fn doubts(problem: &Problem<'_>, covariance: &Covariance, config: &Id
         .map(|member| mean_square(problem, member))
         .collect();
     let overall = mean(&squares).unwrap_or(0.0);
+    let slow: Vec<f64> = problem
+        .members
+        .iter()
+        .filter(|member| member.shares)
+        .filter_map(|m| slow_square(problem, m))
+        .collect();
+    let slow = mean(&slow).unwrap_or(0.0);
     if !config.declared.is_empty() && overall > MODEL_SQUARE {
         doubts.push(format!(
             "all steps together leave {:.2} times the declared noise: something that the model does not know is at work",
             overall.sqrt()
+        ));
+    }
+    if !config.declared.is_empty() && slow > SLOW_SQUARE {
+        doubts.push(format!(
+            "what all steps leave of T2 has a shape: its slow part is {:.2} times that of the declared noise",
+            slow.sqrt()
         ));
     }
     let error = |index: usize| covariance.error_of(index);
@@ -143,6 +177,12 @@ pub(crate) fn doubts(problem: &Problem<'_>, covariance: &Covariance, config: &Id
     let scatter = mean(&deviations).unwrap_or(0.0).sqrt();
     if problem.setting.with_law && scatter > LAW_SCATTER_RATIO {
         doubts.push(format!("the points scatter by {:.1} % about the convection law", 100.0 * scatter));
+    }
+    if smoothed.strain > STRAIN_SIGMAS {
+        doubts.push(format!(
+            "the efficiencies bend towards low speed as no map does; taken for offsets they are {:.1} times the declared ones",
+            smoothed.strain
+        ));
     }
     doubts.extend(split_doubt(problem));
     doubts

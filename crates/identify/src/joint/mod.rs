@@ -16,6 +16,7 @@ pub(crate) mod profile;
 pub(crate) mod rows;
 pub(crate) mod shared;
 pub(crate) mod smoothing;
+pub(crate) mod smoothness;
 pub(crate) mod solve;
 pub(crate) mod start;
 pub(crate) mod surface;
@@ -24,13 +25,12 @@ pub(crate) mod whitening;
 use crate::dynamic::{self, Estimate};
 use crate::end_state::EndState;
 use crate::findings::{Findings, code};
-use crate::joint::parameters::{
-    ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, PROBE_MM2, SHARED, SURFACE,
-};
+use crate::joint::parameters::{FLOW_GAIN, OFFSETS, PROBE_MM2, SHARED};
+use crate::joint::smoothness::{Judged, Smoothed};
 use crate::joint::solve::{Covariance, FULLY, Problem, ROUGHLY};
 use crate::samples::mean;
 use crate::{IdentifyConfig, jump};
-use mapper_core::{EstimateUncertainty, JointSettings, Recording, ThermalModel, Window};
+use mapper_core::{Choice, EstimateUncertainty, JointSettings, Recording, ThermalModel, Window};
 
 /// Fits before the last one.
 const ROUNDS: usize = 3;
@@ -63,26 +63,40 @@ pub(crate) fn estimate(
     if config.joint == JointSettings::all_off() {
         return Joint { estimates: alone, thermal: None };
     }
-    let nothing = || Joint { estimates: vec![Estimate::default(); recording.steps.len()], thermal: None };
     let steps = start::steps(recording, end_states, config, findings);
-    let Some(mut problem) = start::problem(&steps, &alone, config) else { return nothing() };
-    let Some(covariance) = fitted(&mut problem, &steps, config) else {
-        for step in &steps {
-            let message = "least squares over all steps came to no end".to_owned();
-            findings[step.position].refuse(code::FIT_FAILED, message);
-        }
-        return nothing();
+    let careful = carefully(config);
+    let late: Vec<rows::StepRows> = steps.iter().map(rows::StepRows::settled).collect();
+    let attempt = match Attempt::new(&steps, &alone, config) {
+        Some(attempt) if attempt.thermal.doubts.is_empty() || careful.joint == config.joint => Some(attempt),
+        first => match Attempt::new(&late, &alone, &careful) {
+            Some(other) => Some(other.instead_of(first)),
+            None => first,
+        },
     };
-    let thermal = shared::thermal_model(&problem, &covariance, &steps, config);
+    let Some(attempt) = attempt else {
+        // Each step on its own is better than nothing.
+        let mut estimates = vec![Estimate::default(); recording.steps.len()];
+        for step in &steps {
+            let message =
+                "least squares over all steps came to no end: this step stands for itself alone".to_owned();
+            findings[step.position].doubt(code::FIT_FAILED, message);
+            estimates[step.position] = alone[step.position];
+        }
+        return Joint { estimates, thermal: None };
+    };
+    let Attempt { problem, smoothed, thermal } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
         let own = &mut findings[step.position];
-        let eta = eta_uncertainty(&problem, &covariance, i);
-        let (h_w_m2k, _) = problem.setting.h_at_end(&step.end, &problem.shared, &member.local);
-        let h = h_uncertainty(&problem, &covariance, &steps, i);
-        let finite =
-            member.local[ETA].is_finite() && h_w_m2k.is_finite() && eta.combined_standard_error().is_finite();
-        if !finite || !h.combined_standard_error().is_finite() {
+        let (Judged { value: eta, uncertainty: eta_error }, ln_h) = (smoothed.eta[i], smoothed.ln_h[i]);
+        let h_w_m2k =
+            problem.setting.h_at_end(&step.end, &problem.shared, &member.local).0 * ln_h.value.exp();
+        let h_error = EstimateUncertainty {
+            noise_standard_error: h_w_m2k * ln_h.uncertainty.noise_standard_error,
+            bias_standard_error: h_w_m2k * ln_h.uncertainty.bias_standard_error,
+        };
+        let errors = [eta_error, h_error].map(|error| error.combined_standard_error());
+        if ![eta, h_w_m2k, errors[0], errors[1]].iter().all(|number| number.is_finite()) {
             own.refuse(code::FIT_FAILED, "the fit gives no finite number for this step".to_owned());
             continue;
         }
@@ -98,14 +112,14 @@ pub(crate) fn estimate(
             .map(|(measured, found)| (measured - found).powi(2))
             .collect();
         estimates[step.position] = Estimate {
-            eta: Some((member.local[ETA], Some(eta))),
-            h_w_m2k: Some((h_w_m2k, Some(h))),
+            eta: Some((eta, Some(eta_error))),
+            h_w_m2k: Some((h_w_m2k, Some(h_error))),
             window: first.zip(last).map(|(first, last)| Window { start_s: first.t_s, end_s: last.t_s }),
             residual_rms_k: mean(&squares).map(f64::sqrt),
             dt2_k: change(|row| row.t2_k),
             dtc_k: change(|row| row.tc_k),
         };
-        judge::judge_step(&problem, i, eta.combined_standard_error(), config, own);
+        judge::judge_step(&problem, i, eta_error.combined_standard_error(), config, own);
         if !jump::begins_with_jump(&recording.steps, step.position) {
             let message =
                 "no jump leads to this step: its efficiency rests on what the points share".to_owned();
@@ -120,6 +134,58 @@ pub(crate) fn estimate(
         }
     }
     Joint { estimates, thermal: Some(thermal) }
+}
+
+/// A fit with what is made of it.
+struct Attempt<'a> {
+    problem: Problem<'a>,
+    smoothed: Smoothed,
+    thermal: ThermalModel,
+}
+
+impl<'a> Attempt<'a> {
+    fn new(steps: &'a [rows::StepRows], alone: &[Estimate], config: &IdentifyConfig) -> Option<Self> {
+        let mut problem = start::problem(steps, alone, config)?;
+        let covariance = fitted(&mut problem, steps, config)?;
+        let mut smoothed = smoothness::smoothed(&problem, &covariance, steps, config.reference);
+        if smoothed.strain > smoothness::STRAIN_SIGMAS {
+            // The declaration does not hold: the offsets then have the spread that they show.
+            let strain = smoothed.strain;
+            for prior in &mut problem.priors[OFFSETS..FLOW_GAIN] {
+                prior.sigma *= strain;
+            }
+            smoothed = smoothness::smoothed(&problem, &problem.covariance()?, steps, config.reference);
+            smoothed.strain = strain;
+        }
+        let thermal = shared::thermal_model(&problem, &covariance, &smoothed, steps, config);
+        Some(Attempt { problem, smoothed, thermal })
+    }
+
+    /// This one after another was doubted: the doubts remain.
+    fn instead_of(mut self, doubted: Option<Attempt<'_>>) -> Self {
+        let doubts = match doubted {
+            Some(doubted) => doubted.thermal.doubts,
+            None => vec!["least squares over all steps came to no end".to_owned()],
+        };
+        let mut doubts: Vec<String> = doubts
+            .into_iter()
+            .map(|doubt| format!("{doubt}; so all refinements are held as declared"))
+            .collect();
+        doubts.extend(self.thermal.doubts);
+        self.thermal.doubts = doubts;
+        self
+    }
+}
+
+/// The refinements held as declared.
+fn carefully(config: &IdentifyConfig) -> IdentifyConfig {
+    let held = JointSettings {
+        alpha_area: Choice::Fixed,
+        probe: Choice::Fixed,
+        direction: Choice::Fixed,
+        ..config.joint
+    };
+    IdentifyConfig { joint: held, ..config.clone() }
 }
 
 /// Fits, learns from the fit how noisy steps are and how far points may scatter, leaves out what fits far worse, and
@@ -139,61 +205,4 @@ fn fitted(
     problem.minimise(FULLY)?;
     parsimony::settle(problem)?;
     problem.covariance()
-}
-
-/// Splits a variance into what declared offsets and gains bring and the rest.
-fn split(
-    problem: &Problem<'_>,
-    covariance: &Covariance,
-    variance: f64,
-    with_shared: impl Fn(usize) -> f64,
-) -> EstimateUncertainty {
-    let mut bias = 0.0;
-    for (row, index) in covariance.fitted.iter().enumerate() {
-        if (OFFSETS..SURFACE).contains(index) {
-            bias += with_shared(row).powi(2) * problem.priors[*index].weight();
-        }
-    }
-    EstimateUncertainty {
-        noise_standard_error: (variance - bias).max(0.0).sqrt(),
-        bias_standard_error: bias.sqrt(),
-    }
-}
-
-fn eta_uncertainty(problem: &Problem<'_>, covariance: &Covariance, i: usize) -> EstimateUncertainty {
-    let (own, mixed) = &covariance.own[i];
-    split(problem, covariance, own[(ETA, ETA)], |row| mixed[(ETA, row)])
-}
-
-fn h_uncertainty(
-    problem: &Problem<'_>,
-    covariance: &Covariance,
-    steps: &[rows::StepRows],
-    i: usize,
-) -> EstimateUncertainty {
-    let (own, mixed) = &covariance.own[i];
-    let (h, ln_re) = problem.setting.h_at_end(&steps[i].end, &problem.shared, &problem.members[i].local);
-    let mut weights = [0.0; SHARED];
-    if problem.setting.with_law {
-        weights[LN_COEFFICIENT] = 1.0;
-        weights[EXPONENT] = ln_re;
-    }
-    let with_shared = |row: usize| {
-        let shared: f64 = covariance
-            .fitted
-            .iter()
-            .enumerate()
-            .map(|(other, index)| weights[*index] * covariance.shared[(other, row)])
-            .sum();
-        shared + mixed[(LN_DEVIATION, row)]
-    };
-    let mut variance = own[(LN_DEVIATION, LN_DEVIATION)];
-    for (row, index) in covariance.fitted.iter().enumerate() {
-        variance += weights[*index] * (with_shared(row) + mixed[(LN_DEVIATION, row)]);
-    }
-    let relative = split(problem, covariance, variance, with_shared);
-    EstimateUncertainty {
-        noise_standard_error: h * relative.noise_standard_error,
-        bias_standard_error: h * relative.bias_standard_error,
-    }
 }

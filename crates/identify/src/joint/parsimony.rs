@@ -1,71 +1,123 @@
 //! Keeps to what was declared unless the recording speaks against it.
 //!
 //! Each refinement (alpha_A, the probe, the direction factor) that is free costs the points some certainty, also on a
-//! machine that needs none of it. So the declared value has a weight of its own beforehand, as much as all other values
-//! together. The ratio of the densities after and before at the declared value (Savage and Dickey; e.g. Kass and Raftery,
-//! Bayes Factors, 1995) says what is left of it; mean and variance of the mixture then make the prior of the last fit.
+//! machine that needs none of it, and the small faults of any model look like a little of each. So every choice of which of
+//! them are at work is weighed: the density, after the fit, of the declared values of those that are not, over their
+//! density before (Savage and Dickey; e.g. Kass and Raftery, Bayes Factors, 1995), with an error of its own for what the
+//! model does not know. A refinement is then drawn towards the declared value by the weight of the choices without it, and
+//! what that leaves open (the spread between the two answers) is carried on as variance.
 
-use crate::joint::parameters::{ALPHA, LN_DIRECTION, PROBE_MM2, Prior};
-use crate::joint::solve::{FULLY, Problem};
+use crate::joint::parameters::{ALPHA, LN_DIRECTION, PROBE_MM2, SHARED};
+use crate::joint::solve::{Covariance, FULLY, Problem};
+use nalgebra::{DMatrix, DVector};
 
-/// The refinements.
-const REFINEMENTS: [usize; 3] = [PROBE_MM2, LN_DIRECTION, ALPHA];
+/// The refinements, and for each what small faults of the model can pass for: a clearance that grows by a percent as the
+/// housing warms up by 100 K looks like 0.06 of alpha_A.
+const REFINEMENTS: [(usize, f64); 3] = [(PROBE_MM2, 0.1), (LN_DIRECTION, 0.015), (ALPHA, 0.025)];
+/// Probability beforehand that a refinement is not at work.
+const DECLARED_HOLDS: f64 = 0.67;
+/// Weight of a refinement above which it is left alone.
+const SURE: f64 = 0.999;
 
-/// Takes the refinements one after the other, the least needed first, and fits again after each.
+/// Weighs the refinements, draws each by its weight, and fits again.
 pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<()> {
-    let mut left: Vec<usize> = REFINEMENTS.into_iter().filter(|index| problem.active[*index]).collect();
-    while !left.is_empty() {
-        let covariance = problem.covariance()?;
-        let judged: Vec<(usize, f64, Prior)> = left
-            .iter()
-            .filter_map(|index| {
-                let (weight, prior) = mixture(
-                    problem.priors[*index],
-                    problem.shared[*index],
-                    covariance.error_of(*index)?,
-                    problem.information(*index)?,
-                )?;
-                Some((*index, weight, prior))
-            })
-            .collect();
-        let Some((index, _, prior)) = judged.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { break };
-        left.retain(|other| *other != index && problem.active[*other]);
-        problem.priors[index] = prior;
+    let covariance = problem.covariance()?;
+    let mut weights = weights(problem, &covariance);
+    // The least needed first: what is found of the others without it is what counts.
+    weights.sort_by(|a, b| a.1.total_cmp(&b.1));
+    for (index, weight) in weights {
+        if weight > SURE || !problem.active[index] {
+            continue;
+        }
+        let information = problem.information(index)?;
+        if !(information.is_finite() && information > 0.0) {
+            continue;
+        }
+        let found = problem.shared[index] - problem.priors[index].mean;
+        problem.extra_variances[index] = weight * (1.0 - weight) * found * found;
+        let needed = information * (1.0 / weight.max(1e-6) - 1.0);
+        if needed > problem.priors[index].weight() {
+            problem.priors[index].sigma = needed.powf(-0.5);
+        }
         problem.minimise(FULLY)?;
     }
     Some(())
 }
 
-/// Probability that a value other than the declared one holds, and the prior with which the fit gives the mixture's mean
-/// and variance; `None` for errors that are no number.
-///
-/// `information`: one over the variance that least squares alone gives, without the prior.
-fn mixture(prior: Prior, found: f64, error: f64, information: f64) -> Option<(f64, Prior)> {
-    if !(information.is_finite() && information > 0.0 && error > 0.0) {
-        return None;
-    }
-    let distance = (found - prior.mean) / error;
-    let odds_declared = prior.sigma / error * (-0.5 * distance * distance).exp();
-    let weight = 1.0 / (1.0 + odds_declared);
-    let variance = weight * (error * error + (1.0 - weight) * (found - prior.mean).powi(2));
-    // The fit draws by prior over information; what it has to draw is what is left of the variance.
-    let drawn = (variance / (error * error)).min(1.0);
-    let needed = information * (1.0 / drawn - 1.0);
-    let sigma = if needed > prior.weight() { needed.powf(-0.5) } else { prior.sigma };
-    Some((weight, Prior { mean: prior.mean, sigma }))
+/// Probability of each active refinement to be at work.
+fn weights(problem: &Problem<'_>, covariance: &Covariance) -> Vec<(usize, f64)> {
+    let active: Vec<(usize, usize, f64)> = REFINEMENTS
+        .into_iter()
+        .filter(|(index, _)| problem.active[*index])
+        .filter_map(|(index, floor)| Some((index, covariance.row_of(index)?, floor)))
+        .collect();
+    let found: Vec<f64> =
+        active.iter().map(|(index, ..)| problem.shared[*index] - problem.priors[*index].mean).collect();
+    let sigmas: Vec<f64> = active.iter().map(|(index, ..)| problem.priors[*index].sigma).collect();
+    let spread = DMatrix::from_fn(active.len(), active.len(), |a, b| {
+        let floor = if a == b { active[a].2.powi(2) } else { 0.0 };
+        covariance.shared[(active[a].1, active[b].1)] + floor
+    });
+    let on = at_work(&found, &sigmas, &spread);
+    active.iter().zip(on).map(|((index, ..), weight)| (*index, weight)).collect()
 }
+
+/// The same from what was found (less what was declared), the standard deviations beforehand, and the covariance after.
+fn at_work(found: &[f64], sigmas: &[f64], spread: &DMatrix<f64>) -> Vec<f64> {
+    let count = found.len();
+    // For each set of those that are not at work the logarithm of its probability, but for a constant.
+    let logs: Vec<f64> = (0..1usize << count)
+        .map(|off| {
+            let without: Vec<usize> = (0..count).filter(|i| off >> i & 1 == 1).collect();
+            let before: f64 = without.iter().map(|i| sigmas[*i].ln()).sum();
+            let odds = without.len() as f64 * (DECLARED_HOLDS / (1.0 - DECLARED_HOLDS)).ln();
+            let part =
+                DMatrix::from_fn(without.len(), without.len(), |a, b| spread[(without[a], without[b])]);
+            let distance = DVector::from_iterator(without.len(), without.iter().map(|i| found[*i]));
+            if without.is_empty() {
+                return 0.0;
+            }
+            let Some(factors) = part.cholesky() else { return f64::NEG_INFINITY };
+            let determinant: f64 = factors.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+            odds + before - determinant - 0.5 * distance.dot(&factors.solve(&distance))
+        })
+        .collect();
+    let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = logs.iter().map(|log| (log - best).exp()).sum();
+    (0..count)
+        .map(|i| {
+            let with = logs.iter().enumerate().filter(|(off, _)| off >> i & 1 == 0);
+            with.map(|(_, log)| (log - best).exp()).sum::<f64>() / total
+        })
+        .collect()
+}
+
+/// No variance beyond that of the fit.
+pub(crate) const NO_EXTRA: [f64; SHARED] = [0.0; SHARED];
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const PRIOR: Prior = Prior { mean: 0.0, sigma: 0.3 };
+    fn diagonal(errors: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&DVector::from_iterator(errors.len(), errors.iter().map(|e| e * e)))
+    }
 
     #[test]
     fn a_clear_finding_is_left_alone_and_none_is_drawn_to_the_declared_value() {
-        let (sure, kept) = mixture(PRIOR, 0.2, 0.01, 1e4).unwrap();
-        assert!(sure > 0.999 && kept.sigma > 0.1);
-        let (doubtful, drawn) = mixture(PRIOR, 0.005, 0.02, 2.5e3).unwrap();
-        assert!(doubtful < 0.1 && drawn.sigma < 0.01);
+        assert!(at_work(&[0.2], &[0.3], &diagonal(&[0.02]))[0] > SURE);
+        // Half its error: twice as likely not to be there beforehand, and then 13 times as dense as before.
+        assert!(at_work(&[0.01], &[0.3], &diagonal(&[0.02]))[0] < 0.05);
+    }
+
+    /// Two that stand for each other, each two of its errors off, are less than either of them for certain.
+    #[test]
+    fn what_only_balances_another_is_not_at_work() {
+        let errors = [0.02f64, 0.02];
+        let mut spread = diagonal(&errors);
+        spread[(0, 1)] = 0.95 * errors[0] * errors[1];
+        spread[(1, 0)] = spread[(0, 1)];
+        let together = at_work(&[0.045, 0.045], &[0.3, 0.3], &spread);
+        assert!(together.iter().all(|weight| *weight < 0.3), "{together:?}");
     }
 }

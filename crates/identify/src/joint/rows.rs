@@ -16,6 +16,11 @@ const LATE_BLOCK_S: f64 = 1.0;
 /// Time from the first sample on after which that holds, s: several times what a probe and the speed need to settle.
 const LATE_S: f64 = 20.0;
 
+/// Time from the first row on after which lags of lines and sensors no longer show, s.
+const SETTLED_S: f64 = 8.5;
+/// Fewest rows that a step may be cut to.
+const FEWEST_ROWS: usize = 20;
+
 /// Means over one block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Row {
@@ -39,6 +44,15 @@ pub(crate) struct StepRows {
     pub(crate) rows: Vec<Row>,
     /// Means over the step's end: one row more, that is not fitted.
     pub(crate) end: Row,
+}
+
+impl StepRows {
+    /// Without the rows in which pressures, flow and speed still follow the jump.
+    pub(crate) fn settled(&self) -> StepRows {
+        let from_s = self.rows.first().map_or(0.0, |row| row.t_s) + SETTLED_S;
+        let rows: Vec<Row> = self.rows.iter().filter(|row| row.t_s >= from_s).copied().collect();
+        StepRows { rows: if rows.len() < FEWEST_ROWS { self.rows.clone() } else { rows }, ..self.clone() }
+    }
 }
 
 /// Condenses the samples of a window.

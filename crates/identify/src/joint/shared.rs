@@ -8,6 +8,7 @@ use crate::joint::parameters::{
 };
 use crate::joint::profile;
 use crate::joint::rows::StepRows;
+use crate::joint::smoothness::Smoothed;
 use crate::joint::solve::{Covariance, Problem};
 use mapper_core::{ConvectionLaw, Entangled, EstimateUncertainty, Origin, SharedValue, ThermalModel};
 
@@ -20,10 +21,12 @@ const UNINFORMED_RATIO: f64 = 0.7;
 pub(crate) fn thermal_model(
     problem: &Problem<'_>,
     covariance: &Covariance,
+    smoothed: &Smoothed,
     steps: &[StepRows],
     config: &IdentifyConfig,
 ) -> ThermalModel {
-    let of = |index: usize, transform: &dyn Fn(f64) -> f64| value(problem, covariance, index, transform);
+    let of =
+        |index: usize, transform: &dyn Fn(f64) -> f64| value(problem, covariance, smoothed, index, transform);
     let reynolds: Vec<f64> = steps
         .iter()
         .zip(&problem.members)
@@ -71,7 +74,7 @@ pub(crate) fn thermal_model(
             .map(|(i, channel)| (*channel, of(OFFSETS + i, &|x| x)))
             .collect(),
         entangled,
-        doubts: judge::doubts(problem, covariance, config),
+        doubts: judge::doubts(problem, covariance, smoothed, config),
     }
 }
 
@@ -79,13 +82,17 @@ pub(crate) fn thermal_model(
 fn value(
     problem: &Problem<'_>,
     covariance: &Covariance,
+    smoothed: &Smoothed,
     index: usize,
     transform: &dyn Fn(f64) -> f64,
 ) -> SharedValue {
-    let fitted = problem.shared[index];
+    let Some(row) = covariance.row_of(index) else {
+        return SharedValue::assumed(transform(problem.shared[index]));
+    };
+    let (shift, sigma) = smoothed.shared[row];
+    let fitted = problem.shared[index] + shift;
     let told = transform(fitted);
-    let Some(row) = covariance.row_of(index) else { return SharedValue::assumed(told) };
-    let variance = covariance.shared[(row, row)];
+    let variance = sigma * sigma;
     let slope = (transform(fitted + 1e-6) - transform(fitted - 1e-6)) / 2e-6;
     let mut bias = 0.0;
     for (other, index) in covariance.fitted.iter().enumerate() {
@@ -99,7 +106,7 @@ fn value(
         // An offset has its declared spread even where the recording adds nothing.
         value: (!uninformed || is_offset).then_some(told),
         uncertainty: EstimateUncertainty {
-            noise_standard_error: slope.abs() * (variance - bias).max(0.0).sqrt(),
+            noise_standard_error: slope.abs() * (variance - bias.min(variance)).max(0.0).sqrt(),
             bias_standard_error: slope.abs() * bias.min(variance).sqrt(),
         },
         origin: if uninformed { Origin::NotIdentifiable } else { Origin::Fitted },

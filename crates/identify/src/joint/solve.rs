@@ -53,6 +53,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) explained: Explained,
     /// Whether the probe is sought, be it on its bound for now.
     pub(crate) probe_fitted: bool,
+    /// Variance of shared parameters beyond that of the fit: whether they are at work at all.
+    pub(crate) extra_variances: SharedVector,
 }
 
 /// A step's part of the normal equations.
@@ -80,6 +82,8 @@ pub(crate) struct Covariance {
     pub(crate) shared: DMatrix<f64>,
     /// For each step: own covariance with the shared ones free, and own by shared.
     pub(crate) own: Vec<(Matrix4<f64>, Matrix4xX<f64>)>,
+    /// For each step: how its own parameters answer to the shared ones.
+    pub(crate) answers: Vec<Matrix4xX<f64>>,
 }
 
 impl Member<'_> {
@@ -325,9 +329,22 @@ impl Problem<'_> {
             for (active, (value, lowest)) in self.active.iter_mut().zip(shared.iter().zip(&self.lowest)) {
                 *active &= value > lowest;
             }
+            // A step without a say is not in the cost: it moves only where it fits better.
+            let moves: Vec<bool> = self
+                .members
+                .iter()
+                .zip(&locals)
+                .map(|(member, local)| {
+                    member.shares
+                        || self.local_cost(member, &shared, local)
+                            <= self.local_cost(member, &shared, &member.local)
+                })
+                .collect();
             self.shared = shared;
-            for (member, local) in self.members.iter_mut().zip(locals) {
-                member.local = local;
+            for ((member, local), moves) in self.members.iter_mut().zip(locals).zip(moves) {
+                if moves {
+                    member.local = local;
+                }
             }
             let decrease = best - cost;
             best = cost;
@@ -379,14 +396,17 @@ impl Problem<'_> {
         };
         let answer = -(&inverse * reduced.view((0, sought), (sought, carried)));
         // The noise of the inputs pulls the probe beyond what least squares knows of.
-        let inverse = match fitted[..sought].iter().position(|index| *index == PROBE_MM2) {
-            None => inverse,
-            Some(row) => {
-                let pulled = inverse.column(row).into_owned();
-                let variance = self.explained.pull_variance(self.shared[PROBE_MM2]);
-                inverse + variance * &pulled * pulled.transpose()
+        let mut inverse = inverse;
+        for (row, index) in fitted[..sought].iter().enumerate() {
+            let pulled = inverse.column(row).into_owned();
+            let pull =
+                if *index == PROBE_MM2 { self.explained.pull_variance(self.shared[PROBE_MM2]) } else { 0.0 };
+            let variance = pull + self.extra_variances[*index] / pulled[row].powi(2);
+            if variance > 0.0 {
+                inverse += variance * &pulled * pulled.transpose();
             }
-        };
+        }
+        let inverse = inverse;
         let spread = DMatrix::from_diagonal(&DVector::from_iterator(
             carried,
             fitted[sought..].iter().map(|index| self.priors[*index].sigma.powi(2)),
@@ -396,16 +416,16 @@ impl Problem<'_> {
         shared.view_mut((0, sought), (sought, carried)).copy_from(&mixed);
         shared.view_mut((sought, 0), (carried, sought)).copy_from(&mixed.transpose());
         shared.view_mut((sought, sought), (carried, carried)).copy_from(&spread);
-        let own = normal
-            .blocks
+        let answers: Vec<Matrix4xX<f64>> =
+            normal.blocks.iter().zip(&inverses).map(|(block, inverse)| -(inverse * &block.mixed)).collect();
+        let own = answers
             .iter()
             .zip(&inverses)
-            .map(|(block, inverse)| {
-                let spread = inverse * &block.mixed;
-                let own = inverse + &spread * &shared * spread.transpose();
-                (own, -(spread * &shared))
+            .map(|(answer, inverse)| {
+                let mixed = answer * &shared;
+                (inverse + &mixed * answer.transpose(), mixed)
             })
             .collect();
-        Some(Covariance { fitted, shared, own })
+        Some(Covariance { fitted, shared, own, answers })
     }
 }

@@ -10,13 +10,14 @@ use crate::joint::parameters::{
     ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL,
     OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior, SHARED, SLOPE, SURFACE,
 };
+use crate::joint::parsimony::NO_EXTRA;
 use crate::joint::rows::{StepRows, condensed};
 use crate::joint::solve::{Member, Problem};
 use crate::joint::surface::{SurfaceScale, TERM_COUNT, dot};
 use crate::joint::whitening::{RowNoise, Whitening};
 use crate::samples::Samples;
-use crate::window::median;
-use crate::{IdentifyConfig, jump};
+use crate::window::{self, median};
+use crate::{IdentifyConfig, Stabilisation, WindowRule, jump};
 use mapper_core::{Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, Window};
 use mapper_physics::air;
 
@@ -63,6 +64,22 @@ pub(crate) fn steps(
         let samples = cleaned(Samples::of(recording, window, config, true), config, own);
         if !dynamic::enough(&samples, config, own) {
             continue;
+        }
+        if !config.declared.is_empty() {
+            let rule = match config.window {
+                WindowRule::Auto(rule) => rule,
+                WindowRule::Fixed { .. } => Stabilisation::default(),
+            };
+            // What varies is followed; but a point is where a step settles.
+            let mut judged = Findings::new();
+            window::choose(recording, step, &WindowRule::Auto(rule), &mut judged);
+            if judged.warnings.iter().any(|warning| warning.code == code::NOT_STABILISED) {
+                let message = format!(
+                    "speed, flow or pressure ratio still varies beyond its limit in the last {:.0} s of the step",
+                    rule.shortest_s
+                );
+                own.doubt(code::NOT_STABILISED, message);
+            }
         }
         steps.extend(condensed(recording, position, &samples, end_state, config));
     }
@@ -194,6 +211,7 @@ pub(crate) fn problem<'a>(
         surface_sigma,
         explained: Explained::default(),
         probe_fitted: choice.probe == Choice::Fitted,
+        extra_variances: NO_EXTRA,
     })
 }
 

@@ -62,11 +62,21 @@ impl SurfaceScale {
         })
     }
 
-    /// The terms at a place.
-    pub(crate) fn terms(&self, (speed_rpm, flow_kg_s): Place) -> [f64; TERM_COUNT] {
+    /// Speed and flow scaled to the points, -1 to 1.
+    pub(crate) fn coordinates(&self, (speed_rpm, flow_kg_s): Place) -> (f64, f64) {
         let u = (speed_rpm - self.speed_middle_rpm) / self.speed_half_range_rpm;
         let reduced = flow_kg_s / (speed_rpm / self.speed_middle_rpm).max(1e-3).powf(self.flow_exponent);
-        let v = (reduced - self.middle) / self.half_range;
+        (u, (reduced - self.middle) / self.half_range)
+    }
+
+    /// Square of the middle speed over the speed, less 1.
+    pub(crate) fn slowness(&self, (speed_rpm, _): Place) -> f64 {
+        (self.speed_middle_rpm / speed_rpm).powi(2) - 1.0
+    }
+
+    /// The terms at a place.
+    pub(crate) fn terms(&self, place: Place) -> [f64; TERM_COUNT] {
+        let (u, v) = self.coordinates(place);
         TERMS.map(|(i, j, _)| u.powi(i) * v.powi(j))
     }
 

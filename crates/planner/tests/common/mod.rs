@@ -46,6 +46,7 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
             p3_slew_max_pa_s: None,
         },
         repeats: None,
+        appended: None,
         required_sigma_eta: None,
         method: None,
         effort: 0.3,

@@ -1,6 +1,7 @@
 //! The virtual gas stand: the lumped model behind actuators and sensors, in simulated time.
 
 use super::actuator::Actuator;
+use super::drift::{self, LabDrift};
 use super::inputs::{LOWEST_EXPANSION_RATIO, LabInputs};
 use super::sensor::Sensor;
 use super::settings::{LabSettings, Start};
@@ -254,6 +255,7 @@ impl Armed {
         let mut batch = BatchBuilder::new(self.next_sequence);
         while self.now_s < until_s || (self.now_s == 0.0 && self.next_sequence == 0) {
             self.switch_machine(settings);
+            self.drift(settings);
             let next_s = self.advance_machine(settings, until_s, &mut batch)?;
             self.now_s = next_s;
             if until_s <= 0.0 {
@@ -286,6 +288,21 @@ impl Armed {
         self.machine = Some(next);
     }
 
+    /// The machine as it has become by now.
+    fn drift(&mut self, settings: &LabSettings) {
+        if let Some(Machine::Running(simulator)) = self.machine.as_mut()
+            && settings.drifts.iter().any(LabDrift::is_machine)
+        {
+            let held_s = (self.now_s / drift::MACHINE_HOLDS_S + 1e-9).floor() * drift::MACHINE_HOLDS_S;
+            let middle_s = held_s + 0.5 * drift::MACHINE_HOLDS_S;
+            simulator.change_params(drift::drifted_machine(
+                &settings.drifts,
+                settings.model.params,
+                middle_s,
+            ));
+        }
+    }
+
     /// Runs the machine to `until_s`, or for a second where it may have to be switched; returns the time reached.
     fn advance_machine(
         &mut self,
@@ -295,7 +312,12 @@ impl Armed {
     ) -> Result<f64, BackendError> {
         let start_s = self.now_s;
         let coasting = self.wanted == RigMode::Standstill;
-        let end_s = if coasting { until_s.min(start_s + 1.0) } else { until_s };
+        let mut end_s = if coasting { until_s.min(start_s + 1.0) } else { until_s };
+        if settings.drifts.iter().any(LabDrift::is_machine) {
+            // On a grid of its own: how often the lab is polled changes nothing.
+            end_s =
+                end_s.min(((start_s / drift::MACHINE_HOLDS_S + 1e-9).floor() + 1.0) * drift::MACHINE_HOLDS_S);
+        }
         let first_index = self.next_sequence + batch.t_s.len() as u64;
         let rate_hz = settings.sample_rate_hz;
         let sample_times_s = (first_index..).map(|index| index as f64 / rate_hz).take_while(|t| *t <= end_s);
@@ -436,7 +458,8 @@ impl BatchBuilder {
             };
             let truth = follower.read(t_s, truth);
             let sensor = sensors.iter_mut().find(|(channel, _)| *channel == row.channel);
-            column.push(sensor.map_or(truth, |(_, sensor)| sensor.read(truth)));
+            let reading = sensor.map_or(truth, |(_, sensor)| sensor.read(truth));
+            column.push(drift::drifted_reading(&settings.drifts, row.channel, t_s, reading));
         }
         self.truth.push(instant.speed_rpm, instant.tc_k, instant.tt_k, instant.outputs());
     }

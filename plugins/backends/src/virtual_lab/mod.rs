@@ -1,6 +1,8 @@
 //! A gas stand that exists in equations only: the lumped model, actuators, sensors, standstill, surge, overspeed.
 
 mod actuator;
+mod drift;
+mod drift_file;
 mod effects_file;
 mod inputs;
 mod lab;
@@ -12,6 +14,7 @@ mod truth;
 mod weather;
 
 pub use actuator::ActuatorDynamics;
+pub use drift::{Drifting, LabDrift};
 pub use lab::{NAME, VirtualLab};
 pub use sensor::SensorErrors;
 pub use settings::{LabSettings, Start};

@@ -1,6 +1,7 @@
 //! Settings of the virtual lab, in SI units. They are truth: nothing but the lab reads them.
 
 use super::actuator::ActuatorDynamics;
+use super::drift::LabDrift;
 use super::sensor::SensorErrors;
 use super::weather::Weather;
 use mapper_core::Channel;
@@ -44,6 +45,8 @@ pub struct LabSettings {
     pub oil_actuator: ActuatorDynamics,
     /// Errors of the sensors; channels without an entry are ideal.
     pub sensors: BTreeMap<Channel, SensorErrors>,
+    /// What drifts while the lab runs.
+    pub drifts: Vec<LabDrift>,
     /// Pressures that are tapped at the wall of a pipe, with its inner diameter, m; the others are total.
     pub static_tap_pipe_diameters_m: BTreeMap<Channel, f64>,
     /// Shaft speed at which the lab cuts the air by itself, rpm.
@@ -78,6 +81,7 @@ impl LabSettings {
             valve_actuator: at_once,
             oil_actuator: at_once,
             sensors: BTreeMap::new(),
+            drifts: Vec::new(),
             static_tap_pipe_diameters_m: BTreeMap::new(),
             trip_speed_rpm: f64::INFINITY,
             surge_swing_ratio: 0.0,

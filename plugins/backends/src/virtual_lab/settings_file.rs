@@ -1,6 +1,7 @@
 //! The lab's settings as a campaign writes them below `backend: {virtual_lab: ...}`.
 
 use super::actuator::ActuatorDynamics;
+use super::drift_file::{self, DriftFile};
 use super::effects_file::{EffectValues, put_in};
 use super::lab::NAME;
 use super::sensor::SensorErrors;
@@ -60,6 +61,8 @@ struct SettingsFile {
     offset_of: BTreeMap<Channel, String>,
     /// What the machine has that the declared one has not.
     effects: BTreeMap<String, EffectValues>,
+    /// What drifts while the lab runs.
+    drift: Vec<DriftFile>,
     /// `calm` (the default) or `wandering`.
     weather: WeatherName,
     /// `drawn` from the campaign's tolerances, or `none` (the default).
@@ -199,6 +202,7 @@ pub fn read_settings(settings: &serde_json::Value, nominal: NominalRig) -> Resul
         valve_actuator: actuators.valve.dynamics("valve", 0.2, 1.0)?,
         oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", 30.0, 1.0)?,
         sensors: sensors(&file, &nominal)?,
+        drifts: drift_file::read(&file.drift).map_err(|(path, message)| wrong(&path, message))?,
         static_tap_pipe_diameters_m: nominal.static_tap_pipe_diameters_m,
         trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.inside),
         surge_swing_ratio,
@@ -360,6 +364,24 @@ mod tests {
     }
 
     #[test]
+    fn drifts_have_units_and_may_have_begun_before_the_run() {
+        let settings = json!({"drift": [
+            {"cause": "T2", "change": "0.5 K", "over": "4 h"},
+            {"cause": "m_c", "change": "1 %", "over": "10 h", "from": "-10 h"},
+            {"cause": "P2", "change": "400 Pa", "from": "25 min"},
+            {"cause": "fouling", "change": "-2 %", "over": "1 h"},
+            {"cause": "bearing_friction", "change": "1e-7 W s2/rad2", "over": "1 h"},
+        ]});
+        let drifts = read_settings(&settings, nominal()).unwrap().drifts;
+        let at_the_start: Vec<f64> = drifts.iter().map(|drift| drift.at(0.0)).collect();
+        assert_eq!(at_the_start, [0.0, 0.01, 0.0, 0.0, 0.0]);
+        let after_an_hour: Vec<f64> = drifts.iter().map(|drift| drift.at(3600.0)).collect();
+        for (drift, expected) in after_an_hour.iter().zip([0.125, 0.011, 400.0, -0.02, 1e-7]) {
+            assert!((drift - expected).abs() < 1e-9 * expected.abs(), "{drift} {expected}");
+        }
+    }
+
+    #[test]
     fn drawn_offsets_scatter_as_declared_and_belong_to_seed_and_channel() {
         let offsets: Vec<f64> = (0..2000)
             .map(|seed| {
@@ -383,6 +405,10 @@ mod tests {
             (json!({"machine": {"alpha_area": 2}}), "machine.alpha_area"),
             (json!({"offset_of": {"T2": "1 kPa"}}), "offset_of.T2"),
             (json!({"actuators": {"valve": {"slew": "0 1/s"}}}), "actuators.valve.slew"),
+            (json!({"drift": [{"cause": "T9", "change": "1 K"}]}), "drift[0].cause"),
+            (json!({"drift": [{"cause": "T2", "change": "1 kPa"}]}), "drift[0].change"),
+            (json!({"drift": [{"cause": "T2", "change": "1 K", "over": "0 s"}]}), "leave `over` out"),
+            (json!({"drift": [{"cause": "fouling", "change": "-150 %"}]}), "beyond 30 %"),
             (json!({"effects": {"area_spilt": 0.1}}), "area_split"),
             (json!({"effects": {"area_split": 2.0}}), "is not between 0 and 0.6"),
             (json!({"effects": {"tip_diameter": 1.5}}), "lacks its unit"),

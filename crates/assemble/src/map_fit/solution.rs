@@ -1,0 +1,67 @@
+//! What a fit gives: parameters at any speed, with their covariance.
+
+use super::line_shape::{FlowFrame, LineShape, PARAMETERS, Parameters, WORK};
+use super::problem::LINE_OFFSETS;
+use super::splines::Splines;
+use nalgebra::DMatrix;
+
+/// A solved problem.
+#[derive(Debug, Clone)]
+pub(crate) struct Solution {
+    pub splines: Splines,
+    pub frame: FlowFrame,
+    /// Parameters at the knots.
+    pub(super) values: DMatrix<f64>,
+    /// Covariance of all unknowns, parameters first (parameter by parameter, knot by knot).
+    pub(super) covariance: DMatrix<f64>,
+    /// One over the penalty: variance of the roughness.
+    pub(super) roughness_variance: Parameters,
+    /// Standard deviations of the line offsets, logarithms.
+    pub line_scatter: [f64; 3],
+    /// Root mean squares of distance and efficiency.
+    pub rms: [f64; 2],
+    /// Minus twice the logarithm of the marginal likelihood by Laplace's approximation, but for a constant of the data.
+    pub(super) improbability: f64,
+    /// Highest efficiency of the fit at the points, fraction.
+    pub best_eta: f64,
+    /// Angles of the feet, in the order of the points.
+    pub angles_rad: Vec<f64>,
+}
+
+impl Solution {
+    /// Parameters of the smooth surface at a speed.
+    pub(crate) fn parameters(&self, speed_ratio: f64) -> Parameters {
+        let rows = self.splines.rows(speed_ratio);
+        std::array::from_fn(|q| self.values.row(q).transpose().dot(rows.of(q)))
+    }
+
+    pub(crate) fn shape(&self, speed_ratio: f64) -> LineShape {
+        LineShape::new(&self.parameters(speed_ratio), self.frame)
+    }
+
+    /// Covariance of the parameters at a speed: of the surface, of a line about it, and of what may happen between the
+    /// knots and beyond them.
+    pub(crate) fn covariance(&self, speed_ratio: f64) -> DMatrix<f64> {
+        let (rows, knots) = (self.splines.rows(speed_ratio), self.splines.len());
+        // The roughness was estimated on this many second differences: Student's quantile over the normal one (first
+        // terms of its Cornish-Fisher series at 97.5 %), squared.
+        let freedom = knots.saturating_sub(2).max(1) as f64;
+        let few = (1.0 + 1.21 / freedom + 1.44 / freedom.powi(2)).powi(2);
+        let open =
+            (self.splines.shape.open_variance(speed_ratio), self.splines.work.open_variance(speed_ratio));
+        let mut out = DMatrix::zeros(PARAMETERS, PARAMETERS);
+        for a in 0..PARAMETERS {
+            for b in 0..PARAMETERS {
+                let block = self.covariance.view((a * knots, b * knots), (knots, knots));
+                out[(a, b)] = (rows.of(a).transpose() * block * rows.of(b))[(0, 0)];
+            }
+            out[(a, a)] += if a < WORK { open.0 } else { open.1 } * self.roughness_variance[a] * few;
+        }
+        for (index, together) in LINE_OFFSETS.iter().enumerate() {
+            for (a, b) in together.iter().flat_map(|a| together.iter().map(move |b| (*a, *b))) {
+                out[(a, b)] += self.line_scatter[index].powi(2);
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,95 @@
+//! What the best explanation leaves: stretches that the model cannot follow, and noise beyond what is declared.
+
+use crate::DriftError;
+use crate::low_rank::LowRank;
+use crate::study::Readings;
+use nalgebra::{DMatrix, DVector};
+
+/// A stretch stands out when it lies so many times as far from the model as the middle one.
+const FAR_OUT: f64 = 5.0;
+const LEAVE_OUT_ROUNDS: usize = 4;
+/// Factor on the variance of what is left out.
+const AS_GOOD_AS_NOTHING: f64 = 1e8;
+
+/// Leaves out stretches that stand far out of all others even beside the best explanation: the model cannot follow the
+/// machine there (surge, a valve at its stop). Gives their number.
+pub(crate) fn leave_out(
+    own: &mut [DMatrix<f64>],
+    readings: &Readings,
+    columns: &DMatrix<f64>,
+    difference: &DMatrix<f64>,
+    shown: &DMatrix<f64>,
+) -> Result<usize, DriftError> {
+    let count = readings.columns.len();
+    let mut out = vec![false; own.len()];
+    for _ in 0..LEAVE_OUT_ROUNDS {
+        let noise = LowRank::new(own, columns)?;
+        let left = unexplained(&noise, difference, shown);
+        let sizes: Vec<f64> = (0..own.len())
+            .map(|block| {
+                left.rows(block * count, count).iter().map(|value| value * value).sum::<f64>() / count as f64
+            })
+            .collect();
+        let mut kept: Vec<f64> =
+            (0..own.len()).filter(|block| !out[*block]).map(|block| sizes[block]).collect();
+        kept.sort_by(f64::total_cmp);
+        let usual = kept.get(kept.len() / 2).copied().unwrap_or(1.0).max(1.0);
+        let far: Vec<usize> = (0..own.len())
+            .filter(|block| !out[*block] && sizes[*block] > FAR_OUT * FAR_OUT * usual)
+            .collect();
+        if far.is_empty() {
+            break;
+        }
+        for block in far {
+            out[block] = true;
+            own[block] *= AS_GOOD_AS_NOTHING;
+        }
+    }
+    Ok(out.iter().filter(|out| **out).count())
+}
+
+/// What constants and the best cause leave, whitened.
+fn unexplained(noise: &LowRank, difference: &DMatrix<f64>, shown: &DMatrix<f64>) -> DMatrix<f64> {
+    let whitened = noise.whiten(difference.clone());
+    let whitened_shown = noise.whiten(shown.clone());
+    let inverse_difference = noise.inverse_times(&whitened);
+    let along = whitened_shown.tr_mul(&inverse_difference);
+    let inverse_shown = noise.inverse_times(&whitened_shown);
+    let mut best = (0.0, 0, 0.0);
+    for index in 0..shown.ncols() {
+        let information = whitened_shown.column(index).dot(&inverse_shown.column(index));
+        if information > 0.0 {
+            let evidence = along[(index, 0)].powi(2) / information;
+            if evidence > best.0 {
+                best = (evidence, index, along[(index, 0)] / information);
+            }
+        }
+    }
+    let explained = &whitened - whitened_shown.columns(best.1, 1) * best.2;
+    noise.inverse_times(&explained)
+}
+
+/// Raises each channel's own noise to what the best explanation leaves.
+pub(crate) fn inflate(
+    own: &mut [DMatrix<f64>],
+    readings: &Readings,
+    noise: &LowRank,
+    difference: &DMatrix<f64>,
+    shown: &DMatrix<f64>,
+) {
+    let left = unexplained(noise, difference, shown);
+    let count = readings.columns.len();
+    let rows = left.nrows() as f64;
+    // Constants take their share of the degrees of freedom.
+    let free = (1.0 - noise.degrees_of_freedom() / rows).max(0.2);
+    let factors: Vec<f64> = (0..count)
+        .map(|column| {
+            let own: Vec<f64> = left.iter().skip(column).step_by(count).map(|value| value * value).collect();
+            (own.iter().sum::<f64>() / own.len().max(1) as f64 / free).max(1.0).sqrt()
+        })
+        .collect();
+    let scale = DMatrix::from_diagonal(&DVector::from_vec(factors));
+    for covariance in own {
+        *covariance = &scale * &*covariance * &scale;
+    }
+}

@@ -1,0 +1,51 @@
+//! A drift that was found, put into the model, so that the next fit is linear around it and no longer around a machine
+//! that never changed.
+
+use crate::knob::{INPUTS, Knob};
+use crate::{Cause, Course};
+use mapper_physics::params::{BoundaryConditions, Params};
+
+/// A cause with its course, and its rate or step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Planted {
+    pub cause: Cause,
+    pub course: Course,
+    pub size: f64,
+}
+
+impl Planted {
+    /// Whether the model has it at all: what the sensor of an output adds is linear as it is.
+    pub fn is_in_model(&self) -> bool {
+        self.machine_changes() || self.input_drifts()
+    }
+
+    /// Whether the machine is another one from moment to moment.
+    pub fn machine_changes(&self) -> bool {
+        matches!(self.cause, Cause::Fouling | Cause::BearingFriction)
+    }
+
+    /// Whether something that drives the model was read wrong.
+    pub fn input_drifts(&self) -> bool {
+        matches!(self.cause, Cause::Sensor(channel) if INPUTS.contains(&channel))
+    }
+
+    /// The machine as it is on average over a part of the campaign, time of the campaign, s.
+    pub fn drift_machine(&self, params: &mut Params, from_s: f64, to_s: f64) {
+        let now = self.size * self.course.mean(from_s, to_s);
+        match self.cause {
+            Cause::Fouling => {
+                Knob::Efficiency.turn(params, now);
+                Knob::Flow.turn(params, crate::cause::FOULING_FLOW_SHARE * now);
+            }
+            Cause::BearingFriction => Knob::Friction.turn(params, now),
+            Cause::Sensor(_) => {}
+        }
+    }
+
+    /// Takes the drift of a sensor off the input that was read with it.
+    pub fn undrift(&self, boundary: &mut BoundaryConditions, t_s: f64) {
+        if let Cause::Sensor(channel) = self.cause {
+            Knob::Input(channel).shift(boundary, -self.size * self.course.at(t_s));
+        }
+    }
+}

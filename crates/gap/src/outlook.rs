@@ -1,0 +1,207 @@
+//! What a jump that was not made would show: the candidates' predictions of it, and how far apart they are once each
+//! is fitted again.
+
+use crate::fit::{Fit, coordinates, effect_changes};
+use crate::nuisance::{NuisanceKind, OUTPUTS};
+use crate::study::{Hypothesis, Study};
+use crate::table::Table;
+use crate::whiten::{Linearised, dot};
+use mapper_core::{Channel, OperatingPoint, Recording, Series, StepKind, StepMarker};
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::steady::hold_speed;
+use nalgebra::{DMatrix, DVector};
+
+/// A jump that may be run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jump {
+    /// Where it starts, settled.
+    pub from: OperatingPoint,
+    /// Where it goes.
+    pub to: OperatingPoint,
+    /// Turbine inlet total pressure commanded at the start, Pa.
+    pub from_p3_pa: f64,
+    /// Turbine inlet total pressure commanded by the jump, Pa.
+    pub to_p3_pa: f64,
+    /// Time at the target, s.
+    pub dwell_s: f64,
+}
+
+/// Time at the start of a jump that is looked at as well, s.
+const HOLD_S: f64 = 30.0;
+/// Samples of a first look, and of a close one, s apart.
+const COARSE_S: f64 = 0.5;
+const FINE_S: f64 = 0.1;
+/// Most samples of a jump; a dwell that is longer is looked at up to there.
+const MOST_S: f64 = 600.0;
+
+/// A jump made ready like a recording, of rest at its start and its dwell, with nothing in it but its inputs.
+fn imagined(recorded: &Study, jump: &Jump, interval_s: f64) -> Option<Study> {
+    let dwell_s = jump.dwell_s.clamp(10.0, MOST_S);
+    let count = ((HOLD_S + dwell_s) / interval_s) as usize;
+    let t_s: Vec<f64> = (0..count).map(|i| interval_s * i as f64).collect();
+    let marker = |index: usize, from: f64, to: f64, p3_pa: f64, point: OperatingPoint| StepMarker {
+        index,
+        kind: StepKind::Repeat,
+        start_s: from,
+        end_s: to,
+        from: None,
+        to: Some(point),
+        p3_pa,
+        valve_opening_ratio: point.valve_opening_ratio,
+    };
+    let steps = vec![
+        marker(0, 0.0, HOLD_S, jump.from_p3_pa, jump.from),
+        marker(1, HOLD_S, HOLD_S + dwell_s, jump.to_p3_pa, jump.to),
+    ];
+    // The rest at the start, as a first guess; the inputs are those of the campaign.
+    let boundary = BoundaryConditions {
+        valve_opening_ratio: jump.from.valve_opening_ratio,
+        ..recorded.declared.nominal
+    };
+    let rest = hold_speed(&recorded.nominal.model, jump.from.speed_rpm, &boundary).ok()?.state;
+    let level = |channel: Channel| match channel {
+        Channel::ShaftSpeed => jump.from.speed_rpm,
+        Channel::P2 => rest.p2_pa,
+        Channel::Tc => rest.tc_k,
+        Channel::Tt => rest.tt_k,
+        Channel::T2 => rest.t2_tip_k,
+        _ => 0.0,
+    };
+    let series =
+        |channel: Channel| (channel, Series { t_s: t_s.clone(), values: vec![level(channel); t_s.len()] });
+    // What drives the model comes from the campaign; what the rig measured would be measured again.
+    let measured = OUTPUTS
+        .into_iter()
+        .filter(|channel| *channel != Channel::P3 && recorded.table.column(*channel).is_some());
+    let recording = Recording { series: measured.map(series).collect(), steps, events: Vec::new() };
+    let table = Table::new(&recording)?;
+    Study::new(
+        &recording,
+        table,
+        recorded.declared.clone(),
+        recorded.nominal.model.clone(),
+        recorded.effects.clone(),
+    )
+    .ok()
+}
+
+/// A fit's hypothesis at a new start, of which its own start says nothing.
+fn anew(study: &Study, fit: &Fit) -> Hypothesis {
+    let mut hypothesis = fit.hypothesis.clone();
+    for (nuisance, sigmas) in study.nuisances.iter().zip(&mut hypothesis.nuisances) {
+        if is_start(nuisance.kind) {
+            *sigmas = 0.0;
+        }
+    }
+    hypothesis
+}
+
+fn is_start(kind: NuisanceKind) -> bool {
+    matches!(kind, NuisanceKind::StartTc | NuisanceKind::StartTt)
+}
+
+/// How far apart two candidates' predictions of a jump are, in squared sigmas of the noise alone: a first look.
+///
+/// `None` where the model cannot make the jump.
+pub fn apart_at_first_sight(recorded: &Study, jump: &Jump, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
+    let study = imagined(recorded, jump, COARSE_S)?;
+    let linearised = Linearised::of_noise_alone(&study).ok()?;
+    let predictions: Option<Vec<Vec<f64>>> = fits
+        .iter()
+        .map(|fit| {
+            let mut values = study.predict(&anew(&study, fit)).ok()?.values;
+            linearised.whiten(&study, &mut values);
+            Some(values)
+        })
+        .collect();
+    let predictions = predictions?;
+    let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
+    Some(predictions.iter().map(|a| predictions.iter().map(|b| distance(a, b)).collect()).collect())
+}
+
+/// The same with each rival fitted again to what the jump would show: row `k`, column `j` is by how much the jump would
+/// raise the misfit of `j` if `k` is true, in squared sigmas.
+///
+/// With `D` the difference of the predictions, `J` the derivatives of `j`'s prediction by its nuisances and parameters
+/// and `L` the precision in which the recording leaves them: `D'D - D'J (L + J'J)^-1 J'D`, all whitened.
+pub fn apart(recorded: &Study, jump: &Jump, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
+    let study = imagined(recorded, jump, FINE_S)?;
+    let nominal = Linearised::new(&study).ok()?;
+    let mut predicted = Vec::new();
+    for fit in fits {
+        let hypothesis = anew(&study, fit);
+        let here = nominal.at(&study, &hypothesis).ok()?;
+        let mut values = here.base.values.clone();
+        nominal.whiten(&study, &mut values);
+        let coordinates = coordinates(&study, &hypothesis);
+        let mut columns = here.columns.clone();
+        columns.extend(effect_changes(&study, &nominal, &hypothesis, &here.base, &coordinates));
+        predicted.push((values, columns, precision(&study, fit)));
+    }
+    let mut rows = Vec::new();
+    for (truth, ..) in &predicted {
+        let mut row = Vec::new();
+        for (values, columns, precision) in &predicted {
+            let difference: Vec<f64> = truth.iter().zip(values).map(|(a, b)| a - b).collect();
+            row.push(misfit(&difference, columns, precision)?);
+        }
+        rows.push(row);
+    }
+    Some(rows)
+}
+
+fn misfit(difference: &[f64], columns: &[Vec<f64>], precision: &DMatrix<f64>) -> Option<f64> {
+    let n = columns.len();
+    let mut matrix = precision.clone();
+    for i in 0..n {
+        for j in 0..=i {
+            let product = dot(&columns[i], &columns[j]);
+            matrix[(i, j)] += product;
+            if i != j {
+                matrix[(j, i)] += product;
+            }
+        }
+    }
+    let right = DVector::from_fn(n, |i, _| dot(&columns[i], difference));
+    let taken = right.dot(&matrix.cholesky()?.solve(&right));
+    Some((dot(difference, difference) - taken).max(0.0))
+}
+
+/// What the recording leaves open, but that a new start is as unknown as the first one was.
+fn precision(study: &Study, fit: &Fit) -> DMatrix<f64> {
+    let mut precision = fit.precision.clone();
+    for (index, nuisance) in study.nuisances.iter().enumerate() {
+        if is_start(nuisance.kind) {
+            precision.row_mut(index).fill(0.0);
+            precision.column_mut(index).fill(0.0);
+            precision[(index, index)] = 1.0;
+        }
+    }
+    precision
+}
+
+/// The jumps that were recorded, for where nothing else is known to be allowed.
+pub fn recorded_jumps(study: &Study, points: &[OperatingPoint]) -> Vec<Jump> {
+    let pairs = study.steps.windows(2).zip(points.windows(2));
+    pairs
+        .map(|(steps, points)| Jump {
+            from: points[0],
+            to: points[1],
+            from_p3_pa: steps[0].marker.p3_pa,
+            to_p3_pa: steps[1].marker.p3_pa,
+            dwell_s: steps[1].marker.end_s - steps[1].marker.start_s,
+        })
+        .collect()
+}
+
+/// The points at which a recording's steps ended, by a hypothesis.
+pub fn recorded_points(study: &Study, hypothesis: &Hypothesis) -> Vec<OperatingPoint> {
+    let points = study.points(hypothesis).unwrap_or_default();
+    let steps = study.steps.iter().zip(points);
+    steps
+        .map(|(step, point)| OperatingPoint {
+            speed_rpm: point.speed_rpm,
+            valve_opening_ratio: step.marker.valve_opening_ratio,
+        })
+        .collect()
+}

@@ -1,0 +1,62 @@
+//! One least-squares fit of all steps by itself, for those who measure it beside another program.
+
+use crate::dynamic::Estimate;
+use crate::end_state::end_state;
+use crate::findings::Findings;
+use crate::joint::explained::Explained;
+use crate::joint::parameters::{ALPHA, ETA, LN_DEVIATION, PROBE_MM2};
+use crate::joint::solve::{FULLY, Problem};
+use crate::joint::start;
+use crate::{IdentifyConfig, identify};
+use mapper_core::Recording;
+
+/// What one fit found.
+#[doc(hidden)]
+#[derive(Debug, Clone, PartialEq)]
+pub struct OneFit {
+    /// alpha_A, ratio.
+    pub alpha_area_ratio: f64,
+    /// Diameter of the probe, m.
+    pub probe_diameter_m: f64,
+    /// Efficiency of each step, fraction.
+    pub etas: Vec<f64>,
+}
+
+/// Spreads of the points about surface (fraction) and law (ratio) that a fit starts with.
+const SPREADS: (f64, f64) = (0.005, 0.01);
+
+/// Prepares rows, weights and start values, and hands out a function that fits once from there; `None` where there is
+/// nothing to fit. The weights are those of the declared noise; nothing is learned, judged or corrected.
+#[doc(hidden)]
+pub fn one_fit<R>(
+    recording: &Recording,
+    config: &IdentifyConfig,
+    measure: impl FnOnce(&mut dyn FnMut() -> Option<OneFit>) -> R,
+) -> Option<R> {
+    identify::check(config).ok()?;
+    let mut findings = vec![Findings::new(); recording.steps.len()];
+    let states: Vec<_> = recording
+        .steps
+        .iter()
+        .zip(&mut findings)
+        .map(|(step, findings)| end_state(recording, step, config, findings).ok())
+        .collect();
+    let steps = start::steps(recording, &states, config, &mut findings);
+    let nothing_known = vec![Estimate::default(); recording.steps.len()];
+    let mut prepared: Problem<'_> = start::problem(&steps, &nothing_known, config)?;
+    start::refine(&mut prepared, &steps, config);
+    prepared.explained = Explained::default();
+    prepared.surface_sigma = SPREADS.0;
+    for member in &mut prepared.members {
+        member.priors[LN_DEVIATION].sigma = SPREADS.1;
+    }
+    Some(measure(&mut || {
+        let mut problem = prepared.clone();
+        problem.minimise(FULLY)?;
+        Some(OneFit {
+            alpha_area_ratio: problem.shared[ALPHA],
+            probe_diameter_m: 1e-3 * problem.shared[PROBE_MM2].max(0.0).sqrt(),
+            etas: problem.members.iter().map(|member| member.local[ETA]).collect(),
+        })
+    }))
+}

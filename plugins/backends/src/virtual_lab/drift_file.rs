@@ -1,0 +1,83 @@
+//! `drift:` below `virtual_lab`: what drifts while the campaign runs.
+
+use super::drift::{Drifting, LabDrift};
+use mapper_core::Channel;
+use mapper_units::{Kind, Quantity};
+use serde::Deserialize;
+
+/// One entry: `{cause: T2, change: 0.5 K, over: 4 h, from: 10 min}`, or without `over` a step.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DriftFile {
+    /// A channel, `fouling` or `bearing_friction`.
+    cause: String,
+    /// How far, with its unit.
+    change: String,
+    /// How long the change takes; it goes on at this rate afterwards. A step where left out.
+    #[serde(default)]
+    over: Option<Quantity<mapper_units::Duration>>,
+    /// Begin; 0 where left out, negative for a drift that began before the run.
+    #[serde(default)]
+    from: Option<Quantity<mapper_units::Duration>>,
+}
+
+/// Drifts with their units resolved; gives the key that is wrong and what would be right.
+pub(super) fn read(files: &[DriftFile]) -> Result<Vec<LabDrift>, (String, String)> {
+    files.iter().enumerate().map(|(index, file)| one(index, file)).collect()
+}
+
+fn one(index: usize, file: &DriftFile) -> Result<LabDrift, (String, String)> {
+    let wrong = |key: &str, message: String| (format!("drift[{index}].{key}"), message);
+    let what = match file.cause.as_str() {
+        "fouling" => Drifting::Fouling,
+        "bearing_friction" => Drifting::BearingFriction,
+        name => match serde_json::from_value::<Channel>(serde_json::json!(name)) {
+            Ok(channel) if !is_command(channel) => Drifting::Sensor(channel),
+            _ => {
+                let message = format!(
+                    "`{name}` cannot drift: write a measured channel, `fouling` or `bearing_friction`"
+                );
+                return Err(wrong("cause", message));
+            }
+        },
+    };
+    let change = change(what, &file.change).map_err(|message| wrong("change", message))?;
+    let over_s = file.over.map(|over| over.inside);
+    if let Some(over_s) = over_s.filter(|over_s| *over_s <= 0.0) {
+        return Err(wrong(
+            "over",
+            format!("{over_s} s is no time for a change; leave `over` out for a step"),
+        ));
+    }
+    Ok(LabDrift { what, change, over_s, from_s: file.from.map_or(0.0, |from| from.inside) })
+}
+
+fn is_command(channel: Channel) -> bool {
+    matches!(channel, Channel::P3Command | Channel::T3Command | Channel::ValveCommand | Channel::TOilCommand)
+}
+
+fn change(what: Drifting, text: &str) -> Result<f64, String> {
+    const FRICTION: &str = "W s2/rad2";
+    let kind = match what {
+        Drifting::Sensor(channel) => match channel.info().dimension {
+            mapper_core::Dimension::RotationalSpeed => Kind::Speed,
+            mapper_core::Dimension::MassFlow | mapper_core::Dimension::Ratio => Kind::Fraction,
+            mapper_core::Dimension::Pressure => Kind::PressureDifference,
+            mapper_core::Dimension::Temperature => Kind::TemperatureDifference,
+        },
+        Drifting::Fouling => Kind::Fraction,
+        Drifting::BearingFriction => {
+            let number = text.trim().strip_suffix(FRICTION).map(|number| number.trim().parse());
+            return match number {
+                Some(Ok(value)) if f64::is_finite(value) => Ok(value),
+                _ => Err(format!("`{text}` is not a number and `{FRICTION}`")),
+            };
+        }
+    };
+    let value = mapper_units::parse(kind, text).map_err(|error| error.to_string())?;
+    // Beyond that the machine, or the air supply behind a sensor, would have no meaning.
+    if kind == Kind::Fraction && value.abs() > 0.3 {
+        return Err(format!("{text} is beyond 30 %"));
+    }
+    Ok(value)
+}

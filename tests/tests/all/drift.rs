@@ -1,0 +1,110 @@
+//! Drift planted in the virtual lab, found by `mapper drift` in what was recorded.
+
+use mapper_tests::{DriftCampaign, mapper, scratch};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Twice the time between visits of the repeated jump, s.
+const TWO_REPEATS_S: f64 = 2.0 * 8.0 * 120.0;
+
+fn drift(recordings: &[&Path]) -> Value {
+    let paths = recordings.iter().map(|path| path.as_os_str());
+    mapper(["drift".as_ref(), "--json".as_ref()].into_iter().chain(paths)).exits(0).json()
+}
+
+fn number(report: &Value, key: &str) -> f64 {
+    report[key].as_f64().unwrap_or_else(|| panic!("{key} in {}", report["reason"]))
+}
+
+/// Cause, course with size per hour or step, and onset are as planted.
+fn is_found(report: &Value, verdict: &str, cause: &str, (course, size): (&str, f64), onset_s: f64) {
+    assert_eq!([&report["verdict"], &report["cause"]], [verdict, cause], "{}", report["reason"]);
+    assert!(report[course].is_number(), "{}", report["reason"]);
+    let (low, high) = (number(report, "low"), number(report, "high"));
+    assert!(low <= size && size <= high, "{size} is not in {low} to {high}");
+    assert!((number(report, "onset_s") - onset_s).abs() < TWO_REPEATS_S, "{}", report["reason"]);
+}
+
+#[test]
+fn planted_drifts_are_found_and_none_is_none() {
+    let scratch = scratch();
+    let judge = |drift_key: &str, seed: u32| {
+        drift(&[&DriftCampaign { drift: drift_key, seed, ..DriftCampaign::default() }.run(scratch.path())])
+    };
+    let none = judge("", 21);
+    assert_eq!(
+        [&none["verdict"], &none["cause"]],
+        [&Value::from("none"), &Value::Null],
+        "{}",
+        none["reason"]
+    );
+    // At four to six times the printed limit.
+    let t2 = judge("{cause: T2, change: 0.5 K, over: 1 h, from: 10 min}", 22);
+    is_found(&t2, "sensor", "T2", ("rate_per_h", 0.5), 600.0);
+    let p2 = judge("{cause: P2, change: 250 Pa, from: 25 min}", 23);
+    is_found(&p2, "sensor", "P2", ("step", 250.0), 1500.0);
+    let fouling = judge("{cause: fouling, change: -0.6 %, over: 1 h}", 24);
+    is_found(&fouling, "machine", "fouling", ("rate_per_h", -0.006), 0.0);
+    let friction = judge("{cause: bearing_friction, change: 1.5e-7 W s2/rad2, over: 1 h}", 25);
+    is_found(&friction, "machine", "bearing_friction", ("rate_per_h", 1.5e-7), 0.0);
+}
+
+#[test]
+fn nights_of_one_campaign_are_judged_together_and_another_machine_is_refused() {
+    let scratch = scratch();
+    let night = |seed, drift, replaced: &[(&str, &str)]| {
+        let campaign = DriftCampaign { drift, seed, replaced, ..DriftCampaign::default() };
+        campaign.run(&scratch.path().join(seed.to_string()))
+    };
+    // A rig is one from night to night, its noise is not: offsets and tolerances are left out, the seed differs.
+    let same_rig: &[(&str, &str)] =
+        &[("    weather: wandering\n", "    weather: wandering\n    offsets: none\n")];
+    let first = night(31, "", same_rig);
+    // The gain of the flow meter goes on drifting by 1 % in ten hours, of which five passed in between.
+    let second = night(31, "{cause: m_c, change: 1 %, over: 10 h, from: -5 h}", same_rig);
+    let third = night(31, "{cause: m_c, change: 1 %, over: 10 h, from: -10 h}", same_rig);
+    let report = drift(&[&first, &second, &third]);
+    assert_eq!([&report["verdict"], &report["cause"]], ["sensor", "m_c"], "{}", report["reason"]);
+    assert_eq!(report["groups"][0]["visits"].as_array().unwrap().len(), 12);
+    // The first night alone has nothing.
+    assert_eq!(drift(&[&first])["verdict"], "none");
+
+    // The seed is no part of the machine: it is the weather of the night.
+    let another_seed = night(32, "", same_rig);
+    let two = drift(&[&first, &another_seed]);
+    assert!(!two["reason"].as_str().unwrap().starts_with("No verdict"), "{}", two["reason"]);
+    // A rebuilt machine is another machine, and so is one of another name.
+    let rebuilt = night(
+        33,
+        "",
+        &[("  map: closed_form\n", "  map: closed_form\n  geometry: {bearing: {oil_conductance: 9 W/K}}\n")],
+    );
+    let renamed = night(34, "", &[("  serial_number: TA-0001\n", "  serial_number: TA-0002\n")]);
+    for other in [rebuilt, renamed] {
+        let refused = drift(&[&first, &other]);
+        assert_eq!([&refused["verdict"], &refused["cause"]], [&Value::from("unclear"), &Value::Null]);
+        let reason = refused["reason"].as_str().unwrap();
+        assert!(reason.starts_with("No verdict") && reason.contains("machine"), "{reason}");
+    }
+}
+
+/// An ordinary drift is no effect, and the diagnosis says that it was there.
+#[test]
+fn the_gap_diagnosis_looks_for_drift_first() {
+    let scratch = scratch();
+    let campaign = DriftCampaign {
+        drift: "{cause: T2, change: 0.8 K, over: 1 h}",
+        seed: 41,
+        ..DriftCampaign::default()
+    };
+    let recording = campaign.run(scratch.path());
+    let file = campaign.write();
+    let arguments: [PathBuf; 5] =
+        ["gap".into(), "diagnose".into(), file.path.clone(), "--recording".into(), recording];
+    let diagnosis =
+        mapper(arguments.iter().map(PathBuf::as_path).chain([Path::new("--json")])).exits(0).json();
+    assert_eq!([&diagnosis["drift"]["verdict"], &diagnosis["drift"]["cause"]], ["sensor", "T2"]);
+    assert_eq!(diagnosis["verdict"], "within_tolerance", "{}", diagnosis["candidates"][0]);
+    let warning = diagnosis["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("T2 drifts by") && warning.contains("taken off"), "{warning}");
+}

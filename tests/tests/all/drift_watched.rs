@@ -1,0 +1,66 @@
+//! `on_drift`: what a run does when a repeat differs, and the soak that zeroes its sensors in plan and dry run.
+
+use mapper_tests::{CampaignFile, DriftCampaign, Finished, mapper, scratch};
+use serde_json::Value;
+use std::path::Path;
+
+/// Three speeds at three openings, and the jump again and again; T2 steps by ten times what is declared of it.
+fn campaign(more: &str, drift: &str) -> CampaignFile {
+    let every = 4;
+    let speeds = "[90 krpm, 130 krpm, 70 krpm]";
+    // The watch knows no model: a cell that wanders beyond what is declared of the sensors would be drift to it.
+    let replaced = &[("    weather: wandering\n", "    weather: calm\n")];
+    DriftCampaign { drift, speeds, every, more, replaced, ..DriftCampaign::default() }.write()
+}
+
+const STEP: &str = "{cause: T2, change: 4 K, from: 9 min}";
+
+fn run(campaign: &CampaignFile, out: &Path, more: &[&str]) -> Finished {
+    let arguments = ["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), out.as_os_str()];
+    mapper(arguments.into_iter().chain(more.iter().map(|flag| flag.as_ref())))
+}
+
+#[test]
+fn a_run_whose_repeats_differ_does_as_the_campaign_says() {
+    let scratch = scratch();
+    let steps = |on_drift: &str, drift: &str, code: i32| {
+        let campaign = campaign(&format!("drift: {{on_drift: {on_drift}}}\n"), drift);
+        let out = scratch.path().join(format!("{on_drift}{}", drift.len()));
+        let result = run(&campaign, &out, &["--json"]).exits(code).json();
+        let directory = result["run"].as_str().unwrap().to_owned();
+        let report = std::fs::read_to_string(Path::new(&directory).join("report.md")).unwrap_or_default();
+        (result["points"].as_array().unwrap().len(), report)
+    };
+    let (quiet, _) = steps("hold", "", 0);
+    // The step is finished, the jump made again, two steps more.
+    let (went_on, _) = steps("continue", STEP, 0);
+    assert_eq!(went_on, quiet + 2);
+    let (held, report) = steps("hold", STEP, 5);
+    assert!(held < quiet, "{held} steps of {quiet}");
+    assert!(report.contains("held"), "{report}");
+    let (zero, report) = steps("zero", STEP, 5);
+    assert_eq!(zero, held);
+    assert!(report.contains("zero the sensors"), "{report}");
+}
+
+#[test]
+fn the_soak_stands_in_plan_and_dry_run() {
+    let scratch = scratch();
+    let minutes = |text: &str| {
+        let line = text.lines().find(|line| line.contains(" in all (")).unwrap_or_else(|| panic!("{text}"));
+        line.to_owned()
+    };
+    let plan = |more: &str| {
+        let campaign = campaign(more, "");
+        let text = mapper(["plan".as_ref(), campaign.path.as_os_str()]).exits(0).stdout;
+        let json = mapper(["plan".as_ref(), campaign.path.as_os_str(), "--json".as_ref()]).exits(0).json();
+        let dry = run(&campaign, scratch.path(), &["--dry-run"]).exits(0).stdout;
+        (minutes(&text), json["soak_s"].clone(), minutes(&dry))
+    };
+    let (without, no_soak, _) = plan("");
+    assert!(!without.contains("soak") && no_soak == Value::Null, "{without}");
+    let (with, soak_s, dry) = plan("zero: {soak: 30 min}\n");
+    assert!(with.contains("soak 30 min"), "{with}");
+    assert_eq!(soak_s, 1800.0);
+    assert_eq!(with, dry);
+}

@@ -146,7 +146,7 @@ pub fn fit(
     let mut normal = Normal::default();
     let mut beside = FINE;
     for iteration in 0..effort.iterations.max(1) {
-        effect_columns = effect_changes(study, linearised, &hypothesis, &prediction, &coordinates, beside);
+        effect_columns = changes_beside(study, linearised, &hypothesis, &prediction, &coordinates, beside);
         normal = Normal::new(&rows, linearised, &nuisance_products, &effect_columns, &residual, &hypothesis);
         if iteration + 1 == effort.iterations.max(1) {
             break;
@@ -211,9 +211,19 @@ pub fn nuisance_products(study: &Study, linearised: &Linearised, selection: &Sel
 const FINE: f64 = 0.02;
 const COARSE: f64 = 0.2;
 
-/// Whitened change for a unit of each effect's coordinate, by runs of the model `beside` the hypothesis (in the coordinate's
-/// unit).
-fn effect_changes(
+/// Whitened change for a unit of each effect's coordinate, by runs of the model beside the hypothesis.
+pub fn effect_changes(
+    study: &Study,
+    linearised: &Linearised,
+    hypothesis: &Hypothesis,
+    here: &Prediction,
+    coordinates: &[Coordinate],
+) -> Vec<Vec<f64>> {
+    changes_beside(study, linearised, hypothesis, here, coordinates, FINE)
+}
+
+/// As [`effect_changes`], from runs `beside` the hypothesis in the coordinate's unit.
+fn changes_beside(
     study: &Study,
     linearised: &Linearised,
     hypothesis: &Hypothesis,

@@ -162,10 +162,10 @@ pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Cali
     Calibration {
         made_by,
         threshold: quiet,
-        temperature: temperature(&inside),
+        temperature: temperature(&inside, before.temperature),
         // Never narrower than the fit says: a few cases are no ground for more confidence.
         interval_factor: quantile(&errors, 0.95).map_or(before.interval_factor, |z| (z / 1.96).max(1.0)),
-        outside: logistic(&rows).unwrap_or(before.outside),
+        outside: logistic(&rows, before.outside).unwrap_or(before.outside),
         ..before.clone()
     }
 }
@@ -174,10 +174,16 @@ fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     sorted.get((share * sorted.len() as f64) as usize).or(sorted.last()).copied()
 }
 
-/// The temperature under which the truth of the cases has the largest probability.
-fn temperature(cases: &[&Observed]) -> f64 {
+/// Spread of the logarithm of the temperature that is expected around the one of before: where every case is right, the
+/// cases alone would ask for certainty.
+const TEMPERATURE_SPREAD: f64 = 0.3;
+
+/// The temperature under which the truth of the cases has the largest probability, as far as they say otherwise than
+/// `before`.
+fn temperature(cases: &[&Observed], before: f64) -> f64 {
     let cost = |temperature: f64| -> f64 {
-        cases
+        let away = (temperature / before).ln() / TEMPERATURE_SPREAD;
+        let misses: f64 = cases
             .iter()
             .filter_map(|case| {
                 let truth = match case.kind {
@@ -189,7 +195,8 @@ fn temperature(cases: &[&Observed]) -> f64 {
                 let sum: f64 = all.map(|score| ((score - top) / temperature).exp()).sum();
                 truth.map(|score| sum.ln() - (score - top) / temperature)
             })
-            .sum()
+            .sum();
+        misses + 0.5 * away * away
     };
     let grid = (0..=60).map(|i| 1.0 * 30f64.powf(f64::from(i) / 60.0));
     grid.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(1.0)
@@ -219,8 +226,8 @@ mod tests {
     fn the_temperature_is_that_of_the_share_that_is_right() {
         let mut cases: Vec<Observed> = (0..80).map(|_| observed(CaseKind::Single, 40.0, 36.0)).collect();
         cases.extend((0..20).map(|_| observed(CaseKind::Single, 36.0, 40.0)));
-        let found = temperature(&cases.iter().collect::<Vec<_>>());
         let expected = 4.0 / 4f64.ln();
+        let found = temperature(&cases.iter().collect::<Vec<_>>(), expected);
         // The grid's own steps are 6 %.
         assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected}");
     }

@@ -144,8 +144,9 @@ pub fn fit(
     let mut cost = cost_of(&rows, &residual, &hypothesis);
     let mut effect_columns = Vec::new();
     let mut normal = Normal::default();
+    let mut beside = FINE;
     for iteration in 0..effort.iterations.max(1) {
-        effect_columns = effect_changes(study, linearised, &hypothesis, &prediction, &coordinates);
+        effect_columns = changes_beside(study, linearised, &hypothesis, &prediction, &coordinates, beside);
         normal = Normal::new(&rows, linearised, &nuisance_products, &effect_columns, &residual, &hypothesis);
         if iteration + 1 == effort.iterations.max(1) {
             break;
@@ -173,7 +174,11 @@ pub fn fit(
             share *= 0.35;
         }
         if !accepted {
-            break;
+            // Near surge the cost has small steps: a slope taken over more of the way sees past them.
+            if beside == COARSE {
+                break;
+            }
+            beside = COARSE;
         }
     }
     let nuisances = hypothesis.nuisances.len();
@@ -202,6 +207,10 @@ pub fn nuisance_products(study: &Study, linearised: &Linearised, selection: &Sel
     counted.fold(DMatrix::zeros(n, n), |sum, (products, _)| sum + products)
 }
 
+/// Distance of the runs beside a hypothesis from which slopes are taken, in typical steps.
+const FINE: f64 = 0.02;
+const COARSE: f64 = 0.2;
+
 /// Whitened change for a unit of each effect's coordinate, by runs of the model beside the hypothesis.
 pub fn effect_changes(
     study: &Study,
@@ -210,6 +219,18 @@ pub fn effect_changes(
     here: &Prediction,
     coordinates: &[Coordinate],
 ) -> Vec<Vec<f64>> {
+    changes_beside(study, linearised, hypothesis, here, coordinates, FINE)
+}
+
+/// As [`effect_changes`], from runs `beside` the hypothesis in the coordinate's unit.
+fn changes_beside(
+    study: &Study,
+    linearised: &Linearised,
+    hypothesis: &Hypothesis,
+    here: &Prediction,
+    coordinates: &[Coordinate],
+    beside: f64,
+) -> Vec<Vec<f64>> {
     let values = parameters(hypothesis);
     coordinates
         .iter()
@@ -217,10 +238,10 @@ pub fn effect_changes(
         .enumerate()
         .map(|(place, (coordinate, value))| {
             let at = coordinate.of(*value);
-            // A fiftieth of a typical step, to the side where there is room.
-            let tried = [at + 0.02, at - 0.02];
+            // To the side where there is room.
+            let tried = [at + beside, at - beside];
             let away = tried.into_iter().find(|x| (coordinate.of(coordinate.value(*x)) - x).abs() < 1e-9);
-            let away = away.unwrap_or(at - 0.02);
+            let away = away.unwrap_or(at - beside);
             let mut moved = hypothesis.clone();
             set_parameter(&mut moved, place, coordinate.value(away));
             let step = coordinate.of(coordinate.value(away)) - at;

@@ -70,6 +70,29 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
         Vec::new()
     };
     fits.retain(|pair| does_something(study, pair));
+    if let Some(best) = fits.first() {
+        // A single that stood off its best would make any partner look useful: each member alone, from where the pair stands.
+        let starts: Vec<Hypothesis> = members(&best.hypothesis)
+            .into_iter()
+            .map(|dropped| {
+                let mut start = best.hypothesis.clone();
+                start.effects.retain(|(index, _)| *index != dropped);
+                start
+            })
+            .collect();
+        let alone = parallel::map(&starts, |start| {
+            fit(
+                study,
+                linearised,
+                start,
+                selection,
+                Effort { iterations: 6, enough: 0.2, ..Effort::default() },
+            )
+        });
+        for fitted in alone.into_iter().flatten() {
+            keep_best(&mut singles, fitted);
+        }
+    }
     fits.append(&mut singles);
     sort(&mut fits);
     Ok(Found { null, fits, anew })

@@ -83,7 +83,7 @@ pub enum PredictError {
 }
 
 /// One recording made ready.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Study {
     /// What is declared.
     pub declared: Declared,

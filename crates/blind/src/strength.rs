@@ -40,8 +40,9 @@ pub(crate) fn strength(
     if let [phi, conductance] = parameters.as_slice() {
         let phi = random.random_range(INNER_SHARE).clamp(phi.low, phi.high);
         // The wall's own resistance 1/G is what shows: searched in its size like any strength, and never none at all.
-        let values =
-            |resistance_k_w: f64| vec![phi, (1.0 / resistance_k_w).clamp(conductance.low, 0.9 * conductance.high)];
+        let values = |resistance_k_w: f64| {
+            vec![phi, (1.0 / resistance_k_w).clamp(conductance.low, 0.9 * conductance.high)]
+        };
         let found = search(0.05, sigma, |resistance_k_w| length(values(resistance_k_w)));
         return values(found);
     }

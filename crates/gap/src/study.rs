@@ -349,7 +349,8 @@ impl Study {
         let start_s = self.grid.nodes_s().first().copied().unwrap_or(0.0);
         let boundary = inputs.at(start_s);
         let first = |channel: Channel, otherwise: f64| {
-            let column = self.table.column(channel);
+            // Not from the recording's own begin, where the machine may still stand.
+            let column = self.table.column(channel).map(|c| &c[self.table.range(start_s, f64::INFINITY)]);
             let early =
                 column.map(|c| c.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>());
             early.filter(|v| !v.is_empty()).map_or(otherwise, |v| v.iter().sum::<f64>() / v.len() as f64)

@@ -4,9 +4,10 @@ use super::{gap_drift, gap_page, gap_text};
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::gap_arguments::DiagnoseArguments;
-use crate::{assembly_line, output, registry, run_directory};
+use crate::{assembly_line, output, registry, run_directory, zero};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mapper_campaign::Campaign;
+use mapper_core::{Channel, DeclaredUncertainty};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::declared::Declared;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question};
@@ -39,15 +40,23 @@ pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
     }
     let model =
         mapper_campaign::nominal_model(&campaign).map_err(|error| Failure::new(Code::BadInput, error))?;
+    let drift = gap_drift::of(&report, &path, &campaign, &map);
+    let recording = gap_drift::taken_off(report.recording.clone(), drift.as_ref());
+    let (recording, zeroed, zero) =
+        zero::apply(recording, assembly_line::identification(&campaign), &campaign);
+    // What a zero leaves of the offsets.
+    let sensor = |channel: &Channel, declared: DeclaredUncertainty| {
+        let offset_sigma =
+            zeroed.declared.get(channel).map_or(declared.offset_sigma, |left| left.offset_sigma);
+        (*channel, DeclaredUncertainty { offset_sigma, ..declared })
+    };
     let declared = Declared {
-        sensors: campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
+        sensors: campaign.sensors.iter().map(|(channel, s)| sensor(channel, s.declared)).collect(),
         noise_colour: map.noise_colour.unwrap_or_default(),
         tolerances: campaign.tolerances,
         nominal: campaign.boundary,
     };
     let jumps = allowed_jumps(&campaign, &model)?;
-    let drift = gap_drift::of(&report, &path, &campaign, &map);
-    let recording = gap_drift::taken_off(report.recording.clone(), drift.as_ref());
     let bar = bar();
     let progress = |share: f64, what: &str| {
         bar.set_position((share * 100.0) as u64);
@@ -71,9 +80,11 @@ pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
         output::write_new(file, gap_page::page(&title, &done).as_bytes())?;
     }
     if arguments.json {
-        return output::print_json(&gap_drift::json(&done.diagnosis, drift.as_ref())?);
+        let mut value = gap_drift::json(&done.diagnosis, drift.as_ref())?;
+        value["zero"] = zero.json();
+        return output::print_json(&value);
     }
-    output::print(&gap_text::page(&done.diagnosis))
+    output::print(&(gap_text::page(&done.diagnosis) + zero.text().as_str()))
 }
 
 /// Points up to which every jump between them is simulated to see whether it is allowed.

@@ -28,7 +28,8 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     line("T2 probe diameter", &thermal.probe_diameter_m, 1e3, "mm", 2);
     line("direction factor of h", &thermal.direction_factor, 1.0, "", 3);
     for (channel, offset) in &thermal.offsets {
-        line(&format!("offset of {channel}"), offset, 1.0, channel.unit(), 2);
+        let decimals = if channel.unit() == "Pa" { 0 } else { 2 };
+        line(&format!("offset of {channel}"), offset, 1.0, channel.unit(), decimals);
     }
     if let Some(law) = &thermal.convection {
         let _ = writeln!(

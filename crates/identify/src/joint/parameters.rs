@@ -55,6 +55,24 @@ impl Prior {
     }
 }
 
+/// What a refinement may be beforehand, one standard deviation about its declared value.
+pub(crate) const ALPHA_SIGMA: f64 = 0.3;
+/// The same of the probe's diameter squared, mm2.
+pub(crate) const PROBE_SIGMA_MM2: f64 = 10.0;
+/// The same of the logarithm of the direction factor.
+pub(crate) const LN_DIRECTION_SIGMA: f64 = 0.5;
+
+/// Standard deviation beforehand of a refinement; `None` of what is none. A refinement that the recording speaks against
+/// is drawn to its declared value by a narrower prior later, which is knowledge and no ignorance.
+pub(crate) fn sigma_beforehand(index: usize) -> Option<f64> {
+    match index {
+        ALPHA => Some(ALPHA_SIGMA),
+        PROBE_MM2 => Some(PROBE_SIGMA_MM2),
+        LN_DIRECTION => Some(LN_DIRECTION_SIGMA),
+        _ => None,
+    }
+}
+
 /// Symbol of a shared parameter for people.
 pub(crate) fn symbol(index: usize) -> String {
     match index {

@@ -4,7 +4,7 @@ use crate::IdentifyConfig;
 use crate::joint::judge;
 use crate::joint::parameters::{
     ALPHA, EXPONENT, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS,
-    PROBE_MM2, SURFACE, symbol,
+    PROBE_MM2, PROBE_SIGMA_MM2, SURFACE, sigma_beforehand, symbol,
 };
 use crate::joint::profile;
 use crate::joint::rows::StepRows;
@@ -100,7 +100,8 @@ fn value(
             bias += covariance.shared[(row, other)].powi(2) * problem.priors[*index].weight();
         }
     }
-    let uninformed = variance.sqrt() > UNINFORMED_RATIO * problem.priors[index].sigma;
+    let beforehand = sigma_beforehand(index).unwrap_or(problem.priors[index].sigma);
+    let uninformed = variance.sqrt() > UNINFORMED_RATIO * beforehand;
     let is_offset = (OFFSETS..=FLOW_GAIN).contains(&index);
     SharedValue {
         // An offset has its declared spread even where the recording adds nothing.
@@ -134,7 +135,7 @@ fn probe(problem: &Problem<'_>, covariance: &Covariance) -> SharedValue {
     };
     let error_m = 1e-3 * ((square + sigma).sqrt() - square.sqrt());
     SharedValue {
-        value: (sigma < UNINFORMED_RATIO * problem.priors[PROBE_MM2].sigma).then_some(1e-3 * square.sqrt()),
+        value: (sigma < UNINFORMED_RATIO * PROBE_SIGMA_MM2).then_some(1e-3 * square.sqrt()),
         uncertainty: EstimateUncertainty { noise_standard_error: error_m, bias_standard_error: 0.0 },
         origin: Origin::Fitted,
     }

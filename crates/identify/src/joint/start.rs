@@ -7,8 +7,9 @@ use crate::joint::cleaning::cleaned;
 use crate::joint::explained::{self, Explained};
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
-    ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL,
-    OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior, SHARED, SLOPE, SURFACE,
+    ALPHA, ALPHA_SIGMA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION,
+    LN_DIRECTION_SIGMA, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, PROBE_SIGMA_MM2, Prior, SHARED, SLOPE,
+    SURFACE,
 };
 use crate::joint::parsimony::NO_EXTRA;
 use crate::joint::rows::{StepRows, condensed};
@@ -125,14 +126,14 @@ pub(crate) fn problem<'a>(
     active[LN_COEFFICIENT] = with_law;
     active[EXPONENT] = with_law;
     shared[ALPHA] = config.alpha_area_ratio;
-    priors[ALPHA] = Prior { mean: config.alpha_area_ratio, sigma: 0.3 };
+    priors[ALPHA] = Prior { mean: config.alpha_area_ratio, sigma: ALPHA_SIGMA };
     active[ALPHA] = choice.alpha_area == Choice::Fitted;
     let probe_mm2 = (1e3 * config.probe_diameter_m).powi(2);
     shared[PROBE_MM2] = if choice.probe == Choice::Fitted { probe_mm2.max(0.5) } else { probe_mm2 };
-    priors[PROBE_MM2] = Prior { mean: probe_mm2, sigma: 10.0 };
+    priors[PROBE_MM2] = Prior { mean: probe_mm2, sigma: PROBE_SIGMA_MM2 };
     active[PROBE_MM2] = choice.probe == Choice::Fitted;
     lowest[PROBE_MM2] = 0.0;
-    priors[LN_DIRECTION] = Prior { mean: 0.0, sigma: 0.5 };
+    priors[LN_DIRECTION] = Prior { mean: 0.0, sigma: LN_DIRECTION_SIGMA };
     active[LN_DIRECTION] = choice.direction == Choice::Fitted;
     if choice.offsets == Choice::Fitted {
         for (i, channel) in OFFSET_CHANNELS.iter().enumerate() {

@@ -23,6 +23,10 @@ pub fn taken_off(recording: Recording, drift: Option<&DriftReport>) -> Recording
     drift.and_then(|drift| without_drift(&recording, drift)).unwrap_or(recording)
 }
 
+/// Probability of a cause outside the catalogue below which nothing is made of it where a drift was taken off: how well the
+/// drift's course is known is in no tolerance of the diagnosis, and what is left of it looks like a small unknown cause.
+const SURELY_OUTSIDE: f64 = 0.9;
+
 /// Puts what drifted beside the diagnosis, which names no culprit for it.
 pub fn note(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     let Some(drift) = drift else { return };
@@ -35,6 +39,14 @@ pub fn note(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     diagnosis
         .warnings
         .insert(0, format!("Drift while the recording was made: {} Here {consequence}.", drift.reason));
+    if taken_off
+        && diagnosis.verdict == Verdict::Unexplained
+        && diagnosis.probability_outside < SURELY_OUTSIDE
+    {
+        diagnosis.verdict = Verdict::WithinTolerance;
+        diagnosis.r#where.clear();
+        diagnosis.next = None;
+    }
     if !taken_off && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
         diagnosis.verdict = Verdict::Unexplained;
     }

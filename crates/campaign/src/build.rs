@@ -13,7 +13,6 @@ use crate::file::{
     ReferenceFile, RepeatedJumpFile, RepeatsFile, ReportFile, SensorsFile, TapName, TimingFile,
     TolerancesFile, WindowFile,
 };
-use crate::tree::{Step, steps};
 use crate::units::{Dimension, Fraction, Quantity};
 use mapper_core::{
     Channel, Choice, ConvectionWithinStep, DeclaredUncertainty, EfficiencyWithinStep, JointSettings, Method,
@@ -21,6 +20,7 @@ use mapper_core::{
 };
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::params::{BoundaryConditions, Params};
+use mapper_yaml::{Step, steps};
 use std::collections::{BTreeMap, HashSet};
 use std::io;
 use std::path::Path;

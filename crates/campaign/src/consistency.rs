@@ -2,12 +2,10 @@
 //!
 //! Works on the tree and skips what is missing or unreadable, so that one mistake does not hide another.
 
-use crate::finding::{FindingKind, Notes, Source};
-use crate::tree::{Node, Step, path_text, steps};
 use crate::units::{self, Kind};
 use mapper_core::ReferenceState;
 use mapper_physics::tabulated_map::TabulatedMap;
-use serde_json::Value;
+use mapper_yaml::{Content, FindingKind, Node, Notes, Source, Step, path_text, steps};
 use std::collections::HashSet;
 use std::io;
 use std::path::Path;
@@ -45,7 +43,7 @@ struct Check<'a> {
 
 impl<'a> Check<'a> {
     fn text(&self, steps: &[Step]) -> Option<&'a str> {
-        scalar_text(self.root.get(steps)?)
+        self.root.get(steps)?.text()
     }
 
     /// The value in the unit used inside, and its text.
@@ -134,7 +132,7 @@ impl<'a> Check<'a> {
     fn repeated_jump(&mut self) {
         let point = |end: &str| {
             let (speed, _) = self.quantity(Kind::Speed, &steps!["repeats", "jump", end, "speed"])?;
-            let opening = number(self.root.get(&steps!["repeats", "jump", end, "opening"])?)?;
+            let opening = self.root.get(&steps!["repeats", "jump", end, "opening"])?.number()?;
             Some((speed, opening))
         };
         if let (Some(from), Some(to)) = (point("from"), point("to"))
@@ -165,7 +163,7 @@ impl<'a> Check<'a> {
         for entry in calibration.entries() {
             let steps = steps!["report", "calibration", entry.key.as_str()];
             // The form is the schema's business; here only days that no month has.
-            if let Some(text) = scalar_text(&entry.value)
+            if let Some(text) = entry.value.text()
                 && let Some((year, month, day)) = date(text)
                 && (1..=12).contains(&month)
                 && (29..=31).contains(&day)
@@ -217,7 +215,7 @@ impl<'a> Check<'a> {
 
     fn grid(&mut self) {
         let Some(grid) = self.root.get(&steps!["grid"]) else { return };
-        if grid.entries().is_empty() && !matches!(&grid.content, crate::tree::Content::Mapping(_)) {
+        if grid.entries().is_empty() && !matches!(&grid.content, Content::Mapping(_)) {
             return;
         }
         let has = |key: &str| grid.get(&steps![key]).is_some();
@@ -293,7 +291,7 @@ impl<'a> Check<'a> {
         let mut seen = HashSet::new();
         for index in 0..self.count(&steps!["grid", "openings"]) {
             let steps = steps!["grid", "openings", index];
-            let Some(opening) = self.root.get(&steps).and_then(number) else { continue };
+            let Some(opening) = self.root.get(&steps).and_then(Node::number) else { continue };
             if !seen.insert(rounded(0.0, opening)) {
                 let message = format!("the opening {opening} stands here a second time");
                 self.note(FindingKind::Duplicate, &steps, message, "remove one of the two");
@@ -324,7 +322,7 @@ impl<'a> Check<'a> {
             .map(|(rpm, _)| rounded(rpm, 0.0))
             .collect();
         let openings: HashSet<(i64, i64)> = (0..self.count(&steps!["grid", "openings"]))
-            .filter_map(|i| self.root.get(&steps!["grid", "openings", i]).and_then(number))
+            .filter_map(|i| self.root.get(&steps!["grid", "openings", i]).and_then(Node::number))
             .map(|opening| rounded(0.0, opening))
             .collect();
         let count = speeds.len().saturating_mul(openings.len());
@@ -365,7 +363,8 @@ impl<'a> Check<'a> {
         (0..self.count(&steps!["grid", list]))
             .filter_map(|index| {
                 let (rpm, _) = self.quantity(Kind::Speed, &steps!["grid", list, index, "speed"])?;
-                let opening = self.root.get(&steps!["grid", list, index, "opening"]).and_then(number)?;
+                let opening =
+                    self.root.get(&steps!["grid", list, index, "opening"]).and_then(Node::number)?;
                 Some((index, (rpm, opening)))
             })
             .collect()
@@ -383,20 +382,6 @@ impl<'a> Check<'a> {
                 "lower it, or raise the limit if the machine allows it",
             );
         }
-    }
-}
-
-fn scalar_text(node: &Node) -> Option<&str> {
-    match &node.content {
-        crate::tree::Content::Scalar(Value::String(text)) => Some(text),
-        _ => None,
-    }
-}
-
-fn number(node: &Node) -> Option<f64> {
-    match &node.content {
-        crate::tree::Content::Scalar(Value::Number(number)) => number.as_f64(),
-        _ => None,
     }
 }
 

@@ -7,15 +7,15 @@ use std::collections::BTreeMap;
 /// gets its row. The order is that of the layers, lowest first.
 #[rustfmt::skip]
 const ALLOWED: &[(&str, &[&str])] = &[
-    ("mapper-units",     &[]),
+    ("mapper-yaml",      &[]),
     ("mapper-core",      &[]),
     ("mapper-chart",     &[]),
     ("mapper-physics",   &["core"]),
-    ("mapper-campaign",  &["core", "physics", "units"]),
+    ("mapper-campaign",  &["core", "physics", "yaml"]),
     ("mapper-planner",   &["core", "physics"]),
     ("mapper-runner",    &["core"]),
-    ("mapper-sequence",  &["core", "physics", "units"]),
-    ("mapper-record",    &["core", "units"]),
+    ("mapper-sequence",  &["core", "physics", "yaml"]),
+    ("mapper-record",    &["core", "yaml"]),
     ("mapper-identify",  &["core", "physics"]),
     ("mapper-assemble",  &["core", "physics", "identify"]),
     ("mapper-drift",     &["core", "physics", "identify"]),
@@ -24,14 +24,14 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-history",   &[]),
     ("mapper-reproduce", &["core", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
-    ("mapper-backends",  &["core", "physics", "units"]),
+    ("mapper-backends",  &["core", "physics", "yaml"]),
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-exporters", &["core", "physics", "chart"]),
     ("mapper-importers", &["core", "physics"]),
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
     ("mapper-blind",     &["core", "physics", "campaign", "record", "gap", "backends", "effects"]),
     // The program sees all; nothing sees the program.
-    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "drift", "history", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters", "importers"]),
+    ("mapper-cli",       &["yaml", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "drift", "history", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters", "importers"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),
@@ -47,9 +47,9 @@ const NEVER_IN_TESTS: &[(&str, &[&str])] = &[
 
 /// Libraries that only some packages may use.
 const RESTRICTED: &[(&str, &[&str], &str)] = &[(
-    "serde_yaml",
-    &["mapper-campaign", "mapper-record"],
-    "it is archived, so that it must stay easy to replace",
+    "saphyr-parser",
+    &["mapper-yaml"],
+    "YAML is read in one way, with positions, so that mistakes have places",
 )];
 
 /// One edge: who uses whom, and whether in tests alone.
@@ -148,7 +148,7 @@ fn wrong_edges_are_seen_and_named() {
         ("mapper-identify", "mapper-backends"),
         ("mapper-runner", "mapper-cli"),
         ("mapper-exporters", "mapper-backends"),
-        ("mapper-physics", "serde_yaml"),
+        ("mapper-physics", "saphyr-parser"),
         ("mapper-tests", "mapper-cli"),
     ] {
         assert!(edge(from, to, false).is_some(), "{from} -> {to}");

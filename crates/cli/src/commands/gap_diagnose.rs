@@ -21,13 +21,7 @@ use std::io::IsTerminal;
 pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
     let campaign = mapper_campaign::load(&arguments.campaign).map_err(Failure::of_campaign)?;
     let map = match &arguments.channels {
-        Some(file) => {
-            let text = std::fs::read_to_string(file).map_err(|error| {
-                Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display()))
-            })?;
-            ChannelMap::from_yaml(&text)
-                .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", file.display())))?
-        }
+        Some(file) => super::identify::channel_map(file)?,
         None => ChannelMap::native(),
     };
     let path = run_directory::recording_of(&arguments.recording);

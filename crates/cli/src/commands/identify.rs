@@ -7,10 +7,10 @@ use crate::results;
 use crate::thermal_text;
 use crate::zero::{self, Zero};
 use crate::{assembly_line, output, run_directory};
-use mapper_campaign::Campaign;
+use mapper_campaign::{Campaign, CampaignError};
 use mapper_core::ReferenceState;
 use mapper_identify::{IdentifyConfig, WindowRule};
-use mapper_record::{ChannelMap, ReadOptions, ReadReport, RecordError, read_recording};
+use mapper_record::{ChannelMap, ChannelMapError, ReadOptions, ReadReport, RecordError, read_recording};
 use serde_json::json;
 use std::path::Path;
 
@@ -77,11 +77,10 @@ pub(super) fn bad_recording(error: RecordError) -> Failure {
 }
 
 pub fn channel_map(file: &Path) -> Result<ChannelMap, Failure> {
-    let text = std::fs::read_to_string(file).map_err(|error| {
-        Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display()))
-    })?;
-    ChannelMap::from_yaml(&text)
-        .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", file.display())))
+    ChannelMap::load(file).map_err(|error| match error {
+        ChannelMapError::Mistakes(findings) => Failure::of_campaign(CampaignError::Mistakes(findings)),
+        error => Failure::new(Code::Failure, error),
+    })
 }
 
 /// Machine, sensors and window: from the campaign given, the channel map, or the campaign in the recording.

@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::nightly_run::NightlyRun;
 use crate::{assembly_line, interrupt, output};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use mapper_campaign::{Nightly, NightlyError};
+use mapper_campaign::{CampaignError, Nightly, NightlyError};
 use mapper_core::Method;
 use mapper_history::{Comparison, History, Night, RunKey, RunRow};
 use serde_json::json;
@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 pub fn nightly(arguments: &NightlyArguments) -> Result<(), Failure> {
     let nightly = mapper_campaign::load_nightly(&arguments.nightly).map_err(|error| match error {
         NightlyError::Read { .. } => Failure::new(Code::Failure, error),
-        NightlyError::Mistake { .. } => Failure::new(Code::BadInput, error),
+        NightlyError::Mistakes(findings) => Failure::of_campaign(CampaignError::Mistakes(findings)),
     })?;
     let runs = prepare(&nightly)?;
     // Opened before the work: a history that cannot be written is known at once, not in the morning.

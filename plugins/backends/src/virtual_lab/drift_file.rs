@@ -2,7 +2,7 @@
 
 use super::drift::{Drifting, LabDrift};
 use mapper_core::Channel;
-use mapper_units::{Kind, Quantity};
+use mapper_yaml::units::{Kind, Quantity};
 use serde::Deserialize;
 
 /// One entry: `{cause: T2, change: 0.5 K, over: 4 h, from: 10 min}`, or without `over` a step.
@@ -15,10 +15,10 @@ pub(super) struct DriftFile {
     change: String,
     /// How long the change takes; it goes on at this rate afterwards. A step where left out.
     #[serde(default)]
-    over: Option<Quantity<mapper_units::Duration>>,
+    over: Option<Quantity<mapper_yaml::units::Duration>>,
     /// Begin; 0 where left out, negative for a drift that began before the run.
     #[serde(default)]
-    from: Option<Quantity<mapper_units::Duration>>,
+    from: Option<Quantity<mapper_yaml::units::Duration>>,
 }
 
 /// Drifts with their units resolved; gives the key that is wrong and what would be right.
@@ -74,7 +74,7 @@ fn change(what: Drifting, text: &str) -> Result<f64, String> {
             };
         }
     };
-    let value = mapper_units::parse(kind, text).map_err(|error| error.to_string())?;
+    let value = mapper_yaml::units::parse(kind, text).map_err(|error| error.to_string())?;
     // Beyond that the machine, or the air supply behind a sensor, would have no meaning.
     if kind == Kind::Fraction && value.abs() > 0.3 {
         return Err(format!("{text} is beyond 30 %"));

@@ -1,7 +1,7 @@
 //! `effects:` below `virtual_lab`: what the machine has that the campaign's nominal model has not.
 
 use mapper_physics::effect::{self, Effect, EffectParameter, Rig};
-use mapper_units::Kind;
+use mapper_yaml::units::Kind;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -89,7 +89,7 @@ fn read(parameter: &EffectParameter, value: &ValueText) -> Result<f64, String> {
                 _ if ratio => Kind::Fraction,
                 _ => return Err(format!("`{text}` is not a number and `{unit}`")),
             };
-            mapper_units::parse(kind, text).map_err(|error| error.to_string())
+            mapper_yaml::units::parse(kind, text).map_err(|error| error.to_string())
         }
     }
 }

@@ -13,7 +13,7 @@ use mapper_physics::effect::{Effect, Rig};
 use mapper_physics::instruments::Instruments;
 use mapper_physics::model::Model;
 use mapper_physics::params::{BoundaryConditions, Params};
-use mapper_units::{
+use mapper_yaml::units::{
     Conductance, Dimension, Duration, Fraction, Frequency, Kind, Length, PressureRate, Quantity, RatioRate,
     Speed, TemperatureRate,
 };
@@ -278,7 +278,7 @@ fn sensors(
         })
         .collect();
     for (channel, text) in &file.offset_of {
-        let offset = mapper_units::parse(offset_kind(*channel), text)
+        let offset = mapper_yaml::units::parse(offset_kind(*channel), text)
             .map_err(|error| wrong(&format!("offset_of.{channel}"), error.to_string()))?;
         sensors.entry(*channel).or_default().offset = offset;
     }

@@ -3,6 +3,7 @@
 use crate::exit_code::Code;
 use mapper_campaign::CampaignError;
 use mapper_core::BackendError;
+use mapper_session::{ErrorKind, SessionError};
 use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
@@ -46,17 +47,18 @@ impl Failure {
         }
     }
 
-    /// A backend that could not be made: a mistake in its settings is shown in the campaign's text.
-    pub fn of_backend(error: &BackendError, campaign: &Path) -> Self {
-        let BackendError::Settings { backend, path, message } = error else {
-            return Failure::new(Code::BadInput, error);
+    /// An error of a session that has to do with a campaign file: a mistake in the backend's settings is shown in its text.
+    pub fn in_campaign(error: SessionError, campaign: &Path) -> Self {
+        let SessionError::Backend { source: BackendError::Settings { backend, path, message }, .. } = &error
+        else {
+            return error.into();
         };
         match std::fs::read_to_string(campaign) {
             Ok(text) => {
                 let findings = mapper_campaign::backend_mistake(&text, campaign, backend, path, message);
                 Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
             }
-            Err(_) => Failure::new(Code::BadInput, error),
+            Err(_) => error.into(),
         }
     }
 
@@ -70,11 +72,6 @@ impl Failure {
         Failure { manner: Manner::Told, ..Failure::new(code, "") }
     }
 
-    /// What went wrong.
-    pub fn message(&self) -> &str {
-        &self.message
-    }
-
     /// Prints the message and gives the exit code.
     #[allow(clippy::print_stderr)]
     pub fn report(&self) -> ExitCode {
@@ -85,5 +82,22 @@ impl Failure {
             Manner::Sentence => eprintln!("mapper: {}", self.message),
         }
         ExitCode::from(self.code as u8)
+    }
+}
+
+impl From<SessionError> for Failure {
+    fn from(error: SessionError) -> Self {
+        let code = match error.kind() {
+            ErrorKind::Failure => Code::Failure,
+            ErrorKind::BadInput => Code::BadInput,
+            ErrorKind::NoPlan => Code::NoPlan,
+            ErrorKind::Rig => Code::Rig,
+            ErrorKind::BadRecording => Code::BadRecording,
+            ErrorKind::Interrupted => Code::Interrupted,
+        };
+        match error {
+            SessionError::Campaign(error) => Failure::of_campaign(error),
+            error => Failure::new(code, error),
+        }
     }
 }

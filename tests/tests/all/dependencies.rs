@@ -30,8 +30,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-importers", &["core", "physics"]),
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
     ("mapper-blind",     &["core", "physics", "campaign", "record", "gap", "backends", "effects"]),
-    // The program sees all; nothing sees the program.
-    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "drift", "history", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters", "importers"]),
+    // Words, pages and pictures made from data.
+    ("mapper-report",    &["core", "chart", "physics", "campaign", "planner", "identify", "assemble", "gap", "drift", "history", "score"]),
+    // The application: everything between arguments and words. Plug-ins are handed in.
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "drift", "history", "assemble", "score", "report", "exporters", "importers"]),
+    // The program names the plug-ins; nothing sees the program.
+    ("mapper-cli",       &["core", "physics", "campaign", "planner", "sequence", "record", "drift", "history", "assemble", "reproduce", "report", "session", "backends", "blind", "effects"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

@@ -48,12 +48,13 @@ impl Failure {
 
     /// A backend that could not be made: a mistake in its settings is shown in the campaign's text.
     pub fn of_backend(error: &BackendError, campaign: &Path) -> Self {
-        let BackendError::Settings { backend, path, message } = error else {
+        let BackendError::Settings { backend, path, source } = error else {
             return Failure::new(Code::BadInput, error);
         };
         match std::fs::read_to_string(campaign) {
             Ok(text) => {
-                let findings = mapper_campaign::backend_mistake(&text, campaign, backend, path, message);
+                let findings =
+                    mapper_campaign::backend_mistake(&text, campaign, backend, path, &source.to_string());
                 Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
             }
             Err(_) => Failure::new(Code::BadInput, error),

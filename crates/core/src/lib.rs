@@ -27,7 +27,7 @@ mod sample;
 mod step_marker;
 mod thermal_model;
 
-pub use backend::{Backend, BackendError, RigDescription, RigMode, Setpoints};
+pub use backend::{Backend, BackendCause, BackendError, RigDescription, RigMode, Setpoints};
 pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
 pub use clock::{Clock, UnpacedClock};
 pub use declared_uncertainty::{DeclaredUncertainty, NoiseColour};

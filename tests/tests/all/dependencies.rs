@@ -24,7 +24,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-history",   &[]),
     ("mapper-reproduce", &["core", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
-    ("mapper-backends",  &["core", "physics", "units"]),
+    ("mapper-backends",  &["core", "physics", "units", "record"]),
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-exporters", &["core", "physics", "chart"]),
     ("mapper-importers", &["core", "physics"]),

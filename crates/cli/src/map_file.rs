@@ -3,9 +3,8 @@
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::output;
-use mapper_core::{CompressorMap, ReferenceState};
-use mapper_exporters::{EXPORTERS, ExportError, ExporterEntry};
-use mapper_importers::{IMPORTERS, MOST_BYTES, parse_reference};
+use mapper_core::{CompressorMap, ExportError, MAP_FILE_SIZE_LIMIT, MapFormat, ReferenceState};
+use mapper_formats::{FORMATS, parse_reference};
 use std::io::Read;
 use std::path::Path;
 
@@ -17,8 +16,8 @@ pub fn reference(text: Option<&str>) -> Result<Option<ReferenceState>, Failure> 
 /// Reads a map; the extension says the format, SAE text where it says nothing known.
 pub fn read(path: &Path, given: Option<ReferenceState>) -> Result<CompressorMap, Failure> {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    let importer = mapper_importers::of_extension(extension).ok_or_else(|| {
-        let known: Vec<&str> = IMPORTERS.iter().flat_map(|entry| entry.extensions).copied().collect();
+    let format = FORMATS.read_from(extension).ok_or_else(|| {
+        let known: Vec<&str> = FORMATS.read_extensions().collect();
         let message = format!(
             "{}: maps are read from files with the extension {}; this one has `{extension}`",
             path.display(),
@@ -31,28 +30,25 @@ pub fn read(path: &Path, given: Option<ReferenceState>) -> Result<CompressorMap,
     };
     let mut bytes = Vec::new();
     // One byte more than allowed tells a file that is too large from one that just fits.
-    let limit = MOST_BYTES as u64 + 1;
+    let limit = MAP_FILE_SIZE_LIMIT as u64 + 1;
     std::fs::File::open(path)
         .and_then(|file| file.take(limit).read_to_end(&mut bytes))
         .map_err(unreadable)?;
-    mapper_importers::read(importer, &bytes, given)
+    format
+        .read(&bytes, given)
         .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", path.display())))
 }
 
-/// The exporter of a name, or of a file's extension.
-pub fn exporter(path: &Path, name: Option<&str>) -> Result<&'static ExporterEntry, Failure> {
-    let file = path.file_name().and_then(|name| name.to_str()).unwrap_or_default().to_ascii_lowercase();
+/// The format of a name, or of a file's extension, in which a map is written.
+pub fn format(path: &Path, name: Option<&str>) -> Result<&'static MapFormat, Failure> {
+    let file = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let found = match name {
-        Some(name) => mapper_exporters::find(name),
-        // The longest extension counts: `map.fitted.csv` is no plain CSV.
-        None => EXPORTERS
-            .iter()
-            .filter(|entry| file.ends_with(&format!(".{}", entry.extension)))
-            .max_by_key(|entry| entry.extension.len()),
+        Some(name) => FORMATS.find(name).filter(|format| format.write.is_some()),
+        None => FORMATS.written_to(file),
     };
     found.ok_or_else(|| {
         let known: Vec<String> =
-            EXPORTERS.iter().map(|entry| format!("{} (.{})", entry.name, entry.extension)).collect();
+            FORMATS.written().map(|format| format!("{} (.{})", format.name, format.extension)).collect();
         let message =
             format!("{}: say the format by extension or `--to`: {}", path.display(), known.join(", "));
         Failure::new(Code::BadInput, message)
@@ -60,8 +56,8 @@ pub fn exporter(path: &Path, name: Option<&str>) -> Result<&'static ExporterEntr
 }
 
 /// Writes a map into a new file.
-pub fn write(path: &Path, exporter: &ExporterEntry, map: &CompressorMap) -> Result<(), Failure> {
-    let bytes = (exporter.export)(map).map_err(|error| {
+pub fn write(path: &Path, format: &MapFormat, map: &CompressorMap) -> Result<(), Failure> {
+    let bytes = format.write(map).map_err(|error| {
         let code = if matches!(error, ExportError::NeedsFit { .. }) { Code::BadInput } else { Code::Failure };
         Failure::new(code, error)
     })?;

@@ -11,8 +11,7 @@ use crate::{assembly_line, output, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{CompressorMap, IdentifiedPoint, Plan, StepKind, ThermalModel, Verdict};
-use mapper_exporters::ExportError;
+use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Plan, StepKind, ThermalModel, Verdict};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_score::{ScoreSummary, ScoredPoint};
 use serde_json::json;
@@ -62,8 +61,8 @@ pub fn make(
             let assembled = fitted(assembled, &mut remarks);
             for format in &campaign.outputs.formats {
                 let name = format.name();
-                let Some(exporter) = mapper_exporters::find(name) else { continue };
-                let bytes = match (exporter.export)(&assembled) {
+                let Some(writer) = mapper_formats::FORMATS.find(name) else { continue };
+                let bytes = match writer.write(&assembled) {
                     Ok(bytes) => bytes,
                     // A campaign of a few points has a map, but no surface through it.
                     Err(error @ ExportError::NeedsFit { .. }) => {
@@ -72,7 +71,7 @@ pub fn make(
                     }
                     Err(error) => return Err(Failure::new(Code::Failure, error)),
                 };
-                let path = directory.join(format!("map.{}", exporter.extension));
+                let path = directory.join(format!("map.{}", writer.extension));
                 output::write_new(&path, &bytes)?;
                 map.insert(name.to_owned(), path);
             }

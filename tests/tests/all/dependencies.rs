@@ -26,12 +26,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Plug-ins never see each other.
     ("mapper-backends",  &["core", "physics", "units", "record"]),
     ("mapper-effects",   &["core", "physics"]),
-    ("mapper-exporters", &["core", "physics", "chart"]),
-    ("mapper-importers", &["core", "physics"]),
+    ("mapper-formats",   &["core", "physics", "chart"]),
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
     ("mapper-blind",     &["core", "physics", "campaign", "record", "gap", "backends", "effects"]),
     // The program sees all; nothing sees the program.
-    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "drift", "history", "assemble", "score", "reproduce", "backends", "blind", "effects", "exporters", "importers"]),
+    ("mapper-cli",       &["units", "core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "drift", "history", "assemble", "score", "reproduce", "backends", "blind", "effects", "formats"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),
@@ -147,7 +146,7 @@ fn wrong_edges_are_seen_and_named() {
     for (from, to) in [
         ("mapper-identify", "mapper-backends"),
         ("mapper-runner", "mapper-cli"),
-        ("mapper-exporters", "mapper-backends"),
+        ("mapper-formats", "mapper-backends"),
         ("mapper-physics", "serde_yaml"),
         ("mapper-tests", "mapper-cli"),
     ] {

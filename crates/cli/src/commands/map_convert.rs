@@ -4,32 +4,32 @@ use crate::arguments::MapConvertArguments;
 use crate::failure::Failure;
 use crate::{map_file, output};
 use mapper_assemble::{MapFitOptions, fit_map};
-use mapper_exporters::ExportError;
+use mapper_core::ExportError;
 use serde_json::json;
 
 /// Reads a map and writes it again.
 pub fn convert(arguments: &MapConvertArguments) -> Result<(), Failure> {
-    let exporter = map_file::exporter(&arguments.out, arguments.to.as_deref())?;
+    let format = map_file::format(&arguments.out, arguments.to.as_deref())?;
     let to_reference = map_file::reference(arguments.to_reference.as_deref())?;
     let mut map = map_file::read(&arguments.map, map_file::reference(arguments.reference.as_deref())?)?;
     if let Some(reference) = to_reference {
         map = map.at_reference(reference);
     }
     let mut fitted_here = false;
-    if map.fitted.is_none() && matches!((exporter.export)(&map), Err(ExportError::NeedsFit { .. })) {
+    if map.fitted.is_none() && matches!(format.write(&map), Err(ExportError::NeedsFit { .. })) {
         let options = MapFitOptions { leave_one_out: false, ..MapFitOptions::default() };
         map = fit_map(map, &options).map_err(|error| {
-            let message = format!("`{}` needs a fitted map: {error}", exporter.name);
+            let message = format!("`{}` needs a fitted map: {error}", format.name);
             Failure::new(crate::exit_code::Code::BadInput, message)
         })?;
         fitted_here = true;
     }
-    map_file::write(&arguments.out, exporter, &map)?;
+    map_file::write(&arguments.out, format, &map)?;
     let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
     if arguments.json {
         return output::print_json(&json!({
             "file": arguments.out,
-            "format": exporter.name,
+            "format": format.name,
             "reference": map.reference,
             "lines": map.lines.len(),
             "points": points,
@@ -39,7 +39,7 @@ pub fn convert(arguments: &MapConvertArguments) -> Result<(), Failure> {
     output::print(&format!(
         "{}: {}, {points} points on {} speed lines, corrected to {}{}\n",
         arguments.out.display(),
-        exporter.name,
+        format.name,
         map.lines.len(),
         map.reference,
         if fitted_here { "; the format is a table, so the map was fitted" } else { "" },

@@ -12,8 +12,8 @@ use std::fmt::Write;
 
 /// Fits a map.
 pub fn fit(arguments: &MapFitArguments) -> Result<(), Failure> {
-    let exporter = match &arguments.out {
-        Some(path) => Some((path, map_file::exporter(path, arguments.to.as_deref())?)),
+    let format = match &arguments.out {
+        Some(path) => Some((path, map_file::format(path, arguments.to.as_deref())?)),
         None => None,
     };
     let map = map_file::read(&arguments.map, map_file::reference(arguments.reference.as_deref())?)?;
@@ -24,8 +24,8 @@ pub fn fit(arguments: &MapFitArguments) -> Result<(), Failure> {
     };
     let map = fit_map(map, &options)
         .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", arguments.map.display())))?;
-    if let Some((path, exporter)) = exporter {
-        map_file::write(path, exporter, &map)?;
+    if let Some((path, format)) = format {
+        map_file::write(path, format, &map)?;
     }
     if arguments.json {
         return output::print_json(&json!({

@@ -7,7 +7,7 @@ use crate::failure::Failure;
 use crate::{assembly_line, output, run_directory};
 use mapper_campaign::{Campaign, CampaignError};
 use mapper_core::IdentifiedPoint;
-use mapper_exporters::{
+use mapper_formats::{
     ErrorAtGradient, ThermalExport, error_figure, heat_transfer_figure, turbine_points, turbine_text,
 };
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
@@ -36,7 +36,7 @@ pub fn rig(arguments: &MapRigArguments) -> Result<(), Failure> {
     let law = identified.thermal.as_ref().and_then(|found| found.convection.as_ref()?.exponent.value);
     let exponent = law.unwrap_or(params.compressor.nusselt_exponent);
     let heat = heat_transfer_figure(machine, &points, exponent);
-    let export = |error: mapper_exporters::ExportError| Failure::new(Code::Failure, error);
+    let export = |error: mapper_core::ExportError| Failure::new(Code::Failure, error);
     let png = |figure: &mapper_chart::Figure| figure.to_png(2.0).map_err(|e| Failure::new(Code::Failure, e));
     let mut files: Vec<(&str, Vec<u8>)> = vec![
         ("thermal_model.json", thermal.json().map_err(export)?),

@@ -49,13 +49,13 @@ impl Failure {
 
     /// An error of a session that has to do with a campaign file: a mistake in the backend's settings is shown in its text.
     pub fn in_campaign(error: SessionError, campaign: &Path) -> Self {
-        let SessionError::Backend { source: BackendError::Settings { backend, path, message }, .. } = &error
-        else {
+        let SessionError::Backend(BackendError::Settings { backend, path, source }) = &error else {
             return error.into();
         };
         match std::fs::read_to_string(campaign) {
             Ok(text) => {
-                let findings = mapper_campaign::backend_mistake(&text, campaign, backend, path, message);
+                let findings =
+                    mapper_campaign::backend_mistake(&text, campaign, backend, path, &source.to_string());
                 Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
             }
             Err(_) => error.into(),

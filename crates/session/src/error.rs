@@ -1,13 +1,11 @@
 //! Why a session could not do what it was asked.
 
 use mapper_campaign::{CampaignError, NightlyError};
-use mapper_core::BackendError;
+use mapper_core::{BackendError, ExportError, ImportError};
 use mapper_drift::DriftError;
-use mapper_exporters::ExportError;
 use mapper_gap::diagnose::GapError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
-use mapper_importers::ImportError;
 use mapper_planner::PlanError;
 use mapper_record::{ChannelMapError, RecordError};
 use mapper_runner::RunError;
@@ -89,14 +87,9 @@ pub enum SessionError {
         /// What has changed.
         changed: Vec<&'static str>,
     },
-    /// A backend could not be made, or failed.
-    #[error("{source}")]
-    Backend {
-        /// Whether its settings are wrong or the rig failed.
-        kind: ErrorKind,
-        /// Why.
-        source: BackendError,
-    },
+    /// A backend could not be made: its name or its settings are wrong.
+    #[error(transparent)]
+    Backend(BackendError),
     /// A run could not go on; the rig is safe.
     #[error("{source}\nThe recording up to then is {}.", .recording.display())]
     Run {
@@ -215,9 +208,6 @@ pub enum SessionError {
         /// Formats and their extensions.
         known: Vec<String>,
     },
-    /// A reference state that is not understood.
-    #[error(transparent)]
-    Reference(ImportError),
     /// A map cannot be fitted.
     #[error("`{format}` needs a fitted map: {source}")]
     Fit {
@@ -270,6 +260,7 @@ impl SessionError {
             | E::NightlyTwice { .. }
             | E::Method { .. }
             | E::Model(_)
+            | E::Backend(_)
             | E::Effect(_)
             | E::EffectTaken { .. }
             | E::ChannelMap { .. }
@@ -278,7 +269,6 @@ impl SessionError {
             | E::UnknownFormat { .. }
             | E::UnknownExtension { .. }
             | E::FormatUnsaid { .. }
-            | E::Reference(_)
             | E::Fit { .. }
             | E::Drift(DriftError::NoRun)
             | E::Export(ExportError::NeedsFit { .. })
@@ -288,7 +278,6 @@ impl SessionError {
             | E::StalePlan { .. }
             | E::RehearsalTripped { .. }
             | E::NoSteps { .. } => ErrorKind::NoPlan,
-            E::Backend { kind, .. } => *kind,
             E::Run { source, .. } => match source {
                 RunError::Backend(_) => ErrorKind::Rig,
                 RunError::Source(_) => ErrorKind::BadInput,

@@ -7,6 +7,7 @@
 
 pub mod calibrate;
 mod case;
+mod cause;
 mod error;
 mod interval;
 mod kind;
@@ -21,7 +22,8 @@ mod seal;
 mod strength;
 mod truth;
 
-pub use case::{Case, Cause, Draw, SIGMA_RANGE};
+pub use case::{Case, Draw, SIGMA_RANGE};
+pub use cause::Cause;
 pub use error::BlindError;
 pub use interval::{Share, clopper_pearson_95};
 pub use kind::CaseKind;

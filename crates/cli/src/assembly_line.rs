@@ -7,6 +7,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{self, Order, WindowChoice};
 use mapper_core::{Channel, DeclaredUncertainty, Method, Plan};
 use mapper_identify::{IdentifyConfig, PressureTap, Stabilisation, WindowRule};
+use mapper_observe::declared_uncertainties;
 use mapper_physics::model::Model;
 use mapper_planner::{PlanLimits, PlanRequest, PlanTiming, Repeats, SettleBands, VisitOrder, make_plan};
 use mapper_runner::{DriftWatch, Guard, LimitGuard, OnDrift, SilenceGuard, StepSource, SurgeGuard};
@@ -128,13 +129,7 @@ pub fn drift_watch<'a>(campaign: &Campaign, steps: &'a mut dyn StepSource) -> Op
         campaign::OnDrift::Continue => OnDrift::Continue,
         campaign::OnDrift::Zero => OnDrift::Zero,
     };
-    let mut declared: BTreeMap<Channel, DeclaredUncertainty> =
-        campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
-    // The gain of the flow meter may stand with the model's tolerances.
-    if let Some(flow) = declared.get_mut(&Channel::CompressorFlow) {
-        flow.gain_sigma_ratio = flow.gain_sigma_ratio.max(campaign.tolerances.flow_meter_gain_ratio);
-    }
-    Some(DriftWatch::new(steps, on_drift, declared))
+    Some(DriftWatch::new(steps, on_drift, declared(campaign, &BTreeMap::new())))
 }
 
 /// How the recordings of this campaign are identified.
@@ -166,19 +161,16 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         reference: campaign.reference,
         inlet_tap: tap(Channel::P1),
         outlet_tap: tap(Channel::P2),
-        declared: declared(campaign),
+        declared: declared(campaign, &BTreeMap::new()),
         ..IdentifyConfig::default()
     }
 }
 
-/// What is declared of the sensors; a flow meter without a gain of its own has that of the tolerances.
-fn declared(campaign: &Campaign) -> BTreeMap<Channel, DeclaredUncertainty> {
-    let mut declared: BTreeMap<Channel, DeclaredUncertainty> =
-        campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
-    if let Some(flow) = declared.get_mut(&Channel::CompressorFlow)
-        && flow.gain_sigma_ratio == 0.0
-    {
-        flow.gain_sigma_ratio = campaign.tolerances.flow_meter_gain_ratio;
-    }
-    declared
+/// What is declared of the sensors of a recording that is read by a channel map with these declarations.
+pub fn declared(
+    campaign: &Campaign,
+    channel_map: &BTreeMap<Channel, DeclaredUncertainty>,
+) -> BTreeMap<Channel, DeclaredUncertainty> {
+    let sensors = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    declared_uncertainties(&sensors, &campaign.tolerances, channel_map)
 }

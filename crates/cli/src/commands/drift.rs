@@ -9,6 +9,7 @@ use mapper_campaign::Campaign;
 use mapper_core::Recording;
 use mapper_drift::{DriftError, DriftReport, DriftRequest, RecordedRun, RepeatGroup, diagnose};
 use mapper_identify::{IdentifyConfig, WindowRule, ZeroSettings, isothermal_zero, zeroed};
+use mapper_observe::same_machine;
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, RecordError, read_recording};
 use serde_json::json;
 use std::fmt::Write;
@@ -95,21 +96,10 @@ fn attached_campaign(read: &[ReadReport], files: &[PathBuf]) -> Result<Campaign,
 /// Why the campaign's machine is not the one recorded; `None` where it may be.
 fn other_machine(read: &[ReadReport], campaign: &Campaign) -> Option<String> {
     let machine = &campaign.machine;
-    for (index, read) in read.iter().enumerate() {
-        let recorded = |key: &str| read.metadata.get(key);
-        let named = recorded("machine").filter(|name| **name != machine.name);
-        let numbered =
-            recorded("serial_number").filter(|number| Some(*number) != machine.serial_number.as_ref());
-        if let Some(other) = named.or(numbered) {
-            return Some(format!(
-                "No verdict: recording {} was made on machine `{other}`, the campaign names `{}`{}.",
-                index + 1,
-                machine.name,
-                machine.serial_number.as_ref().map_or_else(String::new, |number| format!(" ({number})")),
-            ));
-        }
-    }
-    None
+    read.iter().enumerate().find_map(|(index, read)| {
+        let same = same_machine(&read.metadata, &machine.name, machine.serial_number.as_deref());
+        Some(format!("No verdict: recording {}: {}.", index + 1, same.err()?))
+    })
 }
 
 /// What is said of the recordings, in the order in which they were made, and the zero that was taken off them.
@@ -136,6 +126,7 @@ pub fn judge(
         runs: &runs,
         model: &model,
         boundary: campaign.boundary,
+        tolerances: campaign.tolerances,
         identification: &identification,
         seed: campaign.seed,
     })
@@ -152,13 +143,7 @@ pub fn judge(
 /// What the campaign declares, and what the channel map says of the sensors of this very recording before it.
 fn identification(campaign: &Campaign, map: &ChannelMap) -> IdentifyConfig {
     let mut identification = assembly_line::identification(campaign);
-    for (channel, declared) in &map.sensors {
-        let known = identification.declared.get(channel).map_or(0.0, |known| known.gain_sigma_ratio);
-        let gain_sigma_ratio = declared.gain_sigma_ratio.max(known);
-        identification
-            .declared
-            .insert(*channel, mapper_core::DeclaredUncertainty { gain_sigma_ratio, ..*declared });
-    }
+    identification.declared = assembly_line::declared(campaign, &map.sensors);
     identification.noise_colour = map.noise_colour.unwrap_or(identification.noise_colour);
     if let Some(window) = map.window {
         identification.window = WindowRule::Fixed { start_s: window.start_s, end_s: window.end_s };

@@ -7,11 +7,10 @@ use crate::gap_arguments::DiagnoseArguments;
 use crate::{assembly_line, output, registry, run_directory, zero};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, DeclaredUncertainty};
 use mapper_gap::calibration::Calibration;
-use mapper_gap::declared::Declared;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question};
-use mapper_gap::outlook::Jump;
+use mapper_gap::outlook::AllowedJump;
+use mapper_observe::{Declared, same_machine};
 use mapper_physics::model::Model;
 use mapper_planner::PlanRequest;
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, RecordError, read_recording};
@@ -35,23 +34,19 @@ pub fn diagnose(arguments: &DiagnoseArguments) -> Result<(), Failure> {
         let code = if matches!(error, RecordError::Read { .. }) { Code::Failure } else { Code::BadRecording };
         Failure::new(code, error)
     })?;
-    if let Some(message) = other_machine(&report, &campaign) {
-        return Err(Failure::new(Code::BadRecording, message));
-    }
+    let machine = &campaign.machine;
+    same_machine(&report.metadata, &machine.name, machine.serial_number.as_deref())
+        .map_err(|error| Failure::new(Code::BadRecording, error))?;
     let model =
         mapper_campaign::nominal_model(&campaign).map_err(|error| Failure::new(Code::BadInput, error))?;
     let drift = gap_drift::of(&report, &path, &campaign, &map);
     let recording = gap_drift::taken_off(report.recording.clone(), drift.as_ref());
-    let (recording, zeroed, zero) =
-        zero::apply(recording, assembly_line::identification(&campaign), &campaign);
-    // What a zero leaves of the offsets.
-    let sensor = |channel: &Channel, declared: DeclaredUncertainty| {
-        let offset_sigma =
-            zeroed.declared.get(channel).map_or(declared.offset_sigma, |left| left.offset_sigma);
-        (*channel, DeclaredUncertainty { offset_sigma, ..declared })
-    };
+    let mut identification = assembly_line::identification(&campaign);
+    identification.declared = assembly_line::declared(&campaign, &map.sensors);
+    // A zero leaves less of the offsets.
+    let (recording, zeroed, zero) = zero::apply(recording, identification, &campaign);
     let declared = Declared {
-        sensors: campaign.sensors.iter().map(|(channel, s)| sensor(channel, s.declared)).collect(),
+        sensors: zeroed.declared,
         noise_colour: map.noise_colour.unwrap_or_default(),
         tolerances: campaign.tolerances,
         nominal: campaign.boundary,
@@ -92,7 +87,7 @@ const MOST_POINTS: usize = 40;
 
 /// The jumps that the planner allows between the points of the campaign; none for grids too large to simulate them all,
 /// and for campaigns that are no grid.
-fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<Jump>, Failure> {
+fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<AllowedJump>, Failure> {
     if campaign.points.len() > MOST_POINTS {
         return Ok(Vec::new());
     }
@@ -102,7 +97,7 @@ fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<Jump>, Failur
         let Ok(graph) = mapper_planner::jump_graph(&request) else { return Ok(Vec::new()) };
         let allowed = graph.edge_weights().filter(|jump| jump.rejections.is_empty());
         Ok(allowed
-            .map(|jump| Jump {
+            .map(|jump| AllowedJump {
                 from: jump.from,
                 to: jump.to,
                 from_p3_pa: jump.p3_pa - jump.p3_change_pa,
@@ -111,21 +106,6 @@ fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<Jump>, Failur
             })
             .collect())
     })
-}
-
-/// Why the campaign's machine is not the one recorded; `None` where it may be.
-fn other_machine(report: &ReadReport, campaign: &Campaign) -> Option<String> {
-    let machine = &campaign.machine;
-    let other = |key: &str, own: Option<&String>| {
-        report.metadata.get(key).filter(|recorded| Some(*recorded) != own && !recorded.is_empty())
-    };
-    let other = other("machine", Some(&machine.name))
-        .or_else(|| other("serial_number", machine.serial_number.as_ref()))?;
-    Some(format!(
-        "the recording was made on machine `{other}`, the campaign is of `{}`{}: diagnose it with the campaign of its own machine",
-        machine.name,
-        machine.serial_number.as_ref().map_or_else(String::new, |number| format!(" ({number})")),
-    ))
 }
 
 /// What was wrong with the file belongs to what is said about it.

@@ -2,17 +2,19 @@
 //! finds the numbers that turn scores into probabilities.
 
 use crate::case::{Case, Draw};
+use crate::error::BlindError;
+use crate::kind::CaseKind;
 use crate::lab::Schedule;
 use crate::logistic::logistic;
+use crate::outside::{OutsideUse, outside_kinds};
 use crate::ruler::{StudyRuler, declared};
-use crate::{BlindError, CaseKind, OutsideUse, outside_kinds};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_gap::calibration::Calibration;
+use mapper_gap::coordinate::coordinates;
 use mapper_gap::diagnose::{Diagnosed, Question, diagnose, prior};
-use mapper_gap::fit::{Fit, coordinates};
+use mapper_gap::fit::Fit;
 use mapper_gap::report::Verdict;
-use mapper_gap::select::members;
-use mapper_gap::study::Study;
+use mapper_gap::study::{Study, members};
 use mapper_physics::effect::Effect;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;

@@ -1,10 +1,12 @@
 //! Makes a directory of blind cases.
 
 use crate::case::{Case, Draw};
+use crate::error::BlindError;
 use crate::lab::Schedule;
+use crate::outside::outside_kinds;
 use crate::ruler::StudyRuler;
 use crate::seal::{ANSWERS_NAME, MANIFEST_NAME, Manifest, sha256};
-use crate::{BlindError, Truth, outside_kinds};
+use crate::truth::Truth;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_physics::effect::Effect;
 use mapper_record::RecordingHeader;

@@ -1,8 +1,10 @@
 //! Holds diagnoses against opened answers.
 
+use crate::error::BlindError;
 use crate::interval::Share;
+use crate::kind::CaseKind;
 use crate::seal::{MANIFEST_NAME, Manifest, open, read_json};
-use crate::{BlindError, CaseKind, Truth};
+use crate::truth::Truth;
 use mapper_effects::catalogue;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

@@ -1,6 +1,7 @@
 //! Answers under seal: a hash printed before anything is diagnosed.
 
-use crate::{BlindError, Truth};
+use crate::error::BlindError;
+use crate::truth::Truth;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

@@ -20,7 +20,6 @@ mod identify;
 mod joint;
 mod jump;
 mod one_fit;
-mod plausible;
 mod samples;
 mod steady;
 mod taps;

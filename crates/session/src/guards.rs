@@ -4,6 +4,7 @@ use crate::declared::declared;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign;
 use mapper_core::Channel;
+use mapper_record::ChannelMap;
 use mapper_runner::{DriftWatch, Guard, LimitGuard, OnDrift, SilenceGuard, StepSource, SurgeGuard};
 
 /// Surge longer than this ends a run, s: a jump may touch the line, a point may not stay beyond it.
@@ -40,5 +41,5 @@ pub fn drift_watch<'a>(campaign: &Campaign, steps: &'a mut dyn StepSource) -> Op
         campaign::OnDrift::Continue => OnDrift::Continue,
         campaign::OnDrift::Zero => OnDrift::Zero,
     };
-    Some(DriftWatch::new(steps, on_drift, declared(campaign)))
+    Some(DriftWatch::new(steps, on_drift, declared(campaign, &ChannelMap::native())))
 }

@@ -70,9 +70,8 @@ pub fn calibrate(
     made_by: String,
     done: &dyn Fn(&Observed),
 ) -> Result<(Calibration, Vec<Observed>), BlindError> {
-    let of_model = |message: String| BlindError::Model { message };
-    let nominal = nominal_model(campaign).map_err(|error| of_model(error.to_string()))?;
-    let before = Calibration::shipped().map_err(|error| of_model(error.to_string()))?;
+    let nominal = nominal_model(campaign)?;
+    let before = Calibration::shipped().map_err(BlindError::signatures)?;
     let schedule = Schedule::new(campaign, &nominal)?;
     let mut known = catalogue.to_vec();
     known.extend(outside_kinds(OutsideUse::Calibration));

@@ -53,11 +53,9 @@ impl StudyRuler {
             seed,
         };
         let recording = schedule.record(&case)?;
-        let of_model = |message: String| BlindError::Model { message };
-        let table = Table::new(&recording)
-            .ok_or_else(|| of_model("the campaign records nothing to measure signatures by".to_owned()))?;
+        let table = Table::new(&recording).ok_or(BlindError::NothingRecorded)?;
         let study = Study::new(&recording, table, declared(campaign), nominal.clone(), effects);
-        let linearised = Linearised::new(&study).map_err(|error| of_model(error.to_string()))?;
+        let linearised = Linearised::new(&study).map_err(BlindError::signatures)?;
         Ok(StudyRuler { study, linearised })
     }
 }

@@ -156,10 +156,10 @@ pub fn open_answers(directory: &Path) -> Result<usize, BlindError> {
             continue;
         }
         let path = directory.join(format!("{}.truth.json", truth.name));
-        let bytes = serde_json::to_vec_pretty(truth).map_err(|error| BlindError::Content {
+        let bytes = serde_json::to_vec_pretty(truth).map_err(|source| BlindError::Content {
             path: path.clone(),
             what: "JSON",
-            message: error.to_string(),
+            source,
         })?;
         std::fs::write(&path, bytes).map_err(BlindError::file(&path))?;
     }

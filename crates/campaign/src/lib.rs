@@ -26,6 +26,6 @@ pub use campaign::Campaign;
 pub use finding::{Finding, FindingKind, Findings};
 pub use load::{CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, load};
 pub use mapper_units as units;
-pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
+pub use nightly::{Nightly, NightlyError, NightlyGroup, NightlyMistake, load_nightly};
 pub use reach::{Unreachable, nominal_model, unreachable_points};
 pub use schema::json_schema;

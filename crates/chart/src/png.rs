@@ -27,10 +27,10 @@ pub enum PngError {
         height: f64,
     },
     /// The encoder failed.
-    #[error("failed to encode the picture: {message}")]
+    #[error("failed to encode the picture: {source}")]
     Encode {
         /// What it said.
-        message: String,
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
 }
 
@@ -42,7 +42,7 @@ impl Figure {
     pub fn to_png(&self, scale: f32) -> Result<Vec<u8>, PngError> {
         let drawing = crate::draw::figure(self);
         let pixels = pixels(&drawing, scale)?;
-        pixels.encode_png().map_err(|error| PngError::Encode { message: error.to_string() })
+        pixels.encode_png().map_err(|error| PngError::Encode { source: Box::new(error) })
     }
 }
 

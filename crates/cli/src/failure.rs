@@ -1,8 +1,10 @@
 //! Why a command ended early, with what to print and what to return.
 
 use crate::exit_code::Code;
-use mapper_campaign::CampaignError;
+use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
+use mapper_record::ChannelMapError;
+use mapper_session::{ErrorKind, SessionError};
 use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
@@ -37,26 +39,32 @@ impl Failure {
     /// All mistakes of a campaign, or that it cannot be read.
     pub fn of_campaign(error: CampaignError) -> Self {
         match error {
-            CampaignError::Mistakes(findings) => Failure {
-                code: Code::BadInput,
-                message: findings.render(std::io::stderr().is_terminal()),
-                manner: Manner::Rendered,
-            },
+            CampaignError::Mistakes(findings) => Failure::of_findings(&findings),
             error => Failure::new(Code::Failure, error),
         }
     }
 
-    /// A backend that could not be made: a mistake in its settings is shown in the campaign's text.
-    pub fn of_backend(error: &BackendError, campaign: &Path) -> Self {
-        let BackendError::Settings { backend, path, message } = error else {
-            return Failure::new(Code::BadInput, error);
+    /// All mistakes of a file that people write.
+    fn of_findings(findings: &Findings) -> Self {
+        Failure {
+            code: Code::BadInput,
+            message: findings.render(std::io::stderr().is_terminal()),
+            manner: Manner::Rendered,
+        }
+    }
+
+    /// An error of a session that has to do with a campaign file: a mistake in the backend's settings is shown in its text.
+    pub fn in_campaign(error: SessionError, campaign: &Path) -> Self {
+        let SessionError::Backend(BackendError::Settings { backend, path, source }) = &error else {
+            return error.into();
         };
         match std::fs::read_to_string(campaign) {
             Ok(text) => {
-                let findings = mapper_campaign::backend_mistake(&text, campaign, backend, path, message);
+                let findings =
+                    mapper_campaign::backend_mistake(&text, campaign, backend, path, &source.to_string());
                 Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
             }
-            Err(_) => Failure::new(Code::BadInput, error),
+            Err(_) => error.into(),
         }
     }
 
@@ -70,11 +78,6 @@ impl Failure {
         Failure { manner: Manner::Told, ..Failure::new(code, "") }
     }
 
-    /// What went wrong.
-    pub fn message(&self) -> &str {
-        &self.message
-    }
-
     /// Prints the message and gives the exit code.
     #[allow(clippy::print_stderr)]
     pub fn report(&self) -> ExitCode {
@@ -85,5 +88,26 @@ impl Failure {
             Manner::Sentence => eprintln!("mapper: {}", self.message),
         }
         ExitCode::from(self.code as u8)
+    }
+}
+
+impl From<SessionError> for Failure {
+    fn from(error: SessionError) -> Self {
+        let code = match error.kind() {
+            ErrorKind::Failure => Code::Failure,
+            ErrorKind::BadInput => Code::BadInput,
+            ErrorKind::NoPlan => Code::NoPlan,
+            ErrorKind::Rig => Code::Rig,
+            ErrorKind::BadRecording => Code::BadRecording,
+            ErrorKind::Interrupted => Code::Interrupted,
+        };
+        match error {
+            SessionError::Campaign(error) => Failure::of_campaign(error),
+            SessionError::Nightly(NightlyError::Mistakes(findings))
+            | SessionError::ChannelMap(ChannelMapError::Mistakes(findings)) => {
+                Failure::of_findings(&findings)
+            }
+            error => Failure::new(code, error),
+        }
     }
 }

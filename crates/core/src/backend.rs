@@ -53,18 +53,35 @@ pub trait Backend: Send {
     fn describe(&self) -> RigDescription;
 
     /// Takes control of the rig; run time 0 starts here.
+    ///
+    /// # Errors
+    /// [`BackendError::OutOfOrder`] where it is armed already, [`BackendError::Lost`] where it cannot be reached.
     fn arm(&mut self) -> Result<(), BackendError>;
 
     /// Sends new setpoints, effective from the time of the last poll on.
+    ///
+    /// # Errors
+    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::SetpointOutOfRange`],
+    /// [`BackendError::Simulation`] or [`BackendError::Lost`] where the rig cannot follow.
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError>;
 
     /// Lets the rig run until `until_s` (seconds since arming) and returns the samples since the last poll.
+    ///
+    /// # Errors
+    /// [`BackendError::OutOfOrder`] before it is armed and told its setpoints, [`BackendError::Simulation`] and
+    /// [`BackendError::Lost`] with the time at which it stopped.
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError>;
 
     /// Brings the rig into its safe state: air off, valve open.
+    ///
+    /// # Errors
+    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::Lost`] where it cannot be reached.
     fn make_safe(&mut self) -> Result<(), BackendError>;
 
     /// Gives control of the rig back.
+    ///
+    /// # Errors
+    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::Lost`] where it cannot be reached.
     fn disarm(&mut self) -> Result<(), BackendError>;
 }
 
@@ -96,29 +113,32 @@ pub enum BackendError {
         high: f64,
     },
     /// The backend's own settings in the campaign are wrong.
-    #[error("the settings of backend `{backend}` are wrong at `{path}`: {message}")]
+    #[error("the settings of backend `{backend}` are wrong at `{path}`: {source}")]
     Settings {
         /// Name of the backend.
         backend: String,
         /// Key path below `backend.settings`.
         path: String,
         /// What is wrong and what would be right.
-        message: String,
+        source: BackendCause,
     },
     /// A simulation could not go on.
-    #[error("the simulation stopped at {t_s:.3} s: {message}")]
+    #[error("the simulation stopped at {t_s:.3} s: {source}")]
     Simulation {
         /// Run time, s.
         t_s: f64,
         /// Why.
-        message: String,
+        source: BackendCause,
     },
     /// The rig, or what stands for it, went away.
-    #[error("the rig was lost at {t_s:.3} s: {message}")]
+    #[error("the rig was lost at {t_s:.3} s: {source}")]
     Lost {
         /// Run time, s.
         t_s: f64,
         /// Why.
-        message: String,
+        source: BackendCause,
     },
 }
+
+/// What a backend says of its own failure. Its error type is its own: the seam knows no backend.
+pub type BackendCause = Box<dyn std::error::Error + Send + Sync>;

@@ -18,6 +18,8 @@ mod fitted_map;
 mod identified;
 mod joint_settings;
 mod map;
+mod map_format;
+mod map_format_error;
 mod model_tolerances;
 mod operating_point;
 mod plan;
@@ -27,7 +29,7 @@ mod sample;
 mod step_marker;
 mod thermal_model;
 
-pub use backend::{Backend, BackendError, RigDescription, RigMode, Setpoints};
+pub use backend::{Backend, BackendCause, BackendError, RigDescription, RigMode, Setpoints};
 pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
 pub use clock::{Clock, UnpacedClock};
 pub use declared_uncertainty::{DeclaredUncertainty, NoiseColour};
@@ -38,6 +40,8 @@ pub use identified::{
 };
 pub use joint_settings::{Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings};
 pub use map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
+pub use map_format::{MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, ReadMap, WriteMap};
+pub use map_format_error::{ExportError, ImportError};
 pub use model_tolerances::ModelTolerances;
 pub use operating_point::OperatingPoint;
 pub use plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};

@@ -20,12 +20,12 @@ mod identify;
 mod joint;
 mod jump;
 mod one_fit;
-mod plausible;
 mod samples;
 mod steady;
 mod taps;
 mod window;
 mod zero;
+mod zero_outcome;
 
 pub use config::{
     DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Stabilisation, Thresholds, WindowRule,
@@ -39,3 +39,4 @@ pub use mapper_core::{Choice, ConvectionWithinStep, EfficiencyWithinStep, JointS
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
 pub use zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};
+pub use zero_outcome::ZeroOutcome;

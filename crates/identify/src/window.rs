@@ -4,6 +4,7 @@ use crate::findings::{Findings, code};
 use crate::jump;
 use crate::{Stabilisation, WindowRule};
 use mapper_core::{Channel, Recording, Series, StepMarker, Window};
+use mapper_numerics::statistics::{median, robust_sigma};
 
 /// Blocks over which signals are condensed (to their median) before they are compared, s.
 const BLOCK_S: f64 = 1.0;
@@ -84,26 +85,12 @@ fn stabilised(
 /// Medians over blocks counted backwards from `end_s`; NaN where a block has no value.
 fn block_medians(series: Option<&Series>, end_s: f64, count: usize) -> Vec<f64> {
     let Some(series) = series else { return vec![f64::NAN; count] };
-    let mut scratch: Vec<f64> = Vec::new();
     (0..count)
         .map(|block| {
             let range = series.range(end_s - (block + 1) as f64 * BLOCK_S, end_s - block as f64 * BLOCK_S);
-            scratch.clear();
-            scratch.extend(series.values[range].iter().filter(|value| value.is_finite()));
-            median(&mut scratch).unwrap_or(f64::NAN)
+            median(series.values[range].iter().filter(|value| value.is_finite())).unwrap_or(f64::NAN)
         })
         .collect()
-}
-
-/// Median; `None` for an empty slice. Reorders the slice.
-pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return None;
-    }
-    // The upper of the two middle values where their number is even: no matter here.
-    let (_, value, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(*value)
 }
 
 /// How many blocks, from the last one backwards, vary together by at most `allowed_ratio` of their mean.
@@ -125,10 +112,9 @@ fn stable_blocks(backwards: &[f64], allowed_ratio: f64) -> usize {
 /// Standard deviation of a signal's noise from its second differences, whose median ignores where it really moves.
 fn noise_sigma(values: &[f64]) -> f64 {
     let lag = NOISE_LAG_BLOCKS;
-    let mut differences: Vec<f64> = (2 * lag..values.len())
-        .map(|i| (values[i] - 2.0 * values[i - lag] + values[i - 2 * lag]).abs())
-        .filter(|difference| difference.is_finite())
-        .collect();
-    // Median of |x| of a normal distribution is 0.6745 sigma; the second difference has variance 6.
-    median(&mut differences).map_or(0.0, |median| median / 0.6745 / 6f64.sqrt())
+    let differences = (2 * lag..values.len())
+        .map(|i| values[i] - 2.0 * values[i - lag] + values[i - 2 * lag])
+        .filter(|difference| difference.is_finite());
+    // The second difference has six times the variance of a value.
+    robust_sigma(differences).map_or(0.0, |sigma| sigma / 6f64.sqrt())
 }

@@ -4,6 +4,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod circles;
 mod dependencies;
 mod drift;
 mod drift_refusals;
@@ -17,8 +18,10 @@ mod nightly;
 mod pages;
 mod pipes;
 mod plans;
+mod promises;
 mod recordings;
 mod sequences;
 mod shipped_campaign;
+mod sizes;
 mod sources;
 mod zero;

@@ -1,0 +1,253 @@
+//! The smooth course of a wandering quantity under noise of known size.
+//!
+//! An integrated random walk seen through white and first-order noise: its intensity is chosen by likelihood, the
+//! course is the Kalman smoother's (Rauch, Tung and Striebel 1965). Where nothing wanders it becomes a straight line
+//! over the whole recording, and averages all of it.
+
+use mapper_core::NoiseColour;
+use mapper_numerics::coloured_noise::{memory, variance_of_mean};
+use mapper_numerics::statistics::median;
+use nalgebra::{Matrix3, RowVector3, Vector3};
+
+/// Length of the bins that are filtered, s.
+const BIN_S: f64 = 1.0;
+
+/// A smooth course with its uncertainty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course {
+    start_s: f64,
+    value: Vec<f64>,
+    slope_s: Vec<f64>,
+    /// Usual standard deviation of the course, in the quantity's unit.
+    pub sigma: f64,
+    /// Time over which its error stays alike, s.
+    pub correlation_s: f64,
+}
+
+impl Course {
+    /// A value that holds.
+    pub fn constant(value: f64) -> Course {
+        Course { start_s: 0.0, value: vec![value], slope_s: vec![0.0], sigma: 0.0, correlation_s: 1.0 }
+    }
+
+    /// Value at `t_s`; constant beyond both ends.
+    pub fn at(&self, t_s: f64) -> f64 {
+        let last = self.value.len() - 1;
+        let place = (t_s - self.start_s) / BIN_S;
+        if place <= 0.0 {
+            return self.value[0];
+        }
+        if place >= last as f64 {
+            return self.value[last];
+        }
+        let i = place as usize;
+        let x = place - i as f64;
+        // Cubic with the smoother's own slopes.
+        let (a, b) = (self.value[i], self.value[i + 1]);
+        let (da, db) = (BIN_S * self.slope_s[i], BIN_S * self.slope_s[i + 1]);
+        let rise = b - a;
+        a + x * (da + x * (3.0 * rise - 2.0 * da - db + x * (da + db - 2.0 * rise)))
+    }
+}
+
+struct Bin {
+    /// Mean of the samples, `None` where there are none.
+    mean: Option<f64>,
+    samples: f64,
+}
+
+/// The course through `values` at `t_s` (rising; NaN counts as missing) under noise of one sample `noise_sigma`.
+/// `None` where there is no value at all.
+pub fn smooth(t_s: &[f64], values: &[f64], noise_sigma: f64, colour: NoiseColour) -> Option<Course> {
+    let bins = bins(t_s, values);
+    let first = bins.iter().find_map(|bin| bin.mean)?;
+    let start_s = t_s[0] + 0.5 * BIN_S;
+    let noise_sigma = noise_sigma.max(1e-12);
+    let c2 = colour.first_order_share_ratio.powi(2);
+    let tau_s = colour.time_constant_s.max(1e-3);
+    let filter = Filter {
+        bins: &bins,
+        first,
+        noise_sigma,
+        white_variance: (1.0 - c2) * noise_sigma * noise_sigma,
+        coloured_variance: variance_of_mean(c2 * noise_sigma * noise_sigma, BIN_S, tau_s),
+        coloured_decay: memory(BIN_S, tau_s),
+    };
+    // Intensity over variance, 1/s^3: from a straight line over hours to a course that follows each bin.
+    let mut best = (f64::NEG_INFINITY, 0.0);
+    for exponent in -26..=4 {
+        let intensity = noise_sigma * noise_sigma * 10f64.powf(0.5 * f64::from(exponent));
+        let likelihood = filter.run(intensity, None);
+        if likelihood > best.0 {
+            best = (likelihood, intensity);
+        }
+    }
+    let mut tracks = Vec::with_capacity(bins.len());
+    filter.run(best.1, Some(&mut tracks));
+    let (value, slope_s, variance) = filter.back(&tracks);
+    // Density of the noise at low frequency; the smoother's window goes with its fourth root over the intensity's.
+    let density = filter.white_variance * 0.1 + 2.0 * tau_s * c2 * noise_sigma * noise_sigma;
+    let correlation_s = (density / best.1).powf(0.25).clamp(2.0, 1e4) * std::f64::consts::SQRT_2;
+    let sigma = median(&variance).unwrap_or(0.0).max(0.0).sqrt();
+    Some(Course { start_s, value, slope_s, sigma, correlation_s })
+}
+
+fn bins(t_s: &[f64], values: &[f64]) -> Vec<Bin> {
+    let (Some(first_s), Some(last_s)) = (t_s.first(), t_s.last()) else { return Vec::new() };
+    // A day at most: beyond it a file is no campaign.
+    let count = (((last_s - first_s) / BIN_S).floor() as usize + 1).min(200_000);
+    let mut sums = vec![(0.0, 0usize); count];
+    for (t, value) in t_s.iter().zip(values) {
+        let index = ((t - first_s) / BIN_S) as usize;
+        if let (Some(sum), true) = (sums.get_mut(index), value.is_finite()) {
+            *sum = (sum.0 + value, sum.1 + 1);
+        }
+    }
+    sums.into_iter()
+        .map(|(sum, n)| Bin { mean: (n > 0).then(|| sum / n as f64), samples: n as f64 })
+        .collect()
+}
+
+struct Filter<'a> {
+    bins: &'a [Bin],
+    first: f64,
+    noise_sigma: f64,
+    white_variance: f64,
+    coloured_variance: f64,
+    coloured_decay: f64,
+}
+
+/// What the filter knew: before and after each bin.
+type Track = (Vector3<f64>, Matrix3<f64>, Vector3<f64>, Matrix3<f64>);
+
+impl Filter<'_> {
+    fn transition(&self) -> Matrix3<f64> {
+        Matrix3::new(1.0, BIN_S, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, self.coloured_decay)
+    }
+
+    /// Log likelihood, up to what does not depend on the intensity.
+    fn run(&self, intensity: f64, mut tracks: Option<&mut Vec<Track>>) -> f64 {
+        let transition = self.transition();
+        let (d, q) = (BIN_S, intensity);
+        let coloured = self.coloured_variance * (1.0 - self.coloured_decay * self.coloured_decay);
+        let drive = Matrix3::new(
+            q * d * d * d / 3.0,
+            q * d * d / 2.0,
+            0.0,
+            q * d * d / 2.0,
+            q * d,
+            0.0,
+            0.0,
+            0.0,
+            coloured,
+        );
+        let see = RowVector3::new(1.0, 0.0, 1.0);
+        let wide = 1e3 * self.noise_sigma;
+        let mut mean = Vector3::new(self.first, 0.0, 0.0);
+        let mut covariance =
+            Matrix3::from_diagonal(&Vector3::new(wide * wide, wide * wide * 1e-4, self.coloured_variance));
+        let mut likelihood = 0.0;
+        for bin in self.bins {
+            let (before, before_covariance) = (mean, covariance);
+            if let Some(seen) = bin.mean {
+                let variance =
+                    (see * covariance * see.transpose())[0] + self.white_variance / bin.samples.max(1.0);
+                let gain = covariance * see.transpose() / variance;
+                let innovation = seen - (see * mean)[0];
+                likelihood -= 0.5 * (innovation * innovation / variance + variance.ln());
+                mean += gain * innovation;
+                covariance -= gain * see * covariance;
+                covariance = 0.5 * (covariance + covariance.transpose());
+            }
+            if let Some(tracks) = tracks.as_deref_mut() {
+                tracks.push((before, before_covariance, mean, covariance));
+            }
+            mean = transition * mean;
+            covariance = transition * covariance * transition.transpose() + drive;
+        }
+        likelihood
+    }
+
+    /// Smoothed values, slopes and variances of the course.
+    fn back(&self, tracks: &[Track]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let transition = self.transition();
+        let n = tracks.len();
+        let (mut value, mut slope, mut variance) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        let Some(&(_, _, mut mean, mut covariance)) = tracks.last() else { return (value, slope, variance) };
+        for k in (0..n).rev() {
+            if k + 1 < n {
+                let (next, next_covariance, ..) = tracks[k + 1];
+                let (_, _, here, here_covariance) = tracks[k];
+                if let Some(inverse) = next_covariance.try_inverse() {
+                    let gain = here_covariance * transition.transpose() * inverse;
+                    mean = here + gain * (mean - next);
+                    covariance = here_covariance + gain * (covariance - next_covariance) * gain.transpose();
+                } else {
+                    (mean, covariance) = (here, here_covariance);
+                }
+            }
+            (value[k], slope[k], variance[k]) = (mean[0], mean[1], covariance[(0, 0)]);
+        }
+        (value, slope, variance)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64;
+
+    fn noisy(course: impl Fn(f64) -> f64, seed: u64) -> (Vec<f64>, Vec<f64>) {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let colour = NoiseColour::default();
+        let decay = (-0.1 / colour.time_constant_s).exp();
+        let mut slow: f64 = random.sample(StandardNormal);
+        let t_s: Vec<f64> = (0..12_000).map(|i| 0.1 * f64::from(i)).collect();
+        let values = t_s
+            .iter()
+            .map(|t| {
+                let kick: f64 = random.sample(StandardNormal);
+                slow = decay * slow + (1.0 - decay * decay).sqrt() * kick;
+                let white: f64 = random.sample(StandardNormal);
+                course(*t) + 0.1 * (0.8 * white + 0.6 * slow)
+            })
+            .collect();
+        (t_s, values)
+    }
+
+    #[test]
+    fn a_constant_is_found_within_the_error_of_its_mean_and_a_wave_within_its_own_statement() {
+        let (t_s, values) = noisy(|_| 5.0, 1);
+        let course = smooth(&t_s, &values, 0.1, NoiseColour::default()).unwrap();
+        // Noise of a mean over 1200 s: sqrt((2 * 2 * 0.36 + 0.1 * 0.64)/1200) * 0.1 = 0.0035; a line doubles it at its
+        // ends. Four of these.
+        for t in [0.0, 300.0, 600.0, 1190.0] {
+            assert!((course.at(t) - 5.0).abs() < 0.03, "{t}: {}", course.at(t));
+        }
+        let wave = |t: f64| 2.0 * (t / 7.0).sin();
+        let (t_s, values) = noisy(wave, 2);
+        let course = smooth(&t_s, &values, 0.1, NoiseColour::default()).unwrap();
+        let n = 1150;
+        let mean_square =
+            (0..n).map(|i| (course.at(20.0 + f64::from(i)) - wave(20.0 + f64::from(i))).powi(2)).sum::<f64>()
+                / f64::from(n);
+        // A wave is no random walk, so its statement is not exact: within a factor of two either way.
+        let ratio = mean_square.sqrt() / course.sigma;
+        assert!((0.5..2.0).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn missing_values_are_bridged_and_nothing_gives_nothing() {
+        let (t_s, mut values) = noisy(|t| t / 100.0, 3);
+        for value in &mut values[4_000..5_000] {
+            *value = f64::NAN;
+        }
+        let course = smooth(&t_s, &values, 0.1, NoiseColour::default()).unwrap();
+        // Ten times the error of a line through all of it.
+        assert!((course.at(450.0) - 4.5).abs() < 0.1, "{}", course.at(450.0));
+        assert!(smooth(&t_s, &vec![f64::NAN; t_s.len()], 0.1, NoiseColour::default()).is_none());
+        assert!(smooth(&[], &[], 0.1, NoiseColour::default()).is_none());
+    }
+}

@@ -1,0 +1,64 @@
+//! What a campaign declares, as identification and diagnosis need it.
+
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::WindowChoice;
+use mapper_core::{Channel, DeclaredUncertainty};
+use mapper_identify::{IdentifyConfig, PressureTap, Stabilisation, WindowRule};
+use mapper_observe::declared_uncertainties;
+use mapper_record::ChannelMap;
+use std::collections::BTreeMap;
+
+/// How the recordings of this campaign are identified.
+pub fn identification(campaign: &Campaign) -> IdentifyConfig {
+    let chosen = &campaign.identification;
+    let tap = |channel: Channel| {
+        let sensor = campaign.sensors.get(&channel);
+        match sensor.and_then(|sensor| sensor.static_tap_pipe_diameter_m) {
+            Some(pipe_diameter_m) => PressureTap::Static { pipe_diameter_m },
+            None => PressureTap::Total,
+        }
+    };
+    IdentifyConfig {
+        method: chosen.method,
+        window: match chosen.window {
+            WindowChoice::Fixed { start_s, end_s } => WindowRule::Fixed { start_s, end_s },
+            WindowChoice::Auto => WindowRule::Auto(Stabilisation {
+                speed_ratio: chosen.stabilisation.speed_ratio,
+                flow_ratio: chosen.stabilisation.flow_ratio,
+                pressure_ratio_ratio: chosen.stabilisation.pressure_ratio_ratio,
+                ..Stabilisation::default()
+            }),
+        },
+        alpha_area_ratio: chosen.alpha_area_ratio,
+        outlet_diameter_m: campaign.machine.params.compressor.outlet_diameter_m,
+        probe_diameter_m: campaign.machine.params.t2_probe_diameter_m,
+        joint: chosen.joint,
+        internal_area_m2: campaign.machine.params.compressor.internal_area_m2,
+        reference: campaign.reference,
+        inlet_tap: tap(Channel::P1),
+        outlet_tap: tap(Channel::P2),
+        declared: declared(campaign, &ChannelMap::native()),
+        ..IdentifyConfig::default()
+    }
+}
+
+/// What is declared of the sensors of a recording that is read by this channel map.
+pub fn declared(campaign: &Campaign, map: &ChannelMap) -> BTreeMap<Channel, DeclaredUncertainty> {
+    let sensors = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    declared_uncertainties(&sensors, &campaign.tolerances, &map.sensors)
+}
+
+/// As [`identification`], for a recording that is read by this channel map: what it says of sensors, noise and window counts
+/// before the campaign.
+pub fn identification_with(campaign: &Campaign, map: &ChannelMap) -> IdentifyConfig {
+    let identification = identification(campaign);
+    IdentifyConfig {
+        declared: declared(campaign, map),
+        noise_colour: map.noise_colour.unwrap_or(identification.noise_colour),
+        window: map.window.map_or(identification.window, |window| WindowRule::Fixed {
+            start_s: window.start_s,
+            end_s: window.end_s,
+        }),
+        ..identification
+    }
+}

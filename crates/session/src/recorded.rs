@@ -1,0 +1,81 @@
+//! A recording read from a file, with the campaign that says what was recorded.
+
+use crate::SessionError;
+use crate::run_directory;
+use mapper_campaign::{Campaign, CampaignError};
+use mapper_observe::OtherMachine;
+use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
+use std::path::{Path, PathBuf};
+
+/// A recording, where it came from, and the campaign it belongs to.
+#[derive(Debug)]
+pub struct Recorded {
+    /// The file.
+    pub path: PathBuf,
+    /// What is in it.
+    pub read: ReadReport,
+    /// Given by the caller, or attached to the recording.
+    pub campaign: Option<Campaign>,
+}
+
+impl Recorded {
+    /// Reads a run directory or a file. What says the machine is, in this order: the campaign given, the `machine` of the
+    /// channel map, the campaign attached to the recording.
+    ///
+    /// # Errors
+    /// [`SessionError::Record`] where the recording cannot be read, [`SessionError::Campaign`] where the attached campaign
+    /// has mistakes.
+    pub fn read(path: &Path, map: &ChannelMap, given: Option<&Campaign>) -> Result<Recorded, SessionError> {
+        let file = run_directory::recording_of(path);
+        let read = read_recording(&file, map, &ReadOptions::default())?;
+        let campaign = match given {
+            Some(campaign) => Some(campaign.clone()),
+            None if map.machine.is_some() => None,
+            None => attached_campaign(&read, &file)?,
+        };
+        Ok(Recorded { path: file, read, campaign })
+    }
+
+    /// The campaign, or that nobody says what machine was recorded.
+    ///
+    /// # Errors
+    /// [`SessionError::MachineUnknown`] with `remedy`.
+    pub fn known(&self, remedy: &'static str) -> Result<&Campaign, SessionError> {
+        self.campaign.as_ref().ok_or(SessionError::MachineUnknown { remedy })
+    }
+}
+
+/// The campaign attached to a recording; `None` where it carries none.
+pub(crate) fn attached_campaign(read: &ReadReport, file: &Path) -> Result<Option<Campaign>, SessionError> {
+    let Some(text) = &read.campaign_text else { return Ok(None) };
+    let origin = file.with_file_name(run_directory::CAMPAIGN);
+    let checked = mapper_campaign::check(text, &origin, &read_beside);
+    Ok(Some(checked.map_err(|findings| CampaignError::Mistakes(Box::new(findings)))?))
+}
+
+/// A file named by the campaign of a recording. The sequence script, which nothing here needs, may be missing.
+fn read_beside(path: &Path) -> std::io::Result<String> {
+    let text = std::fs::read_to_string(path);
+    if path.extension().is_some_and(|extension| extension == "rhai") {
+        Ok(text.unwrap_or_default())
+    } else {
+        text
+    }
+}
+
+/// A channel map from a file.
+///
+/// # Errors
+/// [`SessionError::ChannelMap`] where it cannot be read, and with its mistakes.
+pub fn channel_map(file: &Path) -> Result<ChannelMap, SessionError> {
+    Ok(ChannelMap::load(file)?)
+}
+
+/// Refuses a recording of another machine than the campaign's.
+///
+/// # Errors
+/// [`OtherMachine`], by the one rule of [`mapper_observe::same_machine`].
+pub(crate) fn same_machine(recorded: &Recorded, campaign: &Campaign) -> Result<(), OtherMachine> {
+    let machine = &campaign.machine;
+    mapper_observe::same_machine(&recorded.read.metadata, &machine.name, machine.serial_number.as_deref())
+}

@@ -1,0 +1,74 @@
+//! The plug-ins that a session works with, handed in by whoever opens it.
+
+use crate::SessionError;
+use mapper_campaign::Campaign;
+use mapper_core::{Backend, MapFormats};
+use mapper_physics::backend_plugin::BackendPlugin;
+use mapper_physics::effect::Effect;
+use mapper_physics::model::Model;
+use mapper_physics::nominal_rig::NominalRig;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Reads a suspected effect from a file.
+pub type ReadEffect = fn(&Path) -> Result<Arc<dyn Effect>, SessionError>;
+
+/// Every plug-in of a session.
+#[derive(Clone)]
+pub struct Registry {
+    /// Rigs, real and simulated.
+    pub backends: Vec<BackendPlugin>,
+    /// The catalogue of effects.
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// How a suspected effect is read from a file.
+    pub read_effect: ReadEffect,
+    /// Map formats, read and written.
+    pub formats: MapFormats,
+}
+
+impl Registry {
+    /// The backend that a campaign asks for.
+    ///
+    /// # Errors
+    /// [`SessionError::Backend`] where the name is unknown or the settings are wrong.
+    pub fn make_backend(&self, campaign: &Campaign, model: &Model) -> Result<Box<dyn Backend>, SessionError> {
+        let wanted = &campaign.backend;
+        let nominal = nominal_rig(campaign, model, &self.effects);
+        BackendPlugin::make_by_name(&self.backends, &wanted.name, &nominal, &wanted.settings)
+            .map_err(SessionError::Backend)
+    }
+
+    /// The catalogue, and the effects that scripts define.
+    ///
+    /// # Errors
+    /// A script that cannot be read, is not an effect, or takes the name of another.
+    pub fn effects_with(&self, scripts: &[PathBuf]) -> Result<Vec<Arc<dyn Effect>>, SessionError> {
+        let mut effects = self.effects.clone();
+        for path in scripts {
+            let scripted = (self.read_effect)(path)?;
+            let id = &scripted.info().id;
+            if effects.iter().any(|effect| effect.info().id == *id) {
+                return Err(SessionError::EffectTaken { path: path.clone(), id: id.to_string() });
+            }
+            effects.push(scripted);
+        }
+        Ok(effects)
+    }
+}
+
+/// What a backend is told of machine and rig.
+fn nominal_rig(campaign: &Campaign, model: &Model, effects: &[Arc<dyn Effect>]) -> NominalRig {
+    let sensors = || campaign.sensors.iter();
+    NominalRig {
+        model: model.clone(),
+        boundary: campaign.boundary,
+        speed_max_rpm: campaign.limits.speed_max_rpm,
+        sensors: sensors().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
+        static_tap_pipe_diameters_m: sensors()
+            .filter_map(|(channel, sensor)| Some((*channel, sensor.static_tap_pipe_diameter_m?)))
+            .collect(),
+        tolerances: campaign.tolerances,
+        effects: effects.to_vec(),
+        seed: campaign.seed,
+    }
+}

@@ -13,7 +13,8 @@ mod night;
 mod quantity;
 mod store;
 
-pub use band::{Band, Floor, median};
+pub use band::{Band, Floor};
+pub use mapper_numerics::statistics::median;
 pub use compare::{Comparison, Moved, MovedPoints, Shift, compare};
 pub use error::HistoryError;
 pub use figure::Figure;

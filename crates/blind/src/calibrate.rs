@@ -15,6 +15,7 @@ use mapper_gap::diagnose::{Diagnosed, Question, diagnose, prior};
 use mapper_gap::fit::Fit;
 use mapper_gap::report::Verdict;
 use mapper_gap::study::{Study, members};
+use mapper_numerics::statistics::{NORMAL_975, quantile};
 use mapper_physics::effect::Effect;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -149,30 +150,23 @@ const SEEN_SIGMA: f64 = 12.0;
 
 /// The calibration that fits what was observed.
 pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {
-    let mut margins: Vec<f64> =
-        observed.iter().filter(|o| o.kind == CaseKind::None).map(Observed::margin).collect();
-    margins.sort_by(f64::total_cmp);
-    let quiet = quantile(&margins, QUIET).map_or(before.threshold, |margin| margin.max(LEAST_THRESHOLD));
+    let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(Observed::margin);
+    let quiet = quantile(margins, QUIET).map_or(before.threshold, |margin| margin.max(LEAST_THRESHOLD));
     let seen = |o: &&Observed| o.sigma.is_none_or(|sigma| sigma >= SEEN_SIGMA);
     let inside: Vec<&Observed> =
         observed.iter().filter(|o| o.kind != CaseKind::Outside).filter(seen).collect();
     let rows: Vec<([f64; 3], bool)> =
         observed.iter().filter(seen).map(|o| (o.features, o.kind == CaseKind::Outside)).collect();
-    let mut errors: Vec<f64> = observed.iter().flat_map(|o| &o.errors_sigma).map(|z| z.abs()).collect();
-    errors.sort_by(f64::total_cmp);
+    let errors = observed.iter().flat_map(|o| &o.errors_sigma).map(|z| z.abs());
     Calibration {
         made_by,
         threshold: quiet,
         temperature: temperature(&inside, before.temperature),
         // Never narrower than the fit says: a few cases are no ground for more confidence.
-        interval_factor: quantile(&errors, 0.95).map_or(before.interval_factor, |z| (z / 1.96).max(1.0)),
+        interval_factor: quantile(errors, 0.95).map_or(before.interval_factor, |z| (z / NORMAL_975).max(1.0)),
         outside: logistic(&rows, before.outside).unwrap_or(before.outside),
         ..before.clone()
     }
-}
-
-fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    sorted.get((share * sorted.len() as f64) as usize).or(sorted.last()).copied()
 }
 
 /// Spread of the logarithm of the temperature that is expected around the one of before: where every case is right, the

@@ -1,6 +1,7 @@
 //! A logistic regression with three features, that a few cases move a little.
 
 use mapper_gap::calibration::squash;
+use mapper_numerics::minimise::minimise;
 
 /// Rounds of coordinate descent at most; it needs some twenty.
 const ROUNDS: usize = 100;
@@ -24,20 +25,17 @@ pub(crate) fn logistic(rows: &[([f64; 3], bool)], before: [f64; 4]) -> Option<[f
         away(1) + away(2) + rows.iter().map(miss).sum::<f64>()
     };
     let mut weights = before;
-    // Coordinate by coordinate, each by ternary search: a convex loss with bounds.
+    // Coordinate by coordinate, each between its bounds: the loss is convex.
     for _ in 0..ROUNDS {
         let last = weights;
         for place in 0..3 {
-            let (mut low, mut high) = if place == 0 { (-30.0, 30.0) } else { (0.0, 10.0) };
-            for _ in 0..80 {
-                let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-                let mut at = |value: f64| {
-                    weights[place] = value;
-                    loss(&weights)
-                };
-                if at(a) < at(b) { high = b } else { low = a }
-            }
-            weights[place] = 0.5 * (low + high);
+            let (low, high) = if place == 0 { (-30.0, 30.0) } else { (0.0, 10.0) };
+            weights[place] = minimise(low, high, 1e-9, |value| {
+                let mut tried = weights;
+                tried[place] = value;
+                loss(&tried)
+            })
+            .at;
         }
         let moved = weights.iter().zip(&last).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         if moved < 1e-6 {

@@ -8,11 +8,11 @@ use crate::ruler::StudyRuler;
 use crate::seal::{ANSWERS_NAME, MANIFEST_NAME, Manifest, sha256};
 use crate::truth::Truth;
 use mapper_campaign::{Campaign, nominal_model};
+use mapper_numerics::parallel;
 use mapper_physics::effect::Effect;
 use mapper_record::RecordingHeader;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Most cases of one directory.
@@ -70,40 +70,18 @@ fn run_all(
     directory: &Path,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<Truth>, BlindError> {
-    let next = AtomicUsize::new(0);
     let finished = AtomicUsize::new(0);
-    let results: Mutex<Vec<Option<Result<Truth, BlindError>>>> =
-        Mutex::new(cases.iter().map(|_| None).collect());
-    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(cases.len());
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                while let Some((index, case)) = {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    cases.get(index).map(|case| (index, case))
-                } {
-                    let header = RecordingHeader {
-                        library: concat!("mapper ", env!("CARGO_PKG_VERSION")).to_owned(),
-                        metadata: [("campaign".to_owned(), campaign.name.clone())].into(),
-                        ..RecordingHeader::default()
-                    };
-                    let result = schedule.run(case, &directory.join(format!("{}.mcap", case.name)), &header);
-                    let failed = result.is_err();
-                    if let Ok(mut results) = results.lock() {
-                        results[index] = Some(result);
-                    }
-                    done(finished.fetch_add(1, Ordering::Relaxed) + 1);
-                    if failed {
-                        // No case is worth starting any more.
-                        next.store(cases.len(), Ordering::Relaxed);
-                    }
-                }
-            });
-        }
-    });
-    let results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    // A case without a result comes behind the failure that stopped the others.
-    results.into_iter().flatten().collect()
+    // No case is worth starting once one has failed.
+    parallel::try_map(cases, |case| {
+        let header = RecordingHeader {
+            library: concat!("mapper ", env!("CARGO_PKG_VERSION")).to_owned(),
+            metadata: [("campaign".to_owned(), campaign.name.clone())].into(),
+            ..RecordingHeader::default()
+        };
+        let truth = schedule.run(case, &directory.join(format!("{}.mcap", case.name)), &header);
+        done(finished.fetch_add(1, Ordering::Relaxed) + 1);
+        truth
+    })
 }
 
 fn json(value: &impl serde::Serialize, path: &Path) -> Result<Vec<u8>, BlindError> {

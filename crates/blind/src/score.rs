@@ -6,6 +6,7 @@ use crate::kind::CaseKind;
 use crate::seal::{MANIFEST_NAME, Manifest, open, read_json};
 use crate::truth::Truth;
 use mapper_effects::catalogue;
+use mapper_numerics::statistics::{mean, nearest_rank};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -273,8 +274,9 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
             sigma,
         });
     }
-    score.parameter_error_median = median(errors);
-    score.shrink_median = median(shrinks);
+    // Of an even number the upper of the two middle values, as `score.py` takes it.
+    score.parameter_error_median = nearest_rank(&errors, 0.5);
+    score.shrink_median = nearest_rank(&shrinks, 0.5);
     score.squared_miss_mean = mean(&squared_misses);
     score.set_size_mean = mean(&set_sizes);
     score
@@ -314,16 +316,6 @@ impl Judged {
         };
         Judged { named, set_size, right, p_truth }
     }
-}
-
-/// The upper of the two middle values, as `score.py` takes it.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
-}
-
-fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 impl Score {

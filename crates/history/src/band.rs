@@ -1,9 +1,8 @@
 //! The band in which a figure has been: robust, so that one odd night does not widen it.
 
+use mapper_numerics::statistics::{median, robust_sigma};
 use serde::Serialize;
 
-/// From the median absolute deviation to the standard deviation of a normal distribution: 1 / quantile(0.75).
-const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
 /// Half width of the band in such standard deviations.
 const WIDTH_SIGMAS: f64 = 4.0;
 
@@ -34,10 +33,9 @@ impl Band {
     /// Median -/+ 4 robust standard deviations (median absolute deviation), at least the floor. `None` without nights;
     /// values that are not finite are left out.
     pub fn of(values: &[f64], floor: Floor) -> Option<Band> {
-        let mut values: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
-        let median = median(&mut values)?;
-        let mut deviations: Vec<f64> = values.iter().map(|value| (value - median).abs()).collect();
-        let sigma = MAD_TO_SIGMA * crate::band::median(&mut deviations)?;
+        let values: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+        let median = median(&values)?;
+        let sigma = robust_sigma(values.iter().map(|value| value - median))?;
         let least = match floor {
             Floor::Absolute(half_width) => half_width,
             Floor::Relative(ratio) => ratio * median.abs(),
@@ -49,17 +47,6 @@ impl Band {
     /// Whether a value lies in it, ends included.
     pub fn holds(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
-    }
-}
-
-/// Median of some numbers, which are sorted by it; `None` of nothing.
-pub fn median(values: &mut [f64]) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => None,
-        count if count % 2 == 1 => Some(values[middle]),
-        _ => Some(0.5 * (values[middle - 1] + values[middle])),
     }
 }
 

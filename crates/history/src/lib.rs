@@ -13,10 +13,11 @@ mod night;
 mod quantity;
 mod store;
 
-pub use band::{Band, Floor, median};
+pub use band::{Band, Floor};
 pub use compare::{Comparison, Moved, MovedPoints, Shift, compare};
 pub use error::HistoryError;
 pub use figure::Figure;
+pub use mapper_numerics::statistics::median;
 pub use night::{Night, PointRow, RunKey, RunRow};
 pub use quantity::PointQuantity;
 pub use store::{DEFAULT_NIGHTS, Filter, History, ListedRun, StoredNight};

@@ -7,6 +7,7 @@
 use crate::auction::prices;
 use crate::chain::Chain;
 use crate::objective::Objective;
+use mapper_numerics::statistics::nearest_rank;
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
@@ -39,9 +40,9 @@ impl Candidates {
                 objective.value(chain, from, to, chain.step(from, to, state).0).max(LEAST_VALUE)
             }));
         }
-        let mut sizes: Vec<f64> =
-            weight.iter().copied().filter(|weight| *weight > 0.5 * LEAST_VALUE).collect();
-        let (smallest, largest) = (quantile(&mut sizes, 0.02), quantile(&mut sizes, 0.98));
+        let sizes: Vec<f64> = weight.iter().copied().filter(|weight| *weight > 0.5 * LEAST_VALUE).collect();
+        let size = |share| nearest_rank(&sizes, share).unwrap_or(0.0);
+        let (smallest, largest) = (size(0.02), size(0.98));
         let spread = (largest - smallest).max(1e-9);
         let prices = prices(n, &weight, (0.2 * spread, 2e-3 * spread));
         for (i, &from) in given.iter().enumerate() {
@@ -64,12 +65,4 @@ impl Candidates {
         let successors = &self.successors[from];
         (!successors.is_empty()).then(|| successors[random.random_range(0..successors.len())])
     }
-}
-
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    let place = (share * values.len().saturating_sub(1) as f64).round() as usize;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(place, f64::total_cmp).1
 }

@@ -5,6 +5,7 @@ use crate::method::ForecastRow;
 use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest, VisitOrder};
 use mapper_core::{OperatingPoint, Plan, StepKind};
+use mapper_numerics::statistics::mean;
 use mapper_physics::model::{Outputs, State};
 use mapper_physics::steady::SteadyState;
 
@@ -83,7 +84,7 @@ fn way(order: Vec<OperatingPoint>, seconds: f64, errors: impl Iterator<Item = Op
         order,
         minutes: seconds / 60.0,
         worst_error_eta: errors.iter().copied().max_by(f64::total_cmp),
-        mean_error_eta: (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64),
+        mean_error_eta: mean(&errors),
     }
 }
 

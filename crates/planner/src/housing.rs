@@ -10,6 +10,7 @@ use crate::chain::Chain;
 use crate::forecast::{forecast, hold};
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::OperatingPoint;
+use mapper_numerics::parallel;
 use mapper_physics::model::State;
 use mapper_physics::steady::SteadyState;
 use std::collections::HashSet;
@@ -146,13 +147,13 @@ impl Housing {
         };
         let slowest = targets.iter().min_by(by_speed).ok_or(PlanError::NoPoints)?;
         let fastest = targets.iter().max_by(by_speed).ok_or(PlanError::NoPoints)?;
-        let one = |index: usize| -> Result<Response, PlanError> {
-            let (target, to) = (&targets[index], points[index]);
+        let aims: Vec<(&SteadyState, OperatingPoint)> = targets.iter().zip(points.iter().copied()).collect();
+        let one = |(target, to): &(&SteadyState, OperatingPoint)| {
             response(request, target, &scale, [slowest, fastest], start.is_none())
-                .map_err(|source| PlanError::Forecast { to, source })
+                .map_err(|source| PlanError::Forecast { to: *to, source })
         };
         Ok(Housing {
-            responses: in_parallel(targets.len(), &one)?,
+            responses: parallel::try_map(&aims, one)?,
             start: start.map(|state| scale.scaled(&state)),
             forbidden: HashSet::new(),
             gradient_max_k: request.limits.housing_gradient_max_k.unwrap_or(f64::INFINITY),
@@ -177,31 +178,6 @@ impl Housing {
             None => self.responses[to].first,
         }
     }
-}
-
-/// Shares the points among the processor's cores; the result does not depend on how many there are.
-fn in_parallel<T: Send>(
-    count: usize,
-    one: &(impl Fn(usize) -> Result<T, PlanError> + Sync),
-) -> Result<Vec<T>, PlanError> {
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(8).min(count.max(1));
-    let size = count.div_ceil(threads).max(1);
-    let parts = std::thread::scope(|scope| {
-        let handles: Vec<_> = (0..threads)
-            .map(|part| {
-                let range = (part * size).min(count)..((part + 1) * size).min(count);
-                scope.spawn(move || range.map(one).collect::<Result<Vec<T>, PlanError>>())
-            })
-            .collect();
-        handles
-            .into_iter()
-            .map(|handle| match handle.join() {
-                Ok(part) => part,
-                Err(panic) => std::panic::resume_unwind(panic),
-            })
-            .collect::<Result<Vec<Vec<T>>, PlanError>>()
-    })?;
-    Ok(parts.into_iter().flatten().collect())
 }
 
 fn response(

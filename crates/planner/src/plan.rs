@@ -10,6 +10,7 @@ use crate::reach::reachable;
 use crate::repeats::{RepeatedJump, Visit, append, plain, usual_jumps, with_repeats};
 use crate::request::{PlanError, PlanRequest, Repeats, VisitOrder};
 use mapper_core::{OperatingPoint, Plan, PlanBound, PlanFigures, PlanStep, StepKind};
+use mapper_numerics::statistics::rms;
 use mapper_physics::model::State;
 use mapper_physics::steady::SteadyState;
 
@@ -375,8 +376,7 @@ fn figures(steps: &[PlanStep], minutes: f64) -> PlanFigures {
         sum_gradient_k: gradients().sum(),
         worst_gradient_k: gradients().min_by(f64::total_cmp),
         worst_sigma_eta: largest(&mut points().filter_map(|predicted| predicted.sigma_eta)),
-        rms_error_eta: (!errors.is_empty())
-            .then(|| (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()),
+        rms_error_eta: rms(&errors),
         worst_error_eta: largest(&mut errors.iter().copied()),
         minutes,
     }

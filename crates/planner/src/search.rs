@@ -8,6 +8,7 @@
 use crate::candidates::Candidates;
 use crate::chain::{Chain, gradients_k};
 use crate::objective::Objective;
+use mapper_numerics::statistics::nearest_rank;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -386,15 +387,14 @@ impl<'a, C: Chain> Annealing<'a, C> {
         best_figure: &mut f64,
     ) {
         // Typical change of value, from moves that are not made.
-        let mut sizes: Vec<f64> = (0..200)
+        let sizes: Vec<f64> = (0..200)
             .map(|_| {
                 self.propose(random);
                 self.gain().abs()
             })
             .filter(|size| *size > 0.0 && *size < 1e5)
             .collect();
-        sizes.sort_by(f64::total_cmp);
-        let typical = sizes.get(sizes.len() / 2).copied().unwrap_or(1.0);
+        let typical = nearest_rank(&sizes, 0.5).unwrap_or(1.0);
         let (hottest, coldest) = (typical * if gently { 0.1 } else { 0.5 }, typical * 5e-4);
         const STAGES: u64 = 200;
         for stage in 0..STAGES {

@@ -7,6 +7,8 @@ use crate::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Figure, Marker, Panel, Rule, RuleAt, Scatter, palette};
 use mapper_core::{Channel, Recording, Verdict as PointVerdict};
 use mapper_identify::{DeclaredUncertainty, IdentifyConfig, code};
+use mapper_numerics::coloured_noise::memory;
+use mapper_numerics::statistics::quantile;
 use mapper_physics::model::Model;
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -49,7 +51,7 @@ fn as_measured(clean: &Recording, errors: &[(f64, f64)], rng: &mut impl Rng) -> 
         let mut slow: f64 = StandardNormal.sample(rng);
         let mut last_s = 0.0;
         for (t_s, value) in series.t_s.iter().zip(&mut series.values) {
-            let decay = ((last_s - t_s) / 2.0f64).exp();
+            let decay = memory(t_s - last_s, 2.0);
             let [kick, white]: [f64; 2] = [StandardNormal.sample(rng), StandardNormal.sample(rng)];
             slow = decay * slow + (1.0 - decay * decay).sqrt() * kick;
             *value += offset + gain * *value + sigma * (0.8 * white + 0.6 * slow);
@@ -118,11 +120,8 @@ impl<'a> Bin<'a> {
     }
 
     fn quantile(&self, share: f64) -> f64 {
-        let mut errors: Vec<f64> =
-            self.members.iter().filter_map(|o| o.eta_error_points()).map(f64::abs).collect();
-        errors.sort_by(f64::total_cmp);
-        let at = (share * errors.len().saturating_sub(1) as f64).round() as usize;
-        errors.get(at).copied().unwrap_or(f64::NAN)
+        let errors = self.members.iter().filter_map(|o| o.eta_error_points()).map(f64::abs);
+        quantile(errors, share).unwrap_or(f64::NAN)
     }
 }
 

@@ -7,6 +7,7 @@ use crate::outcome::{Outcome, WINDOW, assuming, extremes, in_window, outcomes, r
 use crate::picture::{at_speed, equality_panel, eta_pairs, h_pairs, krpm, speed_colour, target_speeds_rpm};
 use crate::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Figure, Marker};
+use mapper_numerics::statistics::mean;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::steady::hold_speed;
@@ -123,7 +124,7 @@ fn steady_hot(outcome: &Outcome) -> Result<f64, ReproduceError> {
 fn nrmse_percent(found: &[Outcome]) -> (f64, f64) {
     let error = rms(found.iter().map(|o| Some(o.point.h_w_m2k? - o.h_mean_w_m2k))).unwrap_or(f64::NAN);
     let (low, high) = extremes(found.iter().map(|o| Some(o.h_mean_w_m2k))).unwrap_or((f64::NAN, f64::NAN));
-    let mean = found.iter().map(|o| o.h_mean_w_m2k).sum::<f64>() / found.len().max(1) as f64;
+    let mean = mean(found.iter().map(|o| o.h_mean_w_m2k)).unwrap_or(f64::NAN);
     (100.0 * error / (high - low), 100.0 * error / mean)
 }
 

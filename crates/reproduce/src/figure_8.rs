@@ -8,6 +8,7 @@ use crate::picture::{
 };
 use crate::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Dash, Figure, Line, Marker, Panel, Rule, RuleAt};
+use mapper_numerics::statistics::mean;
 use mapper_physics::model::Model;
 
 const ALPHAS: [f64; 6] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5];
@@ -165,8 +166,7 @@ fn picture(cases: &[Case], right: &[Outcome], wrong: &[Outcome]) -> String {
                 .filter_map(|case| {
                     let errors: Option<Vec<f64>> =
                         at_speed(pick(case), speed_rpm).map(Outcome::eta_error_points).collect();
-                    let errors = errors?;
-                    Some((case.alpha, errors.iter().sum::<f64>() / errors.len().max(1) as f64))
+                    Some((case.alpha, mean(errors?)?))
                 })
                 .collect::<Vec<_>>()
         };

@@ -4,6 +4,7 @@ use crate::ReproduceError;
 use crate::lab::{Jump, Run, Truth};
 use mapper_core::{IdentifiedPoint, Recording};
 use mapper_identify::{IdentifyConfig, WindowRule, identify_each};
+use mapper_numerics::statistics;
 
 /// The paper's window: 100 s from 10 s after the jump.
 pub(crate) const WINDOW: WindowRule = WindowRule::Fixed { start_s: 10.0, end_s: 110.0 };
@@ -66,7 +67,7 @@ pub(crate) fn outcome_of(
     let mut points = identify_each(recording, config)?;
     let point = points.pop().ok_or(ReproduceError::NoStep)??;
     let window = in_window(run, &config.window);
-    let mean = |value: fn(&Truth) -> f64| window.iter().map(value).sum::<f64>() / window.len().max(1) as f64;
+    let mean = |value: fn(&Truth) -> f64| statistics::mean(window.iter().map(value)).unwrap_or(f64::NAN);
     let last = window.last().ok_or(ReproduceError::NoStep)?;
     Ok(Outcome {
         jump: run.jump,
@@ -110,7 +111,5 @@ pub(crate) fn worst(values: impl IntoIterator<Item = Option<f64>>) -> f64 {
 
 /// Root mean square of the values that are there; `None` for none.
 pub(crate) fn rms(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
-    let (sum, count) =
-        values.into_iter().flatten().fold((0.0, 0u32), |(sum, n), value| (sum + value * value, n + 1));
-    (count > 0).then(|| (sum / f64::from(count)).sqrt())
+    statistics::rms(values.into_iter().flatten())
 }

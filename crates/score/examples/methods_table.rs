@@ -3,6 +3,7 @@
 #![allow(clippy::print_stdout, reason = "what it prints is what it is for")]
 
 use mapper_core::{IdentifiedPoint, Plan, StepKind, Verdict};
+use mapper_numerics::statistics::{median, quantile};
 use mapper_score::{PointTruth, ScoredPoint, summarise};
 use serde::Deserialize;
 use std::path::Path;
@@ -53,12 +54,6 @@ fn read<T: serde::de::DeserializeOwned>(
     Ok(serde_json::from_slice(&std::fs::read(path.ok_or("no such run")?)?)?)
 }
 
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let place = (share * values.len().saturating_sub(1) as f64).round() as usize;
-    values.get(place).copied().unwrap_or(f64::NAN)
-}
-
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("{HEAD}");
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -76,12 +71,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             })
             .collect();
         let score = summarise(&points).ok_or("no point has both a number and a truth")?;
-        let mut errors: Vec<f64> =
+        let errors: Vec<f64> =
             points.iter().filter_map(|scored| Some((scored.point.eta? - scored.truth?.eta).abs())).collect();
-        let mut halves: Vec<f64> = points
-            .iter()
-            .filter_map(|scored| Some(0.5 * (scored.point.eta_high? - scored.point.eta_low?)))
-            .collect();
+        let halves =
+            points.iter().filter_map(|scored| Some(0.5 * (scored.point.eta_high? - scored.point.eta_low?)));
         let minutes = (plan.duration_s() / 60.0).round() as u64;
         println!(
             "| {} | {}:{:02} | {} | {} | {:.2} | {:.2} | {:.2} | {:.2} | {:.0} % |",
@@ -91,9 +84,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             score.points,
             points.iter().filter(|scored| scored.point.verdict == Verdict::Good).count(),
             100.0 * score.eta_median_error,
-            100.0 * quantile(&mut errors, 0.9),
+            100.0 * quantile(&errors, 0.9).unwrap_or(f64::NAN),
             100.0 * score.eta_worst_error,
-            100.0 * quantile(&mut halves, 0.5),
+            100.0 * median(halves).unwrap_or(f64::NAN),
             100.0 * score.eta_coverage_ratio,
         );
     }

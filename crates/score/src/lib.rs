@@ -3,6 +3,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 use mapper_core::{IdentifiedPoint, StepMarker};
+use mapper_numerics::statistics::median;
 use mapper_record::{RecordError, Truth, read_truth};
 use serde::Serialize;
 use std::path::Path;
@@ -91,33 +92,11 @@ pub fn summarise(points: &[ScoredPoint]) -> Option<ScoreSummary> {
     let share = |part: usize| part as f64 / count as f64;
     Some(ScoreSummary {
         points: count,
-        eta_median_error: median(&mut eta_errors)?,
+        eta_median_error: median(&eta_errors)?,
         eta_within_one_point_ratio: share(eta_errors.iter().filter(|error| **error <= 0.01).count()),
         eta_worst_error: eta_errors.iter().copied().fold(0.0, f64::max),
         eta_coverage_ratio: share(covered),
-        h_median_error_ratio: median(&mut h_errors),
+        h_median_error_ratio: median(&h_errors),
         h_worst_error_ratio: h_errors.iter().copied().reduce(f64::max),
     })
-}
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => None,
-        count if count % 2 == 1 => Some(values[middle]),
-        _ => Some(0.5 * (values[middle - 1] + values[middle])),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::median;
-
-    #[test]
-    fn the_median_is_the_middle() {
-        assert_eq!(median(&mut [3.0, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median(&mut [4.0, 1.0, 2.0, 3.0]), Some(2.5));
-        assert_eq!(median(&mut []), None);
-    }
 }

@@ -1,26 +1,18 @@
 //! How well a line is foretold by the others.
 
-use super::MapFit;
 use super::observations::Observations;
+use super::surface::MapFit;
 use mapper_core::LeftOutLine;
+use mapper_numerics::parallel;
+use mapper_numerics::statistics::{NORMAL_975, median};
 
 /// Leaves each line out in turn, fits the others anew from the beginning, and measures the line's points against what
 /// that fit says at its speed. Lines without which too little is left are passed over.
 pub fn leave_out(fit: &MapFit) -> Vec<LeftOutLine> {
     let count = fit.data.lines_rpm.len();
     let one = |line: usize| left_out(&fit.data, line, line == 0 || line + 1 == count);
-    // Each line by itself, so that the result does not depend on the number of cores.
-    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(count).max(1);
-    let mut found: Vec<(usize, LeftOutLine)> = std::thread::scope(|scope| {
-        let part =
-            |worker: usize| (worker..count).step_by(workers).filter_map(|l| Some((l, one(l)?))).collect();
-        let handles: Vec<_> =
-            (0..workers).map(|worker| scope.spawn(move || -> Vec<_> { part(worker) })).collect();
-        // A worker cannot panic; were it to, its lines would be missing.
-        handles.into_iter().filter_map(|handle| handle.join().ok()).flatten().collect()
-    });
-    found.sort_by_key(|(line, _)| *line);
-    found.into_iter().map(|(_, left_out)| left_out).collect()
+    let lines: Vec<usize> = (0..count).collect();
+    parallel::map(&lines, |line| one(*line)).into_iter().flatten().collect()
 }
 
 fn left_out(data: &Observations, line: usize, outermost: bool) -> Option<LeftOutLine> {
@@ -28,7 +20,7 @@ fn left_out(data: &Observations, line: usize, outermost: bool) -> Option<LeftOut
     let (mut distances, mut errors) = (Vec::new(), Vec::new());
     let (mut distances_held, mut errors_held) = (0usize, 0usize);
     let [distance_rms, eta_rms] = rest.solution.rms;
-    let held = |off: f64, line: f64, point: f64| usize::from(off <= 1.96 * line.hypot(point));
+    let held = |off: f64, line: f64, point: f64| usize::from(off <= NORMAL_975 * line.hypot(point));
     for point in data.points.iter().filter(|point| point.line == line) {
         let speed_rpm = point.speed_ratio * data.nominal_speed_rpm;
         let place = rest.nearest(
@@ -52,13 +44,7 @@ fn left_out(data: &Observations, line: usize, outermost: bool) -> Option<LeftOut
         outermost,
         distance_held_ratio: share(distances_held, distances.len()),
         eta_held_ratio: share(errors_held, errors.len()),
-        distance_ratio: median(&mut distances)?,
-        eta: median(&mut errors),
+        distance_ratio: median(&distances)?,
+        eta: median(&errors),
     })
-}
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let (below, above) = (values.len().checked_sub(1)? / 2, values.len() / 2);
-    Some(0.5 * (values[below] + values[above]))
 }

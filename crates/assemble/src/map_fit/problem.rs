@@ -10,8 +10,9 @@ use super::line_shape::{
 };
 use super::nearest::{Foot, Scales, nearest, normal};
 use super::observations::{Observation, Observations};
+use super::precisions::{Precisions, ROBUST};
 use super::splines::{Rows, Splines};
-use super::variances::{Precisions, ROBUST};
+use mapper_numerics::statistics::{mean, median, quantile};
 use nalgebra::{DMatrix, DVector};
 
 /// Parameters that an offset of a whole line moves together: flow; head with work, as an error of speed does, which
@@ -45,10 +46,9 @@ impl<'a> Problem<'a> {
         ratios.dedup_by(|b, a| *b < *a * 1.02);
         let splines = Splines::new(&if ratios.len() <= MOST_KNOTS { ratios } else { thinned(&ratios) });
         let rows = data.points.iter().map(|p| splines.rows(p.speed_ratio)).collect();
-        let mut flows: Vec<f64> = data.points.iter().map(Observation::flow).collect();
-        flows.sort_by(f64::total_cmp);
-        let (low, high) = (flows.first().copied().unwrap_or(0.0), flows.last().copied().unwrap_or(1.0));
-        let middle = flows.get(flows.len() / 2).copied().unwrap_or(0.5);
+        let flows: Vec<f64> = data.points.iter().map(Observation::flow).collect();
+        let (low, high) = (quantile(&flows, 0.0).unwrap_or(0.0), quantile(&flows, 1.0).unwrap_or(1.0));
+        let middle = median(&flows).unwrap_or(0.5);
         let frame = FlowFrame { middle, half: (0.5 * (high - low)).max(1e-6 * high) };
         let mut problem = Problem { data, frame, splines, rows, start: [0.0; PARAMETERS] };
         problem.start = problem.starting_level();
@@ -65,7 +65,7 @@ impl<'a> Problem<'a> {
     }
 
     pub(super) fn starting_level(&self) -> Parameters {
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let mean = |values: &[f64]| mean(values).unwrap_or(f64::NAN);
         let mut level = [0.0; PARAMETERS];
         level[CHOKE_FLOW] = (1.03 * mean(&self.line_maxima(Observation::flow))).ln();
         level[ZERO_SLOPE_HEAD] = mean(&self.line_maxima(Observation::head)).max(1e-9).ln();

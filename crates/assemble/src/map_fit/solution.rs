@@ -3,6 +3,7 @@
 use super::line_shape::{FlowFrame, LineShape, PARAMETERS, Parameters, WORK};
 use super::problem::LINE_OFFSETS;
 use super::splines::Splines;
+use mapper_numerics::statistics::{NORMAL_975, student_quantile};
 use nalgebra::DMatrix;
 
 /// A solved problem.
@@ -43,10 +44,9 @@ impl Solution {
     /// knots and beyond them.
     pub(crate) fn covariance(&self, speed_ratio: f64) -> DMatrix<f64> {
         let (rows, knots) = (self.splines.rows(speed_ratio), self.splines.len());
-        // The roughness was estimated on this many second differences: Student's quantile over the normal one (first
-        // terms of its Cornish-Fisher series at 97.5 %), squared.
+        // The roughness was estimated on this many second differences: Student's quantile over the normal one, squared.
         let freedom = knots.saturating_sub(2).max(1) as f64;
-        let few = (1.0 + 1.21 / freedom + 1.44 / freedom.powi(2)).powi(2);
+        let few = student_quantile(0.975, freedom).map_or(1.0, |quantile| (quantile / NORMAL_975).powi(2));
         let open =
             (self.splines.shape.open_variance(speed_ratio), self.splines.work.open_variance(speed_ratio));
         let mut out = DMatrix::zeros(PARAMETERS, PARAMETERS);

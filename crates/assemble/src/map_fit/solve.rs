@@ -3,10 +3,11 @@
 use super::MapFitError;
 use super::line_shape::{Parameters, WORK};
 use super::observations::Observations;
+use super::precisions::Precisions;
 use super::problem::{LINE_OFFSETS, Problem, Unknowns};
 use super::solution::Solution;
-use super::variances::Precisions;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use mapper_numerics::least_squares::{Damping, DampingRule, damped_step, inverse};
+use nalgebra::{DMatrix, DVector};
 
 /// Rounds with everything fixed but the parameters, rounds that estimate the variances, and rounds to settle.
 const ROUNDS: [usize; 3] = [8, 22, 15];
@@ -21,6 +22,17 @@ const START_SCALES: [f64; 3] = [0.01, 0.003, 0.02];
 const FAR: f64 = 0.006;
 /// Roughness of each parameter over speed where the estimation starts.
 const ROUGHNESS: Parameters = [0.5, 0.5, 3.0, 1.0, 1.5, 1.5, 0.15, 0.15, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
+
+/// Of the search for a step: careful, since feet jump and weights change from round to round.
+const DAMPING: DampingRule = DampingRule {
+    start: 1e-2,
+    growth: 5.0,
+    relief: 0.2,
+    renewed: 1e-6,
+    least: 1e-9,
+    most: f64::INFINITY,
+    tries: 6,
+};
 
 /// What a round of the fit is for.
 enum Phase {
@@ -60,7 +72,7 @@ fn solve_from(data: &Observations, stiffness: f64, start_scale: f64) -> Result<S
     problem.start =
         std::array::from_fn(|q| if q < WORK { problem.start[q] } else { unknowns.values[(q, 0)] });
     let mut feet = problem.feet(&unknowns, None);
-    let mut damping = 1e-2;
+    let mut damping = Damping::new(DAMPING);
     let [free, estimate, settle] = ROUNDS;
     let mut phase = Phase::Free;
     for round in 0..free + estimate + settle {
@@ -77,34 +89,22 @@ fn solve_from(data: &Observations, stiffness: f64, start_scale: f64) -> Result<S
         // Not tr_mul: a product of two matrices goes through matrixmultiply's kernels.
         let normal_matrix = transposed * &jacobian + &penalty;
         let cost = problem.cost(&residuals, &weights) + problem.penalty_value(&unknowns, &precisions);
-        let mut better = None;
-        for _ in 0..6 {
-            let mut damped = normal_matrix.clone();
-            for i in 0..damped.nrows() {
-                damped[(i, i)] *= 1.0 + damping;
-            }
-            let step = damped.cholesky().map(|factor| -factor.solve(&gradient));
-            if let Some(step) = step.filter(|step| step.iter().all(|v| v.is_finite())) {
-                let next = problem.stepped(&unknowns, &step);
-                let next_feet = problem.feet(&next, Some(&feet));
-                let next_cost = problem.cost(&problem.residuals(&next_feet), &weights)
-                    + problem.penalty_value(&next, &precisions);
-                if next_cost < cost {
-                    better = Some((next, next_feet, next_cost));
-                    break;
-                }
-            }
-            damping = (damping * 5.0).max(1e-6);
-        }
+        let right = -gradient;
+        let better = damping.search(|damping| {
+            let next = problem.stepped(&unknowns, &damped_step(&normal_matrix, &right, damping)?);
+            let next_feet = problem.feet(&next, Some(&feet));
+            let next_cost = problem.cost(&problem.residuals(&next_feet), &weights)
+                + problem.penalty_value(&next, &precisions);
+            (next_cost < cost).then_some((next, next_feet, next_cost))
+        });
         let gain = better.as_ref().map_or(0.0, |(.., next_cost)| cost - next_cost);
         if let Some((next, next_feet, _)) = better {
             (unknowns, feet) = (next, next_feet);
-            damping = (damping / 5.0).max(1e-9);
         }
         match phase {
             Phase::Free if round + 1 >= free || gain < 1e-2 * cost => phase = Phase::Estimate,
             Phase::Estimate => {
-                let inverse = inverse_of(&normal_matrix.cholesky().ok_or(MapFitError::Singular)?);
+                let inverse = inverse(&normal_matrix.cholesky().ok_or(MapFitError::Singular)?);
                 let residuals = problem.residuals(&feet);
                 let change =
                     problem.update(&mut precisions, &unknowns, &inverse, &jacobian, &residuals, &start_rough);
@@ -124,7 +124,7 @@ fn solve_from(data: &Observations, stiffness: f64, start_scale: f64) -> Result<S
     let factor = information.cholesky().ok_or(MapFitError::Singular)?;
     let improbability = problem.improbability(&unknowns, &precisions, &residuals)
         + 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-    let covariance = inverse_of(&factor);
+    let covariance = inverse(&factor);
     // As a user meets the map: points against the smooth surface, without the lines' own offsets.
     let smooth =
         Unknowns { offsets: DMatrix::zeros(LINE_OFFSETS.len(), data.lines_rpm.len()), ..unknowns.clone() };
@@ -141,13 +141,4 @@ fn solve_from(data: &Observations, stiffness: f64, start_scale: f64) -> Result<S
         roughness_variance: precisions.rough.map(|p| 1.0 / p),
         line_scatter: precisions.lines.map(|p| 1.0 / p.sqrt()),
     })
-}
-
-/// Inverse of a factored matrix, as a product of two: three times as fast as one solution for each column.
-fn inverse_of(factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
-    let lower = factor.l_dirty();
-    let mut inverse = DMatrix::identity(lower.nrows(), lower.nrows());
-    // A Cholesky factor has no 0 on its diagonal.
-    lower.solve_lower_triangular_mut(&mut inverse);
-    inverse.transpose() * &inverse
 }

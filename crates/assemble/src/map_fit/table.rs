@@ -1,12 +1,14 @@
 //! The fit as a rectangular table with errors and marks of extrapolation.
 
+use super::MapFitError;
 use super::crossing::crossings;
 use super::line_errors::LineErrors;
 use super::line_shape::{ANGLE_RANGE, LOWEST_ANGLE, LineShape};
 use super::nearest::Scales;
 use super::speed_spline::SpeedSpline;
-use super::{MapFit, MapFitError, MapFitOptions, leave_out};
+use super::surface::{MapFit, SPEED_REACH};
 use mapper_core::{FittedLine, FittedMap, FittedNode};
+use mapper_numerics::root::bisect;
 use nalgebra::{DMatrix, DVector};
 
 /// Steps of the walk along a line from which nodes at equal distances are taken.
@@ -14,10 +16,29 @@ const WALK: usize = 240;
 /// Speeds beyond the measured ones that a table gets unasked, over the slowest (two) and the fastest.
 const UNASKED: (f64, f64, f64) = (0.4, 0.7, 1.05);
 
+/// What a table of the fit holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapFitOptions {
+    /// Corrected speeds of further lines, rpm; the measured lines are always there. `None` adds two below and one
+    /// above, all extrapolated.
+    pub further_speeds_rpm: Option<Vec<f64>>,
+    /// Nodes on each line, 5 to 400.
+    pub nodes: usize,
+    /// Whether each line is left out in turn to see the error at a line that was not measured.
+    pub leave_one_out: bool,
+}
+
+impl Default for MapFitOptions {
+    fn default() -> Self {
+        MapFitOptions { further_speeds_rpm: None, nodes: 41, leave_one_out: true }
+    }
+}
+
+/// The table, without what leaving lines out would show.
 pub(super) fn table(fit: &MapFit, options: &MapFitOptions) -> Result<FittedMap, MapFitError> {
     let (lowest_rpm, highest_rpm) = fit.speed_bounds_rpm();
     let measured = &fit.data.lines_rpm;
-    let (first, last) = (lowest_rpm / super::SPEED_REACH.0, highest_rpm / super::SPEED_REACH.1);
+    let (first, last) = (lowest_rpm / SPEED_REACH.0, highest_rpm / SPEED_REACH.1);
     let further = match &options.further_speeds_rpm {
         Some(speeds) => speeds.clone(),
         None => vec![UNASKED.0 * first, UNASKED.1 * first, UNASKED.2 * last],
@@ -49,16 +70,8 @@ pub(super) fn table(fit: &MapFit, options: &MapFitOptions) -> Result<FittedMap, 
         distance_rms_ratio: fit.solution.rms[0],
         eta_rms: fit.solution.rms[1],
         line_scatter_ratio: fit.solution.line_scatter[0],
-        left_out: if options.leave_one_out { leave_out(fit) } else { Vec::new() },
+        left_out: Vec::new(),
     })
-}
-
-impl MapFit {
-    /// Measured and a few extrapolated lines, coarse: enough to see whether lines cross.
-    pub(super) fn lines_for_check(&self) -> Vec<FittedLine> {
-        let options = MapFitOptions { further_speeds_rpm: None, nodes: 41, leave_one_out: false };
-        table(self, &options).map(|table| table.lines).unwrap_or_default()
-    }
 }
 
 /// Where lines end, as angles over speed.
@@ -189,13 +202,8 @@ fn choke_end(shape: &LineShape, speed_ratio: f64, surge_rad: f64) -> f64 {
     let ratio = |angle: f64| shape.physical(angle, speed_ratio).pressure_ratio;
     let top = ratio(surge_rad.min(std::f64::consts::FRAC_PI_2)).max(ratio(surge_rad));
     let wanted = bottom_ratio(top);
-    let (mut low, mut high) = (LOWEST_ANGLE, surge_rad.min(std::f64::consts::FRAC_PI_2));
-    if ratio(low) > wanted {
-        return low;
+    if ratio(LOWEST_ANGLE) > wanted {
+        return LOWEST_ANGLE;
     }
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if ratio(middle) < wanted { low = middle } else { high = middle }
-    }
-    high
+    bisect(LOWEST_ANGLE, surge_rad.min(std::f64::consts::FRAC_PI_2), 0.0, |angle| ratio(angle) < wanted).1
 }

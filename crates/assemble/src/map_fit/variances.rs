@@ -6,19 +6,9 @@
 //! followed, the rest stays straight over speed.
 
 use super::line_shape::{PARAMETERS, Parameters};
+use super::precisions::{Precisions, ROBUST};
 use super::problem::{Problem, Unknowns};
 use nalgebra::DMatrix;
-
-/// Standard errors beyond which a residual loses weight.
-pub(super) const ROBUST: f64 = 3.0;
-
-/// Variance components, as precisions.
-pub(super) struct Precisions {
-    pub(super) rough: Parameters,
-    pub(super) lines: [f64; 3],
-    /// Scales of distance and efficiency.
-    pub(super) scales: [f64; 2],
-}
 
 impl Problem<'_> {
     /// [`Solution::improbability`] without the determinant of the information.

@@ -1,0 +1,45 @@
+//! The fit of a surface to a map, stiff enough that no lines cross.
+
+use super::MapFitError;
+use super::crossing::crossings;
+use super::observations::Observations;
+use super::solve::solve;
+use super::surface::MapFit;
+use super::table::{MapFitOptions, table};
+use mapper_core::{CompressorMap, FittedLine};
+
+/// Factors on the least penalty that are tried until no lines cross.
+const STIFFNESSES: [f64; 3] = [1.0, 30.0, 1000.0];
+
+impl MapFit {
+    /// Fits all lines of a map, every point at its own corrected speed.
+    ///
+    /// Where lines cross, the fit is made anew with stiffer parameters over speed.
+    ///
+    /// # Errors
+    /// [`MapFitError`] where there is too little, too much or nothing sensible to fit.
+    pub fn new(map: &CompressorMap) -> Result<Self, MapFitError> {
+        MapFit::of(Observations::of(map)?)
+    }
+
+    pub(crate) fn of(data: Observations) -> Result<Self, MapFitError> {
+        let mut best: Option<(usize, MapFit)> = None;
+        for stiffness in STIFFNESSES {
+            let fit = MapFit { solution: solve(&data, stiffness)?, data: data.clone() };
+            let crossings = crossings(&fit.lines_for_check());
+            if best.as_ref().is_none_or(|(least, _)| crossings < *least) {
+                best = Some((crossings, fit));
+            }
+            if crossings == 0 {
+                break;
+            }
+        }
+        best.map(|(_, fit)| fit).ok_or(MapFitError::Singular)
+    }
+
+    /// Measured and a few extrapolated lines, coarse: enough to see whether lines cross.
+    fn lines_for_check(&self) -> Vec<FittedLine> {
+        let options = MapFitOptions { further_speeds_rpm: None, nodes: 41, leave_one_out: false };
+        table(self, &options).map(|table| table.lines).unwrap_or_default()
+    }
+}

@@ -1,0 +1,14 @@
+//! What weighs the parts of a fit against each other.
+
+use super::line_shape::Parameters;
+
+/// Standard errors beyond which a residual loses weight.
+pub(super) const ROBUST: f64 = 3.0;
+
+/// Variance components, as precisions.
+pub(super) struct Precisions {
+    pub(super) rough: Parameters,
+    pub(super) lines: [f64; 3],
+    /// Scales of distance and efficiency.
+    pub(super) scales: [f64; 2],
+}

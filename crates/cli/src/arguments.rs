@@ -5,7 +5,7 @@ use crate::gap_arguments::GapArguments;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mapper_campaign::units::{Kind, parse};
 use mapper_core::{Method, OperatingPoint};
-use mapper_history::Figure;
+use mapper_history::Metric;
 use std::path::PathBuf;
 
 /// From a campaign file to a complete turbocharger-compressor map, efficiency and heat transfer included.
@@ -295,7 +295,7 @@ pub struct HistoryArguments {
     pub method: Option<String>,
     /// Show this figure instead of the usual ones; may be given more than once
     #[arg(long, value_name = "FIGURE", value_parser = figure)]
-    pub figure: Vec<Figure>,
+    pub figure: Vec<Metric>,
     /// Only nights from this day on (UTC)
     #[arg(long, value_name = "YYYY-MM-DD", value_parser = day)]
     pub since: Option<jiff::Timestamp>,
@@ -310,9 +310,9 @@ pub struct HistoryArguments {
     pub json: bool,
 }
 
-fn figure(text: &str) -> Result<Figure, String> {
-    Figure::find(text).ok_or_else(|| {
-        let names: Vec<&str> = Figure::ALL.into_iter().map(Figure::name).collect();
+fn figure(text: &str) -> Result<Metric, String> {
+    Metric::find(text).ok_or_else(|| {
+        let names: Vec<&str> = Metric::ALL.into_iter().map(Metric::name).collect();
         format!("there is no figure `{text}`; there are {}", names.join(", "))
     })
 }

@@ -4,16 +4,13 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::predicted_method::Dynamic;
 use mapper_campaign::Campaign;
-use mapper_campaign::campaign::{self, Order, WindowChoice};
-use mapper_core::{Channel, DeclaredUncertainty, Method, Plan};
-use mapper_identify::{IdentifyConfig, PressureTap, Stabilisation, WindowRule};
+use mapper_core::{Channel, DeclaredUncertainty, Method, Plan, SURGE_ALLOWED_S};
+use mapper_identify::{IdentifyConfig, PressureTap};
 use mapper_physics::model::Model;
-use mapper_planner::{PlanLimits, PlanRequest, PlanTiming, Repeats, SettleBands, VisitOrder, make_plan};
-use mapper_runner::{DriftWatch, Guard, LimitGuard, OnDrift, SilenceGuard, StepSource, SurgeGuard};
+use mapper_planner::{PlanRequest, make_plan};
+use mapper_runner::{DriftWatch, Guard, LimitGuard, SilenceGuard, StepSource, SurgeGuard};
 use std::collections::BTreeMap;
 
-/// Surge longer than this ends a run, s: a jump may touch the line, a point may not stay beyond it.
-const SURGE_ALLOWED_S: f64 = 5.0;
 /// Silence of a guarded channel longer than this ends a run, s.
 const SILENCE_ALLOWED_S: f64 = 3.0;
 
@@ -37,12 +34,6 @@ pub fn with_plan_request<T>(
 ) -> Result<T, Failure> {
     let canonical = serde_json::to_string(campaign).map_err(|error| Failure::new(Code::Failure, error))?;
     let dynamic = Dynamic::of(identification(campaign));
-    let (window_start_s, window_end_s) = match campaign.identification.window {
-        WindowChoice::Auto => (None, None),
-        WindowChoice::Fixed { start_s, end_s } => (Some(start_s), Some(end_s)),
-    };
-    let stabilisation = &campaign.identification.stabilisation;
-    let limits = &campaign.limits;
     then(&PlanRequest {
         campaign_name: &campaign.name,
         campaign_canonical: &canonical,
@@ -50,45 +41,13 @@ pub fn with_plan_request<T>(
         boundary: campaign.boundary,
         follow_outlet: campaign.follow_outlet,
         points: &campaign.points,
-        order: match campaign.order {
-            Order::SumGradient => VisitOrder::SumGradient,
-            Order::WorstGradient => VisitOrder::WorstGradient,
-            Order::Information => VisitOrder::Information,
-            Order::Time => VisitOrder::Time,
-            Order::Greedy => VisitOrder::GreedyGradient,
-            Order::Listed => VisitOrder::Listed,
-        },
-        timing: PlanTiming {
-            warm_up_s: campaign.timing.warm_up_s,
-            dwell_s: campaign.timing.dwell_s,
-            cool_down_s: campaign.timing.cool_down_s,
-            window_start_s,
-            window_end_s,
-        },
-        settle_bands: SettleBands {
-            speed_ratio: stabilisation.speed_ratio,
-            flow_ratio: stabilisation.flow_ratio,
-            pressure_ratio_ratio: stabilisation.pressure_ratio_ratio,
-        },
-        limits: PlanLimits {
-            speed_max_rpm: limits.speed_max_rpm,
-            p3_min_pa: limits.p3_min_pa,
-            p3_max_pa: limits.p3_max_pa,
-            t3_max_k: limits.t3_max_k,
-            t2_max_k: limits.t2_max_k,
-            surge_margin_min_ratio: limits.surge_margin_min_ratio,
-            surge_allowed_s: SURGE_ALLOWED_S,
-            housing_gradient_max_k: limits.housing_gradient_max_k,
-            p3_slew_max_pa_s: limits
-                .p3_stroke_s
-                .map(|stroke_s| (limits.p3_max_pa - limits.p3_min_pa) / stroke_s),
-        },
+        order: campaign.order,
+        timing: campaign.timing,
+        window: campaign.identification.window,
+        settle_bands: campaign.identification.settle_bands,
+        limits: campaign.limits,
         appended: None,
-        repeats: campaign.repeats.map(|repeats| Repeats {
-            jump: repeats.jump.map(|jump| (jump.from, jump.to)),
-            every_steps: repeats.every_steps,
-            at_least: repeats.at_least,
-        }),
+        repeats: campaign.repeats,
         required_sigma_eta: campaign.required_sigma_eta,
         method: match campaign.identification.method {
             Method::Dynamic | Method::Joint => Some(&dynamic),
@@ -123,11 +82,7 @@ pub fn guards(campaign: &Campaign, delivered: &[Channel]) -> Vec<Box<dyn Guard>>
 
 /// Watches the repeats of a run, where the campaign says what to do about drift.
 pub fn drift_watch<'a>(campaign: &Campaign, steps: &'a mut dyn StepSource) -> Option<DriftWatch<'a>> {
-    let on_drift = match campaign.on_drift? {
-        campaign::OnDrift::Hold => OnDrift::Hold,
-        campaign::OnDrift::Continue => OnDrift::Continue,
-        campaign::OnDrift::Zero => OnDrift::Zero,
-    };
+    let on_drift = campaign.on_drift?;
     let mut declared: BTreeMap<Channel, DeclaredUncertainty> =
         campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
     // The gain of the flow meter may stand with the model's tolerances.
@@ -149,15 +104,8 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
     };
     IdentifyConfig {
         method: chosen.method,
-        window: match chosen.window {
-            WindowChoice::Fixed { start_s, end_s } => WindowRule::Fixed { start_s, end_s },
-            WindowChoice::Auto => WindowRule::Auto(Stabilisation {
-                speed_ratio: chosen.stabilisation.speed_ratio,
-                flow_ratio: chosen.stabilisation.flow_ratio,
-                pressure_ratio_ratio: chosen.stabilisation.pressure_ratio_ratio,
-                ..Stabilisation::default()
-            }),
-        },
+        window: chosen.window,
+        settle_bands: chosen.settle_bands,
         alpha_area_ratio: chosen.alpha_area_ratio,
         outlet_diameter_m: campaign.machine.params.compressor.outlet_diameter_m,
         probe_diameter_m: campaign.machine.params.t2_probe_diameter_m,

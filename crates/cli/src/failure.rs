@@ -1,7 +1,7 @@
 //! Why a command ended early, with what to print and what to return.
 
 use crate::exit_code::Code;
-use mapper_campaign::CampaignError;
+use mapper_campaign::{Campaign, CampaignError};
 use mapper_core::BackendError;
 use std::io::IsTerminal;
 use std::path::Path;
@@ -58,6 +58,17 @@ impl Failure {
             }
             Err(_) => Failure::new(Code::BadInput, error),
         }
+    }
+
+    /// Formats of the map that the campaign asks for and nobody writes, at their place in its text.
+    pub fn check_formats(of: &Campaign, campaign: &Path) -> Result<(), Self> {
+        let known: Vec<&str> = mapper_exporters::EXPORTERS.iter().map(|format| format.name).collect();
+        let Some(format) = of.outputs.formats.iter().find(|format| !known.contains(&format.name())) else {
+            return Ok(());
+        };
+        let text = std::fs::read_to_string(campaign).unwrap_or_default();
+        let findings = mapper_campaign::format_mistake(&text, campaign, format, &known);
+        Err(Failure::of_campaign(CampaignError::Mistakes(Box::new(findings))))
     }
 
     /// Standard output was closed by its reader: a normal end of a pipe.

@@ -62,7 +62,10 @@ pub fn make(
             let assembled = fitted(assembled, &mut remarks);
             for format in &campaign.outputs.formats {
                 let name = format.name();
-                let Some(exporter) = mapper_exporters::find(name) else { continue };
+                let Some(exporter) = mapper_exporters::find(name) else {
+                    let message = format!("a map cannot be written in the format `{name}`");
+                    return Err(Failure::new(Code::BadInput, message));
+                };
                 let bytes = match (exporter.export)(&assembled) {
                     Ok(bytes) => bytes,
                     // A campaign of a few points has a map, but no surface through it.

@@ -5,14 +5,12 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::registry::{BackendContext, make_backend};
 use mapper_campaign::Campaign;
-use mapper_campaign::campaign::{BackendChoice, Order, SequenceSource, WindowChoice};
-use mapper_core::{Method, Plan, PlanStep, Recording, SampleBatch, StepMarker, UnpacedClock};
+use mapper_campaign::campaign::{BackendChoice, SequenceSource};
+use mapper_core::{Method, Plan, PlanStep, Recording, SampleBatch, StepMarker, UnpacedClock, VisitOrder};
 use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_physics::model::Model;
 use mapper_runner::{RunEnd, RunError, RunObserver, Runner, StepSource, StepSourceError};
-use mapper_sequence::{
-    Bench, Hold, Script, SequenceRunner, SettleBands, SettleWatch, StepLimits, StepResult,
-};
+use mapper_sequence::{Hold, Script, SequenceRequest, SequenceRunner, SettleWatch, StepResult};
 use std::sync::atomic::AtomicBool;
 
 /// What the plan of a script says of its objective.
@@ -37,7 +35,7 @@ impl ScriptedSteps {
     /// The steps of a campaign's script.
     pub fn new(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<Self, Failure> {
         let script = Script { path: source.path.clone(), text: source.text.clone() };
-        let script = SequenceRunner::start(script, bench(campaign, model))
+        let script = SequenceRunner::start(script, request(campaign, model))
             .map_err(|error| Failure::new(Code::Failure, error))?;
         Ok(ScriptedSteps {
             script,
@@ -236,7 +234,8 @@ fn base_plan(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Res
         serde_json::to_string(&without_script).map_err(|error| Failure::new(Code::Failure, error))?;
     // The planner plans one point alone: the script has the say over the others.
     let points = campaign.points.iter().copied().take(1).collect();
-    let mut plan = assembly_line::plan(&Campaign { points, order: Order::Listed, ..without_script }, model)?;
+    let mut plan =
+        assembly_line::plan(&Campaign { points, order: VisitOrder::Listed, ..without_script }, model)?;
     plan.objective = OBJECTIVE.to_owned();
     plan.made_from.campaign_sha256 = mapper_planner::sha256_hex(&canonical);
     plan.made_from.script_sha256 = Some(mapper_planner::sha256_hex(&source.text));
@@ -256,33 +255,17 @@ fn with_steps(mut plan: Plan, steps: Vec<PlanStep>) -> Plan {
 }
 
 /// What a script sees of the campaign.
-fn bench(campaign: &Campaign, model: &Model) -> Bench {
-    let (limits, stabilisation) = (&campaign.limits, &campaign.identification.stabilisation);
+fn request(campaign: &Campaign, model: &Model) -> SequenceRequest {
     let (planned, machine) = (campaign.clone(), model.clone());
-    Bench {
+    SequenceRequest {
         points: campaign.points.clone(),
-        dwell_s: campaign.timing.dwell_s,
-        warm_up_s: campaign.timing.warm_up_s,
-        window_s: match campaign.identification.window {
-            WindowChoice::Auto => None,
-            WindowChoice::Fixed { start_s, end_s } => Some((start_s, end_s)),
-        },
-        settle_bands: SettleBands {
-            speed_ratio: stabilisation.speed_ratio,
-            flow_ratio: stabilisation.flow_ratio,
-            pressure_ratio_ratio: stabilisation.pressure_ratio_ratio,
-        },
+        timing: campaign.timing,
+        window: campaign.identification.window,
+        settle_bands: campaign.identification.settle_bands,
         model: model.clone(),
         boundary: campaign.boundary,
         follow_outlet: campaign.follow_outlet,
-        limits: StepLimits {
-            speed_max_rpm: limits.speed_max_rpm,
-            p3_min_pa: limits.p3_min_pa,
-            p3_max_pa: limits.p3_max_pa,
-            t2_max_k: limits.t2_max_k,
-            t3_max_k: limits.t3_max_k,
-            surge_margin_min_ratio: limits.surge_margin_min_ratio,
-        },
+        limits: campaign.limits,
         order: Box::new(move |points| {
             // Repeats are the script's own business.
             let subset =

@@ -25,12 +25,13 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     // The backend reads its settings now, so that a mistake in them does not wait for the night.
     make_backend(&BackendContext { campaign: &campaign, model: &model })
         .map_err(|error| Failure::of_backend(&error, &arguments.campaign))?;
+    Failure::check_formats(&campaign, &arguments.campaign)?;
     if let Some(source) = &campaign.sequence {
         let script = Script { path: source.path.clone(), text: source.text.clone() };
         mapper_sequence::check(&script).map_err(|error| Failure::new(Code::BadInput, error))?;
     }
     let timing = &campaign.timing;
-    let soak_s = campaign.zero.map_or(0.0, |zero| zero.soak_s);
+    let soak_s = campaign.zero.map_or(0.0, |zero| zero.duration_s);
     let duration_s =
         soak_s + timing.warm_up_s + campaign.points.len() as f64 * timing.dwell_s + timing.cool_down_s;
     if arguments.json {

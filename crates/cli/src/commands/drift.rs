@@ -193,7 +193,7 @@ fn fingerprint(read: &ReadReport, file: &Path) -> Option<String> {
     let of_campaign = |text: &String| {
         let origin = file.with_file_name(run_directory::CAMPAIGN);
         let campaign = mapper_campaign::check(text, &origin, &super::identify::read_beside).ok()?;
-        let mapper_campaign::campaign::Timing { dwell_s, .. } = campaign.timing;
+        let mapper_core::Timing { dwell_s, .. } = campaign.timing;
         let same = (&campaign.machine, campaign.boundary, campaign.follow_outlet, &campaign.points, dwell_s);
         serde_json::to_string(&same).ok()
     };

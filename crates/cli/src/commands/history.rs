@@ -4,18 +4,18 @@ use crate::arguments::HistoryArguments;
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::{history_picture, output, table};
-use mapper_history::{Figure, Filter, History, ListedRun, median};
+use mapper_history::{Filter, History, ListedRun, Metric, median};
 use serde_json::json;
 use std::collections::BTreeMap;
 
 /// Figures that are shown where none is asked for.
-const SHOWN: [Figure; 6] = [
-    Figure::GoodPoints,
-    Figure::EtaMean,
-    Figure::EtaMedianError,
-    Figure::EtaWorstError,
-    Figure::HMean,
-    Figure::HMedianError,
+const SHOWN: [Metric; 6] = [
+    Metric::GoodPoints,
+    Metric::EtaMean,
+    Metric::EtaMedianError,
+    Metric::EtaWorstError,
+    Metric::HMean,
+    Metric::HMedianError,
 ];
 
 /// Lists, filters, prints JSON, draws.
@@ -28,7 +28,7 @@ pub fn history(arguments: &HistoryArguments) -> Result<(), Failure> {
         since_ms: arguments.since.map(|since| since.as_millisecond()),
     };
     let runs = history.runs(&filter).map_err(fail)?;
-    let figures: Vec<Figure> =
+    let figures: Vec<Metric> =
         if arguments.figure.is_empty() { SHOWN.to_vec() } else { arguments.figure.clone() };
     if let Some(path) = &arguments.svg {
         output::write_new(path, history_picture::svg(&runs, &figures).as_bytes())?;
@@ -44,7 +44,7 @@ pub fn history(arguments: &HistoryArguments) -> Result<(), Failure> {
 fn run_json(listed: &ListedRun) -> serde_json::Value {
     let ListedRun { night, run } = listed;
     let figures: BTreeMap<&str, Option<f64>> =
-        Figure::ALL.into_iter().map(|figure| (figure.name(), run.figures.get(&figure).copied())).collect();
+        Metric::ALL.into_iter().map(|figure| (figure.name(), run.figures.get(&figure).copied())).collect();
     json!({
         "night": {
             "id": night.id, "name": night.name, "started": time(night.started_ms, "%Y-%m-%dT%H:%M:%SZ"),
@@ -61,14 +61,14 @@ fn time(ms: i64, format: &str) -> String {
         .map_or_else(|_| "-".to_owned(), |time| time.strftime(format).to_string())
 }
 
-fn heads(first: &[&str], figures: &[Figure]) -> Vec<String> {
+fn heads(first: &[&str], figures: &[Metric]) -> Vec<String> {
     let figure_heads = figures.iter().map(|figure| format!("{figure} {}", figure.shown_unit().0));
     first.iter().map(|head| (*head).to_owned()).chain(figure_heads).collect()
 }
 
-fn shown(figure: Figure, value: Option<f64>) -> String {
+fn shown(figure: Metric, value: Option<f64>) -> String {
     let decimals = match figure {
-        Figure::GoodPoints | Figure::HMean | Figure::HTrueMean | Figure::RigMinutes => 1,
+        Metric::GoodPoints | Metric::HMean | Metric::HTrueMean | Metric::RigMinutes => 1,
         _ => 3,
     };
     table::number(value.map(|value| figure.shown_unit().1 * value), decimals)
@@ -83,7 +83,7 @@ fn state(listed: &ListedRun) -> &'static str {
 }
 
 /// A row per night, campaign and method: medians over the seeds.
-fn groups_text(runs: &[ListedRun], figures: &[Figure]) -> String {
+fn groups_text(runs: &[ListedRun], figures: &[Metric]) -> String {
     let mut groups: BTreeMap<(i64, i64, &str, &str), Vec<&ListedRun>> = BTreeMap::new();
     for listed in runs {
         let key = (
@@ -121,7 +121,7 @@ fn groups_text(runs: &[ListedRun], figures: &[Figure]) -> String {
 }
 
 /// A row per run.
-fn runs_text(runs: &[ListedRun], figures: &[Figure]) -> String {
+fn runs_text(runs: &[ListedRun], figures: &[Metric]) -> String {
     let mut table =
         table::with_heads(&heads(&["night (UTC)", "campaign", "method", "seed", "night is"], figures));
     let mut failures = String::new();

@@ -9,7 +9,7 @@ use crate::table::{self, Display, number};
 use crate::{assembly_line, output, plan_picture};
 use mapper_campaign::Campaign;
 use mapper_core::{OperatingPoint, Plan, PlanBound, StepKind};
-use mapper_planner::{Comparison, Jump, PlanRequest, STABLE_DRIFT_K_MIN, WayOfMapping};
+use mapper_planner::{Comparison, JumpForecast, PlanRequest, STABLE_DRIFT_K_MIN, WayOfMapping};
 use std::fmt::Write;
 
 /// Makes the plan of a campaign and prints it.
@@ -32,7 +32,7 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
     }
     let plan = assembly_line::with_plan_request(&campaign, &model, |request| {
         let appended = match arguments.append.as_slice() {
-            [from, to] => Some((*from, *to)),
+            [from, to] => Some(mapper_core::Jump { from: *from, to: *to }),
             _ => None,
         };
         let effort = arguments.effort.unwrap_or(request.effort);
@@ -58,7 +58,7 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
             object.insert("comparison".to_owned(), comparison_json(comparison));
         }
         if let (Some(object), Some(zero)) = (value.as_object_mut(), campaign.zero) {
-            object.insert("soak_s".to_owned(), serde_json::json!(zero.soak_s));
+            object.insert("soak_s".to_owned(), serde_json::json!(zero.duration_s));
         }
         return output::print_json(&value);
     }
@@ -139,7 +139,7 @@ fn bound_text(bound: &PlanBound) -> String {
 }
 
 /// One edge of the jump graph in words.
-fn why_text(campaign: &Campaign, jump: &Jump) -> String {
+fn why_text(campaign: &Campaign, jump: &JumpForecast) -> String {
     let display = Display::new(&campaign.display);
     let predicted = &jump.predicted;
     let mut text = format!(
@@ -229,7 +229,7 @@ pub fn text(campaign: &Campaign, plan: &Plan) -> String {
         plan.steps.len(),
         plan.objective,
         table::duration(soak_s + plan.duration_s()),
-        campaign.zero.map_or_else(String::new, |zero| format!("soak {}, ", table::duration(zero.soak_s))),
+        campaign.zero.map_or_else(String::new, |zero| format!("soak {}, ", table::duration(zero.duration_s))),
         table::duration(plan.warm_up_s),
         table::duration(plan.cool_down_s),
     );

@@ -37,6 +37,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     };
     let mut backend = make_backend(&BackendContext { campaign: &campaign, model: &model })
         .map_err(|error| Failure::of_backend(&error, &arguments.campaign))?;
+    Failure::check_formats(&campaign, &arguments.campaign)?;
     let parent = arguments.out.clone().unwrap_or_else(|| PathBuf::from(&campaign.outputs.directory));
     if arguments.dry_run {
         return dry_run(arguments, &campaign, &plan, backend.as_ref(), &parent);
@@ -243,7 +244,7 @@ fn dry_run(
             "dry_run": true,
             "rig": rig,
             "would_write": would_write,
-            "soak_s": campaign.zero.map(|zero| zero.soak_s),
+            "soak_s": campaign.zero.map(|zero| zero.duration_s),
             "plan": plan,
         }));
     }

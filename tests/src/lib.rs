@@ -6,6 +6,7 @@ mod campaign;
 mod drift_campaign;
 mod program;
 mod python;
+pub mod tree;
 
 pub use campaign::{CampaignFile, SHIPPED, SHORT_GRID};
 pub use drift_campaign::DriftCampaign;

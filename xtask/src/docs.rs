@@ -31,10 +31,9 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
     if made.exists() {
         fs::remove_dir_all(&made).map_err(at(&made))?;
     }
-    let arguments = ["run", "--release", "--quiet", "-p", "mapper-cli", "--", "reproduce", "--out"];
-    run(command(workspace::cargo(), &[&arguments[..], &[&*made.to_string_lossy()]].concat()))?;
-    let arguments = ["run", "--quiet", "-p", "mapper-sequence", "--example", "sequence_docs"];
-    let page = output(command(workspace::cargo(), &arguments))? + "\n";
+    let programs = build()?;
+    run(command(&programs.mapper, &["reproduce", "--out", &made.to_string_lossy()]))?;
+    let page = output(command(&programs.sequence_docs, &[]))? + "\n";
     write(&made.join("sequences.md"), page.as_bytes())?;
 
     // The README's picture is the map of the shipped campaign; the other campaigns map the same grid by other methods.
@@ -42,15 +41,11 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
     if runs.exists() {
         fs::remove_dir_all(&runs).map_err(at(&runs))?;
     }
-    let mut methods: Vec<String> =
-        ["run", "--release", "--quiet", "-p", "mapper-score", "--example", "methods_table", "--"]
-            .map(str::to_owned)
-            .into();
+    let mut methods: Vec<String> = Vec::new();
     for (name, campaign) in METHODS {
         let out = runs.join(campaign);
         let file = format!("campaigns/{campaign}.yaml");
-        let arguments = ["run", "--release", "--quiet", "-p", "mapper-cli", "--", "run", &file, "--out"];
-        run(command(workspace::cargo(), &[&arguments[..], &[&*out.to_string_lossy()]].concat()))?;
+        run(command(&programs.mapper, &["run", &file, "--out", &out.to_string_lossy()]))?;
         for run in fs::read_dir(&out).map_err(at(&out))? {
             let run = run.map_err(at(&out))?.path();
             methods.extend([(*name).to_owned(), run.to_string_lossy().into_owned()]);
@@ -61,7 +56,7 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
         }
     }
     let methods: Vec<&str> = methods.iter().map(String::as_str).collect();
-    let page = output(command(workspace::cargo(), &methods))? + "\n";
+    let page = output(command(&programs.methods_table, &methods))? + "\n";
     write(&made.join("methods.md"), page.as_bytes())?;
 
     let (new, old) = (contents(&made)?, contents(&docs)?);
@@ -91,6 +86,29 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
     }
     say(&format!("{}\n", differences.join("\n")));
     Ok(())
+}
+
+/// Programs that make documents.
+struct Programs {
+    mapper: PathBuf,
+    sequence_docs: PathBuf,
+    methods_table: PathBuf,
+}
+
+/// Builds them as the tests are built: what is computed is the same to the bit in every profile, and a clone that is
+/// being worked on has most of it already.
+fn build() -> Result<Programs, Error> {
+    // The whole workspace is named so that libraries have the features that they have in the tests.
+    let arguments = ["build", "--quiet", "--workspace", "--tests", "--bin", "mapper"];
+    let examples = ["--example", "sequence_docs", "--example", "methods_table"];
+    run(command(workspace::cargo(), &[&arguments[..], &examples].concat()))?;
+    let built = workspace::target_dir().join("debug");
+    let program = |name: &str| built.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+    Ok(Programs {
+        mapper: program("mapper"),
+        sequence_docs: program("examples/sequence_docs"),
+        methods_table: program("examples/methods_table"),
+    })
 }
 
 fn write(path: &Path, content: &[u8]) -> Result<(), Error> {

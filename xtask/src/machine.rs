@@ -56,6 +56,16 @@ pub fn prepare() -> Result<(), Error> {
     Ok(())
 }
 
+/// Whether tests can be run beside each other across programs.
+pub fn has_nextest() -> bool {
+    step::succeeds(&workspace::cargo(), &["nextest", "--version"])
+}
+
+/// Whether licences and sources of dependencies can be checked.
+pub fn has_deny() -> bool {
+    step::succeeds(&workspace::cargo(), &["deny", "--version"])
+}
+
 /// Whether a file system of limited size can be made here: the test of a full disk needs one.
 pub fn can_mount() -> bool {
     let target = workspace::target_dir();

@@ -1,12 +1,16 @@
-//! Chores of the repository: `cargo xtask test`, `docs` and `performance`.
+//! Chores of the repository: `cargo xtask quick`, `test`, `docs` and `performance`.
 
 mod docs;
 mod error;
 mod machine;
+mod offered;
 mod performance;
 mod python_env;
+mod quick;
 mod step;
+mod tally;
 mod test;
+mod test_programs;
 mod workspace;
 
 use std::process::ExitCode;
@@ -14,6 +18,7 @@ use std::process::ExitCode;
 const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
+  quick          formatting, lints and the tests that are fast: while working; names what it leaves out
   test           run every test of the repository; installs what they need, skips nothing
   docs           make the generated documents anew
   docs --check   fail where a generated document is not what the program makes now
@@ -25,6 +30,7 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let done = match arguments.as_slice() {
+        ["quick"] => quick::quick(),
         ["test"] => test::test(),
         ["docs"] => docs::docs(docs::Mode::Write),
         ["docs", "--check"] => docs::docs(docs::Mode::Check),

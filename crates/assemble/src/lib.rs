@@ -12,6 +12,7 @@ mod compare;
 mod error;
 mod grouping;
 mod map_fit;
+mod repeated_jumps;
 mod repeats;
 
 pub use assemble::assemble;
@@ -19,4 +20,5 @@ pub use compare::{ComparedLine, ComparedPlace, MapComparison, compare};
 pub use error::AssembleError;
 pub use grouping::Grouping;
 pub use map_fit::{MapFit, MapFitError, MapFitOptions, NearestPlace, fit_map, leave_out};
+pub use repeated_jumps::{RepeatedJump, repeated_jumps};
 pub use repeats::points_for_map;

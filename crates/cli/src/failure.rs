@@ -1,8 +1,9 @@
 //! Why a command ended early, with what to print and what to return.
 
 use crate::exit_code::Code;
-use mapper_campaign::{Campaign, CampaignError};
+use mapper_campaign::CampaignError;
 use mapper_core::BackendError;
+use mapper_session::{ErrorKind, SessionError};
 use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
@@ -46,29 +47,20 @@ impl Failure {
         }
     }
 
-    /// A backend that could not be made: a mistake in its settings is shown in the campaign's text.
-    pub fn of_backend(error: &BackendError, campaign: &Path) -> Self {
-        let BackendError::Settings { backend, path, message } = error else {
-            return Failure::new(Code::BadInput, error);
-        };
-        match std::fs::read_to_string(campaign) {
-            Ok(text) => {
-                let findings = mapper_campaign::backend_mistake(&text, campaign, backend, path, message);
-                Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
+    /// An error of a session that has to do with a campaign file: a mistake in the backend's settings or in the formats of
+    /// the map is shown in its text.
+    pub fn in_campaign(error: SessionError, campaign: &Path) -> Self {
+        let Ok(text) = std::fs::read_to_string(campaign) else { return error.into() };
+        let findings = match &error {
+            SessionError::Backend { source: BackendError::Settings { backend, path, message }, .. } => {
+                mapper_campaign::backend_mistake(&text, campaign, backend, path, message)
             }
-            Err(_) => Failure::new(Code::BadInput, error),
-        }
-    }
-
-    /// Formats of the map that the campaign asks for and nobody writes, at their place in its text.
-    pub fn check_formats(of: &Campaign, campaign: &Path) -> Result<(), Self> {
-        let known: Vec<&str> = mapper_exporters::EXPORTERS.iter().map(|format| format.name).collect();
-        let Some(format) = of.outputs.formats.iter().find(|format| !known.contains(&format.name())) else {
-            return Ok(());
+            SessionError::MapFormat { format, known } => {
+                mapper_campaign::format_mistake(&text, campaign, format, known)
+            }
+            _ => return error.into(),
         };
-        let text = std::fs::read_to_string(campaign).unwrap_or_default();
-        let findings = mapper_campaign::format_mistake(&text, campaign, format, &known);
-        Err(Failure::of_campaign(CampaignError::Mistakes(Box::new(findings))))
+        Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
     }
 
     /// Standard output was closed by its reader: a normal end of a pipe.
@@ -81,11 +73,6 @@ impl Failure {
         Failure { manner: Manner::Told, ..Failure::new(code, "") }
     }
 
-    /// What went wrong.
-    pub fn message(&self) -> &str {
-        &self.message
-    }
-
     /// Prints the message and gives the exit code.
     #[allow(clippy::print_stderr)]
     pub fn report(&self) -> ExitCode {
@@ -96,5 +83,22 @@ impl Failure {
             Manner::Sentence => eprintln!("mapper: {}", self.message),
         }
         ExitCode::from(self.code as u8)
+    }
+}
+
+impl From<SessionError> for Failure {
+    fn from(error: SessionError) -> Self {
+        let code = match error.kind() {
+            ErrorKind::Failure => Code::Failure,
+            ErrorKind::BadInput => Code::BadInput,
+            ErrorKind::NoPlan => Code::NoPlan,
+            ErrorKind::Rig => Code::Rig,
+            ErrorKind::BadRecording => Code::BadRecording,
+            ErrorKind::Interrupted => Code::Interrupted,
+        };
+        match error {
+            SessionError::Campaign(error) => Failure::of_campaign(error),
+            error => Failure::new(code, error),
+        }
     }
 }

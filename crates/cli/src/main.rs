@@ -1,40 +1,32 @@
 //! `mapper`: from one campaign file to a compressor map.
 //!
-//! One file per command in `commands`; `registry` alone names plug-ins; `assembly_line` turns a campaign into what
-//! each crate of the way needs.
+//! One file per command in `commands`: its options, its call, its words. What is done stands in `mapper-session`;
+//! `registry` alone names plug-ins.
 
-mod arguments;
-mod assembly_line;
 mod commands;
-mod drive;
 mod exit_code;
 mod failure;
-mod gap_arguments;
-mod history_picture;
+mod given;
 mod interrupt;
-mod map_comparison_picture;
-mod map_file;
-mod nightly_run;
-mod observers;
 mod output;
-mod plan_picture;
-mod predicted_method;
+mod progress;
 mod registry;
-mod repeated_jumps;
-mod results;
-mod run_directory;
-mod sequence_run;
-mod table;
-mod test_report;
-mod thermal_text;
-mod zero;
+mod subcommands;
 
 use clap::Parser;
 use std::process::ExitCode;
 
+/// From a campaign file to a complete turbocharger-compressor map, efficiency and heat transfer included.
+#[derive(Debug, Parser)]
+#[command(name = "mapper", version, after_help = exit_code::HELP, arg_required_else_help = true)]
+struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    command: commands::Command,
+}
+
 fn main() -> ExitCode {
-    let arguments = arguments::Arguments::parse();
-    match commands::dispatch(&arguments) {
+    match Arguments::parse().command.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }

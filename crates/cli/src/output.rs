@@ -4,7 +4,6 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
-use std::path::Path;
 
 /// Writes text to standard output. A closed pipe ends the command quietly.
 pub fn print(text: &str) -> Result<(), Failure> {
@@ -17,18 +16,5 @@ pub fn print(text: &str) -> Result<(), Failure> {
 
 /// Writes one JSON object and a line end to standard output.
 pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
-    print(&(to_json(value)? + "\n"))
-}
-
-/// Indented JSON.
-pub fn to_json(value: &impl Serialize) -> Result<String, Failure> {
-    serde_json::to_string_pretty(value)
-        .map_err(|error| Failure::new(Code::Failure, format!("failed to write JSON: {error}")))
-}
-
-/// Writes a file that is not there yet.
-pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    std::fs::File::create_new(path)
-        .and_then(|mut file| file.write_all(bytes))
-        .map_err(|error| Failure::new(Code::Failure, format!("failed to write {}: {error}", path.display())))
+    print(&mapper_session::json_text(value)?)
 }

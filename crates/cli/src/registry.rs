@@ -1,76 +1,42 @@
 //! The one place that names plug-ins.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
 use mapper_backends::{replay, virtual_lab};
-use mapper_campaign::Campaign;
 use mapper_core::{Backend, BackendError};
 use mapper_effects::ScriptEffect;
 use mapper_physics::effect::Effect;
-use mapper_physics::model::Model;
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use std::path::{Path, PathBuf};
+use mapper_session::{BackendContext, BackendPlugin, Registry, SessionError};
+use std::path::Path;
 use std::sync::Arc;
 
-/// What a backend is made from.
-pub struct BackendContext<'a> {
-    /// The campaign; its backend settings are the backend's alone to read.
-    pub campaign: &'a Campaign,
-    /// The nominal model.
-    pub model: &'a Model,
-}
-
-type MakeBackend = fn(&BackendContext<'_>) -> Result<Box<dyn Backend>, BackendError>;
-
-/// Every backend: name in campaigns, one line for people, constructor.
-pub const BACKENDS: &[(&str, &str, MakeBackend)] = &[
-    (virtual_lab::NAME, "simulated gas stand, needs nothing", make_virtual_lab),
-    (replay::NAME, "plays a recording back: {recording: FILE}", make_replay),
-];
-
-/// The backend that a campaign asks for.
-///
-/// # Errors
-/// [`BackendError::Settings`] where the name is unknown or the settings are wrong.
-pub fn make_backend(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, BackendError> {
-    let wanted = &context.campaign.backend.name;
-    match BACKENDS.iter().find(|(name, ..)| name == wanted) {
-        Some((_, _, make)) => make(context),
-        None => {
-            let known: Vec<&str> = BACKENDS.iter().map(|(name, ..)| *name).collect();
-            Err(settings_error(
-                wanted,
-                "",
-                format!("there is no such backend; there are {}", known.join(", ")),
-            ))
-        }
+/// Every plug-in of this program.
+pub fn registry() -> Registry {
+    Registry {
+        backends: vec![
+            BackendPlugin {
+                name: virtual_lab::NAME,
+                summary: "simulated gas stand, needs nothing",
+                make: make_virtual_lab,
+            },
+            BackendPlugin {
+                name: replay::NAME,
+                summary: "plays a recording back: {recording: FILE}",
+                make: make_replay,
+            },
+        ],
+        effects: mapper_effects::catalogue(),
+        read_effect,
     }
 }
 
-/// Every effect of the catalogue.
-pub fn effects() -> Vec<Arc<dyn Effect>> {
-    mapper_effects::catalogue()
-}
-
-/// Every effect of the catalogue, and those that scripts define.
-///
-/// # Errors
-/// A script that cannot be read, is no effect, or takes the name of another.
-pub fn effects_with(scripts: &[PathBuf]) -> Result<Vec<Arc<dyn Effect>>, Failure> {
-    let mut effects = effects();
-    for path in scripts {
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| Failure::new(Code::Failure, format!("{}: {error}", path.display())))?;
-        let scripted = ScriptEffect::new(&text, path).map_err(|error| Failure::new(Code::BadInput, error))?;
-        let id = &scripted.info().id;
-        if effects.iter().any(|effect| effect.info().id == *id) {
-            let message =
-                format!("{}: there is an effect `{id}` already; choose another name", path.display());
-            return Err(Failure::new(Code::BadInput, message));
-        }
-        effects.push(Arc::new(scripted));
-    }
-    Ok(effects)
+fn read_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
+    let text = std::fs::read_to_string(path).map_err(|source| SessionError::File {
+        action: "read",
+        path: path.to_owned(),
+        source,
+    })?;
+    let effect = ScriptEffect::new(&text, path).map_err(|error| SessionError::Effect(Box::new(error)))?;
+    Ok(Arc::new(effect))
 }
 
 fn make_virtual_lab(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, BackendError> {
@@ -86,7 +52,7 @@ fn make_virtual_lab(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, Ba
             .filter_map(|(channel, sensor)| Some((*channel, sensor.static_tap_pipe_diameter_m?)))
             .collect(),
         tolerances: campaign.tolerances,
-        effects: effects(),
+        effects: context.effects.to_vec(),
         seed: campaign.seed,
     };
     let settings = virtual_lab::read_settings(&campaign.backend.settings, nominal)?;
@@ -97,13 +63,13 @@ fn make_replay(context: &BackendContext<'_>) -> Result<Box<dyn Backend>, Backend
     let settings = &context.campaign.backend.settings;
     let Some(path) = settings.get("recording").and_then(|value| value.as_str()) else {
         let message = "write the path of an MCAP file, e.g. {recording: runs/x/recording.mcap}";
-        return Err(settings_error(replay::NAME, "recording", message.to_owned()));
+        return Err(settings_error(message.to_owned()));
     };
     let report = read_recording(Path::new(path), &ChannelMap::native(), &ReadOptions::default())
-        .map_err(|error| settings_error(replay::NAME, "recording", error.to_string()))?;
+        .map_err(|error| settings_error(error.to_string()))?;
     Ok(Box::new(replay::ReplayBackend::new(&report.recording)))
 }
 
-fn settings_error(backend: &str, path: &str, message: String) -> BackendError {
-    BackendError::Settings { backend: backend.to_owned(), path: path.to_owned(), message }
+fn settings_error(message: String) -> BackendError {
+    BackendError::Settings { backend: replay::NAME.to_owned(), path: "recording".to_owned(), message }
 }

@@ -12,6 +12,7 @@ mod lab;
 use lab::{Machine, campaign, measured};
 use mapper_core::{Channel, Method};
 use mapper_identify::{IdentifyConfig, identify_recording, one_fit};
+use mapper_numerics::statistics::median;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use std::fmt::Write;
@@ -51,11 +52,12 @@ fn main() {
     .unwrap();
     fit_s.sort_by(f64::total_cmp);
     times_s.sort_by(f64::total_cmp);
+    let median_s = median(&times_s).unwrap();
     println!(
         "{} points, {samples} samples: fastest {:.3} s, median {:.3} s of {rounds}",
         found.points.len(),
         times_s[0],
-        times_s[times_s.len() / 2]
+        median_s
     );
     println!("one fit of it: fastest {:.3} s, alpha_A {:.4}", fit_s[0], alone.alpha_area_ratio);
     let thermal = found.thermal.unwrap();
@@ -96,11 +98,7 @@ fn main() {
     std::fs::write(directory.join("samples.csv"), text).unwrap();
     let found = format!(
         "alpha_area_ratio,probe_diameter_m,fastest_s,median_s,fit_s,fit_alpha_area_ratio,fit_probe_diameter_m\n{alpha},{probe_m},{},{},{},{},{}\n",
-        times_s[0],
-        times_s[times_s.len() / 2],
-        fit_s[0],
-        alone.alpha_area_ratio,
-        alone.probe_diameter_m
+        times_s[0], median_s, fit_s[0], alone.alpha_area_ratio, alone.probe_diameter_m
     );
     std::fs::write(directory.join("found.csv"), found).unwrap();
     let mut points = "eta,truth_eta,fit_eta\n".to_owned();

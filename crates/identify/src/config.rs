@@ -2,6 +2,7 @@
 
 use mapper_core::{Channel, JointSettings, Method, ReferenceState, SettleBands, WindowRule};
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
+use mapper_numerics::coloured_noise::ColouredNoise;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -118,4 +119,9 @@ impl Default for Thresholds {
             end_mean_s: 2.0,
         }
     }
+}
+
+/// The declared noise, with what numerics know of it.
+pub(crate) fn coloured(colour: NoiseColour) -> ColouredNoise {
+    ColouredNoise::new(colour.first_order_share_ratio, colour.time_constant_s)
 }

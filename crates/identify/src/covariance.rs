@@ -6,7 +6,9 @@
 //! regressors (T1, Tc, flow, pressures) is in the residual and thus in the result.
 
 use crate::NoiseColour;
+use crate::config::coloured;
 use crate::fit::Fit;
+use mapper_numerics::coloured_noise::correlate;
 
 /// Variances of the residual's two parts, K2.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,8 +20,11 @@ pub(crate) struct NoiseVariances {
 impl NoiseVariances {
     /// A total variance, K2, split as declared.
     pub(crate) fn split(total_k2: f64, colour: NoiseColour) -> Self {
-        let share = colour.first_order_share_ratio * colour.first_order_share_ratio;
-        NoiseVariances { white_k2: (1.0 - share) * total_k2, first_order_k2: share * total_k2 }
+        let noise = coloured(colour);
+        NoiseVariances {
+            white_k2: noise.white_variance_ratio() * total_k2,
+            first_order_k2: noise.first_order_variance_ratio() * total_k2,
+        }
     }
 }
 
@@ -83,27 +88,6 @@ impl Correlation {
     }
 }
 
-/// `R x` with `R_ij = exp(-|t_i - t_j|/tau)`, in one pass forwards and one backwards.
-fn correlate(t_s: &[f64], x: &[f64], time_constant_s: f64) -> Vec<f64> {
-    let decay = |i: usize| ((t_s[i - 1] - t_s[i]) / time_constant_s).exp();
-    let mut sums = x.to_vec();
-    let mut carried = 0.0;
-    for i in 0..x.len() {
-        if i > 0 {
-            carried = (carried + x[i - 1]) * decay(i);
-        }
-        sums[i] += carried;
-    }
-    carried = 0.0;
-    for i in (0..x.len()).rev() {
-        if i + 1 < x.len() {
-            carried = (carried + x[i + 1]) * decay(i + 1);
-        }
-        sums[i] += carried;
-    }
-    sums
-}
-
 fn products(a: &[Vec<f64>; 2], b: &[Vec<f64>; 2]) -> [[f64; 2]; 2] {
     [0, 1].map(|i| [0, 1].map(|j| a[i].iter().zip(&b[j]).map(|(x, y)| x * y).sum()))
 }
@@ -114,20 +98,4 @@ fn multiply(a: &[[f64; 2]; 2], b: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
 
 fn trace(m: &[[f64; 2]; 2]) -> f64 {
     m[0][0] + m[1][1]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn two_passes_make_the_full_product() {
-        let t_s = [0.0, 0.1, 0.4, 1.5, 1.6];
-        let x = [1.0, -2.0, 0.5, 3.0, 1.0];
-        let found = correlate(&t_s, &x, 0.7);
-        for i in 0..5 {
-            let full: f64 = (0..5).map(|j| (-(t_s[i] - t_s[j]).abs() / 0.7).exp() * x[j]).sum();
-            assert!((found[i] - full).abs() < 1e-12);
-        }
-    }
 }

@@ -5,10 +5,11 @@ use crate::covariance::{Correlation, NoiseVariances};
 use crate::findings::{Findings, code};
 use crate::fit::{Fit, Geometry, fit};
 use crate::flow_drift::{FlowDrift, flow_drift};
-use crate::samples::{Samples, mean};
-use crate::window::{self, median};
+use crate::samples::Samples;
+use crate::window;
 use crate::{IdentifyConfig, commands};
 use mapper_core::{EstimateUncertainty, Recording, Window};
+use mapper_numerics::statistics::{mean, median, robust_sigma};
 
 /// Isentropic temperature rise over inlet temperature below which there is nothing to compress.
 const SMALLEST_RISE_RATIO: f64 = 1e-3;
@@ -130,20 +131,16 @@ fn fit_without_outliers(
     findings: &mut Findings,
 ) -> Option<(Samples, Fit)> {
     let first = fit(&samples, geometry)?;
-    let mut sizes: Vec<f64> = first.residual_k.iter().map(|r| r.abs()).collect();
-    let limit_k = (OUTLIER_SIGMAS * median(&mut sizes)? / 0.6745).max(OUTLIER_K);
+    let limit_k = (OUTLIER_SIGMAS * robust_sigma(&first.residual_k)?).max(OUTLIER_K);
     let last = samples.len().saturating_sub(1);
-    let mut around = Vec::with_capacity(2 * OUTLIER_NEIGHBOURS + 1);
     let kept: Vec<bool> = (0..samples.len())
         .map(|i| {
             let residual_k = first.residual_k[i];
             if residual_k.abs() <= limit_k {
                 return true;
             }
-            around.clear();
             let nearby = i.saturating_sub(OUTLIER_NEIGHBOURS)..=(i + OUTLIER_NEIGHBOURS).min(last);
-            around.extend_from_slice(&first.residual_k[nearby]);
-            median(&mut around).is_some_and(|middle_k| (residual_k - middle_k).abs() <= limit_k)
+            median(&first.residual_k[nearby]).is_some_and(|middle_k| (residual_k - middle_k).abs() <= limit_k)
         })
         .collect();
     let inlier = |i: usize| kept.get(i).copied().unwrap_or(false);

@@ -2,9 +2,9 @@
 
 use crate::findings::{Findings, code};
 use crate::plausible::plausible;
-use crate::samples::mean;
 use crate::{IdentifyConfig, StepError, taps};
 use mapper_core::{Channel, Recording, Series, StepMarker};
+use mapper_numerics::statistics::mean;
 
 /// The operating point at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]

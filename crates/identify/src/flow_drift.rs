@@ -2,7 +2,8 @@
 //! viscosity at the wall.
 
 use crate::fit::Fit;
-use crate::samples::{Samples, mean};
+use crate::samples::Samples;
+use mapper_numerics::statistics::mean;
 use mapper_physics::compression::compressed_k;
 use mapper_physics::nusselt::coefficient_w_m2k;
 use mapper_physics::params::{CompressorParams, Params};

@@ -26,6 +26,7 @@ mod steady;
 mod taps;
 mod window;
 mod zero;
+mod zero_outcome;
 
 pub use config::{DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Thresholds};
 pub use error::{IdentifyError, StepError};
@@ -39,3 +40,4 @@ pub use mapper_core::{
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
 pub use zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};
+pub use zero_outcome::ZeroOutcome;

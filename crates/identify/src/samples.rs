@@ -4,6 +4,7 @@ use crate::IdentifyConfig;
 use crate::plausible::plausible;
 use crate::taps;
 use mapper_core::{Channel, Recording, Series, Window};
+use mapper_numerics::statistics::mean;
 use mapper_physics::compression::isentropic_rise_ratio;
 
 /// Longest stretch between two samples of a channel that is bridged by interpolation, s: slower loggers have 1 Hz.
@@ -107,11 +108,6 @@ impl Samples {
         let change = mean(&column[late..])? - mean(&column[..early])?;
         change.is_finite().then_some(change)
     }
-}
-
-/// Mean of a column; `None` for an empty one.
-pub(crate) fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 /// A channel at given times: its own values where it was sampled together with them, else interpolated over short

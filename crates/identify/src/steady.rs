@@ -4,10 +4,12 @@
 //! the dynamic method is for (fig. 5 of the paper).
 
 use crate::IdentifyConfig;
+use crate::config::coloured;
 use crate::dynamic::{Estimate, enough};
 use crate::findings::{Findings, code};
-use crate::samples::{Samples, mean};
+use crate::samples::Samples;
 use mapper_core::{Channel, EstimateUncertainty, Recording, Window};
+use mapper_numerics::statistics::{mean, standard_deviation};
 use mapper_physics::compression::isentropic_rise_ratio;
 
 /// Stretch at the end of a step over which temperatures must not drift, s: noise of 0.1 K leaves their slope uncertain by
@@ -146,14 +148,9 @@ pub(crate) fn uncertainty(means: &Means, samples: &Samples, config: &IdentifyCon
         .map(|i| samples.t1_k[i] * samples.rise_ratio[i] / (samples.t2_k[i] - samples.t1_k[i]))
         .filter(|eta| eta.is_finite())
         .collect();
-    let n = etas.len() as f64;
-    let centre = mean(&etas).unwrap_or(0.0);
-    let scatter = etas.iter().map(|eta| (eta - centre).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    let share = config.noise_colour.first_order_share_ratio.powi(2);
+    let scatter = standard_deviation(&etas).unwrap_or(0.0).powi(2);
     let span_s = samples.t_s.last().copied().unwrap_or(0.0) - samples.t_s.first().copied().unwrap_or(0.0);
-    // Variance of a mean: white noise averages over samples, first-order noise over twice its time constant.
-    let independent = (span_s / (2.0 * config.noise_colour.time_constant_s)).max(1.0);
-    let averaging = (1.0 - share) / n.max(1.0) + share / independent;
+    let averaging = coloured(config.noise_colour).variance_of_mean(etas.len(), span_s);
     let noise_square = scatter.max(declared_square) * averaging;
     EstimateUncertainty { noise_standard_error: noise_square.sqrt(), bias_standard_error: bias_square.sqrt() }
 }

@@ -3,6 +3,7 @@
 use crate::commands;
 use crate::findings::{Findings, code};
 use mapper_core::{Channel, Recording, Series, SettleBands, StepMarker, Window, WindowRule};
+use mapper_numerics::statistics::median;
 use mapper_physics::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 
 /// Most blocks looked at, from the step's end backwards: bounds the work on absurd step times.
@@ -79,24 +80,10 @@ fn settled(
 /// Medians over blocks counted backwards from `end_s`; NaN where a block has no value.
 fn block_medians(series: Option<&Series>, end_s: f64, count: usize) -> Vec<f64> {
     let Some(series) = series else { return vec![f64::NAN; count] };
-    let mut scratch: Vec<f64> = Vec::new();
     (0..count)
         .map(|block| {
             let range = series.range(end_s - (block + 1) as f64 * BLOCK_S, end_s - block as f64 * BLOCK_S);
-            scratch.clear();
-            scratch.extend(series.values[range].iter().filter(|value| value.is_finite()));
-            median(&mut scratch).unwrap_or(f64::NAN)
+            median(series.values[range].iter().filter(|value| value.is_finite())).unwrap_or(f64::NAN)
         })
         .collect()
-}
-
-/// Median; `None` for an empty slice. Reorders the slice.
-pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return None;
-    }
-    // The upper of the two middle values where their number is even: no matter here.
-    let (_, value, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(*value)
 }

@@ -5,9 +5,11 @@
 //! have in common stays unknown; it shifts an efficiency by its share of the absolute temperature only, which is nothing.
 
 use crate::IdentifyConfig;
+use crate::config::coloured;
 use crate::plausible::plausible;
-use crate::samples::mean;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, Series};
+use mapper_numerics::coloured_noise::variance_of_mean;
+use mapper_numerics::statistics::mean;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -131,10 +133,14 @@ pub fn isothermal_zero(
                 });
             }
             let declared = config.declared.get(channel).copied().unwrap_or_default();
-            // The first-order part of the noise averages over twice its time constant only.
-            let share = config.noise_colour.first_order_share_ratio;
-            let averaged = share * (2.0 * config.noise_colour.time_constant_s / (end_s - start_s)).sqrt();
-            let own = sigma.hypot(declared.noise_sigma * averaged);
+            // The white part of the noise averages over hundreds of samples.
+            let colour = coloured(config.noise_colour);
+            let averaged = variance_of_mean(
+                colour.first_order_variance_ratio(),
+                end_s - start_s,
+                colour.time_constant_s,
+            );
+            let own = sigma.hypot(declared.noise_sigma * averaged.sqrt());
             readings.push((*channel, reading.mean, own, own.hypot(declared.offset_sigma)));
         }
         let weight: f64 = readings.iter().map(|(.., total)| total.powi(-2)).sum();

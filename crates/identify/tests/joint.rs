@@ -2,9 +2,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
+#[path = "common/honesty.rs"]
+mod honesty;
 #[path = "common/lab.rs"]
 mod lab;
 
+use honesty::Honesty;
 use lab::{Campaign, Machine, campaign, eighteen, measured};
 use mapper_core::{Channel, IdentifiedPoint, Method, Recording, ThermalModel, Verdict};
 use mapper_identify::{
@@ -129,7 +132,8 @@ fn a_fixed_share_stays_what_it_was_declared() {
 #[test]
 fn with_noise_on_t2_the_share_is_found() {
     let campaign = campaign(&eighteen(), 120.0, Machine { alpha: 0.2, ..Machine::default() });
-    let (mut alpha_squares, mut eta_squares, mut held, mut count) = (0.0, 0.0, 0.0, 0.0);
+    let (mut alpha_squares, mut eta_squares, mut count) = (0.0, 0.0, 0.0);
+    let mut honesty = Honesty::default();
     let seeds = 5;
     for seed in 0..seeds {
         let mut rng = Pcg64::seed_from_u64(seed);
@@ -153,17 +157,16 @@ fn with_noise_on_t2_the_share_is_found() {
         }
         for (point, truth) in points.iter().zip(&campaign.truth) {
             eta_squares += (point.eta.unwrap() - truth.eta).powi(2);
-            held += f64::from(u8::from(
-                point.eta_low.unwrap() <= truth.eta && truth.eta <= point.eta_high.unwrap(),
-            ));
+            honesty.add(point.eta, point.eta_low, point.eta_high, truth.eta);
             count += 1.0;
         }
     }
     let alpha_rms = f64::sqrt(alpha_squares / seeds as f64);
     let eta_rms = f64::sqrt(eta_squares / count);
     assert!(alpha_rms < 0.015 && eta_rms < 0.006, "alpha {alpha_rms}, eta {eta_rms}");
-    // All points of a seed share one alpha_A: five seeds hold between three fifths and all of them.
-    assert!(held / count >= 0.6, "held {}", held / count);
+    // The model is exact here but for the noise, which the method does not count on: intervals may be wider than the
+    // errors, so that all but one of a seed's eighteen hold; but no wider than four times what is asked of the errors.
+    assert!(honesty.held() > 0.94 && honesty.said_rms() < 0.012, "{} {}", honesty.held(), honesty.said_rms());
 }
 
 /// Noise on every channel, its slow part included: a probe that is ideal is not taken for a slow one (noise in T1 and
@@ -245,8 +248,11 @@ fn a_campaign_of_one_step_gives_what_it_can() {
     let config = IdentifyConfig { window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 }, ..joint() };
     let Identified { points, .. } = identify_recording(&campaign.recording, &config).unwrap();
     let point = points[0].as_ref().unwrap();
-    // Settled, alone: nothing tells efficiency from heat.
-    assert!(point.verdict != Verdict::Good || point.eta.is_none(), "{point:?}");
+    // Settled, alone: nothing tells efficiency from heat. There is a number, doubted, whose interval is of no use but holds.
+    assert_eq!(point.verdict, Verdict::Doubtful, "{point:?}");
+    assert!(codes(point).contains(&code::SMALL_GRADIENT), "{point:?}");
+    let (low, high) = point.eta_low.zip(point.eta_high).unwrap();
+    assert!((low..=high).contains(&campaign.truth[0].eta) && high - low > 0.2, "{low} to {high}");
 }
 
 /// Noise, then what a step may suffer, in step 7 of eighteen: what the point then says, and that the others stay right.
@@ -371,13 +377,15 @@ fn a_share_that_the_recording_can_not_tell_is_no_number() {
     assert_eq!(thermal.alpha_area_ratio.value, None, "{:?}", thermal.alpha_area_ratio);
 }
 
-/// Noise, offsets and a gain as declared, 8 campaigns of 18 points: the intervals of eta and of h hold. What a campaign's
-/// points share is one draw for all of them, so 144 points count for some twenty: of twenty at 95 % fewer than 16 hold in
-/// 0.3 % of the cases. `examples/joint_study.rs` has the hundreds of campaigns.
+/// Noise, offsets and a gain as declared, 8 campaigns of 18 points: the intervals of eta and of h hold, and are no wider
+/// than they have to be. What a campaign's points share is one draw for all of them, so 144 points count for some twenty.
+/// Of twenty at 95 % fewer than 16 hold in 0.3 % of the cases; of twenty at 68 % fewer than 7 or more than 18 in 0.3 % and
+/// 0.5 %; their root mean square is known to 16 %, of which three are allowed. `examples/joint_study.rs` has the hundreds
+/// of campaigns.
 #[test]
-fn intervals_of_a_campaign_with_noise_and_offsets_hold() {
+fn intervals_of_a_campaign_with_noise_and_offsets_hold_and_are_not_too_wide() {
     let campaign = campaign(&eighteen(), 120.0, Machine::default());
-    let (mut eta_held, mut h_held, mut count) = (0.0, 0.0, 0.0);
+    let (mut eta, mut h) = (Honesty::default(), Honesty::default());
     for seed in 100..108 {
         let mut rng = Pcg64::seed_from_u64(seed);
         let (mut recording, mut declared) = measured(&campaign.recording, 1.0, 1.0, &mut rng);
@@ -387,12 +395,14 @@ fn intervals_of_a_campaign_with_noise_and_offsets_hold() {
         declared.get_mut(&Channel::CompressorFlow).unwrap().gain_sigma_ratio = 0.005;
         let (points, _) = found(&recording, &IdentifyConfig { declared, ..joint() });
         for (point, truth) in points.iter().zip(&campaign.truth) {
-            let (low, high) = point.eta_low.zip(point.eta_high).unwrap();
-            eta_held += f64::from(u8::from(low <= truth.eta && truth.eta <= high));
-            let (low, high) = point.h_low_w_m2k.zip(point.h_high_w_m2k).unwrap();
-            h_held += f64::from(u8::from(low <= truth.h_w_m2k && truth.h_w_m2k <= high));
-            count += 1.0;
+            eta.add(point.eta, point.eta_low, point.eta_high, truth.eta);
+            h.add(point.h_w_m2k, point.h_low_w_m2k, point.h_high_w_m2k, truth.h_w_m2k);
         }
     }
-    assert!(eta_held / count >= 0.8 && h_held / count >= 0.8, "eta {eta_held}, h {h_held} of {count}");
+    for (name, honesty) in [("eta", eta), ("h", h)] {
+        let (held, within_one, width) = (honesty.held(), honesty.within_one(), honesty.width());
+        assert!(held >= 0.8, "{name}: {held} hold");
+        assert!((0.35..=0.92).contains(&within_one), "{name}: {within_one} within one standard error");
+        assert!((0.6..=1.6).contains(&width), "{name}: {width} as wide as the errors");
+    }
 }

@@ -7,6 +7,7 @@ mod common;
 use common::{RIG, add_noise};
 use mapper_core::{Channel, IdentifiedPoint, Recording, StepKind, StepMarker};
 use mapper_identify::{DeclaredUncertainty, IdentifyConfig, WindowRule, code, identify};
+use mapper_numerics::statistics::median;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::simulate::{Simulator, Watch};
@@ -135,7 +136,7 @@ fn figures_of(mut errors: Vec<f64>, worst_good: f64) -> Figures {
     errors.sort_by(f64::total_cmp);
     let within = errors.iter().filter(|error| **error <= 0.01).count();
     Figures {
-        median: 0.5 * (errors[(errors.len() - 1) / 2] + errors[errors.len() / 2]),
+        median: median(&errors).unwrap(),
         within_one_point: within as f64 / errors.len() as f64,
         worst: errors[errors.len() - 1],
         worst_good,

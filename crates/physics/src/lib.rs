@@ -5,7 +5,6 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod air;
-mod bracket;
 pub mod characteristic;
 pub mod closed_form_map;
 pub mod compression;

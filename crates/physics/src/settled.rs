@@ -9,6 +9,7 @@
 //! identification lives on. Bands: Burke et al., section 3.
 
 use mapper_core::SettleBands;
+use mapper_numerics::statistics::robust_sigma;
 
 /// Blocks over which recorded signals are condensed (to their median) before they are compared, s.
 pub const BLOCK_S: f64 = 1.0;
@@ -56,25 +57,12 @@ pub fn with_bands<T>(
 /// median ignores where the signal really moves. 0 where there are too few.
 pub fn noise_spread(blocks: &[f64]) -> f64 {
     let lag = NOISE_LAG_BLOCKS;
-    let mut differences: Vec<f64> = (2 * lag..blocks.len())
-        .map(|i| (blocks[i] - 2.0 * blocks[i - lag] + blocks[i - 2 * lag]).abs())
-        .filter(|difference| difference.is_finite())
-        .collect();
-    // Median of |x| of a normal distribution is 0.6745 sigma; the second difference has variance 6.
-    let sigma = block_median(&mut differences).map_or(0.0, |median| median / 0.6745 / 6f64.sqrt());
+    let differences = (2 * lag..blocks.len())
+        .map(|i| blocks[i] - 2.0 * blocks[i - lag] + blocks[i - 2 * lag])
+        .filter(|difference| difference.is_finite());
+    // The second difference has six times the variance of a value.
+    let sigma = robust_sigma(differences).map_or(0.0, |sigma| sigma / 6f64.sqrt());
     NOISE_SPREAD_SIGMAS * sigma
-}
-
-/// The value that stands for a block; `None` for an empty one. Reorders the slice.
-///
-/// The upper of the two middle values where their number is even: a value that was measured.
-pub fn block_median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return None;
-    }
-    let (_, value, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(*value)
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Whether a point has settled, seen in the samples alone.
 
 use mapper_core::{Channel, SampleBatch, SettleBands};
-use mapper_physics::settled::{BLOCK_S, block_median, noise_spread, settled_count, with_bands};
+use mapper_numerics::statistics::median;
+use mapper_physics::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 use std::collections::VecDeque;
 
 /// Samples over which drifts are judged, s.
@@ -88,7 +89,7 @@ impl SettleWatch {
                 blocks[block].push(value);
             }
         }
-        blocks.iter_mut().map(|values| block_median(values).unwrap_or(f64::NAN)).collect()
+        blocks.iter().map(|values| median(values).unwrap_or(f64::NAN)).collect()
     }
 
     /// Least-squares slope of a column, 1/s; `None` without two usable samples.

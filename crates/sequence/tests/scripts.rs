@@ -10,6 +10,8 @@ use mapper_sequence::{
     Hold, Script, ScriptError, SequenceError, SequenceRequest, SequenceRunner, SequenceStep, StepResult,
     api_markdown, check,
 };
+use std::sync::Arc;
+use std::time::Duration;
 
 fn request() -> SequenceRequest {
     let points = [50e3, 110e3, 150e3].into_iter().flat_map(|speed_rpm| {
@@ -268,13 +270,30 @@ fn notes_are_bounded() {
     assert!(notes[999].contains("left out"));
 }
 
-/// A runner that goes away in mid-run takes its script along, whatever the script catches.
+/// A runner that goes away in mid-run takes its script along, whatever the script catches. The script's side holds the
+/// bench, so that the bench is gone when the script is. A script that stays would keep the runner waiting for ever: a
+/// minute is some thousand times what it takes.
 #[test]
 fn a_script_whose_caller_goes_ends() {
-    let mut runner = start("loop { try { jump(grid()[0]); } catch { } }");
+    let held = Arc::new(());
+    let with_the_script = Arc::clone(&held);
+    let order = move |points: &[OperatingPoint]| {
+        let _ = &with_the_script;
+        Ok(points.to_vec())
+    };
+    let script =
+        Script { path: "test.rhai".into(), text: "loop { try { jump(grid()[0]); } catch { } }".to_owned() };
+    let mut runner = SequenceRunner::start(script, Bench { order: Box::new(order), ..bench() }).unwrap();
     let step = runner.next_step(None).unwrap().unwrap();
     runner.next_step(Some(answer(&step))).unwrap().unwrap();
-    drop(runner);
+    assert_eq!(Arc::strong_count(&held), 2, "the script is at its second jump");
+    let (tell, told) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        drop(runner);
+        tell.send(()).unwrap();
+    });
+    told.recv_timeout(Duration::from_secs(60)).expect("the script goes on without its caller");
+    assert_eq!(Arc::strong_count(&held), 1, "the runner has gone and its script has not");
 }
 
 #[test]

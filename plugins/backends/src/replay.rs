@@ -1,5 +1,6 @@
 //! A recording played back as if it were a rig.
 
+use crate::setpoint_limits;
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Group, Recording, RigDescription,
     RigMode, SampleBatch, Series, Setpoints,
@@ -124,6 +125,7 @@ impl Backend for ReplayBackend {
     }
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
+        setpoint_limits::check(setpoints)?;
         self.need_armed("set")?;
         self.pending = Some(*setpoints);
         Ok(())

@@ -4,6 +4,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod circles;
 mod dependencies;
 mod drift;
 mod drift_refusals;
@@ -20,5 +21,6 @@ mod plans;
 mod recordings;
 mod sequences;
 mod shipped_campaign;
+mod sizes;
 mod sources;
 mod zero;

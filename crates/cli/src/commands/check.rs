@@ -1,54 +1,68 @@
 //! `mapper check`.
 
-use crate::arguments::CheckArguments;
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::registry::{BackendContext, make_backend};
-use crate::{assembly_line, output, table};
+use crate::{output, registry};
+use clap::Args;
 use mapper_campaign::CampaignError;
+use mapper_report::duration;
 use mapper_sequence::Script;
+use mapper_session::{check_formats, nominal_model, soak_s};
 use serde_json::json;
+use std::path::PathBuf;
 
-/// Checks a campaign and says in a line what it is.
-pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
-    let campaign = match mapper_campaign::load(&arguments.campaign) {
-        Ok(campaign) => campaign,
-        Err(CampaignError::Mistakes(findings)) if arguments.json => {
-            output::print_json(
-                &json!({"campaign": null, "findings": findings.list, "omitted": findings.omitted}),
-            )?;
-            return Err(Failure::told(Code::BadInput));
+/// Check a campaign file and print all its mistakes, each with its line and what would be right
+#[derive(Debug, Args)]
+pub struct Check {
+    /// Campaign file (YAML)
+    pub campaign: PathBuf,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Check {
+    /// Checks a campaign and says in a line what it is.
+    pub fn run(&self) -> Result<(), Failure> {
+        let campaign = match mapper_campaign::load(&self.campaign) {
+            Ok(campaign) => campaign,
+            Err(CampaignError::Mistakes(findings)) if self.json => {
+                let mistakes =
+                    json!({"campaign": null, "findings": findings.list, "omitted": findings.omitted});
+                output::print_json(&mistakes)?;
+                return Err(Failure::told(Code::BadInput));
+            }
+            Err(error) => return Err(Failure::of_campaign(error)),
+        };
+        let model = nominal_model(&campaign)?;
+        // The backend reads its settings now, so that a mistake in them does not wait for the night.
+        registry::registry()
+            .make_backend(&campaign, &model)
+            .map_err(|error| Failure::in_campaign(error, &self.campaign))?;
+        check_formats(&campaign).map_err(|error| Failure::in_campaign(error, &self.campaign))?;
+        if let Some(source) = &campaign.sequence {
+            let script = Script { path: source.path.clone(), text: source.text.clone() };
+            mapper_sequence::check(&script).map_err(|error| Failure::new(Code::BadInput, error))?;
         }
-        Err(error) => return Err(Failure::of_campaign(error)),
-    };
-    let model = assembly_line::nominal_model(&campaign)?;
-    // The backend reads its settings now, so that a mistake in them does not wait for the night.
-    make_backend(&BackendContext { campaign: &campaign, model: &model })
-        .map_err(|error| Failure::of_backend(&error, &arguments.campaign))?;
-    Failure::check_formats(&campaign, &arguments.campaign)?;
-    if let Some(source) = &campaign.sequence {
-        let script = Script { path: source.path.clone(), text: source.text.clone() };
-        mapper_sequence::check(&script).map_err(|error| Failure::new(Code::BadInput, error))?;
+        let timing = &campaign.timing;
+        let steps_s = campaign.points.len() as f64 * timing.dwell_s;
+        let duration_s = soak_s(&campaign) + timing.warm_up_s + steps_s + timing.cool_down_s;
+        if self.json {
+            return output::print_json(&json!({
+                "campaign": campaign.name,
+                "points": campaign.points.len(),
+                "minutes": duration_s / 60.0,
+                "backend": campaign.backend.name,
+                "findings": [],
+                "omitted": 0,
+            }));
+        }
+        output::print(&format!(
+            "{}: no mistakes. {} points on `{}` in {} of the rig's time.\n",
+            self.campaign.display(),
+            campaign.points.len(),
+            campaign.backend.name,
+            duration(duration_s),
+        ))
     }
-    let timing = &campaign.timing;
-    let soak_s = campaign.zero.map_or(0.0, |zero| zero.duration_s);
-    let duration_s =
-        soak_s + timing.warm_up_s + campaign.points.len() as f64 * timing.dwell_s + timing.cool_down_s;
-    if arguments.json {
-        return output::print_json(&json!({
-            "campaign": campaign.name,
-            "points": campaign.points.len(),
-            "minutes": duration_s / 60.0,
-            "backend": campaign.backend.name,
-            "findings": [],
-            "omitted": 0,
-        }));
-    }
-    output::print(&format!(
-        "{}: no mistakes. {} points on `{}` in {} of the rig's time.\n",
-        arguments.campaign.display(),
-        campaign.points.len(),
-        campaign.backend.name,
-        table::duration(duration_s),
-    ))
 }

@@ -1,19 +1,26 @@
 //! `mapper gap`.
 
-use super::{gap_blind, gap_diagnose, gap_effects};
 use crate::failure::Failure;
-use crate::gap_arguments::{BlindCommand, GapArguments, GapCommand};
+use crate::subcommands::subcommands;
+use clap::Args;
 
-/// Runs the sub-command that was asked for.
-pub fn gap(arguments: &GapArguments) -> Result<(), Failure> {
-    match &arguments.command {
-        GapCommand::Diagnose(arguments) => gap_diagnose::diagnose(arguments),
-        GapCommand::Blind(arguments) => match &arguments.command {
-            BlindCommand::Make(arguments) => gap_blind::make(arguments),
-            BlindCommand::Run(arguments) => gap_blind::run(arguments),
-            BlindCommand::Score(arguments) => gap_blind::score(arguments),
-            BlindCommand::Calibrate(arguments) => gap_blind::calibrate(arguments),
-        },
-        GapCommand::Effects(arguments) => gap_effects::effects(arguments),
+mod blind;
+mod diagnose;
+mod effects;
+
+/// Diagnose the gap between nominal model and rig, and check that diagnosis on withheld data
+#[derive(Debug, Args)]
+pub struct Gap {
+    /// What to do.
+    #[command(subcommand)]
+    command: GapCommand,
+}
+
+subcommands! { GapCommand: diagnose::Diagnose, blind::Blind, effects::Effects }
+
+impl Gap {
+    /// Runs the sub-command that was asked for.
+    pub fn run(&self) -> Result<(), Failure> {
+        self.command.run()
     }
 }

@@ -1,12 +1,57 @@
 //! `mapper history`: what the nights gave.
 
-use crate::arguments::HistoryArguments;
-use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{history_picture, output, table};
-use mapper_history::{Filter, History, ListedRun, Metric, median};
+use crate::output;
+use clap::Args;
+use mapper_history::{Filter, ListedRun, Metric};
+use mapper_report::{groups_text, history_svg, runs_text, time};
+use mapper_session::{SessionError, write_new};
 use serde_json::json;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// List, filter and draw what the nightly runs gave
+#[derive(Debug, Args)]
+pub struct History {
+    /// The history
+    #[arg(long, value_name = "FILE", default_value = "runs/history.db")]
+    pub db: PathBuf,
+    /// Only this machine, or campaign
+    #[arg(long, value_name = "NAME")]
+    pub machine: Option<String>,
+    /// Only this method
+    #[arg(long, value_name = "METHOD")]
+    pub method: Option<String>,
+    /// Show this figure instead of the usual ones; may be given more than once
+    #[arg(long, value_name = "FIGURE", value_parser = figure)]
+    pub figure: Vec<Metric>,
+    /// Only nights from this day on (UTC)
+    #[arg(long, value_name = "YYYY-MM-DD", value_parser = day)]
+    pub since: Option<jiff::Timestamp>,
+    /// A row for each run, instead of the medians over the seeds
+    #[arg(long)]
+    pub runs: bool,
+    /// Draw the trends into this new SVG file
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn figure(text: &str) -> Result<Metric, String> {
+    Metric::find(text).ok_or_else(|| {
+        let names: Vec<&str> = Metric::ALL.into_iter().map(Metric::name).collect();
+        format!("there is no figure `{text}`; there are {}", names.join(", "))
+    })
+}
+
+/// Midnight UTC at the begin of a day.
+fn day(text: &str) -> Result<jiff::Timestamp, String> {
+    let day: jiff::civil::Date = text.parse().map_err(|error| format!("{error}; write e.g. 2026-11-21"))?;
+    let midnight = day.to_zoned(jiff::tz::TimeZone::UTC).map_err(|error| error.to_string())?;
+    Ok(midnight.timestamp())
+}
 
 /// Figures that are shown where none is asked for.
 const SHOWN: [Metric; 6] = [
@@ -18,27 +63,26 @@ const SHOWN: [Metric; 6] = [
     Metric::HMedianError,
 ];
 
-/// Lists, filters, prints JSON, draws.
-pub fn history(arguments: &HistoryArguments) -> Result<(), Failure> {
-    let fail = |error| Failure::new(Code::Failure, error);
-    let history = History::open_existing(&arguments.db).map_err(fail)?;
-    let filter = Filter {
-        machine: arguments.machine.clone(),
-        method: arguments.method.clone(),
-        since_ms: arguments.since.map(|since| since.as_millisecond()),
-    };
-    let runs = history.runs(&filter).map_err(fail)?;
-    let figures: Vec<Metric> =
-        if arguments.figure.is_empty() { SHOWN.to_vec() } else { arguments.figure.clone() };
-    if let Some(path) = &arguments.svg {
-        output::write_new(path, history_picture::svg(&runs, &figures).as_bytes())?;
+impl History {
+    /// Lists, filters, prints JSON, draws.
+    pub fn run(&self) -> Result<(), Failure> {
+        let history = mapper_history::History::open_existing(&self.db).map_err(SessionError::from)?;
+        let filter = Filter {
+            machine: self.machine.clone(),
+            method: self.method.clone(),
+            since_ms: self.since.map(|since| since.as_millisecond()),
+        };
+        let runs = history.runs(&filter).map_err(SessionError::from)?;
+        let figures: Vec<Metric> = if self.figure.is_empty() { SHOWN.to_vec() } else { self.figure.clone() };
+        if let Some(path) = &self.svg {
+            write_new(path, history_svg(&runs, &figures).as_bytes())?;
+        }
+        if self.json {
+            let runs: Vec<serde_json::Value> = runs.iter().map(run_json).collect();
+            return output::print_json(&json!({"history": self.db, "runs": runs}));
+        }
+        output::print(&if self.runs { runs_text(&runs, &figures) } else { groups_text(&runs, &figures) })
     }
-    if arguments.json {
-        return output::print_json(
-            &json!({"history": arguments.db, "runs": runs.iter().map(run_json).collect::<Vec<_>>()}),
-        );
-    }
-    output::print(&if arguments.runs { runs_text(&runs, &figures) } else { groups_text(&runs, &figures) })
 }
 
 fn run_json(listed: &ListedRun) -> serde_json::Value {
@@ -54,92 +98,4 @@ fn run_json(listed: &ListedRun) -> serde_json::Value {
         "campaign_sha256": run.campaign_sha256, "model_sha256": run.model_sha256,
         "failure": run.failure, "figures": figures,
     })
-}
-
-fn time(ms: i64, format: &str) -> String {
-    jiff::Timestamp::from_millisecond(ms)
-        .map_or_else(|_| "-".to_owned(), |time| time.strftime(format).to_string())
-}
-
-fn heads(first: &[&str], figures: &[Metric]) -> Vec<String> {
-    let figure_heads = figures.iter().map(|figure| format!("{figure} {}", figure.shown_unit().0));
-    first.iter().map(|head| (*head).to_owned()).chain(figure_heads).collect()
-}
-
-fn shown(figure: Metric, value: Option<f64>) -> String {
-    let decimals = match figure {
-        Metric::GoodPoints | Metric::HMean | Metric::HTrueMean | Metric::RigMinutes => 1,
-        _ => 3,
-    };
-    table::number(value.map(|value| figure.shown_unit().1 * value), decimals)
-}
-
-fn state(listed: &ListedRun) -> &'static str {
-    match (listed.night.accepted, listed.night.moved) {
-        (true, _) => "accepted",
-        (_, true) => "moved",
-        _ => "",
-    }
-}
-
-/// A row per night, campaign and method: medians over the seeds.
-fn groups_text(runs: &[ListedRun], figures: &[Metric]) -> String {
-    let mut groups: BTreeMap<(i64, i64, &str, &str), Vec<&ListedRun>> = BTreeMap::new();
-    for listed in runs {
-        let key = (
-            listed.night.started_ms,
-            listed.night.id,
-            listed.run.key.campaign.as_str(),
-            listed.run.key.method.as_str(),
-        );
-        groups.entry(key).or_default().push(listed);
-    }
-    let mut table =
-        table::with_heads(&heads(&["night (UTC)", "campaign", "method", "seeds", "night is"], figures));
-    for ((started_ms, _, campaign, method), group) in &groups {
-        let mut row = vec![
-            time(*started_ms, "%Y-%m-%d %H:%M"),
-            (*campaign).to_owned(),
-            (*method).to_owned(),
-            group.len().to_string(),
-            group.first().map(|listed| state(listed)).unwrap_or_default().to_owned(),
-        ];
-        row.extend(figures.iter().map(|figure| {
-            shown(
-                *figure,
-                median(
-                    &mut group
-                        .iter()
-                        .filter_map(|listed| listed.run.figures.get(figure).copied())
-                        .collect::<Vec<f64>>(),
-                ),
-            )
-        }));
-        table.add_row(row);
-    }
-    format!("{table}\n\n{} rows of {} runs; figures are medians over the seeds.\n", groups.len(), runs.len())
-}
-
-/// A row per run.
-fn runs_text(runs: &[ListedRun], figures: &[Metric]) -> String {
-    let mut table =
-        table::with_heads(&heads(&["night (UTC)", "campaign", "method", "seed", "night is"], figures));
-    let mut failures = String::new();
-    for listed in runs {
-        let key = &listed.run.key;
-        let started = time(listed.night.started_ms, "%Y-%m-%d %H:%M");
-        if let Some(failure) = &listed.run.failure {
-            failures.push_str(&format!("{started} {key} failed: {failure}\n"));
-        }
-        let mut row = vec![
-            started,
-            key.campaign.clone(),
-            key.method.clone(),
-            key.seed.to_string(),
-            state(listed).to_owned(),
-        ];
-        row.extend(figures.iter().map(|figure| shown(*figure, listed.run.figures.get(figure).copied())));
-        table.add_row(row);
-    }
-    format!("{table}\n\n{failures}{} runs.\n", runs.len())
 }

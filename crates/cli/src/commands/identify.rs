@@ -1,124 +1,85 @@
 //! `mapper identify`: from a recording to points, without a rig.
 
-use crate::arguments::IdentifyArguments;
-use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::results;
-use crate::thermal_text;
-use crate::zero::{self, Zero};
-use crate::{assembly_line, output, run_directory};
-use mapper_campaign::Campaign;
-use mapper_core::ReferenceState;
-use mapper_identify::{IdentifyConfig, WindowRule};
-use mapper_record::{ChannelMap, ReadOptions, ReadReport, RecordError, read_recording};
+use crate::given::{channel_map, given_campaign};
+use crate::{output, registry};
+use clap::{Args, ValueEnum};
+use mapper_core::Method;
+use mapper_report::{points_text, thermal_text, zero_text};
+use mapper_session::{Recorded, Session};
 use serde_json::json;
-use std::path::Path;
+use std::path::PathBuf;
 
-/// Identifies all steps of a recording.
-pub fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
-    let path = run_directory::recording_of(&arguments.recording);
-    let map = match &arguments.channels {
-        Some(file) => channel_map(file)?,
-        None => ChannelMap::native(),
-    };
-    let report = read_recording(&path, &map, &ReadOptions::default()).map_err(bad_recording)?;
-    let (mut config, campaign) = config(arguments, &map, &report)?;
-    if let Some(method) = arguments.method {
-        config.method = method.into();
-    }
-    let display = campaign.as_ref().map(|campaign| campaign.display.clone()).unwrap_or_default();
-    let (recording, config, zero) = match &campaign {
-        Some(campaign) => zero::apply(report.recording, config, campaign),
-        None => (report.recording, config, Zero::NotAsked),
-    };
-    let identified = mapper_identify::identify_recording(&recording, &config)
-        .map_err(|error| Failure::new(Code::BadRecording, error))?;
-    let thermal = identified.thermal;
-    let points = identified.points.into_iter().filter_map(Result::ok).collect();
-    let points = mapper_score::score(&path, &recording.steps, points).map_err(bad_recording)?;
-    if arguments.json {
-        return output::print_json(&json!({
-            "recording": path,
-            "reference": config.reference,
-            "points": points,
-            "thermal": thermal,
-            "zero": zero.json(),
-            "score": mapper_score::summarise(&points),
-            "recording_warnings": report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        }));
-    }
-    let mut text = results::points_text(&points, &display);
-    if let Some(thermal) = &thermal {
-        text.push_str(&thermal_text::thermal_text(thermal));
-    }
-    text.push_str(&zero.text());
-    for warning in &report.warnings {
-        text.push_str(&format!("recording: {warning}\n"));
-    }
-    output::print(&text)
+/// Identify efficiency and heat transfer from a run directory or any MCAP recording
+#[derive(Debug, Args)]
+pub struct Identify {
+    /// Run directory, or MCAP file
+    pub recording: PathBuf,
+    /// Where a recording made by another program holds the rig's channels (YAML)
+    #[arg(long, value_name = "FILE")]
+    pub channels: Option<PathBuf>,
+    /// Campaign that says machine, sensors and window, instead of the one attached to the recording
+    #[arg(long, value_name = "FILE")]
+    pub campaign: Option<PathBuf>,
+    /// How to identify [default: the campaign's method, or dynamic]
+    #[arg(long, value_enum)]
+    pub method: Option<MethodArgument>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
 }
 
-/// A file named by the campaign of a recording. The sequence script, which identification does not need, may be missing.
-pub fn read_beside(path: &Path) -> std::io::Result<String> {
-    let text = std::fs::read_to_string(path);
-    if path.extension().is_some_and(|extension| extension == "rhai") {
-        Ok(text.unwrap_or_default())
-    } else {
-        text
+impl Identify {
+    /// Identifies all steps of a recording.
+    pub fn run(&self) -> Result<(), Failure> {
+        let map = channel_map(self.channels.as_deref())?;
+        let given = given_campaign(self.campaign.as_deref())?;
+        let recorded = Recorded::read(&self.recording, &map, given.as_ref())?;
+        let path = recorded.path.clone();
+        let warnings: Vec<String> = recorded.read.warnings.iter().map(ToString::to_string).collect();
+        let display = recorded.campaign.as_ref().map(|campaign| campaign.display.clone()).unwrap_or_default();
+        let registry = registry::registry();
+        let found = Session::new(&registry).identify(recorded, &map, self.method.map(Method::from))?;
+        if self.json {
+            return output::print_json(&json!({
+                "recording": path,
+                "reference": found.config.reference,
+                "points": found.points,
+                "thermal": found.thermal,
+                "zero": found.zero,
+                "score": found.score,
+                "recording_warnings": warnings,
+            }));
+        }
+        let mut text = points_text(&found.points, &display);
+        if let Some(thermal) = &found.thermal {
+            text.push_str(&thermal_text(thermal));
+        }
+        text.push_str(&zero_text(&found.zero));
+        for warning in &warnings {
+            text.push_str(&format!("recording: {warning}\n"));
+        }
+        output::print(&text)
     }
 }
 
-pub(super) fn bad_recording(error: RecordError) -> Failure {
-    let code = match error {
-        RecordError::Read { .. } => Code::Failure,
-        _ => Code::BadRecording,
-    };
-    Failure::new(code, error)
+/// Methods as written on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodArgument {
+    /// Conventional: apparent efficiency from the temperature rise
+    Steady,
+    /// Efficiency and heat-transfer coefficient from the transient (Burke et al.)
+    Dynamic,
+    /// All points together: what they share is fitted over all of them
+    Joint,
 }
 
-pub fn channel_map(file: &Path) -> Result<ChannelMap, Failure> {
-    let text = std::fs::read_to_string(file).map_err(|error| {
-        Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display()))
-    })?;
-    ChannelMap::from_yaml(&text)
-        .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", file.display())))
-}
-
-/// Machine, sensors and window: from the campaign given, the channel map, or the campaign in the recording.
-fn config(
-    arguments: &IdentifyArguments,
-    map: &ChannelMap,
-    report: &ReadReport,
-) -> Result<(IdentifyConfig, Option<Campaign>), Failure> {
-    if let Some(path) = &arguments.campaign {
-        let campaign = mapper_campaign::load(path).map_err(Failure::of_campaign)?;
-        return Ok((assembly_line::identification(&campaign), Some(campaign)));
+impl From<MethodArgument> for Method {
+    fn from(argument: MethodArgument) -> Self {
+        match argument {
+            MethodArgument::Steady => Method::Steady,
+            MethodArgument::Dynamic => Method::Dynamic,
+            MethodArgument::Joint => Method::Joint,
+        }
     }
-    if let Some(machine) = &map.machine {
-        let config = IdentifyConfig {
-            alpha_area_ratio: machine.alpha_area_ratio,
-            internal_area_m2: machine.compressor_internal_area_m2,
-            reference: map.reference.unwrap_or(ReferenceState::SAE),
-            window: map.window.map_or_else(WindowRule::default, |window| WindowRule::Fixed {
-                start_s: window.start_s,
-                end_s: window.end_s,
-            }),
-            declared: map.sensors.clone(),
-            noise_colour: map.noise_colour.unwrap_or_default(),
-            ..IdentifyConfig::default()
-        };
-        return Ok((config, None));
-    }
-    if let Some(text) = &report.campaign_text {
-        let origin = arguments.recording.join(run_directory::CAMPAIGN);
-        let campaign = mapper_campaign::check(text, &origin, &read_beside).map_err(|findings| {
-            Failure::of_campaign(mapper_campaign::CampaignError::Mistakes(Box::new(findings)))
-        })?;
-        return Ok((assembly_line::identification(&campaign), Some(campaign)));
-    }
-    Err(Failure::new(
-        Code::BadInput,
-        "the machine is not known: the recording carries no campaign. Give `--campaign FILE`, or `machine:` with \
-         `compressor_internal_area` in the channel map",
-    ))
 }

@@ -1,58 +1,59 @@
 //! `mapper reproduce`: the paper's figures on the nominal model.
 
-use crate::arguments::ReproduceArguments;
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::output;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use crate::progress::Progress;
+use clap::Args;
 use mapper_reproduce::{FIGURES, FigureResult, picture_path};
 use serde_json::json;
-use std::io::IsTerminal;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Makes the page and its pictures, and says in a line per statement what came out.
-pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
-    let bar = ProgressBar::with_draw_target(
-        Some(FIGURES.len() as u64),
-        if std::io::stderr().is_terminal() {
-            ProgressDrawTarget::stderr()
-        } else {
-            ProgressDrawTarget::hidden()
-        },
-    );
-    if let Ok(style) = ProgressStyle::with_template("{msg:12} [{wide_bar}] {pos}/{len} figures") {
-        bar.set_style(style.progress_chars("=> "));
-    }
-    let results = mapper_reproduce::reproduce(|number| {
-        bar.set_message(format!("figure {number}"));
-        bar.inc(1);
-    })
-    .map_err(|error| Failure::new(Code::Failure, error))?;
-    bar.finish_and_clear();
-    for result in &results {
-        write(&arguments.out.join(picture_path(result)), result.svg.as_bytes())?;
-    }
-    let page = arguments.out.join("reproduction.md");
-    write(&page, mapper_reproduce::markdown(&results).as_bytes())?;
-    if arguments.json {
-        return output::print_json(&json!({
-            "page": page,
-            "figures": results.iter().map(figure_json).collect::<Vec<_>>(),
-        }));
-    }
-    let mut text = String::new();
-    for result in &results {
-        text.push_str(&format!("Figure {}: {}\n", result.number, result.title));
-        for statement in &result.statements {
-            text.push_str(&format!(
-                "  {:8} {}\n           {}\n",
-                statement.verdict.to_string(),
-                statement.paper,
-                statement.here
-            ));
+/// Redo the paper's figures 5 to 10 and 12 on the nominal model, beside what the paper states
+#[derive(Debug, Args)]
+pub struct Reproduce {
+    /// Directory for `reproduction.md` and the pictures; files of an earlier reproduction there are replaced
+    #[arg(long, value_name = "DIR", default_value = "reproduction")]
+    pub out: PathBuf,
+    /// Print what the paper states beside what came out as one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Reproduce {
+    /// Makes the page and its pictures, and says in a line per statement what came out.
+    pub fn run(&self) -> Result<(), Failure> {
+        let progress = Progress::new();
+        let mut done = 0;
+        let results = mapper_reproduce::reproduce(|_| {
+            done += 1;
+            progress.pieces(done, FIGURES.len());
+        });
+        progress.clear();
+        let results = results.map_err(|error| Failure::new(Code::Failure, error))?;
+        for result in &results {
+            write(&self.out.join(picture_path(result)), result.svg.as_bytes())?;
         }
+        let page = self.out.join("reproduction.md");
+        write(&page, mapper_reproduce::markdown(&results).as_bytes())?;
+        if self.json {
+            let figures: Vec<serde_json::Value> = results.iter().map(figure_json).collect();
+            return output::print_json(&json!({"page": page, "figures": figures}));
+        }
+        let mut text = String::new();
+        for result in &results {
+            text.push_str(&format!("Figure {}: {}\n", result.number, result.title));
+            for statement in &result.statements {
+                text.push_str(&format!(
+                    "  {:8} {}\n           {}\n",
+                    statement.verdict.to_string(),
+                    statement.paper,
+                    statement.here
+                ));
+            }
+        }
+        output::print(&format!("{text}\n{}\n", page.display()))
     }
-    output::print(&format!("{text}\n{}\n", page.display()))
 }
 
 fn figure_json(result: &FigureResult) -> serde_json::Value {

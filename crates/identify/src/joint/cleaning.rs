@@ -3,8 +3,8 @@
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
 use crate::samples::Samples;
-use crate::window::median;
 use mapper_core::Channel;
+use mapper_numerics::statistics::{median_of_sorted, robust_sigma};
 
 /// Samples on either side whose median a spike is held against.
 const NEIGHBOURS: usize = 7;
@@ -79,11 +79,10 @@ fn spikes_of(column: &[f64], smallest: f64) -> Vec<usize> {
         if let Some(going) = i.checked_sub(NEIGHBOURS + 1).and_then(|before| column.get(before)) {
             sorted.remove(place(&sorted, *going));
         }
-        off.push(value - sorted.get(sorted.len() / 2).copied().unwrap_or(*value));
+        off.push(value - median_of_sorted(&sorted).unwrap_or(*value));
     }
-    let mut sizes: Vec<f64> = off.iter().map(|off| off.abs()).collect();
-    let Some(middle) = median(&mut sizes) else { return Vec::new() };
-    let limit = (SIGMAS * middle / 0.6745).max(smallest);
+    let Some(sigma) = robust_sigma(&off) else { return Vec::new() };
+    let limit = (SIGMAS * sigma).max(smallest);
     (0..off.len()).filter(|i| off[*i].abs() > limit).collect()
 }
 

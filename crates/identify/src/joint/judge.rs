@@ -5,7 +5,7 @@ use crate::findings::{Findings, code};
 use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
 use crate::joint::smoothness::{Judged, STRAIN_SIGMAS, Smoothed};
 use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
-use crate::samples::mean;
+use mapper_numerics::statistics::{mean, median, rms};
 
 /// Whitened mean square above which a step is doubted.
 const DOUBT_SQUARE: f64 = 2.0;
@@ -50,8 +50,7 @@ fn slow_square(problem: &Problem<'_>, member: &Member<'_>) -> Option<f64> {
 /// Takes steps that fit far worse than the others out of what is shared; true where that changed anything.
 pub(crate) fn exclude(problem: &mut Problem<'_>) -> bool {
     let squares: Vec<f64> = problem.members.iter().map(|member| mean_square(problem, member)).collect();
-    let mut sorted = squares.clone();
-    let Some(middle) = crate::window::median(&mut sorted) else { return false };
+    let Some(middle) = median(&squares) else { return false };
     let limit = EXCLUDE_SQUARE * middle.max(1.0);
     let mut changed = false;
     // Never more than a third: then it is the model that is wrong, not the steps.
@@ -174,9 +173,7 @@ pub(crate) fn doubts(
             ));
         }
     }
-    let deviations: Vec<f64> =
-        problem.members.iter().map(|member| member.local[LN_DEVIATION].powi(2)).collect();
-    let scatter = mean(&deviations).unwrap_or(0.0).sqrt();
+    let scatter = rms(problem.members.iter().map(|member| member.local[LN_DEVIATION])).unwrap_or(0.0);
     if problem.setting.with_law && scatter > LAW_SCATTER_RATIO {
         doubts.push(format!("the points scatter by {:.1} % about the convection law", 100.0 * scatter));
     }

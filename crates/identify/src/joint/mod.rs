@@ -7,6 +7,7 @@
 
 pub(crate) mod cleaning;
 pub(crate) mod explained;
+pub(crate) mod input_noise;
 pub(crate) mod judge;
 pub(crate) mod model;
 pub(crate) mod parameters;
@@ -20,7 +21,6 @@ pub(crate) mod smoothness;
 pub(crate) mod solve;
 pub(crate) mod start;
 pub(crate) mod surface;
-pub(crate) mod whitening;
 
 use crate::dynamic::{self, Estimate};
 use crate::end_state::EndState;
@@ -28,9 +28,9 @@ use crate::findings::{Findings, code};
 use crate::joint::parameters::{FLOW_GAIN, OFFSETS, PROBE_MM2, SHARED};
 use crate::joint::smoothness::{Judged, Smoothed};
 use crate::joint::solve::{Covariance, FULLY, Problem, ROUGHLY};
-use crate::samples::mean;
 use crate::{IdentifyConfig, commands};
 use mapper_core::{Choice, EstimateUncertainty, JointSettings, Recording, ThermalModel, Window};
+use mapper_numerics::statistics::rms;
 
 /// Fits before the last one.
 const ROUNDS: usize = 3;
@@ -105,17 +105,13 @@ pub(crate) fn estimate(
             |read: fn(&rows::Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
         let prediction =
             problem.setting.predict(&member.course, &problem.shared, &member.local, &[false; SHARED], false);
-        let squares: Vec<f64> = member
-            .measured_k
-            .iter()
-            .zip(&prediction.t2_k)
-            .map(|(measured, found)| (measured - found).powi(2))
-            .collect();
+        let residual =
+            member.measured_k.iter().zip(&prediction.t2_k).map(|(measured, found)| measured - found);
         estimates[step.position] = Estimate {
             eta: Some((eta, Some(eta_error))),
             h_w_m2k: Some((h_w_m2k, Some(h_error))),
             window: first.zip(last).map(|(first, last)| Window { start_s: first.t_s, end_s: last.t_s }),
-            residual_rms_k: mean(&squares).map(f64::sqrt),
+            residual_rms_k: rms(residual),
             dt2_k: change(|row| row.t2_k),
             dtc_k: change(|row| row.tc_k),
         };

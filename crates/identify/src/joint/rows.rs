@@ -1,11 +1,13 @@
 //! One step condensed to block means, with where on the map each of them lies.
 
 use crate::IdentifyConfig;
+use crate::config::coloured;
 use crate::end_state::EndState;
-use crate::joint::smoothing::smooth;
-use crate::joint::whitening::RowNoise;
-use crate::samples::{Samples, mean};
+use crate::joint::smoothing::Smoother;
+use crate::samples::Samples;
 use mapper_core::{Channel, Recording, Window};
+use mapper_numerics::coloured_noise::BlockNoise;
+use mapper_numerics::statistics::mean;
 
 /// Block over which samples are averaged before they are fitted, s: a quarter of what sensor noise remembers, and far
 /// below anything that moves in a window.
@@ -33,7 +35,7 @@ pub(crate) struct Row {
     pub(crate) flow_kg_s: f64,
     /// Corrected speed and flow.
     pub(crate) place: (f64, f64),
-    pub(crate) noise: RowNoise,
+    pub(crate) noise: BlockNoise,
 }
 
 /// One step with what the fit needs of it.
@@ -92,7 +94,7 @@ pub(crate) fn condensed(
             p2_pa: of(&samples.p2_pa),
             flow_kg_s,
             place: place(config, speed_rpm, flow_kg_s, t1_k, p1_pa),
-            noise: RowNoise::of_mean(config.noise_colour, count, block_s),
+            noise: BlockNoise::of_mean(coloured(config.noise_colour), count, block_s),
         });
         start = end;
     }
@@ -116,6 +118,25 @@ pub(crate) fn condensed(
     };
     let usable = end.place.0 > 0.0 && end.place.1 > 0.0 && rows.iter().all(|row| row.place.0.is_finite());
     usable.then_some(StepRows { position, rows, end })
+}
+
+/// Smooths T1, Tc, P1, P2, flow and the place on the map.
+fn smooth(rows: &mut [Row]) {
+    let t_s: Vec<f64> = rows.iter().map(|row| row.t_s).collect();
+    let smoother = Smoother::new(&t_s);
+    let mut column = |read: fn(&Row) -> f64, write: fn(&mut Row, f64)| {
+        let raw: Vec<f64> = rows.iter().map(read).collect();
+        for (row, value) in rows.iter_mut().zip(smoother.apply(&raw)) {
+            write(row, value);
+        }
+    };
+    column(|row| row.t1_k, |row, value| row.t1_k = value);
+    column(|row| row.tc_k, |row, value| row.tc_k = value);
+    column(|row| row.p1_pa, |row, value| row.p1_pa = value);
+    column(|row| row.p2_pa, |row, value| row.p2_pa = value);
+    column(|row| row.flow_kg_s, |row, value| row.flow_kg_s = value);
+    column(|row| row.place.0, |row, value| row.place.0 = value);
+    column(|row| row.place.1, |row, value| row.place.1 = value);
 }
 
 fn place(config: &IdentifyConfig, speed_rpm: f64, flow_kg_s: f64, t1_k: f64, p1_pa: f64) -> (f64, f64) {

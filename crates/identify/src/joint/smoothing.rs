@@ -4,7 +4,6 @@
 //! "explain" it by a lag that smooths the prediction, and a slope by a smaller one. Over ten seconds nothing that really
 //! moves in a window is more than a cubic; noise that remembers two seconds is.
 
-use crate::joint::rows::Row;
 use nalgebra::{Matrix4, Vector4};
 
 /// Half of the stretch of time that a local cubic is fitted to, s.
@@ -61,23 +60,4 @@ impl Smoother {
             })
             .collect()
     }
-}
-
-/// Smooths T1, Tc, P1, P2, flow and the place on the map.
-pub(crate) fn smooth(rows: &mut [Row]) {
-    let t_s: Vec<f64> = rows.iter().map(|row| row.t_s).collect();
-    let smoother = Smoother::new(&t_s);
-    let mut column = |read: fn(&Row) -> f64, write: fn(&mut Row, f64)| {
-        let raw: Vec<f64> = rows.iter().map(read).collect();
-        for (row, value) in rows.iter_mut().zip(smoother.apply(&raw)) {
-            write(row, value);
-        }
-    };
-    column(|row| row.t1_k, |row, value| row.t1_k = value);
-    column(|row| row.tc_k, |row, value| row.tc_k = value);
-    column(|row| row.p1_pa, |row, value| row.p1_pa = value);
-    column(|row| row.p2_pa, |row, value| row.p2_pa = value);
-    column(|row| row.flow_kg_s, |row, value| row.flow_kg_s = value);
-    column(|row| row.place.0, |row, value| row.place.0 = value);
-    column(|row| row.place.1, |row, value| row.place.1 = value);
 }

@@ -6,13 +6,17 @@ use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
     ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, SHARED, SURFACE, SharedVector,
 };
-use crate::joint::whitening::Whitening;
+use mapper_numerics::coloured_noise::WhiteningFilter;
+use mapper_numerics::least_squares::{Arrow, ArrowBlock, Damping, DampingRule, Reduced};
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 
 /// Most iterations: a good start needs about ten.
 const MOST_ITERATIONS: usize = 60;
 /// Relative decrease of the cost below which the search ends.
 const ENOUGH_RATIO: f64 = 1e-10;
+/// Of the search for a step: bold, since the start is good and the model nearly linear.
+const DAMPING: DampingRule =
+    DampingRule { start: 1e-4, growth: 10.0, relief: 0.1, renewed: 1e-8, least: 1e-12, most: 1e8, tries: 12 };
 /// Decrease in squares of standard deviations that is enough for a fit that only leads to another, or is held against
 /// standard errors.
 pub(crate) const ROUGHLY: f64 = 1e-4;
@@ -25,7 +29,7 @@ pub(crate) struct Member<'a> {
     pub(crate) course: Course<'a>,
     /// Measured T2 of each row, K.
     pub(crate) measured_k: Vec<f64>,
-    pub(crate) whitening: Whitening,
+    pub(crate) whitening: WhiteningFilter,
     /// What the shared parameters make of the point's efficiency: the surface's terms at the step's end, and for each
     /// offset what it does to the efficiency found. So the surface goes through the points as the readings have them, and
     /// its smoothness says nothing of the offsets, which bend a map as well as nature does.
@@ -57,20 +61,10 @@ pub(crate) struct Problem<'a> {
     pub(crate) extra_variances: SharedVector,
 }
 
-/// A step's part of the normal equations.
-#[derive(Debug, Clone)]
-struct Block {
-    own: Matrix4<f64>,
-    /// Own by shared, only the active ones.
-    mixed: Matrix4xX<f64>,
-    right: Vector4<f64>,
-}
-
+/// The normal equations where the parameters stand, and the cost there.
 struct Normal {
     cost: f64,
-    shared: DMatrix<f64>,
-    right: DVector<f64>,
-    blocks: Vec<Block>,
+    equations: Arrow<LOCAL>,
 }
 
 /// Covariance of everything, as far as it is needed.
@@ -174,16 +168,19 @@ impl Problem<'_> {
         let m = fitted.len();
         let mut normal = Normal {
             cost: self.shared_cost(&self.shared),
-            shared: DMatrix::zeros(m, m),
-            right: DVector::zeros(m),
-            blocks: Vec::with_capacity(self.members.len()),
+            equations: Arrow {
+                shared: DMatrix::zeros(m, m),
+                right: DVector::zeros(m),
+                blocks: Vec::with_capacity(self.members.len()),
+            },
         };
+        let equations = &mut normal.equations;
         for (row, index) in fitted.iter().enumerate() {
             let prior = self.priors[*index];
-            normal.shared[(row, row)] += prior.weight();
-            normal.right[row] += prior.weight() * (prior.mean - self.shared[*index]);
+            equations.shared[(row, row)] += prior.weight();
+            equations.right[row] += prior.weight() * (prior.mean - self.shared[*index]);
             if *index == PROBE_MM2 {
-                normal.right[row] += 0.5 * self.explained.at(self.shared[PROBE_MM2]).1;
+                equations.right[row] += 0.5 * self.explained.at(self.shared[PROBE_MM2]).1;
             }
         }
         let surface_weight = 1.0 / (self.surface_sigma * self.surface_sigma);
@@ -195,8 +192,12 @@ impl Problem<'_> {
         for member in &self.members {
             let (residual, columns) = self.residual(member, &self.shared, &member.local, Some(&wanted));
             let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-            let mut block =
-                Block { own: Matrix4::zeros(), mixed: Matrix4xX::zeros(m), right: Vector4::zeros() };
+            let mut block = ArrowBlock {
+                own: Matrix4::zeros(),
+                mixed: Matrix4xX::zeros(m),
+                right: Vector4::zeros(),
+                shares: member.shares,
+            };
             for i in 0..LOCAL {
                 let column = &columns[SHARED + i];
                 for j in i..LOCAL {
@@ -232,50 +233,20 @@ impl Problem<'_> {
                 if !member.shares {
                     continue;
                 }
-                normal.right[a] += product(&columns[*index], &residual) + surface_weight * off * term(*index);
+                equations.right[a] +=
+                    product(&columns[*index], &residual) + surface_weight * off * term(*index);
                 for (b, other) in fitted.iter().enumerate().skip(a) {
                     let value = product(&columns[*index], &columns[*other])
                         + surface_weight * term(*index) * term(*other);
-                    normal.shared[(a, b)] += value;
+                    equations.shared[(a, b)] += value;
                     if a != b {
-                        normal.shared[(b, a)] += value;
+                        equations.shared[(b, a)] += value;
                     }
                 }
             }
-            normal.blocks.push(block);
+            equations.blocks.push(block);
         }
         normal
-    }
-
-    /// Changes of the shared and of each step's parameters with damping; `None` where the equations are singular.
-    fn change(&self, normal: &Normal, damping: f64) -> Option<(DVector<f64>, Vec<Vector4<f64>>)> {
-        let mut reduced = normal.shared.clone();
-        let mut right = normal.right.clone();
-        for i in 0..reduced.nrows() {
-            reduced[(i, i)] *= 1.0 + damping;
-        }
-        let mut inverses = Vec::with_capacity(normal.blocks.len());
-        for (block, member) in normal.blocks.iter().zip(&self.members) {
-            let mut own = block.own;
-            for i in 0..LOCAL {
-                own[(i, i)] *= 1.0 + damping;
-            }
-            let inverse = own.cholesky()?.inverse();
-            if member.shares {
-                let folded = block.mixed.transpose() * inverse;
-                reduced -= &folded * &block.mixed;
-                right -= &folded * block.right;
-            }
-            inverses.push(inverse);
-        }
-        let shared = if reduced.nrows() == 0 { DVector::zeros(0) } else { reduced.cholesky()?.solve(&right) };
-        let own = normal
-            .blocks
-            .iter()
-            .zip(&inverses)
-            .map(|(block, inverse)| inverse * (block.right - &block.mixed * &shared))
-            .collect();
-        Some((shared, own))
     }
 
     fn cost(&self, shared: &SharedVector, locals: &[LocalVector]) -> f64 {
@@ -288,7 +259,7 @@ impl Problem<'_> {
     /// [`ROUGHLY`] and [`FULLY`].
     pub(crate) fn minimise(&mut self, enough_square: f64) -> Option<f64> {
         let mut fitted = self.fitted();
-        let mut damping = 1e-4;
+        let mut damping = Damping::new(DAMPING);
         let mut best = f64::INFINITY;
         for _ in 0..MOST_ITERATIONS {
             let normal = self.normal(&fitted);
@@ -296,12 +267,8 @@ impl Problem<'_> {
             if !best.is_finite() {
                 return None;
             }
-            let mut accepted = None;
-            for _ in 0..12 {
-                let Some((change, own)) = self.change(&normal, damping) else {
-                    damping *= 10.0;
-                    continue;
-                };
+            let trial = |damping| {
+                let (change, own) = normal.equations.step(damping)?;
                 let mut shared = self.shared;
                 for (row, index) in fitted.iter().enumerate() {
                     shared[*index] = (shared[*index] + change[row]).max(self.lowest[*index]);
@@ -313,17 +280,9 @@ impl Problem<'_> {
                     .map(|(member, change)| std::array::from_fn(|i| member.local[i] + change[i]))
                     .collect();
                 let cost = self.cost(&shared, &locals);
-                if cost <= best * (1.0 + 1e-14) {
-                    accepted = Some((shared, locals, cost));
-                    damping = (damping * 0.1).max(1e-12);
-                    break;
-                }
-                damping = (damping * 10.0).max(1e-8);
-                if damping > 1e8 {
-                    break;
-                }
-            }
-            let Some((shared, locals, cost)) = accepted else { break };
+                (cost <= best * (1.0 + 1e-14)).then_some((shared, locals, cost))
+            };
+            let Some((shared, locals, cost)) = damping.search(trial) else { break };
             // A parameter on its bound rests there as long as the others are searched.
             fitted.retain(|index| shared[*index] > self.lowest[*index]);
             for (active, (value, lowest)) in self.active.iter_mut().zip(shared.iter().zip(&self.lowest)) {
@@ -360,12 +319,7 @@ impl Problem<'_> {
     pub(crate) fn information(&self, index: usize) -> Option<f64> {
         let fitted = self.fitted();
         let row = fitted.iter().position(|other| *other == index)?;
-        let normal = self.normal(&fitted);
-        let mut reduced = normal.shared.clone();
-        for (block, _) in normal.blocks.iter().zip(&self.members).filter(|(_, member)| member.shares) {
-            let inverse = block.own.cholesky()?.inverse();
-            reduced -= block.mixed.transpose() * inverse * &block.mixed;
-        }
+        let reduced = self.normal(&fitted).equations.reduced(0.0)?.matrix;
         let variance = reduced.cholesky()?.inverse()[(row, row)];
         Some(1.0 / variance - self.priors[index].weight())
     }
@@ -376,16 +330,8 @@ impl Problem<'_> {
     /// covariance).
     pub(crate) fn covariance(&self) -> Option<Covariance> {
         let fitted = self.unknown();
-        let normal = self.normal(&fitted);
-        let mut reduced = normal.shared.clone();
-        let mut inverses = Vec::new();
-        for (block, member) in normal.blocks.iter().zip(&self.members) {
-            let inverse = block.own.cholesky()?.inverse();
-            if member.shares {
-                reduced -= block.mixed.transpose() * inverse * &block.mixed;
-            }
-            inverses.push(inverse);
-        }
+        let equations = self.normal(&fitted).equations;
+        let Reduced { matrix: reduced, inverses, .. } = equations.reduced(0.0)?;
         let sought = fitted.iter().filter(|index| !(OFFSETS..SURFACE).contains(*index)).count();
         let carried = fitted.len() - sought;
         let mut shared = DMatrix::zeros(fitted.len(), fitted.len());
@@ -416,8 +362,12 @@ impl Problem<'_> {
         shared.view_mut((0, sought), (sought, carried)).copy_from(&mixed);
         shared.view_mut((sought, 0), (carried, sought)).copy_from(&mixed.transpose());
         shared.view_mut((sought, sought), (carried, carried)).copy_from(&spread);
-        let answers: Vec<Matrix4xX<f64>> =
-            normal.blocks.iter().zip(&inverses).map(|(block, inverse)| -(inverse * &block.mixed)).collect();
+        let answers: Vec<Matrix4xX<f64>> = equations
+            .blocks
+            .iter()
+            .zip(&inverses)
+            .map(|(block, inverse)| -(inverse * &block.mixed))
+            .collect();
         let own = answers
             .iter()
             .zip(&inverses)

@@ -4,7 +4,8 @@ use crate::dynamic::{self, Estimate};
 use crate::end_state::EndState;
 use crate::findings::{Findings, code};
 use crate::joint::cleaning::cleaned;
-use crate::joint::explained::{self, Explained};
+use crate::joint::explained::Explained;
+use crate::joint::input_noise;
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
     ALPHA, ALPHA_SIGMA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION,
@@ -15,11 +16,12 @@ use crate::joint::parsimony::NO_EXTRA;
 use crate::joint::rows::{StepRows, condensed};
 use crate::joint::solve::{Member, Problem};
 use crate::joint::surface::{SurfaceScale, TERM_COUNT, dot};
-use crate::joint::whitening::{RowNoise, Whitening};
 use crate::samples::Samples;
-use crate::window::{self, median};
+use crate::window;
 use crate::{IdentifyConfig, WindowRule, commands};
 use mapper_core::{Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, Window};
+use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
+use mapper_numerics::statistics::{mean, median, robust_sigma};
 use mapper_physics::air;
 
 /// Start of what is used of a step, after the last change of a command, s: h and efficiency are followed while the
@@ -147,17 +149,16 @@ pub(crate) fn problem<'a>(
         .filter_map(|step| alone.get(step.position)?.eta.map(|(eta, _)| eta))
         .filter(|eta| (0.2..0.95).contains(eta))
         .collect();
-    let mean_eta = crate::samples::mean(&etas).unwrap_or(0.65);
+    let mean_eta = mean(&etas).unwrap_or(0.65);
     shared[SURFACE] = mean_eta;
     for (k, sigma) in SurfaceScale::prior_sigmas().into_iter().enumerate() {
         priors[SURFACE + k] = Prior { mean: shared[SURFACE + k], sigma };
         active[SURFACE + k] = shaped;
     }
 
-    let mut residuals: Vec<f64> =
-        steps.iter().filter_map(|step| alone.get(step.position)?.residual_rms_k).collect();
+    let residuals_k = steps.iter().filter_map(|step| alone.get(step.position)?.residual_rms_k);
     let suspect_k =
-        median(&mut residuals).map_or(f64::INFINITY, |middle| (SUSPECT_RATIO * middle).max(SUSPECT_K));
+        median(residuals_k).map_or(f64::INFINITY, |middle| (SUSPECT_RATIO * middle).max(SUSPECT_K));
     let members = steps
         .iter()
         .map(|step| {
@@ -219,13 +220,12 @@ fn whitening(
     sigma_k: f64,
     white_sigma_k: f64,
     shape_k: impl Fn(usize) -> f64,
-) -> Whitening {
+) -> WhiteningFilter {
     let noise = step.rows.iter().enumerate().map(|(i, row)| {
         let wrong = SHAPE_ERROR_RATIO * shape_k(i) / sigma_k;
-        RowNoise { first_order: row.noise.first_order + wrong * wrong, ..row.noise }
+        (row.t_s, BlockNoise { first_order: row.noise.first_order + wrong * wrong, ..row.noise })
     });
-    let t_s = step.rows.iter().map(|row| row.t_s);
-    Whitening::new(t_s, noise, config.noise_colour, sigma_k, white_sigma_k)
+    WhiteningFilter::new(noise, config.noise_colour.time_constant_s, sigma_k, white_sigma_k)
 }
 
 /// Takes the noise of each step and the spreads of the points about surface and law from what was found.
@@ -267,12 +267,10 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
         let new = whitening(step, config, sigma_k, white_sigma_k, shape_k);
         problem.members[i].whitening = new;
     }
-    problem.explained = explained::explained(problem, steps, config);
+    problem.explained = input_noise::explained(problem, steps, config);
     // Medians: one bad step must not make room for itself.
-    let spread = |off: &dyn Fn(&Member<'_>) -> f64| {
-        let mut sizes: Vec<f64> = problem.members.iter().map(|member| off(member).abs()).collect();
-        median(&mut sizes).unwrap_or(0.0) / 0.6745
-    };
+    let spread =
+        |off: &dyn Fn(&Member<'_>) -> f64| robust_sigma(problem.members.iter().map(off)).unwrap_or(0.0);
     let off_surface = spread(&|member| member.off_surface(&problem.shared, &member.local));
     let off_law = spread(&|member| member.local[LN_DEVIATION]);
     if problem.setting.shaped {

@@ -6,6 +6,7 @@ use super::inputs::{LOWEST_EXPANSION_RATIO, LabInputs};
 use super::sensor::Sensor;
 use super::settings::{LabSettings, Start};
 use super::truth::TruthRecorder;
+use crate::setpoint_limits;
 use mapper_core::{
     Backend, BackendError, CHANNELS, Channel, ChannelColumn, Event, EventKind, RigDescription, RigMode,
     SampleBatch, Setpoints,
@@ -153,7 +154,7 @@ impl Backend for VirtualLab {
     }
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
-        check_setpoints(setpoints)?;
+        setpoint_limits::check(setpoints)?;
         let (settings, armed) = self.armed("set")?;
         armed.commands = Some(*setpoints);
         armed.wanted = if armed.tripped { RigMode::Standstill } else { setpoints.mode };
@@ -236,24 +237,12 @@ fn running(settings: &LabSettings, t_s: f64, state: State) -> Simulator {
     Simulator::new(&settings.model, t_s, state, DEFAULT_RELATIVE_TOLERANCE, watch)
 }
 
-fn check_setpoints(setpoints: &Setpoints) -> Result<(), BackendError> {
-    for (quantity, value, unit, low, high) in [
-        ("P3", setpoints.p3_pa, "Pa", 50e3, 2e6),
-        ("T3", setpoints.t3_k, "K", 250.0, 1400.0),
-        ("valve opening", setpoints.valve_opening_ratio, "1", 0.05, 2.5),
-        ("T_oil", setpoints.oil_temperature_k, "K", 250.0, 450.0),
-    ] {
-        if !(low..=high).contains(&value) {
-            return Err(BackendError::SetpointOutOfRange { quantity, value, unit, low, high });
-        }
-    }
-    Ok(())
-}
-
 impl Armed {
     fn advance(&mut self, settings: &LabSettings, until_s: f64) -> Result<SampleBatch, BackendError> {
         let mut batch = BatchBuilder::new(self.next_sequence);
-        while self.now_s < until_s || (self.now_s == 0.0 && self.next_sequence == 0) {
+        // A time before the first sample, or none at all, asks for nothing.
+        let asks_for_the_first = self.next_sequence == 0 && until_s >= 0.0;
+        while self.now_s < until_s || (self.now_s == 0.0 && asks_for_the_first) {
             self.switch_machine(settings);
             self.drift(settings);
             let next_s = self.advance_machine(settings, until_s, &mut batch)?;

@@ -1,0 +1,55 @@
+//! What repeats of one jump say about drift.
+
+use mapper_core::{IdentifiedPoint, OperatingPoint, StepKind, StepMarker};
+use serde::Serialize;
+
+/// One jump that was made more than once.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RepeatedJump {
+    /// Where it starts.
+    pub from: OperatingPoint,
+    /// Where it goes.
+    pub to: OperatingPoint,
+    /// Indices of the steps.
+    pub steps: Vec<usize>,
+    /// Efficiency found by each, fraction.
+    pub eta: Vec<f64>,
+    /// Last less first efficiency, fraction.
+    pub eta_change: f64,
+    /// Standard error of this change from noise, fraction; fixed offsets cancel. `None` where an interval is missing.
+    pub eta_change_standard_error: Option<f64>,
+}
+
+/// Jumps that repeats have made, with the efficiency each time; a point that was reached by the same jump counts too.
+pub fn repeated_jumps(markers: &[StepMarker], points: &[IdentifiedPoint]) -> Vec<RepeatedJump> {
+    let mut jumps: Vec<(OperatingPoint, OperatingPoint)> = Vec::new();
+    for marker in markers.iter().filter(|marker| marker.kind == StepKind::Repeat) {
+        if let Some(jump) = marker.from.zip(marker.to).filter(|jump| !jumps.contains(jump)) {
+            jumps.push(jump);
+        }
+    }
+    jumps
+        .into_iter()
+        .filter_map(|(from, to)| {
+            let made = markers.iter().filter(|marker| (marker.from, marker.to) == (Some(from), Some(to)));
+            let found: Vec<(&IdentifiedPoint, f64)> = made
+                .filter_map(|marker| {
+                    let point = points.iter().find(|point| point.step == marker.index)?;
+                    Some((point, point.eta?))
+                })
+                .collect();
+            let ((first, first_eta), (last, last_eta)) = (found.first()?, found.last()?);
+            let noise = |point: &IdentifiedPoint| Some(point.eta_uncertainty?.noise_standard_error);
+            (found.len() > 1).then(|| RepeatedJump {
+                from,
+                to,
+                steps: found.iter().map(|(point, _)| point.step).collect(),
+                eta: found.iter().map(|(_, eta)| *eta).collect(),
+                eta_change: last_eta - first_eta,
+                eta_change_standard_error: noise(first)
+                    .zip(noise(last))
+                    .map(|(first, last)| first.hypot(last)),
+            })
+        })
+        .collect()
+}

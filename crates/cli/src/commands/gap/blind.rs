@@ -1,0 +1,37 @@
+//! `mapper gap blind`: the check of the diagnosis on withheld data.
+
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::subcommands::subcommands;
+use clap::Args;
+use mapper_blind::BlindError;
+
+mod calibrate;
+mod make;
+mod run;
+mod score;
+
+/// Check the diagnosis on data whose causes are withheld
+#[derive(Debug, Args)]
+pub struct Blind {
+    /// What to do.
+    #[command(subcommand)]
+    command: BlindCommand,
+}
+
+subcommands! { BlindCommand: make::Make, run::Run, score::Score, calibrate::Calibrate }
+
+impl Blind {
+    /// Runs the sub-command that was asked for.
+    pub fn run(&self) -> Result<(), Failure> {
+        self.command.run()
+    }
+}
+
+fn of_blind(error: BlindError) -> Failure {
+    let code = match error {
+        BlindError::Content { .. } | BlindError::Seal { .. } | BlindError::Cases { .. } => Code::BadInput,
+        _ => Code::Failure,
+    };
+    Failure::new(code, error)
+}

@@ -1,0 +1,61 @@
+//! `mapper gap blind calibrate`.
+
+use super::of_blind;
+use crate::failure::Failure;
+use crate::progress::Progress;
+use crate::{output, registry};
+use clap::Args;
+use mapper_blind::calibrate::{Observed, Plan, calibrate};
+use mapper_session::{json_text, write_new};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Find the numbers behind the probabilities on cases of its own, with outside causes that the check does not use
+#[derive(Debug, Args)]
+pub struct Calibrate {
+    /// Campaign that says machine, schedule, declared uncertainties and tolerances (YAML)
+    #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
+    pub campaign: PathBuf,
+    /// Seed of everything that is drawn
+    #[arg(long)]
+    pub seed: u64,
+    /// Number of cases without a cause, which set the threshold
+    #[arg(long)]
+    pub nulls: usize,
+    /// Number of cases of the other kinds
+    #[arg(long)]
+    pub cases: usize,
+    /// New file for the calibration (JSON)
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Also write what each case gave to this new file (JSON)
+    #[arg(long, value_name = "FILE")]
+    pub observed: Option<PathBuf>,
+}
+
+impl Calibrate {
+    /// Draws, records and diagnoses cases of its own, and writes the calibration that fits them.
+    pub fn run(&self) -> Result<(), Failure> {
+        let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
+        let plan = Plan { seed: self.seed, nulls: self.nulls, others: self.cases };
+        let made_by = format!(
+            "mapper gap blind calibrate --campaign {} --seed {} --nulls {} --cases {}",
+            self.campaign.display(),
+            plan.seed,
+            plan.nulls,
+            plan.others
+        );
+        let (progress, done) = (Progress::new(), AtomicUsize::new(0));
+        let tell = |_: &Observed| {
+            progress.pieces(done.fetch_add(1, Ordering::Relaxed) + 1, plan.nulls + plan.others)
+        };
+        let found = calibrate(&campaign, &registry::registry().effects, &plan, made_by, &tell);
+        progress.clear();
+        let (calibration, observed) = found.map_err(of_blind)?;
+        write_new(&self.out, json_text(&calibration)?.as_bytes())?;
+        if let Some(file) = &self.observed {
+            write_new(file, json_text(&observed)?.as_bytes())?;
+        }
+        output::print(&format!("calibration from {} diagnoses in {}\n", observed.len(), self.out.display()))
+    }
+}

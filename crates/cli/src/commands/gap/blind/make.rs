@@ -1,0 +1,97 @@
+//! `mapper gap blind make`.
+
+use super::of_blind;
+use crate::failure::Failure;
+use crate::progress::Progress;
+use crate::{output, registry};
+use clap::{Args, ValueEnum};
+use mapper_blind::{CaseKind, Draw, OutsideUse};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Draw cases on the virtual lab, record them, seal their causes and print the seal
+#[derive(Debug, Args)]
+pub struct Make {
+    /// Campaign that says machine, schedule, declared uncertainties and tolerances (YAML)
+    #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
+    pub campaign: PathBuf,
+    /// Directory for the cases
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Seed of everything that is drawn
+    #[arg(long)]
+    pub seed: u64,
+    /// Number of cases
+    #[arg(long)]
+    pub cases: usize,
+    /// Draw cases of this kind alone; may be repeated
+    #[arg(long = "kind", value_name = "KIND")]
+    kinds: Vec<BlindKind>,
+    /// Shortest signature of a cause, in sigmas
+    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_blind::SIGMA_RANGE[0])]
+    pub least_sigma: f64,
+    /// Longest signature of a cause, in sigmas
+    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_blind::SIGMA_RANGE[1])]
+    pub most_sigma: f64,
+    /// Draw outside causes from those kept for calibration, not from those reserved for the check
+    #[arg(long)]
+    pub calibration: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What a blind case is a case of.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum BlindKind {
+    /// Nothing beyond the declared tolerances.
+    None,
+    /// One effect of the catalogue.
+    Single,
+    /// Two effects of the catalogue.
+    Pair,
+    /// A cause outside the catalogue.
+    Outside,
+}
+
+impl From<BlindKind> for CaseKind {
+    fn from(kind: BlindKind) -> Self {
+        match kind {
+            BlindKind::None => CaseKind::None,
+            BlindKind::Single => CaseKind::Single,
+            BlindKind::Pair => CaseKind::Pair,
+            BlindKind::Outside => CaseKind::Outside,
+        }
+    }
+}
+
+impl Make {
+    /// Draws, records and seals cases.
+    pub fn run(&self) -> Result<(), Failure> {
+        let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
+        let outside = if self.calibration { OutsideUse::Calibration } else { OutsideUse::Check };
+        let draw = Draw {
+            kinds: self.kinds.iter().map(|kind| CaseKind::from(*kind)).collect(),
+            sigma_range: [self.least_sigma, self.most_sigma],
+            ..Draw::new(self.seed, self.cases, outside)
+        };
+        let progress = Progress::new();
+        let done = |done| progress.pieces(done, self.cases);
+        let made = mapper_blind::make(&campaign, &registry::registry().effects, &draw, &self.out, &done);
+        progress.clear();
+        let made = made.map_err(of_blind)?;
+        if self.json {
+            return output::print_json(&json!({
+                "directory": self.out,
+                "cases": made.manifest.cases,
+                "answers_sha256": made.manifest.answers_sha256,
+            }));
+        }
+        output::print(&format!(
+            "{} cases in {}\nSHA-256 of the answers: {}\n",
+            made.manifest.cases.len(),
+            self.out.display(),
+            made.manifest.answers_sha256,
+        ))
+    }
+}

@@ -1,0 +1,27 @@
+//! `mapper map`.
+
+use crate::failure::Failure;
+use crate::subcommands::subcommands;
+use clap::Args;
+
+mod compare;
+mod convert;
+mod fit;
+mod rig;
+
+/// Fit, convert and compare compressor maps
+#[derive(Debug, Args)]
+pub struct Map {
+    /// What to do with the map
+    #[command(subcommand)]
+    command: MapCommand,
+}
+
+subcommands! { MapCommand: fit::Fit, convert::Convert, compare::Compare, rig::Rig }
+
+impl Map {
+    /// Runs the sub-command that was asked for.
+    pub fn run(&self) -> Result<(), Failure> {
+        self.command.run()
+    }
+}

@@ -1,0 +1,58 @@
+//! `mapper map compare`: where two maps differ.
+
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::output;
+use clap::Args;
+use mapper_report::{map_comparison_figure, map_comparison_text};
+use mapper_session::{read_map, reference, write_new};
+use std::path::PathBuf;
+
+/// Show where two maps differ, in units and in their uncertainty
+#[derive(Debug, Args)]
+pub struct Compare {
+    /// Map that counts as the known one
+    pub first: PathBuf,
+    /// Map that is compared with it
+    pub second: PathBuf,
+    /// State of the first map, where its file does not say
+    #[arg(long, value_name = "STATE")]
+    pub reference: Option<String>,
+    /// State of the second map, where its file does not say
+    #[arg(long, value_name = "STATE")]
+    pub second_reference: Option<String>,
+    /// Draw both maps and their difference in this new file (.svg or .png)
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Compare {
+    /// Compares two maps.
+    pub fn run(&self) -> Result<(), Failure> {
+        let first = read_map(&self.first, reference(self.reference.as_deref())?)?;
+        let second = read_map(&self.second, reference(self.second_reference.as_deref())?)?;
+        let comparison =
+            mapper_assemble::compare(&first, &second).map_err(|error| Failure::new(Code::BadInput, error))?;
+        if let Some(path) = &self.picture {
+            let names = [&self.first, &self.second].map(|path| {
+                path.file_name()
+                    .map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+            });
+            let figure = map_comparison_figure(&first, &second, &comparison, &names);
+            let png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
+            let bytes = if png {
+                figure.to_png(2.0).map_err(|error| Failure::new(Code::Failure, error))?
+            } else {
+                figure.to_svg().into_bytes()
+            };
+            write_new(path, &bytes)?;
+        }
+        if self.json {
+            return output::print_json(&comparison);
+        }
+        output::print(&map_comparison_text(&comparison))
+    }
+}

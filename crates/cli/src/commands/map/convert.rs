@@ -1,0 +1,61 @@
+//! `mapper map convert`: a map in another format, at another reference state.
+
+use crate::failure::Failure;
+use crate::output;
+use clap::Args;
+use mapper_session::{exporter, read_map, reference, write_map_fitted_if_needed};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Write a map in another format, at another reference state
+#[derive(Debug, Args)]
+pub struct Convert {
+    /// Map (CSV, JSON or SAE text)
+    pub map: PathBuf,
+    /// New file; the extension says the format, unless `--to` does
+    pub out: PathBuf,
+    /// Format of the new file
+    #[arg(long, value_name = "FORMAT")]
+    pub to: Option<String>,
+    /// State to which the file's corrected quantities refer, where the file does not say: SAE, Garrett, BorgWarner or "T, P"
+    #[arg(long, value_name = "STATE")]
+    pub reference: Option<String>,
+    /// State to which the new file shall refer [default: as before]
+    #[arg(long, value_name = "STATE")]
+    pub to_reference: Option<String>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Convert {
+    /// Reads a map and writes it again.
+    pub fn run(&self) -> Result<(), Failure> {
+        let exporter = exporter(&self.out, self.to.as_deref())?;
+        let to_reference = reference(self.to_reference.as_deref())?;
+        let mut map = read_map(&self.map, reference(self.reference.as_deref())?)?;
+        if let Some(reference) = to_reference {
+            map = map.at_reference(reference);
+        }
+        let (map, fitted_here) = write_map_fitted_if_needed(&self.out, exporter, map)?;
+        let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
+        if self.json {
+            return output::print_json(&json!({
+                "file": self.out,
+                "format": exporter.name,
+                "reference": map.reference,
+                "lines": map.lines.len(),
+                "points": points,
+                "fitted": map.fitted.is_some(),
+            }));
+        }
+        output::print(&format!(
+            "{}: {}, {points} points on {} speed lines, corrected to {}{}\n",
+            self.out.display(),
+            exporter.name,
+            map.lines.len(),
+            map.reference,
+            if fitted_here { "; the format is a table, so the map was fitted" } else { "" },
+        ))
+    }
+}

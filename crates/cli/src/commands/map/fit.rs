@@ -1,0 +1,73 @@
+//! `mapper map fit`: all speed lines together, with the error at lines that are left out.
+
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::output;
+use clap::Args;
+use mapper_assemble::{MapFitOptions, fit_map};
+use mapper_report::map_fit_text;
+use mapper_session::{exporter, read_map, reference, write_map};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Fit all speed lines together and print the error at each line when it is left out
+#[derive(Debug, Args)]
+pub struct Fit {
+    /// Map (CSV, JSON or SAE text)
+    pub map: PathBuf,
+    /// State to which the file's corrected quantities refer, where the file does not say: SAE, Garrett, BorgWarner or "T, P"
+    #[arg(long, value_name = "STATE")]
+    pub reference: Option<String>,
+    /// Corrected speeds of further lines, rpm, instead of two below and one above the measured ones
+    #[arg(long, value_delimiter = ',', value_name = "RPM,...")]
+    pub speeds: Option<Vec<f64>>,
+    /// Nodes on each line
+    #[arg(long, default_value_t = 41, value_parser = clap::value_parser!(u16).range(5..=400))]
+    pub nodes: u16,
+    /// Write the fitted map to this new file; the extension says the format, unless `--to` does
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Format of `--out`
+    #[arg(long, value_name = "FORMAT", requires = "out")]
+    pub to: Option<String>,
+    /// Do not leave lines out
+    #[arg(long)]
+    pub no_leave_out: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Fit {
+    /// Fits a map.
+    pub fn run(&self) -> Result<(), Failure> {
+        let exporter = match &self.out {
+            Some(path) => Some((path, exporter(path, self.to.as_deref())?)),
+            None => None,
+        };
+        let map = read_map(&self.map, reference(self.reference.as_deref())?)?;
+        let options = MapFitOptions {
+            further_speeds_rpm: self.speeds.clone(),
+            nodes: usize::from(self.nodes),
+            leave_one_out: !self.no_leave_out,
+        };
+        let map = fit_map(map, &options)
+            .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", self.map.display())))?;
+        if let Some((path, exporter)) = exporter {
+            write_map(path, exporter, &map)?;
+        }
+        if self.json {
+            return output::print_json(&json!({
+                "map": self.map,
+                "reference": map.reference,
+                "fitted": map.fitted,
+                "file": self.out,
+            }));
+        }
+        let mut text = map.fitted.as_ref().map(|fitted| map_fit_text(&map, fitted)).unwrap_or_default();
+        if let Some(path) = &self.out {
+            text.push_str(&format!("map        {}\n", path.display()));
+        }
+        output::print(&text)
+    }
+}

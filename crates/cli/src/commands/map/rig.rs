@@ -1,0 +1,40 @@
+//! `mapper map rig`: what a run gave beside the compressor's map.
+
+use crate::failure::Failure;
+use crate::given::given_campaign;
+use crate::{output, registry};
+use clap::Args;
+use mapper_record::ChannelMap;
+use mapper_session::{Recorded, Session};
+use std::path::PathBuf;
+
+/// Write what a run gave beside the map: thermal model, turbine, pictures of h and of errors
+#[derive(Debug, Args)]
+pub struct Rig {
+    /// Run directory, or MCAP file of a run
+    pub recording: PathBuf,
+    /// Directory for the files; those that are there are not replaced
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Campaign that says machine, sensors and window, instead of the one attached to the recording
+    #[arg(long, value_name = "FILE")]
+    pub campaign: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Rig {
+    /// Identifies a recording by its campaign's method and writes thermal model, turbine and pictures.
+    pub fn run(&self) -> Result<(), Failure> {
+        let given = given_campaign(self.campaign.as_deref())?;
+        let recorded = Recorded::read(&self.recording, &ChannelMap::native(), given.as_ref())?;
+        let registry = registry::registry();
+        let written = Session::new(&registry).rig_files(recorded, &self.out)?;
+        if self.json {
+            return output::print_json(&written);
+        }
+        let lines: String = written.files.iter().map(|path| format!("{}\n", path.display())).collect();
+        output::print(&lines)
+    }
+}

@@ -1,0 +1,27 @@
+//! A set of commands as clap sees it.
+
+/// An enum with one variant for each `module::Options`, named like the options, whose help is their documentation; its
+/// `run` runs the one that was asked for.
+macro_rules! subcommands {
+    ($name:ident: $($module:ident::$options:ident),+ $(,)?) => {
+        /// One variant a command.
+        #[derive(Debug, clap::Subcommand)]
+        pub enum $name {
+            $(
+                #[allow(missing_docs, reason = "a variant's documentation would replace that of its options in the help")]
+                $options($module::$options),
+            )+
+        }
+
+        impl $name {
+            /// Runs the command that was asked for.
+            pub fn run(&self) -> Result<(), Failure> {
+                match self {
+                    $($name::$options(options) => options.run(),)+
+                }
+            }
+        }
+    };
+}
+
+pub(crate) use subcommands;

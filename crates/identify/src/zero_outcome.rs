@@ -1,0 +1,53 @@
+//! What came of the isothermal zero that a campaign asks for.
+
+use crate::IdentifyConfig;
+use crate::zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};
+use mapper_core::Recording;
+use serde::{Serialize, Serializer};
+
+/// Whether offsets were taken off a recording.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum ZeroOutcome {
+    /// Offsets were taken off.
+    Found(IsothermalZero),
+    /// A zero was asked for and the recording has none; the declared offsets stand.
+    Refused(NoZero),
+    /// No zero was asked for.
+    #[default]
+    NotAsked,
+}
+
+impl ZeroOutcome {
+    /// Looks for the zero of a recording where one is asked for.
+    pub fn of(recording: &Recording, config: &IdentifyConfig, asked: bool) -> Self {
+        if !asked {
+            return ZeroOutcome::NotAsked;
+        }
+        isothermal_zero(recording, config, &ZeroSettings::default())
+            .map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
+    }
+
+    /// Takes the offsets off a recording, and leaves what is not known of them in the configuration; both stay as they are
+    /// where no zero was found.
+    pub fn take_off(&self, recording: Recording, config: IdentifyConfig) -> (Recording, IdentifyConfig) {
+        match self {
+            ZeroOutcome::Found(zero) => zeroed(recording, config, zero),
+            ZeroOutcome::Refused(_) | ZeroOutcome::NotAsked => (recording, config),
+        }
+    }
+}
+
+/// Offsets and what is left of them, K or Pa, with the stretch they come from; `{"refused": reason}`, or `null` where none was asked for.
+impl Serialize for ZeroOutcome {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Refused {
+            refused: String,
+        }
+        match self {
+            ZeroOutcome::Found(zero) => zero.serialize(serializer),
+            ZeroOutcome::Refused(reason) => Refused { refused: reason.to_string() }.serialize(serializer),
+            ZeroOutcome::NotAsked => serializer.serialize_unit(),
+        }
+    }
+}

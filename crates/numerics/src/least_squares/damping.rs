@@ -1,0 +1,107 @@
+//! How strongly steps are damped, and the search for a step that helps.
+
+/// How the damping changes. All are ratios of the normal matrix's diagonal, or factors on them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DampingRule {
+    /// Where it starts.
+    pub start: f64,
+    /// Factor after a step that does not help, above 1.
+    pub growth: f64,
+    /// Factor after one that does, below 1.
+    pub relief: f64,
+    /// Where it goes at least after a step that does not help, so that a long way down is not taken back in small steps.
+    pub renewed: f64,
+    /// Least that relief makes of it.
+    pub least: f64,
+    /// Beyond it the search ends: steps are too short to change anything.
+    pub most: f64,
+    /// Steps tried before the search ends.
+    pub tries: usize,
+}
+
+/// The damping of a fit as it goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Damping {
+    rule: DampingRule,
+    value: f64,
+}
+
+impl Damping {
+    /// Damping at its start.
+    pub fn new(rule: DampingRule) -> Self {
+        Damping { rule, value: rule.start }
+    }
+
+    /// Tries steps, each damped more than the one before, until `trial` makes something of one: it is handed the damping and
+    /// answers `None` where the equations cannot be solved or the step does not help. `None` where no step helps.
+    ///
+    /// The damping that helped, relieved, is where the next search starts.
+    pub fn search<T>(&mut self, mut trial: impl FnMut(f64) -> Option<T>) -> Option<T> {
+        for _ in 0..self.rule.tries {
+            if let Some(found) = trial(self.value) {
+                self.value = (self.value * self.rule.relief).max(self.rule.least);
+                return Some(found);
+            }
+            self.value = (self.value * self.rule.growth).max(self.rule.renewed);
+            if self.value > self.rule.most {
+                break;
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RULE: DampingRule = DampingRule {
+        start: 1e-2,
+        growth: 10.0,
+        relief: 0.1,
+        renewed: 1e-6,
+        least: 1e-8,
+        most: 1e3,
+        tries: 12,
+    };
+
+    #[test]
+    fn the_search_grows_until_something_helps_and_starts_relieved_next_time() {
+        let mut damping = Damping::new(RULE);
+        let mut tried = Vec::new();
+        let found = damping.search(|value| {
+            tried.push(value);
+            (value > 0.5).then_some("helps")
+        });
+        assert_eq!((found, tried.len()), (Some("helps"), 3));
+        assert_eq!(damping.search(Some), Some(tried[2] * 0.1));
+    }
+
+    #[test]
+    fn it_ends_at_the_largest_damping_and_after_so_many_tries() {
+        let mut count = 0;
+        let mut never = |_: f64| -> Option<()> {
+            count += 1;
+            None
+        };
+        assert_eq!(Damping::new(RULE).search(&mut never), None);
+        assert_eq!(Damping::new(DampingRule { most: f64::INFINITY, ..RULE }).search(&mut never), None);
+        // 1e-2 to 1e3 in factors of ten, and the tries allowed.
+        assert!((6..=7).contains(&(count - 12)), "{count}");
+    }
+
+    #[test]
+    fn relief_and_renewal_have_their_floors() {
+        let mut damping = Damping::new(RULE);
+        for _ in 0..20 {
+            damping.search(Some);
+        }
+        assert_eq!(damping.search(Some), Some(1e-8));
+        let mut tried = Vec::new();
+        damping.search(|value| {
+            tried.push(value);
+            (tried.len() == 2).then_some(())
+        });
+        assert_eq!(tried, [1e-8, 1e-6]);
+    }
+}

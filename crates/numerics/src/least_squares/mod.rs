@@ -1,0 +1,16 @@
+//! Nonlinear least squares by damped steps: the damping and its search, and the solution of the damped normal equations,
+//! whether their matrix is full or has the shape of an arrow.
+//!
+//! What a problem is (residuals, weights, bounds, what may be estimated between the steps) stays with whoever has it.
+//! Why this is no library's: decision 0013.
+//!
+//! Source: K. Levenberg, Quarterly of Applied Mathematics 2 (1944); D. W. Marquardt, SIAM Journal 11 (1963), whose damping is
+//! relative to the diagonal, so that units of the parameters do not matter.
+
+mod arrow;
+mod damping;
+mod dense;
+
+pub use arrow::{Arrow, ArrowBlock, Reduced};
+pub use damping::{Damping, DampingRule};
+pub use dense::{damped_step, inverse};

@@ -1,0 +1,161 @@
+//! Independent work spread over the cores.
+//!
+//! Results come in the order of the items, whoever finished first, so that nothing depends on the number of cores. A panic
+//! in a worker is a panic of the caller: no result can go missing. Work is shared out by rayon, item by item.
+
+use rayon::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// `work` on every item, on rayon's pool: as many threads as there are cores unless the program, or `RAYON_NUM_THREADS`, says
+/// otherwise. May be nested.
+///
+/// While a worker waits for a nested call it may begin another item: long work whose number at a time matters belongs to
+/// [`try_map_on`].
+pub fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    items.par_iter().with_max_len(1).map(|item| work(item)).collect()
+}
+
+/// The same with work that may fail. After a failure no later item is begun; items before it are still done, so that the
+/// error is that of the first item that fails, whatever the number of cores.
+///
+/// # Errors
+/// That of the first item whose work fails.
+pub fn try_map<T, R, E>(items: &[T], work: impl Fn(&T) -> Result<R, E> + Sync) -> Result<Vec<R>, E>
+where
+    T: Sync,
+    R: Send,
+    E: Send,
+{
+    let failed = AtomicUsize::new(items.len());
+    let one = |(index, item)| {
+        if index > failed.load(Ordering::Relaxed) {
+            return None;
+        }
+        let result = work(item);
+        if result.is_err() {
+            failed.fetch_min(index, Ordering::Relaxed);
+        }
+        Some(result)
+    };
+    // Whatever was not begun comes behind a failure.
+    let results: Vec<Option<Result<R, E>>> = items.par_iter().enumerate().with_max_len(1).map(one).collect();
+    results.into_iter().flatten().collect()
+}
+
+/// As [`try_map`], with exactly `threads` items at a time (1 at least) on threads of their own, for work that lasts, takes
+/// memory or itself spreads over the cores. `work` is handed the item's position too.
+///
+/// # Errors
+/// That of the first item whose work fails.
+pub fn try_map_on<T, R, E>(
+    threads: usize,
+    items: &[T],
+    work: impl Fn(usize, &T) -> Result<R, E> + Sync,
+) -> Result<Vec<R>, E>
+where
+    T: Sync,
+    R: Send,
+    E: Send,
+{
+    let next = AtomicUsize::new(0);
+    let failed = AtomicUsize::new(items.len());
+    let results: Mutex<Vec<(usize, Result<R, E>)>> = Mutex::new(Vec::with_capacity(items.len()));
+    let run = || {
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(item) = items.get(index) else { return };
+            if index > failed.load(Ordering::Relaxed) {
+                return;
+            }
+            let result = catch_unwind(AssertUnwindSafe(|| work(index, item))).unwrap_or_else(|panic| {
+                // Nothing new is begun while the others end.
+                next.store(items.len(), Ordering::Relaxed);
+                resume_unwind(panic)
+            });
+            if result.is_err() {
+                failed.fetch_min(index, Ordering::Relaxed);
+            }
+            results.lock().unwrap_or_else(PoisonError::into_inner).push((index, result));
+        }
+    };
+    // Not rayon: a worker that waits for nested work would take up another item, and hold two.
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads.clamp(1, items.len().max(1))).map(|_| scope.spawn(run)).collect();
+        for worker in workers {
+            if let Err(panic) = worker.join() {
+                resume_unwind(panic);
+            }
+        }
+    });
+    let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+    results.sort_by_key(|(index, _)| *index);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_the_order_of_the_items() {
+        let items: Vec<u64> = (0..1000).collect();
+        // Early items take longest.
+        let slow = |i: &u64| (0..(1000 - i) * 50).fold(*i, |sum, x| sum ^ (x * x)) ^ i;
+        let expected: Vec<u64> = items.iter().map(slow).collect();
+        assert_eq!(map(&items, slow), expected);
+        assert_eq!(try_map(&items, |i| Ok::<_, ()>(slow(i))).unwrap(), expected);
+        assert_eq!(try_map_on(3, &items, |_, i| Ok::<_, ()>(slow(i))).unwrap(), expected);
+        assert!(map(&[], |_: &u64| 0).is_empty());
+        assert!(try_map_on(0, &[], |_, _: &u64| Ok::<u64, ()>(0)).unwrap().is_empty());
+    }
+
+    #[test]
+    fn calls_may_be_nested() {
+        let inner = |i: &u64| map(&[1, 2, 3], |j| i * j).into_iter().sum::<u64>();
+        assert_eq!(map(&[1, 10, 100], inner), [6, 60, 600]);
+        assert_eq!(try_map_on(2, &[1, 10, 100], |_, i| Ok::<_, ()>(inner(i))).unwrap(), [6, 60, 600]);
+    }
+
+    #[test]
+    fn the_first_error_in_the_order_of_the_items_is_told() {
+        let items: Vec<usize> = (0..500).collect();
+        let work = |i: &usize| if i % 100 == 37 { Err(*i) } else { Ok(*i) };
+        for _ in 0..20 {
+            assert_eq!(try_map(&items, work), Err(37));
+            assert_eq!(try_map_on(4, &items, |_, i| work(i)), Err(37));
+        }
+    }
+
+    #[test]
+    fn nothing_is_begun_after_a_failure() {
+        let begun = AtomicUsize::new(0);
+        let items = [0; 100];
+        let found: Result<Vec<()>, &str> = try_map_on(1, &items, |index, _| {
+            begun.fetch_add(1, Ordering::Relaxed);
+            if index == 4 { Err("stopped") } else { Ok(()) }
+        });
+        assert_eq!((found, begun.into_inner()), (Err("stopped"), 5));
+    }
+
+    #[test]
+    fn a_panic_of_a_worker_is_a_panic_of_the_caller() {
+        let items: Vec<u32> = (0..64).collect();
+        let work = |i: &u32| {
+            assert_ne!(*i, 40, "the fortieth");
+            *i
+        };
+        for panicked in [
+            catch_unwind(AssertUnwindSafe(|| map(&items, work).len())),
+            catch_unwind(AssertUnwindSafe(|| try_map(&items, |i| Ok::<_, ()>(work(i))).unwrap().len())),
+            catch_unwind(AssertUnwindSafe(|| {
+                try_map_on(3, &items, |_, i| Ok::<_, ()>(work(i))).unwrap().len()
+            })),
+        ] {
+            let message = panicked.unwrap_err();
+            assert!(message.downcast_ref::<String>().unwrap().contains("the fortieth"));
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! Quantiles of the distributions that intervals are made of.
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// 97.5 % quantile of the standard normal distribution: half of a 95 % interval, standard errors.
+pub const NORMAL_975: f64 = 1.959_963_984_540_054;
+
+/// 95 % quantile of chi-square with one degree of freedom: the square of [`NORMAL_975`].
+pub const CHI_SQUARE_1_95: f64 = 3.841_458_820_694_124;
+
+/// Quantile of Student's t distribution at `share` (between 0 and 1), for `degrees_of_freedom` above 0; `None` elsewhere.
+pub fn student_quantile(share: f64, degrees_of_freedom: f64) -> Option<f64> {
+    let inside = share > 0.0 && share < 1.0;
+    let distribution = StudentsT::new(0.0, 1.0, degrees_of_freedom).ok().filter(|_| inside)?;
+    Some(distribution.inverse_cdf(share))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use statrs::distribution::{ChiSquared, Normal};
+
+    /// scipy: `scipy.stats.norm.ppf(0.975)`, `scipy.stats.chi2.ppf(0.95, 1)`; statrs as a second witness.
+    #[test]
+    fn the_constants_are_those_of_scipy() {
+        assert!((NORMAL_975 - 1.959963984540054).abs() < 1e-15);
+        assert!((CHI_SQUARE_1_95 - 3.841458820694124).abs() < 1e-14);
+        assert!((NORMAL_975 - Normal::standard().inverse_cdf(0.975)).abs() < 1e-10);
+        assert!((CHI_SQUARE_1_95 - ChiSquared::new(1.0).unwrap().inverse_cdf(0.95)).abs() < 1e-6);
+    }
+
+    /// scipy: `scipy.stats.t.ppf(0.975, n)` for n = 1, 2, 3, 10, 1000.
+    #[test]
+    fn students_quantiles_are_those_of_scipy() {
+        for (freedom, expected) in SCIPY_T {
+            let found = student_quantile(0.975, freedom).unwrap();
+            assert!((found / expected - 1.0).abs() < 1e-9, "{freedom}: {found} for {expected}");
+        }
+        assert_eq!(student_quantile(0.975, 0.0), None);
+        assert_eq!(student_quantile(1.0, 3.0), None);
+        assert_eq!(student_quantile(0.5, f64::NAN), None);
+    }
+
+    const SCIPY_T: [(f64, f64); 5] = [
+        (1.0, 12.706204736174694),
+        (2.0, 4.302652729749462),
+        (3.0, 3.1824463052837078),
+        (10.0, 2.228138851986274),
+        (1000.0, 1.9623390808264083),
+    ];
+}

@@ -1,0 +1,79 @@
+//! Values in the units that a campaign wants shown.
+
+use mapper_campaign::campaign::DisplayUnits;
+use mapper_campaign::units::Kind;
+use mapper_core::OperatingPoint;
+
+/// Values as the campaign wants them shown.
+#[derive(Debug, Clone)]
+pub struct Display {
+    units: DisplayUnits,
+}
+
+impl Display {
+    /// The campaign's display units.
+    pub fn new(units: &DisplayUnits) -> Self {
+        Display { units: units.clone() }
+    }
+
+    fn shown(kind: Kind, symbol: &str, value: f64, decimals: usize) -> String {
+        // A checked campaign names only units that exist; anything else is shown in SI.
+        let shown = kind.unit(symbol).map_or(value, |unit| unit.from_inside(value));
+        format!("{shown:.decimals$}")
+    }
+
+    /// Column head: what, and the unit of speeds.
+    pub fn speed_head(&self, what: &str) -> String {
+        format!("{what} {}", self.units.speed)
+    }
+
+    /// A shaft speed.
+    pub fn speed(&self, speed_rpm: f64) -> String {
+        Self::shown(Kind::Speed, &self.units.speed, speed_rpm, if self.units.speed == "krpm" { 2 } else { 0 })
+    }
+
+    /// An operating point: speed and opening.
+    pub fn place(&self, point: OperatingPoint) -> String {
+        format!("{} @ {}", self.speed(point.speed_rpm), point.valve_opening_ratio)
+    }
+
+    /// Column head: what, and the unit of pressures.
+    pub fn pressure_head(&self, what: &str) -> String {
+        format!("{what} {}", self.units.pressure)
+    }
+
+    /// A pressure.
+    pub fn pressure(&self, pressure_pa: f64) -> String {
+        let decimals = match self.units.pressure.as_str() {
+            "Pa" => 0,
+            "bar" => 4,
+            _ => 2,
+        };
+        Self::shown(Kind::Pressure, &self.units.pressure, pressure_pa, decimals)
+    }
+
+    /// Column head: what, and the unit of flows.
+    pub fn flow_head(&self, what: &str) -> String {
+        format!("{what} {}", self.units.flow)
+    }
+
+    /// A mass flow.
+    pub fn flow(&self, flow_kg_s: f64) -> String {
+        Self::shown(
+            Kind::MassFlow,
+            &self.units.flow,
+            flow_kg_s,
+            if self.units.flow == "kg/s" { 5 } else { 2 },
+        )
+    }
+
+    /// Column head: what, and the unit of temperatures.
+    pub fn temperature_head(&self, what: &str) -> String {
+        format!("{what} {}", self.units.temperature)
+    }
+
+    /// A temperature.
+    pub fn temperature(&self, temperature_k: f64) -> String {
+        Self::shown(Kind::Temperature, &self.units.temperature, temperature_k, 1)
+    }
+}

@@ -1,0 +1,128 @@
+//! A diagnosis as a page for a terminal.
+
+use crate::number::four_figures;
+use mapper_gap::report::{Candidate, Diagnosis, Gap, Next, Verdict};
+
+/// Causes shown.
+const CAUSES: usize = 5;
+/// Places shown.
+const PLACES: usize = 5;
+
+/// The page.
+pub fn gap_text(diagnosis: &Diagnosis) -> String {
+    let mut text = format!("{}\n", headline(diagnosis));
+    if !diagnosis.r#where.is_empty() {
+        text += "\nwhere\n";
+        for place in diagnosis.r#where.iter().take(PLACES) {
+            text += &format!(
+                "  {:20} {:>3.0} % of the gap, {:.0} sigma; most in {}, {} after the jump, {}: {} {}\n",
+                place.submodel,
+                100.0 * place.share,
+                place.sigma,
+                place.channel,
+                place.phase,
+                place.region,
+                four_figures(place.size),
+                place.unit,
+            );
+        }
+    }
+    text += "\nwhich\n";
+    for candidate in diagnosis.candidates.iter().take(CAUSES) {
+        text += &format!("  {:>5.1} %  {}\n", 100.0 * candidate.probability, cause(candidate));
+        for set in &candidate.equivalent {
+            text += &format!("           cannot be told from {}\n", set.join(" + "));
+        }
+    }
+    text += &format!("  {:>5.1} %  nothing beyond tolerance\n", 100.0 * diagnosis.probability_none);
+    text += &format!("  {:>5.1} %  a cause outside the catalogue\n", 100.0 * diagnosis.probability_outside);
+    text += &how_far(&diagnosis.gap);
+    if let Some(next) = &diagnosis.next {
+        text += "\nwhat next\n";
+        text += &match next {
+            Next::Jump { from, to, expected_probability, minutes } => format!(
+                "  jump from {:.0} krpm at opening {} to {:.0} krpm at {}: {minutes:.1} min, after which the true cause should have {:.0} %\n  mapper plan CAMPAIGN --append {:.0}krpm@{} {:.0}krpm@{} --out PLAN puts it behind the points\n",
+                from.speed_rpm / 1e3,
+                from.valve,
+                to.speed_rpm / 1e3,
+                to.valve,
+                100.0 * expected_probability,
+                from.speed_rpm / 1e3,
+                from.valve,
+                to.speed_rpm / 1e3,
+                to.valve,
+            ),
+            Next::Sensor { sensor, reason } => format!("  {sensor}: {reason}\n"),
+        };
+    }
+    if !diagnosis.warnings.is_empty() {
+        text += "\nbefore you believe it\n";
+        for warning in &diagnosis.warnings {
+            text += &format!("  {warning}\n");
+        }
+    }
+    text
+}
+
+/// One sentence.
+pub fn headline(diagnosis: &Diagnosis) -> String {
+    let first = diagnosis.candidates.first().map_or_else(String::new, |c| c.effects.join(" + "));
+    match diagnosis.verdict {
+        Verdict::WithinTolerance => "nothing beyond the declared tolerances is seen".to_owned(),
+        Verdict::Explained => format!("{first} explains the gap"),
+        Verdict::PartlyExplained => {
+            format!("{first} explains most of the gap; what is left is more than tolerance")
+        }
+        Verdict::Unexplained => "something is there that no effect of the catalogue explains".to_owned(),
+    }
+}
+
+/// A cause with its parameters.
+pub fn cause(candidate: &Candidate) -> String {
+    let parameters: Vec<String> = candidate
+        .parameters
+        .iter()
+        .map(|(name, e)| {
+            format!(
+                "{name} = {} {} ({} .. {})",
+                four_figures(e.value),
+                e.unit,
+                four_figures(e.low),
+                four_figures(e.high)
+            )
+        })
+        .collect();
+    format!("{}: {}", candidate.effects.join(" + "), parameters.join(", "))
+}
+
+fn how_far(gap: &Gap) -> String {
+    let mut text = format!(
+        "\nhow far, on {} steps that were used neither to select nor to fit\n  {:.1} % of the gap removed ({:.1} .. {:.1} %)\n",
+        gap.held_out_steps.len(),
+        100.0 * gap.shrink,
+        100.0 * gap.shrink_low,
+        100.0 * gap.shrink_high
+    );
+    for (channel, row) in &gap.channels {
+        // Pascals are many.
+        let (scale, unit) = if row.unit == "Pa" { (1e-3, "kPa") } else { (1.0, row.unit.as_str()) };
+        text += &format!(
+            "  {channel:4} {:>10} -> {:>10} {unit}\n",
+            four_figures(scale * row.before),
+            four_figures(scale * row.after)
+        );
+    }
+    let largest = |of: fn(&mapper_gap::report::PointGap) -> f64| {
+        gap.points
+            .iter()
+            .map(of)
+            .filter(|d| d.is_finite())
+            .fold(0.0f64, |most, d| if d.abs() > most.abs() { d } else { most })
+    };
+    text += &format!(
+        "  efficiency changes by up to {:+.2} points, h by up to {:+.0} W/(m2 K)\n",
+        100.0 * largest(|p| p.eta_after - p.eta_before),
+        largest(|p| p.h_after_w_m2k - p.h_before_w_m2k)
+    );
+    text
+}

@@ -1,0 +1,55 @@
+//! What people read: tables for a terminal, the report of a run, pages and pictures.
+//!
+//! Every function here turns data into text or a picture, in the units that a campaign wants shown. Nothing is read,
+//! written or decided.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod comparison_text;
+mod corrected_points;
+mod display;
+mod drift_text;
+mod duration;
+mod gap_page;
+mod gap_text;
+mod history_picture;
+mod history_text;
+mod jump_text;
+mod map_comparison_picture;
+mod map_comparison_text;
+mod map_fit_text;
+mod markdown;
+mod night_text;
+mod number;
+mod plan_picture;
+mod plan_text;
+mod points;
+mod repeated_jumps;
+mod run_report;
+mod table;
+mod thermal_model;
+mod zero_text;
+
+pub use comparison_text::{comparison_json, comparison_text};
+pub use corrected_points::corrected_csv;
+pub use display::Display;
+pub use drift_text::drift_text;
+pub use duration::duration;
+pub use gap_page::gap_page;
+pub use gap_text::gap_text;
+pub use history_picture::history_svg;
+pub use history_text::{groups_text, runs_text, time};
+pub use jump_text::jump_text;
+pub use map_comparison_picture::map_comparison_figure;
+pub use map_comparison_text::map_comparison_text;
+pub use map_fit_text::map_fit_text;
+pub use night_text::night_text;
+pub use number::{number, percent};
+pub use plan_picture::plan_svg;
+pub use plan_text::plan_text;
+pub use points::points_text;
+pub use repeated_jumps::repeated_jumps_text;
+pub use run_report::{RunReport, run_report};
+pub use table::with_heads;
+pub use thermal_model::thermal_text;
+pub use zero_text::zero_text;

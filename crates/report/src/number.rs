@@ -1,0 +1,26 @@
+//! Numbers as people read them.
+
+/// A number, or a dash where there is none: a silent number helps nobody.
+pub fn number(value: Option<f64>, decimals: usize) -> String {
+    value
+        .filter(|value| value.is_finite())
+        .map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+}
+
+/// A fraction in percent (for efficiencies: in points), or a dash.
+pub fn percent(fraction: Option<f64>, decimals: usize) -> String {
+    number(fraction.map(|fraction| 100.0 * fraction), decimals)
+}
+
+/// A number with four significant figures.
+pub fn four_figures(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let exponent = value.abs().log10().floor();
+    if !(-3.0..5.0).contains(&exponent) {
+        return format!("{value:.3e}");
+    }
+    let decimals = (3.0 - exponent).max(0.0) as usize;
+    format!("{value:.decimals$}")
+}

@@ -1,0 +1,116 @@
+//! Identified points, their doubts, and how far they are from the truth.
+
+use crate::display::Display;
+use crate::number::{number, percent};
+use crate::table;
+use mapper_campaign::campaign::DisplayUnits;
+use mapper_core::{IdentifiedPoint, StepKind, Verdict};
+use mapper_score::{ScoreSummary, ScoredPoint};
+use std::fmt::Write;
+
+/// Identified points as a table, their doubts below, and how far they are from the truth where it is known.
+pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits) -> String {
+    let mut text = format!("{}\n\n", points_table(points, units));
+    for ScoredPoint { point, .. } in points.iter().filter(|scored| scored.point.verdict != Verdict::Good) {
+        for warning in &point.warnings {
+            let _ = writeln!(text, "step {}: {}", point.step + 1, warning.message);
+        }
+    }
+    let count = |verdict| points.iter().filter(|scored| scored.point.verdict == verdict).count();
+    let _ = writeln!(
+        text,
+        "{} points: {} good, {} doubtful, {} unusable.",
+        points.len(),
+        count(Verdict::Good),
+        count(Verdict::Doubtful),
+        count(Verdict::Unusable),
+    );
+    if let Some(score) = mapper_score::summarise(points) {
+        text.push_str(&score_text(&score));
+    }
+    text
+}
+
+/// How far the points are from what the simulator knows.
+pub fn score_text(score: &ScoreSummary) -> String {
+    let mut text = format!(
+        "Against the simulator's truth ({} points): efficiency off by {:.2} points in the median, {:.2} at worst, {:.0} % \
+         within 1 point; the 95 % interval holds it at {:.0} %.\n",
+        score.points,
+        100.0 * score.eta_median_error,
+        100.0 * score.eta_worst_error,
+        100.0 * score.eta_within_one_point_ratio,
+        100.0 * score.eta_coverage_ratio,
+    );
+    if let (Some(median), Some(worst)) = (score.h_median_error_ratio, score.h_worst_error_ratio) {
+        let _ = writeln!(
+            text,
+            "Heat-transfer coefficient off by {:.1} % in the median, {:.1} % at worst.",
+            100.0 * median,
+            100.0 * worst
+        );
+    }
+    text
+}
+
+fn points_table(points: &[ScoredPoint], units: &DisplayUnits) -> comfy_table::Table {
+    let display = Display::new(units);
+    let with_truth = points.iter().any(|scored| scored.truth.is_some());
+    let mut heads = vec![
+        "step".to_owned(),
+        display.speed_head("speed"),
+        "opening 1".to_owned(),
+        display.flow_head("corr. flow"),
+        "PR 1".to_owned(),
+        "eta %".to_owned(),
+        "+/- points".to_owned(),
+        "h W/(m2 K)".to_owned(),
+        "+/- W/(m2 K)".to_owned(),
+        "dT2 K".to_owned(),
+        "verdict".to_owned(),
+    ];
+    if with_truth {
+        heads.push("true eta %".to_owned());
+        heads.push("true h".to_owned());
+    }
+    let mut table = table::with_heads(&heads);
+    for ScoredPoint { point, truth } in points {
+        let half = |low: Option<f64>, high: Option<f64>| Some(0.5 * (high? - low?));
+        let mut row = vec![
+            step_name(point),
+            display.speed(point.speed_rpm),
+            format!("{}", point.valve_opening_ratio),
+            display.flow(point.flow_corrected_kg_s),
+            format!("{:.4}", point.pressure_ratio),
+            percent(point.eta, 2),
+            percent(half(point.eta_low, point.eta_high), 2),
+            number(point.h_w_m2k, 0),
+            number(half(point.h_low_w_m2k, point.h_high_w_m2k), 0),
+            number(point.dt2_k, 1),
+            verdict_word(point.verdict).to_owned(),
+        ];
+        if with_truth {
+            row.push(number(truth.map(|truth| 100.0 * truth.eta), 2));
+            row.push(number(truth.map(|truth| truth.h_w_m2k), 0));
+        }
+        table.add_row(row);
+    }
+    table
+}
+
+/// The number of a point's step, from 1, and whether it is a repeat.
+pub fn step_name(point: &IdentifiedPoint) -> String {
+    match point.kind {
+        StepKind::Point => (point.step + 1).to_string(),
+        StepKind::Repeat => format!("{} repeat", point.step + 1),
+    }
+}
+
+/// A verdict in a word.
+pub fn verdict_word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Good => "good",
+        Verdict::Doubtful => "doubtful",
+        Verdict::Unusable => "unusable",
+    }
+}

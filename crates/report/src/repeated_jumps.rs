@@ -1,0 +1,25 @@
+//! What repeats of one jump say about drift, in sentences.
+
+use crate::display::Display;
+use crate::number::percent;
+use mapper_assemble::RepeatedJump;
+use std::fmt::Write;
+
+/// One sentence for each repeated jump.
+pub fn repeated_jumps_text(jumps: &[RepeatedJump], display: &Display) -> String {
+    let mut text = String::new();
+    for jump in jumps {
+        let found: Vec<String> = jump.eta.iter().map(|eta| format!("{:.2}", 100.0 * eta)).collect();
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "Repeats {} to {}: eta {} %; from first to last {:+.2} points (standard error from noise {}).",
+            display.place(jump.from),
+            display.place(jump.to),
+            found.join(", "),
+            100.0 * jump.eta_change,
+            percent(jump.eta_change_standard_error, 2),
+        );
+    }
+    text
+}

@@ -1,0 +1,80 @@
+//! Whether the rig stayed the same over one or more recordings.
+
+use crate::declared::identification_with;
+use crate::recorded::{Recorded, attached_campaign};
+use crate::{Session, SessionError, planning};
+use mapper_campaign::Campaign;
+use mapper_core::Recording;
+use mapper_drift::{DriftReport, DriftRequest, RecordedRun, diagnose};
+use mapper_identify::{IdentifyConfig, ZeroOutcome};
+use mapper_record::ChannelMap;
+
+/// What is said of the recordings, and the zero that was taken off them.
+#[derive(Debug)]
+pub struct Drift {
+    /// The answer.
+    pub report: DriftReport,
+    /// What came of the isothermal zero.
+    pub zero: ZeroOutcome,
+}
+
+impl Session<'_> {
+    /// Judges recordings in the order in which they were made. The machine is that of `campaign`.
+    ///
+    /// # Errors
+    /// [`SessionError::Drift`] where there is nothing to compare, [`SessionError::Model`] where the campaign's map is unusable.
+    pub fn drift(
+        &self,
+        recorded: &[Recorded],
+        campaign: &Campaign,
+        map: &ChannelMap,
+    ) -> Result<Drift, SessionError> {
+        let model = planning::nominal_model(campaign)?;
+        let config = identification_with(campaign, map);
+        let (recordings, config, zero) = zeroed_alike(recorded, config, campaign);
+        let fingerprints: Vec<Option<String>> = recorded.iter().map(fingerprint).collect();
+        let runs: Vec<RecordedRun<'_>> = recordings
+            .iter()
+            .zip(&fingerprints)
+            .map(|(recording, fingerprint)| RecordedRun { recording, fingerprint: fingerprint.as_deref() })
+            .collect();
+        let report = diagnose(&DriftRequest {
+            runs: &runs,
+            model: &model,
+            boundary: campaign.boundary,
+            identification: &config,
+            seed: campaign.seed,
+        })?;
+        Ok(Drift { report, zero })
+    }
+}
+
+/// The zero of the first run, taken off all: a zero of its own for each would hide what drifted between them.
+fn zeroed_alike(
+    recorded: &[Recorded],
+    config: IdentifyConfig,
+    campaign: &Campaign,
+) -> (Vec<Recording>, IdentifyConfig, ZeroOutcome) {
+    let zero = recorded.first().map_or(ZeroOutcome::NotAsked, |first| {
+        ZeroOutcome::of(&first.read.recording, &config, campaign.zero.is_some())
+    });
+    let off = |recorded: &Recorded| zero.take_off(recorded.read.recording.clone(), config.clone()).0;
+    let recordings = recorded.iter().map(off).collect();
+    let left = zero.take_off(Recording::default(), config.clone()).1;
+    (recordings, left, zero)
+}
+
+/// What has to be the same in all runs: machine, boundary conditions, points and their timing. Seed, name, rig and what is
+/// written may differ from night to night.
+fn fingerprint(recorded: &Recorded) -> Option<String> {
+    let (read, file) = (&recorded.read, &recorded.path);
+    let of_campaign = || {
+        let campaign = attached_campaign(read, file).ok()??;
+        let mapper_core::Timing { dwell_s, .. } = campaign.timing;
+        let same = (&campaign.machine, campaign.boundary, campaign.follow_outlet, &campaign.points, dwell_s);
+        serde_json::to_string(&same).ok()
+    };
+    let of_hashes =
+        || Some(format!("{} {}", read.metadata.get("campaign_sha256")?, read.metadata.get("model_sha256")?));
+    of_campaign().or_else(of_hashes)
+}

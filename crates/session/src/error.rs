@@ -1,0 +1,323 @@
+//! Why a session could not do what it was asked.
+
+use mapper_campaign::{CampaignError, NightlyError};
+use mapper_core::BackendError;
+use mapper_drift::DriftError;
+use mapper_exporters::ExportError;
+use mapper_gap::diagnose::GapError;
+use mapper_history::HistoryError;
+use mapper_identify::IdentifyError;
+use mapper_importers::ImportError;
+use mapper_planner::PlanError;
+use mapper_record::{ChannelMapError, RecordError};
+use mapper_runner::RunError;
+use mapper_sequence::SequenceError;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What kind of trouble it is: what an exit code or a status page tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// A file could not be read or written, or the program is at fault.
+    Failure,
+    /// The campaign or another input has mistakes.
+    BadInput,
+    /// There is no plan, or the plan given is stale.
+    NoPlan,
+    /// The rig failed.
+    Rig,
+    /// The recording does not hold what is needed.
+    BadRecording,
+    /// Stopped by the operator.
+    Interrupted,
+}
+
+/// Why a session could not do what it was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// The campaign cannot be read, or has mistakes.
+    #[error(transparent)]
+    Campaign(#[from] CampaignError),
+    /// The nightly campaign cannot be read, or has mistakes.
+    #[error(transparent)]
+    Nightly(#[from] NightlyError),
+    /// A nightly campaign names one whose steps come from a script.
+    #[error(
+        "{}: a nightly run compares the same points night after night; the steps of this campaign come from a script, \
+         which may visit others. Give it a grid instead of `sequence`", .path.display()
+    )]
+    NightlySequence {
+        /// The campaign.
+        path: PathBuf,
+    },
+    /// Two runs of a night have the same campaign, machine, method and seed.
+    #[error("{key} stands in the nightly campaign twice; give each campaign its own name")]
+    NightlyTwice {
+        /// The run.
+        key: String,
+    },
+    /// The campaign asks for a format of the map that nobody writes.
+    #[error("`{format}` is not a format that a map can be written in; choose from {}", .known.join(", "))]
+    MapFormat {
+        /// What was asked for.
+        format: mapper_campaign::campaign::FormatName,
+        /// What can be written.
+        known: Vec<&'static str>,
+    },
+    /// A method that does not exist.
+    #[error("`{name}` is not a method: {source}")]
+    Method {
+        /// What was written.
+        name: String,
+        /// The methods that exist.
+        source: serde_json::Error,
+    },
+    /// The campaign's map is not usable.
+    #[error("the nominal model has no map: {0}")]
+    Model(#[from] mapper_physics::tabulated_map::MapError),
+    /// There is no plan.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A file does not hold a plan.
+    #[error("{} is not a plan: {source}", .path.display())]
+    NotAPlan {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: serde_json::Error,
+    },
+    /// A stored plan was made from something else.
+    #[error(
+        "{} is stale: {} changed since it was made; make it anew with `mapper plan CAMPAIGN --out FILE`",
+        .path.display(), .changed.join(" and ")
+    )]
+    StalePlan {
+        /// The file.
+        path: PathBuf,
+        /// What has changed.
+        changed: Vec<&'static str>,
+    },
+    /// A backend could not be made, or failed.
+    #[error("{source}")]
+    Backend {
+        /// Whether its settings are wrong or the rig failed.
+        kind: ErrorKind,
+        /// Why.
+        source: BackendError,
+    },
+    /// A run could not go on; the rig is safe.
+    #[error("{source}\nThe recording up to then is {}.", .recording.display())]
+    Run {
+        /// Why.
+        source: RunError,
+        /// What was recorded.
+        recording: PathBuf,
+    },
+    /// A sequence script has a mistake.
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
+    /// A sequence script failed while it was rehearsed.
+    #[error("the rehearsal failed: {0}")]
+    Rehearsal(#[source] RunError),
+    /// A guard tripped in the rehearsal of a script.
+    #[error("in the rehearsal on the nominal machine at {t_s:.1} s {reason}")]
+    RehearsalTripped {
+        /// Run time, s.
+        t_s: f64,
+        /// What tripped it.
+        reason: String,
+    },
+    /// A script that makes no step.
+    #[error("the sequence script {} makes no step", .path.display())]
+    NoSteps {
+        /// The script.
+        path: PathBuf,
+    },
+    /// A suspected effect is not an effect.
+    #[error(transparent)]
+    Effect(Box<dyn std::error::Error + Send + Sync>),
+    /// A suspected effect has the name of another.
+    #[error("{}: there is an effect `{id}` already; choose another name", .path.display())]
+    EffectTaken {
+        /// The script.
+        path: PathBuf,
+        /// The name.
+        id: String,
+    },
+    /// A recording cannot be read or written.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// A channel map has mistakes.
+    #[error("{}: {source}", .path.display())]
+    ChannelMap {
+        /// The file.
+        path: PathBuf,
+        /// Its mistakes.
+        source: ChannelMapError,
+    },
+    /// Nobody says what machine was recorded.
+    #[error("the machine is not known: the recording carries no campaign. {remedy}")]
+    MachineUnknown {
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The recording is of another machine.
+    #[error(
+        "the recording was made on machine `{recorded}`, the campaign is of `{campaign}`: use the campaign of the machine that was recorded"
+    )]
+    OtherMachine {
+        /// Name or serial number in the recording.
+        recorded: String,
+        /// Name, and serial number if there is one, in the campaign.
+        campaign: String,
+    },
+    /// A recording cannot be identified.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// Recordings cannot be searched for drift.
+    #[error(transparent)]
+    Drift(#[from] DriftError),
+    /// A recording cannot be diagnosed.
+    #[error(transparent)]
+    Gap(#[from] GapError),
+    /// The calibration that ships cannot be read.
+    #[error("failed to read the calibration of the diagnosis: {0}")]
+    Calibration(#[source] serde_json::Error),
+    /// A history cannot be opened or written.
+    #[error(transparent)]
+    History(#[from] HistoryError),
+    /// A map cannot be written in a format.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+    /// A map file has mistakes.
+    #[error("{}: {source}", .path.display())]
+    Import {
+        /// The file.
+        path: PathBuf,
+        /// Its mistakes.
+        source: ImportError,
+    },
+    /// A map format that does not exist.
+    #[error("there is no map format `{name}`; there are {}", .known.join(", "))]
+    UnknownFormat {
+        /// What was asked for.
+        name: String,
+        /// The formats.
+        known: Vec<&'static str>,
+    },
+    /// A file that is of no known map format.
+    #[error("{}: maps are read from files with the extension {}; this one has `{extension}`", .path.display(), .known.join(", "))]
+    UnknownExtension {
+        /// The file.
+        path: PathBuf,
+        /// Its extension.
+        extension: String,
+        /// The extensions that are read.
+        known: Vec<&'static str>,
+    },
+    /// A new file of no known map format.
+    #[error("{}: say the format by extension or `--to`: {}", .path.display(), .known.join(", "))]
+    FormatUnsaid {
+        /// The file.
+        path: PathBuf,
+        /// Formats and their extensions.
+        known: Vec<String>,
+    },
+    /// A reference state that is not understood.
+    #[error(transparent)]
+    Reference(ImportError),
+    /// A map cannot be fitted.
+    #[error("`{format}` needs a fitted map: {source}")]
+    Fit {
+        /// The format.
+        format: &'static str,
+        /// Why.
+        source: mapper_assemble::MapFitError,
+    },
+    /// A file or directory could not be read, written or made.
+    #[error("failed to {action} {}: {source}", .path.display())]
+    File {
+        /// What was tried: "read", "write", "create".
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A parent directory is full of runs.
+    #[error("{} holds 999 runs of this second already", .parent.display())]
+    TooManyRuns {
+        /// The directory.
+        parent: PathBuf,
+    },
+    /// Data could not be written as JSON: a fault of the program.
+    #[error("failed to write JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    /// The operator stopped it.
+    #[error("stopped by the operator")]
+    Interrupted,
+}
+
+impl SessionError {
+    /// A file that could not be read, written or created.
+    pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| SessionError::File { action, path, source }
+    }
+
+    /// What kind of trouble it is.
+    pub fn kind(&self) -> ErrorKind {
+        use SessionError as E;
+        match self {
+            E::Campaign(CampaignError::Read { .. }) | E::Nightly(NightlyError::Read { .. }) => {
+                ErrorKind::Failure
+            }
+            E::Campaign(CampaignError::Mistakes(_))
+            | E::Nightly(NightlyError::Mistake { .. })
+            | E::NightlySequence { .. }
+            | E::NightlyTwice { .. }
+            | E::MapFormat { .. }
+            | E::Method { .. }
+            | E::Model(_)
+            | E::Effect(_)
+            | E::EffectTaken { .. }
+            | E::ChannelMap { .. }
+            | E::MachineUnknown { .. }
+            | E::Import { .. }
+            | E::UnknownFormat { .. }
+            | E::UnknownExtension { .. }
+            | E::FormatUnsaid { .. }
+            | E::Reference(_)
+            | E::Fit { .. }
+            | E::Drift(DriftError::NoRun)
+            | E::Export(ExportError::NeedsFit { .. })
+            | E::Rehearsal(RunError::Source(_)) => ErrorKind::BadInput,
+            E::Plan(_)
+            | E::NotAPlan { .. }
+            | E::StalePlan { .. }
+            | E::RehearsalTripped { .. }
+            | E::NoSteps { .. } => ErrorKind::NoPlan,
+            E::Backend { kind, .. } => *kind,
+            E::Run { source, .. } => match source {
+                RunError::Backend(_) => ErrorKind::Rig,
+                RunError::Source(_) => ErrorKind::BadInput,
+                RunError::Observer(_) => ErrorKind::Failure,
+            },
+            // Only reading fails for reasons that are not the recording's.
+            E::Record(RecordError::Read { .. } | RecordError::Exists { .. } | RecordError::Create { .. })
+            | E::Record(RecordError::Write { .. } | RecordError::BadInput { .. }) => ErrorKind::Failure,
+            E::Record(_) | E::OtherMachine { .. } | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
+                ErrorKind::BadRecording
+            }
+            E::Sequence(_)
+            | E::Rehearsal(_)
+            | E::Calibration(_)
+            | E::History(_)
+            | E::Export(_)
+            | E::File { .. }
+            | E::TooManyRuns { .. }
+            | E::Json(_) => ErrorKind::Failure,
+            E::Interrupted => ErrorKind::Interrupted,
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The gap between nominal model and rig: drift is looked for first, a zero taken off, then the diagnosis.
+
+use crate::declared::identification;
+use crate::planning::{nominal_model, with_plan_request};
+use crate::recorded::Recorded;
+use crate::{Session, SessionError, SessionEvent};
+use mapper_campaign::Campaign;
+use mapper_core::{Channel, DeclaredUncertainty, Recording};
+use mapper_drift::{CauseKind, DriftReport, without_drift};
+use mapper_gap::calibration::Calibration;
+use mapper_gap::declared::Declared;
+use mapper_gap::diagnose::{Diagnosed, Question, diagnose};
+use mapper_gap::outlook::Jump;
+use mapper_gap::report::{Diagnosis, Verdict};
+use mapper_identify::ZeroOutcome;
+use mapper_physics::effect::Effect;
+use mapper_physics::model::Model;
+use mapper_planner::PlanRequest;
+use mapper_record::ChannelMap;
+use std::slice;
+use std::sync::Arc;
+
+/// What a recording says of the gap.
+pub struct Gap {
+    /// The diagnosis, with what it was made from.
+    pub diagnosed: Diagnosed,
+    /// What drifted while it was recorded; `None` where nothing was seen, or where nothing can be said, as without repeats.
+    pub drift: Option<DriftReport>,
+    /// What came of the isothermal zero.
+    pub zero: ZeroOutcome,
+}
+
+impl Session<'_> {
+    /// Diagnoses one recording with candidate effects.
+    ///
+    /// # Errors
+    /// [`SessionError::Gap`] where the recording lacks what is needed or the nominal model cannot follow it.
+    pub fn diagnose_gap(
+        &self,
+        recorded: &Recorded,
+        campaign: &Campaign,
+        map: &ChannelMap,
+        effects: Vec<Arc<dyn Effect>>,
+    ) -> Result<Gap, SessionError> {
+        let model = nominal_model(campaign)?;
+        // A recording in which drift cannot be looked for may still have a gap.
+        let drift = self.drift(slice::from_ref(recorded), campaign, map).ok();
+        let drift = drift.map(|drift| drift.report).filter(|report| report.cause.is_some());
+        let recording = taken_off(recorded.read.recording.clone(), drift.as_ref());
+        let config = identification(campaign);
+        let zero = ZeroOutcome::of(&recording, &config, campaign.zero.is_some());
+        let (recording, zeroed) = zero.take_off(recording, config);
+        // What a zero leaves of the offsets.
+        let sensor = |channel: &Channel, declared: DeclaredUncertainty| {
+            let offset_sigma =
+                zeroed.declared.get(channel).map_or(declared.offset_sigma, |left| left.offset_sigma);
+            (*channel, DeclaredUncertainty { offset_sigma, ..declared })
+        };
+        let declared = Declared {
+            sensors: campaign.sensors.iter().map(|(channel, s)| sensor(channel, s.declared)).collect(),
+            noise_colour: map.noise_colour.unwrap_or_default(),
+            tolerances: campaign.tolerances,
+            nominal: campaign.boundary,
+        };
+        let progress = |done_ratio: f64, what: &str| {
+            self.tell(SessionEvent::Progress { done_ratio, what: what.to_owned() });
+        };
+        let mut diagnosed = diagnose(Question {
+            recording: &recording,
+            declared,
+            jumps: allowed_jumps(campaign, &model)?,
+            model,
+            effects,
+            calibration: Calibration::shipped().map_err(SessionError::Calibration)?,
+            progress: &progress,
+        })?;
+        // What was wrong with the file belongs to what is said about it.
+        let warnings = recorded.read.warnings.iter().map(ToString::to_string);
+        diagnosed.diagnosis.warnings.extend(warnings);
+        note_drift(&mut diagnosed.diagnosis, drift.as_ref());
+        Ok(Gap { diagnosed, drift, zero })
+    }
+}
+
+/// Points up to which every jump between them is simulated to see whether it is allowed.
+const MAX_POINTS: usize = 40;
+
+/// The jumps that the planner allows between the points of the campaign; none for grids too large to simulate them all,
+/// and for campaigns that are no grid.
+fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<Jump>, SessionError> {
+    if campaign.points.len() > MAX_POINTS {
+        return Ok(Vec::new());
+    }
+    with_plan_request(campaign, model, |request| {
+        // Whether a jump is allowed does not hang on what it would tell.
+        let request = PlanRequest { method: None, ..request.clone() };
+        let Ok(graph) = mapper_planner::jump_graph(&request) else { return Ok(Vec::new()) };
+        let allowed = graph.edge_weights().filter(|jump| jump.rejections.is_empty());
+        Ok(allowed
+            .map(|jump| Jump {
+                from: jump.from,
+                to: jump.to,
+                from_p3_pa: jump.p3_pa - jump.p3_change_pa,
+                to_p3_pa: jump.p3_pa,
+                dwell_s: request.timing.dwell_s,
+            })
+            .collect())
+    })
+}
+
+/// The recording to be diagnosed: a sensor's drift is taken off.
+fn taken_off(recording: Recording, drift: Option<&DriftReport>) -> Recording {
+    drift.and_then(|drift| without_drift(&recording, drift)).unwrap_or(recording)
+}
+
+/// Probability of a cause outside the catalogue below which nothing is made of it where a drift was taken off: how well the
+/// drift's course is known is in no tolerance of the diagnosis, and what is left of it looks like a small unknown cause.
+const SURELY_OUTSIDE: f64 = 0.9;
+
+/// Puts what drifted beside the diagnosis, which names no culprit for it.
+fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
+    let Some(drift) = drift else { return };
+    let taken_off = drift.cause.is_some_and(|cause| cause.kind() == CauseKind::Sensor);
+    let consequence = if taken_off {
+        "this was taken off its reading before the diagnosis"
+    } else {
+        "the diagnosis looks for what does not change, so that no cause is named while this is so"
+    };
+    diagnosis
+        .warnings
+        .insert(0, format!("Drift while the recording was made: {} Here {consequence}.", drift.reason));
+    if taken_off
+        && diagnosis.verdict == Verdict::Unexplained
+        && diagnosis.probability_outside < SURELY_OUTSIDE
+    {
+        diagnosis.verdict = Verdict::WithinTolerance;
+        diagnosis.r#where.clear();
+        diagnosis.next = None;
+    }
+    if !taken_off && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
+        diagnosis.verdict = Verdict::Unexplained;
+    }
+}

@@ -1,0 +1,80 @@
+//! From a recording to identified points beside their truth, where there is any: one way for all who need it.
+
+use crate::declared::identification_with;
+use crate::recorded::Recorded;
+use crate::{Session, SessionError, SessionEvent};
+use mapper_core::{IdentifiedPoint, Method, Recording, ReferenceState, ThermalModel};
+use mapper_identify::{IdentifyConfig, WindowRule, ZeroOutcome, identify_recording};
+use mapper_record::ChannelMap;
+use mapper_score::{ScoreSummary, ScoredPoint};
+
+/// What a recording gives.
+#[derive(Debug)]
+pub struct Identified {
+    /// The recording as it was identified: what the isothermal zero takes off is off.
+    pub recording: Recording,
+    /// How it was identified.
+    pub config: IdentifyConfig,
+    /// The points, with the truth where the recording holds it.
+    pub points: Vec<ScoredPoint>,
+    /// What the points share (joint method).
+    pub thermal: Option<ThermalModel>,
+    /// What came of the zero.
+    pub zero: ZeroOutcome,
+    /// How far the points are from the truth; `None` on a real rig.
+    pub score: Option<ScoreSummary>,
+}
+
+impl Identified {
+    /// The points without their truth.
+    pub fn points_alone(&self) -> impl Iterator<Item = &IdentifiedPoint> {
+        self.points.iter().map(|scored| &scored.point)
+    }
+}
+
+impl Session<'_> {
+    /// Identifies all steps of a recording. Machine, sensors and window come from its campaign, or else from the channel map.
+    ///
+    /// # Errors
+    /// [`SessionError::MachineUnknown`] where neither is known, [`SessionError::Identify`] where the recording lacks what
+    /// the method needs.
+    pub fn identify(
+        &self,
+        recorded: Recorded,
+        map: &ChannelMap,
+        method: Option<Method>,
+    ) -> Result<Identified, SessionError> {
+        let mut config = match (&recorded.campaign, &map.machine) {
+            (Some(campaign), _) => identification_with(campaign, map),
+            (None, Some(machine)) => IdentifyConfig {
+                alpha_area_ratio: machine.alpha_area_ratio,
+                internal_area_m2: machine.compressor_internal_area_m2,
+                reference: map.reference.unwrap_or(ReferenceState::SAE),
+                window: map.window.map_or_else(WindowRule::default, |window| WindowRule::Fixed {
+                    start_s: window.start_s,
+                    end_s: window.end_s,
+                }),
+                declared: map.sensors.clone(),
+                noise_colour: map.noise_colour.unwrap_or_default(),
+                ..IdentifyConfig::default()
+            },
+            (None, None) => {
+                return Err(SessionError::MachineUnknown {
+                    remedy: "Give `--campaign FILE`, or `machine:` with `compressor_internal_area` in the channel map",
+                });
+            }
+        };
+        config.method = method.unwrap_or(config.method);
+        let zero_asked = recorded.campaign.as_ref().is_some_and(|campaign| campaign.zero.is_some());
+        let zero = ZeroOutcome::of(&recorded.read.recording, &config, zero_asked);
+        let (recording, config) = zero.take_off(recorded.read.recording, config);
+        let found = identify_recording(&recording, &config)?;
+        let points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
+        for point in &points {
+            self.tell(SessionEvent::PointIdentified(Box::new(point.clone())));
+        }
+        let points = mapper_score::score(&recorded.path, &recording.steps, points)?;
+        let score = mapper_score::summarise(&points);
+        Ok(Identified { recording, config, points, thermal: found.thermal, zero, score })
+    }
+}

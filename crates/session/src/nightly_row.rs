@@ -1,0 +1,66 @@
+//! What the history keeps of a nightly run.
+
+use mapper_core::{Plan, Verdict};
+use mapper_history::{Metric, PointRow};
+use mapper_score::ScoredPoint;
+use std::collections::BTreeMap;
+
+/// The figures that are watched; those without a value are left out.
+pub(crate) fn figures(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f64> {
+    let mean = |values: Vec<f64>| {
+        let count = values.len() as f64;
+        (count > 0.0).then(|| values.iter().sum::<f64>() / count)
+    };
+    let score = mapper_score::summarise(points);
+    let good = points.iter().filter(|scored| scored.point.verdict == Verdict::Good).count();
+    // True means over the points that have a result as well: the same points in both.
+    let both = |scored: &&ScoredPoint| scored.point.eta.is_some() && scored.truth.is_some();
+    let with_eta: Vec<&ScoredPoint> = points.iter().filter(both).collect();
+    Metric::ALL
+        .into_iter()
+        .filter_map(|figure| {
+            let value = match figure {
+                Metric::GoodPoints => Some(good as f64),
+                Metric::EtaMean => mean(with_eta.iter().filter_map(|scored| scored.point.eta).collect()),
+                Metric::EtaTrueMean => {
+                    mean(with_eta.iter().filter_map(|scored| Some(scored.truth?.eta)).collect())
+                }
+                Metric::EtaMedianError => score.map(|score| score.eta_median_error),
+                Metric::EtaWorstError => score.map(|score| score.eta_worst_error),
+                Metric::EtaCoverage => score.map(|score| score.eta_coverage_ratio),
+                Metric::HMean => mean(with_eta.iter().filter_map(|scored| scored.point.h_w_m2k).collect()),
+                Metric::HTrueMean => {
+                    mean(with_eta.iter().filter_map(|scored| Some(scored.truth?.h_w_m2k)).collect())
+                }
+                Metric::HMedianError => score.and_then(|score| score.h_median_error_ratio),
+                Metric::HWorstError => score.and_then(|score| score.h_worst_error_ratio),
+                Metric::RigMinutes => Some(plan.duration_s() / 60.0),
+            };
+            Some((figure, value.filter(|value| value.is_finite())?))
+        })
+        .collect()
+}
+
+/// One row a point; a point that is visited again is told apart by its visit.
+pub(crate) fn point_rows(points: &[ScoredPoint]) -> Vec<PointRow> {
+    let mut visits: BTreeMap<(u64, u64), usize> = BTreeMap::new();
+    points
+        .iter()
+        .map(|ScoredPoint { point, truth }| {
+            let speed_rpm = point.target.map_or(point.speed_rpm, |target| target.speed_rpm);
+            let visits =
+                visits.entry((speed_rpm.to_bits(), point.valve_opening_ratio.to_bits())).or_default();
+            let visit = *visits;
+            *visits += 1;
+            PointRow {
+                speed_rpm,
+                valve_opening_ratio: point.valve_opening_ratio,
+                visit,
+                eta: point.eta,
+                eta_true: truth.map(|truth| truth.eta),
+                h_w_m2k: point.h_w_m2k,
+                h_true_w_m2k: truth.map(|truth| truth.h_w_m2k),
+            }
+        })
+        .collect()
+}

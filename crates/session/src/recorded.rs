@@ -1,0 +1,96 @@
+//! A recording read from a file, with the campaign that says what was recorded.
+
+use crate::SessionError;
+use crate::files::read_text;
+use crate::run_directory;
+use mapper_campaign::{Campaign, CampaignError};
+use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
+use std::path::{Path, PathBuf};
+
+/// A recording, where it came from, and the campaign it belongs to.
+#[derive(Debug)]
+pub struct Recorded {
+    /// The file.
+    pub path: PathBuf,
+    /// What is in it.
+    pub read: ReadReport,
+    /// Given by the caller, or attached to the recording.
+    pub campaign: Option<Campaign>,
+}
+
+impl Recorded {
+    /// Reads a run directory or a file. What says the machine is, in this order: the campaign given, the `machine` of the
+    /// channel map, the campaign attached to the recording.
+    ///
+    /// # Errors
+    /// [`SessionError::Record`] where the recording cannot be read, [`SessionError::Campaign`] where the attached campaign
+    /// has mistakes, [`SessionError::OtherMachine`] where the recording is of another machine than the campaign.
+    pub fn read(path: &Path, map: &ChannelMap, given: Option<&Campaign>) -> Result<Recorded, SessionError> {
+        let file = run_directory::recording_of(path);
+        let read = read_recording(&file, map, &ReadOptions::default())?;
+        let campaign = match given {
+            Some(campaign) => Some(campaign.clone()),
+            None if map.machine.is_some() => None,
+            None => attached_campaign(&read, &file)?,
+        };
+        if let Some(campaign) = &campaign {
+            same_machine(&read, campaign)?;
+        }
+        Ok(Recorded { path: file, read, campaign })
+    }
+
+    /// The campaign, or that nobody says what machine was recorded.
+    ///
+    /// # Errors
+    /// [`SessionError::MachineUnknown`] with `remedy`.
+    pub fn known(&self, remedy: &'static str) -> Result<&Campaign, SessionError> {
+        self.campaign.as_ref().ok_or(SessionError::MachineUnknown { remedy })
+    }
+}
+
+/// The campaign attached to a recording; `None` where it carries none.
+pub(crate) fn attached_campaign(read: &ReadReport, file: &Path) -> Result<Option<Campaign>, SessionError> {
+    let Some(text) = &read.campaign_text else { return Ok(None) };
+    let origin = file.with_file_name(run_directory::CAMPAIGN);
+    let checked = mapper_campaign::check(text, &origin, &read_beside);
+    Ok(Some(checked.map_err(|findings| CampaignError::Mistakes(Box::new(findings)))?))
+}
+
+/// A file named by the campaign of a recording. The sequence script, which nothing here needs, may be missing.
+fn read_beside(path: &Path) -> std::io::Result<String> {
+    let text = std::fs::read_to_string(path);
+    if path.extension().is_some_and(|extension| extension == "rhai") {
+        Ok(text.unwrap_or_default())
+    } else {
+        text
+    }
+}
+
+/// A channel map from a file.
+///
+/// # Errors
+/// [`SessionError::File`] where it cannot be read, [`SessionError::ChannelMap`] with its mistakes.
+pub fn channel_map(file: &Path) -> Result<ChannelMap, SessionError> {
+    ChannelMap::from_yaml(&read_text(file)?)
+        .map_err(|source| SessionError::ChannelMap { path: file.to_owned(), source })
+}
+
+/// Refuses a recording of another machine than the campaign's. A recording that names none may be of any.
+pub(crate) fn same_machine(read: &ReadReport, campaign: &Campaign) -> Result<(), SessionError> {
+    let machine = &campaign.machine;
+    let other = |key: &str, own: Option<&String>| {
+        read.metadata.get(key).filter(|recorded| Some(*recorded) != own && !recorded.is_empty())
+    };
+    let number = machine.serial_number.as_ref();
+    match other("machine", Some(&machine.name)).or_else(|| other("serial_number", number)) {
+        None => Ok(()),
+        Some(recorded) => Err(SessionError::OtherMachine {
+            recorded: recorded.clone(),
+            campaign: format!(
+                "{}{}",
+                machine.name,
+                number.map_or_else(String::new, |number| format!(" ({number})"))
+            ),
+        }),
+    }
+}

@@ -1,0 +1,112 @@
+//! A sequence script rehearsed on the nominal machine: what fails there never touches the rig.
+
+use crate::drive::drive;
+use crate::planning::plan;
+use crate::scripted_steps::ScriptedSteps;
+use crate::{Session, SessionError};
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::{BackendChoice, SequenceSource};
+use mapper_core::{Plan, PlanStep, SampleBatch, StepMarker, VisitOrder};
+use mapper_physics::model::Model;
+use mapper_runner::{RunEnd, RunObserver, StepSource, StepSourceError};
+
+/// What the plan of a script says of its objective.
+const OBJECTIVE: &str = "sequence";
+/// The backend of the rehearsal.
+const REHEARSED_ON: &str = "virtual_lab";
+
+/// What a script made of the nominal machine.
+pub struct Rehearsal {
+    /// The steps in the order they came, with the standard errors found.
+    pub plan: Plan,
+    /// The script's notes.
+    pub notes: Vec<String>,
+}
+
+/// Runs the script on the virtual lab of the nominal machine, where nothing is recorded.
+///
+/// # Errors
+/// [`SessionError`] where the script has a mistake, makes no step, or a guard trips.
+pub fn rehearse(
+    session: &Session<'_>,
+    campaign: &Campaign,
+    model: &Model,
+    source: &SequenceSource,
+) -> Result<Rehearsal, SessionError> {
+    let base = base_plan(campaign, model, source)?;
+    let choice = BackendChoice { name: REHEARSED_ON.to_owned(), settings: serde_json::json!({}) };
+    // Only the script's own steps: a rehearsal has no sensors to be zeroed.
+    let nominal = Campaign { backend: choice, zero: None, ..campaign.clone() };
+    let mut backend = session.registry.make_backend(&nominal, model)?;
+    let mut steps = Rehearsing { steps: ScriptedSteps::new(campaign, model, source)?, notes: Vec::new() };
+    let end = drive(&nominal, &mut steps, backend.as_mut(), &mut Nobody, session.stop);
+    match end.map_err(SessionError::Rehearsal)? {
+        RunEnd::Completed => {}
+        RunEnd::Tripped(trip) => {
+            return Err(SessionError::RehearsalTripped { t_s: trip.t_s, reason: trip.reason });
+        }
+        RunEnd::Interrupted { .. } => return Err(SessionError::Interrupted),
+    }
+    let plan = steps.steps.executed(&base);
+    if plan.steps.is_empty() {
+        return Err(SessionError::NoSteps { path: source.path.clone() });
+    }
+    Ok(Rehearsal { plan, notes: steps.notes })
+}
+
+struct Nobody;
+
+impl RunObserver for Nobody {}
+
+/// Steps on the nominal machine: what is identified there is the forecast.
+struct Rehearsing {
+    steps: ScriptedSteps,
+    notes: Vec<String>,
+}
+
+impl StepSource for Rehearsing {
+    fn warm_up_s(&self) -> f64 {
+        self.steps.warm_up_s()
+    }
+
+    fn cool_down_s(&self) -> f64 {
+        self.steps.cool_down_s()
+    }
+
+    fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
+        self.steps.next_step()
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> bool {
+        self.steps.on_batch(batch)
+    }
+
+    fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        self.steps.after_step(marker)?;
+        if let (Some(step), Some(result)) = (self.steps.done.last_mut(), &self.steps.finished) {
+            step.predicted.sigma_eta = Some(result.sigma_eta()).filter(|sigma| sigma.is_finite());
+            step.predicted.sigma_h_rel =
+                result.h_w_m2k().map(|h| result.sigma_h_w_m2k() / h).filter(|ratio| ratio.is_finite());
+        }
+        Ok(())
+    }
+
+    fn take_notes(&mut self) -> Vec<String> {
+        let notes = self.steps.take_notes();
+        self.notes.extend(notes.iter().cloned());
+        notes
+    }
+}
+
+/// A plan without the script's steps: hashes and times.
+fn base_plan(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<Plan, SessionError> {
+    let without_script = Campaign { sequence: None, repeats: None, ..campaign.clone() };
+    let canonical = serde_json::to_string(&without_script)?;
+    // The planner plans one point alone: the script has the say over the others.
+    let points = campaign.points.iter().copied().take(1).collect();
+    let mut plan = plan(&Campaign { points, order: VisitOrder::Listed, ..without_script }, model)?;
+    plan.objective = OBJECTIVE.to_owned();
+    plan.made_from.campaign_sha256 = mapper_planner::sha256_hex(&canonical);
+    plan.made_from.script_sha256 = Some(mapper_planner::sha256_hex(&source.text));
+    Ok(plan)
+}

@@ -1,0 +1,171 @@
+//! What a run gives: points, map, report; data for whoever asks, files in its directory.
+
+use crate::files::{json_text, write_new};
+use crate::identified::Identified;
+use crate::recorded::Recorded;
+use crate::{Session, SessionError, run_directory};
+use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble, repeated_jumps};
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::FormatName;
+use mapper_core::{CompressorMap, IdentifiedPoint, Plan, ThermalModel};
+use mapper_exporters::ExportError;
+use mapper_identify::ZeroOutcome;
+use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_report::{RunReport, run_report};
+use mapper_score::{ScoreSummary, ScoredPoint};
+use serde::Serialize;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Everything that came of a run, with the files it was written to; written as JSON, the one object that a run prints.
+#[derive(Debug, Serialize)]
+pub struct Results {
+    /// The run's directory.
+    pub run: PathBuf,
+    /// Its recording.
+    pub recording: PathBuf,
+    /// Identified points, repeats included.
+    pub points: Vec<ScoredPoint>,
+    /// Files of the map by format.
+    pub map: BTreeMap<String, PathBuf>,
+    /// The test report.
+    pub report: PathBuf,
+    /// How far the points are from the truth; `None` on a real rig.
+    pub score: Option<ScoreSummary>,
+    /// Jumps that were made more than once.
+    pub repeats: Vec<RepeatedJump>,
+    /// What the points share (joint method).
+    pub thermal: Option<ThermalModel>,
+    /// What came of the isothermal zero.
+    pub zero: ZeroOutcome,
+    /// What else is to be known.
+    pub remarks: Vec<String>,
+    /// The map itself; `None` where there is none.
+    #[serde(skip)]
+    pub compressor_map: Option<CompressorMap>,
+}
+
+impl Session<'_> {
+    /// Reads the recording back, identifies, assembles, exports and reports, all into `directory`.
+    ///
+    /// # Errors
+    /// [`SessionError`] where the recording cannot be identified or a file cannot be written. A map that cannot be
+    /// assembled or fitted is a remark.
+    pub(crate) fn results(
+        &self,
+        campaign: &Campaign,
+        plan: &Plan,
+        outcome: &str,
+        directory: &Path,
+        recording: &Path,
+    ) -> Result<Results, SessionError> {
+        let read = read_recording(recording, &ChannelMap::native(), &ReadOptions::default())?;
+        let mut remarks: Vec<String> = read.warnings.iter().map(ToString::to_string).collect();
+        let recorded = Recorded { path: recording.to_owned(), read, campaign: Some(campaign.clone()) };
+        let identified = self.identify(recorded, &ChannelMap::native(), None)?;
+        let compressor_map = compressor_map(campaign, &identified, &mut remarks);
+        let map = match &compressor_map {
+            Some(map) => export(campaign, map, directory, &mut remarks)?,
+            None => BTreeMap::new(),
+        };
+        let Identified { recording: recorded, config, points, thermal, zero, score } = identified;
+        let points_file =
+            json!({"reference": config.reference, "points": points, "thermal": thermal, "zero": zero});
+        write_new(&directory.join(run_directory::POINTS), json_text(&points_file)?.as_bytes())?;
+        let report = directory.join(run_directory::REPORT);
+        let alone: Vec<IdentifiedPoint> = points.iter().map(|scored| scored.point.clone()).collect();
+        let repeats = repeated_jumps(&recorded.steps, &alone);
+        let text = run_report(&RunReport {
+            campaign,
+            plan,
+            outcome,
+            events: &recorded.events,
+            points: &points,
+            repeats: &repeats,
+            score: score.as_ref(),
+            has_picture: map.contains_key("svg"),
+        });
+        write_new(&report, text.as_bytes())?;
+        Ok(Results {
+            run: directory.to_owned(),
+            recording: recording.to_owned(),
+            points,
+            map,
+            report,
+            score,
+            repeats,
+            thermal,
+            zero,
+            remarks,
+            compressor_map,
+        })
+    }
+}
+
+/// The map of all points that have a place on it, with a surface through it where it has enough of them.
+fn compressor_map(
+    campaign: &Campaign,
+    identified: &Identified,
+    remarks: &mut Vec<String>,
+) -> Option<CompressorMap> {
+    let has_place = |point: &&IdentifiedPoint| {
+        [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm]
+            .iter()
+            .all(|value| value.is_finite())
+    };
+    let placed: Vec<IdentifiedPoint> = identified.points_alone().filter(has_place).cloned().collect();
+    let config = &identified.config;
+    let map = assemble(&placed, &campaign.machine.name, config.reference, config.method, Grouping::default())
+        .map_err(|error| remarks.push(format!("there is no map: {error}")))
+        .ok()?;
+    match MapFit::new(&map).and_then(|fit| fit.table(&MapFitOptions::default())) {
+        Ok(table) => Some(CompressorMap { fitted: Some(table), ..map }),
+        Err(error) => {
+            remarks.push(format!("the map is not fitted: {error}"));
+            Some(map)
+        }
+    }
+}
+
+/// Whether every format that the campaign names can be written: before a run, not after it.
+///
+/// # Errors
+/// [`SessionError::MapFormat`] with the first that cannot.
+pub fn check_formats(campaign: &Campaign) -> Result<(), SessionError> {
+    let formats = &campaign.outputs.formats;
+    let wrong = formats.iter().find(|format| mapper_exporters::find(format.name()).is_none());
+    wrong.map_or(Ok(()), |format| Err(unknown(format)))
+}
+
+fn unknown(format: &FormatName) -> SessionError {
+    let known = mapper_exporters::EXPORTERS.iter().map(|exporter| exporter.name).collect();
+    SessionError::MapFormat { format: format.clone(), known }
+}
+
+/// Writes the map in every format that the campaign names.
+fn export(
+    campaign: &Campaign,
+    map: &CompressorMap,
+    directory: &Path,
+    remarks: &mut Vec<String>,
+) -> Result<BTreeMap<String, PathBuf>, SessionError> {
+    let mut files = BTreeMap::new();
+    for format in &campaign.outputs.formats {
+        let name = format.name();
+        let Some(exporter) = mapper_exporters::find(name) else { return Err(unknown(format)) };
+        let bytes = match (exporter.export)(map) {
+            Ok(bytes) => bytes,
+            // A campaign of a few points has a map, but no surface through it.
+            Err(error @ ExportError::NeedsFit { .. }) => {
+                remarks.push(error.to_string());
+                continue;
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let path = directory.join(format!("map.{}", exporter.extension));
+        write_new(&path, &bytes)?;
+        files.insert(name.to_owned(), path);
+    }
+    Ok(files)
+}

@@ -1,0 +1,43 @@
+//! Where a run's files go: one new directory each, never an old one.
+
+use crate::SessionError;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// The file names within a run directory.
+pub const RECORDING: &str = "recording.mcap";
+/// The plan that was run.
+pub const PLAN: &str = "plan.json";
+/// The steps that a sequence script has made of the run.
+pub const EXECUTED: &str = "executed_plan.json";
+/// The campaign as it was read.
+pub const CAMPAIGN: &str = "campaign.yaml";
+/// The sequence script, where there is one.
+pub const SEQUENCE: &str = "sequence.rhai";
+/// Identified points.
+pub const POINTS: &str = "points.json";
+/// The test report.
+pub const REPORT: &str = "report.md";
+
+/// Creates `<parent>/<campaign>-<time>`, with `-2`, `-3`, ... behind it where that exists already.
+///
+/// # Errors
+/// [`SessionError::File`] where a directory cannot be made, [`SessionError::TooManyRuns`] after 999 of the same name.
+pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, SessionError> {
+    std::fs::create_dir_all(parent).map_err(SessionError::file("create", parent))?;
+    for attempt in 1..=999 {
+        let suffix = if attempt == 1 { String::new() } else { format!("-{attempt}") };
+        let path = parent.join(format!("{campaign}-{time}{suffix}"));
+        match std::fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(SessionError::file("create", &path)(error)),
+        }
+    }
+    Err(SessionError::TooManyRuns { parent: parent.to_owned() })
+}
+
+/// The recording of a run directory, or the file itself.
+pub fn recording_of(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join(RECORDING) } else { path.to_owned() }
+}

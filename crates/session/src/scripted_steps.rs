@@ -1,0 +1,167 @@
+//! A sequence script at work: its steps for the runner, and for the script what each has given.
+
+use crate::SessionError;
+use crate::declared::identification;
+use crate::planning::plan;
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::SequenceSource;
+use mapper_core::{Method, Plan, PlanStep, Recording, SampleBatch, StepMarker};
+use mapper_identify::{IdentifyConfig, identify_each};
+use mapper_physics::model::Model;
+use mapper_runner::{StepSource, StepSourceError};
+use mapper_sequence::{Hold, Script, SequenceRequest, SequenceRunner, SettleWatch, StepResult};
+
+/// The steps of a script, each identified as soon as it has ended.
+pub(crate) struct ScriptedSteps {
+    script: SequenceRunner,
+    config: IdentifyConfig,
+    warm_up_s: f64,
+    cool_down_s: f64,
+    /// The last two steps and their samples: all that identifying the last one needs.
+    recent: Recording,
+    now: Option<PlanStep>,
+    settling: Option<SettleWatch>,
+    pub(crate) finished: Option<StepResult>,
+    /// Steps that have ended, with their real times.
+    pub done: Vec<PlanStep>,
+}
+
+impl ScriptedSteps {
+    /// The steps of a campaign's script.
+    pub fn new(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<Self, SessionError> {
+        let script = Script { path: source.path.clone(), text: source.text.clone() };
+        let script = SequenceRunner::start(script, request(campaign, model))?;
+        Ok(ScriptedSteps {
+            script,
+            // A script sees a step at once, the joint method all of them at the end.
+            config: single_steps(identification(campaign)),
+            warm_up_s: campaign.timing.warm_up_s,
+            cool_down_s: campaign.timing.cool_down_s,
+            recent: Recording::default(),
+            now: None,
+            settling: None,
+            finished: None,
+            done: Vec::new(),
+        })
+    }
+
+    /// The steps that were run as a plan, with the rest of a plan from `base`.
+    pub fn executed(&self, base: &Plan) -> Plan {
+        with_steps(base.clone(), self.done.clone())
+    }
+
+    fn forget_before(&mut self, start_s: f64) {
+        for series in self.recent.series.values_mut() {
+            let kept = series.t_s.partition_point(|t_s| *t_s < start_s);
+            series.t_s.drain(..kept);
+            series.values.drain(..kept);
+        }
+    }
+}
+
+impl StepSource for ScriptedSteps {
+    fn warm_up_s(&self) -> f64 {
+        self.warm_up_s
+    }
+
+    fn cool_down_s(&self) -> f64 {
+        self.cool_down_s
+    }
+
+    fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
+        let next = self.script.next_step(self.finished.take()).map_err(source_error)?;
+        let Some(next) = next else { return Ok(None) };
+        self.settling = match next.hold {
+            Hold::Dwell => None,
+            Hold::UntilSettled(rule) => Some(SettleWatch::new(rule, next.step.start_s)),
+        };
+        self.now = Some(next.step.clone());
+        Ok(Some(next.step))
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> bool {
+        for column in &batch.columns {
+            let series = self.recent.series.entry(column.channel).or_default();
+            // As a recording is read back: what the sensor did not give is not there.
+            for (t_s, value) in batch.t_s.iter().zip(&column.values).filter(|(_, value)| value.is_finite()) {
+                series.t_s.push(*t_s);
+                series.values.push(*value);
+            }
+        }
+        self.settling.as_mut().is_some_and(|watch| watch.has_settled(batch))
+    }
+
+    fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        let Some(mut step) = self.now.take() else { return Ok(()) };
+        if self.recent.steps.len() > 1 {
+            self.recent.steps.remove(0);
+        }
+        if let Some(before) = self.recent.steps.first().copied() {
+            self.forget_before(before.start_s);
+        }
+        self.recent.steps.push(*marker);
+        let identified = identify_each(&self.recent, &self.config).map_err(source_error)?.pop();
+        self.finished = Some(StepResult {
+            number: step.index + 1,
+            target: step.to,
+            from: step.from,
+            start_s: marker.start_s,
+            end_s: marker.end_s,
+            identified: identified.and_then(Result::ok),
+        });
+        (step.start_s, step.dwell_s) = (marker.start_s, marker.end_s - marker.start_s);
+        step.predicted.minutes = step.dwell_s / 60.0;
+        self.done.push(step);
+        Ok(())
+    }
+
+    fn take_notes(&mut self) -> Vec<String> {
+        self.script.take_notes()
+    }
+}
+
+fn single_steps(config: IdentifyConfig) -> IdentifyConfig {
+    let method = match config.method {
+        Method::Joint => Method::Dynamic,
+        method => method,
+    };
+    IdentifyConfig { method, ..config }
+}
+
+fn source_error(error: impl std::error::Error + Send + Sync + 'static) -> StepSourceError {
+    StepSourceError { message: error.to_string(), source: Some(Box::new(error)) }
+}
+
+fn with_steps(mut plan: Plan, steps: Vec<PlanStep>) -> Plan {
+    plan.steps = steps;
+    let gradients = || plan.steps.iter().filter_map(|step| step.predicted.dtc_k).map(f64::abs);
+    let (sum_k, worst_k) = (gradients().sum(), gradients().min_by(f64::total_cmp));
+    plan.figures.sum_gradient_k = sum_k;
+    plan.figures.worst_gradient_k = worst_k;
+    plan.figures.worst_sigma_eta =
+        plan.steps.iter().filter_map(|step| step.predicted.sigma_eta).max_by(f64::total_cmp);
+    plan.figures.minutes = plan.duration_s() / 60.0;
+    plan
+}
+
+/// What a script sees of the campaign.
+fn request(campaign: &Campaign, model: &Model) -> SequenceRequest {
+    let (planned, machine) = (campaign.clone(), model.clone());
+    SequenceRequest {
+        points: campaign.points.clone(),
+        timing: campaign.timing,
+        window: campaign.identification.window,
+        settle_bands: campaign.identification.settle_bands,
+        model: model.clone(),
+        boundary: campaign.boundary,
+        follow_outlet: campaign.follow_outlet,
+        limits: campaign.limits,
+        order: Box::new(move |points| {
+            // Repeats are the script's own business.
+            let subset =
+                Campaign { points: points.to_vec(), sequence: None, repeats: None, ..planned.clone() };
+            let plan = plan(&subset, &machine).map_err(|error| error.to_string())?;
+            Ok(plan.steps.into_iter().map(|step| step.to).collect())
+        }),
+    }
+}

@@ -1,0 +1,31 @@
+//! What every operation of a session shares.
+
+use crate::event::OnEvent;
+use crate::{Registry, SessionEvent};
+use std::sync::atomic::AtomicBool;
+
+/// Plug-ins, somebody who looks on, and a way to stop.
+#[derive(Clone, Copy)]
+pub struct Session<'a> {
+    /// The plug-ins.
+    pub registry: &'a Registry,
+    /// Called with everything that happens.
+    pub on_event: OnEvent<'a>,
+    /// Set from outside to stop at the next sample; the rig is brought into its safe state.
+    pub stop: &'a AtomicBool,
+}
+
+/// Nobody stops a session that was opened without a flag.
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+impl<'a> Session<'a> {
+    /// A session that nobody looks at and nobody stops.
+    pub fn new(registry: &'a Registry) -> Self {
+        Session { registry, on_event: &|_| {}, stop: &NEVER }
+    }
+
+    /// Tells whoever looks on.
+    pub(crate) fn tell(&self, event: SessionEvent) {
+        (self.on_event)(&event);
+    }
+}

@@ -1,0 +1,88 @@
+//! Every backend keeps every rule of the seam. A new backend gets its row in [`candidates`], and all rules with it.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod candidate;
+mod rules;
+
+use candidate::Candidate;
+use mapper_backends::replay::{self, ReplayBackend};
+use mapper_backends::virtual_lab::{self, ActuatorDynamics, LabSettings, SensorErrors, Start, VirtualLab};
+use mapper_core::{Backend, Channel, Recording, RigMode, Series, Setpoints};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+
+/// All backends, each as it is driven in practice.
+fn candidates() -> [Candidate; 3] {
+    [
+        Candidate { name: virtual_lab::NAME, make: settled_lab, setpoints: setpoints(150e3), lasts_s: None },
+        Candidate { name: virtual_lab::NAME, make: lab_at_rest, setpoints: setpoints(150e3), lasts_s: None },
+        Candidate {
+            name: replay::NAME,
+            make: replay_of_the_lab,
+            setpoints: setpoints(150e3),
+            lasts_s: Some(RECORDED_S),
+        },
+    ]
+}
+
+fn setpoints(p3_pa: f64) -> Setpoints {
+    Setpoints {
+        mode: RigMode::Running,
+        p3_pa,
+        t3_k: 773.15,
+        valve_opening_ratio: 0.7,
+        oil_temperature_k: 323.15,
+    }
+}
+
+/// Noise, offsets and slow actuators: all that a seed decides.
+fn lab(start: Start) -> LabSettings {
+    let errors = SensorErrors {
+        white_sigma: 0.08,
+        coloured_sigma: 0.06,
+        coloured_time_constant_s: 2.0,
+        offset: 0.3,
+        gain_ratio: 0.0,
+    };
+    LabSettings {
+        sensors: [(Channel::T1, errors), (Channel::T2, errors)].into(),
+        p3_actuator: ActuatorDynamics { lag_s: 0.3, slew_per_s: 50e3 },
+        start,
+        seed: 42,
+        ..LabSettings::ideal(Model::nominal(), BoundaryConditions::default())
+    }
+}
+
+fn settled_lab() -> Box<dyn Backend> {
+    Box::new(VirtualLab::new(lab(Start::Settled)))
+}
+
+fn lab_at_rest() -> Box<dyn Backend> {
+    Box::new(VirtualLab::new(lab(Start::Standstill)))
+}
+
+/// More than any rule takes.
+const RECORDED_S: f64 = 30.0;
+
+/// Half a minute of the lab.
+fn replay_of_the_lab() -> Box<dyn Backend> {
+    let mut rig = settled_lab();
+    rig.arm().unwrap();
+    rig.set(&setpoints(150e3)).unwrap();
+    let batch = rig.poll(RECORDED_S).unwrap();
+    let series = batch
+        .columns
+        .into_iter()
+        .map(|column| (column.channel, Series { t_s: batch.t_s.clone(), values: column.values }));
+    Box::new(ReplayBackend::new(&Recording { series: series.collect(), ..Recording::default() }))
+}
+
+#[test]
+fn every_backend_keeps_every_rule() {
+    for candidate in candidates() {
+        for (rule, check) in rules::ALL {
+            println!("{}: {rule}", candidate.name);
+            check(&candidate);
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! No circle inside a crate nor between crates: what is below can be read, moved and tested without what is above.
+
+use cargo_metadata::{DependencyKind, MetadataCommand};
+use mapper_tests::tree::{circles, packages};
+use petgraph::algo::tarjan_scc;
+use petgraph::graphmap::DiGraphMap;
+
+/// Circles that are known and to be broken: folder of the package, and its files from `src`. What is left of one may stay;
+/// one that is gone fails the test as well, so that this list can only shrink.
+#[rustfmt::skip]
+const KNOWN: &[(&str, &[&str])] = &[
+    ("crates/assemble", &["map_fit/leave_out.rs", "map_fit/mod.rs", "map_fit/table.rs"]),
+    ("crates/assemble", &["map_fit/problem.rs", "map_fit/variances.rs"]),
+    ("crates/blind", &["case.rs", "strength.rs"]),
+    ("crates/blind", &["outside.rs", "outside/back_plate.rs", "outside/clearance.rs", "outside/coolant_passage.rs", "outside/coulomb_friction.rs", "outside/flow_dependent_htc.rs", "outside/mount_conduction.rs", "outside/outlet_duct.rs", "outside/slow_housing_probe.rs", "outside/slow_pressure_line.rs", "outside/speed_gain.rs"]),
+    ("crates/chart", &["draw.rs", "figure.rs", "frame.rs", "layout.rs", "legend.rs"]),
+    ("crates/cli", &["commands/plan.rs", "commands/scripted.rs"]),
+    ("crates/cli", &["results.rs", "test_report.rs"]),
+    ("crates/drift", &["candidates.rs", "correct.rs", "decide.rs", "fit.rs", "leftovers.rs", "nuisance.rs", "refine.rs", "study.rs"]),
+    ("crates/gap", &["screen.rs", "select.rs"]),
+    ("crates/identify", &["joint/explained.rs", "joint/solve.rs"]),
+    ("crates/identify", &["joint/rows.rs", "joint/smoothing.rs"]),
+    ("crates/record", &["read.rs", "rig_sink.rs", "scan.rs"]),
+    ("crates/runner", &["soak.rs", "source.rs"]),
+    ("crates/sequence", &["api.rs", "runner.rs", "session.rs"]),
+    ("plugins/effects", &["script/engine.rs", "script/hooks.rs"]),
+    ("plugins/exporters", &["fitted_items.rs", "svg.rs"]),
+    ("plugins/importers", &["csv.rs", "json.rs", "lib.rs", "lines.rs", "sae.rs"]),
+];
+
+#[test]
+fn no_files_of_a_crate_need_each_other() {
+    let packages = packages();
+    assert!(packages.len() > 15, "only {} packages were found", packages.len());
+    let mut found = Vec::new();
+    for package in &packages {
+        found.extend(circles(package).into_iter().map(|circle| (package.folder.clone(), circle)));
+    }
+    let is_part_of =
+        |circle: &[String], files: &[&str]| circle.iter().all(|file| files.contains(&file.as_str()));
+    let is_known = |folder: &str, circle: &[String]| {
+        KNOWN.iter().any(|(known, files)| *known == folder && is_part_of(circle, files))
+    };
+    let new: Vec<String> = found
+        .iter()
+        .filter(|(folder, circle)| !is_known(folder, circle))
+        .map(|(folder, circle)| format!("(\"{folder}\", &{circle:?}),"))
+        .collect();
+    assert!(
+        new.is_empty(),
+        "files that need each other; give what they share a file of its own:\n{}",
+        new.join("\n")
+    );
+    for (folder, files) in KNOWN {
+        let there = found.iter().any(|(found, circle)| found == folder && is_part_of(circle, files));
+        assert!(there, "{folder}: the circle of {files:?} is gone: take it off the list in {}", file!());
+    }
+}
+
+/// Tests included, which Cargo would let pass.
+#[test]
+fn no_crates_need_each_other() {
+    let manifest = mapper_tests::repository().join("Cargo.toml");
+    let metadata = MetadataCommand::new().manifest_path(manifest).no_deps().exec().unwrap();
+    let mut packages = DiGraphMap::<&str, ()>::new();
+    for package in &metadata.packages {
+        for dependency in &package.dependencies {
+            let is_own = metadata.packages.iter().any(|other| *other.name == dependency.name);
+            if is_own && dependency.kind != DependencyKind::Build {
+                packages.add_edge(package.name.as_str(), dependency.name.as_str(), ());
+            }
+        }
+    }
+    let circles: Vec<_> = tarjan_scc(&packages).into_iter().filter(|circle| circle.len() > 1).collect();
+    assert!(circles.is_empty(), "{circles:?}");
+}
+
+/// What a crate does to the rule is seen: by `use`, by path, through a re-export, in a macro; not in tests.
+#[test]
+fn circles_are_seen() {
+    let directory = mapper_tests::scratch();
+    let files = [
+        ("lib.rs", "mod a; mod b; mod c; mod d; mod e; mod f; pub use a::A; use f::F; pub struct Root(F);"),
+        ("a.rs", "use crate::b::B; pub struct A(B);"),
+        ("b.rs", "pub struct B; fn f() { let _ = std::mem::size_of::<Option<crate::A>>(); }"),
+        ("c.rs", "pub struct C; fn f() { println!(\"{}\", super::d::D); }"),
+        ("d.rs", "pub const D: u8 = { fn g() { use crate::c::C as Other; } 1 };"),
+        ("e.rs", "pub struct E; #[cfg(test)] mod tests { use crate::f::F; }"),
+        ("f.rs", "use super::e::*; pub struct F(E);"),
+    ];
+    for (name, text) in files {
+        std::fs::write(directory.path().join(name), text).unwrap();
+    }
+    let found = mapper_tests::tree::circles_below(directory.path(), &[directory.path().join("lib.rs")]);
+    assert_eq!(found, [["a.rs", "b.rs"], ["c.rs", "d.rs"]]);
+}

@@ -1,0 +1,36 @@
+//! What this machine offers to tests that need more than Rust.
+
+use crate::{machine, workspace};
+use std::path::PathBuf;
+use std::process::Command;
+
+/// What was found.
+pub struct Offered {
+    /// A Python with the packages of the tests.
+    pub python: PathBuf,
+    /// Whether a small file system can be mounted.
+    pub mountable: bool,
+}
+
+impl Offered {
+    /// With this Python.
+    pub fn with(python: PathBuf) -> Self {
+        Offered { python, mountable: machine::can_mount() }
+    }
+
+    /// A command that knows of it. All commands that build get the same, so that nothing is built again.
+    pub fn to(&self, mut command: Command) -> Command {
+        command.env("MAPPER_TEST_PYTHON", &self.python);
+        command.env("MAPPER_TEST_CHROMIUM", "chromium");
+        if self.mountable {
+            command.env("MAPPER_TEST_TMPFS", "1");
+        }
+        command
+    }
+}
+
+/// A command whose tests find the program where it has just been built.
+pub fn with_program(mut command: Command) -> Command {
+    command.env("MAPPER_TEST_PROGRAM", workspace::target_dir().join("debug/mapper"));
+    command
+}

@@ -1,5 +1,6 @@
 //! Draws what a case has: which causes, how strong.
 
+use crate::cause::Cause;
 use crate::strength::{Ruler, strength};
 use crate::{CaseKind, OutsideUse, outside_kinds};
 use mapper_physics::effect::Effect;
@@ -7,15 +8,6 @@ use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::sync::Arc;
-
-/// One cause with its strength.
-#[derive(Debug, Clone)]
-pub struct Cause {
-    /// The effect.
-    pub effect: Arc<dyn Effect>,
-    /// Its values.
-    pub values: Vec<f64>,
-}
 
 /// One case before it is run.
 #[derive(Debug, Clone)]

@@ -7,6 +7,7 @@
 
 pub mod calibrate;
 mod case;
+mod cause;
 mod error;
 mod interval;
 mod kind;
@@ -14,14 +15,14 @@ mod lab;
 mod logistic;
 mod make;
 mod outside;
-mod place;
 mod ruler;
 pub mod score;
 mod seal;
 mod strength;
 mod truth;
 
-pub use case::{Case, Cause, Draw, SIGMA_RANGE};
+pub use case::{Case, Draw, SIGMA_RANGE};
+pub use cause::Cause;
 pub use error::BlindError;
 pub use interval::{Share, clopper_pearson_95};
 pub use kind::CaseKind;

@@ -1,6 +1,7 @@
 //! The ruler of the diagnosis itself, laid on a recording without causes.
 
-use crate::case::{Case, Cause};
+use crate::case::Case;
+use crate::cause::Cause;
 use crate::lab::Schedule;
 use crate::strength::Ruler;
 use crate::{BlindError, CaseKind};

@@ -1,7 +1,6 @@
 //! Holds diagnoses against opened answers.
 
 use crate::interval::Share;
-use crate::place;
 use crate::seal::{MANIFEST_NAME, Manifest, open, read_json};
 use crate::{BlindError, CaseKind, Truth};
 use mapper_effects::catalogue;
@@ -177,7 +176,12 @@ fn kind_of(truth: &Truth) -> CaseKind {
 }
 
 fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosis>) -> Score {
-    let neutral: BTreeMap<String, f64> = catalogue()
+    let catalogue = catalogue();
+    // More than one place is right where neighbours share a balance.
+    let shows_in = |id: &str, submodel: &str| {
+        catalogue.iter().any(|effect| effect.info().id == id && effect.info().shows_in(submodel))
+    };
+    let neutral: BTreeMap<String, f64> = catalogue
         .iter()
         .filter_map(|effect| match effect.info().parameters.as_slice() {
             [only] => Some((effect.info().id.to_string(), only.neutral)),
@@ -233,7 +237,7 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
             if matches!(kind, CaseKind::Single | CaseKind::Pair) {
                 let first_two = diagnosis.places.iter().take(2);
                 let right = first_two
-                    .flat_map(|place| causes.iter().map(|id| place::is_right(id, &place.submodel)))
+                    .flat_map(|place| causes.iter().map(|id| shows_in(id, &place.submodel)))
                     .any(|right| right);
                 score.place.count(right);
                 if judged.named == causes {

@@ -1,6 +1,6 @@
 //! How strong a cause is drawn: so that its signature in the recording has a wanted length.
 
-use crate::case::Cause;
+use crate::cause::Cause;
 use mapper_physics::effect::{Effect, EffectParameter};
 use rand::RngExt;
 use rand_pcg::Pcg64;

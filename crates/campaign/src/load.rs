@@ -1,6 +1,6 @@
 //! From a text, or a file, to a campaign or all its mistakes.
 
-use crate::campaign::{Campaign, CampaignFile, FormatName};
+use crate::campaign::{Campaign, CampaignFile};
 use crate::checking::scalar_text;
 use crate::consistency;
 use crate::deserialise;
@@ -125,13 +125,13 @@ pub fn backend_mistake(text: &str, origin: &Path, backend: &str, setting: &str, 
 }
 
 /// A format of the map that nobody writes, at its place in the campaign's text. `known`: the names that can be written.
-pub fn format_mistake(text: &str, origin: &Path, format: &FormatName, known: &[&str]) -> Findings {
+pub fn format_mistake(text: &str, origin: &Path, format: &str, known: &[&str]) -> Findings {
     let source = Source::new(origin, text);
     let mut notes = Notes::default();
     let list = tree::steps!["outputs", "formats"];
     let root = tree::read(&source, &mut notes);
     let written = root.as_ref().and_then(|root| root.get(&list)).map(|list| list.items()).unwrap_or_default();
-    let named = |node: &Node| scalar_text(node) == Some(format.name());
+    let named = |node: &Node| scalar_text(node) == Some(format);
     let mut steps = list.to_vec();
     steps.extend(written.iter().position(named).map(Step::from));
     let span = root.as_ref().map_or(0..0, |root| root.place(&steps));

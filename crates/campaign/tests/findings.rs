@@ -650,8 +650,12 @@ proptest::proptest! {
 fn a_format_that_nobody_writes_is_shown_where_it_stands() {
     let text = format!("{RIGHT}outputs: {{formats: [csv, cvs]}}\n");
     let campaign = run(&text).unwrap();
-    let findings =
-        mapper_campaign::format_mistake(&text, Path::new("a.yaml"), &campaign.outputs.formats[1], &["csv"]);
+    let findings = mapper_campaign::format_mistake(
+        &text,
+        Path::new("a.yaml"),
+        campaign.outputs.formats[1].name(),
+        &["csv"],
+    );
     let line = text.lines().position(|line| line.contains("cvs")).unwrap() + 1;
     let finding = &findings.list[0];
     assert_eq!((findings.list.len(), finding.line, finding.path.as_str()), (1, line, "outputs.formats[1]"));

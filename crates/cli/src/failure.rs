@@ -52,11 +52,11 @@ impl Failure {
     pub fn in_campaign(error: SessionError, campaign: &Path) -> Self {
         let Ok(text) = std::fs::read_to_string(campaign) else { return error.into() };
         let findings = match &error {
-            SessionError::Backend { source: BackendError::Settings { backend, path, message }, .. } => {
-                mapper_campaign::backend_mistake(&text, campaign, backend, path, message)
+            SessionError::Backend(BackendError::Settings { backend, path, source }) => {
+                mapper_campaign::backend_mistake(&text, campaign, backend, path, &source.to_string())
             }
-            SessionError::MapFormat { format, known } => {
-                mapper_campaign::format_mistake(&text, campaign, format, known)
+            SessionError::UnknownFormat { name, known } => {
+                mapper_campaign::format_mistake(&text, campaign, name, known)
             }
             _ => return error.into(),
         };

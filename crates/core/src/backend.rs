@@ -96,29 +96,32 @@ pub enum BackendError {
         high: f64,
     },
     /// The backend's own settings in the campaign are wrong.
-    #[error("the settings of backend `{backend}` are wrong at `{path}`: {message}")]
+    #[error("the settings of backend `{backend}` are wrong at `{path}`: {source}")]
     Settings {
         /// Name of the backend.
         backend: String,
         /// Key path below `backend.settings`.
         path: String,
         /// What is wrong and what would be right.
-        message: String,
+        source: BackendCause,
     },
     /// A simulation could not go on.
-    #[error("the simulation stopped at {t_s:.3} s: {message}")]
+    #[error("the simulation stopped at {t_s:.3} s: {source}")]
     Simulation {
         /// Run time, s.
         t_s: f64,
         /// Why.
-        message: String,
+        source: BackendCause,
     },
     /// The rig, or what stands for it, went away.
-    #[error("the rig was lost at {t_s:.3} s: {message}")]
+    #[error("the rig was lost at {t_s:.3} s: {source}")]
     Lost {
         /// Run time, s.
         t_s: f64,
         /// Why.
-        message: String,
+        source: BackendCause,
     },
 }
+
+/// What a backend says of its own failure. Its error type is its own: the seam knows no backend.
+pub type BackendCause = Box<dyn std::error::Error + Send + Sync>;

@@ -20,6 +20,8 @@ mod joint_settings;
 mod jump;
 mod limits;
 mod map;
+mod map_format;
+mod map_format_error;
 mod model_tolerances;
 mod on_drift;
 mod operating_point;
@@ -36,7 +38,7 @@ mod timing;
 mod visit_order;
 mod window_rule;
 
-pub use backend::{Backend, BackendError, RigDescription, RigMode, Setpoints};
+pub use backend::{Backend, BackendCause, BackendError, RigDescription, RigMode, Setpoints};
 pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
 pub use clock::{Clock, UnpacedClock};
 pub use declared_uncertainty::{DeclaredUncertainty, NoiseColour};
@@ -49,6 +51,8 @@ pub use joint_settings::{Choice, ConvectionWithinStep, EfficiencyWithinStep, Joi
 pub use jump::{Jump, Repeats};
 pub use limits::{Limits, SURGE_ALLOWED_S};
 pub use map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
+pub use map_format::{MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, ReadMap, WriteMap};
+pub use map_format_error::{ExportError, ImportError};
 pub use model_tolerances::ModelTolerances;
 pub use on_drift::OnDrift;
 pub use operating_point::OperatingPoint;

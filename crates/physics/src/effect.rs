@@ -131,8 +131,75 @@ pub struct EffectInfo {
     pub source: Cow<'static, str>,
     /// Where it sits.
     pub submodel: Submodel,
+    /// Where its gap may show as well: neighbours that share a balance with it.
+    pub also_shows_in: Vec<Submodel>,
     /// Its numbers, at least one.
     pub parameters: Vec<EffectParameter>,
+}
+
+impl EffectInfo {
+    /// Names of its parameters for messages.
+    fn parameter_names(&self) -> String {
+        let names: Vec<&str> = self.parameters.iter().map(|parameter| parameter.name.as_ref()).collect();
+        names.join(", ")
+    }
+
+    /// Whether its gap may show in the submodel of this name.
+    pub fn shows_in(&self, submodel_name: &str) -> bool {
+        std::iter::once(&self.submodel).chain(&self.also_shows_in).any(|place| place.name() == submodel_name)
+    }
+}
+
+/// The values of an effect's parameters, one for each and within its range, asked for by name.
+#[derive(Debug, Clone, Copy)]
+pub struct EffectValues<'a> {
+    info: &'a EffectInfo,
+    values: &'a [f64],
+}
+
+impl<'a> EffectValues<'a> {
+    /// `values` stand in the order of the effect's parameters.
+    ///
+    /// # Errors
+    /// [`EffectError`] where a value is missing, out of range or not finite.
+    pub fn new(info: &'a EffectInfo, values: &'a [f64]) -> Result<Self, EffectError> {
+        let id = || info.id.clone().into_owned();
+        if values.len() != info.parameters.len() {
+            return Err(EffectError::Count { id: id(), names: info.parameter_names(), given: values.len() });
+        }
+        for (parameter, value) in info.parameters.iter().zip(values) {
+            let EffectParameter { low, high, .. } = *parameter;
+            if !(low..=high).contains(value) {
+                let (name, unit) = (parameter.name.clone().into_owned(), parameter.unit.clone().into_owned());
+                return Err(EffectError::OutOfRange { id: id(), name, value: *value, unit, low, high });
+            }
+        }
+        Ok(EffectValues { info, values })
+    }
+
+    /// The value of a parameter, in its unit.
+    ///
+    /// # Errors
+    /// [`EffectError::NoParameter`].
+    pub fn get(&self, name: &str) -> Result<f64, EffectError> {
+        self.iter().find(|(parameter, _)| parameter.name == name).map(|(_, value)| value).ok_or_else(|| {
+            EffectError::NoParameter {
+                id: self.info.id.clone().into_owned(),
+                name: name.to_owned(),
+                names: self.info.parameter_names(),
+            }
+        })
+    }
+
+    /// Each parameter with its value.
+    pub fn iter(&self) -> impl Iterator<Item = (&'a EffectParameter, f64)> {
+        self.info.parameters.iter().zip(self.values.iter().copied())
+    }
+
+    /// Whether every value is the one at which the effect is not there.
+    pub fn is_neutral(&self) -> bool {
+        self.iter().all(|(parameter, value)| parameter.neutral == value)
+    }
 }
 
 /// Something a rig may have.
@@ -143,11 +210,12 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     /// What it is.
     fn info(&self) -> &EffectInfo;
 
-    /// Puts it into a rig. `values` are as many as the parameters, within their ranges: [`add`] sees to that.
+    /// Puts it into a rig.
     ///
     /// # Errors
-    /// [`TooManyExtraStates`] where it brings hidden temperatures for which there is no room.
-    fn prepare(&self, values: &[f64], rig: &mut Rig) -> Result<(), TooManyExtraStates>;
+    /// [`EffectError::Room`] where it brings hidden temperatures for which there is no room;
+    /// [`EffectError::NoParameter`] where it asks for a parameter that it does not declare.
+    fn prepare(&self, values: &EffectValues<'_>, rig: &mut Rig) -> Result<(), EffectError>;
 }
 
 /// Why an effect cannot be put into a rig.
@@ -179,6 +247,16 @@ pub enum EffectError {
         /// Largest value.
         high: f64,
     },
+    /// A parameter that the effect does not have: a fault of the effect.
+    #[error("effect `{id}` has no parameter `{name}`; it has {names}")]
+    NoParameter {
+        /// The effect.
+        id: String,
+        /// The name asked for.
+        name: String,
+        /// Names of its parameters.
+        names: String,
+    },
     /// No room for hidden temperatures.
     #[error(transparent)]
     Room(#[from] TooManyExtraStates),
@@ -190,20 +268,7 @@ pub enum EffectError {
 /// [`EffectError`] where a value is missing, out of range or not finite, or hidden temperatures are too many. The rig
 /// is then as before.
 pub fn add(rig: &mut Rig, effect: &dyn Effect, values: &[f64]) -> Result<(), EffectError> {
-    let info = effect.info();
-    let id = || info.id.clone().into_owned();
-    if values.len() != info.parameters.len() {
-        let names: Vec<&str> = info.parameters.iter().map(|parameter| parameter.name.as_ref()).collect();
-        return Err(EffectError::Count { id: id(), names: names.join(", "), given: values.len() });
-    }
-    for (parameter, value) in info.parameters.iter().zip(values) {
-        let EffectParameter { low, high, .. } = *parameter;
-        if !(low..=high).contains(value) {
-            let (name, unit) = (parameter.name.clone().into_owned(), parameter.unit.clone().into_owned());
-            return Err(EffectError::OutOfRange { id: id(), name, value: *value, unit, low, high });
-        }
-    }
-    Ok(effect.prepare(values, rig)?)
+    effect.prepare(&EffectValues::new(effect.info(), values)?, rig)
 }
 
 /// `nominal` with all `effects` at their values.

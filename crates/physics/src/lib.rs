@@ -5,11 +5,14 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod air;
+pub mod backend_plugin;
+pub mod boundary;
 pub mod characteristic;
 pub mod closed_form_map;
 pub mod compression;
 pub mod driven;
 pub mod effect;
+pub mod effect_kind;
 pub mod efficiency_shape;
 pub mod follow_outlet;
 pub mod forecast;
@@ -18,8 +21,10 @@ pub mod housing;
 pub mod inputs;
 pub mod instruments;
 pub mod model;
+pub mod nominal_rig;
 pub mod nusselt;
 pub mod orifice;
+pub mod outputs;
 pub mod params;
 pub mod pressure_tap;
 pub mod reach;

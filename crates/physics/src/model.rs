@@ -1,12 +1,15 @@
 //! The lumped turbocharger: shaft, outlet volume, two housings, and the gas paths between them.
 
+use crate::boundary::BoundaryConditions;
+pub use crate::boundary::BoundaryError;
 use crate::characteristic::CompressorCharacteristic;
 use crate::compression;
 use crate::hooks::{HookList, Hooks, Site};
-use crate::params::{BoundaryConditions, Params};
+pub use crate::outputs::{Added, Outputs};
+use crate::params::Params;
 use crate::state::MAX_STATES;
 pub use crate::state::{State, rad_s_of_rpm};
-use crate::turbine::{TurbineInlet, TurbineState};
+use crate::turbine::TurbineInlet;
 use crate::{air, housing, nusselt, orifice, thermocouple};
 use std::sync::Arc;
 
@@ -22,76 +25,6 @@ pub struct Model {
     pub map: Arc<dyn CompressorCharacteristic>,
     /// What takes part beyond the parameters; usually nothing.
     pub hooks: HookList,
-}
-
-/// Everything the model knows at one instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outputs {
-    /// Compressor mass flow, kg/s.
-    pub flow_kg_s: f64,
-    /// Corrected compressor mass flow in the map's reference state, without the floor of the physical one, kg/s.
-    pub flow_corrected_kg_s: f64,
-    /// Total pressure ratio P2/P1.
-    pub pressure_ratio: f64,
-    /// Isentropic efficiency, total to total, fraction.
-    pub efficiency: f64,
-    /// Place on the speed line: <= 0 choked, 1 on the surge line, > 1 beyond it.
-    pub surge_position_ratio: f64,
-    /// Heat-transfer coefficient between gas and compressor housing, W/(m2 K).
-    pub h_w_m2k: f64,
-    /// Gas before the compressor wheel (station 1'), K.
-    pub t1_prime_k: f64,
-    /// Gas after the compressor wheel (station 2'), K.
-    pub t2_prime_k: f64,
-    /// Gas at the compressor outlet (station 2), K.
-    pub t2_k: f64,
-    /// Reading of the T2 probe, K.
-    pub t2_probe_k: f64,
-    /// What the T2 probe tends to: the gas, but for stem and recovery, K.
-    pub t2_probe_target_k: f64,
-    /// Time constant of the T2 probe, s; 0 for an ideal one.
-    pub t2_probe_time_constant_s: f64,
-    /// Heat from gas to compressor housing, both places, W.
-    pub compressor_heat_w: f64,
-    /// Temperature of the metal that touches the compressor's gas, K.
-    pub wall_k: f64,
-    /// Power the compressor takes from the shaft, W.
-    pub compressor_power_w: f64,
-    /// Power that bearing friction takes from the shaft, W.
-    pub friction_power_w: f64,
-    /// Heat from turbine to compressor housing by radiation, W.
-    pub radiation_w: f64,
-    /// Heat from the inner wall to the rest of the compressor housing, W; 0 where the housing is one node.
-    pub inner_heat_w: f64,
-    /// What hooks add.
-    pub added: Added,
-    /// Heat from the compressor housing to the cell, W.
-    pub compressor_external_heat_w: f64,
-    /// Heat from the turbine housing to the cell, W.
-    pub turbine_external_heat_w: f64,
-    /// Flow through the back-pressure valve, kg/s.
-    pub valve_flow_kg_s: f64,
-    /// Temperature of the bearing housing, K.
-    pub bearing_k: f64,
-    /// Turbine mass flow, kg/s.
-    pub turbine_flow_kg_s: f64,
-    /// Turbine gas path.
-    pub turbine: TurbineState,
-}
-
-/// Heats and power that hooks add; 0 without them.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Added {
-    /// Heat to the compressor housing (its outer part), W.
-    pub compressor_heat_w: f64,
-    /// Heat to the inner wall of the compressor housing, W.
-    pub inner_heat_w: f64,
-    /// Heat to the turbine housing, W.
-    pub turbine_heat_w: f64,
-    /// Power to the shaft, W.
-    pub shaft_power_w: f64,
-    /// Rates of the hidden temperatures, K/s.
-    pub extra_rates_k_s: [f64; crate::state::MAX_EXTRA],
 }
 
 /// The model under boundary conditions that hold for a while; evaluating it repeats nothing that they fix.
@@ -115,58 +48,6 @@ pub struct PreparedModel<'a> {
     moist_flow_ratio: f64,
     /// h of the compressor's air over that of dry air: the Prandtl number's root.
     moist_h_ratio: f64,
-}
-
-/// Boundary conditions under which the model has no meaning.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum BoundaryError {
-    /// No gas goes through the turbine.
-    #[error(
-        "P3 = {p3_pa:.0} Pa is not above P4 = {p4_pa:.0} Pa: the running model needs flow through the turbine; use standstill instead"
-    )]
-    NoTurbineFlow {
-        /// Turbine inlet total pressure, Pa.
-        p3_pa: f64,
-        /// Turbine outlet pressure, Pa.
-        p4_pa: f64,
-    },
-    /// A value that no rig has.
-    #[error("{name} = {value} {unit} has no physical meaning here; it must be finite and above 0 {unit}")]
-    NotPhysical {
-        /// Name of the boundary condition.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Its unit.
-        unit: &'static str,
-    },
-}
-
-impl BoundaryConditions {
-    /// Checks that the running model has a meaning here.
-    ///
-    /// # Errors
-    /// A pressure, temperature or opening that is not positive and finite, or P3 not above P4.
-    pub fn check(&self) -> Result<(), BoundaryError> {
-        for (name, value, unit) in [
-            ("T1", self.t1_k, "K"),
-            ("P1", self.p1_pa, "Pa"),
-            ("P3", self.p3_pa, "Pa"),
-            ("T3", self.t3_k, "K"),
-            ("P4", self.p4_pa, "Pa"),
-            ("T_oil", self.oil_temperature_k, "K"),
-            ("T_amb", self.ambient_temperature_k, "K"),
-            ("valve opening", self.valve_opening_ratio, "1"),
-        ] {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(BoundaryError::NotPhysical { name, value, unit });
-            }
-        }
-        if self.p3_pa <= self.p4_pa {
-            return Err(BoundaryError::NoTurbineFlow { p3_pa: self.p3_pa, p4_pa: self.p4_pa });
-        }
-        Ok(())
-    }
 }
 
 impl Model {

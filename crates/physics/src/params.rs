@@ -1,5 +1,6 @@
 //! Every parameter of the lumped turbocharger model, with Appendix A's values as default.
 
+pub use crate::boundary::BoundaryConditions;
 use mapper_core::ReferenceState;
 use serde::{Deserialize, Serialize};
 
@@ -177,44 +178,6 @@ impl Default for Params {
             bearing_friction_w_s2: 0.0,
             external_convection_ratio: 1.0,
             radiation_area_m2: 0.0,
-        }
-    }
-}
-
-/// What surrounds the machine and is set by rig or cell.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BoundaryConditions {
-    /// Compressor inlet total temperature (station 1), K.
-    pub t1_k: f64,
-    /// Compressor inlet total pressure (station 1), Pa.
-    pub p1_pa: f64,
-    /// Turbine inlet total pressure (station 3), Pa.
-    pub p3_pa: f64,
-    /// Turbine inlet total temperature (station 3), K.
-    pub t3_k: f64,
-    /// Turbine outlet pressure (station 4), Pa.
-    pub p4_pa: f64,
-    /// Oil temperature, K.
-    pub oil_temperature_k: f64,
-    /// Ambient temperature around the housings, K.
-    pub ambient_temperature_k: f64,
-    /// Back-pressure valve opening relative to the nominal area, 0..2.5.
-    pub valve_opening_ratio: f64,
-}
-
-impl Default for BoundaryConditions {
-    /// The nominal boundary conditions, with the turbine at its outlet pressure (no flow) and the valve at 1.
-    fn default() -> Self {
-        BoundaryConditions {
-            t1_k: 298.15,
-            p1_pa: 100_000.0,
-            p3_pa: 110_000.0,
-            t3_k: 773.15,
-            p4_pa: 110_000.0,
-            oil_temperature_k: 323.15,
-            ambient_temperature_k: 298.15,
-            valve_opening_ratio: 1.0,
         }
     }
 }

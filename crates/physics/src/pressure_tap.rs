@@ -4,6 +4,7 @@
 //! Compressible Fluid Flow, ch. 4), with the ratio of specific heats at the total temperature.
 
 use crate::air;
+use mapper_numerics::root::bisect;
 
 fn heat_capacity_ratio(temperature_k: f64) -> f64 {
     let cp = air::heat_capacity_j_kgk(temperature_k);
@@ -45,21 +46,13 @@ pub fn total_to_static_pa(
     // The total pressure rises with the static one above the sonic point; bisection between sonic and standstill.
     let sonic_pa = total_pa * (0.5 * (gamma + 1.0)).powf(-gamma / (gamma - 1.0));
     let total_of = |static_pa| static_to_total_pa(static_pa, flow_kg_s, total_temperature_k, pipe_diameter_m);
-    let (mut low_pa, mut high_pa) = (sonic_pa, total_pa);
     if !matches!(
-        total_of(low_pa).partial_cmp(&total_pa),
+        total_of(sonic_pa).partial_cmp(&total_pa),
         Some(std::cmp::Ordering::Less | std::cmp::Ordering::Equal)
     ) {
         return None;
     }
-    for _ in 0..60 {
-        let middle_pa = 0.5 * (low_pa + high_pa);
-        if total_of(middle_pa) < total_pa {
-            low_pa = middle_pa;
-        } else {
-            high_pa = middle_pa;
-        }
-    }
+    let (low_pa, high_pa) = bisect(sonic_pa, total_pa, 0.0, |static_pa| total_of(static_pa) < total_pa);
     Some(0.5 * (low_pa + high_pa))
 }
 

@@ -5,6 +5,7 @@ use crate::model::{BoundaryError, Model, Outputs, PreparedModel, State};
 use crate::params::{BoundaryConditions, Params};
 use crate::rosenbrock::{IntegrationError, Integrator, OdeSystem, Step, Tolerances};
 use crate::state::MAX_STATES;
+use mapper_numerics::root::bisect;
 use nalgebra::{Const, DimMin};
 
 /// What to look out for.
@@ -257,17 +258,9 @@ impl CrossingWatch {
                 continue;
             }
             // Bisection to a microsecond: the margin is continuous and changes sign once.
-            let (mut low_s, mut high_s) = (step.t0_s, step.t1_s);
-            while high_s - low_s > 1e-6 {
-                let middle_s = 0.5 * (low_s + high_s);
-                if inside(self.margins_at(middle_s, &step.at(middle_s), system)[which])
-                    == inside(before[which])
-                {
-                    low_s = middle_s;
-                } else {
-                    high_s = middle_s;
-                }
-            }
+            let (_, high_s) = bisect(step.t0_s, step.t1_s, 1e-6, |t_s| {
+                inside(self.margins_at(t_s, &step.at(t_s), system)[which]) == inside(before[which])
+            });
             let state = State::from_array(&step.at(high_s));
             events.push(ModelEvent {
                 t_s: high_s,

@@ -1,9 +1,9 @@
 //! Where the machine rests: the steady state at a wanted speed, and the turbine pressure that holds it.
 
-use crate::bracket::root_between;
 use crate::model::{BoundaryError, Model, Outputs, State, rad_s_of_rpm};
 use crate::params::BoundaryConditions;
 use crate::state::MAX_EXTRA;
+use mapper_numerics::root::root_between;
 use nalgebra::{SMatrix, SVector};
 
 /// Temperatures that come to rest: both housings, the inner wall, hidden ones.

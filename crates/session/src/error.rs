@@ -1,13 +1,11 @@
 //! Why a session could not do what it was asked.
 
 use mapper_campaign::{CampaignError, NightlyError};
-use mapper_core::BackendError;
+use mapper_core::{BackendError, ExportError, ImportError};
 use mapper_drift::DriftError;
-use mapper_exporters::ExportError;
 use mapper_gap::diagnose::GapError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
-use mapper_importers::ImportError;
 use mapper_planner::PlanError;
 use mapper_record::{ChannelMapError, RecordError};
 use mapper_runner::RunError;
@@ -56,14 +54,6 @@ pub enum SessionError {
         /// The run.
         key: String,
     },
-    /// The campaign asks for a format of the map that nobody writes.
-    #[error("`{format}` is not a format that a map can be written in; choose from {}", .known.join(", "))]
-    MapFormat {
-        /// What was asked for.
-        format: mapper_campaign::campaign::FormatName,
-        /// What can be written.
-        known: Vec<&'static str>,
-    },
     /// A method that does not exist.
     #[error("`{name}` is not a method: {source}")]
     Method {
@@ -97,14 +87,9 @@ pub enum SessionError {
         /// What has changed.
         changed: Vec<&'static str>,
     },
-    /// A backend could not be made, or failed.
-    #[error("{source}")]
-    Backend {
-        /// Whether its settings are wrong or the rig failed.
-        kind: ErrorKind,
-        /// Why.
-        source: BackendError,
-    },
+    /// A backend could not be made: its name or its settings are wrong.
+    #[error(transparent)]
+    Backend(BackendError),
     /// A run could not go on; the rig is safe.
     #[error("{source}\nThe recording up to then is {}.", .recording.display())]
     Run {
@@ -223,9 +208,6 @@ pub enum SessionError {
         /// Formats and their extensions.
         known: Vec<String>,
     },
-    /// A reference state that is not understood.
-    #[error(transparent)]
-    Reference(ImportError),
     /// A map cannot be fitted.
     #[error("`{format}` needs a fitted map: {source}")]
     Fit {
@@ -276,9 +258,9 @@ impl SessionError {
             | E::Nightly(NightlyError::Mistake { .. })
             | E::NightlySequence { .. }
             | E::NightlyTwice { .. }
-            | E::MapFormat { .. }
             | E::Method { .. }
             | E::Model(_)
+            | E::Backend(_)
             | E::Effect(_)
             | E::EffectTaken { .. }
             | E::ChannelMap { .. }
@@ -287,7 +269,6 @@ impl SessionError {
             | E::UnknownFormat { .. }
             | E::UnknownExtension { .. }
             | E::FormatUnsaid { .. }
-            | E::Reference(_)
             | E::Fit { .. }
             | E::Drift(DriftError::NoRun)
             | E::Export(ExportError::NeedsFit { .. })
@@ -297,7 +278,6 @@ impl SessionError {
             | E::StalePlan { .. }
             | E::RehearsalTripped { .. }
             | E::NoSteps { .. } => ErrorKind::NoPlan,
-            E::Backend { kind, .. } => *kind,
             E::Run { source, .. } => match source {
                 RunError::Backend(_) => ErrorKind::Rig,
                 RunError::Source(_) => ErrorKind::BadInput,

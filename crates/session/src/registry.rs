@@ -1,36 +1,17 @@
 //! The plug-ins that a session works with, handed in by whoever opens it.
 
-use crate::{ErrorKind, SessionError};
+use crate::SessionError;
 use mapper_campaign::Campaign;
-use mapper_core::{Backend, BackendError};
+use mapper_core::{Backend, MapFormats};
+use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
-use std::path::PathBuf;
+use mapper_physics::nominal_rig::NominalRig;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What a backend is made from.
-pub struct BackendContext<'a> {
-    /// The campaign; its backend settings are the backend's alone to read.
-    pub campaign: &'a Campaign,
-    /// The nominal model.
-    pub model: &'a Model,
-    /// Every effect that the registry knows, for simulated rigs.
-    pub effects: &'a [Arc<dyn Effect>],
-}
-
-/// A backend by its name.
-#[derive(Clone, Copy)]
-pub struct BackendPlugin {
-    /// Name in campaigns.
-    pub name: &'static str,
-    /// One line for people.
-    pub summary: &'static str,
-    /// Makes the backend, or says what is wrong with its settings.
-    pub make: fn(&BackendContext<'_>) -> Result<Box<dyn Backend>, BackendError>,
-}
-
-/// Reads a suspected effect from a script; the error is a sentence for people.
-pub type ReadEffect = fn(&std::path::Path) -> Result<Arc<dyn Effect>, SessionError>;
+/// Reads a suspected effect from a file.
+pub type ReadEffect = fn(&Path) -> Result<Arc<dyn Effect>, SessionError>;
 
 /// Every plug-in of a session.
 #[derive(Clone)]
@@ -41,6 +22,8 @@ pub struct Registry {
     pub effects: Vec<Arc<dyn Effect>>,
     /// How a suspected effect is read from a file.
     pub read_effect: ReadEffect,
+    /// Map formats, read and written.
+    pub formats: MapFormats,
 }
 
 impl Registry {
@@ -49,20 +32,10 @@ impl Registry {
     /// # Errors
     /// [`SessionError::Backend`] where the name is unknown or the settings are wrong.
     pub fn make_backend(&self, campaign: &Campaign, model: &Model) -> Result<Box<dyn Backend>, SessionError> {
-        let wanted = &campaign.backend.name;
-        let context = BackendContext { campaign, model, effects: &self.effects };
-        let made = match self.backends.iter().find(|plugin| plugin.name == wanted) {
-            Some(plugin) => (plugin.make)(&context),
-            None => {
-                let known: Vec<&str> = self.backends.iter().map(|plugin| plugin.name).collect();
-                Err(BackendError::Settings {
-                    backend: wanted.clone(),
-                    path: String::new(),
-                    message: format!("there is no such backend; there are {}", known.join(", ")),
-                })
-            }
-        };
-        made.map_err(|error| SessionError::Backend { kind: ErrorKind::BadInput, source: error })
+        let wanted = &campaign.backend;
+        let nominal = nominal_rig(campaign, model, &self.effects);
+        BackendPlugin::make_by_name(&self.backends, &wanted.name, &nominal, &wanted.settings)
+            .map_err(SessionError::Backend)
     }
 
     /// The catalogue, and the effects that scripts define.
@@ -80,5 +53,22 @@ impl Registry {
             effects.push(scripted);
         }
         Ok(effects)
+    }
+}
+
+/// What a backend is told of machine and rig.
+fn nominal_rig(campaign: &Campaign, model: &Model, effects: &[Arc<dyn Effect>]) -> NominalRig {
+    let sensors = || campaign.sensors.iter();
+    NominalRig {
+        model: model.clone(),
+        boundary: campaign.boundary,
+        speed_max_rpm: campaign.limits.speed_max_rpm,
+        sensors: sensors().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
+        static_tap_pipe_diameters_m: sensors()
+            .filter_map(|(channel, sensor)| Some((*channel, sensor.static_tap_pipe_diameter_m?)))
+            .collect(),
+        tolerances: campaign.tolerances,
+        effects: effects.to_vec(),
+        seed: campaign.seed,
     }
 }

@@ -3,12 +3,10 @@
 use crate::files::{json_text, write_new};
 use crate::identified::Identified;
 use crate::recorded::Recorded;
-use crate::{Session, SessionError, run_directory};
+use crate::{Registry, Session, SessionError, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble, repeated_jumps};
 use mapper_campaign::Campaign;
-use mapper_campaign::campaign::FormatName;
-use mapper_core::{CompressorMap, IdentifiedPoint, Plan, ThermalModel};
-use mapper_exporters::ExportError;
+use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Plan, ThermalModel};
 use mapper_identify::ZeroOutcome;
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::{RunReport, run_report};
@@ -66,7 +64,7 @@ impl Session<'_> {
         let identified = self.identify(recorded, &ChannelMap::native(), None)?;
         let compressor_map = compressor_map(campaign, &identified, &mut remarks);
         let map = match &compressor_map {
-            Some(map) => export(campaign, map, directory, &mut remarks)?,
+            Some(map) => export(self.registry, campaign, map, directory, &mut remarks)?,
             None => BTreeMap::new(),
         };
         let Identified { recording: recorded, config, points, thermal, zero, score } = identified;
@@ -128,33 +126,18 @@ fn compressor_map(
     }
 }
 
-/// Whether every format that the campaign names can be written: before a run, not after it.
-///
-/// # Errors
-/// [`SessionError::MapFormat`] with the first that cannot.
-pub fn check_formats(campaign: &Campaign) -> Result<(), SessionError> {
-    let formats = &campaign.outputs.formats;
-    let wrong = formats.iter().find(|format| mapper_exporters::find(format.name()).is_none());
-    wrong.map_or(Ok(()), |format| Err(unknown(format)))
-}
-
-fn unknown(format: &FormatName) -> SessionError {
-    let known = mapper_exporters::EXPORTERS.iter().map(|exporter| exporter.name).collect();
-    SessionError::MapFormat { format: format.clone(), known }
-}
-
 /// Writes the map in every format that the campaign names.
 fn export(
+    registry: &Registry,
     campaign: &Campaign,
     map: &CompressorMap,
     directory: &Path,
     remarks: &mut Vec<String>,
 ) -> Result<BTreeMap<String, PathBuf>, SessionError> {
     let mut files = BTreeMap::new();
-    for format in &campaign.outputs.formats {
-        let name = format.name();
-        let Some(exporter) = mapper_exporters::find(name) else { return Err(unknown(format)) };
-        let bytes = match (exporter.export)(map) {
+    for name in campaign.outputs.formats.iter().map(|format| format.name()) {
+        let format = registry.written_format(name)?;
+        let bytes = match format.write(map) {
             Ok(bytes) => bytes,
             // A campaign of a few points has a map, but no surface through it.
             Err(error @ ExportError::NeedsFit { .. }) => {
@@ -163,7 +146,7 @@ fn export(
             }
             Err(error) => return Err(error.into()),
         };
-        let path = directory.join(format!("map.{}", exporter.extension));
+        let path = directory.join(format!("map.{}", format.extension));
         write_new(&path, &bytes)?;
         files.insert(name.to_owned(), path);
     }

@@ -4,10 +4,10 @@ use crate::files::{json_text, write_new};
 use crate::recorded::Recorded;
 use crate::{Session, SessionError};
 use mapper_chart::Figure;
-use mapper_core::{IdentifiedPoint, ThermalModel};
-use mapper_exporters::{
-    ErrorAtGradient, ExportError, ThermalExport, TurbinePoint, error_figure, heat_transfer_figure,
-    turbine_points, turbine_text,
+use mapper_core::{ExportError, IdentifiedPoint, ThermalModel};
+use mapper_formats::{
+    ErrorAtGradient, ThermalExport, TurbinePoint, error_figure, heat_transfer_figure, turbine_points,
+    turbine_text,
 };
 use mapper_record::ChannelMap;
 use mapper_score::ScoredPoint;
@@ -65,7 +65,7 @@ impl Session<'_> {
 }
 
 fn png(figure: &Figure) -> Result<Vec<u8>, SessionError> {
-    figure.to_png(2.0).map_err(|error| SessionError::Export(ExportError::Png(error)))
+    Ok(figure.to_png(2.0).map_err(ExportError::failed("png"))?)
 }
 
 /// Errors of the points whose truth is known.

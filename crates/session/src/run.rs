@@ -6,7 +6,7 @@ use crate::guards::drift_watch;
 use crate::observers::{Recorder, Teller};
 use crate::planning::{nominal_model, plan, stored_plan};
 use crate::rehearsal::rehearse;
-use crate::results::{Results, check_formats};
+use crate::results::Results;
 use crate::scripted_steps::ScriptedSteps;
 use crate::{Session, SessionError, run_directory};
 use mapper_campaign::Campaign;
@@ -95,7 +95,7 @@ impl<'s> Session<'s> {
     /// [`SessionError`] where there is no plan, the stored one is stale, the script fails or the backend's settings are wrong.
     pub fn prepare<'a>(&self, request: RunRequest<'a>) -> Result<PreparedRun<'a>, SessionError> {
         let campaign = request.campaign;
-        check_formats(campaign)?;
+        self.registry.check_formats(campaign)?;
         let model = nominal_model(campaign)?;
         let made = match &campaign.sequence {
             None => plan(campaign, &model)?,

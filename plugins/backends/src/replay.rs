@@ -5,9 +5,44 @@ use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Group, Recording, RigDescription,
     RigMode, SampleBatch, Series, Setpoints,
 };
+use mapper_physics::backend_plugin::BackendPlugin;
+use mapper_physics::nominal_rig::NominalRig;
+use mapper_record::{ChannelMap, ReadOptions, RecordError, read_recording};
+use std::path::Path;
 
 /// Name of the backend, in campaigns and descriptions.
 pub const NAME: &str = "replay";
+
+/// Replay as campaigns ask for it.
+pub const PLUGIN: BackendPlugin =
+    BackendPlugin { name: NAME, summary: "plays a recording back: {recording: FILE}", make };
+
+/// Why a recording cannot be played, or why the play is over.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// The settings name no file.
+    #[error("write the path of an MCAP file, e.g. {{recording: runs/x/recording.mcap}}")]
+    NoRecording,
+    /// The file cannot be read.
+    #[error(transparent)]
+    Unreadable(#[from] RecordError),
+    /// More was asked for than was recorded.
+    #[error("the recording being replayed is over")]
+    Over,
+}
+
+fn make(_: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {
+    let wrong = |problem: ReplayError| BackendError::Settings {
+        backend: NAME.to_owned(),
+        path: "recording".to_owned(),
+        source: Box::new(problem),
+    };
+    let path = settings.get("recording").and_then(|value| value.as_str());
+    let path = Path::new(path.ok_or_else(|| wrong(ReplayError::NoRecording))?);
+    let report = read_recording(path, &ChannelMap::native(), &ReadOptions::default())
+        .map_err(|error| wrong(error.into()))?;
+    Ok(Box::new(ReplayBackend::new(&report.recording)))
+}
 
 /// Relative difference up to which a setpoint counts as the recorded command: what a file keeps of a value in kPa
 /// with three decimals.
@@ -136,8 +171,8 @@ impl Backend for ReplayBackend {
         let start = self.samples_played;
         let end = start.max(self.t_s.partition_point(|t| *t <= until_s));
         if start == end && self.end_s().is_none_or(|end_s| until_s > end_s) {
-            let message = "the recording being replayed is over".to_owned();
-            return Err(BackendError::Lost { t_s: self.end_s().unwrap_or(0.0), message });
+            let source = Box::new(ReplayError::Over);
+            return Err(BackendError::Lost { t_s: self.end_s().unwrap_or(0.0), source });
         }
         let events_end = self.events_played.max(self.events.partition_point(|event| event.t_s <= until_s));
         let mut events = self.events[self.events_played..events_end].to_vec();

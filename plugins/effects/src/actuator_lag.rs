@@ -1,19 +1,34 @@
 //! P3 follows its command more slowly.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 use mapper_physics::instruments::NOMINAL_P3_LAG_S;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "actuator_lag",
-        "the turbine inlet pressure follows its command more slowly or faster",
-        "dP3/dt = (P3_command - P3)/tau",
-        "first-order actuator",
-        Submodel::Actuator,
-        vec![parameter("actuator_lag", "s", [0.0, 10.0], 0.3, 0.7)],
-        |values, rig| rig.instruments.p3_lag_s += values[0] - NOMINAL_P3_LAG_S,
-    )
+effect_parameters! {
+    /// P3 follows its command more slowly.
+    #[derive(Debug)]
+    pub(crate) struct ActuatorLag {
+        /// Time constant of P3 behind its command, s.
+        lag_s = "actuator_lag" ["s"] 0.0 .. 10.0, neutral 0.3, step 0.7;
+    }
+}
+
+impl EffectKind for ActuatorLag {
+    const ABOUT: About = About {
+        id: "actuator_lag",
+        description: "the turbine inlet pressure follows its command more slowly or faster",
+        equation: "dP3/dt = (P3_command - P3)/tau",
+        source: "first-order actuator",
+        submodel: Submodel::Actuator,
+        also_shows_in: &[],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.instruments.p3_lag_s += self.lag_s - NOMINAL_P3_LAG_S;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -23,7 +38,7 @@ mod tests {
 
     #[test]
     fn the_lag_is_the_one_asked_for() {
-        assert!((Instant::with(&effect(), &[1.2]).rig.instruments.p3_lag_s - 1.2).abs() < 1e-12);
+        assert!((Instant::with(ActuatorLag { lag_s: 1.2 }).rig.instruments.p3_lag_s - 1.2).abs() < 1e-12);
         assert_eq!(Instant::nominal().rig.instruments.p3_lag_s, 0.3);
     }
 }

@@ -1,18 +1,33 @@
 //! Part of the heat goes to the gas before the wheel.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "area_split",
-        "part of the housing's internal area meets the gas before compression",
-        "q1 = h alpha_A A_c (T1 - Tc) before, q2 = h (1 - alpha_A) A_c (T2 - Tc) after compression",
-        "Burke et al., eqs. 1 and 3",
-        Submodel::CompressorGas,
-        vec![parameter("area_split", "1", [0.0, 0.6], 0.0, 0.1)],
-        |values, rig| rig.model.params.compressor.alpha_area_ratio += values[0],
-    )
+effect_parameters! {
+    /// Part of the heat goes to the gas before the wheel.
+    #[derive(Debug)]
+    pub(crate) struct AreaSplit {
+        /// Share alpha_A of the internal area that meets the gas before compression.
+        before_ratio = "area_split" ["1"] 0.0 .. 0.6, neutral 0.0, step 0.1;
+    }
+}
+
+impl EffectKind for AreaSplit {
+    const ABOUT: About = About {
+        id: "area_split",
+        description: "part of the housing's internal area meets the gas before compression",
+        equation: "q1 = h alpha_A A_c (T1 - Tc) before, q2 = h (1 - alpha_A) A_c (T2 - Tc) after compression",
+        source: "Burke et al., eqs. 1 and 3",
+        submodel: Submodel::CompressorGas,
+        also_shows_in: &[Submodel::CompressorHousing],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.compressor.alpha_area_ratio += self.before_ratio;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -23,7 +38,7 @@ mod tests {
     /// Eq. 1 by hand: 12 % of 29e-3 m2, the housing 42 K warmer than the inlet.
     #[test]
     fn gas_before_the_wheel_takes_heat_from_its_share_of_the_area() {
-        let (nominal, warm) = (Instant::nominal(), Instant::with(&effect(), &[0.12]));
+        let (nominal, warm) = (Instant::nominal(), Instant::with(AreaSplit { before_ratio: 0.12 }));
         let heat_w = warm.outputs.h_w_m2k * 0.12 * 29e-3 * (warm.state.tc_k - T1_K);
         let rise_k = heat_w / (warm.outputs.flow_kg_s * CP1_J_KGK);
         assert!((warm.outputs.t1_prime_k - T1_K - rise_k).abs() < 1e-9, "{rise_k} K");

@@ -1,18 +1,33 @@
 //! The compressor's efficiency is higher or lower.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "efficiency_scale",
-        "the compressor's efficiency is higher or lower everywhere",
-        "eta = s eta_nominal",
-        "worn or fouled compressor",
-        Submodel::CompressorGas,
-        vec![parameter("efficiency_scale", "1", [0.7, 1.3], 1.0, -0.02)],
-        |values, rig| rig.model.params.compressor.efficiency_scale_ratio *= values[0],
-    )
+effect_parameters! {
+    /// The compressor's efficiency is higher or lower.
+    #[derive(Debug)]
+    pub(crate) struct EfficiencyScale {
+        /// Efficiency over the map's.
+        scale_ratio = "efficiency_scale" ["1"] 0.7 .. 1.3, neutral 1.0, step -0.02;
+    }
+}
+
+impl EffectKind for EfficiencyScale {
+    const ABOUT: About = About {
+        id: "efficiency_scale",
+        description: "the compressor's efficiency is higher or lower everywhere",
+        equation: "eta = s eta_nominal",
+        source: "worn or fouled compressor",
+        submodel: Submodel::CompressorGas,
+        also_shows_in: &[Submodel::Shaft],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.compressor.efficiency_scale_ratio *= self.scale_ratio;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -22,7 +37,7 @@ mod tests {
 
     #[test]
     fn the_temperature_rise_grows_as_efficiency_falls() {
-        let (nominal, worn) = (Instant::nominal().outputs, Instant::with(&effect(), &[0.97]).outputs);
+        let (nominal, worn) = (Instant::nominal().outputs, Instant::with(EfficiencyScale { scale_ratio: 0.97 }).outputs);
         let ratio = (worn.t2_prime_k - T1_K) / (nominal.t2_prime_k - T1_K);
         assert!((ratio - 1.0 / 0.97).abs() < 1e-12 && worn.flow_kg_s == nominal.flow_kg_s);
     }

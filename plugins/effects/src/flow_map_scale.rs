@@ -1,18 +1,33 @@
 //! The compressor moves more or less.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "flow_map_scale",
-        "the compressor moves more or less at equal speed and pressure ratio",
-        "m_corr = s m_corr,nominal; the efficiency stays where it is on the speed line",
-        "worn or fouled compressor, other trim",
-        Submodel::CompressorFlow,
-        vec![parameter("flow_map_scale", "1", [0.7, 1.3], 1.0, 0.03)],
-        |values, rig| rig.model.params.compressor.flow_scale_ratio *= values[0],
-    )
+effect_parameters! {
+    /// The compressor moves more or less.
+    #[derive(Debug)]
+    pub(crate) struct FlowMapScale {
+        /// Corrected flow over the map's.
+        scale_ratio = "flow_map_scale" ["1"] 0.7 .. 1.3, neutral 1.0, step 0.03;
+    }
+}
+
+impl EffectKind for FlowMapScale {
+    const ABOUT: About = About {
+        id: "flow_map_scale",
+        description: "the compressor moves more or less at equal speed and pressure ratio",
+        equation: "m_corr = s m_corr,nominal; the efficiency stays where it is on the speed line",
+        source: "worn or fouled compressor, other trim",
+        submodel: Submodel::CompressorFlow,
+        also_shows_in: &[],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.compressor.flow_scale_ratio *= self.scale_ratio;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -22,7 +37,7 @@ mod tests {
 
     #[test]
     fn flow_is_multiplied_at_equal_efficiency() {
-        let (nominal, other) = (Instant::nominal().outputs, Instant::with(&effect(), &[1.03]).outputs);
+        let (nominal, other) = (Instant::nominal().outputs, Instant::with(FlowMapScale { scale_ratio: 1.03 }).outputs);
         assert!((other.flow_kg_s / nominal.flow_kg_s - 1.03).abs() < 1e-12);
         assert_eq!(other.efficiency, nominal.efficiency);
     }

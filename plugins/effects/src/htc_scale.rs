@@ -1,18 +1,33 @@
 //! All convection of the compressor housing is stronger or weaker.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "htc_scale",
-        "convection between gas and compressor housing is stronger or weaker everywhere",
-        "h = s h_nominal",
-        "Burke et al., eq. 9: its coefficient a",
-        Submodel::CompressorGas,
-        vec![parameter("htc_scale", "1", [0.3, 3.0], 1.0, 0.2)],
-        |values, rig| rig.model.params.compressor.nusselt_coefficient *= values[0],
-    )
+effect_parameters! {
+    /// All convection of the compressor housing is stronger or weaker.
+    #[derive(Debug)]
+    pub(crate) struct HtcScale {
+        /// h over the correlation's.
+        scale_ratio = "htc_scale" ["1"] 0.3 .. 3.0, neutral 1.0, step 0.2;
+    }
+}
+
+impl EffectKind for HtcScale {
+    const ABOUT: About = About {
+        id: "htc_scale",
+        description: "convection between gas and compressor housing is stronger or weaker everywhere",
+        equation: "h = s h_nominal",
+        source: "Burke et al., eq. 9: its coefficient a",
+        submodel: Submodel::CompressorGas,
+        also_shows_in: &[Submodel::CompressorHousing],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.compressor.nusselt_coefficient *= self.scale_ratio;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -22,7 +37,7 @@ mod tests {
 
     #[test]
     fn h_is_multiplied() {
-        let ratio = Instant::with(&effect(), &[1.2]).outputs.h_w_m2k / Instant::nominal().outputs.h_w_m2k;
+        let ratio = Instant::with(HtcScale { scale_ratio: 1.2 }).outputs.h_w_m2k / Instant::nominal().outputs.h_w_m2k;
         assert!((ratio - 1.2).abs() < 1e-12);
     }
 }

@@ -1,18 +1,33 @@
 //! The compressor breathes moist air.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "humidity",
-        "the compressor breathes moist air",
-        "R (1 + 0.6078 w), cp (1 + 0.84 w), flow times sqrt(287.05/R) on the compressor side",
-        "mixture of ideal gases; cp of vapour 1850 J/(kg K)",
-        Submodel::CompressorFlow,
-        vec![parameter("humidity", "kg/kg", [0.0, 0.06], 0.0, 0.012)],
-        |values, rig| rig.model.params.compressor.humidity_kg_kg += values[0],
-    )
+effect_parameters! {
+    /// The compressor breathes moist air.
+    #[derive(Debug)]
+    pub(crate) struct Humidity {
+        /// Water per dry air, kg/kg.
+        water_kg_kg = "humidity" ["kg/kg"] 0.0 .. 0.06, neutral 0.0, step 0.012;
+    }
+}
+
+impl EffectKind for Humidity {
+    const ABOUT: About = About {
+        id: "humidity",
+        description: "the compressor breathes moist air",
+        equation: "R (1 + 0.6078 w), cp (1 + 0.84 w), flow times sqrt(287.05/R) on the compressor side",
+        source: "mixture of ideal gases; cp of vapour 1850 J/(kg K)",
+        submodel: Submodel::CompressorFlow,
+        also_shows_in: &[Submodel::CompressorGas],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.compressor.humidity_kg_kg += self.water_kg_kg;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -26,7 +41,7 @@ mod tests {
     #[test]
     fn constants_are_those_of_the_mixture_and_flow_falls() {
         let w = 0.01;
-        let (nominal, moist) = (Instant::nominal().outputs, Instant::with(&effect(), &[w]).outputs);
+        let (nominal, moist) = (Instant::nominal().outputs, Instant::with(Humidity { water_kg_kg: w }).outputs);
         let gas_constant = (287.05 + w * 461.5) / (1.0 + w);
         let flow_ratio = moist.flow_kg_s / nominal.flow_kg_s;
         assert!((flow_ratio - (287.05 / gas_constant).sqrt()).abs() < 1e-4, "{flow_ratio}");

@@ -1,25 +1,41 @@
 //! The inner wall of the compressor housing has its own temperature.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-/// At a fixed G the effect does not vanish as phi goes to 0 (the wall keeps the resistance 1/G): it vanishes as 1/G does.
-/// phi = 0 itself is one node.
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "inner_node",
-        "the inner wall of the compressor housing has its own temperature",
-        "phi M c dT_i/dt = q1 + q2 - G (T_i - Tc), (1 - phi) M c dTc/dt = G (T_i - Tc) + bearing - outside",
-        "two-node wall",
-        Submodel::CompressorHousing,
-        vec![parameter("phi", "1", [0.0, 0.9], 0.0, 0.3), parameter("G", "W/K", [1.0, 500.0], 500.0, -480.0)],
-        |values, rig| {
-            if values[0] > 0.0 {
-                rig.model.params.compressor.inner_capacity_ratio = values[0];
-                rig.model.params.compressor.inner_conductance_w_k = values[1];
-            }
-        },
-    )
+effect_parameters! {
+    /// The inner wall of the compressor housing has its own temperature.
+    ///
+    /// At a fixed G the effect does not vanish as phi goes to 0 (the wall keeps the resistance 1/G): it vanishes as 1/G does.
+    /// phi = 0 itself is one node.
+    #[derive(Debug)]
+    pub(crate) struct InnerNode {
+        /// Share phi of the housing's heat capacity that the inner wall has.
+        share_ratio = "phi" ["1"] 0.0 .. 0.9, neutral 0.0, step 0.3;
+        /// Conductance G between inner wall and the rest, W/K.
+        conductance_w_k = "G" ["W/K"] 1.0 .. 500.0, neutral 500.0, step -480.0;
+    }
+}
+
+impl EffectKind for InnerNode {
+    const ABOUT: About = About {
+        id: "inner_node",
+        description: "the inner wall of the compressor housing has its own temperature",
+        equation: "phi M c dT_i/dt = q1 + q2 - G (T_i - Tc), (1 - phi) M c dTc/dt = G (T_i - Tc) + bearing - outside",
+        source: "two-node wall",
+        submodel: Submodel::CompressorHousing,
+        also_shows_in: &[Submodel::CompressorGas],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        if self.share_ratio > 0.0 {
+            rig.model.params.compressor.inner_capacity_ratio = self.share_ratio;
+            rig.model.params.compressor.inner_conductance_w_k = self.conductance_w_k;
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -31,7 +47,7 @@ mod tests {
     #[test]
     fn at_rest_the_wall_passes_what_the_gas_gives_whatever_its_share_of_the_mass() {
         let rest = |phi: f64, g_w_k: f64| {
-            let at = Instant::with(&effect(), &[phi, g_w_k]);
+            let at = Instant::with(InnerNode { share_ratio: phi, conductance_w_k: g_w_k });
             steady::hold_speed(&at.rig.model, 110e3, &at.boundary).unwrap()
         };
         let (thin, thick) = (rest(0.2, 15.0), rest(0.6, 15.0));

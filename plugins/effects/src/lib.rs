@@ -1,10 +1,9 @@
 //! The catalogue of effects: what a rig may have and the nominal model has not, one file each.
 //!
-//! To add one, write its file with a function `effect`, and its line below.
+//! To add one, write its file (a struct of its numbers, what is said of it, what it changes), and its line below.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod catalogued;
 mod script;
 #[cfg(test)]
 mod testing;
@@ -12,46 +11,47 @@ mod testing;
 pub use script::{HOOK_NAMES, ScriptEffect, ScriptEffectError};
 
 use mapper_physics::effect::Effect;
+use mapper_physics::effect_kind::effect_of;
 use std::sync::Arc;
 
 /// Declares the effects' modules and the list of them.
 macro_rules! effects {
-    ($($name:ident),* $(,)?) => {
+    ($($name:ident::$kind:ident),* $(,)?) => {
         $(mod $name;)*
 
         /// Every effect of the catalogue, in the order of reports.
         pub fn catalogue() -> Vec<Arc<dyn Effect>> {
-            vec![$(Arc::new($name::effect())),*]
+            vec![$(effect_of::<$name::$kind>()),*]
         }
     };
 }
 
 effects! {
-    area_split,
-    tip_diameter,
-    stem_conduction,
-    recovery,
-    directional_htc,
-    htc_scale,
-    inner_node,
-    oil_scale,
-    ventilation,
-    turbine_radiation,
-    recirculation,
-    bearing_friction,
-    turbine_efficiency,
-    efficiency_scale,
-    flow_map_scale,
-    valve_area,
-    actuator_lag,
-    flowmeter_lag,
-    flowmeter_gain,
-    t1_offset,
-    t2_offset,
-    tc_offset,
-    p2_offset,
-    humidity,
-    inlet_preheat,
+    area_split::AreaSplit,
+    tip_diameter::TipDiameter,
+    stem_conduction::StemConduction,
+    recovery::Recovery,
+    directional_htc::DirectionalHtc,
+    htc_scale::HtcScale,
+    inner_node::InnerNode,
+    oil_scale::OilScale,
+    ventilation::Ventilation,
+    turbine_radiation::TurbineRadiation,
+    recirculation::Recirculation,
+    bearing_friction::BearingFriction,
+    turbine_efficiency::TurbineEfficiency,
+    efficiency_scale::EfficiencyScale,
+    flow_map_scale::FlowMapScale,
+    valve_area::ValveArea,
+    actuator_lag::ActuatorLag,
+    flowmeter_lag::FlowmeterLag,
+    flowmeter_gain::FlowmeterGain,
+    t1_offset::T1Offset,
+    t2_offset::T2Offset,
+    tc_offset::TcOffset,
+    p2_offset::P2Offset,
+    humidity::Humidity,
+    inlet_preheat::InletPreheat,
 }
 
 /// The effect of an id, if there is one.

@@ -1,18 +1,33 @@
 //! Gas goes in a circle through the wheel.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "recirculation",
-        "part of the flow comes back, hot, from behind the wheel to its inlet",
-        "the wheel pumps (1 + r) m, the map's flow; T2' = T1' (1 + X)/(1 - r X), X = (PR^kappa - 1)/eta",
-        "mixing balance of a ported shroud or backflow",
-        Submodel::CompressorFlow,
-        vec![parameter("recirculation", "1", [0.0, 0.3], 0.0, 0.03)],
-        |values, rig| rig.model.params.compressor.recirculation_ratio += values[0],
-    )
+effect_parameters! {
+    /// Gas goes in a circle through the wheel.
+    #[derive(Debug)]
+    pub(crate) struct Recirculation {
+        /// Part r of the delivered flow that comes back.
+        back_ratio = "recirculation" ["1"] 0.0 .. 0.3, neutral 0.0, step 0.03;
+    }
+}
+
+impl EffectKind for Recirculation {
+    const ABOUT: About = About {
+        id: "recirculation",
+        description: "part of the flow comes back, hot, from behind the wheel to its inlet",
+        equation: "the wheel pumps (1 + r) m, the map's flow; T2' = T1' (1 + X)/(1 - r X), X = (PR^kappa - 1)/eta",
+        source: "mixing balance of a ported shroud or backflow",
+        submodel: Submodel::CompressorFlow,
+        also_shows_in: &[Submodel::CompressorGas],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.compressor.recirculation_ratio += self.back_ratio;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -24,7 +39,7 @@ mod tests {
     #[test]
     fn the_wheel_works_on_the_mixed_gas() {
         let r = 0.05;
-        let (nominal, at) = (Instant::nominal().outputs, Instant::with(&effect(), &[r]).outputs);
+        let (nominal, at) = (Instant::nominal().outputs, Instant::with(Recirculation { back_ratio: r }).outputs);
         assert!((at.flow_kg_s * (1.0 + r) / nominal.flow_kg_s - 1.0).abs() < 1e-12);
         let mixed_k = (at.t1_prime_k + r * at.t2_prime_k) / (1.0 + r);
         let rise = nominal.t2_prime_k / nominal.t1_prime_k;

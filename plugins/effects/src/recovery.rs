@@ -1,18 +1,33 @@
 //! The T2 probe does not feel the whole total temperature.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "recovery",
-        "the T2 probe recovers only part of the gas's kinetic energy",
-        "T_tip tends to T2 - (1 - r) v^2/(2 cp), v = m/(rho A) in the outlet pipe",
-        "recovery factor of a probe: Moffat, Gas temperature measurement (1962)",
-        Submodel::T2Probe,
-        vec![parameter("recovery", "1", [0.0, 1.5], 1.0, -0.3)],
-        |values, rig| rig.model.params.t2_probe_recovery_ratio += values[0] - 1.0,
-    )
+effect_parameters! {
+    /// The T2 probe does not feel the whole total temperature.
+    #[derive(Debug)]
+    pub(crate) struct Recovery {
+        /// Recovery factor r of the probe.
+        recovery_ratio = "recovery" ["1"] 0.0 .. 1.5, neutral 1.0, step -0.3;
+    }
+}
+
+impl EffectKind for Recovery {
+    const ABOUT: About = About {
+        id: "recovery",
+        description: "the T2 probe recovers only part of the gas's kinetic energy",
+        equation: "T_tip tends to T2 - (1 - r) v^2/(2 cp), v = m/(rho A) in the outlet pipe",
+        source: "recovery factor of a probe: Moffat, Gas temperature measurement (1962)",
+        submodel: Submodel::T2Probe,
+        also_shows_in: &[],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.t2_probe_recovery_ratio += self.recovery_ratio - 1.0;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -23,7 +38,7 @@ mod tests {
     /// Without recovery the probe reads v^2/(2 cp) less, v from the continuity of an ideal gas in a pipe of 35 mm.
     #[test]
     fn a_probe_without_recovery_reads_the_static_temperature() {
-        let at = Instant::with(&effect(), &[0.0]);
+        let at = Instant::with(Recovery { recovery_ratio: 0.0 });
         let density_kg_m3 = at.state.p2_pa / (287.05 * at.outputs.t2_k);
         let velocity_m_s = at.outputs.flow_kg_s / (density_kg_m3 * std::f64::consts::PI / 4.0 * 0.035 * 0.035);
         let cp = 1002.5 + 275e-6 * (at.outputs.t2_k - 200.0).powi(2);

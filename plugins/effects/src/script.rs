@@ -6,15 +6,15 @@
 mod engine;
 mod error;
 mod header;
+mod hook_names;
 mod hooks;
 
 pub use error::ScriptEffectError;
-pub use hooks::HOOK_NAMES;
+pub use hook_names::HOOK_NAMES;
 
 use engine::Program;
 use hooks::ScriptHooks;
-use mapper_physics::effect::{Effect, EffectInfo, Rig};
-use mapper_physics::hooks::TooManyExtraStates;
+use mapper_physics::effect::{Effect, EffectError, EffectInfo, EffectValues, Rig};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -51,12 +51,11 @@ impl Effect for ScriptEffect {
         &self.info
     }
 
-    fn prepare(&self, values: &[f64], rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        let parameters = &self.info.parameters;
+    fn prepare(&self, values: &EffectValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
         // At neutral it is not there, however the script rounds.
-        if parameters.iter().zip(values).all(|(parameter, value)| parameter.neutral == *value) {
+        if values.is_neutral() {
             return Ok(());
         }
-        rig.hook(ScriptHooks::new(self.program.clone(), values))
+        Ok(rig.hook(ScriptHooks::new(self.program.clone(), self.program.numbers(values)?))?)
     }
 }

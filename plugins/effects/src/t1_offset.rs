@@ -1,19 +1,34 @@
 //! The T1 probe reads high or low.
 
-use crate::catalogued::{Catalogued, parameter};
 use mapper_core::Channel;
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "t1_offset",
-        "the probe before the compressor reads high or low",
-        "T1_read = T1 + b",
-        "calibration of the probe",
-        Submodel::T1Probe,
-        vec![parameter("t1_offset", "K", [-20.0, 20.0], 0.0, 1.5)],
-        |values, rig| rig.instruments.path_mut(Channel::T1).offset += values[0],
-    )
+effect_parameters! {
+    /// The T1 probe reads high or low.
+    #[derive(Debug)]
+    pub(crate) struct T1Offset {
+        /// Reading minus temperature, K.
+        offset_k = "t1_offset" ["K"] -20.0 .. 20.0, neutral 0.0, step 1.5;
+    }
+}
+
+impl EffectKind for T1Offset {
+    const ABOUT: About = About {
+        id: "t1_offset",
+        description: "the probe before the compressor reads high or low",
+        equation: "T1_read = T1 + b",
+        source: "calibration of the probe",
+        submodel: Submodel::T1Probe,
+        also_shows_in: &[Submodel::CompressorGas],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.instruments.path_mut(Channel::T1).offset += self.offset_k;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -23,7 +38,7 @@ mod tests {
 
     #[test]
     fn the_reading_is_shifted() {
-        let shifted = Instant::with(&effect(), &[0.8]).reading(Channel::T1);
+        let shifted = Instant::with(T1Offset { offset_k: 0.8 }).reading(Channel::T1);
         assert!((shifted - Instant::nominal().reading(Channel::T1) - 0.8).abs() < 1e-9);
     }
 }

@@ -1,8 +1,8 @@
 //! One instant of the machine with an effect, for the effects' known answers.
 
-use crate::catalogued::Catalogued;
 use mapper_core::Channel;
-use mapper_physics::effect::{self, Rig};
+use mapper_physics::effect::Rig;
+use mapper_physics::effect_kind::EffectKind;
 use mapper_physics::instruments::{ChannelFollower, true_value};
 use mapper_physics::model::{Model, Outputs, State, rad_s_of_rpm};
 use mapper_physics::params::BoundaryConditions;
@@ -25,9 +25,9 @@ impl Instant {
         Self::of(Rig::new(Model::nominal()))
     }
 
-    pub(crate) fn with(effect: &Catalogued, values: &[f64]) -> Self {
+    pub(crate) fn with(effect: impl EffectKind) -> Self {
         let mut rig = Rig::new(Model::nominal());
-        effect::add(&mut rig, effect, values).unwrap();
+        effect.put_into(&mut rig).unwrap();
         Self::of(rig)
     }
 

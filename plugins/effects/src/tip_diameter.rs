@@ -1,18 +1,33 @@
 //! The T2 probe has a tip of its own mass.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "tip_diameter",
-        "the T2 probe's tip has a mass and follows the gas with a lag",
-        "dT_tip/dt = (T2 - T_tip)/tau, tau = rho c d^2/(6 Nu k)",
-        "Burke et al., eqs. 11 and 12",
-        Submodel::T2Probe,
-        vec![parameter("tip_diameter", "m", [0.0, 0.006], 0.0, 0.0015)],
-        |values, rig| rig.model.params.t2_probe_diameter_m += values[0],
-    )
+effect_parameters! {
+    /// The T2 probe has a tip of its own mass.
+    #[derive(Debug)]
+    pub(crate) struct TipDiameter {
+        /// Diameter of the tip, m.
+        diameter_m = "tip_diameter" ["m"] 0.0 .. 0.006, neutral 0.0, step 0.0015;
+    }
+}
+
+impl EffectKind for TipDiameter {
+    const ABOUT: About = About {
+        id: "tip_diameter",
+        description: "the T2 probe's tip has a mass and follows the gas with a lag",
+        equation: "dT_tip/dt = (T2 - T_tip)/tau, tau = rho c d^2/(6 Nu k)",
+        source: "Burke et al., eqs. 11 and 12",
+        submodel: Submodel::T2Probe,
+        also_shows_in: &[],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.t2_probe_diameter_m += self.diameter_m;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -26,7 +41,7 @@ mod tests {
     /// A tip that is 10 K off is off by 10/e K after its own time constant: nothing in the machine depends on it.
     #[test]
     fn the_tip_forgets_within_its_time_constant() {
-        let mut at = Instant::with(&effect(), &[3e-3]);
+        let mut at = Instant::with(TipDiameter { diameter_m: 3e-3 });
         let rest = steady::hold_speed(&at.rig.model, 110e3, &at.boundary).unwrap();
         let tau_s = rest.outputs.t2_probe_time_constant_s;
         at.state = State { t2_tip_k: rest.outputs.t2_k + 10.0, ..rest.state };

@@ -1,18 +1,33 @@
 //! The turbine gives more or less of its power.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "turbine_efficiency",
-        "the turbine's efficiency is higher or lower everywhere",
-        "eta_t = s eta_t,nominal",
-        "worn or fouled turbine",
-        Submodel::Shaft,
-        vec![parameter("turbine_efficiency", "1", [0.5, 1.3], 1.0, -0.04)],
-        |values, rig| rig.model.params.turbine.peak_efficiency *= values[0],
-    )
+effect_parameters! {
+    /// The turbine gives more or less of its power.
+    #[derive(Debug)]
+    pub(crate) struct TurbineEfficiency {
+        /// Turbine efficiency over the nominal one.
+        scale_ratio = "turbine_efficiency" ["1"] 0.5 .. 1.3, neutral 1.0, step -0.04;
+    }
+}
+
+impl EffectKind for TurbineEfficiency {
+    const ABOUT: About = About {
+        id: "turbine_efficiency",
+        description: "the turbine's efficiency is higher or lower everywhere",
+        equation: "eta_t = s eta_t,nominal",
+        source: "worn or fouled turbine",
+        submodel: Submodel::Shaft,
+        also_shows_in: &[],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.turbine.peak_efficiency *= self.scale_ratio;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -23,7 +38,7 @@ mod tests {
     #[test]
     fn the_drop_over_the_wheel_is_multiplied() {
         let drop_k = |at: Instant| at.outputs.turbine.t3_prime_k - at.outputs.turbine.t4_k;
-        let ratio = drop_k(Instant::with(&effect(), &[0.96])) / drop_k(Instant::nominal());
+        let ratio = drop_k(Instant::with(TurbineEfficiency { scale_ratio: 0.96 })) / drop_k(Instant::nominal());
         assert!((ratio - 0.96).abs() < 1e-12);
     }
 }

@@ -1,18 +1,33 @@
 //! The turbine housing shines on the compressor housing.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "turbine_radiation",
-        "the turbine housing radiates to the compressor housing",
-        "Q = FA sigma (Tt^4 - Tc^4)",
-        "two-surface exchange: Incropera, 13.2",
-        Submodel::TurbineHousing,
-        vec![parameter("turbine_radiation", "m2", [0.0, 0.1], 0.0, 0.01)],
-        |values, rig| rig.model.params.radiation_area_m2 += values[0],
-    )
+effect_parameters! {
+    /// The turbine housing shines on the compressor housing.
+    #[derive(Debug)]
+    pub(crate) struct TurbineRadiation {
+        /// View factor times area FA, m2.
+        view_area_m2 = "turbine_radiation" ["m2"] 0.0 .. 0.1, neutral 0.0, step 0.01;
+    }
+}
+
+impl EffectKind for TurbineRadiation {
+    const ABOUT: About = About {
+        id: "turbine_radiation",
+        description: "the turbine housing radiates to the compressor housing",
+        equation: "Q = FA sigma (Tt^4 - Tc^4)",
+        source: "two-surface exchange: Incropera, 13.2",
+        submodel: Submodel::TurbineHousing,
+        also_shows_in: &[Submodel::CompressorHousing],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.radiation_area_m2 += self.view_area_m2;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -30,7 +45,7 @@ mod tests {
                 prepared.turbine_housing_balance_w(&at.state, &at.outputs),
             ]
         };
-        let (dark, shining) = (balances(&Instant::nominal()), balances(&Instant::with(&effect(), &[0.01])));
+        let (dark, shining) = (balances(&Instant::nominal()), balances(&Instant::with(TurbineRadiation { view_area_m2: 0.01 })));
         for (found_w, expected_w) in [(shining[0] - dark[0], 27.863), (shining[1] - dark[1], -27.863)] {
             assert!((found_w - expected_w).abs() < 1e-3, "{found_w} W");
         }

@@ -1,18 +1,33 @@
 //! The back-pressure valve is wider or narrower.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "valve_area",
-        "the back-pressure valve is wider or narrower than its opening says",
-        "CdA = s CdA,nominal",
-        "calibration of the valve",
-        Submodel::Outlet,
-        vec![parameter("valve_area", "1", [0.7, 1.4], 1.0, 0.04)],
-        |values, rig| rig.model.params.outlet.valve_area_m2 *= values[0],
-    )
+effect_parameters! {
+    /// The back-pressure valve is wider or narrower.
+    #[derive(Debug)]
+    pub(crate) struct ValveArea {
+        /// Area of the valve over the nominal one.
+        scale_ratio = "valve_area" ["1"] 0.7 .. 1.4, neutral 1.0, step 0.04;
+    }
+}
+
+impl EffectKind for ValveArea {
+    const ABOUT: About = About {
+        id: "valve_area",
+        description: "the back-pressure valve is wider or narrower than its opening says",
+        equation: "CdA = s CdA,nominal",
+        source: "calibration of the valve",
+        submodel: Submodel::Outlet,
+        also_shows_in: &[],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.outlet.valve_area_m2 *= self.scale_ratio;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -23,7 +38,7 @@ mod tests {
     #[test]
     fn the_valve_passes_in_proportion() {
         let flow_kg_s = |at: Instant| at.outputs.valve_flow_kg_s;
-        let ratio = flow_kg_s(Instant::with(&effect(), &[1.05])) / flow_kg_s(Instant::nominal());
+        let ratio = flow_kg_s(Instant::with(ValveArea { scale_ratio: 1.05 })) / flow_kg_s(Instant::nominal());
         assert!((ratio - 1.05).abs() < 1e-12);
     }
 }

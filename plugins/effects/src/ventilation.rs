@@ -1,18 +1,33 @@
 //! Air moves in the cell.
 
-use crate::catalogued::{Catalogued, parameter};
-use mapper_physics::effect::Submodel;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
 
-pub(crate) fn effect() -> Catalogued {
-    Catalogued::new(
-        "ventilation",
-        "air moves around the housings: convection to the cell is stronger or weaker",
-        "Q_ext = A_ext (s 1.25 |T - T_amb|^(1/3) (T - T_amb) + eps sigma (T^4 - T_amb^4)), both housings",
-        "Burke et al., Appendix A, external convection",
-        Submodel::TurbineHousing,
-        vec![parameter("ventilation", "1", [0.1, 5.0], 1.0, 0.6)],
-        |values, rig| rig.model.params.external_convection_ratio *= values[0],
-    )
+effect_parameters! {
+    /// Air moves in the cell.
+    #[derive(Debug)]
+    pub(crate) struct Ventilation {
+        /// Convection to the cell over the nominal one.
+        convection_ratio = "ventilation" ["1"] 0.1 .. 5.0, neutral 1.0, step 0.6;
+    }
+}
+
+impl EffectKind for Ventilation {
+    const ABOUT: About = About {
+        id: "ventilation",
+        description: "air moves around the housings: convection to the cell is stronger or weaker",
+        equation: "Q_ext = A_ext (s 1.25 |T - T_amb|^(1/3) (T - T_amb) + eps sigma (T^4 - T_amb^4)), both housings",
+        source: "Burke et al., Appendix A, external convection",
+        submodel: Submodel::TurbineHousing,
+        also_shows_in: &[Submodel::CompressorHousing],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.external_convection_ratio *= self.convection_ratio;
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -23,7 +38,7 @@ mod tests {
     /// By hand: 1.25 A |dT|^(4/3) more for each housing at twice the convection; radiation stays.
     #[test]
     fn convection_to_the_cell_is_multiplied_and_radiation_is_not() {
-        let (nominal, windy) = (Instant::nominal(), Instant::with(&effect(), &[2.0]));
+        let (nominal, windy) = (Instant::nominal(), Instant::with(Ventilation { convection_ratio: 2.0 }));
         let more_w = |area_m2: f64, wall_k: f64| 1.25 * area_m2 * (wall_k - 298.15).powf(4.0 / 3.0);
         for (found_w, expected_w) in [
             (windy.outputs.compressor_external_heat_w - nominal.outputs.compressor_external_heat_w, more_w(79e-3, nominal.state.tc_k)),

@@ -109,11 +109,11 @@ fn a_script_changes_the_reading_it_names_and_no_other() {
 fn mistakes_are_named_with_their_line() {
     for (result, expected) in [
         (script("fn flow_kg_s(at, p, v) { v }"), "lacks `//! parameter"),
-        (script("//! effect: Bad Name\n"), "suspect.rhai:1: `Bad Name` is no name"),
-        (script("//! effect: a\n//! submodel: engine\n"), "suspect.rhai:2: `engine` is no submodel"),
+        (script("//! effect: Bad Name\n"), "suspect.rhai:1: `Bad Name` is not a valid name"),
+        (script("//! effect: a\n//! submodel: engine\n"), "suspect.rhai:2: `engine` is not a submodel"),
         (script("//! effect: a\n//! parameter: c 0 .. 1\n"), "suspect.rhai:2: write `//! parameter"),
         (script("//! parameter: c [1] 0 .. 1, neutral 2, step 0.1\n"), "hold the neutral value 2"),
-        (script("//! colour: red\n"), "`colour` is no key"),
+        (script("//! colour: red\n"), "`colour` is not a key"),
         (with_body(""), "it takes part nowhere"),
         (with_body("fn flow_kg_s(at) { 1.0 }"), "write flow_kg_s(at, p, value)"),
         (with_body("fn reading_T9(at, p, value) { value }"), "no channel is called `T9`"),

@@ -25,18 +25,18 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-history",   &["numerics"]),
     ("mapper-reproduce", &["core", "numerics", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
-    ("mapper-backends",  &["core", "numerics", "physics", "units"]),
+    // A backend may read recordings: replay does.
+    ("mapper-backends",  &["core", "numerics", "physics", "record", "units"]),
     ("mapper-effects",   &["core", "physics"]),
-    ("mapper-exporters", &["core", "numerics", "physics", "chart"]),
-    ("mapper-importers", &["core", "physics"]),
+    ("mapper-formats",   &["core", "numerics", "physics", "chart"]),
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
     ("mapper-blind",     &["core", "numerics", "physics", "campaign", "record", "gap", "backends", "effects"]),
     // Words, pages and pictures made from data.
     ("mapper-report",    &["core", "chart", "physics", "campaign", "planner", "identify", "assemble", "gap", "drift", "history", "score"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "drift", "history", "assemble", "score", "report", "exporters", "importers"]),
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "identify", "gap", "drift", "history", "assemble", "score", "report", "formats"]),
     // The program names the plug-ins; nothing sees the program.
-    ("mapper-cli",       &["core", "physics", "campaign", "planner", "sequence", "record", "drift", "history", "assemble", "reproduce", "report", "session", "backends", "blind", "effects"]),
+    ("mapper-cli",       &["core", "physics", "campaign", "planner", "sequence", "record", "drift", "history", "assemble", "reproduce", "report", "session", "backends", "blind", "effects", "formats"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),
@@ -152,7 +152,7 @@ fn wrong_edges_are_seen_and_named() {
     for (from, to) in [
         ("mapper-identify", "mapper-backends"),
         ("mapper-runner", "mapper-cli"),
-        ("mapper-exporters", "mapper-backends"),
+        ("mapper-formats", "mapper-backends"),
         ("mapper-physics", "serde_yaml"),
         ("mapper-tests", "mapper-cli"),
     ] {

@@ -4,27 +4,35 @@
 use mapper_core::EventKind;
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use mapper_tests::{CampaignFile, Finished, mapper, mapper_command, only_run, python};
+use notify::{RecommendedWatcher, RecursiveMode, Watcher};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::thread::sleep;
+use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 /// A day of the rig's time: far from over when the recording holds a few steps.
 const LONG: &[(&str, &str)] = &[("warm_up: 10 min ", "warm_up: 60 s "), ("dwell: 120 s ", "dwell: 30 min ")];
 /// About an hour and a quarter of the rig's time, two steps of half an hour.
 const SOME_STEPS_BYTES: u64 = 20_000_000;
-/// Looks at the file before giving up: ten minutes, which no machine needs; a run takes seconds.
-const LOOKS: usize = 60_000;
-const BETWEEN_LOOKS: Duration = Duration::from_millis(10);
+/// Without any news of the recording for so long the test gives up: a run writes each second of its own clock, thousands of
+/// which take a second.
+const LONGEST_SILENCE: Duration = Duration::from_secs(120);
 
 /// A run that is killed where the test ends before it does.
 struct Running {
     child: Option<Child>,
     runs: PathBuf,
+    /// Ends the news where it is dropped.
+    _watcher: RecommendedWatcher,
+    news: Receiver<notify::Result<notify::Event>>,
 }
 
 impl Running {
     fn start(campaign: &CampaignFile) -> Self {
+        // Watched before it starts, so that no news is missed.
+        let (tell, news) = channel();
+        let mut watcher = notify::recommended_watcher(tell).unwrap();
+        watcher.watch(campaign.directory(), RecursiveMode::Recursive).unwrap();
         let child = mapper_command(["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref()])
             .arg("--out")
             .arg(campaign.runs())
@@ -32,12 +40,13 @@ impl Running {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        Running { child: Some(child), runs: campaign.runs() }
+        Running { child: Some(child), runs: campaign.runs(), _watcher: watcher, news }
     }
 
     /// Waits until the recording has grown to `bytes`; the run must still be going on.
     fn recorded(&mut self, bytes: u64) -> PathBuf {
-        for _ in 0..LOOKS {
+        loop {
+            self.news.recv_timeout(LONGEST_SILENCE).expect("the recording grows").unwrap();
             let ended = self.child.as_mut().unwrap().try_wait().unwrap();
             assert_eq!(ended, None, "the run was over before it could be stopped");
             let run = self.runs.read_dir().ok().and_then(|mut runs| runs.next()).and_then(Result::ok);
@@ -47,9 +56,7 @@ impl Running {
             {
                 return recording;
             }
-            sleep(BETWEEN_LOOKS);
         }
-        panic!("the recording did not grow to {bytes} bytes");
     }
 
     fn interrupt(&self) {

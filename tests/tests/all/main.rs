@@ -18,6 +18,7 @@ mod nightly;
 mod pages;
 mod pipes;
 mod plans;
+mod promises;
 mod recordings;
 mod sequences;
 mod shipped_campaign;

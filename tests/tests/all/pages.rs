@@ -34,12 +34,14 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
         campaign.path.as_os_str(),
         "--recording".as_ref(),
         only_run(&campaign.runs()).as_os_str(),
+        "--json".as_ref(),
         "--html".as_ref(),
         page.as_os_str(),
     ])
     .exits(0);
     // The rig's backend settings are truth, which the diagnosis does not read: it has to find the effect.
-    assert!(diagnosed.stdout.contains("stem_conduction"), "{}", diagnosed.stdout);
+    let found = &diagnosed.json()["candidates"][0]["effects"];
+    assert_eq!(*found, serde_json::json!(["stem_conduction"]), "{}", diagnosed.stdout);
 
     let Some(chromium) = option_env!("MAPPER_TEST_CHROMIUM") else {
         panic!("needs Chromium: run `cargo xtask test`")

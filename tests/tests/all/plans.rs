@@ -94,7 +94,8 @@ fn orders_do_what_they_are_for() {
 }
 
 /// The standard error that the plan states is the scatter of what is found: 48 seeds draw noise and offsets anew. The
-/// standard deviation of 48 is itself known to 10 %; three of that beside the 20 % which the prediction may be off.
+/// standard deviation of 48 is itself known to 10.3 %; three of that, beside 4 % by which the prediction may be off: over 300
+/// seeds the ratios were 0.95 and 0.95, which are known to 4 % themselves.
 #[test]
 fn predicted_errors_are_the_scatter_of_seeded_runs() {
     let small: &[(&str, &str)] = &[("openings: [0.7, 1.4]", "openings: [1.0]")];
@@ -116,7 +117,7 @@ fn predicted_errors_are_the_scatter_of_seeded_runs() {
         let mean = etas.iter().sum::<f64>() / etas.len() as f64;
         let square = etas.iter().map(|eta| (eta - mean).powi(2)).sum::<f64>() / (etas.len() as f64 - 1.0);
         let ratio = square.sqrt() / number(&planned["steps"][step]["predicted"]["sigma_eta"]);
-        assert!((ratio - 1.0).abs() < 0.5, "step {step}: the scatter is {ratio} of the prediction");
+        assert!((ratio - 1.0).abs() < 0.35, "step {step}: the scatter is {ratio} of the prediction");
     }
 }
 

@@ -1,29 +1,37 @@
 //! The clearance over the wheel grows with the housing's temperature.
 
-use super::{Outside, hook};
-use mapper_physics::effect::Submodel;
-use mapper_physics::hooks::{Hooks, Site};
+use super::WITHHELD;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
 
-pub(super) fn effect() -> Outside {
-    Outside::new(
-        [
-            "X_clearance",
-            "a clearance that grows as the compressor housing gets hotter than 320 K",
-            "eta (1 - k (Tc - 320 K)/100 K)",
-        ],
-        Submodel::CompressorGas,
-        ["k", "1"],
-        [-0.5, 0.5, 0.0, 0.06],
-        |value, rig| hook(rig, Taken(value)),
-    )
+effect_parameters! {
+    /// The clearance over the wheel grows with the housing's temperature.
+    #[derive(Debug)]
+    pub(super) struct Clearance {
+        /// Loss of efficiency per 100 K, ratio.
+        loss_ratio = "k" ["1"] -0.5 .. 0.5, neutral 0.0, step 0.06;
+    }
 }
 
-/// Loss of efficiency per 100 K.
-#[derive(Debug)]
-struct Taken(f64);
+impl EffectKind for Clearance {
+    const ABOUT: About = About {
+        id: "X_clearance",
+        description: "a clearance that grows as the compressor housing gets hotter than 320 K",
+        equation: "eta (1 - k (Tc - 320 K)/100 K)",
+        source: WITHHELD,
+        submodel: Submodel::CompressorGas,
+        also_shows_in: &[],
+    };
 
-impl Hooks for Taken {
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.hook(self)
+    }
+}
+
+impl Hooks for Clearance {
     fn efficiency(&self, site: &Site<'_>, efficiency: f64) -> f64 {
-        efficiency * (1.0 - self.0 * (site.state.tc_k - 320.0) / 100.0)
+        efficiency * (1.0 - self.loss_ratio * (site.state.tc_k - 320.0) / 100.0)
     }
 }

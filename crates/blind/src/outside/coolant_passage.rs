@@ -1,32 +1,40 @@
 //! Water flows through the compressor housing.
 
-use super::{Outside, hook};
-use mapper_physics::effect::Submodel;
-use mapper_physics::hooks::{Hooks, Site};
+use super::WITHHELD;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
 
 /// Temperature of the water, K.
 const WATER_K: f64 = 358.15;
 
-pub(super) fn effect() -> Outside {
-    Outside::new(
-        [
-            "X_coolant_passage",
-            "a coolant passage from the compressor housing to water at 85 degC",
-            "G (358.15 K - Tc) to the compressor housing",
-        ],
-        Submodel::CompressorHousing,
-        ["G", "W/K"],
-        [0.0, 20.0, 0.0, 1.5],
-        |value, rig| hook(rig, Taken(value)),
-    )
+effect_parameters! {
+    /// Water flows through the compressor housing.
+    #[derive(Debug)]
+    pub(super) struct CoolantPassage {
+        /// Conductance to the water, W/K.
+        conductance_w_k = "G" ["W/K"] 0.0 .. 20.0, neutral 0.0, step 1.5;
+    }
 }
 
-/// Conductance to the water, W/K.
-#[derive(Debug)]
-struct Taken(f64);
+impl EffectKind for CoolantPassage {
+    const ABOUT: About = About {
+        id: "X_coolant_passage",
+        description: "a coolant passage from the compressor housing to water at 85 degC",
+        equation: "G (358.15 K - Tc) to the compressor housing",
+        source: WITHHELD,
+        submodel: Submodel::CompressorHousing,
+        also_shows_in: &[],
+    };
 
-impl Hooks for Taken {
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.hook(self)
+    }
+}
+
+impl Hooks for CoolantPassage {
     fn heat_to_compressor_w(&self, site: &Site<'_>) -> f64 {
-        self.0 * (WATER_K - site.state.tc_k)
+        self.conductance_w_k * (WATER_K - site.state.tc_k)
     }
 }

@@ -1,25 +1,37 @@
 //! The shaft rubs with a torque that does not depend on speed.
 
-use super::{Outside, hook};
-use mapper_physics::effect::Submodel;
-use mapper_physics::hooks::{Hooks, Site};
+use super::WITHHELD;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
 
-pub(super) fn effect() -> Outside {
-    Outside::new(
-        ["X_coulomb_friction", "the shaft rubs with a constant torque", "-M on the shaft"],
-        Submodel::Shaft,
-        ["M", "N m"],
-        [0.0, 0.2, 0.0, 0.012],
-        |value, rig| hook(rig, Taken(value)),
-    )
+effect_parameters! {
+    /// The shaft rubs with a torque that does not depend on speed.
+    #[derive(Debug)]
+    pub(super) struct CoulombFriction {
+        /// Torque, N m.
+        torque_nm = "M" ["N m"] 0.0 .. 0.2, neutral 0.0, step 0.012;
+    }
 }
 
-/// Torque, N m.
-#[derive(Debug)]
-struct Taken(f64);
+impl EffectKind for CoulombFriction {
+    const ABOUT: About = About {
+        id: "X_coulomb_friction",
+        description: "the shaft rubs with a constant torque",
+        equation: "-M on the shaft",
+        source: WITHHELD,
+        submodel: Submodel::Shaft,
+        also_shows_in: &[],
+    };
 
-impl Hooks for Taken {
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.hook(self)
+    }
+}
+
+impl Hooks for CoulombFriction {
     fn shaft_torque_nm(&self, _site: &Site<'_>) -> f64 {
-        -self.0
+        -self.torque_nm
     }
 }

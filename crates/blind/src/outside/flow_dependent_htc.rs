@@ -1,29 +1,37 @@
 //! Convection depends on flow other than the correlation says.
 
-use super::{Outside, hook};
-use mapper_physics::effect::Submodel;
-use mapper_physics::hooks::{Hooks, Site};
+use super::WITHHELD;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
 
-pub(super) fn effect() -> Outside {
-    Outside::new(
-        [
-            "X_flow_dependent_htc",
-            "the exponent of the flow in the convection is other than the correlation's",
-            "h (m/0.06 kg/s)^e",
-        ],
-        Submodel::CompressorGas,
-        ["e", "1"],
-        [-1.0, 1.0, 0.0, 0.25],
-        |value, rig| hook(rig, Taken(value)),
-    )
+effect_parameters! {
+    /// Convection depends on flow other than the correlation says.
+    #[derive(Debug)]
+    pub(super) struct FlowDependentHtc {
+        /// Excess of the exponent.
+        exponent = "e" ["1"] -1.0 .. 1.0, neutral 0.0, step 0.25;
+    }
 }
 
-/// Excess of the exponent.
-#[derive(Debug)]
-struct Taken(f64);
+impl EffectKind for FlowDependentHtc {
+    const ABOUT: About = About {
+        id: "X_flow_dependent_htc",
+        description: "the exponent of the flow in the convection is other than the correlation's",
+        equation: "h (m/0.06 kg/s)^e",
+        source: WITHHELD,
+        submodel: Submodel::CompressorGas,
+        also_shows_in: &[],
+    };
 
-impl Hooks for Taken {
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.hook(self)
+    }
+}
+
+impl Hooks for FlowDependentHtc {
     fn h_w_m2k(&self, site: &Site<'_>, h_w_m2k: f64) -> f64 {
-        h_w_m2k * (site.flow_kg_s / 0.06).powf(self.0)
+        h_w_m2k * (site.flow_kg_s / 0.06).powf(self.exponent)
     }
 }

@@ -1,29 +1,37 @@
 //! The compressor housing stands on a cold mount.
 
-use super::{Outside, hook};
-use mapper_physics::effect::Submodel;
-use mapper_physics::hooks::{Hooks, Site};
+use super::WITHHELD;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
 
-pub(super) fn effect() -> Outside {
-    Outside::new(
-        [
-            "X_mount_conduction",
-            "the compressor housing conducts to a mount at 20 degC",
-            "G (293.15 K - Tc) to the compressor housing",
-        ],
-        Submodel::CompressorHousing,
-        ["G", "W/K"],
-        [0.0, 20.0, 0.0, 1.5],
-        |value, rig| hook(rig, Taken(value)),
-    )
+effect_parameters! {
+    /// The compressor housing stands on a cold mount.
+    #[derive(Debug)]
+    pub(super) struct MountConduction {
+        /// Conductance to the mount, W/K.
+        conductance_w_k = "G" ["W/K"] 0.0 .. 20.0, neutral 0.0, step 1.5;
+    }
 }
 
-/// Conductance to the mount, W/K.
-#[derive(Debug)]
-struct Taken(f64);
+impl EffectKind for MountConduction {
+    const ABOUT: About = About {
+        id: "X_mount_conduction",
+        description: "the compressor housing conducts to a mount at 20 degC",
+        equation: "G (293.15 K - Tc) to the compressor housing",
+        source: WITHHELD,
+        submodel: Submodel::CompressorHousing,
+        also_shows_in: &[],
+    };
 
-impl Hooks for Taken {
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.hook(self)
+    }
+}
+
+impl Hooks for MountConduction {
     fn heat_to_compressor_w(&self, site: &Site<'_>) -> f64 {
-        self.0 * (293.15 - site.state.tc_k)
+        self.conductance_w_k * (293.15 - site.state.tc_k)
     }
 }

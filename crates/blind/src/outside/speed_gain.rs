@@ -1,26 +1,38 @@
 //! The speed pick-up reads high or low.
 
-use super::{Outside, hook};
+use super::WITHHELD;
 use mapper_core::Channel;
-use mapper_physics::effect::Submodel;
-use mapper_physics::hooks::{Hooks, Site};
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
 
-pub(super) fn effect() -> Outside {
-    Outside::new(
-        ["X_speed_gain", "the speed sensor reads high or low in proportion", "N_read = (1 + g) N"],
-        Submodel::Shaft,
-        ["g", "1"],
-        [-0.1, 0.1, 0.0, 0.01],
-        |value, rig| hook(rig, Taken(value)),
-    )
+effect_parameters! {
+    /// The speed pick-up reads high or low.
+    #[derive(Debug)]
+    pub(super) struct SpeedGain {
+        /// Error of the gain, ratio.
+        error_ratio = "g" ["1"] -0.1 .. 0.1, neutral 0.0, step 0.01;
+    }
 }
 
-/// Error of the gain.
-#[derive(Debug)]
-struct Taken(f64);
+impl EffectKind for SpeedGain {
+    const ABOUT: About = About {
+        id: "X_speed_gain",
+        description: "the speed sensor reads high or low in proportion",
+        equation: "N_read = (1 + g) N",
+        source: WITHHELD,
+        submodel: Submodel::Shaft,
+        also_shows_in: &[],
+    };
 
-impl Hooks for Taken {
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.hook(self)
+    }
+}
+
+impl Hooks for SpeedGain {
     fn reading(&self, _site: &Site<'_>, channel: Channel, value: f64) -> f64 {
-        if channel == Channel::ShaftSpeed { value * (1.0 + self.0) } else { value }
+        if channel == Channel::ShaftSpeed { value * (1.0 + self.error_ratio) } else { value }
     }
 }

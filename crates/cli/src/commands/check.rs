@@ -7,7 +7,7 @@ use clap::Args;
 use mapper_campaign::CampaignError;
 use mapper_report::duration;
 use mapper_sequence::Script;
-use mapper_session::{check_formats, nominal_model, soak_s};
+use mapper_session::{nominal_model, soak_s};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -36,10 +36,12 @@ impl Check {
         };
         let model = nominal_model(&campaign)?;
         // The backend reads its settings now, so that a mistake in them does not wait for the night.
-        registry::registry()
+        let registry = registry::registry();
+        registry
             .make_backend(&campaign, &model)
+            .map(drop)
+            .and_then(|()| registry.check_formats(&campaign))
             .map_err(|error| Failure::in_campaign(error, &self.campaign))?;
-        check_formats(&campaign).map_err(|error| Failure::in_campaign(error, &self.campaign))?;
         if let Some(source) = &campaign.sequence {
             let script = Script { path: source.path.clone(), text: source.text.clone() };
             mapper_sequence::check(&script).map_err(|error| Failure::new(Code::BadInput, error))?;

@@ -1,7 +1,8 @@
 //! `drift:` below `virtual_lab`: what drifts while the campaign runs.
 
 use super::drift::{Drifting, LabDrift};
-use mapper_core::Channel;
+use super::setting_problem::SettingProblem;
+use mapper_core::{BackendError, Channel};
 use mapper_units::{Kind, Quantity};
 use serde::Deserialize;
 
@@ -21,33 +22,25 @@ pub(super) struct DriftFile {
     from: Option<Quantity<mapper_units::Duration>>,
 }
 
-/// Drifts with their units resolved; gives the key that is wrong and what would be right.
-pub(super) fn read(files: &[DriftFile]) -> Result<Vec<LabDrift>, (String, String)> {
+/// Drifts with their units resolved.
+pub(super) fn read(files: &[DriftFile]) -> Result<Vec<LabDrift>, BackendError> {
     files.iter().enumerate().map(|(index, file)| one(index, file)).collect()
 }
 
-fn one(index: usize, file: &DriftFile) -> Result<LabDrift, (String, String)> {
-    let wrong = |key: &str, message: String| (format!("drift[{index}].{key}"), message);
+fn one(index: usize, file: &DriftFile) -> Result<LabDrift, BackendError> {
+    let key = |key: &str| format!("drift[{index}].{key}");
     let what = match file.cause.as_str() {
         "fouling" => Drifting::Fouling,
         "bearing_friction" => Drifting::BearingFriction,
         name => match serde_json::from_value::<Channel>(serde_json::json!(name)) {
             Ok(channel) if !is_command(channel) => Drifting::Sensor(channel),
-            _ => {
-                let message = format!(
-                    "`{name}` cannot drift: write a measured channel, `fouling` or `bearing_friction`"
-                );
-                return Err(wrong("cause", message));
-            }
+            _ => return Err(SettingProblem::UnknownDrift { cause: name.to_owned() }.at(key("cause"))),
         },
     };
-    let change = change(what, &file.change).map_err(|message| wrong("change", message))?;
+    let change = change(what, &file.change).map_err(|problem| problem.at(key("change")))?;
     let over_s = file.over.map(|over| over.inside);
     if let Some(over_s) = over_s.filter(|over_s| *over_s <= 0.0) {
-        return Err(wrong(
-            "over",
-            format!("{over_s} s is no time for a change; leave `over` out for a step"),
-        ));
+        return Err(SettingProblem::NoDuration { over_s }.at(key("over")));
     }
     Ok(LabDrift { what, change, over_s, from_s: file.from.map_or(0.0, |from| from.inside) })
 }
@@ -56,7 +49,10 @@ fn is_command(channel: Channel) -> bool {
     matches!(channel, Channel::P3Command | Channel::T3Command | Channel::ValveCommand | Channel::TOilCommand)
 }
 
-fn change(what: Drifting, text: &str) -> Result<f64, String> {
+/// Beyond that the machine, or the air supply behind a sensor, would have no meaning.
+const LARGEST_CHANGE_RATIO: f64 = 0.3;
+
+fn change(what: Drifting, text: &str) -> Result<f64, SettingProblem> {
     const FRICTION: &str = "W s2/rad2";
     let kind = match what {
         Drifting::Sensor(channel) => match channel.info().dimension {
@@ -70,14 +66,17 @@ fn change(what: Drifting, text: &str) -> Result<f64, String> {
             let number = text.trim().strip_suffix(FRICTION).map(|number| number.trim().parse());
             return match number {
                 Some(Ok(value)) if f64::is_finite(value) => Ok(value),
-                _ => Err(format!("`{text}` is not a number and `{FRICTION}`")),
+                _ => Err(SettingProblem::NotInUnit { text: text.to_owned(), unit: FRICTION.to_owned() }),
             };
         }
     };
-    let value = mapper_units::parse(kind, text).map_err(|error| error.to_string())?;
-    // Beyond that the machine, or the air supply behind a sensor, would have no meaning.
-    if kind == Kind::Fraction && value.abs() > 0.3 {
-        return Err(format!("{text} is beyond 30 %"));
+    let value =
+        mapper_units::parse(kind, text).map_err(|source| SettingProblem::Quantity { kind, source })?;
+    if kind == Kind::Fraction && value.abs() > LARGEST_CHANGE_RATIO {
+        return Err(SettingProblem::DriftTooLarge {
+            text: text.to_owned(),
+            limit_ratio: LARGEST_CHANGE_RATIO,
+        });
     }
     Ok(value)
 }

@@ -1,5 +1,7 @@
 //! `effects:` below `virtual_lab`: what the machine has that the campaign's nominal model has not.
 
+use super::setting_problem::SettingProblem;
+use mapper_core::BackendError;
 use mapper_physics::effect::{self, Effect, EffectParameter, Rig};
 use mapper_units::Kind;
 use serde::Deserialize;
@@ -23,58 +25,65 @@ pub(super) enum ValueText {
     Text(String),
 }
 
-/// Puts the effects into a rig; gives the key that is wrong and what would be right.
+/// Puts the effects into a rig.
 pub(super) fn put_in(
     rig: &mut Rig,
     wanted: &BTreeMap<String, EffectValues>,
     known: &[Arc<dyn Effect>],
-) -> Result<(), (String, String)> {
+) -> Result<(), BackendError> {
     for (id, values) in wanted {
-        let key = || format!("effects.{id}");
+        let key = format!("effects.{id}");
         let Some(effect) = known.iter().find(|effect| effect.info().id == id.as_str()) else {
             let ids: Vec<&str> = known.iter().map(|effect| effect.info().id.as_ref()).collect();
-            return Err((key(), format!("there is no such effect; there are {}", ids.join(", "))));
+            return Err(SettingProblem::UnknownEffect { known: ids.join(", ") }.at(key));
         };
         let parameters = &effect.info().parameters;
-        let values = match (values, parameters.as_slice()) {
-            (EffectValues::Number(number), [only]) => vec![read(only, &ValueText::Number(*number))],
-            (EffectValues::Text(text), [only]) => vec![read(only, &ValueText::Text(text.clone()))],
-            (EffectValues::Named(values), several) => {
-                if let Some(name) =
-                    values.keys().find(|name| several.iter().all(|one| one.name != name.as_str()))
-                {
-                    return Err((format!("effects.{id}.{name}"), names(several)));
-                }
-                several
-                    .iter()
-                    .map(|one| {
-                        values
-                            .get(one.name.as_ref())
-                            .map_or_else(|| Err(names(several)), |text| read(one, text))
-                    })
-                    .collect()
-            }
-            (_, several) => return Err((key(), names(several))),
-        };
-        let values: Vec<f64> =
-            values.into_iter().collect::<Result<_, String>>().map_err(|message| (key(), message))?;
-        effect::add(rig, effect.as_ref(), &values).map_err(|error| (key(), error.to_string()))?;
+        if let Some(name) = values.unknown_name(parameters) {
+            return Err(form(parameters).at(format!("{key}.{name}")));
+        }
+        read_all(parameters, values)
+            .and_then(|values| Ok(effect::add(rig, effect.as_ref(), &values)?))
+            .map_err(|problem| problem.at(key))?;
     }
     Ok(())
 }
 
-fn names(parameters: &[EffectParameter]) -> String {
-    let names: Vec<String> =
-        parameters.iter().map(|one| format!("{}: a value in {}", one.name, one.unit)).collect();
-    format!("write {{{}}}", names.join(", "))
+impl EffectValues {
+    /// A name that none of the parameters has.
+    fn unknown_name(&self, parameters: &[EffectParameter]) -> Option<&str> {
+        let EffectValues::Named(values) = self else { return None };
+        values.keys().map(String::as_str).find(|name| parameters.iter().all(|one| one.name != *name))
+    }
 }
 
-fn read(parameter: &EffectParameter, value: &ValueText) -> Result<f64, String> {
+/// A value for each parameter, in their order.
+fn read_all(parameters: &[EffectParameter], values: &EffectValues) -> Result<Vec<f64>, SettingProblem> {
+    let read_one = |parameter: &EffectParameter| {
+        let value = match values {
+            EffectValues::Number(number) if parameters.len() == 1 => &ValueText::Number(*number),
+            EffectValues::Text(text) if parameters.len() == 1 => &ValueText::Text(text.clone()),
+            EffectValues::Named(values) => {
+                values.get(parameter.name.as_ref()).ok_or_else(|| form(parameters))?
+            }
+            EffectValues::Number(_) | EffectValues::Text(_) => return Err(form(parameters)),
+        };
+        read(parameter, value)
+    };
+    parameters.iter().map(read_one).collect()
+}
+
+fn form(parameters: &[EffectParameter]) -> SettingProblem {
+    let names: Vec<String> =
+        parameters.iter().map(|one| format!("{}: a value in {}", one.name, one.unit)).collect();
+    SettingProblem::EffectForm { form: format!("{{{}}}", names.join(", ")) }
+}
+
+fn read(parameter: &EffectParameter, value: &ValueText) -> Result<f64, SettingProblem> {
     let unit = parameter.unit.as_ref();
     let ratio = matches!(unit, "1" | "kg/kg");
     match value {
         ValueText::Number(number) if ratio => Ok(*number),
-        ValueText::Number(number) => Err(format!("{number} lacks its unit: write `{number} {unit}`")),
+        ValueText::Number(value) => Err(SettingProblem::BareNumber { value: *value, unit: unit.to_owned() }),
         ValueText::Text(text) => {
             if let Some(Ok(number)) = text.trim().strip_suffix(unit).map(|number| number.trim().parse()) {
                 return Ok(number);
@@ -87,9 +96,9 @@ fn read(parameter: &EffectParameter, value: &ValueText) -> Result<f64, String> {
                 "Pa" => Kind::PressureDifference,
                 "W/K" => Kind::Conductance,
                 _ if ratio => Kind::Fraction,
-                _ => return Err(format!("`{text}` is not a number and `{unit}`")),
+                _ => return Err(SettingProblem::NotInUnit { text: text.clone(), unit: unit.to_owned() }),
             };
-            mapper_units::parse(kind, text).map_err(|error| error.to_string())
+            mapper_units::parse(kind, text).map_err(|source| SettingProblem::Quantity { kind, source })
         }
     }
 }

@@ -3,20 +3,20 @@
 use super::actuator::Actuator;
 use super::drift::{self, LabDrift};
 use super::inputs::{LOWEST_EXPANSION_RATIO, LabInputs};
+use super::samples::{Instant, SampleCollector};
 use super::sensor::Sensor;
 use super::settings::{LabSettings, Start};
-use super::truth::TruthRecorder;
 use crate::setpoint_limits;
 use mapper_core::{
-    Backend, BackendError, CHANNELS, Channel, ChannelColumn, Event, EventKind, RigDescription, RigMode,
-    SampleBatch, Setpoints,
+    Backend, BackendError, CHANNELS, Channel, Event, EventKind, RigDescription, RigMode, SampleBatch,
+    Setpoints,
 };
 use mapper_physics::inputs::Inputs;
-use mapper_physics::instruments::{self, ChannelFollower};
-use mapper_physics::model::{Outputs, PreparedModel, State, rad_s_of_rpm};
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::pressure_tap;
-use mapper_physics::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, Simulator, Watch};
+use mapper_physics::instruments::ChannelFollower;
+use mapper_physics::model::{State, rad_s_of_rpm};
+use mapper_physics::simulate::{
+    Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Simulator, Watch,
+};
 use mapper_physics::standstill::{self, StandstillState};
 use mapper_physics::steady;
 
@@ -25,8 +25,6 @@ pub const NAME: &str = "virtual_lab";
 
 /// Shaft speed at which a starting machine enters the running model and a stopping one leaves it, rpm.
 const CRANKING_SPEED_RPM: f64 = 5_000.0;
-/// Frequency of the surge cycle, Hz: the order of a small compressor with a short outlet duct.
-const SURGE_FREQUENCY_HZ: f64 = 7.3;
 
 /// What moves in the lab.
 #[derive(Debug)]
@@ -40,6 +38,14 @@ enum Machine {
         /// Time of the state, s.
         t_s: f64,
     },
+}
+
+/// A simulation that stopped because an effect's hook gave no number.
+#[derive(Debug, thiserror::Error)]
+#[error("{source}: {fault}")]
+struct EffectFault {
+    source: SimulationError,
+    fault: String,
 }
 
 #[derive(Debug)]
@@ -67,22 +73,6 @@ pub struct VirtualLab {
 /// Channels the lab delivers: all of them.
 fn channels() -> Vec<Channel> {
     CHANNELS.iter().map(|row| row.channel).collect()
-}
-
-/// What the sensors see at one instant, before their errors.
-struct Instant<'a> {
-    boundary: BoundaryConditions,
-    speed_rpm: f64,
-    tc_k: f64,
-    tt_k: f64,
-    /// `None` at standstill.
-    running: Option<(&'a State, &'a Outputs)>,
-}
-
-impl Instant<'_> {
-    fn outputs(&self) -> Option<&Outputs> {
-        self.running.map(|(_, outputs)| outputs)
-    }
 }
 
 impl VirtualLab {
@@ -218,7 +208,7 @@ fn settled(settings: &LabSettings, armed: &Armed, now_s: f64) -> Result<Machine,
     match armed.wanted {
         RigMode::Running => {
             let rest = steady::settle_under(&settings.model, &armed.inputs.at(now_s))
-                .map_err(|error| BackendError::Simulation { t_s: now_s, message: error.to_string() })?;
+                .map_err(|error| BackendError::Simulation { t_s: now_s, source: Box::new(error) })?;
             Ok(Machine::Running(Box::new(running(settings, now_s, rest.state))))
         }
         RigMode::Standstill => {
@@ -239,7 +229,7 @@ fn running(settings: &LabSettings, t_s: f64, state: State) -> Simulator {
 
 impl Armed {
     fn advance(&mut self, settings: &LabSettings, until_s: f64) -> Result<SampleBatch, BackendError> {
-        let mut batch = BatchBuilder::new(self.next_sequence);
+        let mut batch = SampleCollector::new(self.next_sequence);
         // A time before the first sample, or none at all, asks for nothing.
         let asks_for_the_first = self.next_sequence == 0 && until_s >= 0.0;
         while self.now_s < until_s || (self.now_s == 0.0 && asks_for_the_first) {
@@ -251,9 +241,8 @@ impl Armed {
                 break;
             }
         }
-        batch.events.append(&mut self.pending_events);
-        self.next_sequence += batch.t_s.len() as u64;
-        Ok(batch.finish())
+        self.next_sequence += batch.len() as u64;
+        Ok(batch.finish(std::mem::take(&mut self.pending_events)))
     }
 
     /// Starts a machine at rest that should run, and stops a slow one that should rest.
@@ -297,7 +286,7 @@ impl Armed {
         &mut self,
         settings: &LabSettings,
         until_s: f64,
-        batch: &mut BatchBuilder,
+        batch: &mut SampleCollector,
     ) -> Result<f64, BackendError> {
         let start_s = self.now_s;
         let coasting = self.wanted == RigMode::Standstill;
@@ -307,7 +296,7 @@ impl Armed {
             end_s =
                 end_s.min(((start_s / drift::MACHINE_HOLDS_S + 1e-9).floor() + 1.0) * drift::MACHINE_HOLDS_S);
         }
-        let first_index = self.next_sequence + batch.t_s.len() as u64;
+        let first_index = self.next_sequence + batch.len() as u64;
         let rate_hz = settings.sample_rate_hz;
         let sample_times_s = (first_index..).map(|index| index as f64 / rate_hz).take_while(|t| *t <= end_s);
         let Armed { inputs, machine, sensors, followers, commands, .. } = self;
@@ -340,9 +329,11 @@ impl Armed {
                 }
                 result.map_err(|error| {
                     // A hook cannot fail by itself: it gives NaN and keeps the reason.
-                    let reason =
-                        settings.model.hooks.fault().map_or_else(String::new, |fault| format!(": {fault}"));
-                    BackendError::Simulation { t_s: start_s, message: format!("{error}{reason}") }
+                    let source = match settings.model.hooks.fault() {
+                        Some(fault) => EffectFault { source: error, fault }.into(),
+                        None => error.into(),
+                    };
+                    BackendError::Simulation { t_s: start_s, source }
                 })?;
                 Ok(end_s)
             }
@@ -399,120 +390,5 @@ impl Armed {
             self.inputs.p3.set(now_s, self.inputs.cell.p4_pa * LOWEST_EXPANSION_RATIO);
         }
         self.pending_events.push(Event { t_s, kind, message });
-    }
-}
-
-/// Collects samples into columns.
-struct BatchBuilder {
-    first_sequence: u64,
-    t_s: Vec<f64>,
-    columns: Vec<Vec<f64>>,
-    truth: TruthRecorder,
-    events: Vec<Event>,
-}
-
-impl BatchBuilder {
-    fn new(first_sequence: u64) -> Self {
-        BatchBuilder {
-            first_sequence,
-            t_s: Vec::new(),
-            columns: vec![Vec::new(); CHANNELS.len()],
-            truth: TruthRecorder::default(),
-            events: Vec::new(),
-        }
-    }
-
-    fn push(
-        &mut self,
-        t_s: f64,
-        instant: &Instant<'_>,
-        commands: Option<&Setpoints>,
-        sensors: &mut [(Channel, Sensor)],
-        followers: &mut [ChannelFollower],
-        settings: &LabSettings,
-    ) {
-        self.t_s.push(t_s);
-        let surging = instant.outputs().is_some_and(|outputs| outputs.surge_position_ratio >= 1.0);
-        let swing = if surging {
-            settings.surge_swing_ratio * (2.0 * std::f64::consts::PI * SURGE_FREQUENCY_HZ * t_s).sin()
-        } else {
-            0.0
-        };
-        let prepared = instant.running.map(|_| settings.model.prepare(&instant.boundary));
-        for ((row, column), follower) in CHANNELS.iter().zip(&mut self.columns).zip(followers) {
-            let total = true_value(row.channel, instant, prepared.as_ref(), commands, swing);
-            let truth = match settings.static_tap_pipe_diameters_m.get(&row.channel) {
-                Some(pipe_diameter_m) => at_the_wall_pa(row.channel, total, *pipe_diameter_m, instant),
-                None => total,
-            };
-            let truth = follower.read(t_s, truth);
-            let sensor = sensors.iter_mut().find(|(channel, _)| *channel == row.channel);
-            let reading = sensor.map_or(truth, |(_, sensor)| sensor.read(truth));
-            column.push(drift::drifted_reading(&settings.drifts, row.channel, t_s, reading));
-        }
-        self.truth.push(instant.speed_rpm, instant.tc_k, instant.tt_k, instant.outputs());
-    }
-
-    fn finish(self) -> SampleBatch {
-        let columns = CHANNELS.iter().zip(self.columns);
-        SampleBatch {
-            first_sequence: self.first_sequence,
-            columns: columns.map(|(row, values)| ChannelColumn { channel: row.channel, values }).collect(),
-            truth: self.truth.finish(),
-            t_s: self.t_s,
-            events: self.events,
-        }
-    }
-}
-
-/// Static pressure at the wall of the pipe of one of the four stations; the total one where the pipe would choke.
-fn at_the_wall_pa(channel: Channel, total_pa: f64, pipe_diameter_m: f64, instant: &Instant<'_>) -> f64 {
-    let Some(outputs) = instant.outputs() else { return total_pa };
-    let (flow_kg_s, temperature_k) = match channel {
-        Channel::P1 => (outputs.flow_kg_s, instant.boundary.t1_k),
-        Channel::P2 => (outputs.flow_kg_s, outputs.t2_k),
-        Channel::P3 => (outputs.turbine_flow_kg_s, instant.boundary.t3_k),
-        Channel::P4 => (outputs.turbine_flow_kg_s, outputs.turbine.t4_k),
-        _ => return total_pa,
-    };
-    pressure_tap::total_to_static_pa(total_pa, flow_kg_s, temperature_k, pipe_diameter_m).unwrap_or(total_pa)
-}
-
-fn true_value(
-    channel: Channel,
-    instant: &Instant<'_>,
-    prepared: Option<&PreparedModel<'_>>,
-    commands: Option<&Setpoints>,
-    swing: f64,
-) -> f64 {
-    let boundary = &instant.boundary;
-    let command = |value: fn(&Setpoints) -> f64| commands.map_or(f64::NAN, value);
-    match channel {
-        Channel::P3Command => return command(|setpoints| setpoints.p3_pa),
-        Channel::T3Command => return command(|setpoints| setpoints.t3_k),
-        Channel::ValveCommand => return command(|setpoints| setpoints.valve_opening_ratio),
-        Channel::TOilCommand => return command(|setpoints| setpoints.oil_temperature_k),
-        _ => {}
-    }
-    if let (Some((state, outputs)), Some(prepared)) = (instant.running, prepared) {
-        let value = instruments::true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
-        return match channel {
-            Channel::CompressorFlow => value * (1.0 + swing),
-            // The pressure swings less than the flow: it is the volume's.
-            Channel::P2 => value * (1.0 + 0.2 * swing),
-            _ => value,
-        };
-    }
-    // At rest every gas probe but T1's sees the cell.
-    match channel {
-        Channel::ShaftSpeed | Channel::CompressorFlow | Channel::TurbineFlow => 0.0,
-        Channel::P1 | Channel::P2 => boundary.p1_pa,
-        Channel::T1 => boundary.t1_k,
-        Channel::Tc => instant.tc_k,
-        Channel::Tt => instant.tt_k,
-        Channel::P3 => boundary.p3_pa,
-        Channel::P4 => boundary.p4_pa,
-        Channel::TOil => boundary.oil_temperature_k,
-        _ => boundary.ambient_temperature_k,
     }
 }

@@ -6,7 +6,9 @@ mod drift_file;
 mod effects_file;
 mod inputs;
 mod lab;
+mod samples;
 mod sensor;
+mod setting_problem;
 mod settings;
 mod settings_file;
 mod tolerances;
@@ -17,7 +19,20 @@ pub use actuator::ActuatorDynamics;
 pub use drift::{Drifting, LabDrift};
 pub use lab::{NAME, VirtualLab};
 pub use sensor::SensorErrors;
+pub use setting_problem::SettingProblem;
 pub use settings::{LabSettings, Start};
-pub use settings_file::{NominalRig, read_settings};
+pub use settings_file::read_settings;
 pub use tolerances::draw_tolerances;
 pub use weather::Weather;
+
+use mapper_core::{Backend, BackendError};
+use mapper_physics::backend_plugin::BackendPlugin;
+use mapper_physics::nominal_rig::NominalRig;
+
+/// The lab as campaigns ask for it.
+pub const PLUGIN: BackendPlugin =
+    BackendPlugin { name: NAME, summary: "simulated gas stand, needs nothing", make };
+
+fn make(rig: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {
+    Ok(Box::new(VirtualLab::new(read_settings(settings, rig)?)))
+}

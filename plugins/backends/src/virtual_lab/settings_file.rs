@@ -3,16 +3,17 @@
 use super::actuator::ActuatorDynamics;
 use super::drift_file::{self, DriftFile};
 use super::effects_file::{EffectValues, put_in};
-use super::lab::NAME;
 use super::sensor::SensorErrors;
+use super::setting_problem::SettingProblem;
 use super::settings::{LabSettings, Start};
 use super::tolerances::draw_tolerances;
 use super::weather::Weather;
-use mapper_core::{BackendError, Channel, DeclaredUncertainty, ModelTolerances};
-use mapper_physics::effect::{Effect, Rig};
+use mapper_core::{BackendError, Channel};
+use mapper_physics::effect::Rig;
 use mapper_physics::instruments::Instruments;
 use mapper_physics::model::Model;
-use mapper_physics::params::{BoundaryConditions, Params};
+use mapper_physics::nominal_rig::NominalRig;
+use mapper_physics::params::Params;
 use mapper_units::{
     Conductance, Dimension, Duration, Fraction, Frequency, Kind, Length, PressureRate, Quantity, RatioRate,
     Speed, TemperatureRate,
@@ -22,28 +23,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::sync::Arc;
-
-/// What the campaign declares; the lab deviates from it as its settings say.
-#[derive(Debug, Clone)]
-pub struct NominalRig {
-    /// The machine as declared.
-    pub model: Model,
-    /// Boundary conditions as declared.
-    pub boundary: BoundaryConditions,
-    /// The campaign's speed limit, rpm.
-    pub speed_max_rpm: f64,
-    /// Declared one-sigma uncertainty of each sensor.
-    pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
-    /// Declared static taps with the inner diameters of their pipes, m.
-    pub static_tap_pipe_diameters_m: BTreeMap<Channel, f64>,
-    /// Declared tolerances of the model.
-    pub tolerances: ModelTolerances,
-    /// Effects that the machine may be given by their ids.
-    pub effects: Vec<Arc<dyn Effect>>,
-    /// Seed of all noise and of all that is drawn.
-    pub seed: u64,
-}
+use std::ops::RangeInclusive;
 
 /// The keys below `virtual_lab`. Everything may be left out.
 #[derive(Debug, Default, Deserialize)]
@@ -159,30 +139,28 @@ const COLOURED_TIME_CONSTANT_S: f64 = 2.0;
 ///
 /// # Errors
 /// [`BackendError::Settings`] with the key that is wrong and what would be right.
-pub fn read_settings(settings: &serde_json::Value, nominal: NominalRig) -> Result<LabSettings, BackendError> {
+pub fn read_settings(
+    settings: &serde_json::Value,
+    nominal: &NominalRig,
+) -> Result<LabSettings, BackendError> {
     let file: SettingsFile = match settings {
         serde_json::Value::Null => SettingsFile::default(),
         settings => serde_path_to_error::deserialize(settings).map_err(|error| {
             let path = error.path().to_string();
-            wrong(path.trim_start_matches('.'), error.into_inner().to_string())
+            SettingProblem::Form(error.into_inner()).at(path.trim_start_matches('.'))
         })?,
     };
     let params = &nominal.model.params;
     let model = Model { params: true_params(*params, &file.machine)?, ..nominal.model.clone() };
     let sample_rate_hz = file.sample_rate.map_or(10.0, |rate| rate.inside);
-    if !(0.1..=1000.0).contains(&sample_rate_hz) {
-        let message = format!("{sample_rate_hz} Hz is not between 0.1 and 1000 Hz");
-        return Err(wrong("sample_rate", message));
-    }
+    within(sample_rate_hz, "Hz", 0.1..=1000.0).map_err(|problem| problem.at("sample_rate"))?;
     let surge_swing_ratio = file.surge_swing.map_or(0.08, |swing| swing.inside);
-    if !(0.0..=1.0).contains(&surge_swing_ratio) {
-        return Err(wrong("surge_swing", "write a share between 0 % and 100 %".to_owned()));
-    }
+    within(100.0 * surge_swing_ratio, "%", 0.0..=100.0).map_err(|problem| problem.at("surge_swing"))?;
     let mut rig = Rig::new(model);
     if file.tolerances == TolerancesName::Drawn {
         draw_tolerances(&mut rig, &nominal.tolerances, nominal.seed);
     }
-    put_in(&mut rig, &file.effects, &nominal.effects).map_err(|(path, message)| wrong(&path, message))?;
+    put_in(&mut rig, &file.effects, &nominal.effects)?;
     let actuators = &file.actuators;
     let mut lab = LabSettings {
         model: rig.model.clone(),
@@ -201,9 +179,9 @@ pub fn read_settings(settings: &serde_json::Value, nominal: NominalRig) -> Resul
         t3_actuator: actuators.turbine_inlet_temperature.dynamics("turbine_inlet_temperature", 20.0, 10.0)?,
         valve_actuator: actuators.valve.dynamics("valve", 0.2, 1.0)?,
         oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", 30.0, 1.0)?,
-        sensors: sensors(&file, &nominal)?,
-        drifts: drift_file::read(&file.drift).map_err(|(path, message)| wrong(&path, message))?,
-        static_tap_pipe_diameters_m: nominal.static_tap_pipe_diameters_m,
+        sensors: sensors(&file, nominal)?,
+        drifts: drift_file::read(&file.drift)?,
+        static_tap_pipe_diameters_m: nominal.static_tap_pipe_diameters_m.clone(),
         trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.inside),
         surge_swing_ratio,
         seed: nominal.seed,
@@ -216,14 +194,10 @@ impl<Rate: Dimension> ActuatorFile<Rate> {
     fn dynamics(&self, name: &str, lag_s: f64, slew_per_s: f64) -> Result<ActuatorDynamics, BackendError> {
         let lag_s = self.lag.map_or(lag_s, |lag| lag.inside);
         let slew_per_s = self.slew.as_ref().map_or(slew_per_s, |slew| slew.inside);
-        if !(0.0..=3600.0).contains(&lag_s) {
-            return Err(wrong(
-                &format!("actuators.{name}.lag"),
-                format!("{lag_s} s is not between 0 s and 1 h"),
-            ));
-        }
+        within(lag_s, "s", 0.0..=3600.0).map_err(|problem| problem.at(format!("actuators.{name}.lag")))?;
         if slew_per_s <= 0.0 {
-            return Err(wrong(&format!("actuators.{name}.slew"), "the rate must be above 0".to_owned()));
+            let problem = SettingProblem::NotPositive { value: slew_per_s, unit: rate_unit::<Rate>() };
+            return Err(problem.at(format!("actuators.{name}.slew")));
         }
         Ok(ActuatorDynamics { lag_s, slew_per_s })
     }
@@ -231,23 +205,18 @@ impl<Rate: Dimension> ActuatorFile<Rate> {
 
 fn true_params(mut params: Params, file: &MachineFile) -> Result<Params, BackendError> {
     if let Some(alpha) = file.alpha_area {
-        if !(0.0..=1.0).contains(&alpha) {
-            return Err(wrong("machine.alpha_area", format!("{alpha} is not between 0 and 1")));
-        }
+        within(alpha, "", 0.0..=1.0).map_err(|problem| problem.at("machine.alpha_area"))?;
         params.compressor.alpha_area_ratio = alpha;
     }
     if let Some(diameter) = file.probe_diameter {
-        if !(0.0..=0.02).contains(&diameter.inside) {
-            return Err(wrong(
-                "machine.probe_diameter",
-                "write a diameter between 0 mm and 20 mm".to_owned(),
-            ));
-        }
+        within(1e3 * diameter.inside, "mm", 0.0..=20.0)
+            .map_err(|problem| problem.at("machine.probe_diameter"))?;
         params.t2_probe_diameter_m = diameter.inside;
     }
     if let Some(conductance) = file.oil_conductance {
         if conductance.inside < 0.0 {
-            return Err(wrong("machine.oil_conductance", "the conductance must not be negative".to_owned()));
+            let problem = SettingProblem::Negative { value: conductance.inside, unit: "W/K" };
+            return Err(problem.at("machine.oil_conductance"));
         }
         params.bearing.oil_conductance_w_k = conductance.inside;
     }
@@ -278,8 +247,9 @@ fn sensors(
         })
         .collect();
     for (channel, text) in &file.offset_of {
-        let offset = mapper_units::parse(offset_kind(*channel), text)
-            .map_err(|error| wrong(&format!("offset_of.{channel}"), error.to_string()))?;
+        let kind = offset_kind(*channel);
+        let offset = mapper_units::parse(kind, text)
+            .map_err(|source| SettingProblem::Quantity { kind, source }.at(format!("offset_of.{channel}")))?;
         sensors.entry(*channel).or_default().offset = offset;
     }
     Ok(sensors)
@@ -304,13 +274,24 @@ fn offset_kind(channel: Channel) -> Kind {
     }
 }
 
-fn wrong(path: &str, message: String) -> BackendError {
-    BackendError::Settings { backend: NAME.to_owned(), path: path.to_owned(), message }
+/// The unit in which a rate is kept.
+fn rate_unit<Rate: Dimension>() -> &'static str {
+    Rate::KIND.units().first().map_or("", |unit| unit.symbol())
+}
+
+/// Refuses a value outside its range.
+fn within(value: f64, unit: &'static str, range: RangeInclusive<f64>) -> Result<(), SettingProblem> {
+    if range.contains(&value) {
+        return Ok(());
+    }
+    Err(SettingProblem::OutOfRange { value, unit, low: *range.start(), high: *range.end() })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mapper_core::{DeclaredUncertainty, ModelTolerances};
+    use mapper_physics::params::BoundaryConditions;
     use serde_json::json;
 
     fn nominal() -> NominalRig {
@@ -336,7 +317,7 @@ mod tests {
                 "bearing_friction": "1.5e-6 W s2/rad2", "flowmeter_lag": "2 s", "actuator_lag": "1.1 s", "t2_offset": "-1 K",
             },
         });
-        let lab = read_settings(&settings, nominal()).unwrap();
+        let lab = read_settings(&settings, &nominal()).unwrap();
         let params = lab.model.params;
         assert_eq!((params.compressor.alpha_area_ratio, params.t2_probe_diameter_m), (0.12, 1.5e-3));
         let inner = (params.compressor.inner_capacity_ratio, params.compressor.inner_conductance_w_k);
@@ -354,7 +335,7 @@ mod tests {
             "actuators": {"turbine_inlet_pressure": {"lag": "0.5 s", "slew": "20 kPa/s"}},
             "machine": {"alpha_area": 0.2, "probe_diameter": "1.5 mm"},
         });
-        let lab = read_settings(&settings, nominal()).unwrap();
+        let lab = read_settings(&settings, &nominal()).unwrap();
         assert_eq!(lab.sample_rate_hz, 20.0);
         assert_eq!(lab.p3_actuator, ActuatorDynamics { lag_s: 0.5, slew_per_s: 20e3 });
         assert_eq!(lab.model.params.compressor.alpha_area_ratio, 0.2);
@@ -372,7 +353,7 @@ mod tests {
             {"cause": "fouling", "change": "-2 %", "over": "1 h"},
             {"cause": "bearing_friction", "change": "1e-7 W s2/rad2", "over": "1 h"},
         ]});
-        let drifts = read_settings(&settings, nominal()).unwrap().drifts;
+        let drifts = read_settings(&settings, &nominal()).unwrap().drifts;
         let at_the_start: Vec<f64> = drifts.iter().map(|drift| drift.at(0.0)).collect();
         assert_eq!(at_the_start, [0.0, 0.01, 0.0, 0.0, 0.0]);
         let after_an_hour: Vec<f64> = drifts.iter().map(|drift| drift.at(3600.0)).collect();
@@ -385,7 +366,7 @@ mod tests {
     fn drawn_offsets_scatter_as_declared_and_belong_to_seed_and_channel() {
         let offsets: Vec<f64> = (0..2000)
             .map(|seed| {
-                let lab = read_settings(&json!({}), NominalRig { seed, ..nominal() }).unwrap();
+                let lab = read_settings(&json!({}), &NominalRig { seed, ..nominal() }).unwrap();
                 assert_ne!(lab.sensors[&Channel::T1].offset, lab.sensors[&Channel::T2].offset);
                 lab.sensors[&Channel::T2].offset
             })
@@ -415,7 +396,7 @@ mod tests {
             (json!({"effects": {"inner_node": {"phi": 0.3}}}), "G: a value in W/K"),
             (json!({"effects": {"inner_node": {"psi": 0.3}}}), "effects.inner_node.psi"),
         ] {
-            let error = read_settings(&settings, nominal()).unwrap_err().to_string();
+            let error = read_settings(&settings, &nominal()).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
     }

@@ -1,8 +1,9 @@
 //! The engine of a script: what it lacks, how much it may do, and one per thread.
 
 use super::header::Mistake;
-use super::hooks::HOOK_NAMES;
+use super::hook_names::HOOK_NAMES;
 use mapper_core::Channel;
+use mapper_physics::effect::{EffectError, EffectValues};
 use mapper_physics::hooks::Site;
 use rhai::packages::{ArithmeticPackage, BasicMathPackage, LogicPackage, Package};
 use rhai::{AST, CallFnOptions, Dynamic, Engine, FuncArgs, ParseError, Position, Scope};
@@ -64,9 +65,9 @@ impl At {
     }
 }
 
-/// The values of a script's parameters: `p.G`.
+/// The values of a script's parameters, as `p.G` reads them: in the order of the program's parameters.
 #[derive(Debug, Clone)]
-pub(super) struct Values(pub(super) Arc<[f64]>);
+pub(super) struct Numbers(Arc<[f64]>);
 
 /// A script that compiles, told apart from every other.
 #[derive(Debug)]
@@ -123,6 +124,11 @@ impl Program {
         }
         let id = NEXT.fetch_add(1, Ordering::Relaxed);
         Ok(Program { id, text: text.to_owned(), parameters, defined })
+    }
+
+    /// The value of each parameter of the script.
+    pub(super) fn numbers(&self, values: &EffectValues<'_>) -> Result<Numbers, EffectError> {
+        Ok(Numbers(self.parameters.iter().map(|name| values.get(name)).collect::<Result<_, _>>()?))
     }
 
     pub(super) fn defines(&self, name: &str) -> bool {
@@ -196,13 +202,14 @@ fn engine(parameters: &[String]) -> Engine {
         .set_max_variables(VARIABLE_LIMIT)
         .set_max_functions(FUNCTION_LIMIT)
         .set_strict_variables(true);
-    engine.register_type_with_name::<At>("machine").register_type_with_name::<Values>("parameters");
+    engine.register_type_with_name::<At>("machine").register_type_with_name::<Numbers>("parameters");
     for (index, (name, _)) in FIELDS.iter().enumerate() {
         engine.register_get(*name, move |at: &mut At| at.values[index]);
     }
     for (index, name) in parameters.iter().enumerate() {
-        engine
-            .register_get(name, move |values: &mut Values| values.0.get(index).copied().unwrap_or(f64::NAN));
+        engine.register_get(name, move |numbers: &mut Numbers| {
+            numbers.0.get(index).copied().unwrap_or(f64::NAN)
+        });
     }
     engine
 }

@@ -14,7 +14,7 @@ const PARAMETER_FORM: &str = "//! parameter: NAME [UNIT] LOW .. HIGH, neutral VA
 
 pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
     let (mut id, mut description, mut equation, mut source) = (None, None, None, None);
-    let mut submodel = None;
+    let (mut submodel, mut also_shows_in) = (None, Vec::new());
     let mut parameters: Vec<EffectParameter> = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let Some(header) = line.trim_start().strip_prefix("//!") else { continue };
@@ -26,27 +26,26 @@ pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
             "effect" if is_name(value) => id = owned(),
             "effect" => {
                 return Err(here(format!(
-                    "`{value}` is no name: use lower-case letters, digits and _, at most 40"
+                    "`{value}` is not a valid name: use lower-case letters, digits and _, at most 40"
                 )));
             }
             "description" => description = owned(),
             "equation" => equation = owned(),
             "source" => source = owned(),
-            "submodel" => match Submodel::ALL.iter().find(|submodel| submodel.name() == value) {
-                Some(found) => submodel = Some(*found),
-                None => {
-                    let names: Vec<&str> = Submodel::ALL.iter().map(|submodel| submodel.name()).collect();
-                    return Err(here(format!("`{value}` is no submodel; there are {}", names.join(", "))));
-                }
-            },
+            "submodel" => submodel = Some(submodel_called(value).map_err(here)?),
+            "also shows in" => {
+                let places: Result<Vec<Submodel>, String> =
+                    value.split(',').map(|name| submodel_called(name.trim())).collect();
+                also_shows_in = places.map_err(here)?;
+            }
             "parameter" => {
                 let parameter = parameter(value).ok_or_else(|| here(format!("write `{PARAMETER_FORM}`")))?;
                 check(&parameter, &parameters).map_err(here)?;
                 parameters.push(parameter);
             }
             other => {
-                let keys = "effect, description, equation, source, submodel, parameter";
-                return Err(here(format!("`{other}` is no key of an effect; there are {keys}")));
+                let keys = "effect, description, equation, source, submodel, also shows in, parameter";
+                return Err(here(format!("`{other}` is not a key of an effect; there are {keys}")));
             }
         }
     }
@@ -60,8 +59,16 @@ pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
         equation: equation.unwrap_or(Cow::Borrowed("as in its script")),
         source: source.unwrap_or(Cow::Borrowed("suspected by the user")),
         submodel: submodel.ok_or_else(|| missing("//! submodel: NAME"))?,
+        also_shows_in,
         id,
         parameters,
+    })
+}
+
+fn submodel_called(name: &str) -> Result<Submodel, String> {
+    Submodel::ALL.into_iter().find(|submodel| submodel.name() == name).ok_or_else(|| {
+        let names: Vec<&str> = Submodel::ALL.iter().map(|submodel| submodel.name()).collect();
+        format!("`{name}` is not a submodel; there are {}", names.join(", "))
     })
 }
 
@@ -102,7 +109,7 @@ fn parameter(text: &str) -> Option<EffectParameter> {
 fn check(parameter: &EffectParameter, others: &[EffectParameter]) -> Result<(), String> {
     let EffectParameter { name, low, high, neutral, typical_step, .. } = parameter;
     if !is_identifier(name) {
-        return Err(format!("`{name}` is no name of a parameter: use letters, digits and _"));
+        return Err(format!("`{name}` is not a valid name of a parameter: use letters, digits and _"));
     }
     if others.iter().any(|other| other.name == *name) {
         return Err(format!("there are two parameters `{name}`"));

@@ -1,30 +1,16 @@
 //! A script at the named places of the model.
 
-use super::engine::{At, Program, Values};
+use super::engine::{At, Numbers, Program};
+use super::hook_names::HOOK_NAMES;
 use mapper_core::{CHANNELS, Channel};
 use mapper_physics::hooks::{Hooks, Site};
 use std::sync::{Arc, OnceLock};
 
-/// Functions a script may define, besides `reading_CHANNEL(at, p, value)`, with the number of their arguments:
-/// `(at, p, value)` gives the value the model shall use, `(at, p)` what is added.
-pub const HOOK_NAMES: [(&str, usize); 10] = [
-    ("flow_kg_s", 3),
-    ("efficiency", 3),
-    ("h_w_m2k", 3),
-    ("gas_before_k", 3),
-    ("gas_after_k", 3),
-    ("gas_outlet_k", 3),
-    ("heat_to_compressor_w", 2),
-    ("heat_to_inner_w", 2),
-    ("heat_to_turbine_w", 2),
-    ("shaft_torque_nm", 2),
-];
-
-/// A program with values.
+/// A program with the values of its parameters.
 #[derive(Debug)]
 pub(super) struct ScriptHooks {
     program: Arc<Program>,
-    values: Values,
+    numbers: Numbers,
     /// Whether each of [`HOOK_NAMES`] is defined.
     defined: [bool; HOOK_NAMES.len()],
     /// Name of the function for each channel that has one.
@@ -33,13 +19,13 @@ pub(super) struct ScriptHooks {
 }
 
 impl ScriptHooks {
-    pub(super) fn new(program: Arc<Program>, values: &[f64]) -> Self {
+    pub(super) fn new(program: Arc<Program>, numbers: Numbers) -> Self {
         let defined = HOOK_NAMES.map(|(name, _)| program.defines(name));
         let readings = CHANNELS.map(|row| {
             let name = format!("reading_{}", row.symbol);
             program.defines(&name).then_some(name)
         });
-        ScriptHooks { program, values: Values(values.into()), defined, readings, fault: OnceLock::new() }
+        ScriptHooks { program, numbers, defined, readings, fault: OnceLock::new() }
     }
 
     /// The value that hook `index` makes of `value`.
@@ -47,7 +33,7 @@ impl ScriptHooks {
         if !self.defined[index] {
             return value;
         }
-        let arguments = (At::new(site), self.values.clone(), value);
+        let arguments = (At::new(site), self.numbers.clone(), value);
         self.program.call(HOOK_NAMES[index].0, arguments, &self.fault)
     }
 
@@ -56,7 +42,7 @@ impl ScriptHooks {
         if !self.defined[index] {
             return 0.0;
         }
-        self.program.call(HOOK_NAMES[index].0, (At::new(site), self.values.clone()), &self.fault)
+        self.program.call(HOOK_NAMES[index].0, (At::new(site), self.numbers.clone()), &self.fault)
     }
 }
 
@@ -103,7 +89,7 @@ impl Hooks for ScriptHooks {
 
     fn reading(&self, site: &Site<'_>, channel: Channel, value: f64) -> f64 {
         match &self.readings[channel as usize] {
-            Some(name) => self.program.call(name, (At::new(site), self.values.clone(), value), &self.fault),
+            Some(name) => self.program.call(name, (At::new(site), self.numbers.clone(), value), &self.fault),
             None => value,
         }
     }

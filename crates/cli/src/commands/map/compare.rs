@@ -2,10 +2,11 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::output;
+use crate::given::reference;
+use crate::{output, registry};
 use clap::Args;
 use mapper_report::{map_comparison_figure, map_comparison_text};
-use mapper_session::{read_map, reference, write_new};
+use mapper_session::write_new;
 use std::path::PathBuf;
 
 /// Show where two maps differ, in units and in their uncertainty
@@ -32,8 +33,9 @@ pub struct Compare {
 impl Compare {
     /// Compares two maps.
     pub fn run(&self) -> Result<(), Failure> {
-        let first = read_map(&self.first, reference(self.reference.as_deref())?)?;
-        let second = read_map(&self.second, reference(self.second_reference.as_deref())?)?;
+        let registry = registry::registry();
+        let first = registry.read_map(&self.first, reference(self.reference.as_deref())?)?;
+        let second = registry.read_map(&self.second, reference(self.second_reference.as_deref())?)?;
         let comparison =
             mapper_assemble::compare(&first, &second).map_err(|error| Failure::new(Code::BadInput, error))?;
         if let Some(path) = &self.picture {

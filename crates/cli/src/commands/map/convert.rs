@@ -1,9 +1,10 @@
 //! `mapper map convert`: a map in another format, at another reference state.
 
 use crate::failure::Failure;
-use crate::output;
+use crate::given::reference;
+use crate::{output, registry};
 use clap::Args;
-use mapper_session::{exporter, read_map, reference, write_map_fitted_if_needed};
+use mapper_session::write_map_fitted_if_needed;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -31,18 +32,19 @@ pub struct Convert {
 impl Convert {
     /// Reads a map and writes it again.
     pub fn run(&self) -> Result<(), Failure> {
-        let exporter = exporter(&self.out, self.to.as_deref())?;
+        let registry = registry::registry();
+        let format = registry.format_of(&self.out, self.to.as_deref())?;
         let to_reference = reference(self.to_reference.as_deref())?;
-        let mut map = read_map(&self.map, reference(self.reference.as_deref())?)?;
+        let mut map = registry.read_map(&self.map, reference(self.reference.as_deref())?)?;
         if let Some(reference) = to_reference {
             map = map.at_reference(reference);
         }
-        let (map, fitted_here) = write_map_fitted_if_needed(&self.out, exporter, map)?;
+        let (map, fitted_here) = write_map_fitted_if_needed(&self.out, format, map)?;
         let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
         if self.json {
             return output::print_json(&json!({
                 "file": self.out,
-                "format": exporter.name,
+                "format": format.name,
                 "reference": map.reference,
                 "lines": map.lines.len(),
                 "points": points,
@@ -52,7 +54,7 @@ impl Convert {
         output::print(&format!(
             "{}: {}, {points} points on {} speed lines, corrected to {}{}\n",
             self.out.display(),
-            exporter.name,
+            format.name,
             map.lines.len(),
             map.reference,
             if fitted_here { "; the format is a table, so the map was fitted" } else { "" },

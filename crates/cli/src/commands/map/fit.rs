@@ -2,11 +2,12 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::output;
+use crate::given::reference;
+use crate::{output, registry};
 use clap::Args;
 use mapper_assemble::{MapFitOptions, fit_map};
 use mapper_report::map_fit_text;
-use mapper_session::{exporter, read_map, reference, write_map};
+use mapper_session::write_map;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -41,11 +42,12 @@ pub struct Fit {
 impl Fit {
     /// Fits a map.
     pub fn run(&self) -> Result<(), Failure> {
-        let exporter = match &self.out {
-            Some(path) => Some((path, exporter(path, self.to.as_deref())?)),
+        let registry = registry::registry();
+        let format = match &self.out {
+            Some(path) => Some((path, registry.format_of(path, self.to.as_deref())?)),
             None => None,
         };
-        let map = read_map(&self.map, reference(self.reference.as_deref())?)?;
+        let map = registry.read_map(&self.map, reference(self.reference.as_deref())?)?;
         let options = MapFitOptions {
             further_speeds_rpm: self.speeds.clone(),
             nodes: usize::from(self.nodes),
@@ -53,8 +55,8 @@ impl Fit {
         };
         let map = fit_map(map, &options)
             .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", self.map.display())))?;
-        if let Some((path, exporter)) = exporter {
-            write_map(path, exporter, &map)?;
+        if let Some((path, format)) = format {
+            write_map(path, format, &map)?;
         }
         if self.json {
             return output::print_json(&json!({

@@ -1,0 +1,116 @@
+//! The seam of map files: a format is a name, a writer, a reader, or both. Formats do no IO.
+
+use crate::{CompressorMap, ExportError, ImportError, ReferenceState};
+
+/// Largest map file that is read, bytes: a measured map has some ten thousand.
+pub const MAP_FILE_SIZE_LIMIT: usize = 32 << 20;
+
+/// Turns a map into the bytes of a file. The same map gives the same bytes.
+pub type WriteMap = fn(&CompressorMap) -> Result<Vec<u8>, ExportError>;
+
+/// Turns the text of a file into a map; the second argument is the reference state that the user names.
+///
+/// A map without a reference state is refused: a wrong one shifts speeds by 1.7 % and more, and nobody sees it.
+pub type ReadMap = fn(&str, Option<ReferenceState>) -> Result<CompressorMap, ImportError>;
+
+/// One file format of compressor maps.
+#[derive(Debug, Clone, Copy)]
+pub struct MapFormat {
+    /// Name as written in campaigns and on the command line.
+    pub name: &'static str,
+    /// Extension, without the dot, of the files that are written; it may have several parts (`fitted.csv`).
+    pub extension: &'static str,
+    /// Further extensions by which a file to be read is known.
+    pub further_extensions: &'static [&'static str],
+    /// One line for people.
+    pub description: &'static str,
+    /// Its writer, if maps can be written in it.
+    pub write: Option<WriteMap>,
+    /// Its reader, if maps can be read from it.
+    pub read: Option<ReadMap>,
+}
+
+impl MapFormat {
+    /// Whether maps are read from files of this extension, whatever its capitals.
+    fn reads_extension(&self, extension: &str) -> bool {
+        self.read.is_some()
+            && std::iter::once(&self.extension)
+                .chain(self.further_extensions)
+                .any(|known| known.eq_ignore_ascii_case(extension))
+    }
+
+    /// The bytes of a file that holds `map`.
+    ///
+    /// # Errors
+    /// [`ExportError`]: the format is only read, or it cannot hold this map.
+    pub fn write(&self, map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
+        match self.write {
+            Some(write) => write(map),
+            None => Err(ExportError::OnlyRead { format: self.name }),
+        }
+    }
+
+    /// The map in the bytes of a file; `given` is the reference state that the user names.
+    ///
+    /// # Errors
+    /// [`ImportError`]: the format is only written, the file is too large, not text, not a map (with its line), or
+    /// without a reference state.
+    pub fn read(&self, bytes: &[u8], given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
+        let read = self.read.ok_or(ImportError::OnlyWritten { format: self.name })?;
+        if bytes.len() > MAP_FILE_SIZE_LIMIT {
+            return Err(ImportError::TooLarge { bytes: bytes.len(), limit: MAP_FILE_SIZE_LIMIT });
+        }
+        let text = std::str::from_utf8(bytes)
+            .map_err(|error| ImportError::NotText { line: line_of(bytes, error.valid_up_to()) })?;
+        // Spreadsheets begin their files with a byte order mark.
+        read(text.strip_prefix('\u{feff}').unwrap_or(text), given)
+    }
+}
+
+fn line_of(bytes: &[u8], offset: usize) -> usize {
+    1 + bytes[..offset.min(bytes.len())].iter().filter(|byte| **byte == b'\n').count()
+}
+
+/// The formats that a program knows.
+#[derive(Debug, Clone, Copy)]
+pub struct MapFormats(pub &'static [MapFormat]);
+
+impl MapFormats {
+    /// All of them, in the order of lists for people.
+    pub fn iter(self) -> impl Iterator<Item = &'static MapFormat> {
+        self.0.iter()
+    }
+
+    /// The format of a name.
+    pub fn find(self, name: &str) -> Option<&'static MapFormat> {
+        self.iter().find(|format| format.name == name)
+    }
+
+    /// Those that can be written.
+    pub fn written(self) -> impl Iterator<Item = &'static MapFormat> {
+        self.iter().filter(|format| format.write.is_some())
+    }
+
+    /// The format in which a file of this name is written, whatever its capitals. The longest extension counts:
+    /// `map.fitted.csv` is no plain CSV.
+    pub fn written_to(self, file_name: &str) -> Option<&'static MapFormat> {
+        let file_name = file_name.to_ascii_lowercase();
+        self.written()
+            .filter(|format| {
+                file_name.strip_suffix(format.extension).is_some_and(|before| before.ends_with('.'))
+            })
+            .max_by_key(|format| format.extension.len())
+    }
+
+    /// The format from which a file of this extension (without the dot) is read.
+    pub fn read_from(self, extension: &str) -> Option<&'static MapFormat> {
+        self.iter().find(|format| format.reads_extension(extension))
+    }
+
+    /// Every extension by which a file to be read is known.
+    pub fn read_extensions(self) -> impl Iterator<Item = &'static str> {
+        self.iter().filter(|format| format.read.is_some()).flat_map(|format| {
+            std::iter::once(format.extension).chain(format.further_extensions.iter().copied())
+        })
+    }
+}

@@ -1,0 +1,178 @@
+//! Why a map cannot be written, and why a file is not a map.
+
+use crate::ReferenceState;
+
+/// What a library below a format says.
+type Cause = Box<dyn std::error::Error + Send + Sync>;
+
+/// Why a map could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The library that writes the format failed.
+    #[error("failed to write the map as {format}: {source}")]
+    Failed {
+        /// The format.
+        format: &'static str,
+        /// What the library said.
+        source: Cause,
+    },
+    /// A coordinate is not a number: JSON would turn it into null, and the file could not be read back.
+    #[error("step {step}: {quantity} is {value}; the format cannot hold it, leave the point out of the map")]
+    NotFinite {
+        /// Index of the step.
+        step: usize,
+        /// Which field.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The format is a table over the whole map, and the map has only points.
+    #[error(
+        "`{format}` needs a fitted map, not points alone; fit it (`mapper map fit FILE --out NEW`), or see why the fit was not possible"
+    )]
+    NeedsFit {
+        /// The format.
+        format: &'static str,
+    },
+    /// Maps are read from this format, and not written in it.
+    #[error("maps are only read from `{format}`; choose another format to write")]
+    OnlyRead {
+        /// The format.
+        format: &'static str,
+    },
+}
+
+impl ExportError {
+    /// The library that writes `format` failed.
+    pub fn failed<E: Into<Cause>>(format: &'static str) -> impl Fn(E) -> ExportError {
+        move |source| ExportError::Failed { format, source: source.into() }
+    }
+}
+
+/// Why a file is not a map.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// Larger than any map.
+    #[error("the file has {bytes} bytes; a map has at most {limit}")]
+    TooLarge {
+        /// Its size.
+        bytes: usize,
+        /// Largest size read.
+        limit: usize,
+    },
+    /// Not UTF-8.
+    #[error("line {line} is not text (UTF-8); save the map as text")]
+    NotText {
+        /// Line, from 1.
+        line: usize,
+    },
+    /// A row that the library below the format cannot take apart.
+    #[error("line {line}: {source}")]
+    Row {
+        /// Line, from 1.
+        line: usize,
+        /// What the library said.
+        source: Cause,
+    },
+    /// A row that does not have the form of the format.
+    #[error("line {line}: `{text}` is not {form}")]
+    RowForm {
+        /// Line, from 1.
+        line: usize,
+        /// The row, shortened.
+        text: String,
+        /// What a row is.
+        form: &'static str,
+    },
+    /// The head line has none of the names of a column that every map needs.
+    #[error("line {line}: no column holds the {quantity} (one of {names}); found: {found}")]
+    MissingColumn {
+        /// Line, from 1.
+        line: usize,
+        /// Which quantity.
+        quantity: &'static str,
+        /// Names that it may have.
+        names: String,
+        /// Names that are there, shortened.
+        found: String,
+    },
+    /// A field that holds something other than a number.
+    #[error("line {line}: the {quantity} is `{text}`, not a number")]
+    NotANumber {
+        /// Line, from 1.
+        line: usize,
+        /// Which quantity or column.
+        quantity: String,
+        /// What stands there, shortened.
+        text: String,
+    },
+    /// A value without physical meaning.
+    #[error("line {line}: {quantity} = {value} has no meaning; it must be {needed}")]
+    Value {
+        /// Line, from 1.
+        line: usize,
+        /// Which column.
+        quantity: &'static str,
+        /// What stands there.
+        value: f64,
+        /// What is allowed.
+        needed: &'static str,
+    },
+    /// Not a map in JSON.
+    #[error("not a map as `mapper` writes it: {0}")]
+    Json(#[from] serde_json::Error),
+    /// A field of a JSON map is no sensible number.
+    #[error("{place}: {quantity} = {value} has no meaning; it must be {needed}")]
+    Field {
+        /// Which line and point of the map.
+        place: String,
+        /// Which field.
+        quantity: &'static str,
+        /// What stands there.
+        value: f64,
+        /// What is allowed.
+        needed: &'static str,
+    },
+    /// The corrected quantities refer to nothing.
+    #[error(
+        "the map does not say to which state its corrected flows and speeds refer; give `--reference`: {}, or \"298 K, 100 kPa\"",
+        crate::usual_references()
+    )]
+    NoReference,
+    /// File and user disagree.
+    #[error(
+        "the map says that it refers to {found}, `--reference` says {given}; leave `--reference` out, or correct the file"
+    )]
+    ReferenceConflict {
+        /// In the file.
+        found: ReferenceState,
+        /// Given.
+        given: ReferenceState,
+    },
+    /// A reference state that cannot be one.
+    #[error(
+        "`{text}` is not a reference state; write {}, or a temperature and a pressure, e.g. \"298 K, 100 kPa\" (200 to 400 K, 50 to 200 kPa)",
+        crate::usual_references()
+    )]
+    Reference {
+        /// What was given.
+        text: String,
+    },
+    /// Nothing in it.
+    #[error("the file holds no points")]
+    Empty,
+    /// More points than any map has.
+    #[error("line {line}: the file has more than {limit} points; no map has that many")]
+    TooMany {
+        /// Line at which the limit was passed.
+        line: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// Maps are written in this format, and not read from it.
+    #[error("maps are only written as `{format}`; give a CSV, JSON or SAE file")]
+    OnlyWritten {
+        /// The format.
+        format: &'static str,
+    },
+}

@@ -1,0 +1,29 @@
+//! What a backend is told of the machine and the rig: all that a campaign declares, and nothing that is true beyond it.
+
+use crate::effect::Effect;
+use crate::model::Model;
+use crate::params::BoundaryConditions;
+use mapper_core::{Channel, DeclaredUncertainty, ModelTolerances};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The machine and the rig as declared. A backend may differ from it as its own settings say.
+#[derive(Debug, Clone)]
+pub struct NominalRig {
+    /// The machine as declared.
+    pub model: Model,
+    /// Boundary conditions as declared.
+    pub boundary: BoundaryConditions,
+    /// The campaign's speed limit, rpm.
+    pub speed_max_rpm: f64,
+    /// Declared one-sigma uncertainty of each sensor, in the channel's unit.
+    pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
+    /// Declared static taps with the inner diameters of their pipes, m.
+    pub static_tap_pipe_diameters_m: BTreeMap<Channel, f64>,
+    /// Declared tolerances of the model.
+    pub tolerances: ModelTolerances,
+    /// Effects that a simulated machine may be given by their ids.
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// Seed of all noise and of all that is drawn.
+    pub seed: u64,
+}

@@ -1,0 +1,149 @@
+//! What the lab's sensors read: the model's values through taps, lags and errors, collected into a batch.
+
+use super::drift;
+use super::sensor::Sensor;
+use super::settings::LabSettings;
+use super::truth::TruthRecorder;
+use mapper_core::{CHANNELS, Channel, ChannelColumn, Event, SampleBatch, Setpoints};
+use mapper_physics::instruments::{self, ChannelFollower};
+use mapper_physics::model::{Outputs, PreparedModel, State};
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::pressure_tap;
+
+/// Frequency of the surge cycle, Hz: the order of a small compressor with a short outlet duct.
+const SURGE_FREQUENCY_HZ: f64 = 7.3;
+
+/// What the sensors see at one instant, before their errors.
+pub(super) struct Instant<'a> {
+    pub(super) boundary: BoundaryConditions,
+    pub(super) speed_rpm: f64,
+    pub(super) tc_k: f64,
+    pub(super) tt_k: f64,
+    /// `None` at standstill.
+    pub(super) running: Option<(&'a State, &'a Outputs)>,
+}
+
+impl Instant<'_> {
+    fn outputs(&self) -> Option<&Outputs> {
+        self.running.map(|(_, outputs)| outputs)
+    }
+}
+
+/// Collects samples into columns.
+pub(super) struct SampleCollector {
+    first_sequence: u64,
+    t_s: Vec<f64>,
+    columns: Vec<Vec<f64>>,
+    truth: TruthRecorder,
+}
+
+impl SampleCollector {
+    pub(super) fn new(first_sequence: u64) -> Self {
+        SampleCollector {
+            first_sequence,
+            t_s: Vec::new(),
+            columns: vec![Vec::new(); CHANNELS.len()],
+            truth: TruthRecorder::default(),
+        }
+    }
+
+    /// Number of samples so far.
+    pub(super) fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// Reads every sensor at one instant.
+    pub(super) fn push(
+        &mut self,
+        t_s: f64,
+        instant: &Instant<'_>,
+        commands: Option<&Setpoints>,
+        sensors: &mut [(Channel, Sensor)],
+        followers: &mut [ChannelFollower],
+        settings: &LabSettings,
+    ) {
+        self.t_s.push(t_s);
+        let surging = instant.outputs().is_some_and(|outputs| outputs.surge_position_ratio >= 1.0);
+        let swing = if surging {
+            settings.surge_swing_ratio * (2.0 * std::f64::consts::PI * SURGE_FREQUENCY_HZ * t_s).sin()
+        } else {
+            0.0
+        };
+        let prepared = instant.running.map(|_| settings.model.prepare(&instant.boundary));
+        for ((row, column), follower) in CHANNELS.iter().zip(&mut self.columns).zip(followers) {
+            let total = true_value(row.channel, instant, prepared.as_ref(), commands, swing);
+            let truth = match settings.static_tap_pipe_diameters_m.get(&row.channel) {
+                Some(pipe_diameter_m) => at_the_wall_pa(row.channel, total, *pipe_diameter_m, instant),
+                None => total,
+            };
+            let truth = follower.read(t_s, truth);
+            let sensor = sensors.iter_mut().find(|(channel, _)| *channel == row.channel);
+            let reading = sensor.map_or(truth, |(_, sensor)| sensor.read(truth));
+            column.push(drift::drifted_reading(&settings.drifts, row.channel, t_s, reading));
+        }
+        self.truth.push(instant.speed_rpm, instant.tc_k, instant.tt_k, instant.outputs());
+    }
+
+    pub(super) fn finish(self, events: Vec<Event>) -> SampleBatch {
+        let columns = CHANNELS.iter().zip(self.columns);
+        SampleBatch {
+            first_sequence: self.first_sequence,
+            columns: columns.map(|(row, values)| ChannelColumn { channel: row.channel, values }).collect(),
+            truth: self.truth.finish(),
+            t_s: self.t_s,
+            events,
+        }
+    }
+}
+
+/// Static pressure at the wall of the pipe of one of the four stations; the total one where the pipe would choke.
+fn at_the_wall_pa(channel: Channel, total_pa: f64, pipe_diameter_m: f64, instant: &Instant<'_>) -> f64 {
+    let Some(outputs) = instant.outputs() else { return total_pa };
+    let (flow_kg_s, temperature_k) = match channel {
+        Channel::P1 => (outputs.flow_kg_s, instant.boundary.t1_k),
+        Channel::P2 => (outputs.flow_kg_s, outputs.t2_k),
+        Channel::P3 => (outputs.turbine_flow_kg_s, instant.boundary.t3_k),
+        Channel::P4 => (outputs.turbine_flow_kg_s, outputs.turbine.t4_k),
+        _ => return total_pa,
+    };
+    pressure_tap::total_to_static_pa(total_pa, flow_kg_s, temperature_k, pipe_diameter_m).unwrap_or(total_pa)
+}
+
+fn true_value(
+    channel: Channel,
+    instant: &Instant<'_>,
+    prepared: Option<&PreparedModel<'_>>,
+    commands: Option<&Setpoints>,
+    swing: f64,
+) -> f64 {
+    let boundary = &instant.boundary;
+    let command = |value: fn(&Setpoints) -> f64| commands.map_or(f64::NAN, value);
+    match channel {
+        Channel::P3Command => return command(|setpoints| setpoints.p3_pa),
+        Channel::T3Command => return command(|setpoints| setpoints.t3_k),
+        Channel::ValveCommand => return command(|setpoints| setpoints.valve_opening_ratio),
+        Channel::TOilCommand => return command(|setpoints| setpoints.oil_temperature_k),
+        _ => {}
+    }
+    if let (Some((state, outputs)), Some(prepared)) = (instant.running, prepared) {
+        let value = instruments::true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
+        return match channel {
+            Channel::CompressorFlow => value * (1.0 + swing),
+            // The pressure swings less than the flow: it is the volume's.
+            Channel::P2 => value * (1.0 + 0.2 * swing),
+            _ => value,
+        };
+    }
+    // At rest every gas probe but T1's sees the cell.
+    match channel {
+        Channel::ShaftSpeed | Channel::CompressorFlow | Channel::TurbineFlow => 0.0,
+        Channel::P1 | Channel::P2 => boundary.p1_pa,
+        Channel::T1 => boundary.t1_k,
+        Channel::Tc => instant.tc_k,
+        Channel::Tt => instant.tt_k,
+        Channel::P3 => boundary.p3_pa,
+        Channel::P4 => boundary.p4_pa,
+        Channel::TOil => boundary.oil_temperature_k,
+        _ => boundary.ambient_temperature_k,
+    }
+}

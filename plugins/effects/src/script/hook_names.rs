@@ -1,0 +1,16 @@
+//! The places at which a script can take part.
+
+/// Functions a script may define, besides `reading_CHANNEL(at, p, value)`, with the number of their arguments:
+/// `(at, p, value)` gives the value the model shall use, `(at, p)` what is added.
+pub const HOOK_NAMES: [(&str, usize); 10] = [
+    ("flow_kg_s", 3),
+    ("efficiency", 3),
+    ("h_w_m2k", 3),
+    ("gas_before_k", 3),
+    ("gas_after_k", 3),
+    ("gas_outlet_k", 3),
+    ("heat_to_compressor_w", 2),
+    ("heat_to_inner_w", 2),
+    ("heat_to_turbine_w", 2),
+    ("shaft_torque_nm", 2),
+];

@@ -1,0 +1,16 @@
+//! CSV: one row a point. Lines that begin with `#` say what the numbers refer to. Tables of others are read by the
+//! names of the four columns that a map needs.
+
+mod read;
+mod write;
+
+use mapper_core::MapFormat;
+
+pub(crate) const FORMAT: MapFormat = MapFormat {
+    name: "csv",
+    extension: "csv",
+    further_extensions: &[],
+    description: "one row a point, units in the column names, reference state and method in `#` lines",
+    write: Some(write::write),
+    read: Some(read::read),
+};

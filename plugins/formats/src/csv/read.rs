@@ -1,0 +1,262 @@
+//! Rows of points to a map: what `mapper` writes, with all its columns, and tables of others with the four columns that
+//! a map needs.
+
+use crate::lines::{Row, line, map_of_rows, room_for_one_more};
+use crate::reference;
+use ::csv::{ReaderBuilder, StringRecord, Trim};
+use mapper_core::{
+    CompressorMap, ImportError, MapPoint, Method, ReferenceState, SpeedShift, Verdict, Warning,
+};
+
+/// Names under which the four columns are found, lower case without blanks and underscores.
+const SPEED: &[&str] =
+    &["speedcorrectedrpm", "rpm", "nccorr", "n", "n(rpm)", "nc", "speed", "speed(rpm)", "correctedspeed"];
+const FLOW: &[&str] = &[
+    "flowcorrectedkgs",
+    "wc",
+    "wccorr",
+    "mdot",
+    "mdot(kg/s)",
+    "flow",
+    "flow(kg/s)",
+    "massflow",
+    "correctedflow",
+    "m",
+];
+const RATIO: &[&str] = &["pressureratio", "prc", "pic", "pr", "pi", "ratio"];
+const ETA: &[&str] = &["eta", "etac", "eff", "efficiency", "eta(ts)", "eta(tt)"];
+
+/// What stands in the `#` lines and the column names.
+struct Head {
+    reference: Option<ReferenceState>,
+    machine: String,
+    method: Option<Method>,
+    columns: Columns,
+}
+
+/// Names of the columns as found, and which of them are the four.
+struct Columns {
+    names: Vec<String>,
+    four: [usize; 4],
+}
+
+pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
+    let (mut reference, mut machine, mut method) = (None, String::new(), None);
+    for comment in text.lines().filter_map(|line| line.trim_start().strip_prefix('#')) {
+        reference = reference.or_else(|| reference::in_comment(comment));
+        if let Some((_, name)) = comment.split_once("compressor map of ") {
+            machine = name.trim().chars().take(200).collect();
+        }
+        if let Some((_, name)) = comment.split_once("method: ") {
+            method = method_of(name);
+        }
+    }
+    let mut reader = ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .delimiter(delimiter(text))
+        .has_headers(false)
+        .trim(Trim::All)
+        .flexible(true)
+        .from_reader(text.as_bytes());
+    let mut records = reader.records();
+    let Some(first) = records.next() else {
+        return Err(ImportError::Empty);
+    };
+    let first = record(first)?;
+    let (columns, mut pending) = match numeric(&first) {
+        true => (Columns { names: Vec::new(), four: [0, 1, 2, 3] }, Some(first)),
+        false => (named(&first)?, None),
+    };
+    let head = Head { reference, machine, method, columns };
+    let mut rows: Vec<(Row, StringRecord)> = Vec::new();
+    while let Some(next) = pending.take().map(Ok).or_else(|| records.next().map(record)) {
+        let next = next?;
+        if next.iter().all(str::is_empty) {
+            continue;
+        }
+        room_for_one_more(rows.len(), at(&next))?;
+        rows.push((row(&next, &head.columns)?, next));
+    }
+    if head.columns.find("line_speed_corrected_rpm").is_some() {
+        own(&head, &rows, given)
+    } else {
+        let rows: Vec<Row> = rows.into_iter().map(|(row, _)| row).collect();
+        map_of_rows(head.machine, &rows, head.reference, given)
+    }
+}
+
+fn record(record: Result<StringRecord, ::csv::Error>) -> Result<StringRecord, ImportError> {
+    record.map_err(|error| {
+        let line = error.position().map_or(1, |position| position.line() as usize);
+        ImportError::Row { line, source: error.into() }
+    })
+}
+
+fn at(record: &StringRecord) -> usize {
+    record.position().map_or(1, |position| position.line() as usize)
+}
+
+/// The separator that the first line of content has most of; a comma where there is none.
+fn delimiter(text: &str) -> u8 {
+    let line = text.lines().find(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
+    let count = |c: char| line.map_or(0, |line| line.matches(c).count());
+    [(',', b','), (';', b';'), ('\t', b'\t')]
+        .into_iter()
+        .max_by_key(|(c, _)| (count(*c), *c == ','))
+        .map_or(b',', |(_, b)| b)
+}
+
+fn numeric(record: &StringRecord) -> bool {
+    record.len() >= 4 && record.iter().take(4).all(|field| field.parse::<f64>().is_ok())
+}
+
+fn named(record: &StringRecord) -> Result<Columns, ImportError> {
+    let names: Vec<String> = record.iter().map(str::to_owned).collect();
+    let plain: Vec<String> = names.iter().map(|n| n.to_ascii_lowercase().replace([' ', '_'], "")).collect();
+    let find = |what: &'static str, wanted: &[&str]| {
+        wanted.iter().find_map(|name| plain.iter().position(|n| n == name)).ok_or_else(|| {
+            let shown: String = names.join(", ").chars().take(120).collect();
+            ImportError::MissingColumn {
+                line: at(record),
+                quantity: what,
+                names: wanted.join(", "),
+                found: shown,
+            }
+        })
+    };
+    let four = [
+        find("corrected speed", SPEED)?,
+        find("corrected flow", FLOW)?,
+        find("pressure ratio", RATIO)?,
+        find("efficiency", ETA)?,
+    ];
+    Ok(Columns { names, four })
+}
+
+impl Columns {
+    fn find(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|known| known == name)
+    }
+
+    fn text<'a>(&self, record: &'a StringRecord, name: &str) -> Option<&'a str> {
+        record.get(self.find(name)?).filter(|text| !text.is_empty())
+    }
+
+    fn number(&self, record: &StringRecord, name: &str) -> Result<Option<f64>, ImportError> {
+        let Some(text) = self.text(record, name) else { return Ok(None) };
+        let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+        let shown: String = text.chars().take(40).collect();
+        value.map(Some).ok_or_else(|| ImportError::NotANumber {
+            line: at(record),
+            quantity: format!("column {name}"),
+            text: shown,
+        })
+    }
+}
+
+fn row(record: &StringRecord, columns: &Columns) -> Result<Row, ImportError> {
+    let field = |index: usize, what: &str| {
+        let text = record.get(columns.four[index]).unwrap_or_default();
+        let shown: String = text.chars().take(40).collect();
+        text.parse::<f64>().map_err(|_| ImportError::NotANumber {
+            line: at(record),
+            quantity: what.to_owned(),
+            text: shown,
+        })
+    };
+    let eta_text = record.get(columns.four[3]).unwrap_or_default();
+    let row = Row {
+        at: at(record),
+        speed_corrected_rpm: field(0, "corrected speed")?,
+        flow_corrected_kg_s: field(1, "corrected flow")?,
+        pressure_ratio: field(2, "pressure ratio")?,
+        eta: if eta_text.is_empty() { None } else { Some(field(3, "efficiency")?) },
+    };
+    row.check()?;
+    Ok(row)
+}
+
+/// A file of our own: lines and all columns as written.
+fn own(
+    head: &Head,
+    rows: &[(Row, StringRecord)],
+    given: Option<ReferenceState>,
+) -> Result<CompressorMap, ImportError> {
+    let reference = reference::settle(head.reference, given)?;
+    if rows.is_empty() {
+        return Err(ImportError::Empty);
+    }
+    let mut points = Vec::with_capacity(rows.len());
+    for (row, record) in rows {
+        let line_rpm =
+            head.columns.number(record, "line_speed_corrected_rpm")?.unwrap_or(row.speed_corrected_rpm);
+        points.push((line_rpm, own_point(head, row, record, line_rpm, reference)?));
+    }
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let lines = points
+        .chunk_by(|a, b| a.0 == b.0)
+        .map(|members| line(members[0].0, members.iter().map(|(_, point)| point.clone()).collect()))
+        .collect();
+    let method = head.method.unwrap_or(Method::Imported);
+    Ok(CompressorMap { machine: head.machine.clone(), reference, method, lines, fitted: None })
+}
+
+fn own_point(
+    head: &Head,
+    row: &Row,
+    record: &StringRecord,
+    line_rpm: f64,
+    reference: ReferenceState,
+) -> Result<MapPoint, ImportError> {
+    let columns = &head.columns;
+    let number = |name: &str| columns.number(record, name);
+    let or = |name: &str, default: f64| Ok::<_, ImportError>(number(name)?.unwrap_or(default));
+    let mut point = row.point(reference, or("step", 0.0)?.max(0.0) as usize);
+    point.flow_corrected_kg_s = or("flow_measured_corrected_kg_s", row.flow_corrected_kg_s)?;
+    point.pressure_ratio = or("pressure_ratio_measured", row.pressure_ratio)?;
+    point.speed_rpm = or("speed_rpm", row.speed_corrected_rpm)?;
+    point.flow_kg_s = or("flow_kg_s", row.flow_corrected_kg_s)?;
+    point.valve_opening_ratio = or("valve", 1.0)?;
+    point.t1_k = or("t1_k", reference.t_ref_k)?;
+    point.p1_pa = or("p1_pa", reference.p_ref_pa)?;
+    (point.eta_low, point.eta_high) = (number("eta_low")?, number("eta_high")?);
+    (point.h_w_m2k, point.h_low_w_m2k, point.h_high_w_m2k) =
+        (number("h_w_m2k")?, number("h_low_w_m2k")?, number("h_high_w_m2k")?);
+    (point.residual_rms_k, point.dt2_k, point.dtc_k) =
+        (number("residual_rms_k")?, number("dt2_k")?, number("dtc_k")?);
+    point.method = columns.text(record, "method").and_then(method_of).unwrap_or(Method::Imported);
+    point.verdict = match columns.text(record, "verdict") {
+        Some("doubtful") => Verdict::Doubtful,
+        Some("unusable") => Verdict::Unusable,
+        _ if row.eta.is_none() => Verdict::Unusable,
+        _ => Verdict::Good,
+    };
+    point.warnings = columns
+        .text(record, "warnings")
+        .unwrap_or_default()
+        .split(';')
+        .filter(|code| !code.is_empty())
+        .map(|code| Warning {
+            code: code.to_owned(),
+            message: "read from a CSV map, which holds the code alone".to_owned(),
+        })
+        .collect();
+    let shift = SpeedShift {
+        speed_corrected_rpm: line_rpm - row.speed_corrected_rpm,
+        flow_corrected_kg_s: row.flow_corrected_kg_s - point.flow_corrected_kg_s,
+        pressure_ratio: row.pressure_ratio - point.pressure_ratio,
+    };
+    Ok(MapPoint {
+        flow_corrected_kg_s: row.flow_corrected_kg_s,
+        pressure_ratio: row.pressure_ratio,
+        eta: row.eta,
+        identified: point,
+        shift: (shift.speed_corrected_rpm != 0.0).then_some(shift),
+    })
+}
+
+fn method_of(name: &str) -> Option<Method> {
+    [Method::Steady, Method::Dynamic, Method::Joint, Method::Imported]
+        .into_iter()
+        .find(|method| method.to_string() == name.trim())
+}

@@ -1,0 +1,149 @@
+//! The fitted surface in the picture: lines, contours, surge and choke, and grey where it is extrapolated.
+
+use crate::labels::{contour_levels, krpm, percent};
+use crate::surface::{SUBDIVISIONS, across};
+use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, StructuredGrid, palette};
+use mapper_core::{FittedLine, FittedMap, FittedNode, confidence_interval_95};
+
+const SURGE: palette::Colour = palette::VERMILLION;
+const CHOKE: palette::Colour = palette::PURPLE;
+/// Efficiency below which a curve of efficiency over flow is not drawn, fraction: towards pressure ratio 1 it falls to 0
+/// and would press what was measured into the upper rim.
+const LEAST_ETA_DRAWN: f64 = 0.4;
+
+/// Everything below the points of the panel pressure ratio over flow.
+pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap) {
+    add_shade(panel, fitted);
+    if let Some(grid) = eta_grid(fitted) {
+        let levels = contour_levels(grid.value_range());
+        panel.add(Contours::new(grid, &levels, percent).shaded().colour(palette::Colour(40, 80, 120)));
+    }
+    for line in &fitted.lines {
+        let all = || line.nodes.iter().map(|n| (place(n), n.extrapolated));
+        let colour = if line.measured { palette::INK } else { palette::GREY };
+        panel.add(Line::new(runs(all(), true), palette::GREY).width_px(1.0).dash(Dash::Dashed));
+        panel.add(Line::new(runs(all(), false), colour).width_px(1.3));
+    }
+    // Where two speeds would be written upon each other the first stays: that of a measured line.
+    let (measured, others): (Vec<&FittedLine>, Vec<&FittedLine>) =
+        fitted.lines.iter().partition(|line| line.measured);
+    for line in measured.into_iter().chain(others) {
+        let colour = if line.measured { palette::INK } else { palette::GREY };
+        // An invisible line of the last visible node carries the speed.
+        let end = line.nodes.iter().find(|n| !n.extrapolated).or_else(|| middle(line)).map(place);
+        panel.add(
+            Line::new(end.into_iter().collect(), colour)
+                .width_px(0.0)
+                .end_label(krpm(line.speed_corrected_rpm), LineEnd::Last),
+        );
+    }
+    let surge: Vec<(f64, f64)> = fitted.surge_line().map(|(_, n)| place(n)).collect();
+    let choke: Vec<(f64, f64)> = fitted.choke_line().map(|(_, n)| place(n)).collect();
+    panel.add(Line::new(surge, SURGE).width_px(1.6).dash(Dash::DashDot).label("surge-side end of the lines"));
+    panel.add(Line::new(choke, CHOKE).width_px(1.6).dash(Dash::Dotted).label("choke"));
+    panel.add(Line::new(Vec::new(), palette::GREY).width_px(1.0).dash(Dash::Dashed).label("extrapolated"));
+}
+
+/// Fitted efficiency of the measured lines over flow, with its 95 % band.
+pub(crate) fn add_eta(panel: &mut Panel, fitted: &FittedMap) {
+    let measured: Vec<&FittedLine> = fitted.lines.iter().filter(|line| line.measured).collect();
+    let last = measured.len().saturating_sub(1).max(1) as f64;
+    for (index, line) in measured.iter().enumerate() {
+        let colour = palette::sequential(index as f64 / last);
+        let drawn: Vec<&FittedNode> = line.nodes.iter().filter(|n| n.eta >= LEAST_ETA_DRAWN).collect();
+        let side = |low: bool| {
+            drawn.iter().filter(|n| !n.extrapolated).map(move |n| {
+                let (below, above) = confidence_interval_95(n.eta, n.eta_standard_error);
+                (n.flow_corrected_kg_s, 100.0 * if low { below } else { above })
+            })
+        };
+        let mut band: Vec<(f64, f64)> = side(true).collect();
+        band.extend(side(false).collect::<Vec<_>>().into_iter().rev());
+        panel.add(Polygon { opacity: 0.25, ..Polygon::new(band, colour) });
+        let at = |n: &&FittedNode| ((n.flow_corrected_kg_s, 100.0 * n.eta), n.extrapolated);
+        panel.add(Line::new(runs(drawn.iter().map(at), false), colour).width_px(1.2));
+    }
+}
+
+fn place(node: &FittedNode) -> (f64, f64) {
+    (node.flow_corrected_kg_s, node.pressure_ratio)
+}
+
+fn middle(line: &FittedLine) -> Option<&FittedNode> {
+    line.nodes.get(line.nodes.len() / 2)
+}
+
+/// Points of one kind; NaN breaks the line where the kind changes. A dashed line reaches to its solid neighbours.
+fn runs(points: impl Iterator<Item = ((f64, f64), bool)>, extrapolated: bool) -> Vec<(f64, f64)> {
+    let all: Vec<((f64, f64), bool)> = points.collect();
+    let belongs = |i: usize| {
+        all[i].1 == extrapolated
+            || extrapolated && (i > 0 && all[i - 1].1 || i + 1 < all.len() && all[i + 1].1)
+    };
+    (0..all.len()).map(|i| if belongs(i) { all[i].0 } else { (f64::NAN, f64::NAN) }).collect()
+}
+
+/// Grey between neighbouring lines wherever a corner is extrapolated, one polygon for each run of nodes. From line to line
+/// it is bounded by the curves that bound the contours, so that nothing stays white between the two.
+fn add_shade(panel: &mut Panel, fitted: &FittedMap) {
+    let speeds: Vec<f64> = fitted.lines.iter().map(|line| line.speed_corrected_rpm).collect();
+    if speeds.len() < 2 || !speeds.windows(2).all(|w| w[1] > w[0]) {
+        return;
+    }
+    let side = |column: usize, pair: usize| -> Vec<(f64, f64)> {
+        let over_speed = |value: fn(&FittedNode) -> f64| {
+            let values: Vec<f64> =
+                fitted.lines.iter().map(|line| line.nodes.get(column).map_or(f64::NAN, value)).collect();
+            across(&speeds, &values)
+        };
+        let (flow, ratio) = (over_speed(|n| n.flow_corrected_kg_s), over_speed(|n| n.pressure_ratio));
+        (pair * SUBDIVISIONS..=(pair + 1) * SUBDIVISIONS).map(|i| (flow[i], ratio[i])).collect()
+    };
+    for (index, pair) in fitted.lines.windows(2).enumerate() {
+        let (low, high) = (&pair[0].nodes, &pair[1].nodes);
+        let grey = |i: usize| [&low[i], &low[i + 1], &high[i], &high[i + 1]].iter().any(|n| n.extrapolated);
+        let cells = low.len().min(high.len()).saturating_sub(1);
+        let mut start = 0;
+        while start < cells {
+            if !grey(start) {
+                start += 1;
+                continue;
+            }
+            let end = (start..cells).take_while(|i| grey(*i)).last().unwrap_or(start) + 1;
+            let mut outline: Vec<(f64, f64)> = low[start..=end].iter().map(place).collect();
+            outline.extend(side(end, index));
+            outline.extend(high[start..=end].iter().rev().map(place));
+            outline.extend(side(start, index).into_iter().rev());
+            panel
+                .add(Polygon { opacity: 0.16, ..Polygon::new(outline, palette::GREY).label("extrapolated") });
+            start = end;
+        }
+    }
+}
+
+/// Efficiency over the supported part of the surface, finer in speed than its lines.
+fn eta_grid(fitted: &FittedMap) -> Option<StructuredGrid> {
+    let speeds: Vec<f64> = fitted.lines.iter().map(|line| line.speed_corrected_rpm).collect();
+    let columns = fitted.beta_ratio.len();
+    if speeds.len() < 2 || !speeds.windows(2).all(|w| w[1] > w[0]) {
+        return None;
+    }
+    let mut fields: [Vec<Vec<f64>>; 3] = Default::default();
+    for column in 0..columns {
+        let values: [fn(&FittedNode) -> f64; 3] = [
+            |n| n.flow_corrected_kg_s,
+            |n| n.pressure_ratio,
+            |n| if n.extrapolated { f64::NAN } else { n.eta },
+        ];
+        for (field, value) in fields.iter_mut().zip(values) {
+            let over_speed: Vec<f64> =
+                fitted.lines.iter().map(|line| line.nodes.get(column).map_or(f64::NAN, value)).collect();
+            field.push(across(&speeds, &over_speed));
+        }
+    }
+    let rows = fields[0].first()?.len();
+    // Column by column as made; the grid wants row by row.
+    let flat =
+        |field: &Vec<Vec<f64>>| (0..rows).flat_map(|r| field.iter().map(move |c| c[r])).collect::<Vec<f64>>();
+    StructuredGrid::new(rows, columns, flat(&fields[0]), flat(&fields[1]), flat(&fields[2])).ok()
+}

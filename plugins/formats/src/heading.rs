@@ -1,0 +1,29 @@
+//! What every text format says first: machine, reference state.
+
+use mapper_core::{CompressorMap, Method};
+
+/// Two comment lines that begin with `mark`.
+pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
+    let (t_ref_k, p_ref_pa) = (map.reference.t_ref_k, map.reference.p_ref_pa);
+    format!(
+        "{mark} compressor map of {}\n\
+         {mark} reference state of corrected flow and speed: {t_ref_k} K, {p_ref_pa} Pa\n",
+        if map.machine.is_empty() { "unnamed machine".to_owned() } else { one_line(&map.machine) },
+    )
+}
+
+/// A name that cannot end a comment.
+pub(crate) fn one_line(name: &str) -> String {
+    name.chars()
+        .map(|c| if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') { ' ' } else { c })
+        .collect()
+}
+
+/// What the efficiency of a method is called.
+pub(crate) fn efficiency_name(method: Method) -> &'static str {
+    match method {
+        Method::Steady => "apparent: heat transfer not removed",
+        Method::Dynamic | Method::Joint => "adiabatic: heat transfer removed",
+        Method::Imported => "as the map file has it",
+    }
+}

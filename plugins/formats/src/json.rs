@@ -1,0 +1,103 @@
+//! JSON: the map as it is. Keys carry units, efficiencies are fractions, what is undefined is null.
+
+use crate::lines::POINT_LIMIT;
+use crate::reference;
+use mapper_core::{CompressorMap, ExportError, ImportError, MapFormat, ReferenceState};
+use serde_json::Value;
+
+pub(crate) const FORMAT: MapFormat = MapFormat {
+    name: "json",
+    extension: "json",
+    further_extensions: &[],
+    description: "the whole map with every point's uncertainty, warnings and window",
+    write: Some(write),
+    read: Some(read),
+};
+
+fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
+    for point in map.lines.iter().flat_map(|line| &line.points) {
+        let p = &point.identified;
+        for (quantity, value) in [
+            ("flow_corrected_kg_s", point.flow_corrected_kg_s),
+            ("pressure_ratio", point.pressure_ratio),
+            ("speed_corrected_rpm", p.speed_corrected_rpm),
+            ("speed_rpm", p.speed_rpm),
+            ("flow_kg_s", p.flow_kg_s),
+            ("valve", p.valve_opening_ratio),
+            ("t1_k", p.t1_k),
+            ("p1_pa", p.p1_pa),
+        ] {
+            if !value.is_finite() {
+                return Err(ExportError::NotFinite { step: p.step, quantity, value });
+            }
+        }
+    }
+    let mut bytes = serde_json::to_vec_pretty(map).map_err(ExportError::failed(FORMAT.name))?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
+    let mut value: Value = serde_json::from_str(text)?;
+    let found: Option<ReferenceState> = match value.get("reference") {
+        None | Some(Value::Null) => None,
+        Some(state) => Some(serde_json::from_value(state.clone())?),
+    };
+    let settled = reference::settle(found, given)?;
+    if !settled.is_plausible() {
+        return Err(ImportError::Reference { text: settled.to_string() });
+    }
+    if let Some(object) = value.as_object_mut() {
+        object.insert("reference".to_owned(), serde_json::to_value(settled)?);
+    }
+    let map: CompressorMap = serde_json::from_value(value)?;
+    check(&map)?;
+    Ok(map)
+}
+
+fn check(map: &CompressorMap) -> Result<(), ImportError> {
+    let count: usize = map.lines.iter().map(|line| line.points.len()).sum();
+    if count == 0 {
+        return Err(ImportError::Empty);
+    }
+    if count > POINT_LIMIT {
+        return Err(ImportError::TooMany { line: 1, limit: POINT_LIMIT });
+    }
+    for (l, line) in map.lines.iter().enumerate() {
+        for (p, point) in line.points.iter().enumerate() {
+            let place = || format!("line {} point {} of the map", l + 1, p + 1);
+            let needed = "a number above 0";
+            for (quantity, value) in [
+                ("line's corrected speed", line.speed_corrected_rpm),
+                ("corrected flow", point.flow_corrected_kg_s),
+                ("pressure ratio", point.pressure_ratio),
+                ("measured corrected flow", point.identified.flow_corrected_kg_s),
+                ("measured pressure ratio", point.identified.pressure_ratio),
+                ("measured corrected speed", point.identified.speed_corrected_rpm),
+            ] {
+                if !(value.is_finite() && value > 0.0) {
+                    return Err(ImportError::Field { place: place(), quantity, value, needed });
+                }
+            }
+            if let Some(eta) = point.eta.filter(|eta| !(-5.0..=1.5).contains(eta)) {
+                let needed = "a fraction (0.72), not a percentage";
+                return Err(ImportError::Field {
+                    place: place(),
+                    quantity: "efficiency",
+                    value: eta,
+                    needed,
+                });
+            }
+        }
+    }
+    if let Some(fitted) = &map.fitted {
+        let columns = fitted.beta_ratio.len();
+        let whole = fitted.lines.iter().all(|line| line.nodes.len() == columns);
+        if !whole {
+            let place = "fitted table".to_owned();
+            let needed = "the number of nodes of every line";
+            return Err(ImportError::Field { place, quantity: "beta_ratio", value: columns as f64, needed });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,51 @@
+//! The file formats of compressor maps, one file each: its writer and, where maps are read from it, its reader.
+//!
+//! To add one, write its file with a constant `FORMAT`, and its line below.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod fitted_items;
+mod heading;
+mod heat_picture;
+mod labels;
+mod lines;
+mod map_picture;
+mod monotone;
+mod reference;
+mod simulation_table;
+mod surface;
+mod thermal;
+mod turbine;
+
+pub use heat_picture::{ErrorAtGradient, error_figure, heat_transfer_figure};
+pub use lines::POINT_LIMIT;
+pub use map_picture::{map_figure, map_panel};
+pub use reference::parse_reference;
+pub use surface::efficiency_surface;
+pub use thermal::ThermalExport;
+pub use turbine::{TurbinePoint, turbine_points, turbine_text};
+
+use mapper_core::MapFormats;
+
+/// Declares the formats' modules and the list of them.
+macro_rules! formats {
+    ($($name:ident),* $(,)?) => {
+        $(mod $name;)*
+
+        /// Every format, in the order of lists for people.
+        pub const FORMATS: MapFormats = MapFormats(&[$($name::FORMAT),*]);
+    };
+}
+
+formats! {
+    csv,
+    json,
+    sae,
+    fitted,
+    modelica,
+    simscape,
+    npss,
+    pycycle,
+    svg,
+    png,
+}

@@ -1,0 +1,171 @@
+//! The map as a picture: (a) pressure ratio over flow with efficiency contours, (b) efficiency over flow.
+//!
+//! How sure a point is shows in (a) by the size of its marker, in classes of its 95 % interval (text beside it would
+//! bury the map), and in (b) by the interval itself as a bar. Shape and colour tell good from doubtful; points without
+//! an efficiency are hollow.
+
+use crate::heading::efficiency_name;
+use crate::labels::{contour_levels, krpm, percent};
+use crate::{fitted_items, surface};
+use mapper_chart::{Axis, Contours, Figure, Line, LineEnd, Marker, Panel, Scatter, ScatterPoint, palette};
+use mapper_core::{CompressorMap, MapPoint, Method, Verdict};
+
+/// The map as a figure of two panels; flow in kg/s, efficiency in %.
+pub fn map_figure(map: &CompressorMap) -> Figure {
+    let points = map.lines.iter().map(|line| line.points.len()).sum::<usize>();
+    let machine = if map.machine.is_empty() { "unnamed machine" } else { &map.machine };
+    Figure::new(format!("Compressor map of {machine}"))
+        .subtitle(format!(
+            "Corrected to {}. Method: {} (isentropic efficiency total to total, {}). {points} points on {} speed lines; \
+             {}.",
+            map.reference,
+            map.method,
+            efficiency_name(map.method),
+            map.lines.len(),
+            match &map.fitted {
+                None => "contours only between measured points".to_owned(),
+                Some(fitted) => format!(
+                    "lines and contours are fitted to all of them (scatter {:.1} % of distance, {:.1} points of efficiency)",
+                    100.0 * fitted.distance_rms_ratio,
+                    100.0 * fitted.eta_rms
+                ),
+            },
+        ))
+        .panel(map_panel(map))
+        .panel(efficiency_panel(map))
+        .panel_size_px(560.0, 460.0)
+}
+
+/// Panel (a) alone, e.g. as the ground for a path through the map: corrected flow in kg/s, pressure ratio.
+pub fn map_panel(map: &CompressorMap) -> Panel {
+    let mut panel =
+        Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new("total pressure ratio P2/P1"))
+            .title("(a) speed lines (krpm, corrected) and efficiency contours (%)");
+    match &map.fitted {
+        Some(fitted) => fitted_items::add_map(&mut panel, fitted),
+        None => add_measured_lines(&mut panel, map),
+    }
+    let all = || map.lines.iter().flat_map(|line| &line.points);
+    for class in CLASSES {
+        let members: Vec<(f64, f64)> = all()
+            .filter(|point| class.holds(point))
+            .map(|point| (point.flow_corrected_kg_s, point.pressure_ratio))
+            .collect();
+        if !members.is_empty() {
+            panel.add(class.scatter(members).label(class.label));
+        }
+    }
+    panel
+}
+
+/// Lines and contours without a fit: through the points.
+fn add_measured_lines(panel: &mut Panel, map: &CompressorMap) {
+    if let Some(grid) = surface::efficiency_surface(map) {
+        let levels = contour_levels(grid.value_range());
+        panel.add(Contours::new(grid, &levels, percent).shaded().colour(palette::Colour(40, 80, 120)));
+    }
+    for line in &map.lines {
+        let curve = surface::speed_curve(map, line);
+        let speed = krpm(line.speed_corrected_rpm);
+        panel.add(Line::new(curve, palette::INK).width_px(1.3).end_label(speed, LineEnd::Last));
+    }
+}
+
+fn efficiency_panel(map: &CompressorMap) -> Panel {
+    let name = match map.method {
+        Method::Steady => "apparent efficiency, %",
+        Method::Dynamic | Method::Joint => "adiabatic efficiency, %",
+        Method::Imported => "isentropic efficiency, %",
+    };
+    let mut panel = Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new(name))
+        .title("(b) efficiency with its 95 % interval");
+    if let Some(fitted) = &map.fitted {
+        fitted_items::add_eta(&mut panel, fitted);
+    }
+    let last = map.lines.len().saturating_sub(1).max(1) as f64;
+    for (index, line) in map.lines.iter().enumerate() {
+        let colour = palette::sequential(index as f64 / last);
+        let points: Vec<(ScatterPoint, Verdict)> = surface::ordered(map, line)
+            .into_iter()
+            .filter_map(|point| {
+                let p = &point.identified;
+                let interval = p.eta_low.zip(p.eta_high).map(|(low, high)| (100.0 * low, 100.0 * high));
+                let eta = 100.0 * point.eta?;
+                let x = point.flow_corrected_kg_s;
+                Some((ScatterPoint { x, y: eta, x_interval: None, y_interval: interval }, p.verdict))
+            })
+            .collect();
+        if points.is_empty() {
+            continue;
+        }
+        let label = format!("{} krpm", krpm(line.speed_corrected_rpm));
+        if map.fitted.is_none() {
+            panel.add(Line::new(points.iter().map(|(p, _)| (p.x, p.y)).collect(), colour).label(&label));
+        }
+        for (verdict, marker) in [(Verdict::Good, Marker::Circle), (Verdict::Doubtful, Marker::Diamond)] {
+            let members: Vec<ScatterPoint> = points.iter().filter(|p| p.1 == verdict).map(|p| p.0).collect();
+            let scatter = Scatter::new(members, colour).marker(marker);
+            // One entry a line; that a diamond is doubtful stands in the other panel's legend too.
+            panel.add(if verdict == Verdict::Good { scatter.label(&label) } else { scatter.size_px(8.0) });
+        }
+    }
+    if map
+        .lines
+        .iter()
+        .flat_map(|l| &l.points)
+        .any(|p| p.identified.verdict == Verdict::Doubtful && p.eta.is_some())
+    {
+        let example: Vec<(f64, f64)> = Vec::new();
+        panel
+            .add(Scatter::new(example, palette::GREY).marker(Marker::Diamond).size_px(8.0).label("doubtful"));
+    }
+    panel
+}
+
+/// Points drawn alike: a verdict and a range of the half width of the 95 % interval, fraction.
+struct Class {
+    verdict: Verdict,
+    above: f64,
+    up_to: f64,
+    size_px: f64,
+    label: &'static str,
+}
+
+const fn class(verdict: Verdict, above: f64, up_to: f64, size_px: f64, label: &'static str) -> Class {
+    Class { verdict, above, up_to, size_px, label }
+}
+
+const NO_INTERVAL: f64 = -1.0;
+
+/// The larger the marker, the less sure the point. An absent interval has a class of its own.
+const CLASSES: [Class; 9] = [
+    class(Verdict::Good, f64::NEG_INFINITY, NO_INTERVAL, 4.0, "good, error unknown"),
+    class(Verdict::Good, NO_INTERVAL, 0.005, 6.5, "good, 95 % within ±0.5 points"),
+    class(Verdict::Good, 0.005, 0.02, 9.0, "good, 95 % within ±2 points"),
+    class(Verdict::Good, 0.02, f64::INFINITY, 12.5, "good, 95 % beyond ±2 points"),
+    class(Verdict::Doubtful, f64::NEG_INFINITY, NO_INTERVAL, 4.0, "doubtful, error unknown"),
+    class(Verdict::Doubtful, NO_INTERVAL, 0.005, 6.5, "doubtful, 95 % within ±0.5 points"),
+    class(Verdict::Doubtful, 0.005, 0.02, 9.0, "doubtful, 95 % within ±2 points"),
+    class(Verdict::Doubtful, 0.02, f64::INFINITY, 12.5, "doubtful, 95 % beyond ±2 points"),
+    class(Verdict::Unusable, f64::NEG_INFINITY, f64::INFINITY, 7.0, "no usable efficiency"),
+];
+
+impl Class {
+    fn holds(&self, point: &MapPoint) -> bool {
+        let p = &point.identified;
+        let verdict = if point.eta.is_none() { Verdict::Unusable } else { p.verdict };
+        let half_width = p.eta_low.zip(p.eta_high).map(|(low, high)| 0.5 * (high - low));
+        let half_width = half_width.filter(|w| *w >= 0.0).unwrap_or(NO_INTERVAL);
+        verdict == self.verdict && half_width <= self.up_to && half_width > self.above
+    }
+
+    fn scatter(&self, points: Vec<(f64, f64)>) -> Scatter {
+        match self.verdict {
+            Verdict::Good => Scatter::new(points, palette::BLUE).size_px(self.size_px),
+            Verdict::Doubtful => {
+                Scatter::new(points, palette::VERMILLION).marker(Marker::Diamond).size_px(self.size_px)
+            }
+            Verdict::Unusable => Scatter::new(points, palette::INK).hollow().size_px(self.size_px),
+        }
+    }
+}

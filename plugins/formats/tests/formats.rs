@@ -1,0 +1,194 @@
+//! What a format writes can be read back, and says what the map says.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod support;
+
+use mapper_core::{CompressorMap, ExportError, MapPoint, Method, ReferenceState, Verdict};
+use mapper_formats::FORMATS;
+
+fn export(name: &str, map: &CompressorMap) -> String {
+    String::from_utf8(FORMATS.find(name).unwrap().write(map).unwrap()).unwrap()
+}
+
+fn points(map: &CompressorMap) -> Vec<&MapPoint> {
+    map.lines.iter().flat_map(|line| &line.points).collect()
+}
+
+fn empty() -> CompressorMap {
+    CompressorMap {
+        machine: String::new(),
+        reference: ReferenceState::SAE,
+        method: Method::Steady,
+        lines: vec![],
+        fitted: None,
+    }
+}
+
+#[test]
+fn names_are_unique_and_every_format_takes_any_map_and_repeats_itself() {
+    for (i, entry) in FORMATS.iter().enumerate() {
+        assert!(FORMATS.iter().skip(i + 1).all(|other| other.name != entry.name));
+        assert!(FORMATS.iter().skip(i + 1).all(|other| other.extension != entry.extension));
+        for map in [empty(), support::turbo_a(), support::fitted()] {
+            match entry.write(&map) {
+                Ok(bytes) => assert!(bytes == entry.write(&map).unwrap(), "{}", entry.name),
+                Err(error) => {
+                    assert!(matches!(error, ExportError::NeedsFit { .. }) && map.fitted.is_none(), "{error}");
+                }
+            }
+        }
+    }
+    assert!(FORMATS.find("xlsx").is_none());
+}
+
+#[test]
+fn csv_reads_back_to_the_same_numbers() {
+    let map = support::turbo_a();
+    let text = export("csv", &map);
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
+    let names: Vec<String> = reader.headers().unwrap().iter().map(str::to_owned).collect();
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), points(&map).len());
+    for (row, point) in rows.iter().zip(points(&map)) {
+        let field = |name: &str| &row[names.iter().position(|n| n == name).unwrap()];
+        let number = |name: &str| field(name).parse::<f64>().ok();
+        let p = &point.identified;
+        assert_eq!(number("flow_corrected_kg_s"), Some(point.flow_corrected_kg_s));
+        assert_eq!(number("pressure_ratio"), Some(point.pressure_ratio));
+        assert_eq!(number("speed_corrected_rpm"), Some(p.speed_corrected_rpm));
+        assert_eq!(number("eta"), point.eta);
+        assert_eq!(number("eta_low"), p.eta_low);
+        assert_eq!(number("eta_high"), p.eta_high);
+        assert_eq!(number("h_w_m2k"), p.h_w_m2k);
+        assert_eq!(number("h_low_w_m2k"), p.h_low_w_m2k);
+        assert_eq!(number("h_high_w_m2k"), p.h_high_w_m2k);
+        assert_eq!(number("valve"), Some(p.valve_opening_ratio));
+        assert_eq!(number("t1_k"), Some(p.t1_k));
+        assert_eq!(number("p1_pa"), Some(p.p1_pa));
+        assert_eq!(number("residual_rms_k"), p.residual_rms_k);
+        assert_eq!(number("dt2_k"), p.dt2_k);
+        assert_eq!(field("verdict") == "unusable", p.verdict == Verdict::Unusable);
+        assert_eq!(
+            field("warnings"),
+            p.warnings.iter().map(|w| w.code.clone()).collect::<Vec<_>>().join(";")
+        );
+    }
+    assert!(text.contains("# reference state of corrected flow and speed: 298 K, 100000 Pa\n"));
+    assert!(text.contains("# method: dynamic\n"));
+}
+
+#[test]
+fn a_machine_name_cannot_break_out_of_the_comment() {
+    let map = CompressorMap { machine: "a\nb,c\r\nd".to_owned(), ..empty() };
+    let text = export("csv", &map);
+    assert_eq!(text.lines().filter(|line| !line.starts_with('#')).count(), 1, "{text}");
+}
+
+#[test]
+fn json_reads_back_to_the_same_map() {
+    let map = support::turbo_a();
+    let text = export("json", &map);
+    let back: CompressorMap = serde_json::from_str(&text).unwrap();
+    assert_eq!((&back.machine, back.reference, back.method), (&map.machine, map.reference, map.method));
+    assert_eq!(back.lines.len(), map.lines.len());
+    for (a, b) in points(&back).iter().zip(points(&map)) {
+        // The writer is exact; serde_json's fast reader may be off by one unit in the last place.
+        let same = |a: f64, b: f64| assert!((a - b).abs() <= 2.0 * f64::EPSILON * b.abs());
+        same(a.flow_corrected_kg_s, b.flow_corrected_kg_s);
+        same(a.pressure_ratio, b.pressure_ratio);
+        assert_eq!(a.eta.is_some(), b.eta.is_some());
+        same(a.eta.unwrap_or(0.0), b.eta.unwrap_or(0.0));
+        assert_eq!(a.identified.warnings, b.identified.warnings);
+        assert_eq!(a.identified.verdict, b.identified.verdict);
+    }
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(value["lines"][0]["points"][0]["eta"].is_null(), "undefined is null");
+}
+
+#[test]
+fn json_refuses_what_it_could_not_read_back() {
+    let mut map = support::turbo_a();
+    map.lines[0].points[1].pressure_ratio = f64::NAN;
+    let refused = FORMATS.find("json").unwrap().write(&map);
+    assert!(matches!(refused, Err(ExportError::NotFinite { step: 1, quantity: "pressure_ratio", .. })));
+}
+
+#[test]
+fn the_picture_shows_every_point_and_says_what_it_shows() {
+    let map = support::turbo_a();
+    let text = export("svg", &map);
+    let document = roxmltree::Document::parse(&text).unwrap();
+    let texts: Vec<&str> =
+        document.descendants().filter(|n| n.has_tag_name("text")).filter_map(|n| n.text()).collect();
+    let all = texts.join(" ");
+    for needed in
+        ["turbo_a", "298 K, 100 kPa", "dynamic", "corrected mass flow, kg/s", "adiabatic efficiency, %"]
+    {
+        assert!(all.contains(needed), "{needed} is missing");
+    }
+    for line in &map.lines {
+        assert!(texts.contains(&format!("{}", line.speed_corrected_rpm / 1000.0).as_str()));
+    }
+    let panel = document.descendants().find(|n| n.attribute("class") == Some("panel")).unwrap();
+    let hollow =
+        panel.descendants().filter(|n| n.has_tag_name("circle") && n.attribute("fill") == Some("#ffffff"));
+    // Two points without efficiency, and their legend entry.
+    assert_eq!(hollow.count(), 3);
+}
+
+#[test]
+fn odd_maps_give_a_picture() {
+    let mut one = support::turbo_a();
+    one.lines.truncate(1);
+    one.lines[0].points.truncate(1);
+    let mut unusable = support::turbo_a();
+    unusable.lines.iter_mut().flat_map(|l| &mut l.points).for_each(|p| p.eta = None);
+    let mut same = support::turbo_a();
+    same.lines
+        .iter_mut()
+        .flat_map(|l| &mut l.points)
+        .for_each(|p| (p.flow_corrected_kg_s, p.pressure_ratio) = (0.1, 2.0));
+    let mut holes = support::turbo_a();
+    holes.lines.iter_mut().for_each(|l| l.points[1].flow_corrected_kg_s = f64::NAN);
+    let mut broad = support::turbo_a();
+    broad.lines[0].points[1].identified.eta_low = Some(-50.0);
+    broad.lines[0].points[1].identified.eta_high = Some(f64::INFINITY);
+    for map in [one, unusable, same, holes, broad, empty()] {
+        let text = export("svg", &map);
+        assert!(roxmltree::Document::parse(&text).is_ok());
+        assert!(!text.contains("NaN"));
+    }
+}
+
+#[test]
+fn every_text_says_its_reference_state() {
+    let map = support::fitted();
+    for entry in FORMATS.iter().filter(|entry| !["json", "svg", "png"].contains(&entry.name)) {
+        let text = export(entry.name, &map);
+        assert!(text.contains("298 K, 100000 Pa"), "{}", entry.name);
+    }
+}
+
+#[test]
+fn sae_goes_from_choke_to_surge_and_holds_every_efficiency() {
+    let map = support::turbo_a();
+    let text = export("sae", &map);
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| line.split(' ').map(|field| field.parse().unwrap()).collect())
+        .collect();
+    assert_eq!(rows.len(), points(&map).iter().filter(|p| p.eta.is_some()).count());
+    assert!(rows.windows(2).all(|w| w[1][0] > w[0][0] || w[1][1] <= w[0][1]));
+}
+
+#[test]
+fn the_fitted_table_marks_what_is_extrapolated() {
+    let map = support::fitted();
+    let text = export("fitted", &map);
+    let (fitted, marks) = (map.fitted.unwrap(), text.matches(",extrapolated\n").count());
+    let nodes = || fitted.lines.iter().flat_map(|line| &line.nodes);
+    assert_eq!(marks, nodes().filter(|n| n.extrapolated).count());
+    assert_eq!(text.matches(",measured\n").count(), nodes().filter(|n| !n.extrapolated).count());
+}

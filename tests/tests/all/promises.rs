@@ -1,0 +1,145 @@
+//! Promises of ARCHITECTURE.md: what is added by one file and one line. Each is kept as a patch in `tests/promises`, put into
+//! a copy of the tree, counted, built, and seen in the program.
+
+use mapper_tests::{repository, scratch};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What a patch adds, and how the program shows that it has it.
+struct Promise {
+    /// File in `tests/promises`.
+    patch: &'static str,
+    /// Arguments of the program, and a word that it prints with the patch and does not print without.
+    shown_by: (&'static [&'static str], &'static str),
+}
+
+const PROMISES: &[Promise] =
+    &[Promise { patch: "effect.patch", shown_by: (&["gap", "effects"], "seal_friction") }];
+
+/// What git says of a patch: lines added and removed, by file.
+fn changes(patch: &Path) -> BTreeMap<String, (usize, usize)> {
+    let listed = git(&repository(), ["apply".as_ref(), "--numstat".as_ref(), patch.as_os_str()]);
+    let change = |line: &str| {
+        let mut columns = line.split('\t');
+        let mut number = || columns.next().unwrap().parse().unwrap();
+        let counts = (number(), number());
+        (columns.next().unwrap().to_owned(), counts)
+    };
+    listed.lines().map(change).collect()
+}
+
+fn git<'a>(directory: &Path, arguments: impl IntoIterator<Item = &'a std::ffi::OsStr>) -> String {
+    let output = Command::new("git")
+        .args(arguments)
+        .current_dir(directory)
+        .output()
+        .unwrap_or_else(|error| panic!("git: {error}"));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn what_is_promised_is_one_file_and_one_line() {
+    for Promise { patch, .. } in PROMISES {
+        let changes = changes(&repository().join("tests/promises").join(patch));
+        let (new, old): (Vec<_>, Vec<_>) =
+            changes.iter().partition(|(file, _)| !repository().join(file).exists());
+        assert_eq!(new.len(), 1, "{patch}: one new file, not {new:?}");
+        assert_eq!(old.len(), 1, "{patch}: one file that is there, not {old:?}");
+        assert_eq!(*old[0].1, (1, 0), "{patch}: one line is added to {}", old[0].0);
+    }
+}
+
+/// A copy of the tree with all patches, kept from run to run: only what differs is written, so that only that is built.
+fn patched_tree() -> PathBuf {
+    let (root, tree) = (repository(), target().join("promises/tree"));
+    // The files that patches change, apart, so that their times in the copy stay.
+    let changed = scratch();
+    let inside = changed.path();
+    for Promise { patch, .. } in PROMISES {
+        let patch = root.join("tests/promises").join(patch);
+        for file in changes(&patch).keys() {
+            let (from, to) = (root.join(file), inside.join(file));
+            if from.exists() && !to.exists() {
+                std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+                std::fs::copy(from, to).unwrap();
+            }
+        }
+        // A line of context on each side: what others change nearby is no matter.
+        git(inside, ["apply".as_ref(), "-C1".as_ref(), patch.as_os_str()]);
+    }
+    let mut wanted: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
+    let listed = git(&root, ["ls-files", "--cached", "--others", "--exclude-standard"].map(AsRef::as_ref));
+    for file in listed.lines().filter(|file| root.join(file).is_file()) {
+        wanted.insert(file.into(), root.join(file));
+    }
+    for file in files_below(inside) {
+        wanted.insert(file.strip_prefix(inside).unwrap().to_owned(), file.clone());
+    }
+    for (file, from) in &wanted {
+        let (to, content) = (tree.join(file), std::fs::read(from).unwrap());
+        if std::fs::read(&to).ok().as_ref() != Some(&content) {
+            std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+            std::fs::write(&to, content).unwrap();
+        }
+    }
+    for file in files_below(&tree) {
+        if !wanted.contains_key(file.strip_prefix(&tree).unwrap()) {
+            std::fs::remove_file(file).unwrap();
+        }
+    }
+    tree
+}
+
+fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).into_iter().flatten() {
+        let path = entry.unwrap().path();
+        if path.is_dir() { files.extend(files_below(&path)) } else { files.push(path) }
+    }
+    files
+}
+
+/// Where this test's own program was built: below it everything may be written.
+fn target() -> PathBuf {
+    let own = std::env::current_exe().unwrap();
+    own.ancestors()
+        .find(|folder| folder.ends_with("target"))
+        .map_or_else(|| repository().join("target"), Path::to_owned)
+}
+
+#[test]
+fn what_is_promised_is_built_and_seen() {
+    let tree = patched_tree();
+    let programs = target().join("promises/programs");
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let built = Command::new(cargo)
+        .args(["build", "--quiet", "--offline", "--workspace", "--bin", "mapper"])
+        // Unoptimised: it is looked at, not used. Libraries of others are the ones that the tests have.
+        .args([
+            "--config",
+            "profile.dev.opt-level=0",
+            "--config",
+            "profile.dev.package.mapper-assemble.opt-level=0",
+        ])
+        .env("CARGO_BUILD_BUILD_DIR", target())
+        .env("CARGO_TARGET_DIR", &programs)
+        .env("CARGO_INCREMENTAL", "0")
+        .current_dir(&tree)
+        .output()
+        .unwrap();
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    for Promise { patch, shown_by: (arguments, word) } in PROMISES {
+        let shown = |program: &Path| {
+            let output = Command::new(program).args(*arguments).current_dir(&tree).output().unwrap();
+            String::from_utf8_lossy(&output.stdout).contains(word)
+        };
+        assert!(
+            shown(&programs.join("debug").join(format!("mapper{}", std::env::consts::EXE_SUFFIX))),
+            "{patch}"
+        );
+        let without = mapper_tests::mapper(*arguments).exits(0);
+        assert!(!without.stdout.contains(word), "{patch}: the program prints `{word}` without it");
+    }
+}

@@ -2,17 +2,19 @@
 //! finds the numbers that turn scores into probabilities.
 
 use crate::case::{Case, Draw};
+use crate::error::BlindError;
+use crate::kind::CaseKind;
 use crate::lab::Schedule;
 use crate::logistic::logistic;
+use crate::outside::{OutsideUse, outside_kinds};
 use crate::ruler::{StudyRuler, declared};
-use crate::{BlindError, CaseKind, OutsideUse, outside_kinds};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_gap::calibration::Calibration;
+use mapper_gap::coordinate::coordinates;
 use mapper_gap::diagnose::{Diagnosed, Question, diagnose, prior};
-use mapper_gap::fit::{Fit, coordinates};
+use mapper_gap::fit::Fit;
 use mapper_gap::report::Verdict;
-use mapper_gap::select::members;
-use mapper_gap::study::Study;
+use mapper_gap::study::{Study, members};
 use mapper_physics::effect::Effect;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -68,9 +70,8 @@ pub fn calibrate(
     made_by: String,
     done: &dyn Fn(&Observed),
 ) -> Result<(Calibration, Vec<Observed>), BlindError> {
-    let of_model = |message: String| BlindError::Model { message };
-    let nominal = nominal_model(campaign).map_err(|error| of_model(error.to_string()))?;
-    let before = Calibration::shipped().map_err(|error| of_model(error.to_string()))?;
+    let nominal = nominal_model(campaign)?;
+    let before = Calibration::shipped().map_err(BlindError::signatures)?;
     let schedule = Schedule::new(campaign, &nominal)?;
     let mut known = catalogue.to_vec();
     known.extend(outside_kinds(OutsideUse::Calibration));

@@ -1,8 +1,9 @@
 //! Draws what a case has: which causes, how strong.
 
 use crate::cause::Cause;
+use crate::kind::CaseKind;
+use crate::outside::{OutsideUse, outside_kinds};
 use crate::strength::{Ruler, strength};
-use crate::{CaseKind, OutsideUse, outside_kinds};
 use mapper_physics::effect::Effect;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};

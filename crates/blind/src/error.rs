@@ -3,6 +3,7 @@
 use mapper_core::BackendError;
 use mapper_physics::effect::EffectError;
 use mapper_physics::steady::SteadyError;
+use mapper_physics::tabulated_map::MapError;
 use mapper_record::RecordError;
 use std::path::PathBuf;
 
@@ -18,14 +19,24 @@ pub enum BlindError {
         source: std::io::Error,
     },
     /// A file does not hold what it should.
-    #[error("{} holds no {what}: {message}", path.display())]
+    #[error("{} does not hold {what}: {source}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
         /// What it should hold.
         what: &'static str,
         /// Why it does not.
-        message: String,
+        source: serde_json::Error,
+    },
+    /// A file is larger than any of its kind.
+    #[error("{} has {bytes} bytes; at most {limit} are read", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+        /// Largest size read.
+        limit: u64,
     },
     /// The answers are not those that were sealed.
     #[error(
@@ -57,11 +68,17 @@ pub enum BlindError {
     /// A recording cannot be written.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// No nominal model.
-    #[error("{message}")]
-    Model {
+    /// The campaign's map makes no nominal model.
+    #[error(transparent)]
+    NominalModel(#[from] MapError),
+    /// No channel of the campaign's recording can be compared with the model.
+    #[error("the campaign records nothing to measure signatures by; declare sensors of speed, P2, T2 or Tc")]
+    NothingRecorded,
+    /// The diagnosis that measures signatures, or its calibration, failed.
+    #[error("failed to measure signatures: {source}")]
+    Signatures {
         /// Why.
-        message: String,
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// More cases than anyone needs.
     #[error("{cases} cases were asked for; between 1 and {most} can be made")]
@@ -74,6 +91,10 @@ pub enum BlindError {
 }
 
 impl BlindError {
+    pub(crate) fn signatures(source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        BlindError::Signatures { source: Box::new(source) }
+    }
+
     pub(crate) fn file(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         move |source| BlindError::File { path, source }

@@ -1,8 +1,9 @@
 //! Runs one case on the virtual lab.
 
 use crate::case::Case;
+use crate::error::BlindError;
+use crate::truth::Truth;
 use crate::truth::TruthPoint;
-use crate::{BlindError, Truth};
 use mapper_backends::virtual_lab::{
     ActuatorDynamics, LabSettings, SensorErrors, Start, VirtualLab, Weather, draw_tolerances,
 };

@@ -1,10 +1,12 @@
 //! Makes a directory of blind cases.
 
 use crate::case::{Case, Draw};
+use crate::error::BlindError;
 use crate::lab::Schedule;
+use crate::outside::outside_kinds;
 use crate::ruler::StudyRuler;
 use crate::seal::{ANSWERS_NAME, MANIFEST_NAME, Manifest, sha256};
-use crate::{BlindError, Truth, outside_kinds};
+use crate::truth::Truth;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_physics::effect::Effect;
 use mapper_record::RecordingHeader;
@@ -42,8 +44,7 @@ pub fn make(
     if !(1..=MOST_CASES).contains(&draw.cases) {
         return Err(BlindError::Cases { cases: draw.cases, most: MOST_CASES });
     }
-    let nominal =
-        nominal_model(campaign).map_err(|error| BlindError::Model { message: error.to_string() })?;
+    let nominal = nominal_model(campaign)?;
     let schedule = Schedule::new(campaign, &nominal)?;
     let mut known = catalogue.to_vec();
     known.extend(outside_kinds(draw.outside));
@@ -106,10 +107,10 @@ fn run_all(
 }
 
 fn json(value: &impl serde::Serialize, path: &Path) -> Result<Vec<u8>, BlindError> {
-    let bytes = serde_json::to_vec_pretty(value).map_err(|error| BlindError::Content {
+    let bytes = serde_json::to_vec_pretty(value).map_err(|source| BlindError::Content {
         path: path.to_owned(),
         what: "JSON",
-        message: error.to_string(),
+        source,
     })?;
     let mut file = std::fs::File::create_new(path).map_err(BlindError::file(path))?;
     std::io::Write::write_all(&mut file, &bytes).map_err(BlindError::file(path))?;

@@ -2,18 +2,20 @@
 
 use crate::case::Case;
 use crate::cause::Cause;
+use crate::error::BlindError;
+use crate::kind::CaseKind;
 use crate::lab::Schedule;
 use crate::strength::Ruler;
-use crate::{BlindError, CaseKind};
 use mapper_campaign::Campaign;
 use mapper_core::NoiseColour;
-use mapper_gap::declared::Declared;
 use mapper_gap::signature::lengths;
 use mapper_gap::study::{EffectValues, Study};
-use mapper_gap::table::Table;
 use mapper_gap::whiten::Linearised;
+use mapper_observe::table::Table;
+use mapper_observe::{Declared, declared_uncertainties};
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Measures signatures on one recording of the campaign that has noise, offsets, tolerances and weather, and no cause.
@@ -25,8 +27,9 @@ pub(crate) struct StudyRuler {
 
 /// What the campaign declares.
 pub(crate) fn declared(campaign: &Campaign) -> Declared {
+    let sensors = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared));
     Declared {
-        sensors: campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
+        sensors: declared_uncertainties(&sensors.collect(), &campaign.tolerances, &BTreeMap::new()),
         noise_colour: NoiseColour::default(),
         tolerances: campaign.tolerances,
         nominal: campaign.boundary,
@@ -50,12 +53,9 @@ impl StudyRuler {
             seed,
         };
         let recording = schedule.record(&case)?;
-        let of_model = |message: String| BlindError::Model { message };
-        let table = Table::new(&recording)
-            .ok_or_else(|| of_model("the campaign records nothing to measure signatures by".to_owned()))?;
-        let study = Study::new(&recording, table, declared(campaign), nominal.clone(), effects)
-            .map_err(|error| of_model(error.to_string()))?;
-        let linearised = Linearised::new(&study).map_err(|error| of_model(error.to_string()))?;
+        let table = Table::new(&recording).ok_or(BlindError::NothingRecorded)?;
+        let study = Study::new(&recording, table, declared(campaign), nominal.clone(), effects);
+        let linearised = Linearised::new(&study).map_err(BlindError::signatures)?;
         Ok(StudyRuler { study, linearised })
     }
 }

@@ -1,8 +1,10 @@
 //! Holds diagnoses against opened answers.
 
+use crate::error::BlindError;
 use crate::interval::Share;
+use crate::kind::CaseKind;
 use crate::seal::{MANIFEST_NAME, Manifest, open, read_json};
-use crate::{BlindError, CaseKind, Truth};
+use crate::truth::Truth;
 use mapper_effects::catalogue;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -154,10 +156,10 @@ pub fn open_answers(directory: &Path) -> Result<usize, BlindError> {
             continue;
         }
         let path = directory.join(format!("{}.truth.json", truth.name));
-        let bytes = serde_json::to_vec_pretty(truth).map_err(|error| BlindError::Content {
+        let bytes = serde_json::to_vec_pretty(truth).map_err(|source| BlindError::Content {
             path: path.clone(),
             what: "JSON",
-            message: error.to_string(),
+            source,
         })?;
         std::fs::write(&path, bytes).map_err(BlindError::file(&path))?;
     }

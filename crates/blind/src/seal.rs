@@ -1,6 +1,7 @@
 //! Answers under seal: a hash printed before anything is diagnosed.
 
-use crate::{BlindError, Truth};
+use crate::error::BlindError;
+use crate::truth::Truth;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -43,18 +44,17 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
 /// Reads a JSON file.
 pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, what: &'static str) -> Result<T, BlindError> {
     let bytes = read(path)?;
-    serde_json::from_slice(&bytes).map_err(|error| BlindError::Content {
+    serde_json::from_slice(&bytes).map_err(|source| BlindError::Content {
         path: path.to_owned(),
         what,
-        message: error.to_string(),
+        source,
     })
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
     let size = std::fs::metadata(path).map_err(BlindError::file(path))?.len();
     if size > LARGEST_BYTES {
-        let message = format!("{size} bytes are more than the {LARGEST_BYTES} that are read");
-        return Err(BlindError::Content { path: path.to_owned(), what: "answers", message });
+        return Err(BlindError::TooLarge { path: path.to_owned(), bytes: size, limit: LARGEST_BYTES });
     }
     std::fs::read(path).map_err(BlindError::file(path))
 }
@@ -70,9 +70,5 @@ pub(crate) fn open(directory: &Path, manifest: &Manifest) -> Result<Vec<Truth>, 
     if found != manifest.answers_sha256 {
         return Err(BlindError::Seal { path, found, expected: manifest.answers_sha256.clone() });
     }
-    serde_json::from_slice(&bytes).map_err(|error| BlindError::Content {
-        path,
-        what: "answers",
-        message: error.to_string(),
-    })
+    serde_json::from_slice(&bytes).map_err(|source| BlindError::Content { path, what: "answers", source })
 }

@@ -29,6 +29,6 @@ pub use load::{
     CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
 };
 pub use mapper_units as units;
-pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
+pub use nightly::{Nightly, NightlyError, NightlyGroup, NightlyMistake, load_nightly};
 pub use reach::{Unreachable, nominal_model, unreachable_points};
 pub use schema::json_schema;

@@ -22,12 +22,60 @@ pub enum NightlyError {
         source: std::io::Error,
     },
     /// The file is not what it should be.
-    #[error("{}: {message}", .path.display())]
+    #[error("{}: {source}", .path.display())]
     Mistake {
         /// The file.
         path: PathBuf,
         /// What is wrong, and what to do.
-        message: String,
+        source: NightlyMistake,
+    },
+}
+
+/// A mistake in a nightly campaign.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NightlyMistake {
+    /// Not text.
+    #[error("this is not UTF-8 from byte {valid_bytes} on; save it as UTF-8")]
+    NotText {
+        /// Bytes before the first that is not.
+        valid_bytes: usize,
+    },
+    /// A key or a value that the file cannot have; the message names its place.
+    #[error("{reason}")]
+    Form {
+        /// What the reader of the file said.
+        reason: String,
+    },
+    /// No name.
+    #[error("`nightly` is empty; give the nightly campaign a name")]
+    NoName,
+    /// A band over no night.
+    #[error("`band.nights` is 0; a band needs at least 1 night, 14 are usual")]
+    NoNights,
+    /// Nothing to run, or more than a night holds.
+    #[error("it asks for {runs} runs; 1 to {RUNS_LIMIT} can be made")]
+    Runs {
+        /// Number of runs asked for.
+        runs: usize,
+    },
+    /// A method or a seed that a group names twice.
+    #[error("`runs[{index}]` ({}) names {what} twice", .campaign.display())]
+    Twice {
+        /// The group, from 0.
+        index: usize,
+        /// Its campaign.
+        campaign: PathBuf,
+        /// What it names twice.
+        what: &'static str,
+    },
+    /// A campaign in two groups.
+    #[error(
+        "the campaign {} stands in `runs` twice; name it once with all its methods and seeds",
+        .campaign.display()
+    )]
+    CampaignTwice {
+        /// The campaign.
+        campaign: PathBuf,
     },
 }
 
@@ -96,21 +144,19 @@ struct GroupFile {
 /// or more than 10 000.
 pub fn load_nightly(path: &Path) -> Result<Nightly, NightlyError> {
     let read = |source| NightlyError::Read { path: path.to_owned(), source };
-    let mistake = |message: String| NightlyError::Mistake { path: path.to_owned(), message };
+    let mistake = |source| NightlyError::Mistake { path: path.to_owned(), source };
     let bytes = read_limited(path, FILE_SIZE_LIMIT).map_err(read)?;
     let text = String::from_utf8(bytes).map_err(|error| {
-        mistake(format!(
-            "this is not UTF-8 from byte {} on; save it as UTF-8",
-            error.utf8_error().valid_up_to()
-        ))
+        mistake(NightlyMistake::NotText { valid_bytes: error.utf8_error().valid_up_to() })
     })?;
-    let file: NightlyFile = deserialise::any(&text).map_err(|error| mistake(error.message))?;
+    let file: NightlyFile =
+        deserialise::any(&text).map_err(|error| mistake(NightlyMistake::Form { reason: error.message }))?;
     if file.nightly.trim().is_empty() {
-        return Err(mistake("`nightly` is empty; give the nightly campaign a name".to_owned()));
+        return Err(mistake(NightlyMistake::NoName));
     }
     let nights = file.band.map_or(DEFAULT_NIGHTS, |band| band.nights);
     if nights == 0 {
-        return Err(mistake("`band.nights` is 0; a band needs at least 1 night, 14 are usual".to_owned()));
+        return Err(mistake(NightlyMistake::NoNights));
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     let groups: Vec<NightlyGroup> = file
@@ -124,12 +170,11 @@ pub fn load_nightly(path: &Path) -> Result<Nightly, NightlyError> {
         .collect();
     let runs = groups.iter().fold(0_usize, |runs, group| runs.saturating_add(group.runs()));
     if !(1..=RUNS_LIMIT).contains(&runs) {
-        return Err(mistake(format!("it asks for {runs} runs; 1 to {RUNS_LIMIT} can be made")));
+        return Err(mistake(NightlyMistake::Runs { runs }));
     }
     for (index, group) in groups.iter().enumerate() {
-        let twice = |what: &str| {
-            mistake(format!("`runs[{index}]` ({}) names {what} twice", group.campaign.display()))
-        };
+        let campaign = group.campaign.clone();
+        let twice = |what| mistake(NightlyMistake::Twice { index, campaign, what });
         if has_duplicate(&group.methods) {
             return Err(twice("a method"));
         }
@@ -137,10 +182,7 @@ pub fn load_nightly(path: &Path) -> Result<Nightly, NightlyError> {
             return Err(twice("a seed"));
         }
         if groups[..index].iter().any(|other| other.campaign == group.campaign) {
-            return Err(mistake(format!(
-                "the campaign {} stands in `runs` twice; name it once with all its methods and seeds",
-                group.campaign.display()
-            )));
+            return Err(mistake(NightlyMistake::CampaignTwice { campaign: group.campaign.clone() }));
         }
     }
     let history = file.history.unwrap_or_else(|| PathBuf::from("runs/history.db"));

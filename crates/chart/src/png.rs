@@ -23,10 +23,10 @@ pub enum PngError {
         height: f32,
     },
     /// The encoder failed.
-    #[error("failed to encode the picture: {message}")]
+    #[error("failed to encode the picture: {source}")]
     Encode {
         /// What it said.
-        message: String,
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
 }
 
@@ -51,6 +51,6 @@ impl Figure {
         let pixels = Pixmap::new(width.ceil() as u32, height.ceil() as u32);
         let mut pixels = pixels.ok_or(PngError::Size { width, height })?;
         resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixels.as_mut());
-        pixels.encode_png().map_err(|error| PngError::Encode { message: error.to_string() })
+        pixels.encode_png().map_err(|error| PngError::Encode { source: Box::new(error) })
     }
 }

@@ -53,18 +53,35 @@ pub trait Backend: Send {
     fn describe(&self) -> RigDescription;
 
     /// Takes control of the rig; run time 0 starts here.
+    ///
+    /// # Errors
+    /// [`BackendError::OutOfOrder`] where it is armed already, [`BackendError::Lost`] where it cannot be reached.
     fn arm(&mut self) -> Result<(), BackendError>;
 
     /// Sends new setpoints, effective from the time of the last poll on.
+    ///
+    /// # Errors
+    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::SetpointOutOfRange`],
+    /// [`BackendError::Simulation`] or [`BackendError::Lost`] where the rig cannot follow.
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError>;
 
     /// Lets the rig run until `until_s` (seconds since arming) and returns the samples since the last poll.
+    ///
+    /// # Errors
+    /// [`BackendError::OutOfOrder`] before it is armed and told its setpoints, [`BackendError::Simulation`] and
+    /// [`BackendError::Lost`] with the time at which it stopped.
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError>;
 
     /// Brings the rig into its safe state: air off, valve open.
+    ///
+    /// # Errors
+    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::Lost`] where it cannot be reached.
     fn make_safe(&mut self) -> Result<(), BackendError>;
 
     /// Gives control of the rig back.
+    ///
+    /// # Errors
+    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::Lost`] where it cannot be reached.
     fn disarm(&mut self) -> Result<(), BackendError>;
 }
 

@@ -1,7 +1,8 @@
 //! Causes with their courses, weighed against the readings.
 
-use crate::study::Readings;
-use crate::{Cause, Course, CourseKind};
+use crate::cause::Cause;
+use crate::course::{Course, CourseKind};
+use crate::readings::Readings;
 use nalgebra::DMatrix;
 
 /// A cause, by its position among those that show, with a course.

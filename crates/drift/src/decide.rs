@@ -1,12 +1,14 @@
 //! Which cause, with which course: every one is tried against what is constant, and chance is simulated.
 
 use crate::candidates::{Candidate, Weighed, courses, evidence, mean_of, weigh};
+use crate::cause::Cause;
+use crate::course::CourseKind;
 use crate::fit::{Fit, fit};
 use crate::leftovers::{inflate, leave_out};
 use crate::low_rank::LowRank;
+use crate::readings::Readings;
 use crate::report::{Alternative, DetectionLimit};
-use crate::study::Readings;
-use crate::{Cause, CourseKind, DriftError};
+use crate::request::{DriftError, Unsolvable};
 use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -80,9 +82,7 @@ pub(crate) fn decide(
     let probabilities = probabilities(&causes, &candidates, &weighed, end_s - start_s);
     let best = (0..candidates.len())
         .max_by(|a, b| weighed.evidence[*a].total_cmp(&weighed.evidence[*b]))
-        .ok_or_else(|| DriftError::Numbers {
-            message: "no cause shows in the channels recorded".to_owned(),
-        })?;
+        .ok_or(Unsolvable::NothingShows)?;
     let evidence = weighed.evidence[best];
     let flagged = evidence > threshold;
     // Among causes, the most probable one: it need not be that of the single best course.

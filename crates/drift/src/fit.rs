@@ -1,20 +1,18 @@
 //! Size and onset of one cause, with everything that is constant fitted beside it.
 
 use crate::candidates::{Candidate, courses, mean_of, weigh};
+use crate::cause::Cause;
+use crate::course::{Course, CourseKind};
 use crate::low_rank::LowRank;
-use crate::study::Readings;
-use crate::{Cause, Course, CourseKind, DriftError};
+use crate::readings::Readings;
+use crate::request::{DriftError, Unsolvable};
+use mapper_numerics::statistics::{CHI_SQUARE_1_95, NORMAL_975};
 use nalgebra::{DMatrix, DVector};
 
 /// Onsets on the fine grid of the cause that is found.
 const FINE_ONSETS: usize = 280;
 /// Evidence that is no difference.
 const AS_GOOD: f64 = 0.1;
-/// 95 % quantile of chi-square with one degree of freedom.
-const CHI2_95: f64 = 3.841_458_820_694_124;
-/// Half width of a 95 % interval in standard deviations.
-const Z_975: f64 = 1.959_963_984_540_054;
-
 /// A cause with its best course and size.
 pub(crate) struct Fit {
     /// Best course.
@@ -47,8 +45,7 @@ pub(crate) fn fit(
     cause: Cause,
     kind: CourseKind,
 ) -> Result<Fit, DriftError> {
-    let nothing =
-        || DriftError::Numbers { message: format!("{cause} does not show in the channels recorded") };
+    let nothing = || Unsolvable::Hidden { cause };
     let signature = readings.signature(cause).ok_or_else(nothing)?;
     let (start_s, end_s) = readings.span_s();
     let fine: Vec<Candidate> = courses(start_s, end_s, FINE_ONSETS)
@@ -71,8 +68,9 @@ pub(crate) fn fit(
     let first = (0..=best).rev().take_while(as_good).last().unwrap_or(best);
     let last = (best..fine.len()).take_while(as_good).last().unwrap_or(best);
     let peak = first.midpoint(last);
-    let within: Vec<usize> =
-        (0..fine.len()).filter(|index| profile.evidence[*index] > profile.evidence[peak] - CHI2_95).collect();
+    let within: Vec<usize> = (0..fine.len())
+        .filter(|index| profile.evidence[*index] > profile.evidence[peak] - CHI_SQUARE_1_95)
+        .collect();
     let extreme = |value: &dyn Fn(usize) -> f64, sign: f64| {
         sign * within.iter().map(|index| sign * value(*index)).fold(f64::NEG_INFINITY, f64::max)
     };
@@ -80,8 +78,8 @@ pub(crate) fn fit(
     Ok(Fit {
         course: fine[peak].course,
         size: profile.size[peak],
-        low: extreme(&|index| profile.size[index] - Z_975 * profile.sigma[index], -1.0),
-        high: extreme(&|index| profile.size[index] + Z_975 * profile.sigma[index], 1.0),
+        low: extreme(&|index| profile.size[index] - NORMAL_975 * profile.sigma[index], -1.0),
+        high: extreme(&|index| profile.size[index] + NORMAL_975 * profile.sigma[index], 1.0),
         onset_low_s: extreme(&|index| fine[index].course.onset_s, -1.0),
         onset_high_s: extreme(&|index| fine[index].course.onset_s, 1.0),
         constants: noise.constants(&left).column(0).into_owned(),

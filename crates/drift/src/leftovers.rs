@@ -1,8 +1,9 @@
 //! What the best explanation leaves: stretches that the model cannot follow, and noise beyond what is declared.
 
-use crate::DriftError;
 use crate::low_rank::LowRank;
-use crate::study::Readings;
+use crate::readings::Readings;
+use crate::request::Unsolvable;
+use mapper_numerics::statistics::median;
 use nalgebra::{DMatrix, DVector};
 
 /// A stretch stands out when it lies so many times as far from the model as the middle one.
@@ -19,7 +20,7 @@ pub(crate) fn leave_out(
     columns: &DMatrix<f64>,
     difference: &DMatrix<f64>,
     shown: &DMatrix<f64>,
-) -> Result<usize, DriftError> {
+) -> Result<usize, Unsolvable> {
     let count = readings.columns.len();
     let mut out = vec![false; own.len()];
     for _ in 0..LEAVE_OUT_ROUNDS {
@@ -30,10 +31,8 @@ pub(crate) fn leave_out(
                 left.rows(block * count, count).iter().map(|value| value * value).sum::<f64>() / count as f64
             })
             .collect();
-        let mut kept: Vec<f64> =
-            (0..own.len()).filter(|block| !out[*block]).map(|block| sizes[block]).collect();
-        kept.sort_by(f64::total_cmp);
-        let usual = kept.get(kept.len() / 2).copied().unwrap_or(1.0).max(1.0);
+        let kept = (0..own.len()).filter(|block| !out[*block]).map(|block| sizes[block]);
+        let usual = median(kept).unwrap_or(1.0).max(1.0);
         let far: Vec<usize> = (0..own.len())
             .filter(|block| !out[*block] && sizes[*block] > FAR_OUT * FAR_OUT * usual)
             .collect();

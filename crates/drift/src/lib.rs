@@ -10,30 +10,36 @@
 mod blocks;
 mod candidates;
 mod cause;
-mod correct;
+mod conclude;
+mod constant;
+mod corrected;
 mod course;
 mod decide;
+mod diagnose;
+mod drive;
 mod fit;
-mod inputs;
-mod knob;
+mod knobs;
 mod leftovers;
 mod low_rank;
 mod nuisance;
 mod planted;
-mod plausible;
+mod prediction;
+mod readings;
 mod refine;
 mod repeats;
 mod report;
 mod request;
-mod simulate;
-mod study;
+mod stretch;
+mod take_off;
+mod usable;
+mod visits;
 
 pub use cause::{Cause, CauseKind};
-pub use correct::without_drift;
 pub use course::{Course, CourseKind};
+pub use diagnose::diagnose;
 pub use report::{
     Alternative, CorrectedPoint, DetectionLimit, DriftReport, DriftVerdict, RateOrStep, RepeatGroup, Visit,
     VisitChannel,
 };
-pub use request::{DriftError, DriftRequest, RecordedRun};
-pub use study::diagnose;
+pub use request::{DriftError, DriftRequest, RecordedRun, Unsolvable};
+pub use take_off::without_drift;

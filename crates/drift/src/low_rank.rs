@@ -1,6 +1,6 @@
 //! Noise that is independent from stretch to stretch, plus constants with priors: covariance D + U U'.
 
-use crate::DriftError;
+use crate::request::Unsolvable;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Whitened by D's Cholesky factors; U stands whitened beside it.
@@ -16,21 +16,19 @@ pub(crate) struct LowRank {
 
 impl LowRank {
     /// `own` are the covariances of the stretches, `columns` the constants as the readings show them.
-    pub fn new(own: &[DMatrix<f64>], columns: &DMatrix<f64>) -> Result<Self, DriftError> {
-        let numbers = |message: &str| DriftError::Numbers { message: message.to_owned() };
+    pub fn new(own: &[DMatrix<f64>], columns: &DMatrix<f64>) -> Result<Self, Unsolvable> {
         let factors = own
             .iter()
             .map(|covariance| Some(Cholesky::new(covariance.clone())?.l()))
             .collect::<Option<Vec<_>>>()
-            .ok_or_else(|| numbers("the noise of some channel is declared as 0; declare what it has"))?;
+            .ok_or(Unsolvable::NoNoise)?;
         let mut whitened = columns.clone();
         whiten_by(&factors, &mut whitened);
         if whitened.iter().any(|value| !value.is_finite()) {
-            return Err(numbers("the model's answer to some parameter is not finite"));
+            return Err(Unsolvable::NotFinite);
         }
         let inner = DMatrix::identity(whitened.ncols(), whitened.ncols()) + whitened.tr_mul(&whitened);
-        let inner =
-            Cholesky::new(inner).ok_or_else(|| numbers("constants of the campaign are not independent"))?;
+        let inner = Cholesky::new(inner).ok_or(Unsolvable::Dependent)?;
         Ok(LowRank { factors, columns: whitened, inner })
     }
 

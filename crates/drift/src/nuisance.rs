@@ -1,20 +1,13 @@
 //! What is constant over a campaign, each with its prior: it is not drift.
 
-use crate::blocks::OUTPUTS;
-use crate::knob::Knob;
-use crate::study::Readings;
-use mapper_core::{Channel, DeclaredUncertainty, Dimension};
-
-/// A constant of one standard deviation, as readings and points show it.
-#[derive(Debug, Clone)]
-pub(crate) struct Constant {
-    /// Readings, stretch after stretch.
-    pub readings: Vec<f64>,
-    /// Efficiency at the end of each step, fraction.
-    pub eta: Vec<f64>,
-    /// Heat-transfer coefficient at the end of each step, W/(m2 K).
-    pub h_w_m2k: Vec<f64>,
-}
+use crate::blocks::Block;
+use crate::constant::Constant;
+use crate::knobs::{KNOBS, sigma};
+use crate::readings::Readings;
+use mapper_core::Channel;
+use mapper_observe::channels::OUTPUTS;
+use mapper_observe::declared::Declared;
+use mapper_observe::knob::Knob;
 
 /// Deviations of each operating point from the smooth model, shared by its repeats: one standard deviation.
 const OWN_DEVIATIONS: [(Knob, f64); 4] = [
@@ -37,38 +30,28 @@ fn own_deviation(channel: Channel, level: f64) -> f64 {
 }
 
 /// All constants of a campaign.
-pub(crate) fn constants(
-    readings: &Readings,
-    declared: &dyn Fn(Channel) -> DeclaredUncertainty,
-) -> Vec<Constant> {
+pub(crate) fn constants(readings: &Readings, declared: &Declared) -> Vec<Constant> {
     let mut constants = Vec::new();
-    for (knob, answer) in Knob::ALL.iter().zip(&readings.answers) {
+    for (knob, answer) in KNOBS.iter().zip(&readings.answers) {
         let sigma = match knob {
             Knob::Input(channel) => {
-                let declared = declared(*channel);
+                let declared = declared.of(*channel);
                 declared.offset_sigma.hypot(declared.gain_sigma_ratio * readings.input_level(*channel))
             }
-            knob => knob.tolerance(),
+            knob => sigma(*knob, &declared.tolerances),
         };
         if sigma <= 0.0 {
             continue;
         }
-        let of_runs = matches!(knob, Knob::InitialTc | Knob::InitialTt);
+        let of_runs = matches!(knob, Knob::StartTc | Knob::StartTt);
         for run in 0..if of_runs { readings.runs } else { 1 } {
             let holds = |step: usize| !of_runs || readings.steps[step].run == run;
             constants.push(scaled(readings, answer, sigma, &holds));
         }
     }
     for (column, channel) in OUTPUTS.iter().enumerate() {
-        let declared = declared(*channel);
-        let sigma = |level: f64| {
-            // A flow meter without a declared gain still has one.
-            let gain = match channel.info().dimension {
-                Dimension::MassFlow => declared.gain_sigma_ratio.max(0.005),
-                _ => declared.gain_sigma_ratio,
-            };
-            declared.offset_sigma.hypot(gain * level)
-        };
+        let declared = declared.of(*channel);
+        let sigma = |level: f64| declared.offset_sigma.hypot(declared.gain_sigma_ratio * level);
         constants.push(channel_constant(readings, column, &sigma, &|_| true));
     }
     let conditions = readings.steps.iter().map(|step| step.condition + 1).max().unwrap_or(0);
@@ -105,7 +88,7 @@ fn wander(readings: &Readings, constants: &mut Vec<Constant>) {
     let (start_s, end_s) = readings.span_s();
     let count = ((end_s - start_s) / KNOT_S).ceil().clamp(1.0, 60.0);
     for knot in 0..=count as usize {
-        let hat = |block: &crate::blocks::Block| {
+        let hat = |block: &Block| {
             let t_s = 0.5 * (block.start_s + block.end_s) + readings.steps[block.step].offset_s;
             let place = (t_s - start_s) / (end_s - start_s).max(1.0) * count;
             (1.0 - (place - knot as f64).abs()).max(0.0)

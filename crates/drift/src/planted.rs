@@ -1,8 +1,10 @@
 //! A drift that was found, put into the model, so that the next fit is linear around it and no longer around a machine
 //! that never changed.
 
-use crate::knob::{INPUTS, Knob};
-use crate::{Cause, Course};
+use crate::cause::{Cause, FOULING_FLOW_SHARE};
+use crate::course::Course;
+use mapper_observe::channels::DRIVERS;
+use mapper_observe::knob::Knob;
 use mapper_physics::params::{BoundaryConditions, Params};
 
 /// A cause with its course, and its rate or step.
@@ -26,7 +28,7 @@ impl Planted {
 
     /// Whether something that drives the model was read wrong.
     pub fn input_drifts(&self) -> bool {
-        matches!(self.cause, Cause::Sensor(channel) if INPUTS.contains(&channel))
+        matches!(self.cause, Cause::Sensor(channel) if DRIVERS.contains(&channel))
     }
 
     /// The machine as it is on average over a part of the campaign, time of the campaign, s.
@@ -35,7 +37,7 @@ impl Planted {
         match self.cause {
             Cause::Fouling => {
                 Knob::Efficiency.turn(params, now);
-                Knob::Flow.turn(params, crate::cause::FOULING_FLOW_SHARE * now);
+                Knob::Flow.turn(params, FOULING_FLOW_SHARE * now);
             }
             Cause::BearingFriction => Knob::Friction.turn(params, now),
             Cause::Sensor(_) => {}

@@ -1,16 +1,17 @@
 //! A drift that was found is planted in the model and fitted again around that: the signature of the first look is that
 //! of a small change that has always been there, while the metal lags behind a real one.
 
-use crate::CauseKind;
 use crate::candidates::mean_of;
+use crate::cause::CauseKind;
+use crate::constant::Constant;
 use crate::decide::Decision;
+use crate::drive::{Drive, predict};
 use crate::fit::{Fit, fit};
 use crate::low_rank::LowRank;
-use crate::nuisance::{self, Constant};
+use crate::nuisance;
 use crate::planted::Planted;
-use crate::simulate::Drive;
-use crate::study::{Readings, predict};
-use mapper_core::{Channel, DeclaredUncertainty};
+use crate::readings::Readings;
+use mapper_observe::declared::Declared;
 use nalgebra::DMatrix;
 
 /// Rounds: each leaves about a tenth of what the one before had wrong.
@@ -28,12 +29,7 @@ pub(crate) struct Refined {
 
 impl Refined {
     /// Fits again around what was found, in rounds; what was found last stays where the model cannot follow it further.
-    pub fn around(
-        mut self,
-        drives: &mut [Drive<'_>],
-        declared: &dyn Fn(Channel) -> DeclaredUncertainty,
-        decision: &Decision,
-    ) -> Self {
+    pub fn around(mut self, drives: &mut [Drive<'_>], declared: &Declared, decision: &Decision) -> Self {
         for _ in 0..ROUNDS {
             match self.round(drives, declared, decision) {
                 Some(better) => self = better,
@@ -50,12 +46,7 @@ impl Refined {
     }
 
     /// `None` where there is nothing to plant, or the model cannot follow what is planted.
-    fn round(
-        &self,
-        drives: &mut [Drive<'_>],
-        declared: &dyn Fn(Channel) -> DeclaredUncertainty,
-        decision: &Decision,
-    ) -> Option<Refined> {
+    fn round(&self, drives: &mut [Drive<'_>], declared: &Declared, decision: &Decision) -> Option<Refined> {
         let Decision { cause, own, .. } = decision;
         let planted = Planted { cause: *cause, course: self.fit.course, size: self.fit.size };
         if !planted.is_in_model() {

@@ -1,7 +1,7 @@
 //! Which jumps are repeated, and whether that is enough to judge.
 
-use crate::RecordedRun;
 use crate::blocks::CampaignStep;
+use crate::request::RecordedRun;
 use mapper_core::{Channel, Recording};
 use std::collections::BTreeMap;
 

@@ -1,6 +1,6 @@
 //! The answer, as it is printed and written as JSON.
 
-use crate::{Cause, CauseKind};
+use crate::cause::{Cause, CauseKind};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -1,7 +1,11 @@
 //! What is asked, and why there may be no answer.
 
-use mapper_core::Recording;
-use mapper_identify::{IdentifyConfig, IdentifyError};
+use crate::cause::Cause;
+use mapper_core::{Channel, ModelTolerances, Recording};
+use mapper_identify::IdentifyConfig;
+use mapper_observe::declared::Declared;
+use mapper_observe::plausible::Implausible;
+use mapper_physics::inputs::InputsError;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 
@@ -23,10 +27,24 @@ pub struct DriftRequest<'a> {
     pub model: &'a Model,
     /// Boundary conditions for what is not recorded.
     pub boundary: BoundaryConditions,
+    /// How far the nominal machine may be off without having drifted.
+    pub tolerances: ModelTolerances,
     /// Declared uncertainty, window, geometry.
     pub identification: &'a IdentifyConfig,
     /// Seed of the simulated drift-free campaigns that set the threshold.
     pub seed: u64,
+}
+
+impl DriftRequest<'_> {
+    /// What is declared of rig and machine.
+    pub(crate) fn declared(&self) -> Declared {
+        Declared {
+            sensors: self.identification.declared.clone(),
+            noise_colour: self.identification.noise_colour,
+            tolerances: self.tolerances,
+            nominal: self.boundary,
+        }
+    }
 }
 
 /// Why a recording cannot be examined at all.
@@ -35,14 +53,56 @@ pub enum DriftError {
     /// No recording was given.
     #[error("no recording was given")]
     NoRun,
-    /// A recording has too little in it.
-    #[error("recording {}: {message}", .run + 1)]
-    Unusable {
+    /// Nothing was commanded.
+    #[error("recording {}: it has no steps; commands that change make steps", .run + 1)]
+    NoSteps {
         /// Which recording, from 0.
         run: usize,
-        /// What is missing, and what to do.
-        message: String,
     },
+    /// Channels without which drift is not judged.
+    #[error("recording {}: it has no {}; drift is judged by all of N, P2, T1, T2, the more the better", .run + 1, symbols(.channels))]
+    MissingChannels {
+        /// Which recording, from 0.
+        run: usize,
+        /// What is missing.
+        channels: Vec<Channel>,
+    },
+    /// A channel that often reads nothing.
+    #[error(
+        "recording {}: {missing} of {all} readings of {channel} are not numbers; mend the channel, or record it anew",
+        .run + 1
+    )]
+    NotNumbers {
+        /// Which recording, from 0.
+        run: usize,
+        /// The channel.
+        channel: Channel,
+        /// Readings that are not numbers.
+        missing: usize,
+        /// All readings.
+        all: usize,
+    },
+    /// Readings that no running machine has.
+    #[error("recording {}: {source}", .run + 1)]
+    Implausible {
+        /// Which recording, from 0.
+        run: usize,
+        /// Why.
+        source: Implausible,
+    },
+    /// The boundary conditions cannot drive the model.
+    #[error("recording {}: its inputs cannot be used: {source}", .run + 1)]
+    Inputs {
+        /// Which recording, from 0.
+        run: usize,
+        /// Why.
+        source: InputsError,
+    },
+    /// Nothing is left to compare.
+    #[error(
+        "no stretch of the recordings can be compared with the model: readings are missing or not numbers, or all of them lie          at the surge line. Look at the channels and their units, and whether the campaign names the machine"
+    )]
+    NothingComparable,
     /// The model cannot be driven by what was recorded.
     #[error(
         "the nominal model cannot follow recording {}: {source}. Does the campaign name the machine that was recorded?",
@@ -54,18 +114,34 @@ pub enum DriftError {
         /// Why.
         source: mapper_physics::driven::DriveError,
     },
-    /// The points cannot be identified.
-    #[error("recording {}: {source}", .run + 1)]
-    Identify {
-        /// Which recording, from 0.
-        run: usize,
-        /// Why.
-        source: IdentifyError,
+    /// The statistics have no solution.
+    #[error("the readings cannot be compared with the model: {0}")]
+    Unsolvable(#[from] Unsolvable),
+}
+
+/// Why the statistics have no solution.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Unsolvable {
+    /// A covariance is not positive definite.
+    #[error("the noise of a channel is declared as 0 or is not a number; declare the noise it has")]
+    NoNoise,
+    /// Readings or predictions are not finite.
+    #[error("a reading or the model's answer to a parameter is not finite")]
+    NotFinite,
+    /// Constants cannot be told apart.
+    #[error("constants of the campaign are not independent")]
+    Dependent,
+    /// No cause has an effect on what is recorded.
+    #[error("no cause shows in the channels recorded")]
+    NothingShows,
+    /// This cause has no effect on what is recorded.
+    #[error("{cause} does not show in the channels recorded")]
+    Hidden {
+        /// The cause.
+        cause: Cause,
     },
-    /// The statistics have no solution: numbers that are not finite.
-    #[error("the readings cannot be compared with the model: {message}")]
-    Numbers {
-        /// What was found.
-        message: String,
-    },
+}
+
+fn symbols(channels: &[Channel]) -> String {
+    channels.iter().map(|channel| channel.symbol()).collect::<Vec<_>>().join(", ")
 }

@@ -1,7 +1,8 @@
 //! Whether what a fit leaves is noise. A misfit is smooth: it is looked for where it can be, in few directions, so that
 //! thousands of noisy values do not hide it.
 
-use crate::fit::{Fit, Selection};
+use crate::fit::Fit;
+use crate::selection::Selection;
 use crate::study::Study;
 use crate::whiten::{Linearised, dot, rows_of_step};
 

@@ -1,22 +1,26 @@
 //! The whole diagnosis of one recording.
 
+use crate::additions::additions;
 use crate::adequacy::{Adequacy, adequacy};
+use crate::another_machine::another_machine;
 use crate::calibration::Calibration;
-use crate::check::{Problem, check, same_machine};
-use crate::declared::Declared;
-use crate::fit::{Effort, Fit, Selection, coordinates, fit, parameters};
+use crate::coordinate::{coordinates, parameters};
+use crate::fit::{Effort, Fit, fit};
 use crate::how_far::{held_out, how_far};
-use crate::inputs::InputError;
 use crate::next::{Rivals, next, sensor_beside};
-use crate::outlook::Jump;
-use crate::parallel;
+use crate::outlook::AllowedJump;
 use crate::place::{Gain, places};
+use crate::problem::Problem;
 use crate::report::{Candidate, Diagnosis, Estimate, Verdict};
-use crate::select::{Search, additions, does_something, keep_best, members, refit, search};
-use crate::study::{Hypothesis, PredictError, Prediction, Study};
-use crate::table::Table;
+use crate::select::{Search, does_something, keep_best, refit, search};
+use crate::selection::Selection;
+use crate::study::{Hypothesis, PredictError, Prediction, Study, members};
+use crate::usable::usable;
 use crate::whiten::Linearised;
 use mapper_core::Recording;
+use mapper_numerics::parallel;
+use mapper_observe::declared::Declared;
+use mapper_observe::table::Table;
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use std::collections::BTreeMap;
@@ -28,9 +32,6 @@ pub enum GapError {
     /// The recording does not fit the campaign, or lacks what is needed.
     #[error(transparent)]
     Recording(#[from] Problem),
-    /// A channel that drives the model is missing.
-    #[error(transparent)]
-    Input(#[from] InputError),
     /// The nominal model cannot follow.
     #[error("the nominal model cannot follow this recording: {0}; is it of this machine?")]
     Predict(#[from] PredictError),
@@ -47,7 +48,7 @@ pub struct Question<'a> {
     /// Candidate effects.
     pub effects: Vec<Arc<dyn Effect>>,
     /// Jumps that the planner allows on this machine, for what to do next; those of the recording where there are none.
-    pub jumps: Vec<Jump>,
+    pub jumps: Vec<AllowedJump>,
     /// Numbers behind the probabilities.
     pub calibration: Calibration,
     /// Told the share done, and what comes.
@@ -89,10 +90,10 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     let Question { recording, declared, model, effects, jumps, calibration, progress } = question;
     progress(0.0, "reading");
     let table = Table::new(recording).ok_or(Problem::Empty)?;
-    let warnings = check(recording, &table, &declared)?;
-    let study = Study::new(recording, table, declared, model, effects)?;
+    let warnings = usable(recording, &table, &declared)?;
+    let study = Study::new(recording, table, declared, model, effects);
     let linearised = Linearised::new(&study)?;
-    same_machine(&study, &linearised.base.values)?;
+    another_machine(&study, &linearised.base.values)?;
     // Hold-outs are chosen by place, before anything is fitted.
     let held_out = held_out(&study);
     let mut training = Selection::all(&study);

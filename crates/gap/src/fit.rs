@@ -4,10 +4,12 @@
 //! (they are strong, and bend); what nuisances do is taken once, where nothing is off (they are small), but the
 //! residual is always that of the model itself.
 
+use crate::coordinate::{Coordinate, coordinates, parameters, set_parameter};
+use crate::normal::{Normal, nuisance_products};
+use crate::selection::{Selection, dot_over};
 use crate::study::{Hypothesis, PredictError, Prediction, Study};
-use crate::whiten::{Linearised, dot};
-use mapper_physics::effect::EffectParameter;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use crate::whiten::Linearised;
+use nalgebra::{DMatrix, DVector};
 
 /// A hypothesis at its best.
 #[derive(Debug, Clone)]
@@ -28,82 +30,6 @@ pub struct Fit {
     pub covariance: DMatrix<f64>,
     /// Precision of nuisances and the effects' search coordinates, priors included.
     pub precision: DMatrix<f64>,
-}
-
-/// Prior width of an effect's parameter, in typical steps.
-const PRIOR_STEPS: f64 = 10.0;
-
-/// The coordinate in which a parameter is searched: itself in typical steps, or its logarithm where it spans decades.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Coordinate {
-    low: f64,
-    high: f64,
-    scale: f64,
-    logarithmic: bool,
-}
-
-impl Coordinate {
-    /// The coordinate of a parameter.
-    pub fn new(parameter: &EffectParameter) -> Self {
-        let logarithmic = parameter.low > 0.0 && parameter.high / parameter.low > 20.0;
-        let scale = if logarithmic { 1.0 } else { parameter.typical_step.abs().max(1e-12) };
-        Coordinate { low: parameter.low, high: parameter.high, scale, logarithmic }
-    }
-
-    /// Coordinate of a value.
-    pub fn of(&self, value: f64) -> f64 {
-        if self.logarithmic { value.max(1e-300).ln() } else { value / self.scale }
-    }
-
-    /// Value of a coordinate, within the parameter's range.
-    pub fn value(&self, coordinate: f64) -> f64 {
-        let value = if self.logarithmic { coordinate.exp() } else { coordinate * self.scale };
-        value.clamp(self.low, self.high)
-    }
-}
-
-/// Coordinates of all parameters of a hypothesis' effects, in order.
-pub fn coordinates(study: &Study, hypothesis: &Hypothesis) -> Vec<Coordinate> {
-    let parameters =
-        hypothesis.effects.iter().flat_map(|(index, _)| study.effects[*index].info().parameters.iter());
-    parameters.map(Coordinate::new).collect()
-}
-
-/// Moves the `place`-th parameter of all effects to a value.
-pub fn set_parameter(hypothesis: &mut Hypothesis, place: usize, value: f64) {
-    if let Some(slot) = hypothesis.effects.iter_mut().flat_map(|(_, values)| values.iter_mut()).nth(place) {
-        *slot = value;
-    }
-}
-
-/// Values of all effects' parameters, in order.
-pub fn parameters(hypothesis: &Hypothesis) -> Vec<f64> {
-    hypothesis.effects.iter().flat_map(|(_, values)| values.iter().copied()).collect()
-}
-
-/// Which rows count.
-#[derive(Debug, Clone)]
-pub struct Selection {
-    /// For each step, whether it counts.
-    pub steps: Vec<bool>,
-}
-
-impl Selection {
-    /// All steps.
-    pub fn all(study: &Study) -> Selection {
-        Selection { steps: vec![true; study.steps.len()] }
-    }
-
-    /// Rows of the steps that count.
-    pub fn rows(&self, study: &Study) -> Vec<std::ops::Range<usize>> {
-        let counts = |step: &usize| self.steps.get(*step).copied().unwrap_or(false);
-        (0..study.steps.len()).filter(counts).map(|step| crate::whiten::rows_of_step(study, step)).collect()
-    }
-}
-
-/// Scalar product over some rows.
-pub fn dot_over(rows: &[std::ops::Range<usize>], a: &[f64], b: &[f64]) -> f64 {
-    rows.iter().map(|range| dot(&a[range.clone()], &b[range.clone()])).sum()
 }
 
 /// How thoroughly to fit.
@@ -200,13 +126,6 @@ fn cost_of(rows: &[std::ops::Range<usize>], residual: &[f64], hypothesis: &Hypot
     if cost.is_finite() { cost } else { f64::INFINITY }
 }
 
-/// Products of the nuisances' columns over the steps that count.
-pub fn nuisance_products(study: &Study, linearised: &Linearised, selection: &Selection) -> DMatrix<f64> {
-    let n = study.nuisances.len();
-    let counted = linearised.products.iter().zip(&selection.steps).filter(|(_, counts)| **counts);
-    counted.fold(DMatrix::zeros(n, n), |sum, (products, _)| sum + products)
-}
-
 /// Distance of the runs beside a hypothesis from which slopes are taken, in typical steps.
 const FINE: f64 = 0.02;
 const COARSE: f64 = 0.2;
@@ -255,82 +174,6 @@ fn changes_beside(
             change
         })
         .collect()
-}
-
-/// The normal equations of one iteration: nuisances first, effects behind them.
-#[derive(Debug, Default)]
-struct Normal {
-    matrix: DMatrix<f64>,
-    right: DVector<f64>,
-}
-
-impl Normal {
-    fn new(
-        rows: &[std::ops::Range<usize>],
-        linearised: &Linearised,
-        nuisance_products: &DMatrix<f64>,
-        effect_columns: &[Vec<f64>],
-        residual: &[f64],
-        hypothesis: &Hypothesis,
-    ) -> Normal {
-        let (n, k) = (hypothesis.nuisances.len(), effect_columns.len());
-        let mut matrix = DMatrix::zeros(n + k, n + k);
-        let mut right = DVector::zeros(n + k);
-        matrix.view_mut((0, 0), (n, n)).copy_from(nuisance_products);
-        for i in 0..n {
-            matrix[(i, i)] += 1.0;
-            right[i] = dot_over(rows, &linearised.columns[i], residual) - hypothesis.nuisances[i];
-        }
-        for (j, column) in effect_columns.iter().enumerate() {
-            for i in 0..n {
-                let product = dot_over(rows, &linearised.columns[i], column);
-                matrix[(i, n + j)] = product;
-                matrix[(n + j, i)] = product;
-            }
-            for (l, other) in effect_columns.iter().enumerate().take(j + 1) {
-                let product = dot_over(rows, other, column);
-                matrix[(n + l, n + j)] = product;
-                matrix[(n + j, n + l)] = product;
-            }
-            // Next to nothing: keeps the equations solvable where a parameter does nothing.
-            matrix[(n + j, n + j)] += 1e-6;
-            right[n + j] = dot_over(rows, column, residual);
-        }
-        Normal { matrix, right }
-    }
-
-    /// The step with some unknowns held to given steps, and what it promises in the cost.
-    fn solve(&self, held: &[Option<f64>]) -> Option<(DVector<f64>, f64)> {
-        let free: Vec<usize> = (0..held.len()).filter(|i| held[*i].is_none()).collect();
-        let mut step = DVector::from_fn(held.len(), |i, _| held[i].unwrap_or(0.0));
-        let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| self.matrix[(free[i], free[j])]);
-        let pushed = &self.matrix * &step;
-        let right = DVector::from_fn(free.len(), |i, _| self.right[free[i]] - pushed[free[i]]);
-        let part = matrix.cholesky()?.solve(&right);
-        for (place, index) in free.iter().enumerate() {
-            step[*index] = part[place];
-        }
-        let promised = 2.0 * step.dot(&self.right) - step.dot(&(&self.matrix * &step));
-        Some((step, promised))
-    }
-
-    /// Laplace's evidence, and the covariance of the effects' coordinates.
-    fn evidence(&self, cost: f64, nuisances: usize) -> (f64, DMatrix<f64>) {
-        let effects = self.matrix.nrows() - nuisances;
-        let Some(cholesky) = self.matrix.clone().cholesky() else {
-            return (f64::NEG_INFINITY, DMatrix::from_element(effects, effects, f64::INFINITY));
-        };
-        let half_ln_determinant = cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        let each = 0.5 * (2.0 * std::f64::consts::PI).ln() - PRIOR_STEPS.ln();
-        let score = -0.5 * cost - half_ln_determinant + effects as f64 * each;
-        (score, covariance_of_effects(&cholesky, nuisances))
-    }
-}
-
-fn covariance_of_effects(cholesky: &Cholesky<f64, Dyn>, nuisances: usize) -> DMatrix<f64> {
-    let inverse = cholesky.inverse();
-    let effects = inverse.nrows() - nuisances;
-    inverse.view((nuisances, nuisances), (effects, effects)).into_owned()
 }
 
 /// Six sigma of a declared tolerance is no tolerance any more.

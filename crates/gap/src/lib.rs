@@ -3,26 +3,27 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod additions;
 pub mod adequacy;
+pub mod another_machine;
 pub mod calibration;
-pub mod check;
-pub mod declared;
+pub mod coordinate;
 pub mod diagnose;
 pub mod fit;
 pub mod how_far;
-pub mod inputs;
 pub mod next;
-pub mod noise;
+mod normal;
 pub mod nuisance;
 pub mod outlook;
-pub mod parallel;
 pub mod place;
+pub mod problem;
+mod projector;
 pub mod report;
 pub mod screen;
 pub mod select;
+pub mod selection;
 pub mod shape;
 pub mod signature;
-pub mod smoother;
 pub mod study;
-pub mod table;
+pub mod usable;
 pub mod whiten;

@@ -1,11 +1,11 @@
 //! What to do next: the jump that separates the remaining candidates best, or the sensor that would.
 
 use crate::fit::Fit;
-use crate::outlook::{Jump, apart, apart_at_first_sight, recorded_jumps, recorded_points};
-use crate::parallel;
+use crate::outlook::{AllowedJump, apart, apart_at_first_sight, recorded_jumps, recorded_points};
 use crate::report::{JumpPoint, Next, Place};
 use crate::study::Study;
 use mapper_core::OperatingPoint;
+use mapper_numerics::parallel;
 use mapper_physics::effect::Submodel;
 
 /// A further jump of which one learns less than this, in squared sigmas, is not worth its minutes.
@@ -29,7 +29,7 @@ pub struct Rivals<'a> {
 /// fitted again, were `k` true. All `allowed` jumps are looked at with the candidates as they stand, the most promising
 /// of them with each rival fitted again. Without allowed jumps those of the recording are taken, to be repeated. Where
 /// no jump shows enough, the sensor beside the part in which the first candidate sits is named.
-pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Jump]) -> Option<Next> {
+pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[AllowedJump]) -> Option<Next> {
     rivals.fits.truncate(RIVALS);
     rivals.probabilities.truncate(RIVALS);
     let first = *rivals.fits.first()?;
@@ -40,14 +40,14 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Jump]) -> Option<N
     } else {
         allowed
     };
-    let rate = |jump: &Jump, apart: &[Vec<f64>]| gain(&rivals.probabilities, apart) / minutes(jump);
+    let rate = |jump: &AllowedJump, apart: &[Vec<f64>]| gain(&rivals.probabilities, apart) / minutes(jump);
     let looks = parallel::map(jumps, |jump| {
         let apart = apart_at_first_sight(study, jump, &rivals.fits)?;
         Some((rate(jump, &apart), *jump))
     });
-    let mut looks: Vec<(f64, Jump)> = looks.into_iter().flatten().collect();
+    let mut looks: Vec<(f64, AllowedJump)> = looks.into_iter().flatten().collect();
     looks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let close: Vec<Jump> = looks.into_iter().take(CLOSE_LOOKS).map(|(_, jump)| jump).collect();
+    let close: Vec<AllowedJump> = looks.into_iter().take(CLOSE_LOOKS).map(|(_, jump)| jump).collect();
     let looked = parallel::map(&close, |jump| Some((*jump, apart(study, jump, &rivals.fits)?)));
     let best = looked.into_iter().flatten().max_by(|a, b| rate(&a.0, &a.1).total_cmp(&rate(&b.0, &b.1)));
     let nearest = |apart: &[Vec<f64>]| apart[0].iter().skip(1).copied().fold(f64::INFINITY, f64::min);
@@ -90,7 +90,7 @@ fn point(point: OperatingPoint) -> JumpPoint {
     JumpPoint { speed_rpm: point.speed_rpm, valve: point.valve_opening_ratio }
 }
 
-fn minutes(jump: &Jump) -> f64 {
+fn minutes(jump: &AllowedJump) -> f64 {
     (jump.dwell_s / 60.0).max(0.1)
 }
 

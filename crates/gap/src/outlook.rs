@@ -1,19 +1,21 @@
 //! What a jump that was not made would show: the candidates' predictions of it, and how far apart they are once each
 //! is fitted again.
 
-use crate::fit::{Fit, coordinates, effect_changes};
+use crate::coordinate::coordinates;
+use crate::fit::{Fit, effect_changes};
 use crate::nuisance::{NuisanceKind, OUTPUTS};
 use crate::study::{Hypothesis, Study};
-use crate::table::Table;
 use crate::whiten::{Linearised, dot};
 use mapper_core::{Channel, OperatingPoint, Recording, Series, StepKind, StepMarker};
+use mapper_observe::knob::Knob;
+use mapper_observe::table::Table;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::steady::hold_speed;
 use nalgebra::{DMatrix, DVector};
 
 /// A jump that may be run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jump {
+pub struct AllowedJump {
     /// Where it starts, settled.
     pub from: OperatingPoint,
     /// Where it goes.
@@ -35,7 +37,7 @@ const FINE_S: f64 = 0.1;
 const MOST_S: f64 = 600.0;
 
 /// A jump made ready like a recording, of rest at its start and its dwell, with nothing in it but its inputs.
-fn imagined(recorded: &Study, jump: &Jump, interval_s: f64) -> Option<Study> {
+fn imagined(recorded: &Study, jump: &AllowedJump, interval_s: f64) -> Option<Study> {
     let dwell_s = jump.dwell_s.clamp(10.0, MOST_S);
     let count = ((HOLD_S + dwell_s) / interval_s) as usize;
     let t_s: Vec<f64> = (0..count).map(|i| interval_s * i as f64).collect();
@@ -75,14 +77,13 @@ fn imagined(recorded: &Study, jump: &Jump, interval_s: f64) -> Option<Study> {
         .filter(|channel| *channel != Channel::P3 && recorded.table.column(*channel).is_some());
     let recording = Recording { series: measured.map(series).collect(), steps, events: Vec::new() };
     let table = Table::new(&recording)?;
-    Study::new(
+    Some(Study::new(
         &recording,
         table,
         recorded.declared.clone(),
         recorded.nominal.model.clone(),
         recorded.effects.clone(),
-    )
-    .ok()
+    ))
 }
 
 /// A fit's hypothesis at a new start, of which its own start says nothing.
@@ -97,13 +98,13 @@ fn anew(study: &Study, fit: &Fit) -> Hypothesis {
 }
 
 fn is_start(kind: NuisanceKind) -> bool {
-    matches!(kind, NuisanceKind::StartTc | NuisanceKind::StartTt)
+    matches!(kind, NuisanceKind::Knob(Knob::StartTc | Knob::StartTt))
 }
 
 /// How far apart two candidates' predictions of a jump are, in squared sigmas of the noise alone: a first look.
 ///
 /// `None` where the model cannot make the jump.
-pub fn apart_at_first_sight(recorded: &Study, jump: &Jump, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
+pub fn apart_at_first_sight(recorded: &Study, jump: &AllowedJump, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
     let study = imagined(recorded, jump, COARSE_S)?;
     let linearised = Linearised::of_noise_alone(&study).ok()?;
     let predictions: Option<Vec<Vec<f64>>> = fits
@@ -124,7 +125,7 @@ pub fn apart_at_first_sight(recorded: &Study, jump: &Jump, fits: &[&Fit]) -> Opt
 ///
 /// With `D` the difference of the predictions, `J` the derivatives of `j`'s prediction by its nuisances and parameters
 /// and `L` the precision in which the recording leaves them: `D'D - D'J (L + J'J)^-1 J'D`, all whitened.
-pub fn apart(recorded: &Study, jump: &Jump, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
+pub fn apart(recorded: &Study, jump: &AllowedJump, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
     let study = imagined(recorded, jump, FINE_S)?;
     let nominal = Linearised::new(&study).ok()?;
     let mut predicted = Vec::new();
@@ -181,10 +182,10 @@ fn precision(study: &Study, fit: &Fit) -> DMatrix<f64> {
 }
 
 /// The jumps that were recorded, for where nothing else is known to be allowed.
-pub fn recorded_jumps(study: &Study, points: &[OperatingPoint]) -> Vec<Jump> {
+pub fn recorded_jumps(study: &Study, points: &[OperatingPoint]) -> Vec<AllowedJump> {
     let pairs = study.steps.windows(2).zip(points.windows(2));
     pairs
-        .map(|(steps, points)| Jump {
+        .map(|(steps, points)| AllowedJump {
             from: points[0],
             to: points[1],
             from_p3_pa: steps[0].marker.p3_pa,

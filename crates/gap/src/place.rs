@@ -6,8 +6,7 @@
 use crate::fit::Fit;
 use crate::nuisance::OUTPUTS;
 use crate::report::Place;
-use crate::select::members;
-use crate::study::{PointState, Study};
+use crate::study::{PointState, Study, members};
 use crate::whiten::Linearised;
 use mapper_physics::effect::Submodel;
 

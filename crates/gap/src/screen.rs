@@ -1,7 +1,8 @@
 //! All pairs of effects in closed form, so that none is overlooked because neither member does much alone.
 
-use crate::fit::{Fit, Selection};
-use crate::select::Projector;
+use crate::fit::Fit;
+use crate::projector::Projector;
+use crate::selection::Selection;
 use crate::study::{Hypothesis, Study};
 use crate::whiten::Linearised;
 

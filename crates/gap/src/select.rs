@@ -3,12 +3,14 @@
 //! Every single effect is fitted with runs of the model. What a second effect would add is first estimated in closed
 //! form beside the best singles; the most promising pairs are then fitted likewise.
 
-use crate::fit::{Coordinate, Effort, Fit, Selection, dot_over, fit, nuisance_products};
-use crate::parallel;
+use crate::additions::{additions, starts_of};
+use crate::fit::{Effort, Fit, fit};
+use crate::projector::Projector;
 use crate::screen::{Screened, screen};
-use crate::study::{Hypothesis, PredictError, Study};
+use crate::selection::Selection;
+use crate::study::{Hypothesis, PredictError, Study, members};
 use crate::whiten::Linearised;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use mapper_numerics::parallel;
 
 /// All hypotheses that were fitted, the empty one first, then best first.
 #[derive(Debug)]
@@ -241,13 +243,6 @@ pub fn sort(fits: &mut [Fit]) {
     fits.sort_by(|a, b| b.score.total_cmp(&a.score));
 }
 
-/// Names of a hypothesis' effects, by index, in order.
-pub fn members(hypothesis: &Hypothesis) -> Vec<usize> {
-    let mut members: Vec<usize> = hypothesis.effects.iter().map(|(index, _)| *index).collect();
-    members.sort_unstable();
-    members
-}
-
 /// Whether each effect of a fit does something: one that the fit left at its neutral value explains nothing, and a pair with
 /// it is no pair.
 pub fn does_something(study: &Study, fitted: &Fit) -> bool {
@@ -268,91 +263,6 @@ pub fn keep_best(fits: &mut Vec<Fit>, fitted: Fit) {
         Some(other) if other.cost <= fitted.cost => {}
         Some(other) => *other = fitted,
         None => fits.push(fitted),
-    }
-}
-
-/// Where the search for an effect begins: a typical step from neutral, and where two parameters work together, several.
-fn starts_of(study: &Study, base: &Hypothesis, index: usize) -> Vec<Hypothesis> {
-    let parameters = &study.effects[index].info().parameters;
-    let with = |values: Vec<f64>| {
-        let mut start = base.clone();
-        start.effects.push((index, values));
-        start
-    };
-    if let [parameter] = parameters.as_slice() {
-        let value = parameter.neutral + parameter.typical_step;
-        return vec![with(vec![value.clamp(parameter.low, parameter.high)])];
-    }
-    // Corners of the inner part of each range.
-    let places = |p: &mapper_physics::effect::EffectParameter| {
-        let coordinate = Coordinate::new(p);
-        let (low, high) = (coordinate.of(p.low), coordinate.of(p.high));
-        [0.33, 0.6].map(|share| coordinate.value(low + share * (high - low)))
-    };
-    let mut corners: Vec<Vec<f64>> = vec![Vec::new()];
-    for parameter in parameters {
-        corners = corners
-            .into_iter()
-            .flat_map(|corner| places(parameter).map(|value| [corner.clone(), vec![value]].concat()))
-            .collect();
-    }
-    corners.into_iter().map(with).collect()
-}
-
-/// Solves the nuisances' part of the normal equations again and again.
-pub(crate) struct Projector<'a> {
-    linearised: &'a Linearised,
-    rows: Vec<std::ops::Range<usize>>,
-    cholesky: Cholesky<f64, Dyn>,
-    /// Columns besides the nuisances' that are free as well.
-    others: &'a [Vec<f64>],
-}
-
-impl<'a> Projector<'a> {
-    pub(crate) fn new(
-        study: &Study,
-        linearised: &'a Linearised,
-        selection: &Selection,
-        others: &'a [Vec<f64>],
-    ) -> Option<Projector<'a>> {
-        let rows = selection.rows(study);
-        let n = study.nuisances.len();
-        let mut matrix = DMatrix::zeros(n + others.len(), n + others.len());
-        matrix.view_mut((0, 0), (n, n)).copy_from(&nuisance_products(study, linearised, selection));
-        for i in 0..n {
-            matrix[(i, i)] += 1.0;
-        }
-        for (j, other) in others.iter().enumerate() {
-            for i in 0..n {
-                let product = dot_over(&rows, &linearised.columns[i], other);
-                matrix[(i, n + j)] = product;
-                matrix[(n + j, i)] = product;
-            }
-            for (l, third) in others.iter().enumerate() {
-                matrix[(n + j, n + l)] = dot_over(&rows, other, third);
-            }
-            matrix[(n + j, n + j)] += 1e-6;
-        }
-        Some(Projector { linearised, rows, cholesky: matrix.cholesky()?, others })
-    }
-
-    pub(crate) fn right(&self, column: &[f64]) -> DVector<f64> {
-        let n = self.linearised.columns.len();
-        DVector::from_fn(n + self.others.len(), |i, _| {
-            let other = if i < n { &self.linearised.columns[i] } else { &self.others[i - n] };
-            dot_over(&self.rows, other, column)
-        })
-    }
-
-    /// Product of two columns with the span of the free ones (softened by their priors) taken out.
-    pub(crate) fn product(
-        &self,
-        a: &[f64],
-        right_a: &DVector<f64>,
-        b: &[f64],
-        right_b: &DVector<f64>,
-    ) -> f64 {
-        dot_over(&self.rows, a, b) - right_a.dot(&self.cholesky.solve(right_b))
     }
 }
 
@@ -406,73 +316,4 @@ fn linear_start(
     moved.effects = vec![(*index, vec![value])];
     // From where nothing is off, not from the null's nuisances, which may have bent far to stand in for the effect.
     Some(moved)
-}
-
-/// What one more effect would do beside a fit.
-pub struct Addition {
-    /// Which.
-    pub effect: usize,
-    /// What it would take off the cost, in a straight line.
-    pub gain: f64,
-    /// Where to start a fit.
-    pub start: Hypothesis,
-}
-
-/// Every further effect beside a fit, in closed form from one run each.
-pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> Vec<Addition> {
-    let Some(projector) = Projector::new(study, linearised, selection, &base.effect_columns) else {
-        return Vec::new();
-    };
-    // At the fit's best what the residual asks of the nuisances is what their priors ask back: a tolerance that stands far
-    // out pulls for the effect that would let it go.
-    let mut right_residual = projector.right(&base.residual);
-    for (right, nuisance) in right_residual.iter_mut().zip(&base.hypothesis.nuisances) {
-        *right -= nuisance;
-    }
-    let used = members(&base.hypothesis);
-    let mut starts: Vec<(usize, Hypothesis)> = Vec::new();
-    for index in (0..study.effects.len()).filter(|index| !used.contains(index)) {
-        starts.extend(starts_of(study, &base.hypothesis, index).into_iter().map(|start| (index, start)));
-    }
-    let mut best: Vec<Addition> = Vec::new();
-    for (index, start) in starts {
-        // A whole typical step: some effects have no slope where they vanish.
-        let parameters = &study.effects[index].info().parameters;
-        let single = parameters.len() == 1;
-        let mut near = start.clone();
-        if let (true, Some((_, values))) = (single, near.effects.last_mut()) {
-            let (neutral, step) = (parameters[0].neutral, values[0] - parameters[0].neutral);
-            values[0] = (neutral + step).clamp(parameters[0].low, parameters[0].high);
-        }
-        let Ok(there) = study.predict(&near) else { continue };
-        let mut change: Vec<f64> =
-            there.values.iter().zip(&base.prediction.values).map(|(t, b)| t - b).collect();
-        linearised.whiten(study, &mut change);
-        let right = projector.right(&change);
-        let own = projector.product(&change, &right, &change, &right);
-        let seen = projector.product(&change, &right, &base.residual, &right_residual);
-        let mut share = if own > 1e-9 { seen / own } else { 0.0 };
-        let mut addition = Addition { effect: index, gain: 0.0, start };
-        if single {
-            let parameter = &parameters[0];
-            let step = parameter.typical_step;
-            // The straight estimate, kept within the range; not far beyond the step that was taken, for effects bend.
-            let value =
-                (parameter.neutral + share.clamp(-3.0, 3.0) * step).clamp(parameter.low, parameter.high);
-            share = (value - parameter.neutral) / step;
-            let value = if value == parameter.neutral { parameter.neutral + 0.1 * step } else { value };
-            if let Some((_, values)) = addition.start.effects.last_mut() {
-                values[0] = value.clamp(parameter.low, parameter.high);
-            }
-            addition.gain = 2.0 * share * seen - share * share * own;
-        } else {
-            addition.gain = if share > 0.0 { seen * seen / own } else { 0.0 };
-        }
-        match best.iter_mut().find(|other| other.effect == index) {
-            Some(other) if other.gain >= addition.gain => {}
-            Some(other) => *other = addition,
-            None => best.push(addition),
-        }
-    }
-    best
 }

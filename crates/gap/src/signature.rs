@@ -4,7 +4,8 @@
 //! of that one's signature: what tolerances, offsets and the other effects can imitate is projected out, tolerances only as
 //! far as their declared size goes. An effect of length 2 is hidden, one of 24 is plain.
 
-use crate::fit::{Effort, Selection, fit};
+use crate::fit::{Effort, fit};
+use crate::selection::Selection;
 use crate::study::{EffectValues, PredictError, Study};
 use crate::whiten::Linearised;
 

@@ -1,16 +1,23 @@
 //! One recording made ready: residuals' layout, whitening, and the model's prediction for any hypothesis.
 
-use crate::declared::Declared;
-use crate::inputs::{DrivenInputs, InputDeclarations, InputError, LaggedCommand, measured_lag_s};
-use crate::nuisance::{Circumstances, DRIVERS, Nuisance, OUTPUTS, apply, nuisances};
+use crate::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
 use crate::shape::{SHAPES, ShapedMap};
-use crate::table::{Block, Table, block_mean, blocks};
 use mapper_core::{Channel, Recording, StepMarker};
+use mapper_observe::block::{Block, block_mean, blocks};
+use mapper_observe::channels::DRIVERS;
+use mapper_observe::declared::Declared;
+use mapper_observe::knob::{Knob, Shifted};
+use mapper_observe::lagged_command::{LaggedCommand, measured_lag_s};
+use mapper_observe::mean::mean_reading;
+use mapper_observe::schedule::Schedule;
+use mapper_observe::smoothed_inputs::SmoothedInputs;
+use mapper_observe::start::state_as_read;
+use mapper_observe::table::Table;
 use mapper_physics::driven::{DriveError, FrozenGrid, drive, settle};
 use mapper_physics::effect::{Effect, EffectError, Rig, add};
 use mapper_physics::inputs::Inputs;
 use mapper_physics::instruments::{ChannelFollower, true_value};
-use mapper_physics::model::{Model, State, rad_s_of_rpm};
+use mapper_physics::model::{Model, State};
 use std::sync::Arc;
 
 /// Values of one output in one step that have a common noise.
@@ -47,6 +54,13 @@ pub struct Hypothesis {
     pub nuisances: Vec<f64>,
     /// Effects.
     pub effects: EffectValues,
+}
+
+/// Names of a hypothesis' effects, by index, in order.
+pub fn members(hypothesis: &Hypothesis) -> Vec<usize> {
+    let mut members: Vec<usize> = hypothesis.effects.iter().map(|(index, _)| *index).collect();
+    members.sort_unstable();
+    members
 }
 
 /// What the model gives for a hypothesis.
@@ -102,7 +116,7 @@ pub struct Study {
     /// Measured block means, in the layout of the groups.
     pub measured: Vec<f64>,
     /// The recorded inputs.
-    pub inputs: DrivenInputs,
+    pub inputs: SmoothedInputs,
     /// Time constant of P3 behind its command as recorded, s, and its standard error.
     pub measured_lag_s: Option<(f64, f64)>,
     grid: FrozenGrid,
@@ -118,18 +132,24 @@ pub struct Study {
 /// the metal's start is fitted anyway.
 const HOLD_S: f64 = 100.0;
 
+/// Blocks where only metal moves.
+const SLOW: Schedule =
+    Schedule { first_s: 0.0, lengths_s: &[(f64::INFINITY, 10.0)], shortest_s: 0.0, shortest_ratio: 0.5 };
+/// Blocks after a jump.
+const AFTER_JUMP: Schedule = Schedule {
+    lengths_s: &[(1.0, 0.1), (3.0, 0.2), (6.0, 1.0), (14.0, 2.0), (30.0, 4.0), (f64::INFINITY, 10.0)],
+    ..SLOW
+};
+
 impl Study {
     /// Makes a recording ready.
-    ///
-    /// # Errors
-    /// [`InputError`] where a channel that drives the model is missing.
     pub fn new(
         recording: &Recording,
         table: Table,
         declared: Declared,
         model: Model,
         effects: Vec<Arc<dyn Effect>>,
-    ) -> Result<Study, InputError> {
+    ) -> Study {
         let mut nominal = Rig::new(model);
         nominal.instruments.p3_lag_s = declared.tolerances.actuator_lag_s;
         let first_s = table.t_s.first().copied().unwrap_or(0.0);
@@ -143,18 +163,13 @@ impl Study {
                 let end_s = recording.steps.get(index + 1).map_or(marker.end_s, |next| next.start_s);
                 let start_s =
                     if jumped { marker.start_s } else { marker.start_s.max(end_s - HOLD_S).max(first_s) };
-                StudyStep { marker: *marker, jumped, blocks: blocks(&table, start_s, end_s, jumped) }
+                let schedule = if jumped { AFTER_JUMP } else { SLOW };
+                StudyStep { marker: *marker, jumped, blocks: blocks(&table, start_s, end_s, &schedule) }
             })
             .collect();
-        let measured_lag =
-            measured_lag_s(&table, &recording.steps, declared.noise_sigma(Channel::P3).max(1.0));
+        let measured_lag = measured_lag_s(&table, &recording.steps, declared.noise_sigma(Channel::P3));
         let lag_s = measured_lag.map_or(nominal.instruments.p3_lag_s, |(lag_s, _)| lag_s);
-        let declarations = InputDeclarations {
-            sensors: declared.sensors.clone(),
-            noise_colour: declared.noise_colour,
-            nominal: declared.nominal,
-        };
-        let inputs = DrivenInputs::read(&table, &recording.steps, &declarations, lag_s)?;
+        let inputs = SmoothedInputs::read(&table, &recording.steps, &declared, lag_s);
         let mut groups = Vec::new();
         let mut measured = Vec::new();
         let mut rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>> =
@@ -201,7 +216,7 @@ impl Study {
         let jumps_s: Vec<f64> =
             steps.iter().filter(|step| step.jumped).map(|step| step.marker.start_s).collect();
         let (times_s, places): (Vec<f64>, Vec<_>) = reads.into_iter().unzip();
-        Ok(Study {
+        Study {
             nuisances: nuisances(&declared),
             grid: FrozenGrid::new(start_s, end_s, &jumps_s, &times_s),
             declared,
@@ -216,7 +231,7 @@ impl Study {
             times_s,
             places,
             rows,
-        })
+        }
     }
 
     /// The hypothesis that nothing is off.
@@ -224,11 +239,11 @@ impl Study {
         Hypothesis { nuisances: vec![0.0; self.nuisances.len()], effects: Vec::new() }
     }
 
-    /// The rig of a hypothesis, and what it is driven with.
+    /// The rig of a hypothesis, and the circumstances in which it runs.
     ///
     /// # Errors
     /// [`EffectError`] where a value is out of its range.
-    pub fn rig(&self, hypothesis: &Hypothesis) -> Result<(Rig, Circumstances, DrivenInputs), EffectError> {
+    fn rig(&self, hypothesis: &Hypothesis) -> Result<(Rig, Circumstances), EffectError> {
         let mut rig = self.nominal.clone();
         let mut circumstances = Circumstances::default();
         for (index, values) in &hypothesis.effects {
@@ -241,17 +256,10 @@ impl Study {
             rig.model.map =
                 Arc::new(ShapedMap { inner: rig.model.map.clone(), coefficients: circumstances.shape });
         }
-        let mut inputs = self.inputs.clone();
-        let offset = |channel: Channel| rig.instruments.path(channel).offset;
-        let [t1, p1, p3, t3, p4, oil] = DRIVERS.map(offset);
-        inputs.offsets.t1_k = t1;
-        inputs.offsets.p1_pa = p1;
-        inputs.offsets.p3_pa = p3;
-        inputs.offsets.t3_k = t3;
-        inputs.offsets.p4_pa = p4;
-        inputs.offsets.oil_k = oil;
-        inputs.offsets.ambient_k = circumstances.ambient_k;
-        Ok((rig, circumstances, inputs))
+        // A sensor that reads too high drives the model too high: the truth lies below.
+        let read = DRIVERS.map(|channel| (Knob::Input(channel), -rig.instruments.path(channel).offset));
+        circumstances.knobs.extend(read);
+        Ok((rig, circumstances))
     }
 
     /// What the model gives.
@@ -259,9 +267,10 @@ impl Study {
     /// # Errors
     /// [`PredictError`] where a value is out of its range or the model cannot follow.
     pub fn predict(&self, hypothesis: &Hypothesis) -> Result<Prediction, PredictError> {
-        let (rig, circumstances, inputs) = self.rig(hypothesis)?;
+        let (rig, circumstances) = self.rig(hypothesis)?;
+        let inputs = Shifted { inputs: &self.inputs, shifts: &circumstances.knobs };
         let mut followers = OUTPUTS.map(|channel| ChannelFollower::new(*rig.instruments.path(channel)));
-        let command = LaggedCommand::new(inputs.command.levels().to_vec(), rig.instruments.p3_lag_s);
+        let command = LaggedCommand::new(self.inputs.command.levels().to_vec(), rig.instruments.p3_lag_s);
         let mut values = vec![0.0; self.measured.len()];
         let start = self.start(&rig, &inputs, &circumstances)?;
         drive(&rig.model, &inputs, start, &self.grid, &self.times_s, |index, prepared, state, outputs| {
@@ -303,7 +312,8 @@ impl Study {
     /// # Errors
     /// [`PredictError`].
     pub fn points(&self, hypothesis: &Hypothesis) -> Result<Vec<PointState>, PredictError> {
-        let (rig, circumstances, inputs) = self.rig(hypothesis)?;
+        let (rig, circumstances) = self.rig(hypothesis)?;
+        let inputs = Shifted { inputs: &self.inputs, shifts: &circumstances.knobs };
         let start = self.start(&rig, &inputs, &circumstances)?;
         let times_s: Vec<f64> = self
             .steps
@@ -343,29 +353,20 @@ impl Study {
     fn start(
         &self,
         rig: &Rig,
-        inputs: &DrivenInputs,
+        inputs: &impl Inputs,
         circumstances: &Circumstances,
     ) -> Result<State, DriveError> {
         let start_s = self.grid.nodes_s().first().copied().unwrap_or(0.0);
         let boundary = inputs.at(start_s);
-        let first = |channel: Channel, otherwise: f64| {
-            // Not from the recording's own begin, where the machine may still stand.
-            let column = self.table.column(channel).map(|c| &c[self.table.range(start_s, f64::INFINITY)]);
-            let early =
-                column.map(|c| c.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>());
-            early.filter(|v| !v.is_empty()).map_or(otherwise, |v| v.iter().sum::<f64>() / v.len() as f64)
+        // Not from the recording's own begin, where the machine may still stand.
+        let read = |channel: Channel| {
+            let column = &self.table.column(channel)?[self.table.range(start_s, f64::INFINITY)];
+            mean_reading(&column.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>())
         };
-        let guess = State::new(
-            rad_s_of_rpm(first(Channel::ShaftSpeed, 90e3).max(1e3)),
-            first(Channel::P2, 1.5 * boundary.p1_pa).max(boundary.p1_pa),
-            first(Channel::Tc, boundary.t1_k + 40.0),
-            first(Channel::Tt, 0.5 * (boundary.t3_k + boundary.t1_k)),
-            first(Channel::T2, boundary.t1_k + 50.0),
-        );
-        let mut start = settle(&rig.model, &boundary, guess)?;
-        start.tc_k += circumstances.start_tc_k;
-        start.inner_k += circumstances.start_tc_k;
-        start.tt_k += circumstances.start_tt_k;
+        let mut start = settle(&rig.model, &boundary, state_as_read(&boundary, read))?;
+        for (knob, by) in &circumstances.knobs {
+            knob.start(&mut start, *by);
+        }
         Ok(start)
     }
 }

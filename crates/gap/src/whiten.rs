@@ -1,10 +1,12 @@
 //! Residuals in units of what noise and imperfectly known inputs explain.
 
-use crate::noise::{Factor, block_covariance};
-use crate::nuisance::{DRIVERS, NuisanceKind, OUTPUTS};
-use crate::parallel;
-use crate::study::{Group, Hypothesis, PredictError, Prediction, Study};
+use crate::nuisance::{NuisanceKind, OUTPUTS};
+use crate::study::{Hypothesis, PredictError, Prediction, Study};
 use mapper_core::Channel;
+use mapper_numerics::coloured_noise::{ColouredNoise, WhiteningFactor, covariance_of_means};
+use mapper_numerics::parallel;
+use mapper_observe::channels::DRIVERS;
+use mapper_observe::smoothed_inputs::InputNoise;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,7 +17,7 @@ pub struct Linearised {
     /// Prediction without any deviation.
     pub base: Prediction,
     /// One factor for each group.
-    factors: Arc<Vec<Factor>>,
+    factors: Arc<Vec<WhiteningFactor>>,
     /// Whitened change for one sigma of each nuisance.
     pub columns: Vec<Vec<f64>>,
     /// Products of the columns, for each step.
@@ -60,7 +62,7 @@ impl Linearised {
         study: &Study,
         base: Prediction,
         mut columns: Vec<Vec<f64>>,
-        factors: Arc<Vec<Factor>>,
+        factors: Arc<Vec<WhiteningFactor>>,
     ) -> Linearised {
         let mut linearised = Linearised { base, factors, columns: Vec::new(), products: Vec::new() };
         for column in &mut columns {
@@ -168,19 +170,20 @@ fn surge_jumps(study: &Study, nothing: &Hypothesis) -> Vec<bool> {
     (0..study.steps.len()).map(|step| near(step) || (step > 0 && near(step - 1))).collect()
 }
 
-fn factors(study: &Study, nothing: &Hypothesis, changes: &[Vec<f64>]) -> Vec<Factor> {
+fn factors(study: &Study, nothing: &Hypothesis, changes: &[Vec<f64>]) -> Vec<WhiteningFactor> {
     let surge_jumps = surge_jumps(study, nothing);
-    let inputs = study.inputs.noise();
     // Response of every value to a unit of each input, from that of its offset.
-    let responses: Vec<(f64, f64, Option<&Vec<f64>>, f64)> = DRIVERS
+    let responses: Vec<(InputNoise, &Vec<f64>, f64)> = DRIVERS
         .iter()
-        .zip(inputs)
-        .map(|(channel, noise)| {
-            let place = study.nuisances.iter().position(|n| n.kind == NuisanceKind::Offset(*channel));
-            let sigma = place.map_or(1.0, |i| study.nuisances[i].sigma);
-            (noise.sigma, noise.correlation_s, place.and_then(|i| changes.get(i)), sigma)
+        .zip(study.inputs.noise())
+        .filter_map(|(channel, noise)| {
+            let place = study.nuisances.iter().position(|n| n.kind == NuisanceKind::Offset(*channel))?;
+            let noise = noise.filter(|noise| noise.sigma > 0.0)?;
+            Some((noise, changes.get(place)?, study.nuisances[place].sigma))
         })
         .collect();
+    let colour = study.declared.noise_colour;
+    let noise = ColouredNoise::new(colour.first_order_share_ratio, colour.time_constant_s.max(1e-3));
     let mut cache: BTreeMap<Vec<(usize, i64)>, DMatrix<f64>> = BTreeMap::new();
     study
         .groups
@@ -188,25 +191,24 @@ fn factors(study: &Study, nothing: &Hypothesis, changes: &[Vec<f64>]) -> Vec<Fac
         .map(|group| {
             let blocks: Vec<_> =
                 group.blocks.iter().map(|i| study.steps[group.step].blocks[*i].clone()).collect();
+            let times: Vec<&[f64]> =
+                blocks.iter().map(|block| &study.table.t_s[block.samples.clone()]).collect();
             // Blocks alike to a tenth of a millisecond have one covariance.
             let key = blocks
                 .iter()
                 .map(|b| (b.samples.len(), ((b.mean_s - blocks[0].mean_s) * 1e4).round() as i64))
                 .collect::<Vec<_>>();
-            let unit = cache
-                .entry(key)
-                .or_insert_with(|| block_covariance(&study.table.t_s, &blocks, study.declared.noise_colour));
-            let sigma = noise_sigma(study, group);
+            let unit = cache.entry(key).or_insert_with(|| covariance_of_means(&times, noise));
+            let sigma = study.declared.noise_sigma(OUTPUTS[group.output]);
             let mut covariance = unit.clone() * (sigma * sigma);
             if OUTPUTS[group.output] != Channel::P3 {
-                for (course_sigma, correlation_s, change, offset_sigma) in &responses {
-                    let Some(change) = change.filter(|_| *course_sigma > 0.0) else { continue };
+                for (input, change, offset_sigma) in &responses {
                     let gain: Vec<f64> =
-                        change[group.rows.clone()].iter().map(|c| c / offset_sigma * course_sigma).collect();
+                        change[group.rows.clone()].iter().map(|c| c / offset_sigma * input.sigma).collect();
                     for i in 0..gain.len() {
                         for j in 0..gain.len() {
                             let apart_s = (blocks[i].mean_s - blocks[j].mean_s).abs();
-                            covariance[(i, j)] += gain[i] * gain[j] * (-apart_s / correlation_s).exp();
+                            covariance[(i, j)] += gain[i] * gain[j] * (-apart_s / input.correlation_s).exp();
                         }
                     }
                 }
@@ -222,17 +224,7 @@ fn factors(study: &Study, nothing: &Hypothesis, changes: &[Vec<f64>]) -> Vec<Fac
             }
             let n = covariance.nrows();
             // Positive definite by construction; the identity stands in should rounding say otherwise.
-            Factor::new(covariance).unwrap_or_else(|| Factor::identity(n, sigma))
+            WhiteningFactor::new(covariance).unwrap_or_else(|| WhiteningFactor::independent(n, sigma))
         })
         .collect()
-}
-
-/// Noise of one sample; where none is declared, a thousandth of the values' size.
-fn noise_sigma(study: &Study, group: &Group) -> f64 {
-    let declared = study.declared.noise_sigma(OUTPUTS[group.output]);
-    if declared > 0.0 {
-        return declared;
-    }
-    let values = &study.measured[group.rows.clone()];
-    (1e-3 * values.iter().map(|v| v.abs()).sum::<f64>() / values.len().max(1) as f64).max(1e-9)
 }

@@ -1,53 +1,23 @@
-//! The diagnosis on recordings of the adaptive simulator, which shares the equations with the driven model but neither
-//! its grid, its inputs nor its noise.
+//! The diagnosis on recordings of the adaptive simulator.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_core::{Channel, DeclaredUncertainty, OperatingPoint, Recording, Series, StepKind, StepMarker};
+mod common;
+
+use common::{Visits, boundary, declared};
+use mapper_core::{Channel, OperatingPoint, Recording};
 use mapper_gap::calibration::Calibration;
-use mapper_gap::declared::Declared;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
-use mapper_gap::outlook::{Jump, apart, apart_at_first_sight};
+use mapper_gap::outlook::{AllowedJump, apart, apart_at_first_sight};
 use mapper_gap::report::Verdict;
 use mapper_physics::effect::{Effect, Rig, add};
-use mapper_physics::inputs::InterpolatedInputs;
-use mapper_physics::instruments::{ChannelFollower, true_value};
 use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{Simulator, Watch};
 use mapper_physics::steady::hold_speed;
-use rand::{RngExt, SeedableRng};
-use rand_distr::StandardNormal;
-use rand_pcg::Pcg64;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
-const DWELL_S: f64 = 60.0;
-const SPEEDS_RPM: [f64; 7] = [90e3, 140e3, 60e3, 120e3, 70e3, 130e3, 80e3];
+const VISITS: Visits = Visits { speeds_rpm: &[90e3, 140e3, 60e3, 120e3, 70e3, 130e3, 80e3], dwell_s: 60.0 };
 
-/// Noise of a sample of each channel, and offset, one sigma.
-const SENSORS: [(Channel, f64, f64); 14] = [
-    (Channel::ShaftSpeed, 30.0, 0.0),
-    (Channel::CompressorFlow, 1.5e-4, 0.0),
-    (Channel::P1, 20.0, 50.0),
-    (Channel::T1, 0.1, 0.25),
-    (Channel::P2, 60.0, 100.0),
-    (Channel::T2, 0.1, 0.25),
-    (Channel::Tc, 0.15, 0.3),
-    (Channel::TurbineFlow, 1.5e-4, 0.0),
-    (Channel::P3, 80.0, 150.0),
-    (Channel::T3, 0.5, 0.5),
-    (Channel::P4, 30.0, 50.0),
-    (Channel::T4, 0.3, 0.5),
-    (Channel::Tt, 0.3, 0.5),
-    (Channel::TOil, 0.2, 0.5),
-];
-
-fn boundary() -> BoundaryConditions {
-    BoundaryConditions { valve_opening_ratio: 0.9, ..BoundaryConditions::default() }
-}
-
-/// Seven points at one opening, a jump between each two, noise and offsets drawn from what is declared.
+/// A recording of a rig with effects.
 fn record(effects: &[(&str, &[f64])], seed: u64) -> Recording {
     let mut rig = Rig::new(Model::nominal());
     for (id, values) in effects {
@@ -57,83 +27,7 @@ fn record(effects: &[(&str, &[f64])], seed: u64) -> Recording {
 }
 
 fn record_of(rig: &Rig, seed: u64) -> Recording {
-    let nominal = Model::nominal();
-    let p3_pa: Vec<f64> =
-        SPEEDS_RPM.iter().map(|n| hold_speed(&nominal, *n, &boundary()).unwrap().boundary.p3_pa).collect();
-    let end_s = DWELL_S * SPEEDS_RPM.len() as f64;
-    let times_s: Vec<f64> = (0..(end_s / 0.1) as usize).map(|i| 0.1 * i as f64).collect();
-    let mut held_pa = p3_pa[0];
-    let lagged: Vec<f64> = times_s
-        .iter()
-        .map(|t| {
-            let wanted = p3_pa[(((t - 1e-6) / DWELL_S).max(0.0) as usize).min(p3_pa.len() - 1)];
-            held_pa = wanted + (held_pa - wanted) * (-0.1f64 / 0.3).exp();
-            held_pa
-        })
-        .collect();
-    let rows = lagged.iter().map(|p3_pa| BoundaryConditions { p3_pa: *p3_pa, ..boundary() }).collect();
-    let inputs = InterpolatedInputs::new(times_s.clone(), rows).unwrap();
-    let at_rest = BoundaryConditions { p3_pa: p3_pa[0], ..boundary() };
-    let guess = hold_speed(&nominal, SPEEDS_RPM[0], &boundary()).unwrap().state;
-    let start = mapper_physics::driven::settle(&rig.model, &at_rest, guess).unwrap();
-    let mut random = Pcg64::seed_from_u64(seed);
-    let mut normal = move || -> f64 { random.sample(StandardNormal) };
-    let offsets: Vec<f64> = SENSORS.iter().map(|(_, _, offset)| offset * normal()).collect();
-    let mut followers: Vec<ChannelFollower> =
-        SENSORS.iter().map(|(channel, ..)| ChannelFollower::new(*rig.instruments.path(*channel))).collect();
-    let mut slow = vec![0.0; SENSORS.len()];
-    let mut values: Vec<Vec<f64>> = vec![Vec::new(); SENSORS.len()];
-    let decay = (-0.1f64 / 2.0).exp();
-    let mut simulator = Simulator::new(&rig.model, 0.0, start, 1e-6, Watch::default());
-    let sample =
-        |t_s: f64, state: &mapper_physics::model::State, outputs: &mapper_physics::model::Outputs| {
-            let at = mapper_physics::inputs::Inputs::at(&inputs, t_s);
-            let prepared = rig.model.prepare(&at);
-            for (i, (channel, noise, _)) in SENSORS.iter().enumerate() {
-                let seen = followers[i].read(t_s, true_value(*channel, &prepared, state, outputs).unwrap());
-                slow[i] = decay * slow[i] + (1.0 - decay * decay).sqrt() * normal();
-                values[i].push(seen + offsets[i] + noise * (0.8 * normal() + 0.6 * slow[i]));
-            }
-        };
-    simulator.run_to(end_s, &inputs, times_s.iter().copied(), sample, |_| {}).unwrap();
-    let series: BTreeMap<Channel, Series> = SENSORS
-        .iter()
-        .zip(values)
-        .map(|((channel, ..), values)| (*channel, Series { t_s: times_s.clone(), values }))
-        .collect();
-    let steps = (0..SPEEDS_RPM.len())
-        .map(|index| StepMarker {
-            index,
-            kind: StepKind::Point,
-            start_s: DWELL_S * index as f64,
-            end_s: DWELL_S * (index + 1) as f64,
-            from: None,
-            to: None,
-            p3_pa: p3_pa[index],
-            valve_opening_ratio: boundary().valve_opening_ratio,
-        })
-        .collect();
-    Recording { series, steps, events: Vec::new() }
-}
-
-fn declared() -> Declared {
-    let sensors = SENSORS
-        .iter()
-        .map(|(channel, noise_sigma, offset_sigma)| {
-            let declared = DeclaredUncertainty {
-                noise_sigma: *noise_sigma,
-                offset_sigma: *offset_sigma,
-                gain_sigma_ratio: 0.0,
-            };
-            (*channel, declared)
-        })
-        .collect();
-    Declared {
-        sensors,
-        noise_colour: Default::default(),
-        tolerances: Default::default(),
-        nominal: boundary(),
-    }
+    common::record_of(rig, &VISITS, seed)
 }
 
 /// With a few candidates only: the search over all of them is checked by `mapper gap blind`.
@@ -206,7 +100,7 @@ fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {
     let alone =
         mapper_gap::signature::lengths(study, &diagnosed.linearised, &vec![(meter, vec![1.02])]).unwrap();
     let fits = |wanted: &[usize]| {
-        let named = |f: &&mapper_gap::fit::Fit| mapper_gap::select::members(&f.hypothesis) == wanted;
+        let named = |f: &&mapper_gap::fit::Fit| mapper_gap::study::members(&f.hypothesis) == wanted;
         diagnosed.fits.iter().find(named).map(|f| f.cost)
     };
     let (both, stem) = (fits(&[1, meter]).unwrap(), fits(&[1]).unwrap());
@@ -286,7 +180,7 @@ fn a_jump_tells_a_slow_probe_from_its_rival_and_from_itself_nothing() {
     let nominal = Model::nominal();
     let p3_pa = |n_rpm: f64| hold_speed(&nominal, n_rpm, &boundary()).unwrap().boundary.p3_pa;
     let point = |speed_rpm: f64| OperatingPoint { speed_rpm, valve_opening_ratio: 0.9 };
-    let jump = |from_rpm: f64, to_rpm: f64| Jump {
+    let jump = |from_rpm: f64, to_rpm: f64| AllowedJump {
         from: point(from_rpm),
         to: point(to_rpm),
         from_p3_pa: p3_pa(from_rpm),

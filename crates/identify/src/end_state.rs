@@ -1,10 +1,10 @@
 //! Where on the map a step ended: means over its last seconds.
 
 use crate::findings::{Findings, code};
-use crate::plausible::plausible;
 use crate::{IdentifyConfig, StepError, taps};
 use mapper_core::{Channel, Recording, Series, StepMarker};
 use mapper_numerics::statistics::mean;
+use mapper_observe::plausible::is_reading;
 
 /// The operating point at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,7 +45,7 @@ pub(crate) fn end_state(
     let state = EndState { speed_rpm, flow_kg_s, t1_k, p1_pa, pressure_ratio: p2_pa / p1_pa };
     // A static tap's correction has no bound of its own.
     for (channel, value) in [(Channel::P1, p1_pa), (Channel::P2, p2_pa)] {
-        if !plausible(channel, value) {
+        if !is_reading(channel, value) {
             return Err(StepError::NoState {
                 step: step.index,
                 start_s: step.start_s,
@@ -61,10 +61,10 @@ pub(crate) fn end_state(
 fn last_mean(channel: Channel, series: &Series, step: &StepMarker, seconds: f64) -> Option<(f64, f64)> {
     let range = series.range(step.start_s, step.end_s);
     let (t_s, values) = (&series.t_s[range.clone()], &series.values[range]);
-    let last = values.iter().rposition(|value| plausible(channel, *value))?;
+    let last = values.iter().rposition(|value| is_reading(channel, *value))?;
     let last_s = t_s[last];
     let first = t_s.partition_point(|t| *t < last_s - seconds);
     let finite: Vec<f64> =
-        values[first..=last].iter().copied().filter(|value| plausible(channel, *value)).collect();
+        values[first..=last].iter().copied().filter(|value| is_reading(channel, *value)).collect();
     Some((mean(&finite)?, last_s))
 }

@@ -20,7 +20,6 @@ mod flow_drift;
 mod identify;
 mod joint;
 mod one_fit;
-mod plausible;
 mod samples;
 mod steady;
 mod taps;

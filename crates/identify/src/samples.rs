@@ -1,10 +1,10 @@
 //! The samples of a window on one time base, total pressures, complete rows only.
 
 use crate::IdentifyConfig;
-use crate::plausible::plausible;
 use crate::taps;
 use mapper_core::{Channel, Recording, Series, Window};
 use mapper_numerics::statistics::mean;
+use mapper_observe::plausible::is_reading;
 use mapper_physics::compression::isentropic_rise_ratio;
 
 /// Longest stretch between two samples of a channel that is bridged by interpolation, s: slower loggers have 1 Hz.
@@ -61,9 +61,9 @@ impl Samples {
                 (Channel::P2, p2_pa),
                 (Channel::CompressorFlow, flow_kg_s),
             ];
-            let complete = readings.into_iter().all(|(channel, value)| plausible(channel, value))
+            let complete = readings.into_iter().all(|(channel, value)| is_reading(channel, value))
                 && flow_kg_s > SMALLEST_FLOW_KG_S
-                && (!with_housing || plausible(Channel::Tc, tc_k));
+                && (!with_housing || is_reading(Channel::Tc, tc_k));
             let rise_ratio = isentropic_rise_ratio(p2_pa / p1_pa, t1_k);
             if !complete || !rise_ratio.is_finite() {
                 samples.lost += 1;

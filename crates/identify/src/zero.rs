@@ -6,10 +6,10 @@
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
-use crate::plausible::plausible;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, Series};
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::mean;
+use mapper_observe::plausible::is_reading;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -202,7 +202,7 @@ fn soak_mean(recording: &Recording, channel: Channel, start_s: f64, end_s: f64) 
     let third_s = (end_s - start_s) / 3.0;
     let of = |start_s: f64, end_s: f64| {
         let (_, values) = series.slice(start_s, end_s);
-        let usable: Vec<f64> = values.iter().copied().filter(|value| plausible(channel, *value)).collect();
+        let usable: Vec<f64> = values.iter().copied().filter(|value| is_reading(channel, *value)).collect();
         mean(&usable)
     };
     let (early, late) = (of(start_s, start_s + third_s)?, of(end_s - third_s, end_s)?);

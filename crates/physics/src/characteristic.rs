@@ -1,4 +1,7 @@
 //! The seam between the model and a compressor map: flow and efficiency at a corrected speed and pressure ratio.
+//!
+//! It holds no formula: those stand in [`closed_form_map`](crate::closed_form_map) and
+//! [`tabulated_map`](crate::tabulated_map), with their known answers.
 
 use mapper_core::ReferenceState;
 

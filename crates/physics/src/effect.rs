@@ -152,12 +152,12 @@ impl EffectInfo {
 
 /// The values of an effect's parameters, one for each and within its range, asked for by name.
 #[derive(Debug, Clone, Copy)]
-pub struct EffectValues<'a> {
+pub struct NamedValues<'a> {
     info: &'a EffectInfo,
     values: &'a [f64],
 }
 
-impl<'a> EffectValues<'a> {
+impl<'a> NamedValues<'a> {
     /// `values` stand in the order of the effect's parameters.
     ///
     /// # Errors
@@ -174,7 +174,7 @@ impl<'a> EffectValues<'a> {
                 return Err(EffectError::OutOfRange { id: id(), name, value: *value, unit, low, high });
             }
         }
-        Ok(EffectValues { info, values })
+        Ok(NamedValues { info, values })
     }
 
     /// The value of a parameter, in its unit.
@@ -215,7 +215,7 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     /// # Errors
     /// [`EffectError::Room`] where it brings hidden temperatures for which there is no room;
     /// [`EffectError::NoParameter`] where it asks for a parameter that it does not declare.
-    fn prepare(&self, values: &EffectValues<'_>, rig: &mut Rig) -> Result<(), EffectError>;
+    fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError>;
 }
 
 /// Why an effect cannot be put into a rig.
@@ -268,7 +268,7 @@ pub enum EffectError {
 /// [`EffectError`] where a value is missing, out of range or not finite, or hidden temperatures are too many. The rig
 /// is then as before.
 pub fn add(rig: &mut Rig, effect: &dyn Effect, values: &[f64]) -> Result<(), EffectError> {
-    effect.prepare(&EffectValues::new(effect.info(), values)?, rig)
+    effect.prepare(&NamedValues::new(effect.info(), values)?, rig)
 }
 
 /// `nominal` with all `effects` at their values.

@@ -1,6 +1,6 @@
 //! An effect as a struct of its own numbers: one struct, what is said of it, and what it does to a rig.
 
-use crate::effect::{Effect, EffectError, EffectInfo, EffectParameter, EffectValues, Rig, Submodel};
+use crate::effect::{Effect, EffectError, EffectInfo, EffectParameter, NamedValues, Rig, Submodel};
 use crate::hooks::TooManyExtraStates;
 use std::borrow::Cow;
 use std::marker::PhantomData;
@@ -32,7 +32,7 @@ pub trait EffectNumbers: Sized {
     ///
     /// # Errors
     /// [`EffectError::NoParameter`] where a name is missing.
-    fn from_values(values: &EffectValues<'_>) -> Result<Self, EffectError>;
+    fn from_values(values: &NamedValues<'_>) -> Result<Self, EffectError>;
 }
 
 /// An effect whose numbers are the fields of `Self`.
@@ -74,7 +74,7 @@ impl<K: EffectKind> Effect for OfKind<K> {
         &self.info
     }
 
-    fn prepare(&self, values: &EffectValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
+    fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
         Ok(K::from_values(values)?.put_into(rig)?)
     }
 }
@@ -93,7 +93,7 @@ impl<K: EffectKind> Effect for OfKind<K> {
 ///         conductance_w_k = "G" ["W/K"] 1.0 .. 500.0, neutral 500.0, step -480.0;
 ///     }
 /// }
-/// let [parameter] = Wall::parameters().try_into().unwrap();
+/// let [parameter]: [_; 1] = Wall::parameters().try_into().unwrap();
 /// assert_eq!((parameter.name.as_ref(), parameter.high, parameter.typical_step), ("G", 500.0, -480.0));
 /// ```
 #[macro_export]
@@ -124,7 +124,7 @@ macro_rules! effect_parameters {
             }
 
             fn from_values(
-                values: &$crate::effect::EffectValues<'_>,
+                values: &$crate::effect::NamedValues<'_>,
             ) -> Result<Self, $crate::effect::EffectError> {
                 Ok($kind { $($field: values.get($name)?),+ })
             }

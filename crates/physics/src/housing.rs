@@ -1,4 +1,8 @@
 //! The metal: conduction through the bearing housing, heat to the oil and to the cell, heat capacities.
+//!
+//! Each housing is one temperature: its Biot number is below 0.1 with the coefficients of the paper. Free convection is
+//! Appendix A's, turbulent over a body of some 0.1 m: walls 10 K and more above the cell. Heat capacities are straight lines
+//! over the ranges that Appendix A gives and go on beyond them.
 
 use crate::params::{BearingParams, Params};
 
@@ -62,4 +66,32 @@ pub fn compressor_capacity_j_k(params: &Params, tc_k: f64) -> f64 {
 #[inline]
 pub fn turbine_capacity_j_k(params: &Params, tt_k: f64) -> f64 {
     params.turbine.housing_mass_kg * (500.0 + 200.0 * (tt_k - 300.0) / 500.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A black body at 300 K emits 459.3 W/m2 (sigma T^4, any text); 1.25 dT^(1/3) at 8 K is 2.5 W/(m2 K).
+    #[test]
+    fn radiation_and_free_convection_by_hand() {
+        let radiated_w = external_heat_w(1.0, 1.0, 0.0, 300.0, 0.0);
+        assert!((radiated_w - 459.3).abs() < 0.05, "{radiated_w} W");
+        assert!((external_heat_w(2.0, 0.0, 1.0, 308.0, 300.0) - 2.0 * 2.5 * 8.0).abs() < 1e-9);
+        assert!((external_heat_w(2.0, 0.0, 1.0, 292.0, 300.0) + 2.0 * 2.5 * 8.0).abs() < 1e-9);
+        assert_eq!(external_heat_w(1.0, 1.0, 1.0, 300.0, 300.0), 0.0);
+        // Incropera, 13.2: two large plates at 800 K and 500 K exchange sigma (T1^4 - T2^4) = 19 682 W/m2 as black bodies.
+        assert!((radiation_w(1.0, 800.0, 500.0) / 19_682.0 - 1.0).abs() < 1e-4);
+    }
+
+    /// Appendix A: 2 k A/L = 2 47.5 7e-4/45e-3 = 1.4778 W/K; the node of equal conductances lies in the middle.
+    #[test]
+    fn the_bearing_housing_is_a_chain_of_conductances() {
+        let params = Params::default();
+        assert!((bearing_conductance_w_k(&params.bearing) - 1.4778).abs() < 1e-4);
+        assert!((bearing_k(1.5, 0.0, 340.0, 500.0, 320.0) - 420.0).abs() < 1e-12);
+        assert!((bearing_k(1.5, 1.5, 340.0, 500.0, 330.0) - 390.0).abs() < 1e-12);
+        assert!((compressor_capacity_j_k(&params, 300.0) - 0.93 * 930.0).abs() < 1e-9);
+        assert!((turbine_capacity_j_k(&params, 800.0) - 3.15 * 700.0).abs() < 1e-9);
+    }
 }

@@ -1,4 +1,7 @@
-//! The back-pressure valve as an isentropic orifice.
+//! The back-pressure valve as an isentropic orifice (St. Venant and Wantzel).
+//!
+//! Domain: a perfect gas with gamma = 1.4 held constant, as the paper's model has it; hot air at 450 K has 1.39, which moves
+//! the flow by 0.3 %. Both pressures are total before and static behind the throat; backflow is not modelled.
 
 use crate::air::{GAS_CONSTANT_J_KGK, HEAT_CAPACITY_RATIO as G};
 
@@ -33,5 +36,13 @@ mod tests {
         assert!((critical - 0.684_731).abs() < 1e-6, "{critical}");
         assert_eq!(flow, flow_kg_s(1e-4, 400e3, 350.0, 10e3));
         assert_eq!(flow_kg_s(1e-4, 100e3, 350.0, 100e3), 0.0);
+    }
+
+    /// NACA report 1135, gamma = 1.4: at p/p0 = 0.8430 the flow is at Mach 0.5, where A*/A = 1/1.3398.
+    #[test]
+    fn subsonic_flow_follows_the_isentropic_tables() {
+        let ratio = flow_kg_s(1e-4, 400e3, 350.0, 0.8430 * 400e3) / flow_kg_s(1e-4, 400e3, 350.0, 100e3);
+        // Four printed digits of the pressure ratio.
+        assert!((ratio - 1.0 / 1.3398).abs() < 2e-4, "{ratio}");
     }
 }

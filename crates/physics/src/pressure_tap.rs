@@ -1,7 +1,8 @@
 //! Static pressure at a pipe's wall and total pressure of the flow in it.
 //!
 //! One-dimensional isentropic relations of a perfect gas (e.g. Shapiro, The Dynamics and Thermodynamics of
-//! Compressible Fluid Flow, ch. 4), with the ratio of specific heats at the total temperature.
+//! Compressible Fluid Flow, ch. 4), with the ratio of specific heats at the total temperature. Domain: subsonic flow that
+//! fills the pipe, 250 to 800 K (see [`air`]).
 
 use crate::air;
 use mapper_numerics::root::bisect;

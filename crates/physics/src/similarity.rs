@@ -1,4 +1,7 @@
 //! Similarity of speed lines: at equal place on the line flow goes with speed, isentropic head with its square.
+//!
+//! The fan laws (e.g. Dixon and Hall, Fluid Mechanics and Thermodynamics of Turbomachinery, ch. 2). They hold for small
+//! changes of speed: within 2 % here. Over more, compressibility bends the line.
 
 /// (gamma - 1)/gamma of cold air.
 const KAPPA: f64 = 1.0 - 1.0 / crate::air::HEAT_CAPACITY_RATIO;

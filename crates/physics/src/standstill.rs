@@ -1,6 +1,7 @@
 //! The machine at rest: no flow, both housings relax to the cell through the bearing housing.
 //!
-//! The running model is singular at speed 0 and flow 0; for soaks and zeros this one stands in for it.
+//! The running model is singular at speed 0 and flow 0; for soaks and zeros this one stands in for it. Domain: no gas flow
+//! at all; the heat balances are those of [`housing`] without their gas side.
 
 use crate::housing;
 use crate::params::Params;
@@ -65,6 +66,21 @@ fn rates_k_s(params: &Params, tc_k: f64, tt_k: f64, oil_k: f64, ambient_k: f64) 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Lumped capacitance (Incropera, 5.1): without losses to the cell, and with oil that holds the bearing node, a housing falls
+    /// to 1/e of its excess in M c/G. The oil's conductance is made large; c at 300 K, and nearly so 1 K above it.
+    #[test]
+    fn a_housing_cools_as_a_lumped_capacitance() {
+        let mut params = Params { external_convection_ratio: 0.0, ..Params::default() };
+        params.compressor.emissivity_ratio = 0.0;
+        params.bearing.oil_conductance_w_k = 1e9;
+        let tau_s =
+            params.compressor.housing_mass_kg * 930.0 / housing::bearing_conductance_w_k(&params.bearing);
+        let state = StandstillState { tc_k: 301.0, tt_k: 300.0 };
+        let later = relax(&params, state, 300.0, 300.0, tau_s);
+        // c rises by 0.03 % per kelvin.
+        assert!((later.tc_k - 300.0 - 1.0 / std::f64::consts::E).abs() < 2e-4, "{} K", later.tc_k);
+    }
 
     #[test]
     fn hot_housings_cool_monotonically_to_a_cell_at_one_temperature() {

@@ -1,4 +1,7 @@
 //! The T2 probe: a small sphere in the outlet pipe (eqs. 11-12).
+//!
+//! Eq. 11 is Whitaker's correlation (AIChE J. 18, 1972) for a sphere: Re 3.5 to 7.6e4, Pr 0.71 to 380. The tip is one
+//! temperature, which needs a Biot number below 0.1: tips up to some 10 mm here.
 
 use crate::air;
 
@@ -40,6 +43,26 @@ pub fn dynamic_temperature_k(
 
 #[cfg(test)]
 mod tests {
+    /// A sphere of 10 mm in air of 300 K by hand, with the properties of a table (Incropera, table A.4): 0.05 kg/s in a pipe of
+    /// 35 mm is Re = 28 150 on the tip and Nu = 2 + (0.4 Re^0.5 + 0.06 Re^(2/3)) Pr^0.4 = 108.7, so that
+    /// tau = 8600 480 0.01^2/(6 Nu k) = 24.1 s.
+    #[test]
+    fn a_large_tip_follows_whitaker() {
+        let tau_s = super::time_constant_s(10e-3, 35e-3, 0.05, 300.0);
+        // Closed forms of air: 2 %.
+        assert!((tau_s / 24.1 - 1.0).abs() < 0.02, "{tau_s} s");
+    }
+
+    /// 100 m/s of air carry v^2/(2 cp) = 1e4/2010 = 4.97 K.
+    #[test]
+    fn the_dynamic_temperature_is_that_of_the_velocity() {
+        let density_kg_m3 = 150e3 / (287.05 * 350.0);
+        let flow_kg_s = 100.0 * density_kg_m3 * 0.25 * std::f64::consts::PI * 0.035 * 0.035;
+        let dynamic_k = super::dynamic_temperature_k(0.035, flow_kg_s, 150e3, 350.0, 287.05);
+        // cp of 350 K: 1008 instead of 1005 J/(kg K).
+        assert!((dynamic_k - 4.97).abs() < 0.03, "{dynamic_k} K");
+    }
+
     /// The paper: "time constants can be as large as 10 s for a 3 mm thermocouple": at the lowest flows of the map.
     #[test]
     fn three_millimetres_take_about_ten_seconds() {

@@ -5,20 +5,50 @@ use std::io::{self, Read};
 use zstd::zstd_safe::{DCtx, ResetDirective, get_error_name};
 
 /// Why a chunk cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum ChunkError {
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ChunkError {
+    /// It ends within its header.
     #[error("its header is not whole")]
     Header,
+    /// It would unpack to more than is read.
     #[error("it claims {claimed} bytes, more than the {limit} that are read")]
-    TooLarge { claimed: u64, limit: u64 },
-    #[error("it is compressed with `{0}`, and only zstd can be read")]
-    Compression(String),
-    #[error("it does not decompress ({0})")]
-    Decompress(std::io::Error),
+    TooLarge {
+        /// Size it claims, bytes.
+        claimed: u64,
+        /// Largest size read, bytes.
+        limit: u64,
+    },
+    /// Another compression.
+    #[error("it is compressed with `{compression}`, and only zstd can be read")]
+    Compression {
+        /// Its compression.
+        compression: String,
+    },
+    /// The compressed data are damaged.
+    #[error("it does not decompress ({reason})")]
+    Decompress {
+        /// What zstd said.
+        reason: String,
+    },
+    /// It unpacks to another size than it claims.
     #[error("it holds {found} bytes and claims {claimed}")]
-    Length { claimed: u64, found: u64 },
+    Length {
+        /// Size it claims, bytes.
+        claimed: u64,
+        /// Size it has, bytes.
+        found: u64,
+    },
+    /// Its content is not what was written.
     #[error("its checksum is {found:08x} and should be {saved:08x}")]
-    Checksum { saved: u32, found: u32 },
+    Checksum {
+        /// Checksum that stands in it.
+        saved: u32,
+        /// Checksum of what is there.
+        found: u32,
+    },
+    /// Its last record is cut.
+    #[error("it ends within a record")]
+    CutRecord,
 }
 
 /// Unpacks chunks; keeps what decompression can use again for the next one.
@@ -41,8 +71,13 @@ impl Unpacker {
         self.content.clear();
         match compression {
             b"" => self.content.extend_from_slice(data),
-            b"zstd" => self.decompress(data, claimed).map_err(ChunkError::Decompress)?,
-            other => return Err(ChunkError::Compression(String::from_utf8_lossy(other).into_owned())),
+            b"zstd" => self
+                .decompress(data, claimed)
+                .map_err(|error| ChunkError::Decompress { reason: error.to_string() })?,
+            other => {
+                let compression = String::from_utf8_lossy(other).into_owned();
+                return Err(ChunkError::Compression { compression });
+            }
         }
         let found = self.content.len() as u64;
         if found != claimed {

@@ -33,12 +33,12 @@ pub enum RecordError {
         source: io::Error,
     },
     /// A batch, event or step that cannot be written: a fault of the program that made it.
-    #[error("failed to record into `{}`: {message}; a fault of the program that made it", path.display())]
+    #[error("failed to record into `{}`: {source}; a fault of the program that made it", path.display())]
     BadInput {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        message: String,
+        source: BadBatch,
     },
     /// The file could not be opened or read.
     #[error("failed to read the recording `{}`: {source}", path.display())]
@@ -97,6 +97,33 @@ pub enum RecordError {
         field: String,
         /// What is wrong with the unit.
         source: Box<UnitError>,
+    },
+}
+
+/// What is wrong with something that was to be recorded.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BadBatch {
+    /// A time that is not a number or leaves the clock's range.
+    #[error("the time {t_s} s cannot be recorded")]
+    Time {
+        /// The time, s.
+        t_s: f64,
+    },
+    /// A column of another length than the times.
+    #[error("{name} has {length} values for {samples} times")]
+    Length {
+        /// The column.
+        name: String,
+        /// Its values.
+        length: usize,
+        /// The times.
+        samples: usize,
+    },
+    /// A column that is there twice.
+    #[error("`{name}` comes twice in a batch")]
+    Twice {
+        /// The column.
+        name: String,
     },
 }
 

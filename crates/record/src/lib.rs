@@ -31,11 +31,12 @@ mod writer;
 
 pub use channel_map::{ChannelMap, ChannelSource, MachineConstants, WindowLimits};
 pub use channel_map_yaml::{ChannelMapError, ChannelMapIssue};
-pub use error::RecordError;
+pub use chunk::ChunkError;
+pub use error::{BadBatch, RecordError};
 pub use format::FormatVersion;
 pub use mapper_units::{Kind, Unit, UnitError};
 pub use read::{ReadOptions, ReadReport, read_recording, read_recording_from};
 pub use recording_file::RecordingHeader;
 pub use truth::{Truth, read_truth};
-pub use warning::ReadWarning;
+pub use warning::{DamagedPart, ReadWarning};
 pub use writer::{RecordingWriter, StepPhase};

@@ -1,12 +1,12 @@
 //! One pass over a recording: finds what can be saved, and hands it on.
 
-use crate::chunk::Unpacker;
+use crate::chunk::{ChunkError, Unpacker};
 use crate::framing::{Frame, FrameReader, split_record};
 use crate::records::{
     ChannelDefinition, MAGIC, op, parse_attachment, parse_channel, parse_message, parse_metadata,
     parse_schema,
 };
-use crate::{ReadOptions, ReadWarning, RecordError};
+use crate::{DamagedPart, ReadOptions, ReadWarning, RecordError};
 use std::collections::BTreeMap;
 use std::io::{self, Read};
 use std::path::Path;
@@ -120,14 +120,13 @@ impl Scanned {
         let mut rest = match unpacker.unpack(body, options.max_chunk_bytes) {
             Ok(content) => content,
             Err(error) => {
-                self.warnings.push(ReadWarning::DamagedChunk { offset, message: error.to_string() });
+                self.warnings.push(ReadWarning::DamagedChunk { offset, source: error });
                 return;
             }
         };
         while !rest.is_empty() {
             let Some((opcode, body, after)) = split_record(rest) else {
-                let message = "it ends within a record".to_owned();
-                self.warnings.push(ReadWarning::DamagedChunk { offset, message });
+                self.warnings.push(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
                 return;
             };
             self.record(offset, opcode, body, options, sink);
@@ -165,14 +164,14 @@ impl Scanned {
             _ => Some(()),
         };
         if whole.is_none() {
-            let message = match opcode {
-                op::MESSAGE => "a message without its header",
-                op::SCHEMA => "a schema whose lengths do not fit",
-                op::CHANNEL => "a topic whose lengths do not fit",
-                op::METADATA => "metadata whose lengths do not fit",
-                _ => "an attachment whose lengths or checksum do not fit",
+            let part = match opcode {
+                op::MESSAGE => DamagedPart::Message,
+                op::SCHEMA => DamagedPart::Schema,
+                op::CHANNEL => DamagedPart::Topic,
+                op::METADATA => DamagedPart::Metadata,
+                _ => DamagedPart::Attachment,
             };
-            self.warnings.push(ReadWarning::DamagedRecord { offset, message: message.to_owned() });
+            self.warnings.push(ReadWarning::DamagedRecord { offset, part });
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What was wrong with a recording that could be read all the same.
 
+use crate::ChunkError;
 use mapper_core::Channel;
 
 /// Something a reader of the recording should know. Each displays as one sentence with values.
@@ -12,20 +13,20 @@ pub enum ReadWarning {
         offset: u64,
     },
     /// A chunk could not be used; the others were.
-    #[error("the chunk at byte {offset} was left out: {message}")]
+    #[error("the chunk at byte {offset} was left out: {source}")]
     DamagedChunk {
         /// Byte offset of the chunk's record.
         offset: u64,
         /// What is wrong with it.
-        message: String,
+        source: ChunkError,
     },
     /// A record other than a message could not be used.
-    #[error("the record at byte {offset} was left out: {message}")]
+    #[error("the record at byte {offset} was left out: {part}")]
     DamagedRecord {
         /// Byte offset of the record, or of the chunk it is in.
         offset: u64,
-        /// What is wrong with it.
-        message: String,
+        /// What it is, and what is wrong with it.
+        part: DamagedPart,
     },
     /// Messages on a mapped topic that are not JSON objects.
     #[error("{count} messages on {topic} were left out: they are not JSON objects")]
@@ -116,4 +117,31 @@ pub enum ReadWarning {
         /// Time taken for its end: that of the last sample, s.
         end_s: f64,
     },
+}
+
+/// What a damaged record was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DamagedPart {
+    /// A sample.
+    Message,
+    /// The description of a topic's fields.
+    Schema,
+    /// A topic.
+    Topic,
+    /// Pairs of names and values.
+    Metadata,
+    /// A file within the file.
+    Attachment,
+}
+
+impl std::fmt::Display for DamagedPart {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            DamagedPart::Message => "a message without its header",
+            DamagedPart::Schema => "a schema whose lengths do not fit",
+            DamagedPart::Topic => "a topic whose lengths do not fit",
+            DamagedPart::Metadata => "metadata whose lengths do not fit",
+            DamagedPart::Attachment => "an attachment whose lengths or checksum do not fit",
+        })
+    }
 }

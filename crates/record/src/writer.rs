@@ -1,9 +1,9 @@
 //! Writing a recording: messages per device group and sample, flushed each second of the run's clock.
 
-use crate::RecordError;
 use crate::format::TRUTH_TOPIC;
 use crate::recording_file::{McapFile, OpenedFile, RecordingHeader, add_channel, io_error, open};
 use crate::schema::{Field, numeric_schema, unit_metadata};
+use crate::{BadBatch, RecordError};
 use mapper_core::{Channel, Event, Group, SampleBatch, StepMarker};
 use mcap::McapResult;
 use mcap::records::MessageHeader;
@@ -206,7 +206,7 @@ impl RecordingWriter {
         let since_epoch = self.start_time_ns as i128 + (t_s * 1e9).round() as i128;
         match u64::try_from(since_epoch) {
             Ok(log_time) if t_s.is_finite() => Ok(log_time),
-            _ => Err(self.bad_input(format!("the time {t_s} s cannot be recorded"))),
+            _ => Err(self.bad_input(BadBatch::Time { t_s })),
         }
     }
 
@@ -239,8 +239,8 @@ impl RecordingWriter {
         })
     }
 
-    fn bad_input(&self, message: String) -> RecordError {
-        RecordError::BadInput { path: self.path.clone(), message }
+    fn bad_input(&self, source: BadBatch) -> RecordError {
+        RecordError::BadInput { path: self.path.clone(), source }
     }
 
     fn check(&self, batch: &SampleBatch) -> Result<(), RecordError> {
@@ -249,17 +249,17 @@ impl RecordingWriter {
         let truth = batch.truth.iter().map(|column| (column.name.as_str(), column.values.len()));
         for (name, length) in columns.chain(truth) {
             if length != samples {
-                return Err(self.bad_input(format!("{name} has {length} values for {samples} times")));
+                return Err(self.bad_input(BadBatch::Length { name: name.to_owned(), length, samples }));
             }
         }
         for (index, column) in batch.columns.iter().enumerate() {
             if batch.columns[..index].iter().any(|earlier| earlier.channel == column.channel) {
-                return Err(self.bad_input(format!("{} comes twice in a batch", column.channel)));
+                return Err(self.bad_input(BadBatch::Twice { name: column.channel.to_string() }));
             }
         }
         for (index, column) in batch.truth.iter().enumerate() {
             if batch.truth[..index].iter().any(|earlier| earlier.name == column.name) {
-                return Err(self.bad_input(format!("truth `{}` comes twice in a batch", column.name)));
+                return Err(self.bad_input(BadBatch::Twice { name: column.name.clone() }));
             }
         }
         Ok(())

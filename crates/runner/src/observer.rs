@@ -4,45 +4,57 @@ use mapper_core::{Event, RigDescription, SampleBatch, StepMarker};
 
 /// What an observer could not do; the run ends in its safe state.
 #[derive(Debug, thiserror::Error)]
-#[error("{message}")]
+#[error(transparent)]
 pub struct ObserverError {
-    /// What went wrong, and what to do.
-    pub message: String,
-    /// The cause.
-    #[source]
-    pub source: Option<Box<dyn std::error::Error + Send + Sync>>,
+    /// The observer's own error: what went wrong, and what to do.
+    source: Box<dyn std::error::Error + Send + Sync>,
 }
 
 impl ObserverError {
     /// Wraps the observer's own error.
     pub fn of(error: impl std::error::Error + Send + Sync + 'static) -> Self {
-        ObserverError { message: error.to_string(), source: Some(Box::new(error)) }
+        ObserverError { source: Box::new(error) }
     }
 }
 
 /// Called by the runner in order of run time. Every method does nothing by default.
 pub trait RunObserver {
     /// The rig is armed.
+    ///
+    /// # Errors
+    /// [`ObserverError`] ends the run in its safe state, here and below.
     fn on_start(&mut self, _rig: &RigDescription) -> Result<(), ObserverError> {
         Ok(())
     }
 
     /// A step begins; its `end_s` is the planned one.
+    ///
+    /// # Errors
+    /// [`ObserverError`].
     fn on_step_start(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
         Ok(())
     }
 
     /// New samples with the rig's own events; also called for warm-up and cool-down.
+    ///
+    /// # Errors
+    /// [`ObserverError`].
     fn on_batch(&mut self, _batch: &SampleBatch) -> Result<(), ObserverError> {
         Ok(())
     }
 
     /// The runner has something to tell: a guard that tripped, a stop, the safe state.
+    ///
+    /// # Errors
+    /// [`ObserverError`].
     fn on_event(&mut self, _event: &Event) -> Result<(), ObserverError> {
         Ok(())
     }
 
     /// A step has ended; its `end_s` is the real one.
+    ///
+    /// # Errors
+    /// [`ObserverError`].
     fn on_step_end(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
         Ok(())
     }

@@ -4,13 +4,17 @@ use mapper_core::{Plan, PlanStep, SampleBatch, Soak, StepMarker};
 
 /// Why a source has no next step though it should; the run ends in its safe state.
 #[derive(Debug, thiserror::Error)]
-#[error("{message}")]
+#[error(transparent)]
 pub struct StepSourceError {
-    /// What went wrong, and what to do.
-    pub message: String,
-    /// The cause.
-    #[source]
-    pub source: Option<Box<dyn std::error::Error + Send + Sync>>,
+    /// The source's own error: what went wrong, and what to do.
+    source: Box<dyn std::error::Error + Send + Sync>,
+}
+
+impl StepSourceError {
+    /// Wraps the source's own error.
+    pub fn of(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        StepSourceError { source: Box::new(error) }
+    }
 }
 
 /// Yields steps one by one, and sees what becomes of them. Guards and observers look on all the same.

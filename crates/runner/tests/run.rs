@@ -91,7 +91,7 @@ impl RunObserver for Notebook {
         }
         match self.fail_at_s {
             Some(fail_s) if now_s >= fail_s => {
-                Err(ObserverError { message: "the disk is full".to_owned(), source: None })
+                Err(ObserverError::of(std::io::Error::other("the disk is full")))
             }
             _ => Ok(()),
         }

@@ -3,6 +3,7 @@
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, DeclaredUncertainty, WindowRule};
 use mapper_identify::{IdentifyConfig, PressureTap};
+use mapper_observe::declared_uncertainties;
 use mapper_record::ChannelMap;
 use std::collections::BTreeMap;
 
@@ -28,34 +29,28 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         reference: campaign.reference,
         inlet_tap: tap(Channel::P1),
         outlet_tap: tap(Channel::P2),
-        declared: declared(campaign),
+        declared: declared(campaign, &ChannelMap::native()),
         ..IdentifyConfig::default()
     }
 }
 
-/// What is declared of the sensors; a flow meter without a gain of its own has that of the tolerances.
-pub fn declared(campaign: &Campaign) -> BTreeMap<Channel, DeclaredUncertainty> {
-    let mut declared: BTreeMap<Channel, DeclaredUncertainty> =
-        campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
-    if let Some(flow) = declared.get_mut(&Channel::CompressorFlow)
-        && flow.gain_sigma_ratio == 0.0
-    {
-        flow.gain_sigma_ratio = campaign.tolerances.flow_meter_gain_ratio;
-    }
-    declared
+/// What is declared of the sensors of a recording that is read by this channel map.
+pub fn declared(campaign: &Campaign, map: &ChannelMap) -> BTreeMap<Channel, DeclaredUncertainty> {
+    let sensors = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    declared_uncertainties(&sensors, &campaign.tolerances, &map.sensors)
 }
 
-/// As [`identification`], with what a channel map says of the sensors of this very recording before it.
+/// As [`identification`], for a recording that is read by this channel map: what it says of sensors, noise and window counts
+/// before the campaign.
 pub fn identification_with(campaign: &Campaign, map: &ChannelMap) -> IdentifyConfig {
-    let mut identification = identification(campaign);
-    for (channel, declared) in &map.sensors {
-        let known = identification.declared.get(channel).map_or(0.0, |known| known.gain_sigma_ratio);
-        let gain_sigma_ratio = declared.gain_sigma_ratio.max(known);
-        identification.declared.insert(*channel, DeclaredUncertainty { gain_sigma_ratio, ..*declared });
+    let identification = identification(campaign);
+    IdentifyConfig {
+        declared: declared(campaign, map),
+        noise_colour: map.noise_colour.unwrap_or(identification.noise_colour),
+        window: map.window.map_or(identification.window, |window| WindowRule::Fixed {
+            start_s: window.start_s,
+            end_s: window.end_s,
+        }),
+        ..identification
     }
-    identification.noise_colour = map.noise_colour.unwrap_or(identification.noise_colour);
-    if let Some(window) = map.window {
-        identification.window = WindowRule::Fixed { start_s: window.start_s, end_s: window.end_s };
-    }
-    identification
 }

@@ -1,7 +1,7 @@
 //! Whether the rig stayed the same over one or more recordings.
 
 use crate::declared::identification_with;
-use crate::recorded::{Recorded, attached_campaign};
+use crate::recorded::{Recorded, attached_campaign, same_machine};
 use crate::{Session, SessionError, planning};
 use mapper_campaign::Campaign;
 use mapper_core::Recording;
@@ -19,7 +19,8 @@ pub struct Drift {
 }
 
 impl Session<'_> {
-    /// Judges recordings in the order in which they were made. The machine is that of `campaign`.
+    /// Judges recordings in the order in which they were made. The machine is that of `campaign`; there is no verdict on a
+    /// recording of another one.
     ///
     /// # Errors
     /// [`SessionError::Drift`] where there is nothing to compare, [`SessionError::Model`] where the campaign's map is unusable.
@@ -29,6 +30,15 @@ impl Session<'_> {
         campaign: &Campaign,
         map: &ChannelMap,
     ) -> Result<Drift, SessionError> {
+        for (index, recorded) in recorded.iter().enumerate() {
+            if let Err(other) = same_machine(recorded, campaign) {
+                let reason = format!("No verdict: recording {}: {other}.", index + 1);
+                return Ok(Drift {
+                    report: DriftReport::without_verdict(reason),
+                    zero: ZeroOutcome::NotAsked,
+                });
+            }
+        }
         let model = planning::nominal_model(campaign)?;
         let config = identification_with(campaign, map);
         let (recordings, config, zero) = zeroed_alike(recorded, config, campaign);
@@ -42,6 +52,7 @@ impl Session<'_> {
             runs: &runs,
             model: &model,
             boundary: campaign.boundary,
+            tolerances: campaign.tolerances,
             identification: &config,
             seed: campaign.seed,
         })?;

@@ -6,6 +6,7 @@ use mapper_drift::DriftError;
 use mapper_gap::diagnose::GapError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
+use mapper_observe::OtherMachine;
 use mapper_planner::PlanError;
 use mapper_record::{ChannelMapError, RecordError};
 use mapper_runner::RunError;
@@ -147,15 +148,8 @@ pub enum SessionError {
         remedy: &'static str,
     },
     /// The recording is of another machine.
-    #[error(
-        "the recording was made on machine `{recorded}`, the campaign is of `{campaign}`: use the campaign of the machine that was recorded"
-    )]
-    OtherMachine {
-        /// Name or serial number in the recording.
-        recorded: String,
-        /// Name, and serial number if there is one, in the campaign.
-        campaign: String,
-    },
+    #[error("{0}: use the campaign of the machine that was recorded")]
+    OtherMachine(#[from] OtherMachine),
     /// A recording cannot be identified.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
@@ -286,7 +280,7 @@ impl SessionError {
             // Only reading fails for reasons that are not the recording's.
             E::Record(RecordError::Read { .. } | RecordError::Exists { .. } | RecordError::Create { .. })
             | E::Record(RecordError::Write { .. } | RecordError::BadInput { .. }) => ErrorKind::Failure,
-            E::Record(_) | E::OtherMachine { .. } | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
+            E::Record(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
                 ErrorKind::BadRecording
             }
             E::Sequence(_)

@@ -1,18 +1,18 @@
 //! The gap between nominal model and rig: drift is looked for first, a zero taken off, then the diagnosis.
 
-use crate::declared::identification;
+use crate::declared::identification_with;
 use crate::planning::{nominal_model, with_plan_request};
-use crate::recorded::Recorded;
+use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, DeclaredUncertainty, Recording};
+use mapper_core::Recording;
 use mapper_drift::{CauseKind, DriftReport, without_drift};
 use mapper_gap::calibration::Calibration;
-use mapper_gap::declared::Declared;
 use mapper_gap::diagnose::{Diagnosed, Question, diagnose};
-use mapper_gap::outlook::Jump;
+use mapper_gap::outlook::AllowedJump;
 use mapper_gap::report::{Diagnosis, Verdict};
 use mapper_identify::ZeroOutcome;
+use mapper_observe::Declared;
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use mapper_planner::PlanRequest;
@@ -34,7 +34,7 @@ impl Session<'_> {
     /// Diagnoses one recording with candidate effects.
     ///
     /// # Errors
-    /// [`SessionError::Gap`] where the recording lacks what is needed or the nominal model cannot follow it.
+    /// [`SessionError::OtherMachine`] where the recording is not of the campaign's machine, [`SessionError::Gap`] where the recording lacks what is needed or the nominal model cannot follow it.
     pub fn diagnose_gap(
         &self,
         recorded: &Recorded,
@@ -42,22 +42,18 @@ impl Session<'_> {
         map: &ChannelMap,
         effects: Vec<Arc<dyn Effect>>,
     ) -> Result<Gap, SessionError> {
+        same_machine(recorded, campaign)?;
         let model = nominal_model(campaign)?;
         // A recording in which drift cannot be looked for may still have a gap.
         let drift = self.drift(slice::from_ref(recorded), campaign, map).ok();
         let drift = drift.map(|drift| drift.report).filter(|report| report.cause.is_some());
         let recording = taken_off(recorded.read.recording.clone(), drift.as_ref());
-        let config = identification(campaign);
+        let config = identification_with(campaign, map);
+        // A zero leaves less of the offsets.
         let zero = ZeroOutcome::of(&recording, &config, campaign.zero.is_some());
         let (recording, zeroed) = zero.take_off(recording, config);
-        // What a zero leaves of the offsets.
-        let sensor = |channel: &Channel, declared: DeclaredUncertainty| {
-            let offset_sigma =
-                zeroed.declared.get(channel).map_or(declared.offset_sigma, |left| left.offset_sigma);
-            (*channel, DeclaredUncertainty { offset_sigma, ..declared })
-        };
         let declared = Declared {
-            sensors: campaign.sensors.iter().map(|(channel, s)| sensor(channel, s.declared)).collect(),
+            sensors: zeroed.declared,
             noise_colour: map.noise_colour.unwrap_or_default(),
             tolerances: campaign.tolerances,
             nominal: campaign.boundary,
@@ -87,7 +83,7 @@ const MAX_POINTS: usize = 40;
 
 /// The jumps that the planner allows between the points of the campaign; none for grids too large to simulate them all,
 /// and for campaigns that are no grid.
-fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<Jump>, SessionError> {
+fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<AllowedJump>, SessionError> {
     if campaign.points.len() > MAX_POINTS {
         return Ok(Vec::new());
     }
@@ -97,7 +93,7 @@ fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<Jump>, Sessio
         let Ok(graph) = mapper_planner::jump_graph(&request) else { return Ok(Vec::new()) };
         let allowed = graph.edge_weights().filter(|jump| jump.rejections.is_empty());
         Ok(allowed
-            .map(|jump| Jump {
+            .map(|jump| AllowedJump {
                 from: jump.from,
                 to: jump.to,
                 from_p3_pa: jump.p3_pa - jump.p3_change_pa,

@@ -3,6 +3,7 @@
 use crate::declared::declared;
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, SURGE_ALLOWED_S};
+use mapper_record::ChannelMap;
 use mapper_runner::{DriftWatch, Guard, LimitGuard, SilenceGuard, StepSource, SurgeGuard};
 
 /// Silence of a guarded channel longer than this ends a run, s.
@@ -32,6 +33,5 @@ pub fn guards(campaign: &Campaign, delivered: &[Channel]) -> Vec<Box<dyn Guard>>
 
 /// Watches the repeats of a run, where the campaign says what to do about drift.
 pub fn drift_watch<'a>(campaign: &Campaign, steps: &'a mut dyn StepSource) -> Option<DriftWatch<'a>> {
-    let on_drift = campaign.on_drift?;
-    Some(DriftWatch::new(steps, on_drift, declared(campaign)))
+    Some(DriftWatch::new(steps, campaign.on_drift?, declared(campaign, &ChannelMap::native())))
 }

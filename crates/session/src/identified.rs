@@ -1,7 +1,7 @@
 //! From a recording to identified points beside their truth, where there is any: one way for all who need it.
 
 use crate::declared::identification_with;
-use crate::recorded::Recorded;
+use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_core::{IdentifiedPoint, Method, Recording, ReferenceState, ThermalModel};
 use mapper_identify::{IdentifyConfig, WindowRule, ZeroOutcome, identify_recording};
@@ -36,7 +36,8 @@ impl Session<'_> {
     /// Identifies all steps of a recording. Machine, sensors and window come from its campaign, or else from the channel map.
     ///
     /// # Errors
-    /// [`SessionError::MachineUnknown`] where neither is known, [`SessionError::Identify`] where the recording lacks what
+    /// [`SessionError::MachineUnknown`] where neither is known, [`SessionError::OtherMachine`] where the recording is not of the
+    /// campaign's machine, [`SessionError::Identify`] where the recording lacks what
     /// the method needs.
     pub fn identify(
         &self,
@@ -44,6 +45,9 @@ impl Session<'_> {
         map: &ChannelMap,
         method: Option<Method>,
     ) -> Result<Identified, SessionError> {
+        if let Some(campaign) = &recorded.campaign {
+            same_machine(&recorded, campaign)?;
+        }
         let mut config = match (&recorded.campaign, &map.machine) {
             (Some(campaign), _) => identification_with(campaign, map),
             (None, Some(machine)) => IdentifyConfig {

@@ -4,6 +4,7 @@ use crate::SessionError;
 use crate::files::read_text;
 use crate::run_directory;
 use mapper_campaign::{Campaign, CampaignError};
+use mapper_observe::OtherMachine;
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use std::path::{Path, PathBuf};
 
@@ -24,7 +25,7 @@ impl Recorded {
     ///
     /// # Errors
     /// [`SessionError::Record`] where the recording cannot be read, [`SessionError::Campaign`] where the attached campaign
-    /// has mistakes, [`SessionError::OtherMachine`] where the recording is of another machine than the campaign.
+    /// has mistakes.
     pub fn read(path: &Path, map: &ChannelMap, given: Option<&Campaign>) -> Result<Recorded, SessionError> {
         let file = run_directory::recording_of(path);
         let read = read_recording(&file, map, &ReadOptions::default())?;
@@ -33,9 +34,6 @@ impl Recorded {
             None if map.machine.is_some() => None,
             None => attached_campaign(&read, &file)?,
         };
-        if let Some(campaign) = &campaign {
-            same_machine(&read, campaign)?;
-        }
         Ok(Recorded { path: file, read, campaign })
     }
 
@@ -75,22 +73,11 @@ pub fn channel_map(file: &Path) -> Result<ChannelMap, SessionError> {
         .map_err(|source| SessionError::ChannelMap { path: file.to_owned(), source })
 }
 
-/// Refuses a recording of another machine than the campaign's. A recording that names none may be of any.
-pub(crate) fn same_machine(read: &ReadReport, campaign: &Campaign) -> Result<(), SessionError> {
+/// Refuses a recording of another machine than the campaign's.
+///
+/// # Errors
+/// [`OtherMachine`], by the one rule of [`mapper_observe::same_machine`].
+pub(crate) fn same_machine(recorded: &Recorded, campaign: &Campaign) -> Result<(), OtherMachine> {
     let machine = &campaign.machine;
-    let other = |key: &str, own: Option<&String>| {
-        read.metadata.get(key).filter(|recorded| Some(*recorded) != own && !recorded.is_empty())
-    };
-    let number = machine.serial_number.as_ref();
-    match other("machine", Some(&machine.name)).or_else(|| other("serial_number", number)) {
-        None => Ok(()),
-        Some(recorded) => Err(SessionError::OtherMachine {
-            recorded: recorded.clone(),
-            campaign: format!(
-                "{}{}",
-                machine.name,
-                number.map_or_else(String::new, |number| format!(" ({number})"))
-            ),
-        }),
-    }
+    mapper_observe::same_machine(&recorded.read.metadata, &machine.name, machine.serial_number.as_deref())
 }

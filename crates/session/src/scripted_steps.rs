@@ -129,7 +129,7 @@ fn single_steps(config: IdentifyConfig) -> IdentifyConfig {
 }
 
 fn source_error(error: impl std::error::Error + Send + Sync + 'static) -> StepSourceError {
-    StepSourceError { message: error.to_string(), source: Some(Box::new(error)) }
+    StepSourceError::of(error)
 }
 
 fn with_steps(mut plan: Plan, steps: Vec<PlanStep>) -> Plan {

@@ -14,7 +14,7 @@ pub use hook_names::HOOK_NAMES;
 
 use engine::Program;
 use hooks::ScriptHooks;
-use mapper_physics::effect::{Effect, EffectError, EffectInfo, EffectValues, Rig};
+use mapper_physics::effect::{Effect, EffectError, EffectInfo, NamedValues, Rig};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -51,7 +51,7 @@ impl Effect for ScriptEffect {
         &self.info
     }
 
-    fn prepare(&self, values: &EffectValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
+    fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
         // At neutral it is not there, however the script rounds.
         if values.is_neutral() {
             return Ok(());

@@ -3,10 +3,12 @@
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
-    Channel, DeclaredUncertainty, NoiseColour, Recording, ReferenceState, Series, StepKind, StepMarker,
+    Channel, DeclaredUncertainty, ModelTolerances, NoiseColour, Recording, ReferenceState, Series, StepKind,
+    StepMarker,
 };
 use mapper_drift::{Cause, Course, DriftReport, DriftRequest, RecordedRun, diagnose};
 use mapper_identify::{IdentifyConfig, WindowRule};
+use mapper_observe::declared_uncertainties;
 use mapper_physics::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use mapper_physics::closed_form_map::ClosedFormMap;
 use mapper_physics::driven::{FrozenGrid, drive};
@@ -66,22 +68,14 @@ pub fn nominal() -> Model {
 
 /// The campaign's own word on its sensors.
 pub fn identification() -> IdentifyConfig {
+    let sensors = SENSORS.iter().map(|&(channel, noise_sigma, offset_sigma)| {
+        (channel, DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio: 0.0 })
+    });
+    // The gain of both flow meters stands with the tolerances.
+    let tolerances = ModelTolerances::default();
     IdentifyConfig {
         window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 },
-        declared: SENSORS
-            .iter()
-            .map(|(channel, noise_sigma, offset_sigma)| {
-                let gain_sigma_ratio = if *channel == Channel::CompressorFlow { 0.005 } else { 0.0 };
-                (
-                    *channel,
-                    DeclaredUncertainty {
-                        noise_sigma: *noise_sigma,
-                        offset_sigma: *offset_sigma,
-                        gain_sigma_ratio,
-                    },
-                )
-            })
-            .collect(),
+        declared: declared_uncertainties(&sensors.collect(), &tolerances, &BTreeMap::new()),
         ..IdentifyConfig::default()
     }
 }
@@ -324,6 +318,7 @@ fn ask(runs: &[RecordedRun<'_>], identification: &IdentifyConfig) -> DriftReport
         runs,
         model: &nominal(),
         boundary: BoundaryConditions::default(),
+        tolerances: ModelTolerances::default(),
         identification,
         seed: 1,
     })

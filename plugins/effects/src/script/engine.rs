@@ -3,7 +3,7 @@
 use super::header::Mistake;
 use super::hook_names::HOOK_NAMES;
 use mapper_core::Channel;
-use mapper_physics::effect::{EffectError, EffectValues};
+use mapper_physics::effect::{EffectError, NamedValues};
 use mapper_physics::hooks::Site;
 use rhai::packages::{ArithmeticPackage, BasicMathPackage, LogicPackage, Package};
 use rhai::{AST, CallFnOptions, Dynamic, Engine, FuncArgs, ParseError, Position, Scope};
@@ -127,7 +127,7 @@ impl Program {
     }
 
     /// The value of each parameter of the script.
-    pub(super) fn numbers(&self, values: &EffectValues<'_>) -> Result<Numbers, EffectError> {
+    pub(super) fn numbers(&self, values: &NamedValues<'_>) -> Result<Numbers, EffectError> {
         Ok(Numbers(self.parameters.iter().map(|name| values.get(name)).collect::<Result<_, _>>()?))
     }
 

@@ -14,7 +14,7 @@ const PARAMETER_FORM: &str = "//! parameter: NAME [UNIT] LOW .. HIGH, neutral VA
 
 pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
     let (mut id, mut description, mut equation, mut source) = (None, None, None, None);
-    let (mut submodel, mut also_shows_in) = (None, Vec::new());
+    let mut submodel = None;
     let mut parameters: Vec<EffectParameter> = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let Some(header) = line.trim_start().strip_prefix("//!") else { continue };
@@ -33,18 +33,13 @@ pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
             "equation" => equation = owned(),
             "source" => source = owned(),
             "submodel" => submodel = Some(submodel_called(value).map_err(here)?),
-            "also shows in" => {
-                let places: Result<Vec<Submodel>, String> =
-                    value.split(',').map(|name| submodel_called(name.trim())).collect();
-                also_shows_in = places.map_err(here)?;
-            }
             "parameter" => {
                 let parameter = parameter(value).ok_or_else(|| here(format!("write `{PARAMETER_FORM}`")))?;
                 check(&parameter, &parameters).map_err(here)?;
                 parameters.push(parameter);
             }
             other => {
-                let keys = "effect, description, equation, source, submodel, also shows in, parameter";
+                let keys = "effect, description, equation, source, submodel, parameter";
                 return Err(here(format!("`{other}` is not a key of an effect; there are {keys}")));
             }
         }
@@ -59,7 +54,7 @@ pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
         equation: equation.unwrap_or(Cow::Borrowed("as in its script")),
         source: source.unwrap_or(Cow::Borrowed("suspected by the user")),
         submodel: submodel.ok_or_else(|| missing("//! submodel: NAME"))?,
-        also_shows_in,
+        also_shows_in: Vec::new(),
         id,
         parameters,
     })

@@ -30,7 +30,10 @@ impl Blind {
 
 fn of_blind(error: BlindError) -> Failure {
     let code = match error {
-        BlindError::Content { .. } | BlindError::Seal { .. } | BlindError::Cases { .. } => Code::BadInput,
+        BlindError::Content { .. }
+        | BlindError::TooLarge { .. }
+        | BlindError::Seal { .. }
+        | BlindError::Cases { .. } => Code::BadInput,
         _ => Code::Failure,
     };
     Failure::new(code, error)

@@ -1,5 +1,10 @@
 //! Boundary conditions as recorded, for the model to be driven by: averaged where they are quiet, as they are after jumps.
+//!
+//! Unlike [`smoothed_inputs`](crate::smoothed_inputs) these keep the noise of means, which is independent from one
+//! stretch to the next, and follow an input sensor that steps: what the search for drift needs.
 
+use crate::channels::{DRIVERS, boundary_condition};
+use crate::mean::BEFORE_S;
 use mapper_core::{Channel, Recording};
 use mapper_physics::inputs::{Inputs, InputsError, InterpolatedInputs};
 use mapper_physics::params::BoundaryConditions;
@@ -8,50 +13,59 @@ use mapper_physics::params::BoundaryConditions;
 const RAW_S: f64 = 3.0;
 /// Between jumps means over this long are taken, s.
 const MEAN_S: f64 = 10.0;
-/// A sample at a jump belongs to what comes after it, s.
-const BEFORE_S: f64 = 1e-6;
 
 /// Boundary conditions from jump to jump: never interpolated across one, however close to it.
-pub(crate) struct RecordedInputs {
+#[derive(Debug, Clone, PartialEq)]
+pub struct AveragedInputs {
     starts_s: Vec<f64>,
     levels: Vec<InterpolatedInputs>,
 }
 
-impl Inputs for RecordedInputs {
+impl Inputs for AveragedInputs {
     fn at(&self, t_s: f64) -> BoundaryConditions {
-        let level = self.starts_s.partition_point(|start_s| *start_s <= t_s).saturating_sub(1);
+        let level = self.level(t_s);
         self.levels[level].at(t_s)
     }
 
     fn next_kink_s(&self, t_s: f64) -> f64 {
-        let level = self.starts_s.partition_point(|start_s| *start_s <= t_s).saturating_sub(1);
+        let level = self.level(t_s);
         let next_s = self.starts_s.get(level + 1).copied().unwrap_or(f64::INFINITY);
         self.levels[level].next_kink_s(t_s).min(next_s)
     }
 
     fn is_constant_after(&self, t_s: f64) -> bool {
-        let level = self.starts_s.partition_point(|start_s| *start_s <= t_s).saturating_sub(1);
+        let level = self.level(t_s);
         self.levels[level].is_constant_after(t_s)
     }
 }
 
-/// The inputs of a recording. `jumps` are the times at which commands change, rising, s, with the valve from then on: the
-/// recorded command itself may show a change one sample late.
-pub(crate) fn recorded(
-    recording: &Recording,
-    nominal: &BoundaryConditions,
-    jumps: &[(f64, f64)],
-    end_s: f64,
-) -> Result<RecordedInputs, InputsError> {
-    let mut inputs = RecordedInputs { starts_s: Vec::new(), levels: Vec::new() };
-    for (index, (start_s, valve_opening_ratio)) in jumps.iter().enumerate() {
-        let next_s = jumps.get(index + 1).map_or(end_s, |next| next.0);
-        let mut nodes = Nodes { recording, nominal, t_s: Vec::new(), rows: Vec::new() };
-        nodes.level(*start_s, next_s, *valve_opening_ratio, index > 0);
-        inputs.starts_s.push(*start_s);
-        inputs.levels.push(InterpolatedInputs::new(nodes.t_s, nodes.rows)?);
+impl AveragedInputs {
+    /// The inputs of a recording until `end_s`. `jumps` are the times at which commands change, rising, s, with the valve
+    /// from then on: the recorded command itself may show a change one sample late. `nominal` stands for what is not
+    /// recorded.
+    ///
+    /// # Errors
+    /// [`InputsError`] where jumps do not rise.
+    pub fn read(
+        recording: &Recording,
+        nominal: &BoundaryConditions,
+        jumps: &[(f64, f64)],
+        end_s: f64,
+    ) -> Result<AveragedInputs, InputsError> {
+        let mut inputs = AveragedInputs { starts_s: Vec::new(), levels: Vec::new() };
+        for (index, (start_s, valve_opening_ratio)) in jumps.iter().enumerate() {
+            let next_s = jumps.get(index + 1).map_or(end_s, |next| next.0);
+            let mut nodes = Nodes { recording, nominal, t_s: Vec::new(), rows: Vec::new() };
+            nodes.level(*start_s, next_s, *valve_opening_ratio, index > 0);
+            inputs.starts_s.push(*start_s);
+            inputs.levels.push(InterpolatedInputs::new(nodes.t_s, nodes.rows)?);
+        }
+        Ok(inputs)
     }
-    Ok(inputs)
+
+    fn level(&self, t_s: f64) -> usize {
+        self.starts_s.partition_point(|start_s| *start_s <= t_s).saturating_sub(1)
+    }
 }
 
 struct Nodes<'a> {
@@ -78,9 +92,10 @@ impl Nodes<'_> {
             for t_s in times {
                 // Quantities that do not jump keep the mean of the whole stretch.
                 let mut row = self.means(start_s, raw_end_s, valve);
-                for (channel, value) in [(Channel::P3, &mut row.p3_pa), (Channel::P4, &mut row.p4_pa)] {
-                    if let Some(series) = self.recording.series.get(&channel) {
-                        *value = series.interpolate(t_s).unwrap_or(*value);
+                for channel in [Channel::P3, Channel::P4] {
+                    let read = self.recording.series.get(&channel).and_then(|series| series.interpolate(t_s));
+                    if let (Some(read), Some(value)) = (read, boundary_condition(&mut row, channel)) {
+                        *value = read;
                     }
                 }
                 self.push(t_s, row);
@@ -105,30 +120,24 @@ impl Nodes<'_> {
         }
     }
 
-    fn command(&self, channel: Channel, t_s: f64) -> Option<f64> {
-        self.recording.series.get(&channel)?.held(t_s)
-    }
-
     fn means(&self, start_s: f64, end_s: f64, valve_opening_ratio: f64) -> BoundaryConditions {
-        let mean = |channel: Channel, nominal: f64| {
-            let Some(series) = self.recording.series.get(&channel) else { return nominal };
-            let values = series.slice(start_s, end_s).1;
-            if values.is_empty() {
-                return series.interpolate(0.5 * (start_s + end_s)).unwrap_or(nominal);
-            }
-            values.iter().sum::<f64>() / values.len() as f64
-        };
-        let nominal = self.nominal;
-        let p3_nominal = self.command(Channel::P3Command, start_s).unwrap_or(nominal.p3_pa);
-        BoundaryConditions {
-            t1_k: mean(Channel::T1, nominal.t1_k),
-            p1_pa: mean(Channel::P1, nominal.p1_pa),
-            p3_pa: mean(Channel::P3, p3_nominal),
-            t3_k: mean(Channel::T3, nominal.t3_k),
-            p4_pa: mean(Channel::P4, nominal.p4_pa),
-            oil_temperature_k: mean(Channel::TOil, nominal.oil_temperature_k),
-            ambient_temperature_k: mean(Channel::TAmb, nominal.ambient_temperature_k),
-            valve_opening_ratio,
+        let mut row = BoundaryConditions { valve_opening_ratio, ..*self.nominal };
+        if let Some(p3_pa) = self.recording.series.get(&Channel::P3Command).and_then(|c| c.held(start_s)) {
+            row.p3_pa = p3_pa;
         }
+        for channel in DRIVERS.into_iter().chain([Channel::TAmb]) {
+            let (Some(series), Some(value)) =
+                (self.recording.series.get(&channel), boundary_condition(&mut row, channel))
+            else {
+                continue;
+            };
+            let values = series.slice(start_s, end_s).1;
+            *value = if values.is_empty() {
+                series.interpolate(0.5 * (start_s + end_s)).unwrap_or(*value)
+            } else {
+                values.iter().sum::<f64>() / values.len() as f64
+            };
+        }
+        row
     }
 }

@@ -5,6 +5,8 @@
 //! over the whole recording, and averages all of it.
 
 use mapper_core::NoiseColour;
+use mapper_numerics::coloured_noise::{memory, variance_of_mean};
+use mapper_numerics::statistics::median;
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
 /// Length of the bins that are filtered, s.
@@ -63,16 +65,13 @@ pub fn smooth(t_s: &[f64], values: &[f64], noise_sigma: f64, colour: NoiseColour
     let noise_sigma = noise_sigma.max(1e-12);
     let c2 = colour.first_order_share_ratio.powi(2);
     let tau_s = colour.time_constant_s.max(1e-3);
-    let decay = BIN_S / tau_s;
-    // Variance of the first-order part's mean over a bin.
-    let within = 2.0 * (decay - 1.0 + (-decay).exp()) / (decay * decay);
     let filter = Filter {
         bins: &bins,
         first,
         noise_sigma,
         white_variance: (1.0 - c2) * noise_sigma * noise_sigma,
-        coloured_variance: c2 * noise_sigma * noise_sigma * within,
-        coloured_decay: (-decay).exp(),
+        coloured_variance: variance_of_mean(c2 * noise_sigma * noise_sigma, BIN_S, tau_s),
+        coloured_decay: memory(BIN_S, tau_s),
     };
     // Intensity over variance, 1/s^3: from a straight line over hours to a course that follows each bin.
     let mut best = (f64::NEG_INFINITY, 0.0);
@@ -85,13 +84,11 @@ pub fn smooth(t_s: &[f64], values: &[f64], noise_sigma: f64, colour: NoiseColour
     }
     let mut tracks = Vec::with_capacity(bins.len());
     filter.run(best.1, Some(&mut tracks));
-    let (value, slope_s, variance) = filter.back(best.1, &tracks);
+    let (value, slope_s, variance) = filter.back(&tracks);
     // Density of the noise at low frequency; the smoother's window goes with its fourth root over the intensity's.
     let density = filter.white_variance * 0.1 + 2.0 * tau_s * c2 * noise_sigma * noise_sigma;
     let correlation_s = (density / best.1).powf(0.25).clamp(2.0, 1e4) * std::f64::consts::SQRT_2;
-    let mut variances = variance;
-    let middle = variances.len() / 2;
-    let sigma = variances.select_nth_unstable_by(middle, f64::total_cmp).1.max(0.0).sqrt();
+    let sigma = median(&variance).unwrap_or(0.0).max(0.0).sqrt();
     Some(Course { start_s, value, slope_s, sigma, correlation_s })
 }
 
@@ -172,7 +169,7 @@ impl Filter<'_> {
     }
 
     /// Smoothed values, slopes and variances of the course.
-    fn back(&self, _intensity: f64, tracks: &[Track]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    fn back(&self, tracks: &[Track]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let transition = self.transition();
         let n = tracks.len();
         let (mut value, mut slope, mut variance) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);

@@ -1,0 +1,161 @@
+//! All readings beside the model.
+
+use crate::blocks::{Block, CampaignStep};
+use crate::cause::{Cause, FOULING_FLOW_SHARE};
+use crate::constant::Constant;
+use crate::knobs::{KNOBS, difference_step};
+use crate::prediction::Prediction;
+use mapper_core::Channel;
+use mapper_observe::channels::{DRIVERS, OUTPUTS};
+use mapper_observe::knob::Knob;
+
+/// All readings beside the model.
+pub(crate) struct Readings {
+    pub runs: usize,
+    pub steps: Vec<CampaignStep>,
+    /// Stretches that are compared.
+    pub blocks: Vec<Block>,
+    /// Channels that are compared, as positions in [`OUTPUTS`].
+    pub columns: Vec<usize>,
+    /// Reading less model, channel after channel, stretch after stretch.
+    pub difference: Vec<f64>,
+    /// The model, in the same order.
+    pub model: Vec<f64>,
+    /// How readings and points answer to each of [`KNOBS`], per unit.
+    pub answers: Vec<Constant>,
+    /// Efficiency and heat-transfer coefficient of the model at the end of each step.
+    pub step_ends: Vec<(f64, f64)>,
+    /// Mean of each of [`DRIVERS`].
+    pub input_levels: Vec<f64>,
+    /// Positions of the stretches that are compared among all.
+    pub kept: Vec<usize>,
+    /// Every stretch with its readings and the nominal model's, those that are not compared included.
+    pub all: Vec<(Block, [Option<f64>; OUTPUTS.len()], [f64; OUTPUTS.len()])>,
+}
+
+impl Readings {
+    pub fn answer(&self, knob: Knob) -> Option<&Constant> {
+        KNOBS.iter().position(|other| *other == knob).and_then(|index| self.answers.get(index))
+    }
+
+    pub fn input_level(&self, channel: Channel) -> f64 {
+        DRIVERS
+            .iter()
+            .position(|input| *input == channel)
+            .and_then(|index| self.input_levels.get(index))
+            .copied()
+            .unwrap_or(0.0)
+    }
+
+    /// Begin of the campaign and end of its last step, time of the campaign, s.
+    pub fn span_s(&self) -> (f64, f64) {
+        let start = self.steps.first().map_or(0.0, |step| step.start_s + step.offset_s);
+        let end = self.steps.last().map_or(0.0, |step| step.end_s + step.offset_s);
+        (start, end)
+    }
+
+    /// A cause of unit size all the time, as readings and points show it; `None` where nothing shows it.
+    pub fn signature(&self, cause: Cause) -> Option<Constant> {
+        let of_knob = |knob: Knob, factor: f64| {
+            let answer = self.answer(knob)?;
+            let times = |values: &[f64]| values.iter().map(|value| factor * value).collect();
+            Some(Constant {
+                readings: times(&answer.readings),
+                eta: times(&answer.eta),
+                h_w_m2k: times(&answer.h_w_m2k),
+            })
+        };
+        match cause {
+            Cause::Fouling => {
+                let (mut sum, flow) =
+                    (of_knob(Knob::Efficiency, 1.0)?, of_knob(Knob::Flow, FOULING_FLOW_SHARE)?);
+                let add = |into: &mut Vec<f64>, from: &[f64]| {
+                    into.iter_mut().zip(from).for_each(|(into, from)| *into += from);
+                };
+                add(&mut sum.readings, &flow.readings);
+                add(&mut sum.eta, &flow.eta);
+                add(&mut sum.h_w_m2k, &flow.h_w_m2k);
+                Some(sum)
+            }
+            Cause::BearingFriction => of_knob(Knob::Friction, 1.0),
+            // An input that reads too high drives the model too high: the truth lies below.
+            Cause::Sensor(channel) if DRIVERS.contains(&channel) => of_knob(Knob::Input(channel), -1.0),
+            Cause::Sensor(channel) => {
+                let output = OUTPUTS.iter().position(|output| *output == channel)?;
+                let column = self.columns.iter().position(|column| *column == output)?;
+                let count = self.columns.len();
+                let readings = (0..self.difference.len())
+                    .map(|row| match row % count == column {
+                        true if cause.is_gain() => self.model[row],
+                        true => 1.0,
+                        false => 0.0,
+                    })
+                    .collect();
+                let steps = self.steps.len();
+                Some(Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] })
+            }
+        }
+    }
+
+    /// The same readings beside another prediction; `None` where it does not say all that the first one said.
+    pub fn around(&self, base: Prediction, turned: &[Prediction]) -> Option<Readings> {
+        let columns = &self.columns;
+        let rows = |values: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
+            self.kept
+                .iter()
+                .flat_map(|block| columns.iter().map(move |column| values(*block, *column)))
+                .collect()
+        };
+        let answers = KNOBS
+            .iter()
+            .zip(turned)
+            .map(|(knob, turned)| Constant {
+                readings: rows(&|block, column| {
+                    (turned.means[block][column] - base.means[block][column]) / difference_step(*knob)
+                }),
+                eta: (0..self.steps.len())
+                    .map(|step| {
+                        finite((turned.step_ends[step].0 - base.step_ends[step].0) / difference_step(*knob))
+                    })
+                    .collect(),
+                h_w_m2k: (0..self.steps.len())
+                    .map(|step| {
+                        finite((turned.step_ends[step].1 - base.step_ends[step].1) / difference_step(*knob))
+                    })
+                    .collect(),
+            })
+            .collect();
+        let readings = Readings {
+            runs: self.runs,
+            steps: self.steps.clone(),
+            blocks: self.blocks.clone(),
+            columns: self.columns.clone(),
+            difference: rows(&|block, column| {
+                self.all[block].1[column].unwrap_or(f64::NAN) - base.means[block][column]
+            }),
+            model: rows(&|block, column| base.means[block][column]),
+            answers,
+            step_ends: base.step_ends,
+            input_levels: self.input_levels.clone(),
+            kept: self.kept.clone(),
+            all: self.all.clone(),
+        };
+        readings.difference.iter().all(|value| value.is_finite()).then_some(readings)
+    }
+
+    /// Takes a linear part out of the model, as large as `of_rows` says in the readings, as `of_steps` at the steps' ends.
+    pub fn give_back(&mut self, part: &Constant, of_rows: &[f64], of_steps: &[f64]) {
+        for ((difference, shown), size) in self.difference.iter_mut().zip(&part.readings).zip(of_rows) {
+            *difference += shown * size;
+        }
+        for (step, ((eta, h_w_m2k), size)) in self.step_ends.iter_mut().zip(of_steps).enumerate() {
+            *eta -= part.eta[step] * size;
+            *h_w_m2k -= part.h_w_m2k[step] * size;
+        }
+    }
+}
+
+/// 0 for steps that the model cannot follow, which have no point.
+fn finite(value: f64) -> f64 {
+    if value.is_finite() { value } else { 0.0 }
+}

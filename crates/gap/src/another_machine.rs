@@ -1,0 +1,46 @@
+//! Whether a recording is of another machine than the nominal one, by what it reads.
+
+use crate::nuisance::OUTPUTS;
+use crate::problem::Problem;
+use crate::study::Study;
+use mapper_core::Channel;
+
+/// Deviations of a step's end from the nominal machine that no effect of a rig makes: of speed, flows, and the rise of
+/// pressure and temperature through the compressor.
+const ANOTHER_MACHINE_RATIO: [(Channel, f64); 5] = [
+    (Channel::ShaftSpeed, 0.25),
+    (Channel::CompressorFlow, 0.4),
+    (Channel::TurbineFlow, 0.4),
+    (Channel::P2, 0.4),
+    (Channel::T2, 0.6),
+];
+
+/// Refuses a recording that is nowhere near the nominal machine, by its prediction without any deviation.
+///
+/// # Errors
+/// [`Problem::OtherMachine`].
+pub fn another_machine(study: &Study, predicted: &[f64]) -> Result<(), Problem> {
+    let mut worst: Option<(f64, Channel, f64)> = None;
+    for (channel, limit) in ANOTHER_MACHINE_RATIO {
+        let nominal = &study.declared.nominal;
+        // Rises are compared, not levels.
+        let zero = match channel {
+            Channel::P2 => nominal.p1_pa,
+            Channel::T2 => nominal.t1_k,
+            _ => 0.0,
+        };
+        let mut away: Vec<f64> = study
+            .groups
+            .iter()
+            .filter(|group| OUTPUTS[group.output] == channel)
+            .filter_map(|group| group.rows.clone().last())
+            .map(|row| (study.measured[row] - zero) / (predicted[row] - zero).max(1e-9) - 1.0)
+            .collect();
+        away.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let Some(median) = away.get(away.len() / 2) else { continue };
+        if median.abs() > limit && worst.is_none_or(|(most, ..)| median.abs() / limit > most) {
+            worst = Some((median.abs() / limit, channel, 100.0 * median));
+        }
+    }
+    worst.map_or(Ok(()), |(_, channel, percent)| Err(Problem::OtherMachine { channel, percent }))
+}

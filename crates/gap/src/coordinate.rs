@@ -1,0 +1,52 @@
+//! The coordinates in which effects' parameters are searched.
+
+use crate::study::{Hypothesis, Study};
+use mapper_physics::effect::EffectParameter;
+
+/// The coordinate in which a parameter is searched: itself in typical steps, or its logarithm where it spans decades.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coordinate {
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    scale: f64,
+    logarithmic: bool,
+}
+
+impl Coordinate {
+    /// The coordinate of a parameter.
+    pub fn new(parameter: &EffectParameter) -> Self {
+        let logarithmic = parameter.low > 0.0 && parameter.high / parameter.low > 20.0;
+        let scale = if logarithmic { 1.0 } else { parameter.typical_step.abs().max(1e-12) };
+        Coordinate { low: parameter.low, high: parameter.high, scale, logarithmic }
+    }
+
+    /// Coordinate of a value.
+    pub fn of(&self, value: f64) -> f64 {
+        if self.logarithmic { value.max(1e-300).ln() } else { value / self.scale }
+    }
+
+    /// Value of a coordinate, within the parameter's range.
+    pub fn value(&self, coordinate: f64) -> f64 {
+        let value = if self.logarithmic { coordinate.exp() } else { coordinate * self.scale };
+        value.clamp(self.low, self.high)
+    }
+}
+
+/// Coordinates of all parameters of a hypothesis' effects, in order.
+pub fn coordinates(study: &Study, hypothesis: &Hypothesis) -> Vec<Coordinate> {
+    let parameters =
+        hypothesis.effects.iter().flat_map(|(index, _)| study.effects[*index].info().parameters.iter());
+    parameters.map(Coordinate::new).collect()
+}
+
+/// Moves the `place`-th parameter of all effects to a value.
+pub fn set_parameter(hypothesis: &mut Hypothesis, place: usize, value: f64) {
+    if let Some(slot) = hypothesis.effects.iter_mut().flat_map(|(_, values)| values.iter_mut()).nth(place) {
+        *slot = value;
+    }
+}
+
+/// Values of all effects' parameters, in order.
+pub fn parameters(hypothesis: &Hypothesis) -> Vec<f64> {
+    hypothesis.effects.iter().flat_map(|(_, values)| values.iter().copied()).collect()
+}

@@ -1,0 +1,57 @@
+//! What forbids a diagnosis: a clear word instead of a confident culprit.
+
+use mapper_core::Channel;
+use mapper_observe::plausible::Implausible;
+
+/// What forbids a diagnosis.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Problem {
+    /// Nothing measured.
+    #[error("the recording has no measured channel with samples; check its channel map")]
+    Empty,
+    /// No steps.
+    #[error(
+        "the recording has {steps} step(s), and no jump of P3 or valve is seen: a diagnosis needs jumps between at least 3 points; record a campaign, and map P3_command and valve_command"
+    )]
+    NoJumps {
+        /// Steps found.
+        steps: usize,
+    },
+    /// Too few outputs.
+    #[error(
+        "too little is measured: of N, m_c, P2, T2, Tc, m_t, T4 and Tt only {present}; at least N, P2 and T2 are needed"
+    )]
+    TooFewOutputs {
+        /// What is there.
+        present: String,
+    },
+    /// Far from what the nominal machine does under the recorded inputs.
+    #[error(
+        "{channel} lies {percent:.0} % off what the nominal machine gives under the recorded P3, T3 and valve, at half of the steps or more: this is a recording of another machine, or a scale is wrong; check machine and map of the campaign"
+    )]
+    OtherMachine {
+        /// The channel that is farthest off.
+        channel: Channel,
+        /// By how much, % of the nominal value (signed).
+        percent: f64,
+    },
+    /// Readings that no running machine has.
+    #[error(transparent)]
+    Implausible(#[from] Implausible),
+    /// A driver is missing altogether.
+    #[error("{channel} ({}) drives the model and is not recorded; without it no cause can be told", .channel.info().description)]
+    NoDriver {
+        /// The channel.
+        channel: Channel,
+    },
+    /// Measured P3 is nowhere near its command.
+    #[error(
+        "measured P3 is {measured_pa:.0} Pa where {commanded_pa:.0} Pa is commanded: the two do not belong together; check the channel map and the units"
+    )]
+    NotCommanded {
+        /// Median of the measured P3 in a step, Pa.
+        measured_pa: f64,
+        /// Its command, Pa.
+        commanded_pa: f64,
+    },
+}

@@ -1,0 +1,49 @@
+//! Columns with what nuisances can stand in for taken out.
+
+use crate::normal::{normal_matrix, nuisance_products};
+use crate::selection::{Selection, dot_over};
+use crate::study::Study;
+use crate::whiten::Linearised;
+use nalgebra::{Cholesky, DVector, Dyn};
+
+/// Solves the nuisances' part of the normal equations again and again.
+pub(crate) struct Projector<'a> {
+    linearised: &'a Linearised,
+    rows: Vec<std::ops::Range<usize>>,
+    cholesky: Cholesky<f64, Dyn>,
+    /// Columns besides the nuisances' that are free as well.
+    others: &'a [Vec<f64>],
+}
+
+impl<'a> Projector<'a> {
+    pub(crate) fn new(
+        study: &Study,
+        linearised: &'a Linearised,
+        selection: &Selection,
+        others: &'a [Vec<f64>],
+    ) -> Option<Projector<'a>> {
+        let rows = selection.rows(study);
+        let products = nuisance_products(study, linearised, selection);
+        let matrix = normal_matrix(&rows, linearised, &products, others);
+        Some(Projector { linearised, rows, cholesky: matrix.cholesky()?, others })
+    }
+
+    pub(crate) fn right(&self, column: &[f64]) -> DVector<f64> {
+        let n = self.linearised.columns.len();
+        DVector::from_fn(n + self.others.len(), |i, _| {
+            let other = if i < n { &self.linearised.columns[i] } else { &self.others[i - n] };
+            dot_over(&self.rows, other, column)
+        })
+    }
+
+    /// Product of two columns with the span of the free ones (softened by their priors) taken out.
+    pub(crate) fn product(
+        &self,
+        a: &[f64],
+        right_a: &DVector<f64>,
+        b: &[f64],
+        right_b: &DVector<f64>,
+    ) -> f64 {
+        dot_over(&self.rows, a, b) - right_a.dot(&self.cholesky.solve(right_b))
+    }
+}

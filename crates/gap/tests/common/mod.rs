@@ -1,0 +1,122 @@
+//! Recordings of the adaptive simulator, which shares the equations with the driven model but neither its grid, its inputs
+//! nor its noise.
+#![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_core::{
+    Channel, DeclaredUncertainty, ModelTolerances, NoiseColour, Recording, Series, StepKind, StepMarker,
+};
+use mapper_observe::declared::{Declared, declared_uncertainties};
+use mapper_physics::effect::Rig;
+use mapper_physics::inputs::InterpolatedInputs;
+use mapper_physics::instruments::{ChannelFollower, true_value};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::simulate::{Simulator, Watch};
+use mapper_physics::steady::hold_speed;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+use std::collections::BTreeMap;
+
+/// What is run: points at one opening, a jump between each two.
+pub struct Visits {
+    pub speeds_rpm: &'static [f64],
+    pub dwell_s: f64,
+}
+
+/// Noise of a sample of each channel, and offset, one sigma.
+const SENSORS: [(Channel, f64, f64); 14] = [
+    (Channel::ShaftSpeed, 30.0, 0.0),
+    (Channel::CompressorFlow, 1.5e-4, 0.0),
+    (Channel::P1, 20.0, 50.0),
+    (Channel::T1, 0.1, 0.25),
+    (Channel::P2, 60.0, 100.0),
+    (Channel::T2, 0.1, 0.25),
+    (Channel::Tc, 0.15, 0.3),
+    (Channel::TurbineFlow, 1.5e-4, 0.0),
+    (Channel::P3, 80.0, 150.0),
+    (Channel::T3, 0.5, 0.5),
+    (Channel::P4, 30.0, 50.0),
+    (Channel::T4, 0.3, 0.5),
+    (Channel::Tt, 0.3, 0.5),
+    (Channel::TOil, 0.2, 0.5),
+];
+
+pub fn boundary() -> BoundaryConditions {
+    BoundaryConditions { valve_opening_ratio: 0.9, ..BoundaryConditions::default() }
+}
+
+/// A recording of a rig, noise and offsets drawn from what is declared.
+pub fn record_of(rig: &Rig, visits: &Visits, seed: u64) -> Recording {
+    let Visits { speeds_rpm, dwell_s } = *visits;
+    let nominal = Model::nominal();
+    let p3_pa: Vec<f64> =
+        speeds_rpm.iter().map(|n| hold_speed(&nominal, *n, &boundary()).unwrap().boundary.p3_pa).collect();
+    let end_s = dwell_s * speeds_rpm.len() as f64;
+    let times_s: Vec<f64> = (0..(end_s / 0.1) as usize).map(|i| 0.1 * i as f64).collect();
+    let mut held_pa = p3_pa[0];
+    let lagged: Vec<f64> = times_s
+        .iter()
+        .map(|t| {
+            let wanted = p3_pa[(((t - 1e-6) / dwell_s).max(0.0) as usize).min(p3_pa.len() - 1)];
+            held_pa = wanted + (held_pa - wanted) * (-0.1 / rig.instruments.p3_lag_s).exp();
+            held_pa
+        })
+        .collect();
+    let rows = lagged.iter().map(|p3_pa| BoundaryConditions { p3_pa: *p3_pa, ..boundary() }).collect();
+    let inputs = InterpolatedInputs::new(times_s.clone(), rows).unwrap();
+    let at_rest = BoundaryConditions { p3_pa: p3_pa[0], ..boundary() };
+    let guess = hold_speed(&nominal, speeds_rpm[0], &boundary()).unwrap().state;
+    let start = mapper_physics::driven::settle(&rig.model, &at_rest, guess).unwrap();
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut normal = move || -> f64 { random.sample(StandardNormal) };
+    let offsets: Vec<f64> = SENSORS.iter().map(|(_, _, offset)| offset * normal()).collect();
+    let mut followers: Vec<ChannelFollower> =
+        SENSORS.iter().map(|(channel, ..)| ChannelFollower::new(*rig.instruments.path(*channel))).collect();
+    let mut slow = vec![0.0; SENSORS.len()];
+    let mut values: Vec<Vec<f64>> = vec![Vec::new(); SENSORS.len()];
+    let decay = (-0.1f64 / 2.0).exp();
+    let mut simulator = Simulator::new(&rig.model, 0.0, start, 1e-6, Watch::default());
+    let sample =
+        |t_s: f64, state: &mapper_physics::model::State, outputs: &mapper_physics::model::Outputs| {
+            let at = mapper_physics::inputs::Inputs::at(&inputs, t_s);
+            let prepared = rig.model.prepare(&at);
+            for (i, (channel, noise, _)) in SENSORS.iter().enumerate() {
+                let seen = followers[i].read(t_s, true_value(*channel, &prepared, state, outputs).unwrap());
+                slow[i] = decay * slow[i] + (1.0 - decay * decay).sqrt() * normal();
+                values[i].push(seen + offsets[i] + noise * (0.8 * normal() + 0.6 * slow[i]));
+            }
+        };
+    simulator.run_to(end_s, &inputs, times_s.iter().copied(), sample, |_| {}).unwrap();
+    let series: BTreeMap<Channel, Series> = SENSORS
+        .iter()
+        .zip(values)
+        .map(|((channel, ..), values)| (*channel, Series { t_s: times_s.clone(), values }))
+        .collect();
+    let steps = (0..speeds_rpm.len())
+        .map(|index| StepMarker {
+            index,
+            kind: StepKind::Point,
+            start_s: dwell_s * index as f64,
+            end_s: dwell_s * (index + 1) as f64,
+            from: None,
+            to: None,
+            p3_pa: p3_pa[index],
+            valve_opening_ratio: boundary().valve_opening_ratio,
+        })
+        .collect();
+    Recording { series, steps, events: Vec::new() }
+}
+
+pub fn declared() -> Declared {
+    let sensors = SENSORS.iter().map(|&(channel, noise_sigma, offset_sigma)| {
+        (channel, DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio: 0.0 })
+    });
+    let tolerances = ModelTolerances::default();
+    Declared {
+        sensors: declared_uncertainties(&sensors.collect(), &tolerances, &BTreeMap::new()),
+        noise_colour: NoiseColour::default(),
+        tolerances,
+        nominal: boundary(),
+    }
+}

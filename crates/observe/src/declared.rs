@@ -1,0 +1,112 @@
+//! What is declared of rig and model: noise, offsets, gains, tolerances. Anything inside them is no news.
+
+use mapper_core::{Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour};
+use mapper_physics::params::BoundaryConditions;
+use std::collections::BTreeMap;
+
+/// Declared uncertainty of every sensor of a recording, by the one rule that holds everywhere.
+///
+/// The most specific word counts. `channel_map` speaks of the sensors of this very recording: where it declares a channel,
+/// its noise and offset replace those of the campaign's `sensors`. A gain of 0 is one that was not declared: the
+/// campaign's then stands for the channel map's, and for a flow meter for which neither gives one, the tolerances'
+/// `flow_meter_gain_ratio`.
+pub fn declared_uncertainties(
+    sensors: &BTreeMap<Channel, DeclaredUncertainty>,
+    tolerances: &ModelTolerances,
+    channel_map: &BTreeMap<Channel, DeclaredUncertainty>,
+) -> BTreeMap<Channel, DeclaredUncertainty> {
+    let mut declared = sensors.clone();
+    for (channel, here) in channel_map {
+        let entry = declared.entry(*channel).or_default();
+        let gain_sigma_ratio = or(here.gain_sigma_ratio, entry.gain_sigma_ratio);
+        *entry = DeclaredUncertainty { gain_sigma_ratio, ..*here };
+    }
+    for (channel, entry) in &mut declared {
+        if channel.info().dimension == Dimension::MassFlow {
+            entry.gain_sigma_ratio = or(entry.gain_sigma_ratio, tolerances.flow_meter_gain_ratio);
+        }
+    }
+    declared
+}
+
+fn or(said: f64, otherwise: f64) -> f64 {
+    if said > 0.0 { said } else { otherwise }
+}
+
+/// Everything that is declared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Declared {
+    /// Noise, offset and gain of each sensor, as [`declared_uncertainties`] merges them.
+    pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
+    /// The noise over time.
+    pub noise_colour: NoiseColour,
+    /// Tolerances of the model.
+    pub tolerances: ModelTolerances,
+    /// Nominal boundary conditions, for what is not recorded.
+    pub nominal: BoundaryConditions,
+}
+
+impl Declared {
+    /// What is declared of a channel; nothing where nobody says anything.
+    pub fn of(&self, channel: Channel) -> DeclaredUncertainty {
+        self.sensors.get(&channel).copied().unwrap_or_default()
+    }
+
+    /// Noise of one sample, in the channel's unit: as declared, or that of a usual sensor where none is.
+    pub fn noise_sigma(&self, channel: Channel) -> f64 {
+        or(self.of(channel).noise_sigma, usual_noise_sigma(channel))
+    }
+
+    /// Fixed offset left after calibration, in the channel's unit.
+    pub fn offset_sigma(&self, channel: Channel) -> f64 {
+        self.of(channel).offset_sigma
+    }
+}
+
+/// Noise of one sample of a gas stand's usual sensor.
+fn usual_noise_sigma(channel: Channel) -> f64 {
+    match channel.info().dimension {
+        Dimension::RotationalSpeed => 30.0,
+        Dimension::MassFlow => 1.5e-4,
+        Dimension::Pressure => 60.0,
+        Dimension::Temperature | Dimension::Ratio => 0.2,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sensor(noise_sigma: f64, offset_sigma: f64, gain_sigma_ratio: f64) -> DeclaredUncertainty {
+        DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio }
+    }
+
+    #[test]
+    fn the_most_specific_word_counts() {
+        let flow = Channel::CompressorFlow;
+        let tolerances = ModelTolerances { flow_meter_gain_ratio: 0.005, ..ModelTolerances::default() };
+        let merged = |campaign: f64, map: Option<f64>| {
+            let campaign = [(flow, sensor(1.0, 2.0, campaign))].into();
+            let map = map.map(|gain| (flow, sensor(3.0, 0.0, gain))).into_iter().collect();
+            declared_uncertainties(&campaign, &tolerances, &map)[&flow]
+        };
+        assert_eq!(merged(0.0, None), sensor(1.0, 2.0, 0.005));
+        // A meter calibrated better than the tolerance is as good as it is declared.
+        assert_eq!(merged(0.002, None), sensor(1.0, 2.0, 0.002));
+        assert_eq!(merged(0.002, Some(0.0)), sensor(3.0, 0.0, 0.002));
+        assert_eq!(merged(0.002, Some(0.01)), sensor(3.0, 0.0, 0.01));
+        assert_eq!(merged(0.0, Some(0.0)), sensor(3.0, 0.0, 0.005));
+    }
+
+    #[test]
+    fn only_flow_meters_have_the_gain_of_the_tolerances() {
+        let sensors =
+            [(Channel::P2, sensor(60.0, 100.0, 0.0)), (Channel::TurbineFlow, sensor(1e-4, 0.0, 0.0))];
+        let declared = declared_uncertainties(&sensors.into(), &ModelTolerances::default(), &BTreeMap::new());
+        assert_eq!(declared[&Channel::P2].gain_sigma_ratio, 0.0);
+        assert_eq!(
+            declared[&Channel::TurbineFlow].gain_sigma_ratio,
+            ModelTolerances::default().flow_meter_gain_ratio
+        );
+    }
+}

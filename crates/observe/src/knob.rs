@@ -1,0 +1,181 @@
+//! What may differ between a recording and the model: one quantity of machine, inputs or start, and what turns it.
+
+use crate::channels::boundary_condition;
+use mapper_core::{Channel, ModelTolerances};
+use mapper_physics::inputs::Inputs;
+use mapper_physics::model::State;
+use mapper_physics::params::{BoundaryConditions, Params};
+
+/// One quantity of model, inputs or initial state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Knob {
+    /// A boundary condition, by the channel that reads it; in its unit.
+    Input(Channel),
+    /// Ambient temperature, K.
+    Ambient,
+    /// Efficiency of the compressor map, ratio.
+    Efficiency,
+    /// Flow of the compressor map, ratio.
+    Flow,
+    /// Efficiency of the turbine, ratio.
+    TurbineEfficiency,
+    /// Choked flow of the turbine, ratio.
+    TurbineFlow,
+    /// Area of the back-pressure valve, ratio.
+    ValveArea,
+    /// Convection between gas and compressor housing, ratio.
+    CompressorConvection,
+    /// Convection between gas and turbine housing, ratio.
+    TurbineConvection,
+    /// Convection of both housings to the cell, ratio.
+    ExternalConvection,
+    /// Conductance to the oil, ratio.
+    OilConductance,
+    /// Friction of the bearing, W s^2/rad^2.
+    Friction,
+    /// Compressor housing at the start, K.
+    StartTc,
+    /// Turbine housing at the start, K.
+    StartTt,
+}
+
+/// Ambient temperature is measured somewhere in the cell, not at each wall, K.
+const AMBIENT_SIGMA_K: f64 = 1.0;
+/// The rig may not have rested before the recording, K.
+const START_SIGMA_K: f64 = 5.0;
+
+impl Knob {
+    /// One standard deviation of what it may be off by, in its unit, as the campaign declares it. 0 for what has no
+    /// tolerance: inputs, whose sensors are declared, and friction, which the nominal model has none of.
+    ///
+    /// A campaign declares no tolerance of the turbine's flow and of its convection: those of the compressor stand for them.
+    pub fn tolerance(self, declared: &ModelTolerances) -> f64 {
+        match self {
+            Knob::Input(_) | Knob::Friction => 0.0,
+            Knob::Ambient => AMBIENT_SIGMA_K,
+            Knob::Efficiency => declared.compressor_efficiency_ratio,
+            Knob::Flow | Knob::TurbineFlow => declared.flow_map_ratio,
+            Knob::TurbineEfficiency => declared.turbine_efficiency_ratio,
+            Knob::ValveArea => declared.valve_area_ratio,
+            Knob::CompressorConvection | Knob::TurbineConvection => declared.convection_ratio,
+            Knob::ExternalConvection => declared.external_convection_ratio,
+            Knob::OilConductance => declared.oil_conductance_ratio,
+            Knob::StartTc | Knob::StartTt => START_SIGMA_K,
+        }
+    }
+
+    /// Turns the machine.
+    pub fn turn(self, params: &mut Params, by: f64) {
+        match self {
+            Knob::Efficiency => params.compressor.efficiency_scale_ratio *= 1.0 + by,
+            Knob::Flow => params.compressor.flow_scale_ratio *= 1.0 + by,
+            Knob::TurbineEfficiency => params.turbine.peak_efficiency *= 1.0 + by,
+            Knob::TurbineFlow => params.turbine.choked_flow_kg_s *= 1.0 + by,
+            Knob::ValveArea => params.outlet.valve_area_m2 *= 1.0 + by,
+            Knob::CompressorConvection => params.compressor.nusselt_coefficient *= 1.0 + by,
+            Knob::TurbineConvection => params.turbine.nusselt_coefficient *= 1.0 + by,
+            Knob::ExternalConvection => params.external_convection_ratio *= 1.0 + by,
+            Knob::OilConductance => params.bearing.oil_conductance_w_k *= 1.0 + by,
+            Knob::Friction => params.bearing_friction_w_s2 += by,
+            Knob::Input(_) | Knob::Ambient | Knob::StartTc | Knob::StartTt => {}
+        }
+    }
+
+    /// Turns the boundary conditions.
+    pub fn shift(self, boundary: &mut BoundaryConditions, by: f64) {
+        let channel = match self {
+            Knob::Input(channel) => channel,
+            Knob::Ambient => Channel::TAmb,
+            _ => return,
+        };
+        if let Some(value) = boundary_condition(boundary, channel) {
+            *value += by;
+        }
+    }
+
+    /// Turns the state at the start.
+    pub fn start(self, state: &mut State, by_k: f64) {
+        match self {
+            Knob::StartTc => {
+                state.tc_k += by_k;
+                state.inner_k += by_k;
+            }
+            Knob::StartTt => state.tt_k += by_k,
+            _ => {}
+        }
+    }
+}
+
+/// Inputs with some of them shifted.
+#[derive(Debug, Clone, Copy)]
+pub struct Shifted<'a, I> {
+    /// As recorded.
+    pub inputs: &'a I,
+    /// What is added to each, in its unit.
+    pub shifts: &'a [(Knob, f64)],
+}
+
+impl<I: Inputs> Inputs for Shifted<'_, I> {
+    fn at(&self, t_s: f64) -> BoundaryConditions {
+        let mut boundary = self.inputs.at(t_s);
+        for (knob, by) in self.shifts {
+            knob.shift(&mut boundary, *by);
+        }
+        boundary
+    }
+
+    fn next_kink_s(&self, t_s: f64) -> f64 {
+        self.inputs.next_kink_s(t_s)
+    }
+
+    fn is_constant_after(&self, t_s: f64) -> bool {
+        self.inputs.is_constant_after(t_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MACHINE: [Knob; 10] = [
+        Knob::Efficiency,
+        Knob::Flow,
+        Knob::TurbineEfficiency,
+        Knob::TurbineFlow,
+        Knob::ValveArea,
+        Knob::CompressorConvection,
+        Knob::TurbineConvection,
+        Knob::ExternalConvection,
+        Knob::OilConductance,
+        Knob::Friction,
+    ];
+
+    /// A knob that turned nothing would fit nothing, and nobody would see it.
+    #[test]
+    fn each_knob_turns_one_thing_of_its_own() {
+        let mut seen = Vec::new();
+        for knob in MACHINE {
+            let mut params = Params::default();
+            knob.turn(&mut params, 0.25);
+            assert_ne!(params, Params::default(), "{knob:?}");
+            assert!(!seen.contains(&params), "{knob:?}");
+            seen.push(params);
+        }
+        let mut boundary = BoundaryConditions::default();
+        for channel in crate::channels::DRIVERS {
+            let before = boundary;
+            Knob::Input(channel).shift(&mut boundary, 1.0);
+            assert_ne!(boundary, before, "{channel}");
+        }
+    }
+
+    #[test]
+    fn shifted_inputs_differ_by_what_is_added() {
+        let recorded = BoundaryConditions::default();
+        let shifts = [(Knob::Input(Channel::P1), -50.0), (Knob::Ambient, 2.0)];
+        let shifted = Shifted { inputs: &recorded, shifts: &shifts }.at(3.0);
+        assert_eq!(shifted.p1_pa, recorded.p1_pa - 50.0);
+        assert_eq!(shifted.ambient_temperature_k, recorded.ambient_temperature_k + 2.0);
+        assert_eq!(shifted.t1_k, recorded.t1_k);
+    }
+}

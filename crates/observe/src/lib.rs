@@ -1,0 +1,25 @@
+//! A recording beside the model: what is read, on which times, with what noise, what drives the model, and what may
+//! differ between the two without being news.
+//!
+//! The diagnosis of the gap and the search for drift both drive the nominal model by a recording and explain what is
+//! left. They share this crate; each keeps its own statistics. Identification takes the plausible readings from here.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod averaged_inputs;
+pub mod block;
+pub mod channels;
+pub mod declared;
+pub mod knob;
+pub mod lagged_command;
+pub mod mean;
+pub mod plausible;
+pub mod same_machine;
+pub mod schedule;
+pub mod smoothed_inputs;
+pub mod smoother;
+pub mod start;
+pub mod table;
+
+pub use declared::{Declared, declared_uncertainties};
+pub use same_machine::{OtherMachine, same_machine};

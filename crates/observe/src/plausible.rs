@@ -1,0 +1,116 @@
+//! What a turbocharger on a gas stand can read: one table for all that judge readings.
+
+use mapper_core::{Channel, Dimension};
+use std::ops::RangeInclusive;
+
+/// What a dimension can read, SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plausible {
+    /// The middle reading of a machine that runs.
+    pub running: RangeInclusive<f64>,
+    /// Any single reading, standstill, spikes and faults of the meter included: beyond it the value is lost.
+    pub any: RangeInclusive<f64>,
+}
+
+/// What a channel can read.
+///
+/// | | running | why | any |
+/// |---|---|---|---|
+/// | shaft speed | 1e3..1e6 rpm | the largest idle above the first, the smallest stay below a third of the second | 0..1e7 |
+/// | flow | 1e-4..20 kg/s | from what leaks through a small one at idle to engines of 10 MW | -100..100 |
+/// | pressure | 20 kPa..2 MPa | absolute, from a throttled inlet at altitude to three stages of boost | 100..1e9 |
+/// | temperature | 200..1600 K | from an arctic cell to exhaust gas that melts turbines | 100..3000 |
+pub fn plausible(channel: Channel) -> Plausible {
+    let (running, any) = match channel.info().dimension {
+        Dimension::RotationalSpeed => (1e3..=1e6, 0.0..=1e7),
+        Dimension::MassFlow => (1e-4..=20.0, -100.0..=100.0),
+        Dimension::Pressure => (2e4..=2e6, 100.0..=1e9),
+        Dimension::Temperature => (200.0..=1600.0, 100.0..=3000.0),
+        Dimension::Ratio => (f64::MIN..=f64::MAX, f64::MIN..=f64::MAX),
+    };
+    Plausible { running, any }
+}
+
+/// Whether a single value is finite and within what any rig could show; the others are lost.
+pub fn is_reading(channel: Channel, value: f64) -> bool {
+    value.is_finite() && plausible(channel).any.contains(&value)
+}
+
+/// The middle reading of a channel is not one of a running machine.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "{channel} reads {value:.4} {unit} in the middle, which no running machine has ({low} to {high} {unit}). {remedy}",
+    unit = .channel.unit(),
+    remedy = remedy(*.channel, *.value),
+    low = plausible(*.channel).running.start(),
+    high = plausible(*.channel).running.end()
+)]
+pub struct Implausible {
+    /// The channel.
+    pub channel: Channel,
+    /// Median, SI.
+    pub value: f64,
+}
+
+/// Judges the middle reading of a channel, SI.
+///
+/// # Errors
+/// [`Implausible`] with what the reading looks like, and what to do.
+pub fn check_running(channel: Channel, median: f64) -> Result<(), Implausible> {
+    if plausible(channel).running.contains(&median) {
+        return Ok(());
+    }
+    Err(Implausible { channel, value: median })
+}
+
+/// What an implausible reading looks like, and what to do.
+fn remedy(channel: Channel, value: f64) -> &'static str {
+    match channel.info().dimension {
+        Dimension::Pressure if (30.0..2_000.0).contains(&value) => {
+            "It looks like kPa labelled Pa; correct the unit in the channel map"
+        }
+        Dimension::Pressure if (0.3..30.0).contains(&value) => {
+            "It looks like bar labelled Pa; correct the unit in the channel map"
+        }
+        Dimension::Temperature if (0.0..200.0).contains(&value) => {
+            "It looks like degC labelled K; correct the unit in the channel map"
+        }
+        Dimension::RotationalSpeed if (5.0..1_000.0).contains(&value) => {
+            "It looks like krpm or 1/s labelled rpm; correct the unit in the channel map"
+        }
+        Dimension::MassFlow if value > 20.0 => {
+            "It looks like g/s or kg/h labelled kg/s; correct the unit in the channel map"
+        }
+        Dimension::MassFlow => "No flow is measured; check unit and sensor",
+        _ => "Check unit and sensor; the channel map says in what unit each field is",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usual_readings_pass_and_each_wrong_unit_is_named() {
+        for (channel, value) in [
+            (Channel::ShaftSpeed, 90e3),
+            (Channel::CompressorFlow, 0.12),
+            (Channel::P2, 180e3),
+            (Channel::T3, 1173.0),
+        ] {
+            assert_eq!(check_running(channel, value), Ok(()));
+        }
+        for (channel, value, named) in [
+            (Channel::ShaftSpeed, 90.0, "krpm"),
+            (Channel::CompressorFlow, 120.0, "g/s"),
+            (Channel::CompressorFlow, 0.0, "No flow"),
+            (Channel::P2, 180.0, "kPa"),
+            (Channel::P2, 1.8, "bar"),
+            (Channel::T2, 85.0, "degC"),
+            (Channel::T2, f64::NAN, "Check unit"),
+        ] {
+            let said = check_running(channel, value).unwrap_err().to_string();
+            assert!(said.contains(named), "{said}");
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Stretches of a step over which readings are averaged: short where the machine still moves, long where only metal does.
+
+/// How a step is cut into stretches.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Schedule {
+    /// Begin of the first stretch after that of the step, s.
+    pub first_s: f64,
+    /// Until so many seconds after the step's begin, stretches of so many seconds; the last row holds for ever.
+    pub lengths_s: &'static [(f64, f64)],
+    /// Shorter stretches go to the one before them, s ...
+    pub shortest_s: f64,
+    /// ... and so do those shorter than this share of what their length should be.
+    pub shortest_ratio: f64,
+}
+
+impl Schedule {
+    /// Begins and ends of the stretches from `start_s` to `end_s`, each at least `interval_s` (the distance of two samples)
+    /// long. No holes; none at all where the step is shorter than the shortest stretch.
+    pub fn stretches(&self, start_s: f64, end_s: f64, interval_s: f64) -> Vec<(f64, f64)> {
+        let whole_s = end_s - start_s;
+        let mut found = Vec::new();
+        let mut at_s = self.first_s;
+        while whole_s - at_s > 1e-9 {
+            let row = self.lengths_s.iter().find(|(until_s, _)| at_s < until_s - 1e-9);
+            let length_s = row.or(self.lengths_s.last()).map_or(whole_s, |(_, l)| *l).max(interval_s);
+            let shortest_s = self.shortest_s.max(self.shortest_ratio * length_s);
+            if whole_s - at_s < shortest_s {
+                break;
+            }
+            let mut next_s = (at_s + length_s).min(whole_s);
+            if whole_s - next_s < shortest_s {
+                next_s = whole_s;
+            }
+            found.push((start_s + at_s, start_s + next_s));
+            at_s = next_s;
+        }
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SLOW: Schedule = Schedule {
+        first_s: 5.0,
+        lengths_s: &[(15.0, 10.0), (35.0, 20.0), (95.0, 30.0), (f64::INFINITY, 60.0)],
+        shortest_s: 5.0,
+        shortest_ratio: 0.0,
+    };
+
+    #[test]
+    fn a_step_of_two_minutes_has_five_stretches_without_holes() {
+        let edges = [(105.0, 115.0), (115.0, 135.0), (135.0, 165.0), (165.0, 195.0), (195.0, 220.0)];
+        assert_eq!(SLOW.stretches(100.0, 220.0, 0.1), edges);
+        assert!(SLOW.stretches(100.0, 104.0, 0.1).is_empty());
+        // Three seconds more than a whole stretch belong to it.
+        assert_eq!(SLOW.stretches(0.0, 38.0, 0.1), [(5.0, 15.0), (15.0, 38.0)]);
+    }
+
+    #[test]
+    fn no_stretch_is_shorter_than_a_sample_or_than_its_share() {
+        let fast = Schedule {
+            first_s: 0.0,
+            lengths_s: &[(1.0, 0.1), (f64::INFINITY, 10.0)],
+            shortest_s: 0.0,
+            shortest_ratio: 0.5,
+        };
+        let stretches = fast.stretches(7.0, 24.0, 0.25);
+        assert_eq!(stretches.first().map(|s| s.0), Some(7.0));
+        assert_eq!(stretches.last().map(|s| s.1), Some(24.0));
+        assert!(stretches.windows(2).all(|pair| pair[0].1 == pair[1].0));
+        assert!(stretches.iter().all(|(from_s, to_s)| to_s - from_s > 0.24));
+    }
+}

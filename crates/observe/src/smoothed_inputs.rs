@@ -1,0 +1,155 @@
+//! What drives the model: the boundary conditions as recorded, without their noise.
+//!
+//! P3 is its command behind a first-order lag, whose time constant is read off the measured P3, plus the smooth rest.
+//! Other quantities may jump along with P3 (P4 does, by the flow): that share is found by regression, and the rest is
+//! smooth. A jump is never smoothed over.
+
+use crate::channels::{DRIVERS, boundary_condition};
+use crate::declared::Declared;
+use crate::lagged_command::LaggedCommand;
+use crate::smoother::{Course, smooth};
+use crate::table::Table;
+use mapper_core::{Channel, StepMarker};
+use mapper_physics::inputs::Inputs;
+use mapper_physics::params::BoundaryConditions;
+
+/// A recorded quantity without its noise: smooth, plus a share of P3's own course.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Driver {
+    /// The smooth part.
+    pub course: Course,
+    /// Change for each pascal of P3.
+    pub along_p3: f64,
+}
+
+/// Recorded boundary conditions over time, without their noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SmoothedInputs {
+    /// P3 by its command.
+    pub command: LaggedCommand,
+    p3_rest: Course,
+    /// Every other boundary condition by its channel.
+    drivers: Vec<(Channel, Driver)>,
+    nominal: BoundaryConditions,
+}
+
+/// What the recording alone says of one of its inputs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InputNoise {
+    /// Standard deviation of its course, in its unit.
+    pub sigma: f64,
+    /// Time over which the error stays alike, s.
+    pub correlation_s: f64,
+}
+
+impl SmoothedInputs {
+    /// Reads the inputs off a recording, P3 behind its command by `lag_s`. The campaign's values stand for what is not
+    /// recorded.
+    pub fn read(table: &Table, steps: &[StepMarker], declared: &Declared, lag_s: f64) -> SmoothedInputs {
+        let command = LaggedCommand::of_steps(steps, lag_s);
+        let along: Vec<f64> = table.t_s.iter().map(|t| command.p3_pa(*t)).collect();
+        let smoothed = |channel: Channel, values: &[f64]| {
+            smooth(&table.t_s, values, declared.noise_sigma(channel), declared.noise_colour)
+        };
+        let p3_rest = table.column(Channel::P3).and_then(|values| {
+            let rest: Vec<f64> = values.iter().zip(&along).map(|(p3, a)| p3 - a).collect();
+            smoothed(Channel::P3, &rest)
+        });
+        let driver = |channel: Channel| {
+            let values = table.column(channel)?;
+            let along_p3 = share_along(table, values, &command, declared.noise_sigma(channel));
+            let rest: Vec<f64> = values.iter().zip(&along).map(|(v, a)| v - along_p3 * a).collect();
+            Some((channel, Driver { course: smoothed(channel, &rest)?, along_p3 }))
+        };
+        let others = DRIVERS.into_iter().filter(|channel| *channel != Channel::P3);
+        SmoothedInputs {
+            p3_rest: p3_rest.unwrap_or_else(|| Course::constant(0.0)),
+            drivers: others.chain([Channel::TAmb]).filter_map(driver).collect(),
+            nominal: declared.nominal,
+            command,
+        }
+    }
+
+    /// How well each of [`DRIVERS`] is known, beyond its fixed offset; `None` for those that are not recorded.
+    pub fn noise(&self) -> [Option<InputNoise>; DRIVERS.len()] {
+        DRIVERS.map(|channel| {
+            let course = match channel {
+                Channel::P3 => &self.p3_rest,
+                _ => &self.drivers.iter().find(|(other, _)| *other == channel)?.1.course,
+            };
+            Some(InputNoise { sigma: course.sigma, correlation_s: course.correlation_s })
+        })
+    }
+}
+
+impl Inputs for SmoothedInputs {
+    fn at(&self, t_s: f64) -> BoundaryConditions {
+        let by_command_pa = self.command.p3_pa(t_s);
+        let mut boundary = BoundaryConditions {
+            p3_pa: by_command_pa + self.p3_rest.at(t_s),
+            valve_opening_ratio: self.command.levels()[self.command.level(t_s)].valve_opening_ratio,
+            ..self.nominal
+        };
+        for (channel, driver) in &self.drivers {
+            if let Some(value) = boundary_condition(&mut boundary, *channel) {
+                *value = driver.course.at(t_s) + driver.along_p3 * by_command_pa;
+            }
+        }
+        boundary
+    }
+
+    fn next_kink_s(&self, t_s: f64) -> f64 {
+        let after = self.command.levels().partition_point(|level| level.start_s <= t_s);
+        self.command.levels().get(after).map_or(f64::INFINITY, |level| level.start_s)
+    }
+
+    fn is_constant_after(&self, _t_s: f64) -> bool {
+        false
+    }
+}
+
+/// Length of the stretches beside a jump from which its height is taken, s.
+const BESIDE_S: f64 = 8.0;
+
+/// Change of `values` per pascal of P3, from their jumps at P3's jumps; 0 where they do not follow it.
+fn share_along(table: &Table, values: &[f64], command: &LaggedCommand, noise_sigma: f64) -> f64 {
+    let (mut sum_xy, mut sum_xx, mut pairs) = (0.0, 0.0, Vec::new());
+    for pair in command.levels().windows(2) {
+        let jump_s = pair[1].start_s;
+        let height_pa = pair[1].p3_pa - pair[0].p3_pa;
+        let settled_s = jump_s + 6.0 * command.lag_s;
+        let (Some(before), Some(after)) = (
+            line_at(table, values, jump_s - BESIDE_S, jump_s, jump_s),
+            line_at(table, values, settled_s, settled_s + BESIDE_S, jump_s),
+        ) else {
+            continue;
+        };
+        pairs.push((height_pa, after - before));
+        sum_xy += height_pa * (after - before);
+        sum_xx += height_pa * height_pa;
+    }
+    if sum_xx <= 0.0 || pairs.len() < 3 {
+        return 0.0;
+    }
+    let share = sum_xy / sum_xx;
+    let scatter = pairs.iter().map(|(x, y)| (y - share * x).powi(2)).sum::<f64>() / (pairs.len() - 1) as f64;
+    // Never better than the noise allows.
+    let error = (scatter.max(noise_sigma * noise_sigma * 0.1) / sum_xx).sqrt();
+    if share.abs() > 6.0 * error { share } else { 0.0 }
+}
+
+/// A line through the values between two times, read at `at_s`.
+fn line_at(table: &Table, values: &[f64], start_s: f64, end_s: f64, at_s: f64) -> Option<f64> {
+    let range = table.range(start_s, end_s);
+    let (mut n, mut st, mut sv, mut stt, mut stv) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (t, v) in table.t_s[range.clone()].iter().zip(&values[range]).filter(|(_, v)| v.is_finite()) {
+        let t = t - at_s;
+        n += 1.0;
+        st += t;
+        sv += v;
+        stt += t * t;
+        stv += t * v;
+    }
+    let determinant = n * stt - st * st;
+    (n >= 8.0 && determinant > 0.0).then(|| (stt * sv - st * stv) / determinant)
+}

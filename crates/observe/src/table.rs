@@ -1,0 +1,76 @@
+//! A recording on one time base.
+
+use mapper_core::{Channel, Recording, Series};
+use mapper_numerics::statistics::median;
+use std::collections::BTreeMap;
+
+/// All channels at the same times; NaN where a channel has nothing.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// Times, s, rising.
+    pub t_s: Vec<f64>,
+    /// Usual distance of two samples, s.
+    pub interval_s: f64,
+    /// SI values of each channel, as long as `t_s`.
+    pub columns: BTreeMap<Channel, Vec<f64>>,
+}
+
+/// A distance of samples beyond this many usual ones is a gap.
+const GAP_INTERVALS: f64 = 2.5;
+
+impl Table {
+    /// Puts the measured channels of a recording on the time base of the shaft speed, or of the first channel.
+    pub fn new(recording: &Recording) -> Option<Table> {
+        let measured = |channel: &Channel| channel.info().group != mapper_core::Group::Command;
+        let base = recording
+            .series
+            .get(&Channel::ShaftSpeed)
+            .or_else(|| recording.series.iter().find(|(channel, _)| measured(channel)).map(|(_, s)| s))?;
+        let t_s = base.t_s.clone();
+        let interval_s = median_interval_s(&t_s)?;
+        let columns = recording
+            .series
+            .iter()
+            .filter(|(channel, series)| measured(channel) && series.t_s.len() > 1)
+            .map(|(channel, series)| (*channel, on_base(series, &t_s, interval_s)))
+            .collect();
+        Some(Table { t_s, interval_s, columns })
+    }
+
+    /// Values of a channel, if it is there.
+    pub fn column(&self, channel: Channel) -> Option<&[f64]> {
+        self.columns.get(&channel).map(Vec::as_slice)
+    }
+
+    /// Indices of the samples with `start_s <= t < end_s`.
+    pub fn range(&self, start_s: f64, end_s: f64) -> std::ops::Range<usize> {
+        let start = self.t_s.partition_point(|t| *t < start_s);
+        start..self.t_s.partition_point(|t| *t < end_s).max(start)
+    }
+}
+
+fn median_interval_s(t_s: &[f64]) -> Option<f64> {
+    median(t_s.windows(2).map(|pair| pair[1] - pair[0]))
+}
+
+fn on_base(series: &Series, t_s: &[f64], interval_s: f64) -> Vec<f64> {
+    if series.t_s == t_s {
+        return series.values.clone();
+    }
+    // A slower channel has its own distance of samples; what is a gap follows from it.
+    let gap_s = GAP_INTERVALS * median_interval_s(&series.t_s).unwrap_or(interval_s).max(interval_s);
+    t_s.iter()
+        .map(|t| {
+            let after = series.t_s.partition_point(|s| s < t);
+            let near = |i: usize| series.t_s.get(i).is_some_and(|s| (s - t).abs() <= gap_s);
+            let exact = series.t_s.get(after).is_some_and(|s| s == t);
+            if exact {
+                series.values[after]
+            } else if after > 0 && near(after - 1) && near(after) {
+                series.interpolate(*t).unwrap_or(f64::NAN)
+            } else {
+                f64::NAN
+            }
+        })
+        .collect()
+}

@@ -20,3 +20,12 @@ pub(crate) fn any<T: DeserializeOwned>(text: &str) -> Result<T, ReadError> {
         character: error.location().map(|location| location.index()),
     })
 }
+
+/// As [`any`], with a reader that is no `Deserialize` of its own, such as a `serde` remote.
+#[cfg(test)]
+pub(crate) fn any_with<T>(
+    text: &str,
+    read: impl FnOnce(serde_yaml::Deserializer<'_>) -> Result<T, serde_yaml::Error>,
+) -> Result<T, serde_yaml::Error> {
+    read(serde_yaml::Deserializer::from_str(text))
+}

@@ -6,11 +6,11 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod build;
 pub mod campaign;
+mod checking;
 mod consistency;
 mod deserialise;
-mod file;
+mod elements;
 mod finding;
 mod load;
 mod nightly;
@@ -19,12 +19,15 @@ mod reach;
 mod render;
 mod scalar;
 mod schema;
+mod si;
 mod structure;
 mod tree;
 
 pub use campaign::Campaign;
 pub use finding::{Finding, FindingKind, Findings};
-pub use load::{CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, load};
+pub use load::{
+    CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
+};
 pub use mapper_units as units;
 pub use nightly::{Nightly, NightlyError, NightlyGroup, NightlyMistake, load_nightly};
 pub use reach::{Unreachable, nominal_model, unreachable_points};

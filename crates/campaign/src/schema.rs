@@ -1,6 +1,6 @@
 //! The JSON schema: made from the file structs, given to editors, and what a file is checked against.
 
-use crate::file::CampaignFile;
+use crate::campaign::CampaignFile;
 use schemars::transform::{Transform, transform_subschemas};
 use schemars::{Schema, generate::SchemaSettings};
 use serde_json::{Map, Value};
@@ -50,9 +50,8 @@ fn without_null(object: &mut Map<String, Value>) {
             }
         }
     }
-    if object.get("default") == Some(&Value::Null) {
-        object.remove("default");
-    }
+    // What is assumed where a key is left out stands in its description, written as a file would have it.
+    object.remove("default");
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-campaign",  &["core", "physics", "units"]),
     ("mapper-planner",   &["core", "numerics", "physics"]),
     ("mapper-runner",    &["core"]),
-    ("mapper-sequence",  &["core", "physics", "units"]),
+    ("mapper-sequence",  &["core", "numerics", "physics", "units"]),
     ("mapper-record",    &["core", "units"]),
     ("mapper-observe",   &["core", "numerics", "physics"]),
     ("mapper-identify",  &["core", "numerics", "physics", "observe"]),

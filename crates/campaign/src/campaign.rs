@@ -15,7 +15,6 @@ use crate::elements::sequence::sequence;
 use crate::elements::timing::TimingElement;
 use crate::elements::tolerances::TolerancesElement;
 use crate::elements::zero::ZeroFile;
-use crate::tree::Step;
 use crate::units::{Fraction, Quantity};
 use mapper_core::{
     Channel, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats, Soak, Timing,
@@ -23,6 +22,7 @@ use mapper_core::{
 };
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::params::BoundaryConditions;
+use mapper_yaml::Step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -2,10 +2,9 @@
 //!
 //! Works on the tree and skips what is missing or unreadable, so that one mistake does not hide another.
 
-use crate::finding::{FindingKind, Notes, Source};
-use crate::tree::{Content, Node, Step, path_text};
 use crate::units::{self, Kind};
-use serde_json::Value;
+use mapper_yaml::{FindingKind, Notes, Source};
+use mapper_yaml::{Node, Step, path_text};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -33,7 +32,7 @@ impl<'a> Check<'a> {
 
     /// The text of a scalar.
     pub fn text(&self, steps: &[Step]) -> Option<&'a str> {
-        scalar_text(self.root.get(steps)?)
+        self.root.get(steps)?.text()
     }
 
     /// The value in the unit used inside, and its text.
@@ -44,10 +43,7 @@ impl<'a> Check<'a> {
 
     /// A plain number.
     pub fn number(&self, steps: &[Step]) -> Option<f64> {
-        match &self.root.get(steps)?.content {
-            Content::Scalar(Value::Number(number)) => number.as_f64(),
-            _ => None,
-        }
+        self.root.get(steps)?.number()
     }
 
     /// Entries of a list; 0 for what is none.
@@ -74,13 +70,5 @@ impl<'a> Check<'a> {
         let place = self.root.key_place(parent, key);
         let path = format!("{}.{key}", path_text(parent));
         self.notes.push(self.source.finding(kind, path, place, message, remedy.to_owned()));
-    }
-}
-
-/// The text of a scalar node.
-pub(crate) fn scalar_text(node: &Node) -> Option<&str> {
-    match &node.content {
-        Content::Scalar(Value::String(text)) => Some(text),
-        _ => None,
     }
 }

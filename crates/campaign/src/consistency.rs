@@ -3,8 +3,7 @@
 
 use crate::checking::{Check, Files};
 use crate::elements;
-use crate::finding::{Notes, Source};
-use crate::tree::Node;
+use mapper_yaml::{Node, Notes, Source};
 
 /// Checks everything that needs more than one value.
 pub(crate) fn check(source: &Source, root: &Node, files: Files<'_>, notes: &mut Notes) {

@@ -9,26 +9,20 @@
 pub mod campaign;
 mod checking;
 mod consistency;
-mod deserialise;
 mod elements;
-mod finding;
 mod load;
 mod nightly;
-mod quantity_check;
 mod reach;
-mod render;
-mod scalar;
 mod schema;
 mod si;
-mod structure;
-mod tree;
+#[cfg(test)]
+mod testing;
 
 pub use campaign::Campaign;
-pub use finding::{Finding, FindingKind, Findings};
 pub use load::{
     CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
 };
-pub use mapper_units as units;
-pub use nightly::{Nightly, NightlyError, NightlyGroup, NightlyMistake, load_nightly};
+pub use mapper_yaml::{Finding, FindingKind, Findings, units};
+pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
 pub use reach::{Unreachable, nominal_model, unreachable_points};
 pub use schema::json_schema;

@@ -1,11 +1,18 @@
 //! The nightly campaign: which campaigns are run by which methods with which seeds, and where the history is.
 
-use crate::deserialise;
-use crate::load::{FILE_SIZE_LIMIT, read_limited};
+use crate::load::FILE_SIZE_LIMIT;
+use mapper_yaml::{
+    Document, FindingKind, Findings, Notes, ReadError, Schema, Source, Step, path_text, steps,
+};
+use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Most runs that one nightly campaign may ask for.
+/// What messages call the file.
+static DOCUMENT: Document = Document { name: "nightly campaign", example: "campaigns/nightly.yaml" };
+
+/// Maximum number of runs that one nightly campaign may ask for.
 const RUNS_LIMIT: usize = 10_000;
 /// Nights that make a band where the file does not say.
 const DEFAULT_NIGHTS: usize = 14;
@@ -21,62 +28,9 @@ pub enum NightlyError {
         /// Why.
         source: std::io::Error,
     },
-    /// The file is not what it should be.
-    #[error("{}: {source}", .path.display())]
-    Mistake {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, and what to do.
-        source: NightlyMistake,
-    },
-}
-
-/// A mistake in a nightly campaign.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum NightlyMistake {
-    /// Not text.
-    #[error("this is not UTF-8 from byte {valid_bytes} on; save it as UTF-8")]
-    NotText {
-        /// Bytes before the first that is not.
-        valid_bytes: usize,
-    },
-    /// A key or a value that the file cannot have; the message names its place.
-    #[error("{reason}")]
-    Form {
-        /// What the reader of the file said.
-        reason: String,
-    },
-    /// No name.
-    #[error("`nightly` is empty; give the nightly campaign a name")]
-    NoName,
-    /// A band over no night.
-    #[error("`band.nights` is 0; a band needs at least 1 night, 14 are usual")]
-    NoNights,
-    /// Nothing to run, or more than a night holds.
-    #[error("it asks for {runs} runs; 1 to {RUNS_LIMIT} can be made")]
-    Runs {
-        /// Number of runs asked for.
-        runs: usize,
-    },
-    /// A method or a seed that a group names twice.
-    #[error("`runs[{index}]` ({}) names {what} twice", .campaign.display())]
-    Twice {
-        /// The group, from 0.
-        index: usize,
-        /// Its campaign.
-        campaign: PathBuf,
-        /// What it names twice.
-        what: &'static str,
-    },
-    /// A campaign in two groups.
-    #[error(
-        "the campaign {} stands in `runs` twice; name it once with all its methods and seeds",
-        .campaign.display()
-    )]
-    CampaignTwice {
-        /// The campaign.
-        campaign: PathBuf,
-    },
+    /// The file has mistakes.
+    #[error("{0}")]
+    Mistakes(Box<Findings>),
 }
 
 /// What is run every night.
@@ -110,86 +64,133 @@ impl NightlyGroup {
     }
 }
 
-#[derive(Debug, Deserialize)]
+/// Campaigns that are run every night.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct NightlyFile {
+    /// Name; nights of other names are never compared.
+    #[schemars(regex(pattern = r"\S"), example = &"turbo_a")]
     nightly: String,
-    #[serde(default)]
+    /// File of the history, relative to the working directory; `runs/history.db` where none is given.
+    #[schemars(example = &"runs/history.db")]
     history: Option<PathBuf>,
-    #[serde(default)]
+    /// How the band of earlier nights is made.
     band: Option<BandFile>,
+    /// Campaigns with their methods and seeds.
+    #[schemars(extend("examples" = [[{"campaign": "nightly/turbo_a.yaml"}]]))]
     runs: Vec<GroupFile>,
 }
 
-#[derive(Debug, Deserialize)]
+/// How the band of earlier nights is made.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct BandFile {
+    /// Nights that make the band, a whole number from 1; 14 are usual.
+    #[schemars(range(min = 1), example = 14)]
     nights: usize,
 }
 
-#[derive(Debug, Deserialize)]
+/// One campaign with its methods and seeds.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct GroupFile {
+    /// The campaign file, relative to this file.
+    #[schemars(length(min = 1), example = &"nightly/turbo_a.yaml")]
     campaign: PathBuf,
-    #[serde(default)]
-    methods: Vec<String>,
-    #[serde(default)]
-    seeds: Vec<u64>,
+    /// Methods by which each recording is identified; the campaign's own where none is given.
+    #[schemars(extend("uniqueItems" = true, "examples" = [["dynamic", "steady"]]))]
+    methods: Option<Vec<String>>,
+    /// Seeds, whole numbers from 0; the campaign's own where none is given.
+    #[schemars(extend("uniqueItems" = true, "examples" = [[1, 2, 3]]))]
+    seeds: Option<Vec<u64>>,
 }
 
 /// Reads a nightly campaign. The campaigns it names are not read.
 ///
 /// # Errors
-/// [`NightlyError`] where the file cannot be read, has unknown or missing keys, or asks for no run, the same run twice,
-/// or more than 10 000.
+/// [`NightlyError::Read`] where the file cannot be read; [`NightlyError::Mistakes`] where it has unknown or missing
+/// keys, or asks for no run, the same run twice, or more than 10 000.
 pub fn load_nightly(path: &Path) -> Result<Nightly, NightlyError> {
-    let read = |source| NightlyError::Read { path: path.to_owned(), source };
-    let mistake = |source| NightlyError::Mistake { path: path.to_owned(), source };
-    let bytes = read_limited(path, FILE_SIZE_LIMIT).map_err(read)?;
-    let text = String::from_utf8(bytes).map_err(|error| {
-        mistake(NightlyMistake::NotText { valid_bytes: error.utf8_error().valid_up_to() })
-    })?;
-    let file: NightlyFile =
-        deserialise::any(&text).map_err(|error| mistake(NightlyMistake::Form { reason: error.message }))?;
-    if file.nightly.trim().is_empty() {
-        return Err(mistake(NightlyMistake::NoName));
+    let mistakes = |findings| NightlyError::Mistakes(Box::new(findings));
+    let text = mapper_yaml::open(&DOCUMENT, path, FILE_SIZE_LIMIT)
+        .map_err(|source| NightlyError::Read { path: path.to_owned(), source })?
+        .map_err(mistakes)?;
+    check(&text, path).map_err(mistakes)
+}
+
+fn check(text: &str, path: &Path) -> Result<Nightly, Findings> {
+    let source = Source::new(&DOCUMENT, path, text);
+    let mut notes = Notes::default();
+    if let Some(root) = mapper_yaml::read(&source, &mut notes) {
+        Schema::of::<NightlyFile>().check(&source, &root, &mut notes);
+        if notes.is_empty() {
+            let mistakes = match root.deserialise::<NightlyFile>() {
+                Ok(file) => match nightly(file, path.parent().unwrap_or(Path::new(""))) {
+                    Ok(nightly) => return Ok(nightly),
+                    Err(mistakes) => mistakes,
+                },
+                Err(ReadError { steps, source: error }) => vec![Mistake {
+                    steps,
+                    kind: FindingKind::WrongValue,
+                    message: error.to_string(),
+                    remedy: "write it more plainly",
+                }],
+            };
+            for Mistake { steps, kind, message, remedy } in mistakes {
+                let place = root.place(&steps);
+                notes.push(source.finding(kind, path_text(&steps), place, message, remedy.to_owned()));
+            }
+        }
     }
-    let nights = file.band.map_or(DEFAULT_NIGHTS, |band| band.nights);
-    if nights == 0 {
-        return Err(mistake(NightlyMistake::NoNights));
+    Err(Findings::new(source, notes))
+}
+
+/// What no schema can say.
+struct Mistake {
+    steps: Vec<Step>,
+    kind: FindingKind,
+    message: String,
+    remedy: &'static str,
+}
+
+fn nightly(file: NightlyFile, folder: &Path) -> Result<Nightly, Vec<Mistake>> {
+    let mut mistakes = Vec::new();
+    let mut campaigns = BTreeSet::new();
+    for (index, group) in file.runs.iter().enumerate() {
+        if !campaigns.insert(&group.campaign) {
+            mistakes.push(Mistake {
+                steps: steps!["runs", index, "campaign"].to_vec(),
+                kind: FindingKind::Duplicate,
+                message: format!("the campaign {} stands in `runs` twice", group.campaign.display()),
+                remedy: "name it once with all its methods and seeds",
+            });
+        }
     }
-    let folder = path.parent().unwrap_or(Path::new(""));
     let groups: Vec<NightlyGroup> = file
         .runs
         .into_iter()
         .map(|group| NightlyGroup {
             campaign: folder.join(group.campaign),
-            methods: group.methods,
-            seeds: group.seeds,
+            methods: group.methods.unwrap_or_default(),
+            seeds: group.seeds.unwrap_or_default(),
         })
         .collect();
     let runs = groups.iter().fold(0_usize, |runs, group| runs.saturating_add(group.runs()));
     if !(1..=RUNS_LIMIT).contains(&runs) {
-        return Err(mistake(NightlyMistake::Runs { runs }));
+        mistakes.push(Mistake {
+            steps: steps!["runs"].to_vec(),
+            kind: FindingKind::Range,
+            message: format!("it asks for {runs} runs; 1 to {RUNS_LIMIT} can be made"),
+            remedy: "name at least one campaign, and fewer methods or seeds if there are too many runs",
+        });
     }
-    for (index, group) in groups.iter().enumerate() {
-        let campaign = group.campaign.clone();
-        let twice = |what| mistake(NightlyMistake::Twice { index, campaign, what });
-        if has_duplicate(&group.methods) {
-            return Err(twice("a method"));
-        }
-        if has_duplicate(&group.seeds) {
-            return Err(twice("a seed"));
-        }
-        if groups[..index].iter().any(|other| other.campaign == group.campaign) {
-            return Err(mistake(NightlyMistake::CampaignTwice { campaign: group.campaign.clone() }));
-        }
+    if !mistakes.is_empty() {
+        return Err(mistakes);
     }
-    let history = file.history.unwrap_or_else(|| PathBuf::from("runs/history.db"));
-    Ok(Nightly { name: file.nightly, history, nights, groups })
-}
-
-fn has_duplicate<T: Ord>(values: &[T]) -> bool {
-    let distinct: std::collections::BTreeSet<&T> = values.iter().collect();
-    distinct.len() != values.len()
+    Ok(Nightly {
+        name: file.nightly,
+        history: file.history.unwrap_or_else(|| PathBuf::from("runs/history.db")),
+        nights: file.band.map_or(DEFAULT_NIGHTS, |band| band.nights),
+        groups,
+    })
 }

@@ -1,62 +1,26 @@
-//! The JSON schema: made from the file structs, given to editors, and what a file is checked against.
+//! The JSON schema of a campaign file.
 
 use crate::campaign::CampaignFile;
-use schemars::transform::{Transform, transform_subschemas};
-use schemars::{Schema, generate::SchemaSettings};
-use serde_json::{Map, Value};
+use mapper_yaml::Schema;
+use serde_json::Value;
+use std::sync::LazyLock;
 
 /// JSON schema (draft 2020-12) of a campaign file, for editors and other tools.
 ///
 /// Quantities are strings; `x-quantity` names their kind, `x-min`, `x-max` and `x-above` their range.
 pub fn json_schema() -> Value {
-    let mut settings = SchemaSettings::draft2020_12();
-    // Without `$ref` a schema path leads straight to the description a message quotes.
-    settings.inline_subschemas = true;
-    settings.transforms.push(Box::new(WithoutNull));
-    settings.into_generator().into_root_schema_for::<CampaignFile>().to_value()
+    mapper_yaml::json_schema_of::<CampaignFile>()
 }
 
-/// A key that may be left out may still not be empty: takes `null` out of what `Option` allows.
-#[derive(Debug, Clone)]
-struct WithoutNull;
-
-impl Transform for WithoutNull {
-    fn transform(&mut self, schema: &mut Schema) {
-        transform_subschemas(self, schema);
-        if let Some(object) = schema.as_object_mut() {
-            without_null(object);
-        }
-    }
-}
-
-fn without_null(object: &mut Map<String, Value>) {
-    if let Some(Value::Array(types)) = object.get_mut("type") {
-        types.retain(|name| name != "null");
-        if let [single] = types.as_slice() {
-            let single = single.clone();
-            object.insert("type".into(), single);
-        }
-    }
-    if let Some(Value::Array(values)) = object.get_mut("enum") {
-        values.retain(|value| !value.is_null());
-    }
-    if let Some(Value::Array(branches)) = object.get_mut("anyOf") {
-        branches.retain(|branch| branch.get("type") != Some(&Value::String("null".into())));
-        if let [Value::Object(single)] = branches.as_mut_slice() {
-            let single = std::mem::take(single);
-            object.remove("anyOf");
-            for (key, value) in single {
-                object.entry(key).or_insert(value);
-            }
-        }
-    }
-    // What is assumed where a key is left out stands in its description, written as a file would have it.
-    object.remove("default");
-}
+/// The same, ready to check files against; made once.
+pub(crate) static SCHEMA: LazyLock<Schema> = LazyLock::new(Schema::of::<CampaignFile>);
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mapper_yaml::{Notes, Source};
+    use serde_json::Map;
+    use std::path::Path;
 
     fn visit(value: &Value, check: &mut impl FnMut(&Map<String, Value>)) {
         match value {
@@ -117,7 +81,8 @@ mod tests {
         let validator = jsonschema::validator_for(&json_schema()).unwrap();
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/turbo_a.yaml");
         let text = std::fs::read_to_string(path).unwrap();
-        let mut value: Value = crate::deserialise::any(&text).unwrap();
+        let source = Source::new(&crate::load::DOCUMENT, Path::new(path), &text);
+        let mut value = mapper_yaml::read(&source, &mut Notes::default()).unwrap().to_json();
         assert!(validator.is_valid(&value), "{:?}", validator.validate(&value));
         for (key, text, right) in
             [("dwell", "120 kg", false), ("dwell", "2 min", true), ("dwel", "2 min", false)]

@@ -1,12 +1,17 @@
-//! The workflow that ships for the nightly run is YAML with the keys that GitHub asks for. It is read here because few crates
-//! may use the library that reads YAML.
+//! The workflow that ships for the nightly run is YAML with the keys that GitHub asks for. It is read as
+//! our own files are.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_yaml::{Document, Notes, Source};
+use std::path::Path;
 
 #[test]
 fn the_shipped_workflow_has_schedule_runner_and_steps() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/nightly/nightly.yml");
     let text = std::fs::read_to_string(path).unwrap();
-    let workflow: serde_json::Value = serde_yaml::from_str(&text).unwrap();
+    let document = &Document { name: "workflow", example: "examples/nightly/nightly.yml" };
+    let source = Source::new(document, Path::new(path), &text);
+    let workflow = mapper_yaml::read(&source, &mut Notes::default()).unwrap().to_json();
     let job = &workflow["jobs"]["nightly"];
     assert!(workflow["on"]["schedule"][0]["cron"].is_string() && job["runs-on"].is_string(), "{workflow}");
     let steps = job["steps"].as_array().unwrap();

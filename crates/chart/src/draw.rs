@@ -3,6 +3,7 @@
 use crate::bands::band;
 use crate::clip::{self, Rect};
 use crate::contour_label::{place, without_gap};
+use crate::drawing::{Drawing, Stroke, TextStyle};
 use crate::frame::Frame;
 use crate::items::{Annotation, Dash, Item, Line, LineEnd, Rule, RuleAt, Scatter, Space, TextAnchor};
 use crate::layout::{
@@ -12,7 +13,6 @@ use crate::legend;
 use crate::marching::contour_lines;
 use crate::markers::{MarkerStyle, draw_arrow, draw_marker};
 use crate::palette::{INK, LIGHT_GREY};
-use crate::svg::{Stroke, Svg, TextStyle};
 use crate::text::{cut, width_px};
 use crate::{Contours, Figure};
 
@@ -28,48 +28,53 @@ struct LateText {
     at_line_end: bool,
 }
 
-pub(crate) fn figure(figure: &Figure) -> String {
+pub(crate) fn figure(figure: &Figure) -> Drawing {
     let sheet = layout(figure);
-    let mut svg = Svg::default();
+    let mut drawing = Drawing {
+        width_px: sheet.width,
+        height_px: sheet.height,
+        title: figure.title.clone(),
+        shapes: Vec::new(),
+    };
     let mut y = MARGIN_PX + 10.0;
     for line in &sheet.title {
-        svg.text((MARGIN_PX, y), line, &TextStyle::new(TITLE_PX, INK, TextAnchor::Start).bold());
+        drawing.text((MARGIN_PX, y), line, &TextStyle::new(TITLE_PX, INK, TextAnchor::Start).bold());
         y += 24.0;
     }
     for line in &sheet.subtitle {
-        svg.text((MARGIN_PX, y), line, &TextStyle::new(SUBTITLE_PX, INK, TextAnchor::Start));
+        drawing.text((MARGIN_PX, y), line, &TextStyle::new(SUBTITLE_PX, INK, TextAnchor::Start));
         y += 18.0;
     }
     for placed in &sheet.panels {
-        panel(&mut svg, placed);
+        panel(&mut drawing, placed);
     }
-    svg.finish(sheet.width, sheet.height, &figure.title)
+    drawing
 }
 
-fn panel(svg: &mut Svg, placed: &PlacedPanel<'_>) {
+fn panel(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
     let frame = &placed.frame;
-    svg.open_group("panel");
-    axes(svg, placed);
+    drawing.open_group("panel");
+    axes(drawing, placed);
     let mut obstacles = obstacles(frame, &placed.panel.items);
     let mut late = Vec::new();
     for item in &placed.panel.items {
         match item {
-            Item::Line(item) => line(svg, frame, item, &mut late),
-            Item::Scatter(item) => scatter(svg, frame, item),
-            Item::Rule(item) => rule(svg, frame, item),
-            Item::Contours(item) => contours(svg, frame, item, &mut obstacles, &mut late),
+            Item::Line(item) => line(drawing, frame, item, &mut late),
+            Item::Scatter(item) => scatter(drawing, frame, item),
+            Item::Rule(item) => rule(drawing, frame, item),
+            Item::Contours(item) => contours(drawing, frame, item, &mut obstacles, &mut late),
             Item::Polygon(item) => {
                 let points: Vec<_> = item.points.iter().map(|p| frame.px(*p)).collect();
-                svg.areas(&[clip::polygon(&points, &frame.rect)], item.colour, item.opacity);
+                drawing.areas(&[clip::polygon(&points, &frame.rect)], item.colour, item.opacity);
             }
             Item::Annotation(item) => annotation(frame, item, &mut late),
         }
     }
     for text in &late {
-        svg.text(text.at, &text.text, &text.style);
+        drawing.text(text.at, &text.text, &text.style);
     }
-    legend::draw(svg, &placed.entries, &placed.legend_places, placed.legend_origin);
-    svg.close_group();
+    legend::draw(drawing, &placed.entries, &placed.legend_places, placed.legend_origin);
+    drawing.close_group();
 }
 
 /// What texts on contour lines keep away from: markers, arrow heads and texts at the ends of lines.
@@ -94,53 +99,53 @@ fn obstacles(frame: &Frame, items: &[Item]) -> Vec<(f64, f64)> {
     out
 }
 
-fn axes(svg: &mut Svg, placed: &PlacedPanel<'_>) {
+fn axes(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
     let (frame, panel) = (&placed.frame, placed.panel);
     let Rect { left, top, right, bottom } = frame.rect;
     let (grid, ink) = (Stroke::solid(LIGHT_GREY, 0.8), Stroke::solid(INK, 1.0));
     for (value, text) in &frame.x.ticks {
         let x = frame.px((*value, frame.y.low)).0;
-        svg.line((x, top), (x, bottom), &grid);
-        svg.line((x, bottom), (x, bottom + 5.0), &ink);
-        svg.text((x, bottom + 15.0), text, &TextStyle::new(TICK_PX, INK, TextAnchor::Middle));
+        drawing.line((x, top), (x, bottom), &grid);
+        drawing.line((x, bottom), (x, bottom + 5.0), &ink);
+        drawing.text((x, bottom + 15.0), text, &TextStyle::new(TICK_PX, INK, TextAnchor::Middle));
     }
     for (value, text) in &frame.y.ticks {
         let y = frame.px((frame.x.low, *value)).1;
-        svg.line((left, y), (right, y), &grid);
-        svg.line((left - 5.0, y), (left, y), &ink);
-        svg.text((left - 8.0, y), text, &TextStyle::new(TICK_PX, INK, TextAnchor::End));
+        drawing.line((left, y), (right, y), &grid);
+        drawing.line((left - 5.0, y), (left, y), &ink);
+        drawing.text((left - 8.0, y), text, &TextStyle::new(TICK_PX, INK, TextAnchor::End));
     }
-    svg.polyline(&[(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], &ink);
+    drawing.polyline(&[(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], &ink);
     let title = TextStyle::new(AXIS_TITLE_PX, INK, TextAnchor::Middle);
     let cut_to = |text: &str, room: f64| cut(text, AXIS_TITLE_PX, room);
-    svg.text(
+    drawing.text(
         (0.5 * (left + right), bottom + 38.0),
         &cut_to(&panel.x.title, frame.rect.width() + 40.0),
         &title,
     );
     let tick_width = frame.y.ticks.iter().map(|t| width_px(&t.1, TICK_PX)).fold(0.0, f64::max);
-    svg.text(
+    drawing.text(
         (left - 16.0 - tick_width - 0.5 * AXIS_TITLE_PX + 4.0, 0.5 * (top + bottom)),
         &cut_to(&panel.y.title, frame.rect.height() + 40.0),
         &title.turned(90.0),
     );
     let panel_title = cut(&panel.title, PANEL_TITLE_PX, frame.rect.width());
-    svg.text(
+    drawing.text(
         (left, top - 13.0),
         &panel_title,
         &TextStyle::new(PANEL_TITLE_PX, INK, TextAnchor::Start).bold(),
     );
 }
 
-fn line(svg: &mut Svg, frame: &Frame, line: &Line, late: &mut Vec<LateText>) {
+fn line(drawing: &mut Drawing, frame: &Frame, line: &Line, late: &mut Vec<LateText>) {
     let points: Vec<_> = line.points.iter().map(|p| frame.px(*p)).collect();
     let stroke = Stroke { colour: line.colour, width_px: line.width_px, dash: line.dash };
     let pieces = clip::polyline(&points, &frame.rect);
     for piece in &pieces {
-        svg.polyline(piece, &stroke);
+        drawing.polyline(piece, &stroke);
         if line.arrows {
             for pair in piece.windows(2) {
-                draw_arrow(svg, pair[0], pair[1], line.colour);
+                draw_arrow(drawing, pair[0], pair[1], line.colour);
             }
         }
     }
@@ -182,7 +187,7 @@ fn end_label_at(frame: &Frame, line: &Line) -> Option<(f64, f64)> {
     Some((x.clamp(leftmost, leftmost.max(frame.rect.right - half_width - 2.0)), y))
 }
 
-fn scatter(svg: &mut Svg, frame: &Frame, scatter: &Scatter) {
+fn scatter(drawing: &mut Drawing, frame: &Frame, scatter: &Scatter) {
     let style = MarkerStyle {
         marker: scatter.marker,
         colour: scatter.colour,
@@ -193,20 +198,20 @@ fn scatter(svg: &mut Svg, frame: &Frame, scatter: &Scatter) {
         for (interval, along_x) in [(point.x_interval, true), (point.y_interval, false)] {
             let Some((low, high)) = interval else { continue };
             let end = |v: f64| frame.px(if along_x { (v, point.y) } else { (point.x, v) });
-            error_bar(svg, frame, end(low), end(high), along_x, scatter);
+            error_bar(drawing, frame, end(low), end(high), along_x, scatter);
         }
     }
     for point in &scatter.points {
         let at = frame.px((point.x, point.y));
         if at.0.is_finite() && at.1.is_finite() && frame.rect.contains(at) {
-            draw_marker(svg, at, &style);
+            draw_marker(drawing, at, &style);
         }
     }
 }
 
 /// A bar with caps; an end outside the frame is cut and has no cap.
 fn error_bar(
-    svg: &mut Svg,
+    drawing: &mut Drawing,
     frame: &Frame,
     low: (f64, f64),
     high: (f64, f64),
@@ -215,27 +220,27 @@ fn error_bar(
 ) {
     let stroke = Stroke::solid(scatter.colour, 1.1);
     for piece in clip::polyline(&[low, high], &frame.rect) {
-        svg.polyline(&piece, &stroke);
+        drawing.polyline(&piece, &stroke);
         for end in [low, high].into_iter().filter(|end| frame.rect.contains(*end)) {
             let (dx, dy) = if along_x { (0.0, 3.0) } else { (3.0, 0.0) };
-            svg.line((end.0 - dx, end.1 - dy), (end.0 + dx, end.1 + dy), &stroke);
+            drawing.line((end.0 - dx, end.1 - dy), (end.0 + dx, end.1 + dy), &stroke);
         }
     }
 }
 
-fn rule(svg: &mut Svg, frame: &Frame, rule: &Rule) {
+fn rule(drawing: &mut Drawing, frame: &Frame, rule: &Rule) {
     let ends = match rule.at {
         RuleAt::Y(value) => [(frame.x.low, value), (frame.x.high, value)],
         RuleAt::X(value) => [(value, frame.y.low), (value, frame.y.high)],
     };
     let stroke = Stroke { colour: rule.colour, width_px: 1.2, dash: rule.dash };
     for piece in clip::polyline(&ends.map(|p| frame.px(p)), &frame.rect) {
-        svg.polyline(&piece, &stroke);
+        drawing.polyline(&piece, &stroke);
     }
 }
 
 fn contours(
-    svg: &mut Svg,
+    drawing: &mut Drawing,
     frame: &Frame,
     contours: &Contours,
     obstacles: &mut Vec<(f64, f64)>,
@@ -253,7 +258,7 @@ fn contours(
                 .map(|p| clip::polygon(&p.into_iter().map(|p| frame.px(p)).collect::<Vec<_>>(), &frame.rect))
                 .collect();
             // Light enough that markers and texts stand out on the darkest.
-            svg.areas(&polygons, shade.tint(0.04 + 0.30 * share), 1.0);
+            drawing.areas(&polygons, shade.tint(0.04 + 0.30 * share), 1.0);
         }
     }
     let stroke = Stroke { colour: contours.colour, width_px: 1.0, dash: Dash::Solid };
@@ -264,11 +269,11 @@ fn contours(
             for piece in clip::polyline(&points, &frame.rect) {
                 let place = if level.label.is_empty() { None } else { place(&piece, width, obstacles) };
                 let Some(place) = place else {
-                    svg.polyline(&piece, &stroke);
+                    drawing.polyline(&piece, &stroke);
                     continue;
                 };
                 for part in without_gap(&piece, place.gap) {
-                    svg.polyline(&part, &stroke);
+                    drawing.polyline(&part, &stroke);
                 }
                 obstacles.push(place.centre);
                 late.push(LateText {

@@ -115,6 +115,6 @@ impl Figure {
 
     /// The picture as an SVG document. The same figure gives the same bytes.
     pub fn to_svg(&self) -> String {
-        crate::draw::figure(self)
+        crate::svg::document(&crate::draw::figure(self))
     }
 }

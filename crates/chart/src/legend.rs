@@ -1,9 +1,9 @@
 //! Entries of a legend, and where they stand.
 
+use crate::drawing::{Drawing, Stroke, TextStyle};
 use crate::items::{Dash, Item, TextAnchor};
 use crate::markers::{MarkerStyle, draw_marker};
 use crate::palette::INK;
-use crate::svg::{Stroke, Svg, TextStyle};
 use crate::text::{cut, width_px};
 use crate::{Colour, Panel};
 
@@ -88,19 +88,19 @@ pub(crate) fn flow(entries: &[Entry], width: f64) -> (Vec<(f64, f64)>, usize) {
     (places, entries.len().div_ceil(columns))
 }
 
-pub(crate) fn draw(svg: &mut Svg, entries: &[Entry], places: &[(f64, f64)], origin: (f64, f64)) {
+pub(crate) fn draw(drawing: &mut Drawing, entries: &[Entry], places: &[(f64, f64)], origin: (f64, f64)) {
     for (entry, place) in entries.iter().zip(places) {
         let (x, y) = (origin.0 + place.0, origin.1 + place.1 + 0.5 * ROW_PX);
         for swatch in &entry.swatches {
             match swatch {
-                Swatch::Line(stroke) => svg.line((x, y), (x + SWATCH_PX, y), stroke),
-                Swatch::Marker(style) => draw_marker(svg, (x + 0.5 * SWATCH_PX, y), style),
+                Swatch::Line(stroke) => drawing.line((x, y), (x + SWATCH_PX, y), stroke),
+                Swatch::Marker(style) => draw_marker(drawing, (x + 0.5 * SWATCH_PX, y), style),
                 Swatch::Area(colour, opacity) => {
                     let (x2, top, bottom) = (x + SWATCH_PX, y - 6.0, y + 6.0);
-                    svg.areas(&[vec![(x, top), (x2, top), (x2, bottom), (x, bottom)]], *colour, *opacity);
+                    drawing.areas(&[vec![(x, top), (x2, top), (x2, bottom), (x, bottom)]], *colour, *opacity);
                 }
             }
         }
-        svg.text((x + SWATCH_PX + 6.0, y), &entry.text, &TextStyle::new(FONT_PX, INK, TextAnchor::Start));
+        drawing.text((x + SWATCH_PX + 6.0, y), &entry.text, &TextStyle::new(FONT_PX, INK, TextAnchor::Start));
     }
 }

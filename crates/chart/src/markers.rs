@@ -1,9 +1,9 @@
 //! Marker shapes and arrow heads.
 
 use crate::Colour;
+use crate::drawing::{Drawing, Stroke};
 use crate::items::Marker;
 use crate::palette::WHITE;
-use crate::svg::{Stroke, Svg};
 
 /// How a marker looks.
 #[derive(Debug, Clone, Copy)]
@@ -14,7 +14,7 @@ pub(crate) struct MarkerStyle {
     pub size_px: f64,
 }
 
-pub(crate) fn draw_marker(svg: &mut Svg, (x, y): (f64, f64), style: &MarkerStyle) {
+pub(crate) fn draw_marker(drawing: &mut Drawing, (x, y): (f64, f64), style: &MarkerStyle) {
     let size = if style.size_px.is_finite() { style.size_px.clamp(1.0, 60.0) } else { 7.0 };
     let r = size / 2.0;
     let (fill, stroke) = if style.hollow {
@@ -25,13 +25,13 @@ pub(crate) fn draw_marker(svg: &mut Svg, (x, y): (f64, f64), style: &MarkerStyle
     };
     let at = |points: &[(f64, f64)]| points.iter().map(|p| (x + r * p.0, y + r * p.1)).collect::<Vec<_>>();
     match style.marker {
-        Marker::Circle => svg.circle((x, y), r, fill, &stroke),
+        Marker::Circle => drawing.circle((x, y), r, fill, &stroke),
         Marker::Square => {
-            svg.polygon(&at(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]), fill, &stroke)
+            drawing.polygon(&at(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]), fill, &stroke)
         }
-        Marker::Triangle => svg.polygon(&at(&[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)]), fill, &stroke),
+        Marker::Triangle => drawing.polygon(&at(&[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)]), fill, &stroke),
         Marker::Diamond => {
-            svg.polygon(&at(&[(0.0, -1.25), (1.25, 0.0), (0.0, 1.25), (-1.25, 0.0)]), fill, &stroke)
+            drawing.polygon(&at(&[(0.0, -1.25), (1.25, 0.0), (0.0, 1.25), (-1.25, 0.0)]), fill, &stroke)
         }
         Marker::Plus | Marker::Cross => {
             let stroke = Stroke::solid(style.colour, 1.6);
@@ -40,14 +40,14 @@ pub(crate) fn draw_marker(svg: &mut Svg, (x, y): (f64, f64), style: &MarkerStyle
                 _ => [[(-0.9, -0.9), (0.9, 0.9)], [(-0.9, 0.9), (0.9, -0.9)]],
             };
             for arm in arms {
-                svg.polyline(&at(&arm), &stroke);
+                drawing.polyline(&at(&arm), &stroke);
             }
         }
     }
 }
 
 /// An arrow head at the middle of a segment; none on a segment too short to show its direction.
-pub(crate) fn draw_arrow(svg: &mut Svg, from: (f64, f64), to: (f64, f64), colour: Colour) {
+pub(crate) fn draw_arrow(drawing: &mut Drawing, from: (f64, f64), to: (f64, f64), colour: Colour) {
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
     let length = dx.hypot(dy);
     if length < 14.0 {
@@ -57,7 +57,7 @@ pub(crate) fn draw_arrow(svg: &mut Svg, from: (f64, f64), to: (f64, f64), colour
     let middle = (from.0 + 0.5 * dx, from.1 + 0.5 * dy);
     let corner =
         |along: f64, aside: f64| (middle.0 + along * ux - aside * uy, middle.1 + along * uy + aside * ux);
-    svg.polygon(
+    drawing.polygon(
         &[corner(5.0, 0.0), corner(-4.0, 3.8), corner(-4.0, -3.8)],
         colour,
         &Stroke::solid(colour, 0.5),

@@ -1,26 +1,30 @@
-//! A figure as pixels: the SVG drawn by resvg with a font that comes along (DejaVu Sans, free licence), so that the
-//! same figure gives the same pixels on a machine without fonts.
+//! A drawing as pixels.
 
-use crate::Figure;
-use resvg::tiny_skia::{Pixmap, Transform};
-use resvg::usvg::{Options, Tree};
+use crate::drawing::{Drawing, Px, Shape, Stroke};
+use crate::glyphs::Fonts;
+use crate::palette::WHITE;
+use crate::{Colour, Figure};
+use tiny_skia::{Color, FillRule, LineJoin, Paint, Path, PathBuilder, Pixmap, StrokeDash, Transform};
 
-/// Most pixels of a picture.
-const MOST_PIXELS: f32 = 64e6;
+/// Maximum number of pixels of a picture.
+const MOST_PIXELS: f64 = 64e6;
+
+/// Width of the white rim around a text, px on both sides together.
+const HALO_PX: f32 = 3.0;
 
 /// Why a figure cannot be drawn as pixels.
 #[derive(Debug, thiserror::Error)]
 pub enum PngError {
-    /// The SVG was not understood.
-    #[error("failed to read the picture's own SVG: {0}")]
-    Svg(#[from] Box<resvg::usvg::Error>),
+    /// The font of this program was not understood.
+    #[error("failed to read the font that comes with the program: {0}")]
+    Font(#[from] ttf_parser::FaceParsingError),
     /// Too large or of no size.
     #[error("a picture of {width} by {height} pixels cannot be made; at most 64 million pixels")]
     Size {
         /// Width, pixels.
-        width: f32,
+        width: f64,
         /// Height, pixels.
-        height: f32,
+        height: f64,
     },
     /// The encoder failed.
     #[error("failed to encode the picture: {source}")]
@@ -36,21 +40,112 @@ impl Figure {
     /// # Errors
     /// [`PngError`].
     pub fn to_png(&self, scale: f32) -> Result<Vec<u8>, PngError> {
-        let mut options = Options::default();
-        let fonts = options.fontdb_mut();
-        fonts.load_font_data(dejavu::sans::regular().to_vec());
-        fonts.load_font_data(dejavu::sans::bold().to_vec());
-        fonts.set_sans_serif_family("DejaVu Sans");
-        options.font_family = "DejaVu Sans".to_owned();
-        let tree = Tree::from_str(&self.to_svg(), &options).map_err(Box::new)?;
-        let (width, height) = (tree.size().width() * scale, tree.size().height() * scale);
-        // Not a number counts as too large.
-        if !(width >= 1.0 && height >= 1.0 && width * height <= MOST_PIXELS) {
-            return Err(PngError::Size { width, height });
-        }
-        let pixels = Pixmap::new(width.ceil() as u32, height.ceil() as u32);
-        let mut pixels = pixels.ok_or(PngError::Size { width, height })?;
-        resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixels.as_mut());
+        let drawing = crate::draw::figure(self);
+        let pixels = pixels(&drawing, scale)?;
         pixels.encode_png().map_err(|error| PngError::Encode { source: Box::new(error) })
     }
+}
+
+fn pixels(drawing: &Drawing, scale: f32) -> Result<Pixmap, PngError> {
+    let size = |px: f64| px.ceil() * f64::from(scale);
+    let (width, height) = (size(drawing.width_px), size(drawing.height_px));
+    // Not a number counts as too large.
+    if !(width >= 1.0 && height >= 1.0 && width * height <= MOST_PIXELS) {
+        return Err(PngError::Size { width, height });
+    }
+    let pixels = Pixmap::new(width.ceil() as u32, height.ceil() as u32);
+    let mut pixels = pixels.ok_or(PngError::Size { width, height })?;
+    pixels.fill(Color::WHITE);
+    let mut canvas = Canvas { pixels, to_pixels: Transform::from_scale(scale, scale), fonts: Fonts::new()? };
+    drawing.shapes.iter().for_each(|shape| canvas.shape(shape));
+    Ok(canvas.pixels)
+}
+
+struct Canvas {
+    pixels: Pixmap,
+    to_pixels: Transform,
+    fonts: Fonts,
+}
+
+impl Canvas {
+    fn shape(&mut self, shape: &Shape) {
+        match shape {
+            Shape::OpenGroup(_) | Shape::CloseGroup => {}
+            Shape::Line(from, to, stroke) => self.outline(open(&[*from, *to]), stroke, LineJoin::Miter),
+            Shape::Polyline(points, stroke) => self.outline(open(points), stroke, LineJoin::Round),
+            Shape::Areas(polygons, colour, opacity) => self.fill(closed(polygons), *colour, *opacity),
+            Shape::Polygon(points, colour, stroke) => {
+                let path = closed(std::slice::from_ref(points));
+                self.fill(path.clone(), *colour, 1.0);
+                self.outline(path, stroke, LineJoin::Miter);
+            }
+            Shape::Circle(centre, radius, colour, stroke) => {
+                let path = PathBuilder::from_circle(centre.0 as f32, centre.1 as f32, *radius as f32);
+                self.fill(path.clone(), *colour, 1.0);
+                self.outline(path, stroke, LineJoin::Miter);
+            }
+            Shape::Text(at, text, style) => {
+                let path = self.fonts.outline(*at, text, style);
+                if style.halo {
+                    let rim = Stroke::solid(WHITE, f64::from(HALO_PX));
+                    self.fill(path.clone(), WHITE, 1.0);
+                    self.outline(path.clone(), &rim, LineJoin::Round);
+                }
+                self.fill(path, style.colour, 1.0);
+            }
+        }
+    }
+
+    /// Draws nothing where there is no path: of too few points, or of none that is a number.
+    fn fill(&mut self, path: Option<Path>, colour: Colour, opacity: f64) {
+        if let Some(path) = path {
+            self.pixels.fill_path(&path, &paint(colour, opacity), FillRule::Winding, self.to_pixels, None);
+        }
+    }
+
+    fn outline(&mut self, path: Option<Path>, stroke: &Stroke, line_join: LineJoin) {
+        let dashes: Vec<f32> = stroke.dashes_px().into_iter().map(|length| length as f32).collect();
+        let look = tiny_skia::Stroke {
+            width: stroke.drawn_width_px() as f32,
+            line_join,
+            dash: StrokeDash::new(dashes, 0.0),
+            ..tiny_skia::Stroke::default()
+        };
+        if let Some(path) = path {
+            self.pixels.stroke_path(&path, &paint(stroke.colour, 1.0), &look, self.to_pixels, None);
+        }
+    }
+}
+
+fn paint(Colour(red, green, blue): Colour, opacity: f64) -> Paint<'static> {
+    let mut paint = Paint::default();
+    paint.set_color_rgba8(red, green, blue, (255.0 * opacity).round() as u8);
+    paint
+}
+
+fn open(points: &[Px]) -> Option<Path> {
+    let mut builder = PathBuilder::new();
+    trace(&mut builder, points);
+    builder.finish()
+}
+
+fn closed(polygons: &[Vec<Px>]) -> Option<Path> {
+    let mut builder = PathBuilder::new();
+    for points in polygons {
+        trace(&mut builder, points);
+        builder.close();
+    }
+    builder.finish()
+}
+
+fn trace(builder: &mut PathBuilder, points: &[Px]) {
+    for (index, (x, y)) in points.iter().enumerate() {
+        let (x, y) = (finite(*x), finite(*y));
+        if index == 0 { builder.move_to(x, y) } else { builder.line_to(x, y) }
+    }
+}
+
+/// As in the SVG: what is not a number is 0.
+fn finite(value: f64) -> f32 {
+    if value.is_finite() { value as f32 } else { 0.0 }
 }

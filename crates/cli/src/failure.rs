@@ -1,8 +1,9 @@
 //! Why a command ended early, with what to print and what to return.
 
 use crate::exit_code::Code;
-use mapper_campaign::CampaignError;
+use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
+use mapper_record::ChannelMapError;
 use mapper_session::{ErrorKind, SessionError};
 use std::io::IsTerminal;
 use std::path::Path;
@@ -38,12 +39,17 @@ impl Failure {
     /// All mistakes of a campaign, or that it cannot be read.
     pub fn of_campaign(error: CampaignError) -> Self {
         match error {
-            CampaignError::Mistakes(findings) => Failure {
-                code: Code::BadInput,
-                message: findings.render(std::io::stderr().is_terminal()),
-                manner: Manner::Rendered,
-            },
+            CampaignError::Mistakes(findings) => Failure::of_findings(&findings),
             error => Failure::new(Code::Failure, error),
+        }
+    }
+
+    /// All mistakes of a file that people write.
+    fn of_findings(findings: &Findings) -> Self {
+        Failure {
+            code: Code::BadInput,
+            message: findings.render(std::io::stderr().is_terminal()),
+            manner: Manner::Rendered,
         }
     }
 
@@ -98,6 +104,10 @@ impl From<SessionError> for Failure {
         };
         match error {
             SessionError::Campaign(error) => Failure::of_campaign(error),
+            SessionError::Nightly(NightlyError::Mistakes(findings))
+            | SessionError::ChannelMap(ChannelMapError::Mistakes(findings)) => {
+                Failure::of_findings(&findings)
+            }
             error => Failure::new(code, error),
         }
     }

@@ -7,7 +7,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().ok_or("name a recording")?;
     let map = match arguments.next() {
-        Some(map) => ChannelMap::from_yaml(&std::fs::read_to_string(map)?)?,
+        Some(map) => ChannelMap::load(map.as_ref())?,
         None => ChannelMap::native(),
     };
     let report = read_recording(path.as_ref(), &map, &ReadOptions::default())?;

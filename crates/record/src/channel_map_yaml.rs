@@ -1,383 +1,227 @@
 //! Channel maps as people write them: YAML with units.
 
+use crate::channel_map_schema::SCHEMA;
 use crate::format::TRUTH_PREFIX;
 use crate::units::{difference, kind_of, parse_quantity, remedy, unit};
 use crate::{ChannelMap, ChannelSource, MachineConstants, WindowLimits};
 use mapper_core::{Channel, DeclaredUncertainty, NoiseColour, ReferenceState};
-use mapper_units::{Kind, UnitError};
-use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor, value::MapAccessDeserializer};
+use mapper_yaml::units::{Kind, UnitError};
+use mapper_yaml::{Document, FindingKind, Findings, Node, Notes, Source, Step, path_text, steps};
 use std::collections::BTreeMap;
-use std::fmt;
-use std::marker::PhantomData;
+use std::io;
+use std::path::{Path, PathBuf};
 
-/// One fault of a channel map.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ChannelMapIssue {
-    /// Line of the fault, from 1, where it is known.
-    pub line: Option<usize>,
-    /// Key path, e.g. `channels.T2.unit`; empty where it is not known.
-    pub path: String,
-    /// What is wrong and what would be right.
-    pub message: String,
-}
+/// Largest channel map that is read, bytes.
+const SIZE_LIMIT: usize = 1 << 20;
 
-impl fmt::Display for ChannelMapIssue {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(line) = self.line {
-            write!(f, "line {line}: ")?;
-        }
-        if !self.path.is_empty() {
-            write!(f, "`{}`: ", self.path)?;
-        }
-        f.write_str(&self.message)
-    }
-}
+/// What messages call the file.
+static DOCUMENT: Document = Document { name: "channel map", example: "examples/channels/gap_rig.yaml" };
 
-/// A channel map that cannot be used; lists every fault that was found.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("failed to read the channel map: {}", .issues.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
-pub struct ChannelMapError {
-    /// The faults, in order of the file.
-    pub issues: Vec<ChannelMapIssue>,
+/// Why there is no channel map.
+#[derive(Debug, thiserror::Error)]
+pub enum ChannelMapError {
+    /// The file cannot be read.
+    #[error("failed to read the channel map {}: {source}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file has mistakes.
+    #[error("{0}")]
+    Mistakes(Box<Findings>),
 }
 
 impl ChannelMap {
-    /// Reads a channel map.
+    /// Reads and checks the file of a channel map.
     ///
     /// # Errors
-    /// [`ChannelMapError`] with every wrong unit and value; with the first fault alone where the text is no YAML, or
-    /// has unknown or missing keys.
-    pub fn from_yaml(text: &str) -> Result<ChannelMap, ChannelMapError> {
-        let raw: RawMap = serde_yaml::from_str(text).map_err(|error| {
-            let line = error.location().map(|location| location.line());
-            ChannelMapError {
-                issues: vec![ChannelMapIssue { line, path: String::new(), message: error.to_string() }],
-            }
-        })?;
-        let mut check = Check { text, issues: Vec::new() };
-        let map = check.map(raw);
-        check.issues.sort_by_key(|issue| issue.line);
-        if check.issues.is_empty() { Ok(map) } else { Err(ChannelMapError { issues: check.issues }) }
+    /// [`ChannelMapError::Read`] where the file cannot be read, [`ChannelMapError::Mistakes`] with all its mistakes.
+    pub fn load(path: &Path) -> Result<ChannelMap, ChannelMapError> {
+        let mistakes = |findings| ChannelMapError::Mistakes(Box::new(findings));
+        let text = mapper_yaml::open(&DOCUMENT, path, SIZE_LIMIT)
+            .map_err(|source| ChannelMapError::Read { path: path.to_owned(), source })?
+            .map_err(mistakes)?;
+        ChannelMap::from_yaml(&text, path).map_err(mistakes)
     }
-}
 
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawMap {
-    channels: ByChannel<RawSource>,
-    #[serde(default)]
-    constants: ByChannel<Quantity>,
-    machine: Option<RawMachine>,
-    reference: Option<RawReference>,
-    window: Option<RawWindow>,
-    #[serde(default)]
-    sensors: ByChannel<RawSensor>,
-    noise_colour: Option<RawNoiseColour>,
-}
-
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawSource {
-    topic: String,
-    field: String,
-    unit: Option<String>,
-}
-
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawMachine {
-    compressor_internal_area: Quantity,
-    alpha_area: Option<Quantity>,
-    compressor_inlet_diameter: Option<Quantity>,
-    compressor_outlet_diameter: Option<Quantity>,
-    t2_probe_diameter: Option<Quantity>,
-}
-
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawWindow {
-    start: Quantity,
-    end: Quantity,
-}
-
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawSensor {
-    noise: Option<Quantity>,
-    offset: Option<Quantity>,
-    gain: Option<Quantity>,
-}
-
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawNoiseColour {
-    share: Quantity,
-    time_constant: Quantity,
-}
-
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawState {
-    temperature: Quantity,
-    pressure: Quantity,
-}
-
-enum RawReference {
-    Named(String),
-    State(RawState),
-}
-
-/// A number with its unit, not looked at yet.
-struct Quantity(String);
-
-/// Values by channel; a channel given twice is an error, which a plain map would hide.
-struct ByChannel<T>(BTreeMap<Channel, T>);
-
-impl<T> Default for ByChannel<T> {
-    fn default() -> Self {
-        ByChannel(BTreeMap::new())
-    }
-}
-
-impl<'de> Deserialize<'de> for Quantity {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Text;
-        impl Visitor<'_> for Text {
-            type Value = Quantity;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number with its unit, e.g. \"25 degC\"")
-            }
-            fn visit_str<E>(self, text: &str) -> Result<Quantity, E> {
-                Ok(Quantity(text.to_owned()))
-            }
-            fn visit_f64<E>(self, number: f64) -> Result<Quantity, E> {
-                Ok(Quantity(number.to_string()))
-            }
-            fn visit_u64<E>(self, number: u64) -> Result<Quantity, E> {
-                Ok(Quantity(number.to_string()))
-            }
-            fn visit_i64<E>(self, number: i64) -> Result<Quantity, E> {
-                Ok(Quantity(number.to_string()))
+    /// Reads a channel map; `origin` names it in messages.
+    ///
+    /// # Errors
+    /// All mistakes of the text in one go.
+    pub fn from_yaml(text: &str, origin: &Path) -> Result<ChannelMap, Findings> {
+        let source = Source::new(&DOCUMENT, origin, text);
+        let mut notes = Notes::default();
+        if let Some(root) = mapper_yaml::read(&source, &mut notes) {
+            SCHEMA.check(&source, &root, &mut notes);
+            let map = Reader { source: &source, root: &root, notes: &mut notes }.map();
+            if notes.is_empty() {
+                return Ok(map);
             }
         }
-        deserializer.deserialize_any(Text)
+        Err(Findings::new(source, notes))
     }
 }
 
-impl<'de> Deserialize<'de> for RawReference {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct NameOrState;
-        impl<'de> Visitor<'de> for NameOrState {
-            type Value = RawReference;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("\"SAE\", or temperature and pressure")
-            }
-            fn visit_str<E>(self, name: &str) -> Result<RawReference, E> {
-                Ok(RawReference::Named(name.to_owned()))
-            }
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<RawReference, A::Error> {
-                RawState::deserialize(MapAccessDeserializer::new(map)).map(RawReference::State)
-            }
-        }
-        deserializer.deserialize_any(NameOrState)
-    }
+/// Turns the tree into values and notes what is wrong with them. What is missing or of another type was noted by the
+/// check against the schema and is passed over here.
+struct Reader<'a> {
+    source: &'a Source,
+    root: &'a Node,
+    notes: &'a mut Notes,
 }
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for ByChannel<T> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Entries<T>(PhantomData<T>);
-        impl<'de, T: Deserialize<'de>> Visitor<'de> for Entries<T> {
-            type Value = ByChannel<T>;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("entries by channel, e.g. `T2: ...`")
-            }
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<ByChannel<T>, A::Error> {
-                let mut entries = BTreeMap::new();
-                while let Some((channel, value)) = map.next_entry::<Channel, T>()? {
-                    if entries.insert(channel, value).is_some() {
-                        return Err(de::Error::custom(format_args!("{channel} is given twice")));
-                    }
-                }
-                Ok(ByChannel(entries))
-            }
-        }
-        deserializer.deserialize_map(Entries(PhantomData))
-    }
-}
-
-/// Turns text into values and collects what is wrong.
-struct Check<'a> {
-    text: &'a str,
-    issues: Vec<ChannelMapIssue>,
-}
-
-impl Check<'_> {
-    fn map(&mut self, raw: RawMap) -> ChannelMap {
-        if raw.channels.0.is_empty() {
-            self.issue("channels", "is empty; name at least one channel".to_owned());
-        }
-        let channels: BTreeMap<_, _> = raw
-            .channels
-            .0
-            .into_iter()
-            .map(|(channel, source)| (channel, self.source(channel, source)))
-            .collect();
+impl<'a> Reader<'a> {
+    fn map(&mut self) -> ChannelMap {
+        let sources = self.channels_below("channels");
+        let channels: BTreeMap<_, _> =
+            sources.into_iter().map(|channel| (channel, self.channel_source(channel))).collect();
         let mut constants = BTreeMap::new();
-        for (channel, quantity) in raw.constants.0 {
-            let path = format!("constants.{channel}");
+        for channel in self.channels_below("constants") {
+            let here = steps!["constants", channel.symbol()];
             if channels.contains_key(&channel) {
-                self.issue(&path, "is also under `channels`; keep one of the two".to_owned());
+                let message = format!("{channel} is also under `channels`");
+                self.note(FindingKind::Conflict, &here, message, "keep one of the two");
             }
-            constants.insert(channel, self.quantity(&path, &quantity, kind_of(channel)));
+            constants.insert(channel, self.quantity(&here, kind_of(channel)).unwrap_or(f64::NAN));
         }
-        let sensors =
-            raw.sensors.0.into_iter().map(|(channel, sensor)| (channel, self.sensor(channel, &sensor)));
+        let sensors = self
+            .channels_below("sensors")
+            .into_iter()
+            .map(|channel| (channel, self.sensor(channel)))
+            .collect();
         ChannelMap {
-            sensors: sensors.collect(),
             channels,
             constants,
-            machine: raw.machine.map(|machine| self.machine(&machine)),
-            reference: raw.reference.and_then(|reference| self.reference(&reference)),
-            window: raw.window.map(|window| self.window(&window)),
-            noise_colour: raw.noise_colour.map(|colour| self.noise_colour(&colour)),
+            sensors,
+            machine: self.has("machine").then(|| self.machine()),
+            reference: self.reference(),
+            window: self.has("window").then(|| self.window()),
+            noise_colour: self.has("noise_colour").then(|| self.noise_colour()),
             native: false,
         }
     }
 
-    fn source(&mut self, channel: Channel, raw: RawSource) -> ChannelSource {
-        let path = format!("channels.{channel}");
-        if raw.topic.starts_with(TRUTH_PREFIX) {
+    fn channel_source(&mut self, channel: Channel) -> ChannelSource {
+        let of = |key: &str| steps!["channels", channel.symbol(), key];
+        let text = |steps: &[Step]| self.root.get(steps).and_then(Node::text).unwrap_or_default().to_owned();
+        let (topic, field) = (text(&of("topic")), text(&of("field")));
+        let written = self.root.get(&of("unit")).and_then(Node::text).map(str::to_owned);
+        if topic.starts_with(TRUTH_PREFIX) {
             let message = "topics below /truth are for scoring and cannot be mapped".to_owned();
-            self.issue(&format!("{path}.topic"), message);
+            let remedy = "name a topic that the rig itself would have recorded";
+            self.note(FindingKind::WrongValue, &of("topic"), message, remedy);
         }
-        if let Some(Err(error)) = raw.unit.as_deref().map(|name| unit(kind_of(channel), name)) {
-            self.issue(&format!("{path}.unit"), explained(kind_of(channel), &error));
+        let kind = kind_of(channel);
+        if let Some(Err(error)) = written.as_deref().map(|name| unit(kind, name)) {
+            self.note_unit(&of("unit"), kind, &error);
         }
-        ChannelSource { topic: raw.topic, field: raw.field, unit: raw.unit }
+        ChannelSource { topic, field, unit: written }
     }
 
-    fn machine(&mut self, raw: &RawMachine) -> MachineConstants {
-        let area_path = "machine.compressor_internal_area";
-        let mut diameter = |name: &str, raw: &Option<Quantity>| {
-            let path = format!("machine.{name}");
-            raw.as_ref().map(|raw| self.positive(&path, raw, Kind::Length))
-        };
-        let compressor_inlet_diameter_m =
-            diameter("compressor_inlet_diameter", &raw.compressor_inlet_diameter);
-        let compressor_outlet_diameter_m =
-            diameter("compressor_outlet_diameter", &raw.compressor_outlet_diameter);
-        let alpha_area_ratio =
-            raw.alpha_area.as_ref().map_or(0.0, |raw| self.share("machine.alpha_area", raw));
+    fn machine(&mut self) -> MachineConstants {
+        let of = |key: &str| steps!["machine", key];
         MachineConstants {
-            compressor_internal_area_m2: self.positive(area_path, &raw.compressor_internal_area, Kind::Area),
-            alpha_area_ratio,
-            compressor_inlet_diameter_m,
-            compressor_outlet_diameter_m,
-            t2_probe_diameter_m: self.not_negative(
-                "machine.t2_probe_diameter",
-                raw.t2_probe_diameter.as_ref(),
-                Kind::Length,
-            ),
+            compressor_internal_area_m2: self
+                .positive(&of("compressor_internal_area"), Kind::Area)
+                .unwrap_or(f64::NAN),
+            alpha_area_ratio: self.share(&of("alpha_area")).unwrap_or(0.0),
+            compressor_inlet_diameter_m: self.positive(&of("compressor_inlet_diameter"), Kind::Length),
+            compressor_outlet_diameter_m: self.positive(&of("compressor_outlet_diameter"), Kind::Length),
+            t2_probe_diameter_m: self.not_negative(&of("t2_probe_diameter"), Kind::Length),
         }
     }
 
-    fn reference(&mut self, raw: &RawReference) -> Option<ReferenceState> {
-        match raw {
-            RawReference::Named(name) if name == "SAE" => Some(ReferenceState::SAE),
-            RawReference::Named(name) => {
-                let message = format!("`{name}` is not known; write SAE, or temperature and pressure");
-                self.issue("reference", message);
-                None
-            }
-            RawReference::State(state) => Some(ReferenceState {
-                t_ref_k: self.positive("reference.temperature", &state.temperature, Kind::Temperature),
-                p_ref_pa: self.positive("reference.pressure", &state.pressure, Kind::Pressure),
-            }),
+    fn reference(&mut self) -> Option<ReferenceState> {
+        let node = self.root.get(&steps!["reference"])?;
+        if let Some(name) = node.text() {
+            return ReferenceState::named(name);
         }
+        let t_ref_k = self.positive(&steps!["reference", "temperature"], Kind::Temperature)?;
+        let p_ref_pa = self.positive(&steps!["reference", "pressure"], Kind::Pressure)?;
+        Some(ReferenceState { t_ref_k, p_ref_pa })
     }
 
-    fn window(&mut self, raw: &RawWindow) -> WindowLimits {
-        let start_s = self.not_negative("window.start", Some(&raw.start), Kind::Duration);
-        let end_s = self.positive("window.end", &raw.end, Kind::Duration);
+    fn window(&mut self) -> WindowLimits {
+        let end = steps!["window", "end"];
+        let start_s = self.not_negative(&steps!["window", "start"], Kind::Duration);
+        let end_s = self.positive(&end, Kind::Duration).unwrap_or(f64::INFINITY);
         if end_s <= start_s {
-            self.issue("window.end", format!("is {end_s} s, not after the start at {start_s} s"));
+            let message = format!("the window ends at {end_s} s, not after its start at {start_s} s");
+            self.note(FindingKind::Conflict, &end, message, "`end` must be after `start`");
         }
         WindowLimits { start_s, end_s }
     }
 
-    fn sensor(&mut self, channel: Channel, raw: &RawSensor) -> DeclaredUncertainty {
-        let mut sigma = |key: &str, raw: &Option<Quantity>, kind| {
-            self.not_negative(&format!("sensors.{channel}.{key}"), raw.as_ref(), kind)
-        };
+    fn sensor(&mut self, channel: Channel) -> DeclaredUncertainty {
+        let of = |key: &str| steps!["sensors", channel.symbol(), key];
         let kind = difference(kind_of(channel));
         DeclaredUncertainty {
-            noise_sigma: sigma("noise", &raw.noise, kind),
-            offset_sigma: sigma("offset", &raw.offset, kind),
-            gain_sigma_ratio: sigma("gain", &raw.gain, Kind::Fraction),
+            noise_sigma: self.not_negative(&of("noise"), kind),
+            offset_sigma: self.not_negative(&of("offset"), kind),
+            gain_sigma_ratio: self.not_negative(&of("gain"), Kind::Fraction),
         }
     }
 
-    fn noise_colour(&mut self, raw: &RawNoiseColour) -> NoiseColour {
+    fn noise_colour(&mut self) -> NoiseColour {
+        let time_constant = steps!["noise_colour", "time_constant"];
         NoiseColour {
-            first_order_share_ratio: self.share("noise_colour.share", &raw.share),
-            time_constant_s: self.positive("noise_colour.time_constant", &raw.time_constant, Kind::Duration),
+            first_order_share_ratio: self.share(&steps!["noise_colour", "share"]).unwrap_or(f64::NAN),
+            time_constant_s: self.positive(&time_constant, Kind::Duration).unwrap_or(f64::NAN),
         }
     }
 
-    fn share(&mut self, path: &str, raw: &Quantity) -> f64 {
-        let ratio = self.quantity(path, raw, Kind::Fraction);
-        if ratio.is_finite() && !(0.0..=1.0).contains(&ratio) {
-            self.issue(path, format!("is {ratio}; it is a share from 0 to 1"));
+    fn share(&mut self, steps: &[Step]) -> Option<f64> {
+        let ratio = self.quantity(steps, Kind::Fraction)?;
+        if !(0.0..=1.0).contains(&ratio) {
+            self.note(FindingKind::Range, steps, format!("{ratio} is not a share"), "it must be from 0 to 1");
         }
-        ratio
+        Some(ratio)
     }
 
-    fn positive(&mut self, path: &str, raw: &Quantity, kind: Kind) -> f64 {
-        let value = self.quantity(path, raw, kind);
+    fn positive(&mut self, steps: &[Step], kind: Kind) -> Option<f64> {
+        let value = self.quantity(steps, kind)?;
         if value <= 0.0 {
-            self.issue(path, format!("is {}; it has to be more than 0", raw.0));
+            let message = format!("{} of 0 or less", kind.name());
+            self.note(FindingKind::Range, steps, message, "it must be above 0");
         }
-        value
+        Some(value)
     }
 
-    fn not_negative(&mut self, path: &str, raw: Option<&Quantity>, kind: Kind) -> f64 {
-        let Some(raw) = raw else { return 0.0 };
-        let value = self.quantity(path, raw, kind);
+    /// 0 where nothing is written.
+    fn not_negative(&mut self, steps: &[Step], kind: Kind) -> f64 {
+        let value = self.quantity(steps, kind).unwrap_or(0.0);
         if value < 0.0 {
-            self.issue(path, format!("is {}; it cannot be negative", raw.0));
+            let message = format!("{} below 0", kind.name());
+            self.note(FindingKind::Range, steps, message, "it must be at least 0");
         }
         value
     }
 
-    /// NaN, with an issue, for what is no quantity: NaN passes every further check.
-    fn quantity(&mut self, path: &str, raw: &Quantity, kind: Kind) -> f64 {
-        parse_quantity(kind, &raw.0).unwrap_or_else(|error| {
-            self.issue(path, explained(kind, &error));
-            f64::NAN
-        })
+    fn quantity(&mut self, steps: &[Step], kind: Kind) -> Option<f64> {
+        let node = self.root.get(steps)?;
+        let text =
+            node.text().map(str::to_owned).or_else(|| node.number().map(|number| number.to_string()))?;
+        parse_quantity(kind, &text).map_err(|error| self.note_unit(steps, kind, &error)).ok()
     }
 
-    fn issue(&mut self, path: &str, message: String) {
-        self.issues.push(ChannelMapIssue { line: locate(self.text, path), path: path.to_owned(), message });
+    fn has(&self, key: &str) -> bool {
+        self.root.get(&steps![key]).is_some()
     }
-}
 
-fn explained(kind: Kind, error: &UnitError) -> String {
-    format!("{error}; {}", remedy(kind, error))
-}
-
-/// Line of a key path: that of the first mention of each key after the one before it. Values are not parsed, which is
-/// enough for a map's block and flow style.
-fn locate(text: &str, path: &str) -> Option<usize> {
-    let mut position = 0;
-    for key in path.split('.') {
-        let rest = text.get(position..)?;
-        let found = rest.match_indices(key).find(|(at, _)| {
-            let before = rest[..*at].chars().next_back();
-            rest[at + key.len()..].trim_start_matches(['"', '\'']).trim_start_matches(' ').starts_with(':')
-                && before.is_none_or(|c| !(c.is_alphanumeric() || c == '_'))
-        })?;
-        position += found.0 + key.len();
+    /// The channels that have an entry below a key.
+    fn channels_below(&self, key: &str) -> Vec<Channel> {
+        let entries = self.root.get(&steps![key]).map(Node::entries).unwrap_or_default();
+        entries.iter().filter_map(|entry| entry.key.parse().ok()).collect()
     }
-    Some(text.get(..position)?.matches('\n').count() + 1)
+
+    fn note_unit(&mut self, steps: &[Step], kind: Kind, error: &UnitError) {
+        self.note(FindingKind::Unit, steps, error.to_string(), &remedy(kind, error));
+    }
+
+    fn note(&mut self, kind: FindingKind, steps: &[Step], message: String, remedy: &str) {
+        let place = self.root.place(steps);
+        self.notes.push(self.source.finding(kind, path_text(steps), place, message, remedy.to_owned()));
+    }
 }

@@ -4,7 +4,7 @@ use crate::records::ChannelDefinition;
 use crate::units::{kind_of, unit};
 use crate::{ChannelMap, ChannelSource, ReadWarning, RecordError};
 use mapper_core::Channel;
-use mapper_units::{Kind, Unit};
+use mapper_yaml::units::{Kind, Unit};
 use serde_json::Value;
 use std::path::Path;
 

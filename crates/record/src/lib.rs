@@ -9,6 +9,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod channel_map;
+mod channel_map_schema;
 mod channel_map_yaml;
 mod chunk;
 mod definitions;
@@ -30,11 +31,11 @@ mod warning;
 mod writer;
 
 pub use channel_map::{ChannelMap, ChannelSource, MachineConstants, WindowLimits};
-pub use channel_map_yaml::{ChannelMapError, ChannelMapIssue};
+pub use channel_map_yaml::ChannelMapError;
 pub use chunk::ChunkError;
 pub use error::{BadBatch, RecordError};
 pub use format::FormatVersion;
-pub use mapper_units::{Kind, Unit, UnitError};
+pub use mapper_yaml::units::{Kind, Unit, UnitError};
 pub use read::{ReadOptions, ReadReport, read_recording, read_recording_from};
 pub use recording_file::RecordingHeader;
 pub use truth::{Truth, read_truth};

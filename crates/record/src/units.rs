@@ -1,7 +1,7 @@
-//! What recordings of other programs spell differently from the table of `mapper-units`.
+//! What recordings of other programs spell differently from the table of `mapper-yaml`.
 
 use mapper_core::{Channel, Dimension};
-use mapper_units::{Kind, Unit, UnitError, parse_with};
+use mapper_yaml::units::{Kind, Unit, UnitError, parse_with};
 
 /// A bare ratio.
 const ONE: Unit = Unit { spellings: &["1", "-"], zero: 0.0, numerator: 1.0, denominator: 1.0, decade: 0 };

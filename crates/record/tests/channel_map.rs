@@ -2,11 +2,27 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_core::{Channel, DeclaredUncertainty, NoiseColour, ReferenceState};
-use mapper_record::{ChannelMap, MachineConstants, WindowLimits};
+use mapper_record::{ChannelMap, ChannelMapError, MachineConstants, WindowLimits};
+use mapper_yaml::{FindingKind as Kind, Findings};
+use std::path::Path;
+
+fn read(text: &str) -> Result<ChannelMap, Findings> {
+    ChannelMap::from_yaml(text, Path::new("dir/map.yaml"))
+}
+
+fn mistakes(text: &str) -> Findings {
+    read(text).expect_err("this text has mistakes")
+}
+
+/// Line, column and path of each mistake.
+fn places(findings: &Findings) -> Vec<(usize, usize, &str)> {
+    findings.list.iter().map(|finding| (finding.line, finding.column, finding.path.as_str())).collect()
+}
 
 #[test]
 fn the_shipped_map_says_what_its_text_says() {
-    let map = ChannelMap::from_yaml(include_str!("../../../examples/channels/gap_rig.yaml")).unwrap();
+    let map = read(include_str!("../../../examples/channels/gap_rig.yaml"))
+        .unwrap_or_else(|mistakes| panic!("{mistakes}"));
     assert_eq!(map.channels.len(), 16);
     let t2 = &map.channels[&Channel::T2];
     assert_eq!(
@@ -37,7 +53,7 @@ channels: {m_c: {topic: /a, field: x, unit: kg/hr}}
 sensors: {m_c: {noise: 0.54 kg/h, gain: 0.5 %}}
 noise_colour: {share: 60 %, time_constant: 2 s}
 ";
-    let map = ChannelMap::from_yaml(text).unwrap();
+    let map = read(text).unwrap_or_else(|mistakes| panic!("{mistakes}"));
     let flow = map.sensors[&Channel::CompressorFlow];
     assert_eq!((flow.offset_sigma, flow.gain_sigma_ratio), (0.0, 0.005));
     // One division: half a unit in the last place.
@@ -48,9 +64,9 @@ noise_colour: {share: 60 %, time_constant: 2 s}
         ("160 %, time_constant: 2 s", "noise_colour.share"),
         ("60 K, time_constant: 2 s", "noise_colour.share"),
     ] {
-        let error = ChannelMap::from_yaml(&text.replace("60 %, time_constant: 2 s", wrong)).unwrap_err();
-        assert_eq!((error.issues.len(), error.issues[0].path.as_str()), (1, path), "{error}");
-        assert_eq!(error.issues[0].line, Some(3));
+        let findings = mistakes(&text.replace("60 %, time_constant: 2 s", wrong));
+        assert_eq!((findings.list.len(), findings.list[0].path.as_str()), (1, path), "{findings}");
+        assert_eq!(findings.list[0].line, 3, "{findings}");
     }
 }
 
@@ -62,13 +78,14 @@ fn a_wrong_unit_is_answered_with_the_right_ones() {
         ("valve_command", "K", "a ratio may be written with `1`"),
     ] {
         let text = format!("channels: {{{channel}: {{topic: /a, field: x, unit: {unit}}}}}");
-        let error = ChannelMap::from_yaml(&text).unwrap_err().to_string();
-        assert!(error.contains(advice), "{error}");
+        let findings = mistakes(&text);
+        assert_eq!(findings.list[0].kind, Kind::Unit, "{findings}");
+        assert!(findings.list[0].remedy.contains(advice), "{findings}");
     }
 }
 
 #[test]
-fn all_wrong_values_are_named_with_their_lines() {
+fn all_mistakes_come_in_one_go_each_at_its_place() {
     let text = "\
 channels:
   T2: {topic: /a, field: x, unit: degG}
@@ -76,39 +93,91 @@ channels:
     topic: /truth/model
     field: y
     unit: kPa
+  T9: {topic: /a, field: x}
 constants: {P3: 1 bar}
 window: {start: 10, end: 5 s}
 machine:
   compressor_internal_area: -1 m^2
+  alpha_area: 1.5
 sensors:
-  T2: {noise: 0.1 Pa}
+  T2: {noise: 0.1 Pa, offsett: 1 K}
+noise_color: {share: 1, time_constant: 2 s}
 ";
-    let error = ChannelMap::from_yaml(text).unwrap_err();
-    let found: Vec<_> = error.issues.iter().map(|issue| (issue.line, issue.path.as_str())).collect();
     let expected = [
-        (Some(2), "channels.T2.unit"),
-        (Some(4), "channels.P3.topic"),
-        (Some(7), "constants.P3"),
-        (Some(8), "window.start"),
-        (Some(10), "machine.compressor_internal_area"),
-        (Some(12), "sensors.T2.noise"),
+        (2, 35, "channels.T2.unit"),
+        (4, 12, "channels.P3.topic"),
+        (7, 3, "channels.T9"),
+        (8, 17, "constants.P3"),
+        (9, 17, "window.start"),
+        (11, 29, "machine.compressor_internal_area"),
+        (12, 15, "machine.alpha_area"),
+        (14, 15, "sensors.T2.noise"),
+        (14, 23, "sensors.T2.offsett"),
+        (15, 1, "noise_color"),
     ];
-    assert_eq!(found, expected, "{error}");
+    let findings = mistakes(text);
+    assert_eq!(places(&findings), expected, "{findings}");
+    for (index, advice) in
+        [(2, "the keys are N, P1,"), (8, "did you mean `offset`?"), (9, "did you mean `noise_colour`?")]
+    {
+        assert!(findings.list[index].remedy.contains(advice), "{findings}");
+    }
+    let shown = findings.to_string();
+    assert!(shown.contains("dir/map.yaml:2:35") && shown.contains("^^^^"), "{shown}");
+    assert!(shown.ends_with("dir/map.yaml: 10 mistakes\n"), "{shown}");
 }
 
 #[test]
-fn unknown_missing_and_repeated_keys_are_refused_with_a_line() {
-    for (text, line, word) in [
-        ("channels:\n  T2: {topic: /a, field: x}\nwindw: {}\n", 3, "windw"),
-        ("channels:\n  T9: {topic: /a, field: x}\n", 2, "T9"),
-        ("channels:\n  T2: {topic: /a}\n", 2, "field"),
-        ("channels:\n  T2: {topic: /a, field: x}\n  T2: {topic: /a, field: x}\n", 2, "twice"),
-        ("channels: [", 2, ""),
+fn missing_and_repeated_keys_and_wrong_types_are_refused_at_their_place() {
+    for (text, kind, place, words) in [
+        ("channels:\n  T2: {topic: /a}\n", Kind::MissingKey, (2, 3), "lacks the key `field`"),
+        (
+            "channels:\n  T2: {topic: /a, field: x}\n  T2: {topic: /a, field: x}\n",
+            Kind::DuplicateKey,
+            (3, 3),
+            "second time",
+        ),
+        ("channels:\n  T2: [/a, x]\n", Kind::WrongType, (2, 3), "a list stands where a mapping is needed"),
+        ("channels:\n  T2: {topic: /a, field: x, unit: 1}\n", Kind::WrongType, (2, 35), "text is needed"),
+        ("channels: {T2: {topic: /a, field: x}}\nreference: SEA\n", Kind::WrongValue, (2, 12), "none of SAE"),
+        (
+            "channels: {T2: {topic: /a, field: x}}\nwindow: {start: 10 s, end: 5 s}\n",
+            Kind::Conflict,
+            (2, 28),
+            "not after its start",
+        ),
+        (
+            "channels: {T2: {topic: /a, field: x}}\nconstants: {P1: [1 bar]}\n",
+            Kind::WrongType,
+            (2, 13),
+            "a list stands where text or a plain number is needed",
+        ),
+        ("channels: {}", Kind::Range, (1, 1), "the mapping is empty"),
+        ("channels: &a {T2: {topic: /a, field: x}}", Kind::Unsupported, (1, 11), "not read in a channel map"),
+        ("", Kind::MissingKey, (1, 1), "the file is empty"),
     ] {
-        let error = ChannelMap::from_yaml(text).unwrap_err();
-        assert!(error.to_string().contains(word), "{error}");
-        assert!(error.issues[0].line.is_some_and(|found| found.abs_diff(line) <= 1), "{error}");
+        let findings = mistakes(text);
+        let finding = &findings.list[0];
+        assert_eq!((findings.count(), finding.kind), (1, kind), "{findings}");
+        assert_eq!((finding.line, finding.column), place, "{findings}");
+        assert!(finding.message.contains(words), "{findings}");
     }
-    assert!(ChannelMap::from_yaml("").is_err());
-    assert!(ChannelMap::from_yaml("channels: {}").is_err());
+    assert_eq!(mistakes("channels: [").list[0].kind, Kind::Syntax);
+}
+
+#[test]
+fn a_file_that_is_not_there_and_one_that_is_not_text_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.yaml");
+    assert!(matches!(ChannelMap::load(&path), Err(ChannelMapError::Read { .. })));
+    std::fs::write(&path, b"channels: \xff").unwrap();
+    let Err(ChannelMapError::Mistakes(findings)) = ChannelMap::load(&path) else { panic!("mistakes") };
+    assert_eq!((findings.list[0].line, findings.list[0].column), (1, 11), "{findings}");
+}
+
+proptest::proptest! {
+    #[test]
+    fn any_piece_of_yaml_gives_an_answer(text in "(channels|T2|topic|field|unit|sensors|noise|window|start|: |\\{|\\}|, |\n|\n  |1|0.1 K|degC|/a){0,30}") {
+        let _ = read(&text).map_err(|findings| findings.to_string());
+    }
 }

@@ -145,7 +145,7 @@ fn foreign(topic: &str, rows: &[(u64, &str)], metadata: &[(&str, &str)]) -> Vec<
 
 fn map(unit: &str) -> ChannelMap {
     let text = format!("channels:\n  T2: {{topic: /daq, field: tt2{unit}}}\nconstants: {{T_amb: 25 degC}}\n");
-    ChannelMap::from_yaml(&text).unwrap()
+    ChannelMap::from_yaml(&text, Path::new("map.yaml")).unwrap()
 }
 
 fn read_foreign(bytes: &[u8], map: &ChannelMap) -> Result<ReadReport, RecordError> {

@@ -5,7 +5,7 @@ use crate::result::StepResult;
 use crate::session::{Session, Thrown, lock};
 use crate::step::Hold;
 use mapper_core::{IdentifiedPoint, OperatingPoint};
-use mapper_units::Kind;
+use mapper_yaml::units::Kind;
 use rhai::{Array, Dynamic, Engine, FLOAT, INT, ImmutableString};
 use std::sync::{Arc, Mutex};
 
@@ -220,7 +220,7 @@ fn points_array(points: &[OperatingPoint]) -> Array {
 }
 
 fn quantity(kind: Kind, text: &str) -> Result<f64, Thrown> {
-    mapper_units::parse(kind, text).map_err(|error| throw(error.to_string(), &error.remedy(kind)))
+    mapper_yaml::units::parse(kind, text).map_err(|error| throw(error.to_string(), &error.remedy(kind)))
 }
 
 fn point(speed: &str, opening: FLOAT) -> Result<Point, Thrown> {

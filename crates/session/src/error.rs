@@ -133,14 +133,9 @@ pub enum SessionError {
     /// A recording cannot be read or written.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A channel map has mistakes.
-    #[error("{}: {source}", .path.display())]
-    ChannelMap {
-        /// The file.
-        path: PathBuf,
-        /// Its mistakes.
-        source: ChannelMapError,
-    },
+    /// The channel map cannot be read, or has mistakes.
+    #[error(transparent)]
+    ChannelMap(#[from] ChannelMapError),
     /// Nobody says what machine was recorded.
     #[error("the machine is not known: the recording carries no campaign. {remedy}")]
     MachineUnknown {
@@ -245,11 +240,11 @@ impl SessionError {
     pub fn kind(&self) -> ErrorKind {
         use SessionError as E;
         match self {
-            E::Campaign(CampaignError::Read { .. }) | E::Nightly(NightlyError::Read { .. }) => {
-                ErrorKind::Failure
-            }
+            E::Campaign(CampaignError::Read { .. })
+            | E::Nightly(NightlyError::Read { .. })
+            | E::ChannelMap(ChannelMapError::Read { .. }) => ErrorKind::Failure,
             E::Campaign(CampaignError::Mistakes(_))
-            | E::Nightly(NightlyError::Mistake { .. })
+            | E::Nightly(NightlyError::Mistakes(_))
             | E::NightlySequence { .. }
             | E::NightlyTwice { .. }
             | E::Method { .. }
@@ -257,7 +252,7 @@ impl SessionError {
             | E::Backend(_)
             | E::Effect(_)
             | E::EffectTaken { .. }
-            | E::ChannelMap { .. }
+            | E::ChannelMap(ChannelMapError::Mistakes(_))
             | E::MachineUnknown { .. }
             | E::Import { .. }
             | E::UnknownFormat { .. }

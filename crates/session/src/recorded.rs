@@ -1,7 +1,6 @@
 //! A recording read from a file, with the campaign that says what was recorded.
 
 use crate::SessionError;
-use crate::files::read_text;
 use crate::run_directory;
 use mapper_campaign::{Campaign, CampaignError};
 use mapper_observe::OtherMachine;
@@ -67,10 +66,9 @@ fn read_beside(path: &Path) -> std::io::Result<String> {
 /// A channel map from a file.
 ///
 /// # Errors
-/// [`SessionError::File`] where it cannot be read, [`SessionError::ChannelMap`] with its mistakes.
+/// [`SessionError::ChannelMap`] where it cannot be read, and with its mistakes.
 pub fn channel_map(file: &Path) -> Result<ChannelMap, SessionError> {
-    ChannelMap::from_yaml(&read_text(file)?)
-        .map_err(|source| SessionError::ChannelMap { path: file.to_owned(), source })
+    Ok(ChannelMap::load(file)?)
 }
 
 /// Refuses a recording of another machine than the campaign's.

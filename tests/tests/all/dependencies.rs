@@ -7,16 +7,16 @@ use std::collections::BTreeMap;
 /// gets its row. The order is that of the layers, lowest first.
 #[rustfmt::skip]
 const ALLOWED: &[(&str, &[&str])] = &[
-    ("mapper-units",     &[]),
+    ("mapper-yaml",      &[]),
     ("mapper-core",      &[]),
     ("mapper-chart",     &[]),
     ("mapper-numerics",  &[]),
     ("mapper-physics",   &["core", "numerics"]),
-    ("mapper-campaign",  &["core", "physics", "units"]),
+    ("mapper-campaign",  &["core", "physics", "yaml"]),
     ("mapper-planner",   &["core", "numerics", "physics"]),
     ("mapper-runner",    &["core"]),
-    ("mapper-sequence",  &["core", "numerics", "physics", "units"]),
-    ("mapper-record",    &["core", "units"]),
+    ("mapper-sequence",  &["core", "numerics", "physics", "yaml"]),
+    ("mapper-record",    &["core", "yaml"]),
     ("mapper-observe",   &["core", "numerics", "physics"]),
     ("mapper-identify",  &["core", "numerics", "physics", "observe"]),
     ("mapper-assemble",  &["core", "numerics", "physics", "identify"]),
@@ -27,7 +27,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-reproduce", &["core", "numerics", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
     // A backend may read recordings: replay does.
-    ("mapper-backends",  &["core", "numerics", "physics", "record", "units"]),
+    ("mapper-backends",  &["core", "numerics", "physics", "record", "yaml"]),
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-formats",   &["core", "numerics", "physics", "chart"]),
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
@@ -54,9 +54,9 @@ const NEVER_IN_TESTS: &[(&str, &[&str])] = &[
 
 /// Libraries that only some packages may use.
 const RESTRICTED: &[(&str, &[&str], &str)] = &[(
-    "serde_yaml",
-    &["mapper-campaign", "mapper-record"],
-    "it is archived, so that it must stay easy to replace",
+    "saphyr-parser",
+    &["mapper-yaml"],
+    "YAML is read in one way, with positions, so that mistakes have places",
 )];
 
 /// One edge: who uses whom, and whether in tests alone.
@@ -155,7 +155,7 @@ fn wrong_edges_are_seen_and_named() {
         ("mapper-identify", "mapper-backends"),
         ("mapper-runner", "mapper-cli"),
         ("mapper-formats", "mapper-backends"),
-        ("mapper-physics", "serde_yaml"),
+        ("mapper-physics", "saphyr-parser"),
         ("mapper-tests", "mapper-cli"),
     ] {
         assert!(edge(from, to, false).is_some(), "{from} -> {to}");

@@ -53,7 +53,7 @@ mod tests {
         ] {
             assert!(kind.units().iter().any(|unit| unit.symbol() == symbol), "{symbol}");
         }
-        let read = crate::deserialise::any::<DisplayUnits>("{pressure: bar}").unwrap();
+        let read = crate::testing::any::<DisplayUnits>("{pressure: bar}").unwrap();
         assert_eq!(read, DisplayUnits { pressure: "bar".into(), ..usual });
     }
 }

@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(params, Params::default());
         let text =
             "{compressor: {outlet_diameter: 40 mm, nusselt: {exponent: 0.8}}, shaft_inertia: 1e-5 kg m^2}";
-        crate::deserialise::any::<GeometryFile>(text).unwrap().apply(&mut params);
+        crate::testing::any::<GeometryFile>(text).unwrap().apply(&mut params);
         assert!((params.compressor.outlet_diameter_m - 0.04).abs() < 1e-12);
         assert_eq!((params.compressor.nusselt_exponent, params.shaft_inertia_kgm2), (0.8, 1e-5));
         let default = Params::default();

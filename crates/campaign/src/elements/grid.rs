@@ -1,10 +1,10 @@
 //! `grid:`
 
 use crate::checking::Check;
-use crate::finding::FindingKind;
-use crate::tree::{Content, Step, steps};
 use crate::units::{Kind, Quantity, Speed};
 use mapper_core::OperatingPoint;
+use mapper_yaml::FindingKind;
+use mapper_yaml::{Content, Step, steps};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::HashSet;
@@ -250,7 +250,7 @@ mod tests {
     #[test]
     fn a_grid_is_every_speed_at_every_opening_without_what_is_skipped() {
         let text = "{speeds: [50 krpm, 90 krpm], openings: [0.5, 1], skip: [{speed: 50000 rpm, opening: 1}]}";
-        let (points, places) = crate::deserialise::any::<GridFile>(text).unwrap().points();
+        let (points, places) = crate::testing::any::<GridFile>(text).unwrap().points();
         let found: Vec<(f64, f64)> = points.iter().map(|p| (p.speed_rpm, p.valve_opening_ratio)).collect();
         assert_eq!(found, [(50e3, 0.5), (90e3, 0.5), (90e3, 1.0)]);
         assert_eq!(places.len(), points.len());

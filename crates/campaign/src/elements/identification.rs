@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn what_is_left_out_has_its_default() {
-        let read = |text| crate::deserialise::any::<IdentificationFile>(text).unwrap().identification(0.2);
+        let read = |text| crate::testing::any::<IdentificationFile>(text).unwrap().identification(0.2);
         let plain = Identification {
             method: Method::Dynamic,
             window: WindowRule::Auto,

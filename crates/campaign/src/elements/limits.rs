@@ -1,10 +1,10 @@
 //! `limits:`
 
 use crate::checking::Check;
-use crate::finding::FindingKind;
-use crate::tree::steps;
 use crate::units::{Duration, Fraction, Kind, Pressure, Quantity, Speed, Temperature, TemperatureDifference};
 use mapper_core::Limits;
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn every_key_lands_in_its_own_field() {
         let text = "{speed: 180 krpm, turbine_inlet_pressure: {min: 110 kPa, max: 4 bar, stroke: 10 s}, turbine_inlet_temperature: 600 degC, compressor_outlet_temperature: 200 degC, surge_margin: -5 %, housing_gradient: 30 K}";
-        let limits = Limits::from(crate::deserialise::any::<LimitsFile>(text).unwrap());
+        let limits = Limits::from(crate::testing::any::<LimitsFile>(text).unwrap());
         let near =
             |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-9 * expected.abs();
         assert!(near(Some(limits.speed_max_rpm), 180e3) && near(limits.p3_stroke_s, 10.0));

@@ -3,11 +3,11 @@
 use super::geometry::GeometryFile;
 use super::reference::ReferenceFile;
 use crate::checking::{Check, beside};
-use crate::finding::FindingKind;
-use crate::tree::steps;
 use mapper_core::ReferenceState;
 use mapper_physics::params::Params;
 use mapper_physics::tabulated_map::TabulatedMap;
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::io;

@@ -2,9 +2,9 @@
 //! [`mapper_core::VisitOrder`].
 
 use crate::checking::Check;
-use crate::finding::FindingKind;
-use crate::tree::steps;
 use mapper_core::VisitOrder;
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
 
 /// An order that counts on the method needs one, and the shortest campaign an error to reach.
 pub(crate) fn check(check: &mut Check<'_>) {

@@ -55,7 +55,7 @@ mod tests {
 
     #[test]
     fn what_is_left_out_has_its_default() {
-        let read = |text| crate::deserialise::any::<Outputs>(text).unwrap();
+        let read = |text| crate::testing::any::<Outputs>(text).unwrap();
         assert_eq!(read("{}"), Outputs::default());
         let one = Outputs { formats: vec![FormatName("npss".to_owned())], ..Outputs::default() };
         assert_eq!(read("{formats: [npss]}"), one);

@@ -2,10 +2,10 @@
 
 use super::grid::PointFile;
 use crate::checking::Check;
-use crate::finding::FindingKind;
-use crate::tree::steps;
 use crate::units::Kind;
 use mapper_core::{Jump, Repeats};
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -89,8 +89,7 @@ mod tests {
     #[test]
     fn what_is_written_and_what_it_means() {
         let read = |text: &str| {
-            repeats(crate::deserialise::any(text).unwrap())
-                .map(|r| (r.jump.is_some(), r.every_steps, r.at_least))
+            repeats(crate::testing::any(text).unwrap()).map(|r| (r.jump.is_some(), r.every_steps, r.at_least))
         };
         assert_eq!(read("off"), None);
         assert_eq!(repeats(None).map(|r| (r.jump, r.every_steps, r.at_least)), Some((None, 12, 2)));

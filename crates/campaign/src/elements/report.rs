@@ -1,12 +1,12 @@
 //! `report:`
 
 use super::sensors::CALIBRATED;
-use crate::checking::{Check, scalar_text};
-use crate::finding::FindingKind;
+use crate::checking::Check;
 use crate::si::si_if_given;
-use crate::tree::steps;
 use crate::units::{Fraction, Pressure, Quantity, Temperature};
 use mapper_core::Channel;
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -72,7 +72,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
     let Some(calibration) = check.get(&steps!["report", "calibration"]) else { return };
     for entry in calibration.entries() {
         let steps = steps!["report", "calibration", entry.key.as_str()];
-        if let Some(text) = scalar_text(&entry.value)
+        if let Some(text) = entry.value.text()
             && let Some((year, month, day)) = date(text)
             && (1..=12).contains(&month)
             && (29..=31).contains(&day)
@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn written_with_units_kept_in_si() {
         let report: Report =
-            crate::deserialise::any("{barometer: 990 mbar, humidity: 45 %, calibration: {T2: 2026-09-01}}")
+            crate::testing::any("{barometer: 990 mbar, humidity: 45 %, calibration: {T2: 2026-09-01}}")
                 .unwrap();
         assert!((report.barometer_pa.unwrap() - 99e3).abs() < 1e-6);
         assert_eq!((report.humidity_ratio, report.cell_temperature_k), (Some(0.45), None));

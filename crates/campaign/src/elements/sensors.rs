@@ -1,13 +1,13 @@
 //! `sensors:`
 
 use crate::checking::Check;
-use crate::finding::FindingKind;
 use crate::si::or;
-use crate::tree::steps;
 use crate::units::{
     Dimension, Fraction, Length, MassFlow, PressureDifference, Quantity, Speed, TemperatureDifference,
 };
 use mapper_core::{Channel, DeclaredUncertainty};
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -267,7 +267,7 @@ mod tests {
     fn a_static_tap_keeps_its_pipe_and_a_total_one_has_none() {
         for (tap, diameter_m) in [("static", Some(0.04)), ("total", None)] {
             let text = format!("{{noise: 20 Pa, tap: {tap}, pipe_diameter: 40 mm}}");
-            let sensor: PressureSensor = crate::deserialise::any(&text).unwrap();
+            let sensor: PressureSensor = crate::testing::any(&text).unwrap();
             assert_eq!(sensor.declaration().static_tap_pipe_diameter_m, diameter_m, "{tap}");
         }
     }

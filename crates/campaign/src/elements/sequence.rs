@@ -1,8 +1,8 @@
 //! `sequence:`, a script in place of an order.
 
 use crate::checking::{Check, beside};
-use crate::finding::FindingKind;
-use crate::tree::steps;
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
 use serde::Serialize;
 use std::io;
 use std::path::{Path, PathBuf};

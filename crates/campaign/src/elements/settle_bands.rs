@@ -27,7 +27,7 @@ pub(crate) struct SettleBandsElement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deserialise::any_with;
+    use crate::testing::any_with;
 
     #[test]
     fn what_is_left_out_keeps_its_default() {

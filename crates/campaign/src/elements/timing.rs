@@ -27,7 +27,7 @@ pub(crate) struct TimingElement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deserialise::any_with;
+    use crate::testing::any_with;
 
     #[test]
     fn what_is_written_and_what_it_means() {

@@ -55,7 +55,7 @@ pub(crate) struct TolerancesElement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deserialise::any_with;
+    use crate::testing::any_with;
     use crate::units::{Kind, parse};
 
     #[test]

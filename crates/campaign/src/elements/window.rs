@@ -1,10 +1,10 @@
 //! `identification.window:`
 
 use crate::checking::Check;
-use crate::finding::FindingKind;
-use crate::tree::steps;
 use crate::units::{Duration, Kind, Quantity};
 use mapper_core::WindowRule;
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn both_forms() {
-        let read = |text| crate::deserialise::any::<WindowFile>(text).map(WindowRule::from);
+        let read = |text| crate::testing::any::<WindowFile>(text).map(WindowRule::from);
         assert_eq!(read("auto").unwrap(), WindowRule::Auto);
         let fixed = WindowRule::Fixed { start_s: 10.0, end_s: 110.0 };
         assert_eq!(read("{start: 10 s, end: 110 s}").unwrap(), fixed);

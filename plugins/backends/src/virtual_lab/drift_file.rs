@@ -3,7 +3,7 @@
 use super::drift::{Drifting, LabDrift};
 use super::setting_problem::SettingProblem;
 use mapper_core::{BackendError, Channel};
-use mapper_units::{Kind, Quantity};
+use mapper_yaml::units::{Kind, Quantity};
 use serde::Deserialize;
 
 /// One entry: `{cause: T2, change: 0.5 K, over: 4 h, from: 10 min}`, or without `over` a step.
@@ -16,10 +16,10 @@ pub(super) struct DriftFile {
     change: String,
     /// How long the change takes; it goes on at this rate afterwards. A step where left out.
     #[serde(default)]
-    over: Option<Quantity<mapper_units::Duration>>,
+    over: Option<Quantity<mapper_yaml::units::Duration>>,
     /// Begin; 0 where left out, negative for a drift that began before the run.
     #[serde(default)]
-    from: Option<Quantity<mapper_units::Duration>>,
+    from: Option<Quantity<mapper_yaml::units::Duration>>,
 }
 
 /// Drifts with their units resolved.
@@ -71,7 +71,7 @@ fn change(what: Drifting, text: &str) -> Result<f64, SettingProblem> {
         }
     };
     let value =
-        mapper_units::parse(kind, text).map_err(|source| SettingProblem::Quantity { kind, source })?;
+        mapper_yaml::units::parse(kind, text).map_err(|source| SettingProblem::Quantity { kind, source })?;
     if kind == Kind::Fraction && value.abs() > LARGEST_CHANGE_RATIO {
         return Err(SettingProblem::DriftTooLarge {
             text: text.to_owned(),

@@ -3,7 +3,7 @@
 use super::setting_problem::SettingProblem;
 use mapper_core::BackendError;
 use mapper_physics::effect::{self, Effect, EffectParameter, Rig};
-use mapper_units::Kind;
+use mapper_yaml::units::Kind;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -98,7 +98,7 @@ fn read(parameter: &EffectParameter, value: &ValueText) -> Result<f64, SettingPr
                 _ if ratio => Kind::Fraction,
                 _ => return Err(SettingProblem::NotInUnit { text: text.clone(), unit: unit.to_owned() }),
             };
-            mapper_units::parse(kind, text).map_err(|source| SettingProblem::Quantity { kind, source })
+            mapper_yaml::units::parse(kind, text).map_err(|source| SettingProblem::Quantity { kind, source })
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::lab::NAME;
 use mapper_core::BackendError;
 use mapper_physics::effect::EffectError;
-use mapper_units::{Kind, UnitError};
+use mapper_yaml::units::{Kind, UnitError};
 
 /// What is wrong with one of the lab's settings. [`BackendError::Settings`] carries it beside the key.
 #[derive(Debug, thiserror::Error)]

@@ -14,7 +14,7 @@ use mapper_physics::instruments::Instruments;
 use mapper_physics::model::Model;
 use mapper_physics::nominal_rig::NominalRig;
 use mapper_physics::params::Params;
-use mapper_units::{
+use mapper_yaml::units::{
     Conductance, Dimension, Duration, Fraction, Frequency, Kind, Length, PressureRate, Quantity, RatioRate,
     Speed, TemperatureRate,
 };
@@ -248,7 +248,7 @@ fn sensors(
         .collect();
     for (channel, text) in &file.offset_of {
         let kind = offset_kind(*channel);
-        let offset = mapper_units::parse(kind, text)
+        let offset = mapper_yaml::units::parse(kind, text)
             .map_err(|source| SettingProblem::Quantity { kind, source }.at(format!("offset_of.{channel}")))?;
         sensors.entry(*channel).or_default().offset = offset;
     }

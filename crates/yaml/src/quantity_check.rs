@@ -5,6 +5,7 @@ use crate::units::{Kind, parse};
 use serde_json::{Map, Value};
 
 /// What is wrong with a quantity, and what would be right.
+#[derive(Debug, Clone)]
 pub(crate) struct Complaint {
     pub kind: FindingKind,
     pub message: String,

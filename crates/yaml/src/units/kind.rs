@@ -266,7 +266,7 @@ mod tests {
     fn keys_and_spellings_are_unambiguous_and_examples_parse() {
         for kind in Kind::ALL {
             assert_eq!(Kind::from_key(kind.key()), Some(kind));
-            assert!(crate::parse(kind, kind.example()).is_ok(), "{}", kind.example());
+            assert!(crate::units::parse(kind, kind.example()).is_ok(), "{}", kind.example());
             let spellings: Vec<_> = kind.units().iter().flat_map(|unit| unit.spellings).collect();
             let distinct: std::collections::BTreeSet<_> = spellings.iter().collect();
             assert_eq!(spellings.len(), distinct.len(), "{kind:?}");

@@ -1,11 +1,14 @@
-//! YAML text -> a tree in which every key and value knows where it stands.
+//! YAML text -> a tree with positions.
 //!
-//! The parser's events are consumed without recursion, so depth is bounded here and not by the stack. What a
-//! campaign has no use for and what would hide mistakes (anchors, aliases, merge keys, tags, several documents,
+//! The parser's events are consumed without recursion, so depth is bounded here and not by the stack. What none of
+//! our files has a use for and what would hide mistakes (anchors, aliases, merge keys, tags, several documents,
 //! keys that are not plain) is refused with its position.
 
-use crate::finding::{FindingKind, Notes, Source};
+use crate::finding::FindingKind;
+use crate::notes::Notes;
 use crate::scalar;
+use crate::source::Source;
+use crate::tree::{Content, Entry, Node};
 use saphyr_parser::{Event, Parser, ScalarStyle};
 use serde_json::Value;
 use std::collections::HashSet;
@@ -14,137 +17,8 @@ use std::ops::Range;
 /// Deepest nesting that is read; a campaign needs six.
 const DEPTH_LIMIT: usize = 32;
 
-/// Most values that are read; the longest list of points a grid may have takes three each.
+/// Maximum number of values that are read; the longest list of points a campaign's grid may have takes three each.
 const VALUE_LIMIT: usize = 100_000;
-
-/// A value and where it stands.
-#[derive(Debug, Clone)]
-pub(crate) struct Node {
-    /// Byte range in the text.
-    pub span: Range<usize>,
-    pub content: Content,
-}
-
-#[derive(Debug, Clone)]
-pub(crate) enum Content {
-    /// Null, boolean, number or text.
-    Scalar(Value),
-    Sequence(Vec<Node>),
-    Mapping(Vec<Entry>),
-}
-
-#[derive(Debug, Clone)]
-pub(crate) struct Entry {
-    pub key: String,
-    pub key_span: Range<usize>,
-    pub value: Node,
-}
-
-/// One step from a node to a child.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Step {
-    Key(String),
-    Index(usize),
-}
-
-impl From<&str> for Step {
-    fn from(key: &str) -> Step {
-        Step::Key(key.to_owned())
-    }
-}
-
-impl From<usize> for Step {
-    fn from(index: usize) -> Step {
-        Step::Index(index)
-    }
-}
-
-/// `grid.points[3].speed`
-pub(crate) fn path_text(steps: &[Step]) -> String {
-    let mut text = String::new();
-    for step in steps {
-        match step {
-            Step::Index(index) => text.push_str(&format!("[{index}]")),
-            Step::Key(key) if text.is_empty() => text.push_str(key),
-            Step::Key(key) => text.push_str(&format!(".{key}")),
-        }
-    }
-    text
-}
-
-/// The steps to a place in a tree, from strings and indices.
-macro_rules! steps {
-    ($($step:expr),* $(,)?) => { [$($crate::tree::Step::from($step)),*] };
-}
-pub(crate) use steps;
-
-impl Node {
-    fn child(&self, step: &Step) -> Option<(Option<&Range<usize>>, &Node)> {
-        match (step, &self.content) {
-            (Step::Key(key), Content::Mapping(entries)) => entries
-                .iter()
-                .find(|entry| entry.key == *key)
-                .map(|entry| (Some(&entry.key_span), &entry.value)),
-            (Step::Index(index), Content::Sequence(items)) => items.get(*index).map(|item| (None, item)),
-            _ => None,
-        }
-    }
-
-    /// The node at the end of a path.
-    pub fn get(&self, steps: &[Step]) -> Option<&Node> {
-        steps.iter().try_fold(self, |node, step| node.child(step).map(|(_, child)| child))
-    }
-
-    /// The items of a sequence; empty for everything else.
-    pub fn items(&self) -> &[Node] {
-        match &self.content {
-            Content::Sequence(items) => items,
-            _ => &[],
-        }
-    }
-
-    /// The entries of a mapping; empty for everything else.
-    pub fn entries(&self) -> &[Entry] {
-        match &self.content {
-            Content::Mapping(entries) => entries,
-            _ => &[],
-        }
-    }
-
-    /// Where to point for a complaint about the thing at a path as a whole: at a scalar itself; at the key of a
-    /// mapping or sequence; at the deepest parent there is, if the path leads nowhere.
-    pub fn place(&self, steps: &[Step]) -> Range<usize> {
-        let mut node = self;
-        let mut place = self.span.start..self.span.start;
-        for step in steps {
-            let Some((key_span, child)) = node.child(step) else { break };
-            node = child;
-            place = match (&child.content, key_span) {
-                (Content::Sequence(_) | Content::Mapping(_), Some(key)) => key.clone(),
-                (Content::Scalar(Value::Null), Some(key)) if child.span.is_empty() => key.clone(),
-                _ => child.span.clone(),
-            };
-        }
-        place
-    }
-
-    /// Where the key at the end of a path stands, for complaints about the key itself.
-    pub fn key_place(&self, parent: &[Step], key: &str) -> Range<usize> {
-        let entry = self.get(parent).and_then(|node| node.entries().iter().find(|entry| entry.key == key));
-        entry.map_or_else(|| self.place(parent), |entry| entry.key_span.clone())
-    }
-
-    /// The tree without its positions.
-    pub fn to_json(&self) -> Value {
-        match &self.content {
-            Content::Scalar(value) => value.clone(),
-            Content::Sequence(items) => Value::Array(items.iter().map(Node::to_json).collect()),
-            Content::Mapping(entries) => Value::Object(
-                entries.iter().map(|entry| (entry.key.clone(), entry.value.to_json())).collect(),
-            ),
-        }
-    }
-}
 
 /// A collection whose end has not been read yet.
 struct Frame {
@@ -162,7 +36,7 @@ struct Pending {
 }
 
 /// Reads the text. `None` where no tree can be had; then at least one finding says why.
-pub(crate) fn read(source: &Source, notes: &mut Notes) -> Option<Node> {
+pub fn read(source: &Source, notes: &mut Notes) -> Option<Node> {
     Reader { source, notes, frames: Vec::new(), root: None, values: 0 }.read()
 }
 
@@ -196,7 +70,7 @@ impl Reader<'_> {
             if matches!(event, Event::DocumentStart(_)) {
                 documents += 1;
                 if documents > 1 {
-                    let remedy = "write one campaign per file, and remove the line `---`";
+                    let remedy = "write one document per file, and remove the line `---`";
                     self.note(
                         FindingKind::Unsupported,
                         span,
@@ -211,12 +85,9 @@ impl Reader<'_> {
             }
         }
         if self.root.is_none() {
-            self.note(
-                FindingKind::MissingKey,
-                0..0,
-                "the file is empty".into(),
-                "see `campaigns/turbo_a.yaml` for a complete campaign",
-            );
+            let document = self.source.document;
+            let remedy = format!("see `{}` for a complete {}", document.example, document.name);
+            self.note(FindingKind::MissingKey, 0..0, "the file is empty".into(), &remedy);
         }
         self.root
     }
@@ -236,7 +107,7 @@ impl Reader<'_> {
             FindingKind::TooLarge,
             span.clone(),
             format!("the file has more than {VALUE_LIMIT} values"),
-            "write a regular grid as `speeds` and `openings`",
+            "is this the right file? A long list may have a shorter form, as a grid has `speeds` and `openings`",
         );
         Err(Stop)
     }
@@ -286,7 +157,7 @@ impl Reader<'_> {
                 self.note(
                     FindingKind::Unsupported,
                     span.clone(),
-                    "aliases (`*name`) are not read in a campaign".into(),
+                    format!("aliases (`*name`) are not read in a {}", self.source.document.name),
                     "write the value out",
                 );
                 if self.waits_for_key() {
@@ -311,7 +182,7 @@ impl Reader<'_> {
             self.note(
                 FindingKind::Unsupported,
                 span.clone(),
-                "anchors (`&name`) are not read in a campaign".into(),
+                format!("anchors (`&name`) are not read in a {}", self.source.document.name),
                 "remove the anchor, and write the value out where it was used",
             );
         }
@@ -319,7 +190,7 @@ impl Reader<'_> {
             self.note(
                 FindingKind::Unsupported,
                 span.clone(),
-                "tags (`!name`) are not read in a campaign".into(),
+                format!("tags (`!name`) are not read in a {}", self.source.document.name),
                 "remove the tag",
             );
         }
@@ -341,7 +212,7 @@ impl Reader<'_> {
                 FindingKind::TooLarge,
                 span,
                 format!("the nesting is deeper than {DEPTH_LIMIT} levels"),
-                "a campaign needs six levels; look for a bracket that is not closed",
+                "six levels are enough; look for a bracket that is not closed",
             );
             return Err(Stop);
         }
@@ -354,7 +225,7 @@ impl Reader<'_> {
             self.note(
                 FindingKind::Unsupported,
                 span.clone(),
-                "merge keys (`<<`) are not read in a campaign".into(),
+                format!("merge keys (`<<`) are not read in a {}", self.source.document.name),
                 "write the keys out",
             );
         }

@@ -5,8 +5,6 @@
 //! factor, has no name for `krpm`, and parses only its own spellings; this table is short enough to be read against
 //! the definitions of its units.
 
-#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
-
 mod kind;
 mod parse;
 mod quantity;

@@ -1,0 +1,139 @@
+//! What a picture consists of before it becomes text or pixels.
+
+use crate::Colour;
+use crate::items::{Dash, TextAnchor};
+
+/// How a line looks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stroke {
+    pub colour: Colour,
+    pub width_px: f64,
+    pub dash: Dash,
+}
+
+impl Stroke {
+    pub(crate) fn solid(colour: Colour, width_px: f64) -> Self {
+        Stroke { colour, width_px, dash: Dash::Solid }
+    }
+
+    /// Width that is drawn, px.
+    pub(crate) fn drawn_width_px(&self) -> f64 {
+        if self.width_px.is_finite() { self.width_px.clamp(0.1, 20.0) } else { 1.0 }
+    }
+
+    /// Lengths of dashes and gaps, px; empty for a solid line.
+    pub(crate) fn dashes_px(&self) -> Vec<f64> {
+        let pattern: &[f64] = match self.dash {
+            Dash::Solid => &[],
+            Dash::Dashed => &[4.0, 2.5],
+            Dash::Dotted => &[1.0, 2.0],
+            Dash::DashDot => &[5.0, 2.0, 1.0, 2.0],
+        };
+        pattern.iter().map(|part| part * self.drawn_width_px().max(1.2)).collect()
+    }
+}
+
+/// How a text looks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TextStyle {
+    pub size_px: f64,
+    pub colour: Colour,
+    pub anchor: TextAnchor,
+    pub bold: bool,
+    /// White rim, so that the text stays legible on lines.
+    pub halo: bool,
+    /// Turned counter-clockwise by this, degrees.
+    pub turn_deg: f64,
+}
+
+impl TextStyle {
+    pub(crate) fn new(size_px: f64, colour: Colour, anchor: TextAnchor) -> Self {
+        TextStyle { size_px, colour, anchor, bold: false, halo: false, turn_deg: 0.0 }
+    }
+
+    pub(crate) fn bold(mut self) -> Self {
+        self.bold = true;
+        self
+    }
+
+    pub(crate) fn halo(mut self) -> Self {
+        self.halo = true;
+        self
+    }
+
+    pub(crate) fn turned(mut self, turn_deg: f64) -> Self {
+        self.turn_deg = turn_deg;
+        self
+    }
+}
+
+/// A point of the picture, px from its upper left corner.
+pub(crate) type Px = (f64, f64);
+
+/// One thing that is drawn.
+#[derive(Debug, Clone)]
+pub(crate) enum Shape {
+    OpenGroup(String),
+    CloseGroup,
+    Line(Px, Px, Stroke),
+    /// At least two points.
+    Polyline(Vec<Px>, Stroke),
+    /// Polygons of at least three points as one shape, so that no seam shows between neighbours; opacity 0 to 1.
+    Areas(Vec<Vec<Px>>, Colour, f64),
+    Polygon(Vec<Px>, Colour, Stroke),
+    /// Centre and radius.
+    Circle(Px, f64, Colour, Stroke),
+    /// Text whose vertical middle is at the point; not empty.
+    Text(Px, String, TextStyle),
+}
+
+/// A picture: its shapes in the order in which they are drawn.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Drawing {
+    pub width_px: f64,
+    pub height_px: f64,
+    pub title: String,
+    pub shapes: Vec<Shape>,
+}
+
+impl Drawing {
+    pub(crate) fn open_group(&mut self, name: &str) {
+        self.shapes.push(Shape::OpenGroup(name.to_owned()));
+    }
+
+    pub(crate) fn close_group(&mut self) {
+        self.shapes.push(Shape::CloseGroup);
+    }
+
+    pub(crate) fn line(&mut self, from: Px, to: Px, stroke: &Stroke) {
+        self.shapes.push(Shape::Line(from, to, *stroke));
+    }
+
+    pub(crate) fn polyline(&mut self, points: &[Px], stroke: &Stroke) {
+        if points.len() > 1 {
+            self.shapes.push(Shape::Polyline(points.to_vec(), *stroke));
+        }
+    }
+
+    pub(crate) fn areas(&mut self, polygons: &[Vec<Px>], fill: Colour, opacity: f64) {
+        let polygons: Vec<_> = polygons.iter().filter(|polygon| polygon.len() > 2).cloned().collect();
+        if !polygons.is_empty() {
+            let opacity = if opacity.is_finite() { opacity.clamp(0.0, 1.0) } else { 1.0 };
+            self.shapes.push(Shape::Areas(polygons, fill, opacity));
+        }
+    }
+
+    pub(crate) fn polygon(&mut self, points: &[Px], fill: Colour, stroke: &Stroke) {
+        self.shapes.push(Shape::Polygon(points.to_vec(), fill, *stroke));
+    }
+
+    pub(crate) fn circle(&mut self, centre: Px, radius: f64, fill: Colour, stroke: &Stroke) {
+        self.shapes.push(Shape::Circle(centre, radius, fill, *stroke));
+    }
+
+    pub(crate) fn text(&mut self, at: Px, text: &str, style: &TextStyle) {
+        if !text.is_empty() {
+            self.shapes.push(Shape::Text(at, text.to_owned(), *style));
+        }
+    }
+}

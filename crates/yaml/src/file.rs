@@ -1,0 +1,41 @@
+//! Files from disk, never more of them than a limit.
+
+use crate::finding::{FindingKind, Findings};
+use crate::source::{Document, Source};
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Reads a file without ever holding much more than `limit_bytes`, whatever the file claims to be.
+///
+/// # Errors
+/// What the system says; [`io::ErrorKind::FileTooLarge`] for a file beyond the limit.
+pub fn read_limited(path: &Path, limit_bytes: usize) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path)?;
+    file.take(limit_bytes as u64 + 1).read_to_end(&mut bytes)?;
+    if bytes.len() > limit_bytes {
+        return Err(io::Error::new(
+            io::ErrorKind::FileTooLarge,
+            format!("it is larger than the {limit_bytes} bytes that are read"),
+        ));
+    }
+    Ok(bytes)
+}
+
+/// Reads a file as text.
+///
+/// # Errors
+/// What the system says, as [`read_limited`]; inside, the one mistake of a file that is not UTF-8.
+pub fn open(
+    document: &'static Document,
+    path: &Path,
+    limit_bytes: usize,
+) -> io::Result<Result<String, Findings>> {
+    let bytes = read_limited(path, limit_bytes)?;
+    Ok(String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        let source = Source::new(document, path, &String::from_utf8_lossy(error.as_bytes()));
+        let remedy = "save the file as UTF-8".to_owned();
+        Findings::single(source, FindingKind::Syntax, at, "this is not UTF-8".to_owned(), remedy)
+    }))
+}

@@ -1,0 +1,106 @@
+//! What is wrong with a file, where, and what would be right.
+
+use crate::notes::Notes;
+use crate::source::Source;
+use serde::Serialize;
+use std::ops::Range;
+use std::path::Path;
+
+/// What kind of mistake it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FindingKind {
+    /// The text is not YAML, or not UTF-8.
+    Syntax,
+    /// YAML that our files do not use: anchors, aliases, merge keys, tags, several documents.
+    Unsupported,
+    /// The file, its nesting or its grid is larger than anything sensible.
+    TooLarge,
+    /// A key that does not exist.
+    UnknownKey,
+    /// A key that stands twice in one mapping.
+    DuplicateKey,
+    /// A key that is needed and not there.
+    MissingKey,
+    /// Text where a number is needed, a list where a mapping is needed, and the like.
+    WrongType,
+    /// A value that is none of those allowed, or not of the form it needs.
+    WrongValue,
+    /// A quantity without its unit, or with one that does not measure it.
+    Unit,
+    /// A value outside its range.
+    Range,
+    /// A point, speed or opening that stands twice.
+    Duplicate,
+    /// Two statements that contradict each other.
+    Conflict,
+    /// A file that is named and cannot be read.
+    MissingFile,
+    /// A point that the machine cannot reach within the limits.
+    Unreachable,
+}
+
+/// One mistake.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// What kind of mistake it is.
+    pub kind: FindingKind,
+    /// Path of keys, e.g. `grid.points[3].speed`; empty for the file as a whole.
+    pub path: String,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column, from 1, in characters.
+    pub column: usize,
+    /// What is wrong, with values and units.
+    pub message: String,
+    /// What would be right.
+    pub remedy: String,
+    /// Byte range in the text, within one line.
+    #[serde(skip)]
+    pub span: Range<usize>,
+}
+
+/// All mistakes of a file, in the order of the text.
+///
+/// [`Display`](std::fmt::Display) renders them without colours; see [`Findings::render`].
+#[derive(Debug, Clone)]
+pub struct Findings {
+    pub(crate) source: Box<Source>,
+    /// At most [`Findings::LIMIT`] mistakes.
+    pub list: Vec<Finding>,
+    /// How many more there are.
+    pub omitted: usize,
+}
+
+impl Findings {
+    /// How many findings are kept; beyond that they are counted.
+    pub const LIMIT: usize = 100;
+
+    /// What was noted about a text, in the order of the text.
+    pub fn new(source: Source, notes: Notes) -> Self {
+        let (mut list, overflow) = notes.into_parts();
+        list.sort_by_key(|finding| finding.span.start);
+        let omitted = list.len().saturating_sub(Self::LIMIT) + overflow;
+        list.truncate(Self::LIMIT);
+        Findings { source: Box::new(source), list, omitted }
+    }
+
+    /// One mistake alone, at a byte of the text.
+    pub fn single(source: Source, kind: FindingKind, at: usize, message: String, remedy: String) -> Self {
+        let mut notes = Notes::default();
+        notes.push(source.finding(kind, String::new(), at..at, message, remedy));
+        Findings::new(source, notes)
+    }
+
+    /// The file they are about.
+    pub fn origin(&self) -> &Path {
+        &self.source.origin
+    }
+
+    /// Number of mistakes, those not kept included.
+    pub fn count(&self) -> usize {
+        self.list.len() + self.omitted
+    }
+}
+
+impl std::error::Error for Findings {}

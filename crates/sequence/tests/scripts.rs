@@ -283,7 +283,8 @@ fn a_script_whose_caller_goes_ends() {
     };
     let script =
         Script { path: "test.rhai".into(), text: "loop { try { jump(grid()[0]); } catch { } }".to_owned() };
-    let mut runner = SequenceRunner::start(script, Bench { order: Box::new(order), ..bench() }).unwrap();
+    let mut runner =
+        SequenceRunner::start(script, SequenceRequest { order: Box::new(order), ..request() }).unwrap();
     let step = runner.next_step(None).unwrap().unwrap();
     runner.next_step(Some(answer(&step))).unwrap().unwrap();
     assert_eq!(Arc::strong_count(&held), 2, "the script is at its second jump");

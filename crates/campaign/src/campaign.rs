@@ -1,12 +1,42 @@
-//! A checked campaign, units resolved and defaults filled in.
+//! The campaign as a whole: how the file is written, and what it becomes, units resolved and defaults filled in. Its
+//! elements stand in [`crate::elements`], one file each.
 
+use crate::elements::backend::backend;
+use crate::elements::boundary::BoundaryFile;
+use crate::elements::drift::DriftFile;
+use crate::elements::grid::GridFile;
+use crate::elements::identification::IdentificationFile;
+use crate::elements::limits::LimitsFile;
+use crate::elements::machine::MachineFile;
+use crate::elements::reference::ReferenceFile;
+use crate::elements::repeats::{RepeatsFile, repeats};
+use crate::elements::sensors::SensorsFile;
+use crate::elements::sequence::sequence;
+use crate::elements::timing::TimingElement;
+use crate::elements::tolerances::TolerancesElement;
+use crate::elements::zero::ZeroFile;
+use crate::units::{Fraction, Quantity};
 use mapper_core::{
-    Channel, DeclaredUncertainty, JointSettings, Method, ModelTolerances, OperatingPoint, ReferenceState,
+    Channel, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats, Soak, Timing,
+    VisitOrder,
 };
 use mapper_physics::follow_outlet::FollowOutlet;
-use mapper_physics::params::{BoundaryConditions, Params};
-use serde::Serialize;
+use mapper_physics::params::BoundaryConditions;
+use mapper_yaml::Step;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::io;
+use std::path::Path;
+
+pub use crate::elements::backend::BackendChoice;
+pub use crate::elements::display::DisplayUnits;
+pub use crate::elements::identification::Identification;
+pub use crate::elements::machine::{Machine, MapSource};
+pub use crate::elements::outputs::{FormatName, Outputs};
+pub use crate::elements::report::Report;
+pub use crate::elements::sensors::SensorDeclaration;
+pub use crate::elements::sequence::SequenceSource;
 
 /// Everything a run needs to know, without mistakes that can be known beforehand.
 ///
@@ -36,11 +66,11 @@ pub struct Campaign {
     pub timing: Timing,
     /// The rest before the warm-up, for a zero of the sensors, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub zero: Option<Zero>,
+    pub zero: Option<Soak>,
     /// How points are identified.
     pub identification: Identification,
     /// Order of the points.
-    pub order: Order,
+    pub order: VisitOrder,
     /// The script that says which step comes next, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sequence: Option<SequenceSource>,
@@ -65,296 +95,114 @@ pub struct Campaign {
     pub display: DisplayUnits,
 }
 
-/// The turbocharger under test.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Machine {
-    /// Name.
-    pub name: String,
-    /// Serial number.
-    pub serial_number: Option<String>,
-    /// Parameters of the nominal model, the diameter of the declared T2 probe included.
-    pub params: Params,
-    /// The nominal compressor map.
-    pub map: MapSource,
+/// A campaign: one machine, one grid of operating points, one night on the gas stand.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "mapper campaign")]
+pub(crate) struct CampaignFile {
+    /// Name of the campaign; run directories begin with it. Letters, digits, `_`, `-` and `.`, at most 64, the first a letter or digit.
+    #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"), example = &"turbo_a")]
+    campaign: String,
+    /// What the campaign is for, in your own words.
+    description: Option<String>,
+    /// The turbocharger under test.
+    machine: MachineFile,
+    /// What the rig and the cell hold constant.
+    boundary: BoundaryFile,
+    /// Declared uncertainty of each measured channel, by its symbol.
+    sensors: SensorsFile,
+    /// Declared tolerances of the nominal model; the defaults where none are given.
+    #[serde(default, deserialize_with = "TolerancesElement::deserialize")]
+    #[schemars(with = "TolerancesElement")]
+    tolerances: ModelTolerances,
+    /// The rig, by the name of its backend, with the backend's own settings below it, e.g. `virtual_lab: {}`. What stands there is checked by the backend.
+    #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"virtual_lab": {}}))]
+    backend: BTreeMap<String, serde_json::Value>,
+    /// The operating points: `speeds` and `openings`, or `points`.
+    grid: GridFile,
+    /// How long things take.
+    #[serde(deserialize_with = "TimingElement::deserialize")]
+    #[schemars(with = "TimingElement")]
+    timing: Timing,
+    /// The isothermal zero before the first point; none where it is left out.
+    zero: Option<ZeroFile>,
+    /// How efficiency and heat-transfer coefficient are found.
+    identification: Option<IdentificationFile>,
+    /// Order of the points. `sum_gradient`, the default, makes the thermal gradients large in all, `worst_gradient` the smallest of them; `information` makes the predicted error of the efficiency small; `time` makes the campaign short and chooses each dwell; `greedy` looks one step ahead; `listed` keeps the order of the grid.
+    #[serde(default)]
+    order: VisitOrder,
+    /// A rhai script that says which step comes next, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/sequences.md says what it may call.
+    #[schemars(regex(pattern = r"\.rhai$"), example = &"scripts/zigzag.rhai")]
+    sequence: Option<String>,
+    /// Error of the efficiency (standard error and bias of the method, one standard deviation) that `order: time` has to reach at each point.
+    #[schemars(extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.5 %")]
+    required_sigma_eta: Option<Quantity<Fraction>>,
+    /// A jump that is repeated, so that drift shows: at least twice, and every 12 steps where nothing else is said; `off` for none. A sequence script makes its own repeats.
+    #[schemars(example = &"off")]
+    repeats: Option<RepeatsFile>,
+    /// Watches the repeats while the campaign runs: one that differs from its first visit by more than is declared is made again, and what differs again is drift.
+    drift: Option<DriftFile>,
+    /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.
+    #[schemars(example = 1)]
+    seed: Option<u64>,
+    /// What the run must never leave.
+    limits: LimitsFile,
+    /// State to which corrected flow and speed refer: SAE (298 K, 100 kPa), Garrett (545 degR, 13.95 psia), BorgWarner (293 K, 98.1 kPa), or `temperature` and `pressure`. SAE where none is given.
+    #[schemars(example = &"SAE")]
+    reference: Option<ReferenceFile>,
+    /// What is written, and where.
+    #[serde(default)]
+    outputs: Outputs,
+    /// What a test report needs and no sensor measures.
+    #[serde(default)]
+    report: Report,
+    /// Units in which people are shown results; files keep SI.
+    #[serde(default)]
+    display: DisplayUnits,
 }
 
-/// Where the nominal compressor map comes from.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MapSource {
-    /// The closed form of the model's description.
-    ClosedForm,
-    /// A table.
-    Table {
-        /// Path as resolved from the campaign file. Not part of the canonical JSON: the text is what counts.
-        #[serde(skip)]
-        path: std::path::PathBuf,
-        /// The file's text, which [`crate::nominal_model`] reads.
-        text: String,
-        /// State to which its corrected quantities refer.
-        reference: ReferenceState,
-    },
-}
-
-/// One sensor as declared; one standard deviation throughout, in the channel's unit (K, Pa, kg/s, rpm).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct SensorDeclaration {
-    /// Noise, offset left after calibration, gain.
-    pub declared: DeclaredUncertainty,
-    /// Inner diameter of the pipe at a static tap, m; `None` where the total value is measured.
-    pub static_tap_pipe_diameter_m: Option<f64>,
-    /// Diameter of the probe's tip, m; 0 is a probe without inertia.
-    pub probe_diameter_m: f64,
-}
-
-/// A backend by its name, with settings that only it understands.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct BackendChoice {
-    /// Name, e.g. `virtual_lab`.
-    pub name: String,
-    /// Its settings, unchecked.
-    pub settings: serde_json::Value,
-}
-
-/// How long things take.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Timing {
-    /// Time at the first point before its step begins, s, >= 0.
-    pub warm_up_s: f64,
-    /// Time without flow after the last step, s, >= 0.
-    pub cool_down_s: f64,
-    /// Time at each point, jump included, s, > 0.
-    pub dwell_s: f64,
-}
-
-/// The machine at rest before a run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Zero {
-    /// Time at rest, s, > 0.
-    pub soak_s: f64,
-    /// Oil inlet temperature in the meantime, K.
-    pub oil_temperature_k: f64,
-}
-
-/// How points are identified.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Identification {
-    /// Method.
-    pub method: Method,
-    /// Part of each step that is used.
-    pub window: WindowChoice,
-    /// Share of the internal area before compression that is assumed, alpha_A, 0..1.
-    pub alpha_area_ratio: f64,
-    /// When a point counts as settled.
-    pub stabilisation: Stabilisation,
-    /// Which refinements the joint method makes.
-    pub joint: JointSettings,
-}
-
-/// Part of each step that is used.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum WindowChoice {
-    /// From where speed, flow and pressure ratio have settled to the end of the step.
-    Auto,
-    /// Fixed.
-    Fixed {
-        /// Begin after the jump, s.
-        start_s: f64,
-        /// End after the jump, s; after the begin, within the dwell.
-        end_s: f64,
-    },
-}
-
-/// Relative drifts over the window within which a point counts as settled.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Stabilisation {
-    /// Shaft speed, ratio.
-    pub speed_ratio: f64,
-    /// Compressor flow, ratio.
-    pub flow_ratio: f64,
-    /// Pressure ratio, ratio.
-    pub pressure_ratio_ratio: f64,
-}
-
-impl Default for Stabilisation {
-    /// The drifts Burke et al. report for settled points: speed 0.8 %, flow 1.5 %, pressure ratio 2 %.
-    fn default() -> Self {
-        Stabilisation { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 }
+impl CampaignFile {
+    /// The campaign of a file without mistakes, and for each of its points the place in the file it came from.
+    ///
+    /// # Errors
+    /// Only where the map file or the sequence script can no longer be read.
+    pub(crate) fn campaign(
+        self,
+        origin: &Path,
+        files: &dyn Fn(&Path) -> io::Result<String>,
+    ) -> io::Result<(Campaign, Vec<Vec<Step>>)> {
+        let (points, point_paths) = self.grid.points();
+        let (boundary, follow_outlet) = (self.boundary.conditions(), self.boundary.follow_outlet());
+        let machine = self.machine.machine(self.sensors.probe_diameter_m(), origin, files)?;
+        let alpha_area_ratio = machine.params.compressor.alpha_area_ratio;
+        let campaign = Campaign {
+            name: self.campaign,
+            description: self.description,
+            boundary,
+            follow_outlet,
+            sensors: self.sensors.declarations(),
+            tolerances: self.tolerances,
+            backend: backend(self.backend),
+            points,
+            timing: self.timing,
+            zero: self.zero.map(|zero| zero.soak(boundary.t1_k)),
+            identification: self.identification.unwrap_or_default().identification(alpha_area_ratio),
+            order: self.order,
+            sequence: sequence(self.sequence.as_deref(), origin, files)?,
+            required_sigma_eta: self.required_sigma_eta.map(|error| error.inside),
+            repeats: repeats(self.repeats),
+            on_drift: self.drift.map(|drift| drift.on_drift),
+            seed: self.seed.unwrap_or(USUAL_SEED),
+            limits: self.limits.into(),
+            reference: self.reference.map_or(ReferenceState::SAE, ReferenceState::from),
+            outputs: self.outputs,
+            report: self.report,
+            display: self.display,
+            machine,
+        };
+        Ok((campaign, point_paths))
     }
 }
 
-/// Order of the points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Order {
-    /// Largest sum of thermal gradients.
-    SumGradient,
-    /// Largest smallest gradient.
-    WorstGradient,
-    /// Smallest predicted error of the efficiency.
-    Information,
-    /// Shortest campaign that reaches [`Campaign::required_sigma_eta`]; each dwell is chosen.
-    Time,
-    /// By predicted thermal gradient from step to step.
-    Greedy,
-    /// As in the grid.
-    Listed,
-}
-
-/// A sequence script.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SequenceSource {
-    /// Path as resolved from the campaign file. Not part of the canonical JSON: the text is what counts.
-    #[serde(skip)]
-    pub path: std::path::PathBuf,
-    /// The script.
-    pub text: String,
-}
-
-/// From where to where.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Jump {
-    /// The point before the jump.
-    pub from: OperatingPoint,
-    /// The point after it.
-    pub to: OperatingPoint,
-}
-
-/// A jump that is made again and again, so that drift shows.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Repeats {
-    /// The jump; `None` where the planner is to choose it.
-    pub jump: Option<Jump>,
-    /// Steps between two of them at most, >= 2.
-    pub every_steps: usize,
-    /// Fewest of them, >= 1.
-    pub at_least: usize,
-}
-
-/// What is done when repeats differ during a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OnDrift {
-    /// The run is held in its safe state.
-    Hold,
-    /// The run goes on with a note.
-    Continue,
-    /// The run is stopped without flow and asks for a zero of the sensors.
-    Zero,
-}
-
-/// What the run must never leave.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Limits {
-    /// Highest shaft speed, rpm.
-    pub speed_max_rpm: f64,
-    /// Lowest turbine inlet pressure the rig may be told, Pa.
-    pub p3_min_pa: f64,
-    /// Highest turbine inlet pressure the rig may be told, Pa.
-    pub p3_max_pa: f64,
-    /// Highest turbine inlet temperature, K.
-    pub t3_max_k: Option<f64>,
-    /// Highest compressor outlet temperature, K.
-    pub t2_max_k: Option<f64>,
-    /// Smallest surge margin: flow over the surge flow at equal corrected speed, minus one.
-    pub surge_margin_min_ratio: Option<f64>,
-    /// Largest change of the compressor housing within a window, K.
-    pub housing_gradient_max_k: Option<f64>,
-    /// Time the rig takes from the lowest to the highest turbine inlet pressure, s.
-    pub p3_stroke_s: Option<f64>,
-}
-
-/// What is written.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outputs {
-    /// Directory of the run directories, as written in the file (relative to the working directory).
-    pub directory: String,
-    /// Formats of the map, each once.
-    pub formats: Vec<OutputFormat>,
-}
-
-/// A format of the map.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OutputFormat {
-    /// Table.
-    Csv,
-    /// For machines.
-    Json,
-    /// Picture.
-    Svg,
-    /// Picture as pixels.
-    Png,
-    /// SAE text.
-    Sae,
-    /// Fitted lines with their errors.
-    Fitted,
-    /// Tables for Modelica.
-    Modelica,
-    /// Tables for Simscape and Powertrain Blockset.
-    Simscape,
-    /// Tables for NPSS.
-    Npss,
-    /// A map for pyCycle.
-    Pycycle,
-}
-
-impl OutputFormat {
-    /// Name as written in campaigns, and of the exporter.
-    pub fn name(self) -> &'static str {
-        match self {
-            OutputFormat::Csv => "csv",
-            OutputFormat::Json => "json",
-            OutputFormat::Svg => "svg",
-            OutputFormat::Png => "png",
-            OutputFormat::Sae => "sae",
-            OutputFormat::Fitted => "fitted",
-            OutputFormat::Modelica => "modelica",
-            OutputFormat::Simscape => "simscape",
-            OutputFormat::Npss => "npss",
-            OutputFormat::Pycycle => "pycycle",
-        }
-    }
-}
-
-/// What a test report needs and no sensor measures.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Report {
-    /// Who ran the test.
-    pub operator: Option<String>,
-    /// Where.
-    pub test_cell: Option<String>,
-    /// Day of each sensor's last calibration, `YYYY-MM-DD`.
-    pub calibration: BTreeMap<Channel, String>,
-    /// Barometric pressure, Pa.
-    pub barometer_pa: Option<f64>,
-    /// Relative humidity, 0..1.
-    pub humidity_ratio: Option<f64>,
-    /// Temperature in the cell, K.
-    pub cell_temperature_k: Option<f64>,
-}
-
-/// Units shown to people, by their symbols; convert with [`crate::units::Kind::unit`].
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DisplayUnits {
-    /// Unit of temperatures.
-    pub temperature: String,
-    /// Unit of pressures.
-    pub pressure: String,
-    /// Unit of shaft speeds.
-    pub speed: String,
-    /// Unit of mass flows.
-    pub flow: String,
-}
-
-impl Default for DisplayUnits {
-    fn default() -> Self {
-        DisplayUnits {
-            temperature: "degC".into(),
-            pressure: "kPa".into(),
-            speed: "krpm".into(),
-            flow: "g/s".into(),
-        }
-    }
-}
+/// Seed where the file names none.
+const USUAL_SEED: u64 = 1;

@@ -6,17 +6,22 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod build;
 pub mod campaign;
+mod checking;
 mod consistency;
-mod file;
+mod elements;
 mod load;
 mod nightly;
 mod reach;
 mod schema;
+mod si;
+#[cfg(test)]
+mod testing;
 
 pub use campaign::Campaign;
-pub use load::{CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, load};
+pub use load::{
+    CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
+};
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
 pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
 pub use reach::{Unreachable, nominal_model, unreachable_points};

@@ -1,9 +1,7 @@
 //! From a text, or a file, to a campaign or all its mistakes.
 
-use crate::build::{self, Built};
-use crate::campaign::Campaign;
+use crate::campaign::{Campaign, CampaignFile};
 use crate::consistency;
-use crate::file::CampaignFile;
 use crate::reach::{self, Unreachable};
 use crate::schema::SCHEMA;
 use mapper_yaml::{Document, FindingKind, Findings, Node, Notes, ReadError, Source, Step, path_text, steps};
@@ -117,6 +115,23 @@ pub fn backend_mistake(text: &str, origin: &Path, backend: &str, setting: &str, 
     Findings::new(source, notes)
 }
 
+/// A format of the map that nobody writes, at its place in the campaign's text. `known`: the names that can be written.
+pub fn format_mistake(text: &str, origin: &Path, format: &str, known: &[&str]) -> Findings {
+    let source = Source::new(&DOCUMENT, origin, text);
+    let mut notes = Notes::default();
+    let list = steps!["outputs", "formats"];
+    let root = mapper_yaml::read(&source, &mut notes);
+    let written = root.as_ref().and_then(|root| root.get(&list)).map(|list| list.items()).unwrap_or_default();
+    let named = |node: &Node| node.text() == Some(format);
+    let mut steps = list.to_vec();
+    steps.extend(written.iter().position(named).map(Step::from));
+    let span = root.as_ref().map_or(0..0, |root| root.place(&steps));
+    let message = format!("`{format}` is not a format that a map can be written in");
+    let remedy = format!("choose from {}", known.join(", "));
+    notes.push(source.finding(FindingKind::WrongValue, path_text(&steps), span, message, remedy));
+    Findings::new(source, notes)
+}
+
 /// Deserialises a text without known mistakes. `None` with at least one finding.
 fn finish(
     source: &Source,
@@ -140,7 +155,7 @@ fn finish(
             return None;
         }
     };
-    let Built { campaign, point_paths } = match build::build(file, &source.origin, files) {
+    let (campaign, point_paths) = match file.campaign(&source.origin, files) {
         Ok(built) => built,
         Err(error) => {
             // Both were there a moment ago; the map is the usual one.

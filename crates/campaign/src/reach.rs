@@ -4,9 +4,8 @@ use crate::campaign::{Campaign, MapSource};
 use mapper_core::OperatingPoint;
 use mapper_physics::characteristic::CompressorCharacteristic;
 use mapper_physics::closed_form_map::ClosedFormMap;
-use mapper_physics::follow_outlet::hold_speed;
 use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::reach::{clause, reach};
 use mapper_physics::tabulated_map::{MapError, TabulatedMap};
 use std::sync::Arc;
 
@@ -36,73 +35,17 @@ pub fn nominal_model(campaign: &Campaign) -> Result<Model, MapError> {
     Ok(Model::new(params, map))
 }
 
-/// The points that cannot be measured: no steady state, beyond the surge line or too close to it, P3 or compressor
-/// outlet temperature outside their limits. One reason each, the first that applies.
+/// The points that cannot be measured, each with everything that is in its way; see [`mapper_physics::reach`].
 pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<Unreachable> {
     let complaint = |(index, point): (usize, &OperatingPoint)| {
-        let (reason, remedy) = complaint(campaign, model, point)?;
-        let name = format!("{} krpm at opening {}", point.speed_rpm / 1000.0, point.valve_opening_ratio);
-        Some(Unreachable { point: index, reason: format!("{name} {reason}"), remedy: remedy.to_owned() })
+        let (boundary, limits) = (&campaign.boundary, &campaign.limits);
+        let obstacles = reach(model, *point, boundary, campaign.follow_outlet, limits).err()?;
+        let (krpm, opening) = (point.speed_rpm / 1000.0, point.valve_opening_ratio);
+        Some(Unreachable {
+            point: index,
+            reason: format!("{krpm} krpm at opening {opening} {}", clause(&obstacles)),
+            remedy: obstacles.first()?.remedy().to_owned(),
+        })
     };
     campaign.points.iter().enumerate().filter_map(complaint).collect()
-}
-
-/// What is wrong with a point, to follow its name, and what to do.
-fn complaint(campaign: &Campaign, model: &Model, point: &OperatingPoint) -> Option<(String, &'static str)> {
-    let limits = &campaign.limits;
-    let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
-    let steady = match hold_speed(model, point.speed_rpm, &boundary, campaign.follow_outlet) {
-        Ok(steady) => steady,
-        Err(error) => {
-            return Some((
-                format!("cannot be held: {error}"),
-                "leave the point out, or change speed or opening",
-            ));
-        }
-    };
-    let margin_ratio = steady.surge_margin_ratio(model);
-    if margin_ratio < 0.0 {
-        return Some((
-            format!(
-                "lies beyond the surge line of the nominal map, at {:.0} % of the surge flow",
-                100.0 * (1.0 + margin_ratio)
-            ),
-            "leave the point out, or open the valve further",
-        ));
-    }
-    if let Some(limit_ratio) = limits.surge_margin_min_ratio.filter(|limit_ratio| margin_ratio < *limit_ratio)
-    {
-        return Some((
-            format!(
-                "has a surge margin of {:.1} %, below `limits.surge_margin` = {} %",
-                100.0 * margin_ratio,
-                100.0 * limit_ratio
-            ),
-            "leave the point out, open the valve further, or lower the limit if the rig allows it",
-        ));
-    }
-    let p3_pa = steady.boundary.p3_pa;
-    if p3_pa > limits.p3_max_pa || p3_pa < limits.p3_min_pa {
-        let (side, limit, limit_pa) = if p3_pa > limits.p3_max_pa {
-            ("above", "max", limits.p3_max_pa)
-        } else {
-            ("below", "min", limits.p3_min_pa)
-        };
-        return Some((
-            format!(
-                "needs P3 = {:.1} kPa, {side} `limits.turbine_inlet_pressure.{limit}` = {} kPa",
-                p3_pa / 1000.0,
-                limit_pa / 1000.0
-            ),
-            "leave the point out, change it, or widen the limit if the rig allows it",
-        ));
-    }
-    let limit_k = limits.t2_max_k.filter(|limit_k| steady.outputs.t2_k > *limit_k)?;
-    Some((
-        format!(
-            "heats the compressor outlet to {:.1} K, above `limits.compressor_outlet_temperature` = {limit_k} K",
-            steady.outputs.t2_k
-        ),
-        "leave the point out, change it, or raise the limit if the machine allows it",
-    ))
 }

@@ -1,6 +1,6 @@
 //! The JSON schema of a campaign file.
 
-use crate::file::CampaignFile;
+use crate::campaign::CampaignFile;
 use mapper_yaml::Schema;
 use serde_json::Value;
 use std::sync::LazyLock;

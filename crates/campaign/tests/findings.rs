@@ -645,3 +645,19 @@ proptest::proptest! {
         }
     }
 }
+
+#[test]
+fn a_format_that_nobody_writes_is_shown_where_it_stands() {
+    let text = format!("{RIGHT}outputs: {{formats: [csv, cvs]}}\n");
+    let campaign = run(&text).unwrap();
+    let findings = mapper_campaign::format_mistake(
+        &text,
+        Path::new("a.yaml"),
+        campaign.outputs.formats[1].name(),
+        &["csv"],
+    );
+    let line = text.lines().position(|line| line.contains("cvs")).unwrap() + 1;
+    let finding = &findings.list[0];
+    assert_eq!((findings.list.len(), finding.line, finding.path.as_str()), (1, line, "outputs.formats[1]"));
+    assert!(finding.message.contains("`cvs`") && finding.remedy.contains("csv"), "{findings}");
+}

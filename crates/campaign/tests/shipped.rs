@@ -2,9 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_campaign::campaign::{MapSource, Order, WindowChoice};
+use mapper_campaign::campaign::MapSource;
 use mapper_campaign::{CampaignError, load};
-use mapper_core::{Channel, ReferenceState};
+use mapper_core::{Channel, ReferenceState, VisitOrder, WindowRule};
 use mapper_physics::params::{BoundaryConditions, Params};
 use std::path::{Path, PathBuf};
 
@@ -34,8 +34,8 @@ fn turbo_a_is_the_machine_of_appendix_a() {
     assert_eq!(campaign.boundary, BoundaryConditions::default());
     assert_eq!(campaign.machine.map, MapSource::ClosedForm);
     assert_eq!(campaign.reference, ReferenceState::SAE);
-    assert_eq!(campaign.order, Order::SumGradient);
-    assert_eq!(campaign.identification.window, WindowChoice::Auto);
+    assert_eq!(campaign.order, VisitOrder::SumGradient);
+    assert_eq!(campaign.identification.window, WindowRule::Auto);
     assert_eq!((campaign.timing.warm_up_s, campaign.timing.dwell_s, campaign.seed), (600.0, 120.0, 1));
     assert!(campaign.points.len() >= 30);
     let mut speeds: Vec<f64> = campaign.points.iter().map(|point| point.speed_rpm).collect();

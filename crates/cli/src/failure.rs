@@ -53,19 +53,20 @@ impl Failure {
         }
     }
 
-    /// An error of a session that has to do with a campaign file: a mistake in the backend's settings is shown in its text.
+    /// An error of a session that has to do with a campaign file: a mistake in the backend's settings or in the formats of
+    /// the map is shown in its text.
     pub fn in_campaign(error: SessionError, campaign: &Path) -> Self {
-        let SessionError::Backend(BackendError::Settings { backend, path, source }) = &error else {
-            return error.into();
-        };
-        match std::fs::read_to_string(campaign) {
-            Ok(text) => {
-                let findings =
-                    mapper_campaign::backend_mistake(&text, campaign, backend, path, &source.to_string());
-                Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
+        let Ok(text) = std::fs::read_to_string(campaign) else { return error.into() };
+        let findings = match &error {
+            SessionError::Backend(BackendError::Settings { backend, path, source }) => {
+                mapper_campaign::backend_mistake(&text, campaign, backend, path, &source.to_string())
             }
-            Err(_) => error.into(),
-        }
+            SessionError::UnknownFormat { name, known } => {
+                mapper_campaign::format_mistake(&text, campaign, name, known)
+            }
+            _ => return error.into(),
+        };
+        Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
     }
 
     /// Standard output was closed by its reader: a normal end of a pipe.

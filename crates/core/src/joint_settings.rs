@@ -1,10 +1,12 @@
 //! Which refinements a joint identification makes, and what is assumed of them beforehand.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Whether a shared number is taken as declared or found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
+#[schemars(transform = crate::schema::names_alone)]
 pub enum Choice {
     /// As declared.
     Fixed,
@@ -14,8 +16,9 @@ pub enum Choice {
 }
 
 /// How the efficiency moves within a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
+#[schemars(transform = crate::schema::names_alone)]
 pub enum EfficiencyWithinStep {
     /// It does not.
     Constant,
@@ -25,8 +28,9 @@ pub enum EfficiencyWithinStep {
 }
 
 /// How the heat-transfer coefficient moves within a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
+#[schemars(transform = crate::schema::names_alone)]
 pub enum ConvectionWithinStep {
     /// It does not, and no point knows of another's.
     Constant,
@@ -36,20 +40,20 @@ pub enum ConvectionWithinStep {
 }
 
 /// The refinements of the joint method. With every one switched off it is the dynamic method.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct JointSettings {
-    /// Share of the area before compression, alpha_A.
+    /// Share of the internal area before compression.
     pub alpha_area: Choice,
-    /// Diameter of the T2 probe's tip.
+    /// Diameter of the T2 probe; `fixed` takes that of `sensors.T2.probe_diameter`.
     pub probe: Choice,
-    /// Factor on h where the metal is hotter than the gas.
+    /// Factor on the heat-transfer coefficient where the metal is hotter than the gas; 1 where `fixed`.
     pub direction: Choice,
     /// Offsets of the sensors, with their declared uncertainty as prior.
     pub offsets: Choice,
-    /// Efficiency within a step.
+    /// Efficiency within a step: `constant`, or as a surface through all points has it.
     pub efficiency: EfficiencyWithinStep,
-    /// Heat-transfer coefficient within a step.
+    /// Heat-transfer coefficient within a step: `constant`, or by a law that all points share.
     pub h: ConvectionWithinStep,
 }
 

@@ -12,6 +12,17 @@ pub struct OperatingPoint {
     pub valve_opening_ratio: f64,
 }
 
+impl OperatingPoint {
+    /// Largest opening that a back-pressure valve may be told, relative to its nominal area.
+    pub const OPENING_MAX_RATIO: f64 = 2.5;
+
+    /// Whether two points are the same on any rig: speeds within 1e-3 rpm, openings within 1e-6.
+    pub fn is_same_place(&self, other: &OperatingPoint) -> bool {
+        (self.speed_rpm - other.speed_rpm).abs() < 1e-3
+            && (self.valve_opening_ratio - other.valve_opening_ratio).abs() < 1e-6
+    }
+}
+
 impl std::fmt::Display for OperatingPoint {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}krpm@{}", self.speed_rpm / 1000.0, self.valve_opening_ratio)

@@ -122,7 +122,7 @@ pub struct PlanBound {
 pub struct Plan {
     /// Name of the campaign.
     pub campaign: String,
-    /// What the order was chosen by, e.g. `listed`, `greedy_gradient`.
+    /// What the order was chosen by, e.g. `listed`, `greedy`.
     pub objective: String,
     /// Seed of the search (and of simulated rigs).
     pub seed: u64,

@@ -1,6 +1,6 @@
 //! Tonight against the band of the nights before, and what it means when something has left it.
 
-use crate::{Band, Figure, Night, PointQuantity, PointRow, RunKey, RunRow};
+use crate::{Band, Metric, Night, PointQuantity, PointRow, RunKey, RunRow};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ pub struct Moved {
     /// The run.
     pub run: RunKey,
     /// The figure.
-    pub figure: Figure,
+    pub figure: Metric,
     /// Tonight's value; `None` where tonight has none and the nights before had.
     pub value: Option<f64>,
     /// Where it has been.
@@ -98,7 +98,7 @@ pub fn compare(night: &Night, earlier: &BTreeMap<RunKey, Vec<RunRow>>) -> Compar
 }
 
 fn compare_figures(run: &RunRow, before: &[&RunRow], moved: &mut Vec<Moved>) {
-    for figure in Figure::ALL {
+    for figure in Metric::ALL {
         let values: Vec<f64> =
             before.iter().filter_map(|earlier| earlier.figures.get(&figure).copied()).collect();
         let Some(band) = Band::of(&values, figure.floor()) else { continue };

@@ -8,7 +8,7 @@
 mod band;
 mod compare;
 mod error;
-mod figure;
+mod metric;
 mod night;
 mod quantity;
 mod store;
@@ -16,8 +16,8 @@ mod store;
 pub use band::{Band, Floor};
 pub use compare::{Comparison, Moved, MovedPoints, Shift, compare};
 pub use error::HistoryError;
-pub use figure::Figure;
 pub use mapper_numerics::statistics::median;
+pub use metric::Metric;
 pub use night::{Night, PointRow, RunKey, RunRow};
 pub use quantity::PointQuantity;
 pub use store::{DEFAULT_NIGHTS, Filter, History, ListedRun, StoredNight};

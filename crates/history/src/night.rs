@@ -1,6 +1,6 @@
 //! The rows of one night, before they are stored.
 
-use crate::Figure;
+use crate::Metric;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -63,7 +63,7 @@ pub struct RunRow {
     /// Why the run failed; `None` where it did not.
     pub failure: Option<String>,
     /// The figures it has.
-    pub figures: BTreeMap<Figure, f64>,
+    pub figures: BTreeMap<Metric, f64>,
     /// Its points.
     pub points: Vec<PointRow>,
 }

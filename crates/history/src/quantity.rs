@@ -58,7 +58,7 @@ impl PointQuantity {
         }
     }
 
-    /// Half width that the band has at least; see [`crate::Figure::floor`].
+    /// Half width that the band has at least; see [`crate::Metric::floor`].
     pub fn floor(self) -> Floor {
         match self {
             PointQuantity::EtaTrue | PointQuantity::Eta | PointQuantity::EtaError => Floor::Absolute(5e-4),

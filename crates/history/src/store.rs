@@ -1,6 +1,6 @@
 //! The file: one SQLite database.
 
-use crate::{Comparison, Figure, HistoryError, Night, PointRow, RunKey, RunRow, compare};
+use crate::{Comparison, HistoryError, Metric, Night, PointRow, RunKey, RunRow, compare};
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -187,7 +187,7 @@ impl History {
                     run.model_sha256.clone().into(),
                     run.failure.clone().into(),
                 ];
-                values.extend(Figure::ALL.map(|figure| finite(run.figures.get(&figure).copied()).into()));
+                values.extend(Metric::ALL.map(|figure| finite(run.figures.get(&figure).copied()).into()));
                 insert_run.execute(rusqlite::params_from_iter(values))?;
                 let run_id = transaction.last_insert_rowid();
                 for point in &run.points {
@@ -246,11 +246,11 @@ const RUN_COLUMNS: &str =
     "r.campaign, r.machine, r.method, r.seed, r.campaign_sha256, r.model_sha256, r.failure";
 
 fn figure_columns(prefix: &str) -> String {
-    Figure::ALL.map(|figure| format!("{prefix}{}", figure.name())).join(", ")
+    Metric::ALL.map(|figure| format!("{prefix}{}", figure.name())).join(", ")
 }
 
 fn insert_run() -> String {
-    let marks: Vec<String> = (1..=8 + Figure::ALL.len()).map(|index| format!("?{index}")).collect();
+    let marks: Vec<String> = (1..=8 + Metric::ALL.len()).map(|index| format!("?{index}")).collect();
     format!(
         "INSERT INTO run (night_id, campaign, machine, method, seed, campaign_sha256, model_sha256, failure, {}) VALUES ({})",
         figure_columns(""),
@@ -261,7 +261,7 @@ fn insert_run() -> String {
 /// A run from the columns that begin at `first`.
 fn run_of(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<RunRow> {
     let mut figures = BTreeMap::new();
-    for (index, figure) in Figure::ALL.into_iter().enumerate() {
+    for (index, figure) in Metric::ALL.into_iter().enumerate() {
         if let Some(value) = row.get::<_, Option<f64>>(first + 7 + index)? {
             figures.insert(figure, value);
         }

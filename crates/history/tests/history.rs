@@ -1,7 +1,7 @@
 //! What a history must do: name what moved, keep what was written, and stand two writers and a kill.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_history::{Comparison, Figure, Filter, History, HistoryError, Night, PointRow, RunKey, RunRow};
+use mapper_history::{Comparison, Filter, History, HistoryError, Metric, Night, PointRow, RunKey, RunRow};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -39,8 +39,8 @@ fn night(number: i64, truth: f64, method: f64) -> Night {
                 model_sha256: "m".into(),
                 failure: None,
                 figures: BTreeMap::from([
-                    (Figure::EtaMean, mean),
-                    (Figure::EtaMedianError, (bias + method).abs()),
+                    (Metric::EtaMean, mean),
+                    (Metric::EtaMedianError, (bias + method).abs()),
                 ]),
                 points,
             });
@@ -74,8 +74,8 @@ fn equal_nights_are_quiet_and_a_model_that_moves_truth_too_is_caught_the_next_ni
     // 0.2 points of efficiency in the model: truth and result move alike, the error against truth stays.
     let caught = append(&path, &night(2, 0.002, 0.0));
     assert!(!caught.is_quiet());
-    assert!(caught.moved.iter().any(|moved| moved.figure == Figure::EtaMean));
-    assert!(caught.moved.iter().all(|moved| moved.figure != Figure::EtaMedianError), "{:?}", caught.moved);
+    assert!(caught.moved.iter().any(|moved| moved.figure == Metric::EtaMean));
+    assert!(caught.moved.iter().all(|moved| moved.figure != Metric::EtaMedianError), "{:?}", caught.moved);
     let said = caught.conclusions.join("\n");
     assert!(said.contains("maps_a: the true efficiency moved by +0.20 points"), "{said}");
     assert!(said.contains("the simulated machine or its model changed"), "{said}");

@@ -1,6 +1,6 @@
 //! What identification is told: method, window, geometry, declared uncertainty, thresholds.
 
-use mapper_core::{Channel, JointSettings, Method, ReferenceState};
+use mapper_core::{Channel, JointSettings, Method, ReferenceState, SettleBands, WindowRule};
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use serde::{Deserialize, Serialize};
@@ -13,6 +13,8 @@ pub struct IdentifyConfig {
     pub method: Method,
     /// Which part of each step is used by the dynamic method.
     pub window: WindowRule,
+    /// When the operating point counts as settled.
+    pub settle_bands: SettleBands,
     /// Assumed share of the internal area before compression, alpha_A, 0..1.
     pub alpha_area_ratio: f64,
     /// Internal area of the compressor housing A_c, m2, > 0.
@@ -43,6 +45,7 @@ impl Default for IdentifyConfig {
         IdentifyConfig {
             method: Method::Dynamic,
             window: WindowRule::default(),
+            settle_bands: SettleBands::default(),
             alpha_area_ratio: 0.0,
             internal_area_m2: 29e-3,
             outlet_diameter_m: 35e-3,
@@ -54,59 +57,6 @@ impl Default for IdentifyConfig {
             declared: BTreeMap::new(),
             noise_colour: NoiseColour::default(),
             thresholds: Thresholds::default(),
-        }
-    }
-}
-
-/// Which part of a step is used by the dynamic method.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum WindowRule {
-    /// From `start_s` to `end_s` after the jump; cut at the step's end.
-    Fixed {
-        /// Start after the jump, s.
-        start_s: f64,
-        /// End after the jump, s.
-        end_s: f64,
-    },
-    /// From where speed, flow and pressure ratio have stabilised to the step's end.
-    Auto(Stabilisation),
-}
-
-impl Default for WindowRule {
-    fn default() -> Self {
-        WindowRule::Auto(Stabilisation::default())
-    }
-}
-
-/// When the operating point counts as stabilised: each quantity varies (largest minus smallest value, noise
-/// discounted) by at most its ratio from the window's start to its end.
-///
-/// Default: the typical variations of section 3 of the paper, 0.8 % in speed, 2 % in pressure ratio, 1.5 % in flow.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Stabilisation {
-    /// Allowed variation of the shaft speed over its mean.
-    pub speed_ratio: f64,
-    /// Allowed variation of the compressor flow over its mean.
-    pub flow_ratio: f64,
-    /// Allowed variation of the pressure ratio over its mean.
-    pub pressure_ratio_ratio: f64,
-    /// The window starts at the earliest this long after the last change of a command, s: what the paper typically
-    /// needs, and what probes of 1.5 mm need to follow.
-    pub earliest_s: f64,
-    /// Shortest useful window, s. A step that stabilises later gives its last `shortest_s` and is doubtful.
-    pub shortest_s: f64,
-}
-
-impl Default for Stabilisation {
-    fn default() -> Self {
-        Stabilisation {
-            speed_ratio: 0.008,
-            flow_ratio: 0.015,
-            pressure_ratio_ratio: 0.02,
-            earliest_s: 10.0,
-            shortest_s: 30.0,
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::fit::{Fit, Geometry, fit};
 use crate::flow_drift::{FlowDrift, flow_drift};
 use crate::samples::Samples;
 use crate::window;
-use crate::{IdentifyConfig, jump};
+use crate::{IdentifyConfig, commands};
 use mapper_core::{EstimateUncertainty, Recording, Window};
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 
@@ -46,13 +46,13 @@ pub(crate) fn estimate(
     let mut estimate = Estimate::default();
     let Some(step) = recording.steps.get(position) else { return estimate };
     let limits = &config.thresholds;
-    if !jump::begins_with_jump(&recording.steps, position) {
+    if !commands::begins_with_jump(&recording.steps, position) {
         let message =
             "no jump leads to this step, so it has no transient; the dynamic method needs one".to_owned();
         findings.refuse(code::NO_TRANSIENT, message);
         return estimate;
     }
-    let Some(window) = window::choose(recording, step, &config.window, findings) else {
+    let Some(window) = window::choose(recording, step, config.window, &config.settle_bands, findings) else {
         let seconds = step.end_s - step.start_s;
         let message =
             format!("the step lasts {seconds:.1} s, which leaves no room for a window after its jump");

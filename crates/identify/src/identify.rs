@@ -3,9 +3,9 @@
 use crate::dynamic::Estimate;
 use crate::end_state::{EndState, end_state};
 use crate::findings::Findings;
-use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, WindowRule, dynamic, joint, steady};
+use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, dynamic, joint, steady};
 use mapper_core::{
-    Channel, EstimateUncertainty, IdentifiedPoint, Method, Recording, StepMarker, ThermalModel,
+    Channel, EstimateUncertainty, IdentifiedPoint, Method, Recording, StepMarker, ThermalModel, WindowRule,
     confidence_interval_95,
 };
 

@@ -7,6 +7,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod bias;
+mod commands;
 mod config;
 mod covariance;
 mod dynamic;
@@ -18,7 +19,6 @@ mod fit;
 mod flow_drift;
 mod identify;
 mod joint;
-mod jump;
 mod one_fit;
 mod samples;
 mod steady;
@@ -27,15 +27,15 @@ mod window;
 mod zero;
 mod zero_outcome;
 
-pub use config::{
-    DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Stabilisation, Thresholds, WindowRule,
-};
+pub use config::{DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Thresholds};
 pub use error::{IdentifyError, StepError};
 pub use expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use findings::code;
 pub use identify::{Identified, identify, identify_each, identify_recording};
 pub use joint::surface::EfficiencySurface;
-pub use mapper_core::{Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings};
+pub use mapper_core::{
+    Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings, SettleBands, WindowRule,
+};
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
 pub use zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};

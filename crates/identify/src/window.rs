@@ -1,30 +1,25 @@
-//! The identification window: fixed, or found from where speed, flow and pressure ratio have stabilised.
+//! The identification window: fixed, or found from where the operating point has settled.
 
+use crate::commands;
 use crate::findings::{Findings, code};
-use crate::jump;
-use crate::{Stabilisation, WindowRule};
-use mapper_core::{Channel, Recording, Series, StepMarker, Window};
-use mapper_numerics::statistics::{median, robust_sigma};
+use mapper_core::{Channel, Recording, Series, SettleBands, StepMarker, Window, WindowRule};
+use mapper_numerics::statistics::median;
+use mapper_physics::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 
-/// Blocks over which signals are condensed (to their median) before they are compared, s.
-const BLOCK_S: f64 = 1.0;
 /// Most blocks looked at, from the step's end backwards: bounds the work on absurd step times.
 const MOST_BLOCKS: usize = 20_000;
-/// Spread (largest less smallest) of about a hundred normally distributed values, standard deviations.
-const NOISE_SPREAD_SIGMAS: f64 = 5.0;
-/// Distance of the blocks whose second difference measures noise: farther apart than noise remembers.
-const NOISE_LAG_BLOCKS: usize = 4;
 
 /// The window of a step; `None` where the step has no room for any.
 pub(crate) fn choose(
     recording: &Recording,
     step: &StepMarker,
-    rule: &WindowRule,
+    rule: WindowRule,
+    bands: &SettleBands,
     findings: &mut Findings,
 ) -> Option<Window> {
     match rule {
-        WindowRule::Fixed { start_s, end_s } => fixed(step, *start_s, *end_s, findings),
-        WindowRule::Auto(stabilisation) => stabilised(recording, step, stabilisation, findings),
+        WindowRule::Fixed { start_s, end_s } => fixed(step, start_s, end_s, findings),
+        WindowRule::Auto => settled(recording, step, bands, findings),
     }
 }
 
@@ -42,13 +37,13 @@ fn fixed(step: &StepMarker, start_s: f64, end_s: f64, findings: &mut Findings) -
     (window.start_s < window.end_s).then_some(window)
 }
 
-fn stabilised(
+fn settled(
     recording: &Recording,
     step: &StepMarker,
-    rule: &Stabilisation,
+    bands: &SettleBands,
     findings: &mut Findings,
 ) -> Option<Window> {
-    let earliest_s = jump::commands_settled_s(recording, step) + rule.earliest_s;
+    let earliest_s = commands::at_rest_s(recording, step) + WindowRule::EARLIEST_S;
     let end_s = step.end_s;
     if end_s.is_nan() || earliest_s.is_nan() || earliest_s >= end_s {
         return None;
@@ -57,25 +52,25 @@ fn stabilised(
     let blocks = |channel| block_medians(recording.series.get(&channel), end_s, block_count);
     let (p1_pa, p2_pa) = (blocks(Channel::P1), blocks(Channel::P2));
     let pressure_ratio: Vec<f64> = p2_pa.iter().zip(&p1_pa).map(|(p2, p1)| p2 / p1).collect();
-    let signals = [
-        ("speed", blocks(Channel::ShaftSpeed), rule.speed_ratio),
-        ("flow", blocks(Channel::CompressorFlow), rule.flow_ratio),
-        ("pressure ratio", pressure_ratio, rule.pressure_ratio_ratio),
-    ];
-    let (slowest, stable_blocks) = signals
-        .iter()
-        .map(|(name, values, allowed_ratio)| (*name, stable_blocks(values, *allowed_ratio)))
+    let signals =
+        with_bands(blocks(Channel::ShaftSpeed), blocks(Channel::CompressorFlow), pressure_ratio, bands);
+    let (slowest, settled_blocks) = signals
+        .into_iter()
+        .map(|(name, backwards, allowed_ratio)| {
+            let spread = noise_spread(&backwards);
+            (name, settled_count(backwards, allowed_ratio, spread))
+        })
         .min_by_key(|(_, blocks)| *blocks)?;
     let start_s =
-        if stable_blocks == block_count { earliest_s } else { end_s - stable_blocks as f64 * BLOCK_S };
-    if end_s - start_s >= rule.shortest_s {
+        if settled_blocks == block_count { earliest_s } else { end_s - settled_blocks as f64 * BLOCK_S };
+    if end_s - start_s >= WindowRule::SHORTEST_S {
         return Some(Window { start_s, end_s });
     }
-    let start_s = (end_s - rule.shortest_s).max(earliest_s);
+    let start_s = (end_s - WindowRule::SHORTEST_S).max(earliest_s);
     let message = format!(
         "the {slowest} still varies beyond its limit {:.0} s before the step's end (needed: {:.0} s); the last {:.0} s are used",
-        stable_blocks as f64 * BLOCK_S,
-        rule.shortest_s,
+        settled_blocks as f64 * BLOCK_S,
+        WindowRule::SHORTEST_S,
         end_s - start_s
     );
     findings.doubt(code::NOT_STABILISED, message);
@@ -91,30 +86,4 @@ fn block_medians(series: Option<&Series>, end_s: f64, count: usize) -> Vec<f64> 
             median(series.values[range].iter().filter(|value| value.is_finite())).unwrap_or(f64::NAN)
         })
         .collect()
-}
-
-/// How many blocks, from the last one backwards, vary together by at most `allowed_ratio` of their mean.
-fn stable_blocks(backwards: &[f64], allowed_ratio: f64) -> usize {
-    let noise = NOISE_SPREAD_SIGMAS * noise_sigma(backwards);
-    let (mut low, mut high, mut sum, mut seen) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
-    for (index, value) in backwards.iter().enumerate() {
-        if value.is_nan() {
-            continue;
-        }
-        (low, high, sum, seen) = (low.min(*value), high.max(*value), sum + value, seen + 1.0);
-        if high - low - noise > allowed_ratio * (sum / seen).abs() {
-            return index;
-        }
-    }
-    if seen > 0.0 { backwards.len() } else { 0 }
-}
-
-/// Standard deviation of a signal's noise from its second differences, whose median ignores where it really moves.
-fn noise_sigma(values: &[f64]) -> f64 {
-    let lag = NOISE_LAG_BLOCKS;
-    let differences = (2 * lag..values.len())
-        .map(|i| values[i] - 2.0 * values[i - lag] + values[i - 2 * lag])
-        .filter(|difference| difference.is_finite());
-    // The second difference has six times the variance of a value.
-    robust_sigma(differences).map_or(0.0, |sigma| sigma / 6f64.sqrt())
 }

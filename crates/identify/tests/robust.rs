@@ -6,8 +6,7 @@ mod common;
 use common::Transient;
 use mapper_core::{Channel, IdentifiedPoint, Method, Recording, Series, Verdict};
 use mapper_identify::{
-    DeclaredUncertainty, IdentifyConfig, PressureTap, Stabilisation, WindowRule, code, identify,
-    identify_each,
+    DeclaredUncertainty, IdentifyConfig, PressureTap, SettleBands, WindowRule, code, identify, identify_each,
 };
 use proptest::prelude::*;
 
@@ -80,14 +79,14 @@ fn any_config() -> impl Strategy<Value = IdentifyConfig> {
         Just(WindowRule::default()),
         Just(WindowRule::Fixed { start_s: 10.0, end_s: 110.0 }),
         Just(WindowRule::Fixed { start_s: 0.0, end_s: f64::INFINITY }),
-        Just(WindowRule::Auto(Stabilisation {
-            earliest_s: 0.0,
-            shortest_s: 0.0,
-            ..Stabilisation::default()
-        })),
     ];
-    (window, any::<bool>(), any::<bool>(), any::<bool>()).prop_map(|(window, steady, taps, declared)| {
-        let mut config = IdentifyConfig { window, ..IdentifyConfig::default() };
+    let bands = prop_oneof![
+        Just(SettleBands::default()),
+        Just(SettleBands { speed_ratio: 0.0, flow_ratio: f64::INFINITY, pressure_ratio_ratio: 0.0 }),
+    ];
+    let switches = (any::<bool>(), any::<bool>(), any::<bool>());
+    (window, bands, switches).prop_map(|(window, settle_bands, (steady, taps, declared))| {
+        let mut config = IdentifyConfig { window, settle_bands, ..IdentifyConfig::default() };
         config.thresholds.fewest_samples = 3;
         if steady {
             config.method = Method::Steady;

@@ -1,11 +1,12 @@
 //! What the plan is better than: conventional mapping with its waits, and the same points along speed lines.
 
-use crate::forecast::{forecast, hold};
+use crate::forecast::forecast;
 use crate::method::ForecastRow;
 use crate::reach::reachable;
-use crate::request::{PlanError, PlanRequest, VisitOrder};
-use mapper_core::{OperatingPoint, Plan, StepKind};
+use crate::request::{PlanError, PlanRequest};
+use mapper_core::{OperatingPoint, Plan, StepKind, VisitOrder};
 use mapper_numerics::statistics::mean;
+use mapper_physics::forecast::{self, hold};
 use mapper_physics::model::{Outputs, State};
 use mapper_physics::steady::SteadyState;
 
@@ -89,13 +90,11 @@ fn way(order: Vec<OperatingPoint>, seconds: f64, errors: impl Iterator<Item = Op
 }
 
 fn warmed_up(request: &PlanRequest<'_>, first: &SteadyState) -> Result<State, PlanError> {
-    let ambient_k = request.boundary.ambient_temperature_k;
-    let cold = State { tc_k: ambient_k, tt_k: ambient_k, ..first.state };
     let to = OperatingPoint {
         speed_rpm: first.state.shaft_speed_rpm(),
         valve_opening_ratio: first.boundary.valve_opening_ratio,
     };
-    hold(request, cold, &first.boundary, request.timing.warm_up_s)
+    forecast::warmed_up(request.model, first.state, &first.boundary, request.timing.warm_up_s)
         .map_err(|source| PlanError::Forecast { to, source })
 }
 
@@ -113,7 +112,7 @@ fn conventional(
         let mut waited_s = 0.0;
         while waited_s < LONGEST_WAIT_S {
             let tc_k = state.tc_k;
-            state = hold(request, state, &target.boundary, LOOK_S)
+            state = hold(request.model, state, &target.boundary, LOOK_S)
                 .map_err(|source| PlanError::Forecast { to, source })?;
             waited_s += LOOK_S;
             let now = prepared.evaluate(&state);

@@ -4,10 +4,10 @@
 //! those that are not allowed out of the search; the whole graph, with its `n (n - 1)` simulations, is made only when it
 //! is asked for.
 
-use crate::forecast::{Forecast, forecast, window_s};
+use crate::forecast::{Forecast, forecast};
 use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest};
-use mapper_core::{OperatingPoint, Predicted};
+use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S};
 use mapper_physics::steady::SteadyState;
 use petgraph::graph::DiGraph;
 
@@ -64,9 +64,9 @@ pub enum Rejection {
     },
 }
 
-/// An edge: a jump from the steady state of one point to another.
+/// An edge: what a jump from the steady state of one point to another is expected to do.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Jump {
+pub struct JumpForecast {
     /// Where it starts.
     pub from: OperatingPoint,
     /// Where it goes.
@@ -96,11 +96,8 @@ pub(crate) fn rejections(
 ) -> Vec<Rejection> {
     let limits = &request.limits;
     let mut found = Vec::new();
-    if forecast.longest_surge_s > limits.surge_allowed_s {
-        found.push(Rejection::Surge {
-            longest_s: forecast.longest_surge_s,
-            allowed_s: limits.surge_allowed_s,
-        });
+    if forecast.longest_surge_s > SURGE_ALLOWED_S {
+        found.push(Rejection::Surge { longest_s: forecast.longest_surge_s, allowed_s: SURGE_ALLOWED_S });
     }
     if forecast.highest_speed_rpm > limits.speed_max_rpm {
         found.push(Rejection::Overspeed {
@@ -118,9 +115,9 @@ pub(crate) fn rejections(
     if let Some(limit_k) = limits.housing_gradient_max_k.filter(|limit_k| gradient_k > *limit_k) {
         found.push(Rejection::HousingGradient { gradient_k, limit_k });
     }
-    if let Some(slew_pa_s) = limits.p3_slew_max_pa_s {
+    if let Some(slew_pa_s) = limits.p3_slew_max_pa_s() {
         let dwell_s = request.timing.dwell_s;
-        let (available_s, _) = window_s(&request.timing, forecast.predicted.settle_s, dwell_s);
+        let (available_s, _) = request.window.of_step_s(forecast.predicted.settle_s, dwell_s);
         let needed_s = p3_change_pa.abs() / slew_pa_s;
         if needed_s > available_s {
             found.push(Rejection::Slew { needed_s, available_s });
@@ -133,11 +130,11 @@ pub(crate) fn jump(
     request: &PlanRequest<'_>,
     (from, start): (OperatingPoint, &SteadyState),
     (to, target): (OperatingPoint, &SteadyState),
-) -> Result<Jump, PlanError> {
+) -> Result<JumpForecast, PlanError> {
     let forecast = forecast(request, start.state, &target.boundary, request.timing.dwell_s, true)
         .map_err(|source| PlanError::Forecast { to, source })?;
     let p3_change_pa = target.boundary.p3_pa - start.boundary.p3_pa;
-    Ok(Jump {
+    Ok(JumpForecast {
         from,
         to,
         predicted: forecast.predicted,
@@ -158,7 +155,7 @@ pub fn explain_jump(
     request: &PlanRequest<'_>,
     from: OperatingPoint,
     to: OperatingPoint,
-) -> Result<Jump, PlanError> {
+) -> Result<JumpForecast, PlanError> {
     let targets = reachable(request, &[from, to])?;
     match targets.as_slice() {
         [start, target] => jump(request, (from, start), (to, target)),
@@ -172,7 +169,7 @@ pub fn explain_jump(
 ///
 /// # Errors
 /// As [`explain_jump`].
-pub fn jump_graph(request: &PlanRequest<'_>) -> Result<DiGraph<OperatingPoint, Jump>, PlanError> {
+pub fn jump_graph(request: &PlanRequest<'_>) -> Result<DiGraph<OperatingPoint, JumpForecast>, PlanError> {
     let targets = reachable(request, request.points)?;
     let mut graph = DiGraph::with_capacity(targets.len(), targets.len() * targets.len());
     let nodes: Vec<_> = request.points.iter().map(|point| graph.add_node(*point)).collect();

@@ -7,10 +7,11 @@
 //! simulation is measured on every plan and printed with it.
 
 use crate::chain::Chain;
-use crate::forecast::{forecast, hold};
+use crate::forecast::forecast;
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::OperatingPoint;
 use mapper_numerics::parallel;
+use mapper_physics::forecast::warmed_up;
 use mapper_physics::model::State;
 use mapper_physics::steady::SteadyState;
 use std::collections::HashSet;
@@ -185,7 +186,7 @@ fn response(
     target: &SteadyState,
     scale: &Scale,
     [slowest, fastest]: [&SteadyState; 2],
-    warmed_up: bool,
+    starts_cold: bool,
 ) -> Result<Response, mapper_physics::simulate::SimulationError> {
     let dwell_s = request.timing.dwell_s;
     let mut gradient_k = [[0.0; 2]; 3];
@@ -213,11 +214,10 @@ fn response(
         }
     }
     error.sort_by(|a: &(f64, f64), b| a.0.total_cmp(&b.0));
-    let first = if warmed_up {
-        let ambient_k = request.boundary.ambient_temperature_k;
-        let cold = State { tc_k: ambient_k, tt_k: ambient_k, ..target.state };
+    let first = if starts_cold {
+        let first_step_s = request.timing.warm_up_s + dwell_s;
         let [c, t, _] =
-            scale.scaled(&hold(request, cold, &target.boundary, request.timing.warm_up_s + dwell_s)?);
+            scale.scaled(&warmed_up(request.model, target.state, &target.boundary, first_step_s)?);
         [c, t]
     } else {
         [0.0; 2]

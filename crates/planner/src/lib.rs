@@ -28,12 +28,10 @@ mod search;
 
 pub use comparison::{Comparison, STABLE_DRIFT_K_MIN, WayOfMapping, along_speed_lines, compare};
 pub use fingerprint::sha256_hex;
-pub use graph::{Jump, Rejection, explain_jump, jump_graph};
+pub use graph::{JumpForecast, Rejection, explain_jump, jump_graph};
 pub use method::{ForecastRow, MethodResult, PredictedMethod};
 pub use objective::Objective;
 pub use order::order_points;
 pub use plan::make_plan;
-pub use request::{
-    PlanError, PlanLimits, PlanRequest, PlanTiming, Repeats, SettleBands, UnreachablePoint, VisitOrder,
-};
+pub use request::{PlanError, PlanRequest, UnreachablePoint};
 pub use search::{Effort, search, search_worst};

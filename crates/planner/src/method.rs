@@ -2,30 +2,7 @@
 //!
 //! The planner does not depend on identification; whoever asks for a plan passes the method in use.
 
-/// One instant of a forecast step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ForecastRow {
-    /// Time after the jump, s.
-    pub t_s: f64,
-    /// Shaft speed, rpm.
-    pub speed_rpm: f64,
-    /// Compressor flow, kg/s.
-    pub flow_kg_s: f64,
-    /// Inlet total temperature, K.
-    pub t1_k: f64,
-    /// Inlet total pressure, Pa.
-    pub p1_pa: f64,
-    /// Outlet total pressure, Pa.
-    pub p2_pa: f64,
-    /// Reading of the outlet probe, K.
-    pub t2_k: f64,
-    /// Compressor housing, K.
-    pub tc_k: f64,
-    /// The model's own efficiency, fraction.
-    pub efficiency: f64,
-    /// The model's own heat-transfer coefficient, W/(m2 K).
-    pub h_w_m2k: f64,
-}
+pub use mapper_physics::forecast::ForecastRow;
 
 /// What the method will find in a window.
 #[derive(Debug, Clone, Copy, PartialEq)]

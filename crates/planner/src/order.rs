@@ -6,9 +6,9 @@ use crate::exact::{self, Figure, branch_and_bound};
 use crate::housing::Housing;
 use crate::objective::Objective;
 use crate::reach::reachable;
-use crate::request::{PlanError, PlanRequest, VisitOrder};
+use crate::request::{PlanError, PlanRequest};
 use crate::search::{Effort, greedy, search, search_worst};
-use mapper_core::OperatingPoint;
+use mapper_core::{OperatingPoint, VisitOrder};
 use mapper_physics::model::State;
 
 /// Repeats are put where no gradient falls below this, K, if that can be.
@@ -31,7 +31,7 @@ pub(crate) fn objective(order: VisitOrder) -> Objective {
     match order {
         VisitOrder::WorstGradient => Objective::Worst { target_k: REPEATS_KEEP_K },
         VisitOrder::Information | VisitOrder::Time => Objective::Information,
-        VisitOrder::Listed | VisitOrder::GreedyGradient | VisitOrder::SumGradient => Objective::Sum,
+        VisitOrder::Listed | VisitOrder::Greedy | VisitOrder::SumGradient => Objective::Sum,
     }
 }
 
@@ -43,7 +43,7 @@ pub(crate) fn order_on(housing: &Housing, given: &[usize], request: &PlanRequest
     let search = |given: &[usize], objective| within(effort, given, objective);
     let (order, figure) = match request.order {
         VisitOrder::Listed => return Ordered { order: given.to_vec(), proven: false },
-        VisitOrder::GreedyGradient => {
+        VisitOrder::Greedy => {
             return Ordered { order: greedy(housing, given, Objective::Sum), proven: false };
         }
         VisitOrder::SumGradient => {

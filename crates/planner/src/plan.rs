@@ -2,15 +2,18 @@
 
 use crate::bound::Optimistic;
 use crate::fingerprint::made_from;
-use crate::forecast::{Forecast, forecast, hold};
+use crate::forecast::{Forecast, forecast};
 use crate::graph::rejections;
 use crate::housing::Housing;
 use crate::order::{Ordered, PROOF_TOLERANCE_RATIO, objective, order_on};
 use crate::reach::reachable;
 use crate::repeats::{RepeatedJump, Visit, append, plain, usual_jumps, with_repeats};
-use crate::request::{PlanError, PlanRequest, Repeats, VisitOrder};
-use mapper_core::{OperatingPoint, Plan, PlanBound, PlanFigures, PlanStep, StepKind};
+use crate::request::{PlanError, PlanRequest};
+use mapper_core::{
+    Jump, OperatingPoint, Plan, PlanBound, PlanFigures, PlanStep, Repeats, StepKind, VisitOrder, WindowRule,
+};
 use mapper_numerics::statistics::rms;
+use mapper_physics::forecast::warmed_up;
 use mapper_physics::model::State;
 use mapper_physics::steady::SteadyState;
 
@@ -21,7 +24,7 @@ const USUAL_JUMPS: usize = 3;
 /// Dwells tried for the shortest campaign lie this far apart, s.
 const DWELL_STEP_S: f64 = 5.0;
 /// Shortest of them, s: the earliest window with the shortest useful length.
-const SHORTEST_DWELL_S: f64 = 40.0;
+const SHORTEST_DWELL_S: f64 = WindowRule::EARLIEST_S + WindowRule::SHORTEST_S;
 
 /// Orders the points and forecasts every step.
 ///
@@ -31,8 +34,7 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
     if request.points.is_empty() {
         return Err(PlanError::NoPoints);
     }
-    let needs_method = matches!(request.order, VisitOrder::Information | VisitOrder::Time);
-    if needs_method && request.method.is_none() {
+    if request.order.needs_method() && request.method.is_none() {
         return Err(PlanError::NeedsMethod { order: request.order.name() });
     }
     if request.order == VisitOrder::Time && request.required_sigma_eta.is_none() {
@@ -60,9 +62,9 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
 fn plan_with(
     request: &PlanRequest<'_>,
     reached: &[SteadyState],
-    repeats: Option<(Repeats, (OperatingPoint, OperatingPoint))>,
+    repeats: Option<(Repeats, Jump)>,
 ) -> Result<Plan, PlanError> {
-    let needs_method = matches!(request.order, VisitOrder::Information | VisitOrder::Time);
+    let needs_method = request.order.needs_method();
     let (mut points, mut targets) = (request.points.to_vec(), reached.to_vec());
     let mut repeated = None;
     let mut place = |point: OperatingPoint| -> Result<usize, PlanError> {
@@ -73,13 +75,13 @@ fn plan_with(
         points.push(point);
         Ok(points.len() - 1)
     };
-    if let Some((repeats, (from, to))) = repeats {
+    if let Some((repeats, Jump { from, to })) = repeats {
         let (from, to) = (place(from)?, place(to)?);
         repeated =
             Some(RepeatedJump { from, to, every_steps: repeats.every_steps, at_least: repeats.at_least });
     }
     let appended =
-        request.appended.map(|(from, to)| Ok::<_, PlanError>((place(from)?, place(to)?))).transpose()?;
+        request.appended.map(|jump| Ok::<_, PlanError>((place(jump.from)?, place(jump.to)?))).transpose()?;
     // Only the search for information needs the method at every start of the reduced housing.
     let without_method = PlanRequest { method: request.method.filter(|_| needs_method), ..request.clone() };
     let mut housing = Housing::of(&without_method, &points, &targets, None)?;
@@ -140,7 +142,8 @@ fn walk(
         let fail = |source| PlanError::Forecast { to, source };
         let state = match now {
             Some((state, _)) => state,
-            None => warmed_up(request, target).map_err(fail)?,
+            None => warmed_up(request.model, target.state, &target.boundary, request.timing.warm_up_s)
+                .map_err(fail)?,
         };
         let is_repeat = visit.kind == StepKind::Repeat && Some(visit.index) == repeated;
         let (dwell_s, forecast) = match repeat_dwell_s.filter(|_| is_repeat) {
@@ -205,16 +208,6 @@ fn error_eta(predicted: &mapper_core::Predicted) -> Option<f64> {
     Some(predicted.sigma_eta?.hypot(predicted.bias_eta.unwrap_or(0.0)))
 }
 
-/// The first point after its warm-up, from housings at ambient temperature.
-fn warmed_up(
-    request: &PlanRequest<'_>,
-    first: &SteadyState,
-) -> Result<State, mapper_physics::simulate::SimulationError> {
-    let ambient_k = request.boundary.ambient_temperature_k;
-    let cold = State { tc_k: ambient_k, tt_k: ambient_k, ..first.state };
-    hold(request, cold, &first.boundary, request.timing.warm_up_s)
-}
-
 fn finished(
     request: &PlanRequest<'_>,
     housing: &Housing,
@@ -233,8 +226,8 @@ fn finished(
         + request.timing.cool_down_s;
     let figures = figures(&steps, duration_s / 60.0);
     // A bound holds for the points and their repeats, not for what is put behind them.
-    let searched = !matches!(request.order, VisitOrder::Listed | VisitOrder::GreedyGradient)
-        && request.appended.is_none();
+    let searched =
+        !matches!(request.order, VisitOrder::Listed | VisitOrder::Greedy) && request.appended.is_none();
     let bound =
         searched.then(|| bound(request, housing, ordered, visits, repeated, &steps, &figures)).flatten();
     Plan {
@@ -258,7 +251,7 @@ fn bound_remark(request: &PlanRequest<'_>, bound: Option<&PlanBound>) -> Option<
         return Some("none was worked out: a jump was put behind the points".to_owned());
     }
     let text = match request.order {
-        VisitOrder::Listed | VisitOrder::GreedyGradient => "the order was not searched for",
+        VisitOrder::Listed | VisitOrder::Greedy => "the order was not searched for",
         VisitOrder::Time => {
             "none is known for the shortest campaign: each dwell is chosen for itself, and bounds hold for one dwell alone"
         }
@@ -280,7 +273,7 @@ fn remarks(request: &PlanRequest<'_>, steps: &[PlanStep], repeated: Option<Opera
     if let Some(PlanStep { from: Some(from), to, .. }) = repeats.first() {
         remarks.push(format!("the jump from {from} to {to} is made {} times to show drift", repeats.len()));
     }
-    if let Some((from, to)) = request.appended {
+    if let Some(Jump { from, to }) = request.appended {
         remarks
             .push(format!("the jump from {from} to {to} is made after all else, and is no point of the map"));
     }

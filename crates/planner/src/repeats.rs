@@ -4,7 +4,7 @@ use crate::chain::Chain;
 use crate::graph::jump;
 use crate::objective::{NOT_ALLOWED, Objective};
 use crate::request::{PlanError, PlanRequest};
-use mapper_core::{OperatingPoint, StepKind};
+use mapper_core::{Jump, OperatingPoint, StepKind};
 use mapper_physics::steady::SteadyState;
 
 /// Jumps that are looked at for one that may be repeated; each takes a simulation.
@@ -41,7 +41,7 @@ impl RepeatedJump {
 pub(crate) fn usual_jumps(
     request: &PlanRequest<'_>,
     targets: &[SteadyState],
-) -> Result<Vec<(OperatingPoint, OperatingPoint)>, PlanError> {
+) -> Result<Vec<Jump>, PlanError> {
     let points = request.points;
     let mut openings: Vec<f64> = points.iter().map(|point| point.valve_opening_ratio).collect();
     openings.sort_by(f64::total_cmp);
@@ -65,7 +65,7 @@ pub(crate) fn usual_jumps(
     for (from, to) in found.into_iter().take(LOOKED_AT) {
         let made = jump(request, (points[from], &targets[from]), (points[to], &targets[to]))?;
         if made.rejections.is_empty() {
-            allowed.push((made.from, made.to));
+            allowed.push(Jump { from: made.from, to: made.to });
         }
     }
     Ok(allowed)

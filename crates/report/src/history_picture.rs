@@ -1,7 +1,7 @@
 //! Trends of the nights: a panel a figure, a line a campaign and method.
 
 use mapper_chart::{Axis, Colour, Figure as Picture, Line, Panel, Scatter};
-use mapper_history::{Figure, ListedRun, median};
+use mapper_history::{ListedRun, Metric, median};
 use std::collections::{BTreeMap, BTreeSet};
 
 const COLOURS: [Colour; 8] = [
@@ -18,7 +18,7 @@ const MOVED: Colour = Colour(0xC6, 0x28, 0x28);
 const MS_PER_DAY: f64 = 86_400_000.0;
 
 /// All figures as one SVG.
-pub fn history_svg(runs: &[ListedRun], figures: &[Figure]) -> String {
+pub fn history_svg(runs: &[ListedRun], figures: &[Metric]) -> String {
     let first_ms = runs.iter().map(|listed| listed.night.started_ms).min().unwrap_or_default();
     let day = |ms: i64| (ms - first_ms) as f64 / MS_PER_DAY;
     let lines: BTreeSet<(&str, &str)> = runs

@@ -1,7 +1,7 @@
 //! What the nights gave, as tables.
 
 use crate::{number, table};
-use mapper_history::{Figure, ListedRun, median};
+use mapper_history::{ListedRun, Metric, median};
 use std::collections::BTreeMap;
 
 /// A time of the history in UTC by a strftime format; a dash where it is no time.
@@ -10,14 +10,14 @@ pub fn time(ms: i64, format: &str) -> String {
         .map_or_else(|_| "-".to_owned(), |time| time.strftime(format).to_string())
 }
 
-fn heads(first: &[&str], figures: &[Figure]) -> Vec<String> {
+fn heads(first: &[&str], figures: &[Metric]) -> Vec<String> {
     let figure_heads = figures.iter().map(|figure| format!("{figure} {}", figure.shown_unit().0));
     first.iter().map(|head| (*head).to_owned()).chain(figure_heads).collect()
 }
 
-fn shown(figure: Figure, value: Option<f64>) -> String {
+fn shown(figure: Metric, value: Option<f64>) -> String {
     let decimals = match figure {
-        Figure::GoodPoints | Figure::HMean | Figure::HTrueMean | Figure::RigMinutes => 1,
+        Metric::GoodPoints | Metric::HMean | Metric::HTrueMean | Metric::RigMinutes => 1,
         _ => 3,
     };
     number::number(value.map(|value| figure.shown_unit().1 * value), decimals)
@@ -32,7 +32,7 @@ fn state(listed: &ListedRun) -> &'static str {
 }
 
 /// A row per night, campaign and method: medians over the seeds.
-pub fn groups_text(runs: &[ListedRun], figures: &[Figure]) -> String {
+pub fn groups_text(runs: &[ListedRun], figures: &[Metric]) -> String {
     let mut groups: BTreeMap<(i64, i64, &str, &str), Vec<&ListedRun>> = BTreeMap::new();
     for listed in runs {
         let key = (
@@ -70,7 +70,7 @@ pub fn groups_text(runs: &[ListedRun], figures: &[Figure]) -> String {
 }
 
 /// A row per run.
-pub fn runs_text(runs: &[ListedRun], figures: &[Figure]) -> String {
+pub fn runs_text(runs: &[ListedRun], figures: &[Metric]) -> String {
     let mut table =
         table::with_heads(&heads(&["night (UTC)", "campaign", "method", "seed", "night is"], figures));
     let mut failures = String::new();

@@ -3,11 +3,11 @@
 use crate::display::Display;
 use crate::number::{number, percent};
 use mapper_campaign::Campaign;
-use mapper_planner::Jump;
+use mapper_planner::JumpForecast;
 use std::fmt::Write;
 
 /// What the jump gives from the steady state of its first point, and each reason against it.
-pub fn jump_text(campaign: &Campaign, jump: &Jump) -> String {
+pub fn jump_text(campaign: &Campaign, jump: &JumpForecast) -> String {
     let display = Display::new(&campaign.display);
     let predicted = &jump.predicted;
     let mut text = format!(

@@ -49,7 +49,7 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
         "ETA".to_owned(),
     ]);
     // The machine rests before the plan begins.
-    let soak_s = campaign.zero.map_or(0.0, |zero| zero.soak_s);
+    let soak_s = campaign.zero.map_or(0.0, |zero| zero.duration_s);
     for step in &plan.steps {
         let predicted = &step.predicted;
         steps.add_row([
@@ -83,7 +83,7 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
         plan.steps.len(),
         plan.objective,
         duration(soak_s + plan.duration_s()),
-        campaign.zero.map_or_else(String::new, |zero| format!("soak {}, ", duration(zero.soak_s))),
+        campaign.zero.map_or_else(String::new, |zero| format!("soak {}, ", duration(zero.duration_s))),
         duration(plan.warm_up_s),
         duration(plan.cool_down_s),
     );

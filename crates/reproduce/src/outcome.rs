@@ -83,7 +83,7 @@ pub(crate) fn outcome_of(
 pub(crate) fn in_window<'a>(run: &'a Run, window: &WindowRule) -> &'a [Truth] {
     let (start_s, end_s) = match window {
         WindowRule::Fixed { start_s, end_s } => (*start_s, *end_s),
-        WindowRule::Auto(_) => (0.0, f64::INFINITY),
+        WindowRule::Auto => (0.0, f64::INFINITY),
     };
     // Sample times are multiples of 0.1 s to rounding.
     let start = run.truth.partition_point(|truth| truth.t_s < start_s - 1e-6);

@@ -1,8 +1,9 @@
 //! Watches the repeats of a run while it goes on: a difference beyond what is declared is looked at again, then acted upon.
 
-use crate::soak::Soak;
 use crate::source::{StepSource, StepSourceError};
-use mapper_core::{Channel, DeclaredUncertainty, OperatingPoint, PlanStep, SampleBatch, StepMarker};
+use mapper_core::{
+    Channel, DeclaredUncertainty, OnDrift, OperatingPoint, PlanStep, SampleBatch, Soak, StepMarker,
+};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Readings of this long at the end of a step are compared, s.
@@ -11,17 +12,6 @@ const END_S: f64 = 20.0;
 const WIDTH: f64 = 1.96;
 /// What is compared. T2 is taken over T1 and P2 over P1, whose own wander is no drift.
 const WATCHED: [Channel; 4] = [Channel::T2, Channel::P2, Channel::CompressorFlow, Channel::Tc];
-
-/// What is done when drift is seen and seen again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OnDrift {
-    /// The run ends in the safe state, and somebody has to look.
-    Hold,
-    /// The run goes on; the recording has a note.
-    Continue,
-    /// The run ends in the safe state, without flow, and asks for a zero of the sensors.
-    Zero,
-}
 
 /// Steps of another source, with the reference jump made again where a repeat differs from its first visit.
 ///

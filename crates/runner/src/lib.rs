@@ -11,9 +11,9 @@ mod run;
 mod soak;
 mod source;
 
-pub use drift_watch::{DriftWatch, OnDrift};
+pub use drift_watch::DriftWatch;
 pub use guard::{Guard, LimitGuard, SilenceGuard, SurgeGuard, Trip};
 pub use observer::{ObserverError, RunObserver};
 pub use run::{RunEnd, RunError, Runner};
-pub use soak::{Soak, Soaked};
+pub use soak::Soaked;
 pub use source::{PlanSteps, StepSource, StepSourceError};

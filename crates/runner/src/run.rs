@@ -2,9 +2,10 @@
 
 use crate::guard::{Guard, Trip};
 use crate::observer::{ObserverError, RunObserver};
-use crate::soak::Soak;
 use crate::source::{StepSource, StepSourceError};
-use mapper_core::{Backend, BackendError, Clock, Event, EventKind, PlanStep, RigMode, Setpoints, StepMarker};
+use mapper_core::{
+    Backend, BackendError, Clock, Event, EventKind, PlanStep, RigMode, Setpoints, Soak, StepMarker,
+};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How often the backend is asked for samples, s of run time.

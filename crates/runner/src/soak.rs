@@ -1,16 +1,7 @@
 //! The soak before a run: the machine at rest, so that sensors which must read the same can be held against each other.
 
 use crate::source::{StepSource, StepSourceError};
-use mapper_core::{PlanStep, SampleBatch, StepMarker};
-
-/// How the machine rests before it runs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Soak {
-    /// Time at rest, s, > 0.
-    pub duration_s: f64,
-    /// Oil inlet temperature in the meantime, K: that of cell and inlet air.
-    pub oil_temperature_k: f64,
-}
+use mapper_core::{PlanStep, SampleBatch, Soak, StepMarker};
 
 /// The steps of another source, after a soak. All of them come later by it.
 pub struct Soaked<'a> {

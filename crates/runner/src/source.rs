@@ -1,7 +1,6 @@
 //! Where the steps of a run come from: a plan, or something that decides as it goes.
 
-use crate::soak::Soak;
-use mapper_core::{Plan, PlanStep, SampleBatch, StepMarker};
+use mapper_core::{Plan, PlanStep, SampleBatch, Soak, StepMarker};
 
 /// Why a source has no next step though it should; the run ends in its safe state.
 #[derive(Debug, thiserror::Error)]

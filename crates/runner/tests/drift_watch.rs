@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
-    Channel, ChannelColumn, DeclaredUncertainty, OperatingPoint, PlanStep, Predicted, SampleBatch, StepKind,
-    StepMarker,
+    Channel, ChannelColumn, DeclaredUncertainty, OnDrift, OperatingPoint, PlanStep, Predicted, SampleBatch,
+    StepKind, StepMarker,
 };
-use mapper_runner::{DriftWatch, OnDrift, StepSource, StepSourceError};
+use mapper_runner::{DriftWatch, StepSource, StepSourceError};
 use std::collections::BTreeMap;
 
 /// Three times slow to fast, with a point between.

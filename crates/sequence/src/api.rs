@@ -2,8 +2,8 @@
 
 use crate::error::throw;
 use crate::result::StepResult;
-use crate::runner::{Hold, lock};
-use crate::session::{Session, Thrown};
+use crate::session::{Session, Thrown, lock};
+use crate::step::Hold;
 use mapper_core::{IdentifiedPoint, OperatingPoint};
 use mapper_yaml::units::Kind;
 use rhai::{Array, Dynamic, Engine, FLOAT, INT, ImmutableString};
@@ -63,7 +63,7 @@ table! {
     "Points" {
         "grid()", "All points of the campaign's grid, in its order." => |engine, session| {
             let session = session.clone();
-            engine.register_fn("grid", move || points_array(&lock(&session).bench.points));
+            engine.register_fn("grid", move || points_array(&lock(&session).request.points));
         };
         "point(speed, opening)", "A point, e.g. `point(\"110 krpm\", 0.7)`; it need not be one of the grid." => |engine, _| {
             engine.register_fn("point", |speed: &str, opening: FLOAT| point(speed, opening));

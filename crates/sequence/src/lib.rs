@@ -2,7 +2,7 @@
 //! have given.
 //!
 //! A script yields steps and nothing else. It has no file, no network, no clock and no rig; each step is checked
-//! against the campaign's limits before it leaves the script ([`Bench`]), and whoever runs it keeps its own guards.
+//! against the campaign's limits before it leaves the script ([`SequenceRequest`]), and whoever runs it keeps its own guards.
 //! Operations, call depth and the size of every value are bounded, so that no script hangs or fills the memory.
 //!
 //! [`SequenceRunner`] runs a script on its own thread and meets it at each step: the script stands still while a step
@@ -12,19 +12,21 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod api;
-mod bench;
 mod docs;
 mod error;
 mod forecast;
+mod request;
 mod result;
 mod runner;
 mod sandbox;
 mod session;
 mod settle;
+mod step;
 
-pub use bench::{Bench, OrderPoints, SettleBands, StepLimits};
 pub use docs::api_markdown;
 pub use error::{ScriptError, SequenceError};
+pub use request::{OrderPoints, SequenceRequest};
 pub use result::StepResult;
-pub use runner::{Hold, Script, SequenceRunner, SequenceStep, check};
+pub use runner::{Script, SequenceRunner, check};
 pub use settle::{SettleRule, SettleWatch};
+pub use step::{Hold, SequenceStep};

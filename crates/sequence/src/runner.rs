@@ -1,17 +1,16 @@
 //! A script on its own thread, met at each step.
 
 use crate::api;
-use crate::bench::Bench;
 use crate::error::{ScriptError, SequenceError};
+use crate::request::SequenceRequest;
 use crate::result::StepResult;
 use crate::sandbox::{SCRIPT_LIMIT, STACK_BYTES, engine};
-use crate::session::Session;
-use crate::settle::SettleRule;
-use mapper_core::PlanStep;
+use crate::session::{Session, lock};
+use crate::step::{FromScript, SequenceStep};
 use rhai::{AST, Engine, EvalAltResult, Scope};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 /// A script's text, and the name it has in messages.
@@ -21,30 +20,6 @@ pub struct Script {
     pub path: PathBuf,
     /// Its text.
     pub text: String,
-}
-
-/// How long a step lasts.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Hold {
-    /// As long as the step says.
-    Dwell,
-    /// Until it has settled, at most as long as the step says.
-    UntilSettled(SettleRule),
-}
-
-/// A step that a script wants to be run, checked against the campaign's limits.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SequenceStep {
-    /// The step; its `dwell_s` is the longest time it may take.
-    pub step: PlanStep,
-    /// When it may end earlier.
-    pub hold: Hold,
-}
-
-pub(crate) enum FromScript {
-    Step(Box<SequenceStep>, Vec<String>),
-    Done(Vec<String>),
-    Failed(Box<ScriptError>, Vec<String>),
 }
 
 /// A running script. Dropping it ends the script where it stands.
@@ -62,13 +37,13 @@ impl SequenceRunner {
     ///
     /// # Errors
     /// [`SequenceError::Thread`] where no thread can be started.
-    pub fn start(script: Script, bench: Bench) -> Result<Self, SequenceError> {
+    pub fn start(script: Script, request: SequenceRequest) -> Result<Self, SequenceError> {
         let (to_script, from_caller) = sync_channel(0);
         let (to_caller, from_script) = sync_channel(0);
         let thread = std::thread::Builder::new()
             .name("sequence".to_owned())
             .stack_size(STACK_BYTES)
-            .spawn(move || run(&script, Session::new(bench, to_caller, from_caller)))
+            .spawn(move || run(&script, Session::new(request, to_caller, from_caller)))
             .map_err(SequenceError::Thread)?;
         Ok(SequenceRunner {
             to_script: Some(to_script),
@@ -148,7 +123,7 @@ fn compile(engine: &Engine, script: &Script) -> Result<AST, Box<ScriptError>> {
 
 /// The life of a script's thread.
 fn run(script: &Script, session: Session) {
-    let mut engine = engine(session.bench.points.len());
+    let mut engine = engine(session.request.points.len());
     let session = Arc::new(Mutex::new(session));
     api::register(&mut engine, &session);
     let compiled = compile(&engine, script);
@@ -165,9 +140,4 @@ fn run(script: &Script, session: Session) {
         Ok(()) => FromScript::Done(notes),
         Err(error) => FromScript::Failed(error, notes),
     });
-}
-
-/// One thread alone has the session; a lock that a panic has left is as good as any.
-pub(crate) fn lock(session: &Mutex<Session>) -> std::sync::MutexGuard<'_, Session> {
-    session.lock().unwrap_or_else(PoisonError::into_inner)
 }

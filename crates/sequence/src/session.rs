@@ -1,14 +1,15 @@
 //! The script's side of a sequence: what its functions do.
 
-use crate::bench::{Bench, Refusal, same_place};
 use crate::error::throw;
 use crate::forecast::Nominal;
+use crate::request::{Refusal, SequenceRequest};
 use crate::result::StepResult;
-use crate::runner::{FromScript, Hold, SequenceStep};
 use crate::settle::SettleRule;
+use crate::step::{FromScript, Hold, SequenceStep};
 use mapper_core::{OperatingPoint, PlanStep, StepKind};
 use rhai::{EvalAltResult, Position};
 use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 pub(crate) type Thrown = Box<EvalAltResult>;
 
@@ -28,7 +29,7 @@ const NOTE_LENGTH_LIMIT: usize = 500;
 
 /// Everything the functions of a script share.
 pub(crate) struct Session {
-    pub bench: Bench,
+    pub request: SequenceRequest,
     /// Time at the points that follow, s.
     pub dwell_s: f64,
     pub results: Vec<StepResult>,
@@ -44,13 +45,13 @@ pub(crate) struct Session {
 
 impl Session {
     pub fn new(
-        bench: Bench,
+        request: SequenceRequest,
         to_caller: SyncSender<FromScript>,
         from_caller: Receiver<Option<StepResult>>,
     ) -> Self {
         Session {
-            dwell_s: bench.dwell_s,
-            bench,
+            dwell_s: request.timing.dwell_s,
+            request,
             results: Vec::new(),
             nominal: Nominal::new(),
             checks: 0,
@@ -75,7 +76,7 @@ impl Session {
 
     /// Run time at which the next step starts, s.
     pub fn now_s(&self) -> f64 {
-        self.results.last().map_or(self.bench.warm_up_s, |result| result.end_s)
+        self.results.last().map_or(self.request.timing.warm_up_s, |result| result.end_s)
     }
 
     pub fn note(&mut self, text: &str) {
@@ -89,7 +90,7 @@ impl Session {
     }
 
     fn check_limit(&self) -> usize {
-        CHECK_LIMIT + CHECKS_OF_POINT * self.bench.points.len()
+        CHECK_LIMIT + CHECKS_OF_POINT * self.request.points.len()
     }
 
     fn check(&mut self, point: OperatingPoint) -> Result<mapper_physics::steady::SteadyState, Thrown> {
@@ -99,7 +100,7 @@ impl Session {
             return Err(throw(message, "judge fewer points"));
         }
         self.checks += 1;
-        self.bench.check(point).map_err(|Refusal { message, remedy }| throw(message, &remedy))
+        self.request.check(point).map_err(|Refusal { message, remedy }| throw(message, &remedy))
     }
 
     /// Whether a step may go to a point.
@@ -112,7 +113,7 @@ impl Session {
 
     /// The planner's order of a set.
     pub fn order(&mut self, points: &[OperatingPoint]) -> Result<Vec<OperatingPoint>, Thrown> {
-        let limit = 1000 + 4 * self.bench.points.len();
+        let limit = 1000 + 4 * self.request.points.len();
         self.ordered += points.len();
         if self.ordered > limit {
             let message = format!("the planner has been asked to order more than {limit} points in all");
@@ -121,7 +122,7 @@ impl Session {
         if points.is_empty() {
             return Ok(Vec::new());
         }
-        (self.bench.order)(points)
+        (self.request.order)(points)
             .map_err(|message| throw(format!("the planner cannot order the points: {message}"), ""))
     }
 
@@ -152,8 +153,9 @@ impl Session {
         let target = self.check(to)?;
         let from = self.results.last().map(|result| result.target);
         let fail = |error| throw(format!("the forecast of the step to {to} failed: {error}"), "");
-        let predicted = self.nominal.forecast(&self.bench, &target, dwell_s, from.is_some()).map_err(fail)?;
-        let visited = self.results.iter().any(|result| same_place(result.target, to));
+        let predicted =
+            self.nominal.forecast(&self.request, &target, dwell_s, from.is_some()).map_err(fail)?;
+        let visited = self.results.iter().any(|result| result.target.is_same_place(&to));
         let step = PlanStep {
             index,
             kind: if visited { StepKind::Repeat } else { StepKind::Point },
@@ -171,7 +173,7 @@ impl Session {
         self.to_caller.send(FromScript::Step(step, notes)).map_err(|_| stopped())?;
         let result = self.wait()?.ok_or_else(stopped)?;
         let duration_s = result.end_s - result.start_s;
-        self.nominal.finish(&self.bench, &target.boundary, duration_s).map_err(fail)?;
+        self.nominal.finish(&self.request, &target.boundary, duration_s).map_err(fail)?;
         self.checks = self.checks.saturating_sub(1);
         self.results.push(result.clone());
         Ok(result)
@@ -185,7 +187,7 @@ impl Session {
             return Err(throw(message, "repeat a later step, or jump to its point"));
         };
         let now = self.results.last().map(|result| result.target);
-        if now.is_none_or(|now| !same_place(now, from)) {
+        if now.is_none_or(|now| !now.is_same_place(&from)) {
             self.step(from, self.dwell_s, Hold::Dwell)?;
         }
         self.step(before.target, before.end_s - before.start_s, Hold::Dwell)
@@ -198,7 +200,7 @@ impl Session {
         max_s: f64,
         rate_max_k_s: f64,
     ) -> Result<StepResult, Thrown> {
-        let rule = SettleRule { rate_max_k_s, bands: self.bench.settle_bands };
+        let rule = SettleRule { rate_max_k_s, bands: self.request.settle_bands };
         self.step(to, max_s, Hold::UntilSettled(rule))
     }
 }
@@ -206,4 +208,9 @@ impl Session {
 /// The caller has gone: the script ends, and cannot catch it.
 fn stopped() -> Thrown {
     Box::new(EvalAltResult::ErrorTerminated(().into(), Position::NONE))
+}
+
+/// One thread alone has the session; a lock that a panic has left is as good as any.
+pub(crate) fn lock(session: &Mutex<Session>) -> MutexGuard<'_, Session> {
+    session.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,7 +1,8 @@
 //! Whether a point has settled, seen in the samples alone.
 
-use crate::bench::SettleBands;
-use mapper_core::{Channel, SampleBatch};
+use mapper_core::{Channel, SampleBatch, SettleBands};
+use mapper_numerics::statistics::median;
+use mapper_physics::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 use std::collections::VecDeque;
 
 /// Samples over which drifts are judged, s.
@@ -14,14 +15,14 @@ const SAMPLE_LIMIT: usize = 100_000;
 pub struct SettleRule {
     /// Largest drift of T2 and Tc over the last 30 s, K/s.
     pub rate_max_k_s: f64,
-    /// Largest relative changes of speed, flow and pressure ratio over the last 30 s.
+    /// Largest variations of speed, flow and pressure ratio over the last 30 s.
     pub bands: SettleBands,
 }
 
 /// Watches the samples of one step.
 ///
-/// Settled: over the last 30 s the slopes of T2 and Tc (least squares) are within the rate, and speed, flow and
-/// pressure ratio (means of the first and the last third) within their bands. Channels that a rig lacks do not count;
+/// A point has settled here when its operating point has ([`mapper_physics::settled`]) for the last 30 s, and when over
+/// these the slopes of T2 and Tc (least squares) are within the rate as well. Channels that a rig lacks do not count;
 /// without T2 nothing settles.
 #[derive(Debug, Clone)]
 pub struct SettleWatch {
@@ -60,15 +61,35 @@ impl SettleWatch {
             return false;
         }
         let slow = |column: usize| self.slope(column).map(|slope| slope.abs() <= self.rule.rate_max_k_s);
-        let bands = &self.rule.bands;
-        let still = |value: fn(&[f64; COLUMNS]) -> f64, ratio: f64| {
-            self.change_ratio(value).is_none_or(|change| change <= ratio)
-        };
-        slow(1) == Some(true)
-            && slow(2) != Some(false)
-            && still(|row| row[3], bands.speed_ratio)
-            && still(|row| row[4], bands.flow_ratio)
-            && still(|row| row[6] / row[5], bands.pressure_ratio_ratio)
+        slow(1) == Some(true) && slow(2) != Some(false) && self.operating_point_has_settled(now_s)
+    }
+
+    /// Whether speed, flow and pressure ratio have settled at the start of the span.
+    fn operating_point_has_settled(&self, now_s: f64) -> bool {
+        type Signal = fn(&[f64; COLUMNS]) -> f64;
+        let signals =
+            with_bands::<Signal>(|row| row[3], |row| row[4], |row| row[6] / row[5], &self.rule.bands);
+        signals.into_iter().all(|(_, signal, allowed_ratio)| {
+            let backwards = self.blocks(now_s, signal);
+            let known = backwards.iter().any(|value| value.is_finite());
+            let spread = noise_spread(&backwards);
+            let count = backwards.len();
+            !known || settled_count(backwards, allowed_ratio, spread) == count
+        })
+    }
+
+    /// Medians over blocks counted backwards from `now_s`; NaN where a block has no value.
+    fn blocks(&self, now_s: f64, signal: fn(&[f64; COLUMNS]) -> f64) -> Vec<f64> {
+        let count = (SPAN_S / BLOCK_S) as usize;
+        let mut blocks: Vec<Vec<f64>> = vec![Vec::new(); count];
+        for row in &self.samples {
+            let block = (((now_s - row[0]) / BLOCK_S) as usize).min(count - 1);
+            let value = signal(row);
+            if value.is_finite() {
+                blocks[block].push(value);
+            }
+        }
+        blocks.iter().map(|values| median(values).unwrap_or(f64::NAN)).collect()
     }
 
     /// Least-squares slope of a column, 1/s; `None` without two usable samples.
@@ -81,19 +102,6 @@ impl SettleWatch {
         });
         (bottom > 0.0).then(|| top / bottom)
     }
-
-    /// Relative difference of the means over the first and the last third; `None` where either has no sample.
-    fn change_ratio(&self, value: fn(&[f64; COLUMNS]) -> f64) -> Option<f64> {
-        let third = self.samples.len() / 3;
-        let mean = |rows: &mut dyn Iterator<Item = &[f64; COLUMNS]>| {
-            let (sum, count) =
-                rows.map(value).filter(|v| v.is_finite()).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
-            (count > 0.0).then(|| sum / count)
-        };
-        let first = mean(&mut self.samples.iter().take(third))?;
-        let last = mean(&mut self.samples.iter().rev().take(third))?;
-        Some(((last - first) / last).abs())
-    }
 }
 
 #[cfg(test)]
@@ -101,10 +109,9 @@ mod tests {
     use super::*;
     use mapper_core::ChannelColumn;
 
-    const RULE: SettleRule = SettleRule {
-        rate_max_k_s: 1.0 / 60.0,
-        bands: SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 },
-    };
+    fn new_watch() -> SettleWatch {
+        SettleWatch::new(SettleRule { rate_max_k_s: 1.0 / 60.0, bands: SettleBands::default() }, 0.0)
+    }
 
     fn batch(start_s: f64, t2: impl Fn(f64) -> f64) -> SampleBatch {
         let t_s: Vec<f64> = (0..10).map(|i| start_s + 0.1 * f64::from(i)).collect();
@@ -120,7 +127,7 @@ mod tests {
     /// last 30 s it comes a few seconds to half a span later.
     #[test]
     fn an_exponential_settles_when_its_slope_says_so() {
-        let mut watch = SettleWatch::new(RULE, 0.0);
+        let mut watch = new_watch();
         let settled = (0..600).find(|second| {
             watch.has_settled(&batch(f64::from(*second), |t| 400.0 - 10.0 * (-t / 60.0).exp()))
         });
@@ -130,9 +137,24 @@ mod tests {
 
     #[test]
     fn nothing_settles_within_the_span_or_without_t2() {
-        let mut watch = SettleWatch::new(RULE, 0.0);
+        let mut watch = new_watch();
         assert!(!(0..29).any(|second| watch.has_settled(&batch(f64::from(second), |_| 400.0))));
-        let mut watch = SettleWatch::new(RULE, 0.0);
+        let mut watch = new_watch();
         assert!(!(0..90).any(|second| watch.has_settled(&batch(f64::from(second), |_| f64::NAN))));
+    }
+
+    /// Speed that falls by 0.02 % each second varies by 0.6 % over 30 s, within 0.8 %; by 0.03 %, it varies by 0.9 %.
+    #[test]
+    fn speed_has_settled_when_it_varies_within_its_band() {
+        for (ratio_per_s, expected) in [(2e-4, true), (3e-4, false)] {
+            let mut watch = new_watch();
+            let settled = (0..60).any(|second| {
+                let mut batch = batch(f64::from(second), |_| 400.0);
+                let values = batch.t_s.iter().map(|t_s| 1e5 * (1.0 - ratio_per_s * t_s)).collect();
+                batch.columns.push(ChannelColumn { channel: Channel::ShaftSpeed, values });
+                watch.has_settled(&batch)
+            });
+            assert_eq!(settled, expected, "{ratio_per_s}");
+        }
     }
 }

@@ -1,36 +1,39 @@
 //! Scripts against a caller that answers without a rig: what they may, what they may not, and what they are told.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_core::{IdentifiedPoint, Method, OperatingPoint, StepKind, Verdict};
+use mapper_core::{
+    IdentifiedPoint, Limits, Method, OperatingPoint, SettleBands, StepKind, Timing, Verdict, WindowRule,
+};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_sequence::{
-    Bench, Hold, Script, ScriptError, SequenceError, SequenceRunner, SequenceStep, SettleBands, StepLimits,
-    StepResult, api_markdown, check,
+    Hold, Script, ScriptError, SequenceError, SequenceRequest, SequenceRunner, SequenceStep, StepResult,
+    api_markdown, check,
 };
 use std::sync::Arc;
 use std::time::Duration;
 
-fn bench() -> Bench {
+fn request() -> SequenceRequest {
     let points = [50e3, 110e3, 150e3].into_iter().flat_map(|speed_rpm| {
         [0.7, 1.0].map(|valve_opening_ratio| OperatingPoint { speed_rpm, valve_opening_ratio })
     });
-    Bench {
+    SequenceRequest {
         points: points.collect(),
-        dwell_s: 120.0,
-        warm_up_s: 60.0,
-        window_s: Some((10.0, 110.0)),
-        settle_bands: SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 },
+        timing: Timing { warm_up_s: 60.0, dwell_s: 120.0, cool_down_s: 0.0 },
+        window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 },
+        settle_bands: SettleBands::default(),
         model: Model::nominal(),
         boundary: BoundaryConditions::default(),
         follow_outlet: mapper_physics::follow_outlet::FollowOutlet::default(),
-        limits: StepLimits {
+        limits: Limits {
             speed_max_rpm: 180e3,
             p3_min_pa: 120e3,
             p3_max_pa: 500e3,
+            p3_stroke_s: None,
             t2_max_k: Some(573.0),
             t3_max_k: None,
             surge_margin_min_ratio: None,
+            housing_gradient_max_k: None,
         },
         order: Box::new(|points| Ok(points.iter().rev().copied().collect())),
     }
@@ -38,7 +41,7 @@ fn bench() -> Bench {
 
 fn start(text: &str) -> SequenceRunner {
     let script = Script { path: "test.rhai".into(), text: text.to_owned() };
-    SequenceRunner::start(script, bench()).unwrap()
+    SequenceRunner::start(script, request()).unwrap()
 }
 
 /// What a step gives here: an efficiency that grows with each step.
@@ -153,7 +156,7 @@ fn steps_carry_what_the_nominal_machine_expects() {
 #[test]
 fn the_planner_orders_what_it_is_given() {
     let steps = steps_of("for p in order(grid()) { jump(p); }");
-    let expected: Vec<OperatingPoint> = bench().points.into_iter().rev().collect();
+    let expected: Vec<OperatingPoint> = request().points.into_iter().rev().collect();
     assert_eq!(steps.iter().map(|step| step.step.to).collect::<Vec<_>>(), expected);
     let error = error_of("let x = 1;\norder([x]);");
     assert!(error.line == Some(2) && error.message.contains("points"), "{error}");
@@ -162,14 +165,14 @@ fn the_planner_orders_what_it_is_given() {
 #[test]
 fn no_step_leaves_the_limits() {
     for (step, word) in [
-        (r#"jump(point("250 krpm", 1.0))"#, "speed limit of 180 krpm"),
+        (r#"jump(point("250 krpm", 1.0))"#, "above the speed limit, `limits.speed` = 180 krpm"),
         (r#"jump(point("110 krpm", 2.6))"#, "valve's range"),
         (r#"jump(point("110 krpm", 0.0))"#, "valve's range"),
         (r#"jump(point("110 krpm", 0.0/0.0))"#, "valve's range"),
-        (r#"jump(point("-5 krpm", 1.0))"#, "no positive speed"),
-        (r#"jump(point("10 krpm", 1.0))"#, "outside the limits of 120.0 to 500.0 kPa"),
-        (r#"settle(point("250 krpm", 1.0), "60 s")"#, "speed limit of 180 krpm"),
-        (r#"jump(point("110 krpm", 0.2))"#, "surge margin"),
+        (r#"jump(point("-5 krpm", 1.0))"#, "shaft speed"),
+        (r#"jump(point("10 krpm", 1.0))"#, "below `limits.turbine_inlet_pressure.min` = 120 kPa"),
+        (r#"settle(point("250 krpm", 1.0), "60 s")"#, "above the speed limit, `limits.speed` = 180 krpm"),
+        (r#"jump(point("110 krpm", 0.2))"#, "beyond the surge line"),
         (r#"jump(point("110 krpm", 1.0), "25 h")"#, "86400 s"),
         (r#"jump(point("110 krpm", 1.0), "-5 s")"#, "more than 0 s"),
         (r#"jump(point("110", 1.0))"#, "lacks its unit"),
@@ -280,7 +283,8 @@ fn a_script_whose_caller_goes_ends() {
     };
     let script =
         Script { path: "test.rhai".into(), text: "loop { try { jump(grid()[0]); } catch { } }".to_owned() };
-    let mut runner = SequenceRunner::start(script, Bench { order: Box::new(order), ..bench() }).unwrap();
+    let mut runner =
+        SequenceRunner::start(script, SequenceRequest { order: Box::new(order), ..request() }).unwrap();
     let step = runner.next_step(None).unwrap().unwrap();
     runner.next_step(Some(answer(&step))).unwrap().unwrap();
     assert_eq!(Arc::strong_count(&held), 2, "the script is at its second jump");

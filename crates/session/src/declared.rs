@@ -1,9 +1,8 @@
 //! What a campaign declares, as identification and diagnosis need it.
 
 use mapper_campaign::Campaign;
-use mapper_campaign::campaign::WindowChoice;
-use mapper_core::{Channel, DeclaredUncertainty};
-use mapper_identify::{IdentifyConfig, PressureTap, Stabilisation, WindowRule};
+use mapper_core::{Channel, DeclaredUncertainty, WindowRule};
+use mapper_identify::{IdentifyConfig, PressureTap};
 use mapper_observe::declared_uncertainties;
 use mapper_record::ChannelMap;
 use std::collections::BTreeMap;
@@ -20,15 +19,8 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
     };
     IdentifyConfig {
         method: chosen.method,
-        window: match chosen.window {
-            WindowChoice::Fixed { start_s, end_s } => WindowRule::Fixed { start_s, end_s },
-            WindowChoice::Auto => WindowRule::Auto(Stabilisation {
-                speed_ratio: chosen.stabilisation.speed_ratio,
-                flow_ratio: chosen.stabilisation.flow_ratio,
-                pressure_ratio_ratio: chosen.stabilisation.pressure_ratio_ratio,
-                ..Stabilisation::default()
-            }),
-        },
+        window: chosen.window,
+        settle_bands: chosen.settle_bands,
         alpha_area_ratio: chosen.alpha_area_ratio,
         outlet_diameter_m: campaign.machine.params.compressor.outlet_diameter_m,
         probe_diameter_m: campaign.machine.params.t2_probe_diameter_m,

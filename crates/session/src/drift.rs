@@ -81,7 +81,7 @@ fn fingerprint(recorded: &Recorded) -> Option<String> {
     let (read, file) = (&recorded.read, &recorded.path);
     let of_campaign = || {
         let campaign = attached_campaign(read, file).ok()??;
-        let mapper_campaign::campaign::Timing { dwell_s, .. } = campaign.timing;
+        let mapper_core::Timing { dwell_s, .. } = campaign.timing;
         let same = (&campaign.machine, campaign.boundary, campaign.follow_outlet, &campaign.points, dwell_s);
         serde_json::to_string(&same).ok()
     };

@@ -3,7 +3,7 @@
 use crate::guards::guards;
 use mapper_campaign::Campaign;
 use mapper_core::{Backend, UnpacedClock};
-use mapper_runner::{RunEnd, RunError, RunObserver, Runner, Soak, Soaked, StepSource};
+use mapper_runner::{RunEnd, RunError, RunObserver, Runner, Soaked, StepSource};
 use std::sync::atomic::AtomicBool;
 
 /// Drives the rig through the steps, after the soak where the campaign has one, under the campaign's guards.
@@ -21,8 +21,7 @@ pub fn drive(
     let mut soaked;
     let steps: &mut dyn StepSource = match campaign.zero {
         None => steps,
-        Some(zero) => {
-            let soak = Soak { duration_s: zero.soak_s, oil_temperature_k: zero.oil_temperature_k };
+        Some(soak) => {
             soaked = Soaked::new(steps, soak);
             &mut soaked
         }
@@ -33,5 +32,5 @@ pub fn drive(
 
 /// Time at rest before the plan begins, s.
 pub fn soak_s(campaign: &Campaign) -> f64 {
-    campaign.zero.map_or(0.0, |zero| zero.soak_s)
+    campaign.zero.map_or(0.0, |zero| zero.duration_s)
 }

@@ -2,13 +2,10 @@
 
 use crate::declared::declared;
 use mapper_campaign::Campaign;
-use mapper_campaign::campaign;
-use mapper_core::Channel;
+use mapper_core::{Channel, SURGE_ALLOWED_S};
 use mapper_record::ChannelMap;
-use mapper_runner::{DriftWatch, Guard, LimitGuard, OnDrift, SilenceGuard, StepSource, SurgeGuard};
+use mapper_runner::{DriftWatch, Guard, LimitGuard, SilenceGuard, StepSource, SurgeGuard};
 
-/// Surge longer than this ends a run, s: a jump may touch the line, a point may not stay beyond it.
-pub(crate) const SURGE_ALLOWED_S: f64 = 5.0;
 /// Silence of a guarded channel longer than this ends a run, s.
 const SILENCE_ALLOWED_S: f64 = 3.0;
 
@@ -36,10 +33,5 @@ pub fn guards(campaign: &Campaign, delivered: &[Channel]) -> Vec<Box<dyn Guard>>
 
 /// Watches the repeats of a run, where the campaign says what to do about drift.
 pub fn drift_watch<'a>(campaign: &Campaign, steps: &'a mut dyn StepSource) -> Option<DriftWatch<'a>> {
-    let on_drift = match campaign.on_drift? {
-        campaign::OnDrift::Hold => OnDrift::Hold,
-        campaign::OnDrift::Continue => OnDrift::Continue,
-        campaign::OnDrift::Zero => OnDrift::Zero,
-    };
-    Some(DriftWatch::new(steps, on_drift, declared(campaign, &ChannelMap::native())))
+    Some(DriftWatch::new(steps, campaign.on_drift?, declared(campaign, &ChannelMap::native())))
 }

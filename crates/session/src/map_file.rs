@@ -3,6 +3,7 @@
 use crate::files::write_new;
 use crate::{Registry, SessionError};
 use mapper_assemble::{MapFitOptions, fit_map};
+use mapper_campaign::Campaign;
 use mapper_core::{CompressorMap, ExportError, MAP_FILE_SIZE_LIMIT, MapFormat, ReferenceState};
 use std::io::Read;
 use std::path::Path;
@@ -41,6 +42,14 @@ impl Registry {
             name: name.to_owned(),
             known: self.formats.written().map(|format| format.name).collect(),
         })
+    }
+
+    /// Whether every format that the campaign names can be written: before a run, not after it.
+    ///
+    /// # Errors
+    /// [`SessionError::UnknownFormat`] with the first that cannot.
+    pub fn check_formats(&self, campaign: &Campaign) -> Result<(), SessionError> {
+        campaign.outputs.formats.iter().try_for_each(|format| self.written_format(format.name()).map(drop))
     }
 
     /// The format of a new map file: by name, or else by the file's extension.

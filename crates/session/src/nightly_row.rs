@@ -1,12 +1,12 @@
 //! What the history keeps of a nightly run.
 
 use mapper_core::{Plan, Verdict};
-use mapper_history::{Figure, PointRow};
+use mapper_history::{Metric, PointRow};
 use mapper_score::ScoredPoint;
 use std::collections::BTreeMap;
 
 /// The figures that are watched; those without a value are left out.
-pub(crate) fn figures(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Figure, f64> {
+pub(crate) fn figures(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f64> {
     let mean = |values: Vec<f64>| {
         let count = values.len() as f64;
         (count > 0.0).then(|| values.iter().sum::<f64>() / count)
@@ -16,25 +16,25 @@ pub(crate) fn figures(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Figure, f
     // True means over the points that have a result as well: the same points in both.
     let both = |scored: &&ScoredPoint| scored.point.eta.is_some() && scored.truth.is_some();
     let with_eta: Vec<&ScoredPoint> = points.iter().filter(both).collect();
-    Figure::ALL
+    Metric::ALL
         .into_iter()
         .filter_map(|figure| {
             let value = match figure {
-                Figure::GoodPoints => Some(good as f64),
-                Figure::EtaMean => mean(with_eta.iter().filter_map(|scored| scored.point.eta).collect()),
-                Figure::EtaTrueMean => {
+                Metric::GoodPoints => Some(good as f64),
+                Metric::EtaMean => mean(with_eta.iter().filter_map(|scored| scored.point.eta).collect()),
+                Metric::EtaTrueMean => {
                     mean(with_eta.iter().filter_map(|scored| Some(scored.truth?.eta)).collect())
                 }
-                Figure::EtaMedianError => score.map(|score| score.eta_median_error),
-                Figure::EtaWorstError => score.map(|score| score.eta_worst_error),
-                Figure::EtaCoverage => score.map(|score| score.eta_coverage_ratio),
-                Figure::HMean => mean(with_eta.iter().filter_map(|scored| scored.point.h_w_m2k).collect()),
-                Figure::HTrueMean => {
+                Metric::EtaMedianError => score.map(|score| score.eta_median_error),
+                Metric::EtaWorstError => score.map(|score| score.eta_worst_error),
+                Metric::EtaCoverage => score.map(|score| score.eta_coverage_ratio),
+                Metric::HMean => mean(with_eta.iter().filter_map(|scored| scored.point.h_w_m2k).collect()),
+                Metric::HTrueMean => {
                     mean(with_eta.iter().filter_map(|scored| Some(scored.truth?.h_w_m2k)).collect())
                 }
-                Figure::HMedianError => score.and_then(|score| score.h_median_error_ratio),
-                Figure::HWorstError => score.and_then(|score| score.h_worst_error_ratio),
-                Figure::RigMinutes => Some(plan.duration_s() / 60.0),
+                Metric::HMedianError => score.and_then(|score| score.h_median_error_ratio),
+                Metric::HWorstError => score.and_then(|score| score.h_worst_error_ratio),
+                Metric::RigMinutes => Some(plan.duration_s() / 60.0),
             };
             Some((figure, value.filter(|value| value.is_finite())?))
         })

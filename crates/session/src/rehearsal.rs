@@ -5,8 +5,8 @@ use crate::planning::plan;
 use crate::scripted_steps::ScriptedSteps;
 use crate::{Session, SessionError};
 use mapper_campaign::Campaign;
-use mapper_campaign::campaign::{BackendChoice, Order, SequenceSource};
-use mapper_core::{Plan, PlanStep, SampleBatch, StepMarker};
+use mapper_campaign::campaign::{BackendChoice, SequenceSource};
+use mapper_core::{Plan, PlanStep, SampleBatch, StepMarker, VisitOrder};
 use mapper_physics::model::Model;
 use mapper_runner::{RunEnd, RunObserver, StepSource, StepSourceError};
 
@@ -104,7 +104,7 @@ fn base_plan(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Res
     let canonical = serde_json::to_string(&without_script)?;
     // The planner plans one point alone: the script has the say over the others.
     let points = campaign.points.iter().copied().take(1).collect();
-    let mut plan = plan(&Campaign { points, order: Order::Listed, ..without_script }, model)?;
+    let mut plan = plan(&Campaign { points, order: VisitOrder::Listed, ..without_script }, model)?;
     plan.objective = OBJECTIVE.to_owned();
     plan.made_from.campaign_sha256 = mapper_planner::sha256_hex(&canonical);
     plan.made_from.script_sha256 = Some(mapper_planner::sha256_hex(&source.text));

@@ -95,6 +95,7 @@ impl<'s> Session<'s> {
     /// [`SessionError`] where there is no plan, the stored one is stale, the script fails or the backend's settings are wrong.
     pub fn prepare<'a>(&self, request: RunRequest<'a>) -> Result<PreparedRun<'a>, SessionError> {
         let campaign = request.campaign;
+        self.registry.check_formats(campaign)?;
         let model = nominal_model(campaign)?;
         let made = match &campaign.sequence {
             None => plan(campaign, &model)?,

@@ -4,14 +4,12 @@ use crate::SessionError;
 use crate::declared::identification;
 use crate::planning::plan;
 use mapper_campaign::Campaign;
-use mapper_campaign::campaign::{SequenceSource, WindowChoice};
+use mapper_campaign::campaign::SequenceSource;
 use mapper_core::{Method, Plan, PlanStep, Recording, SampleBatch, StepMarker};
 use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_physics::model::Model;
 use mapper_runner::{StepSource, StepSourceError};
-use mapper_sequence::{
-    Bench, Hold, Script, SequenceRunner, SettleBands, SettleWatch, StepLimits, StepResult,
-};
+use mapper_sequence::{Hold, Script, SequenceRequest, SequenceRunner, SettleWatch, StepResult};
 
 /// The steps of a script, each identified as soon as it has ended.
 pub(crate) struct ScriptedSteps {
@@ -32,7 +30,7 @@ impl ScriptedSteps {
     /// The steps of a campaign's script.
     pub fn new(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<Self, SessionError> {
         let script = Script { path: source.path.clone(), text: source.text.clone() };
-        let script = SequenceRunner::start(script, bench(campaign, model))?;
+        let script = SequenceRunner::start(script, request(campaign, model))?;
         Ok(ScriptedSteps {
             script,
             // A script sees a step at once, the joint method all of them at the end.
@@ -147,33 +145,17 @@ fn with_steps(mut plan: Plan, steps: Vec<PlanStep>) -> Plan {
 }
 
 /// What a script sees of the campaign.
-fn bench(campaign: &Campaign, model: &Model) -> Bench {
-    let (limits, stabilisation) = (&campaign.limits, &campaign.identification.stabilisation);
+fn request(campaign: &Campaign, model: &Model) -> SequenceRequest {
     let (planned, machine) = (campaign.clone(), model.clone());
-    Bench {
+    SequenceRequest {
         points: campaign.points.clone(),
-        dwell_s: campaign.timing.dwell_s,
-        warm_up_s: campaign.timing.warm_up_s,
-        window_s: match campaign.identification.window {
-            WindowChoice::Auto => None,
-            WindowChoice::Fixed { start_s, end_s } => Some((start_s, end_s)),
-        },
-        settle_bands: SettleBands {
-            speed_ratio: stabilisation.speed_ratio,
-            flow_ratio: stabilisation.flow_ratio,
-            pressure_ratio_ratio: stabilisation.pressure_ratio_ratio,
-        },
+        timing: campaign.timing,
+        window: campaign.identification.window,
+        settle_bands: campaign.identification.settle_bands,
         model: model.clone(),
         boundary: campaign.boundary,
         follow_outlet: campaign.follow_outlet,
-        limits: StepLimits {
-            speed_max_rpm: limits.speed_max_rpm,
-            p3_min_pa: limits.p3_min_pa,
-            p3_max_pa: limits.p3_max_pa,
-            t2_max_k: limits.t2_max_k,
-            t3_max_k: limits.t3_max_k,
-            surge_margin_min_ratio: limits.surge_margin_min_ratio,
-        },
+        limits: campaign.limits,
         order: Box::new(move |points| {
             // Repeats are the script's own business.
             let subset =

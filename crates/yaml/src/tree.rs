@@ -157,6 +157,7 @@ impl Node {
             ),
         }
     }
+
     /// The tree as a value of a type. A tree that was found right against the schema of the type fails here only
     /// where the schema is laxer than the type.
     ///

@@ -15,7 +15,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-campaign",  &["core", "physics", "yaml"]),
     ("mapper-planner",   &["core", "numerics", "physics"]),
     ("mapper-runner",    &["core"]),
-    ("mapper-sequence",  &["core", "physics", "yaml"]),
+    ("mapper-sequence",  &["core", "numerics", "physics", "yaml"]),
     ("mapper-record",    &["core", "yaml"]),
     ("mapper-observe",   &["core", "numerics", "physics"]),
     ("mapper-identify",  &["core", "numerics", "physics", "observe"]),

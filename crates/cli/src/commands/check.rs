@@ -36,8 +36,11 @@ impl Check {
         };
         let model = nominal_model(&campaign)?;
         // The backend reads its settings now, so that a mistake in them does not wait for the night.
-        registry::registry()
+        let registry = registry::registry();
+        registry
             .make_backend(&campaign, &model)
+            .map(drop)
+            .and_then(|()| registry.check_formats(&campaign))
             .map_err(|error| Failure::in_campaign(error, &self.campaign))?;
         if let Some(source) = &campaign.sequence {
             let script = Script { path: source.path.clone(), text: source.text.clone() };

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::output;
 use clap::Args;
-use mapper_history::{Figure, Filter, ListedRun};
+use mapper_history::{Filter, ListedRun, Metric};
 use mapper_report::{groups_text, history_svg, runs_text, time};
 use mapper_session::{SessionError, write_new};
 use serde_json::json;
@@ -24,7 +24,7 @@ pub struct History {
     pub method: Option<String>,
     /// Show this figure instead of the usual ones; may be given more than once
     #[arg(long, value_name = "FIGURE", value_parser = figure)]
-    pub figure: Vec<Figure>,
+    pub figure: Vec<Metric>,
     /// Only nights from this day on (UTC)
     #[arg(long, value_name = "YYYY-MM-DD", value_parser = day)]
     pub since: Option<jiff::Timestamp>,
@@ -39,9 +39,9 @@ pub struct History {
     pub json: bool,
 }
 
-fn figure(text: &str) -> Result<Figure, String> {
-    Figure::find(text).ok_or_else(|| {
-        let names: Vec<&str> = Figure::ALL.into_iter().map(Figure::name).collect();
+fn figure(text: &str) -> Result<Metric, String> {
+    Metric::find(text).ok_or_else(|| {
+        let names: Vec<&str> = Metric::ALL.into_iter().map(Metric::name).collect();
         format!("there is no figure `{text}`; there are {}", names.join(", "))
     })
 }
@@ -54,13 +54,13 @@ fn day(text: &str) -> Result<jiff::Timestamp, String> {
 }
 
 /// Figures that are shown where none is asked for.
-const SHOWN: [Figure; 6] = [
-    Figure::GoodPoints,
-    Figure::EtaMean,
-    Figure::EtaMedianError,
-    Figure::EtaWorstError,
-    Figure::HMean,
-    Figure::HMedianError,
+const SHOWN: [Metric; 6] = [
+    Metric::GoodPoints,
+    Metric::EtaMean,
+    Metric::EtaMedianError,
+    Metric::EtaWorstError,
+    Metric::HMean,
+    Metric::HMedianError,
 ];
 
 impl History {
@@ -73,7 +73,7 @@ impl History {
             since_ms: self.since.map(|since| since.as_millisecond()),
         };
         let runs = history.runs(&filter).map_err(SessionError::from)?;
-        let figures: Vec<Figure> = if self.figure.is_empty() { SHOWN.to_vec() } else { self.figure.clone() };
+        let figures: Vec<Metric> = if self.figure.is_empty() { SHOWN.to_vec() } else { self.figure.clone() };
         if let Some(path) = &self.svg {
             write_new(path, history_svg(&runs, &figures).as_bytes())?;
         }
@@ -88,7 +88,7 @@ impl History {
 fn run_json(listed: &ListedRun) -> serde_json::Value {
     let ListedRun { night, run } = listed;
     let figures: BTreeMap<&str, Option<f64>> =
-        Figure::ALL.into_iter().map(|figure| (figure.name(), run.figures.get(&figure).copied())).collect();
+        Metric::ALL.into_iter().map(|figure| (figure.name(), run.figures.get(&figure).copied())).collect();
     json!({
         "night": {
             "id": night.id, "name": night.name, "started": time(night.started_ms, "%Y-%m-%dT%H:%M:%SZ"),

@@ -75,7 +75,7 @@ impl Plan {
         }
         let (plan, comparison) = with_plan_request(&campaign, &model, |request| {
             let appended = match self.append.as_slice() {
-                [from, to] => Some((*from, *to)),
+                [from, to] => Some(mapper_core::Jump { from: *from, to: *to }),
                 _ => None,
             };
             let effort = self.effort.unwrap_or(request.effort);
@@ -94,7 +94,7 @@ impl Plan {
                 value["comparison"] = comparison_json(comparison);
             }
             if let Some(zero) = campaign.zero {
-                value["soak_s"] = zero.soak_s.into();
+                value["soak_s"] = zero.duration_s.into();
             }
             return output::print_json(&value);
         }

@@ -98,7 +98,7 @@ impl Run {
                 "dry_run": true,
                 "rig": rig,
                 "would_write": would_write,
-                "soak_s": campaign.zero.map(|zero| zero.soak_s),
+                "soak_s": campaign.zero.map(|zero| zero.duration_s),
                 "plan": plan,
             }));
         }

@@ -28,7 +28,7 @@ use crate::findings::{Findings, code};
 use crate::joint::parameters::{FLOW_GAIN, OFFSETS, PROBE_MM2, SHARED};
 use crate::joint::smoothness::{Judged, Smoothed};
 use crate::joint::solve::{Covariance, FULLY, Problem, ROUGHLY};
-use crate::{IdentifyConfig, jump};
+use crate::{IdentifyConfig, commands};
 use mapper_core::{Choice, EstimateUncertainty, JointSettings, Recording, ThermalModel, Window};
 use mapper_numerics::statistics::rms;
 
@@ -116,7 +116,7 @@ pub(crate) fn estimate(
             dtc_k: change(|row| row.tc_k),
         };
         judge::judge_step(&problem, i, eta_error.combined_standard_error(), config, own);
-        if !jump::begins_with_jump(&recording.steps, step.position) {
+        if !commands::begins_with_jump(&recording.steps, step.position) {
             let message =
                 "no jump leads to this step: its efficiency rests on what the points share".to_owned();
             own.remark(code::THROUGH_THE_LAW, message);

@@ -18,7 +18,7 @@ use crate::joint::solve::{Member, Problem};
 use crate::joint::surface::{SurfaceScale, TERM_COUNT, dot};
 use crate::samples::Samples;
 use crate::window;
-use crate::{IdentifyConfig, Stabilisation, WindowRule, jump};
+use crate::{IdentifyConfig, WindowRule, commands};
 use mapper_core::{Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, Window};
 use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
 use mapper_numerics::statistics::{mean, median, robust_sigma};
@@ -56,7 +56,7 @@ pub(crate) fn steps(
             continue;
         };
         let after_s = if config.declared.is_empty() { START_S } else { START_WITH_NOISE_S };
-        let start_s = jump::commands_settled_s(recording, step).max(step.start_s) + after_s;
+        let start_s = commands::at_rest_s(recording, step).max(step.start_s) + after_s;
         let window = Window { start_s, end_s: step.end_s };
         if start_s.is_nan() || start_s >= step.end_s {
             let message =
@@ -69,17 +69,13 @@ pub(crate) fn steps(
             continue;
         }
         if !config.declared.is_empty() {
-            let rule = match config.window {
-                WindowRule::Auto(rule) => rule,
-                WindowRule::Fixed { .. } => Stabilisation::default(),
-            };
             // What varies is followed; but a point is where a step settles.
             let mut judged = Findings::new();
-            window::choose(recording, step, &WindowRule::Auto(rule), &mut judged);
+            window::choose(recording, step, WindowRule::Auto, &config.settle_bands, &mut judged);
             if judged.warnings.iter().any(|warning| warning.code == code::NOT_STABILISED) {
                 let message = format!(
                     "speed, flow or pressure ratio still varies beyond its limit in the last {:.0} s of the step",
-                    rule.shortest_s
+                    WindowRule::SHORTEST_S
                 );
                 own.doubt(code::NOT_STABILISED, message);
             }

@@ -1,12 +1,12 @@
 //! The grid of docs/planner.md, a request, and a housing with one time constant per point.
 
-use mapper_core::OperatingPoint;
+use mapper_core::{Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::{air, housing, steady};
+use mapper_planner::PlanRequest;
 use mapper_planner::chain::Chain;
-use mapper_planner::{PlanLimits, PlanRequest, PlanTiming, SettleBands, VisitOrder};
 
 /// Along speed lines, as conventional mapping goes.
 pub fn grid() -> Vec<OperatingPoint> {
@@ -26,24 +26,18 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
         follow_outlet: FollowOutlet::default(),
         points,
         order,
-        timing: PlanTiming {
-            warm_up_s: 3600.0,
-            dwell_s: 120.0,
-            cool_down_s: 0.0,
-            window_start_s: Some(10.0),
-            window_end_s: Some(110.0),
-        },
-        settle_bands: SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 },
-        limits: PlanLimits {
+        timing: Timing { warm_up_s: 3600.0, dwell_s: 120.0, cool_down_s: 0.0 },
+        window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 },
+        settle_bands: SettleBands::default(),
+        limits: Limits {
             speed_max_rpm: 180e3,
             p3_min_pa: 110e3,
             p3_max_pa: 400e3,
+            p3_stroke_s: None,
             t3_max_k: None,
             t2_max_k: None,
             surge_margin_min_ratio: None,
-            surge_allowed_s: 5.0,
             housing_gradient_max_k: None,
-            p3_slew_max_pa_s: None,
         },
         repeats: None,
         appended: None,

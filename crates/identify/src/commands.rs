@@ -1,4 +1,4 @@
-//! Whether a step begins with a jump, and when its commands came to rest.
+//! The commands of a step: whether they begin with a jump, and when they come to rest.
 
 use mapper_core::{Channel, Recording, StepMarker};
 
@@ -27,7 +27,7 @@ pub(crate) fn begins_with_jump(steps: &[StepMarker], position: usize) -> bool {
 }
 
 /// Time of the last change of P3 and valve commands within the step (its start where none is recorded), s.
-pub(crate) fn commands_settled_s(recording: &Recording, step: &StepMarker) -> f64 {
+pub(crate) fn at_rest_s(recording: &Recording, step: &StepMarker) -> f64 {
     let mut settled_s = step.start_s;
     for channel in [Channel::P3Command, Channel::ValveCommand] {
         let Some(series) = recording.series.get(&channel) else { continue };

@@ -6,7 +6,7 @@ use serde::Serialize;
 /// One figure of a run. Efficiencies are fractions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Figure {
+pub enum Metric {
     /// Points with the verdict `good`.
     GoodPoints,
     /// Mean identified efficiency, fraction.
@@ -31,53 +31,53 @@ pub enum Figure {
     RigMinutes,
 }
 
-impl Figure {
+impl Metric {
     /// All of them, in the order in which they are shown.
-    pub const ALL: [Figure; 11] = [
-        Figure::GoodPoints,
-        Figure::EtaMean,
-        Figure::EtaTrueMean,
-        Figure::EtaMedianError,
-        Figure::EtaWorstError,
-        Figure::EtaCoverage,
-        Figure::HMean,
-        Figure::HTrueMean,
-        Figure::HMedianError,
-        Figure::HWorstError,
-        Figure::RigMinutes,
+    pub const ALL: [Metric; 11] = [
+        Metric::GoodPoints,
+        Metric::EtaMean,
+        Metric::EtaTrueMean,
+        Metric::EtaMedianError,
+        Metric::EtaWorstError,
+        Metric::EtaCoverage,
+        Metric::HMean,
+        Metric::HTrueMean,
+        Metric::HMedianError,
+        Metric::HWorstError,
+        Metric::RigMinutes,
     ];
 
     /// Name on the command line, in JSON, and of the column in the file.
     pub fn name(self) -> &'static str {
         match self {
-            Figure::GoodPoints => "good_points",
-            Figure::EtaMean => "eta_mean",
-            Figure::EtaTrueMean => "eta_true_mean",
-            Figure::EtaMedianError => "eta_median_error",
-            Figure::EtaWorstError => "eta_worst_error",
-            Figure::EtaCoverage => "eta_coverage",
-            Figure::HMean => "h_mean",
-            Figure::HTrueMean => "h_true_mean",
-            Figure::HMedianError => "h_median_error",
-            Figure::HWorstError => "h_worst_error",
-            Figure::RigMinutes => "rig_minutes",
+            Metric::GoodPoints => "good_points",
+            Metric::EtaMean => "eta_mean",
+            Metric::EtaTrueMean => "eta_true_mean",
+            Metric::EtaMedianError => "eta_median_error",
+            Metric::EtaWorstError => "eta_worst_error",
+            Metric::EtaCoverage => "eta_coverage",
+            Metric::HMean => "h_mean",
+            Metric::HTrueMean => "h_true_mean",
+            Metric::HMedianError => "h_median_error",
+            Metric::HWorstError => "h_worst_error",
+            Metric::RigMinutes => "rig_minutes",
         }
     }
 
     /// The figure of this name.
-    pub fn find(name: &str) -> Option<Figure> {
-        Figure::ALL.into_iter().find(|figure| figure.name() == name)
+    pub fn find(name: &str) -> Option<Metric> {
+        Metric::ALL.into_iter().find(|figure| figure.name() == name)
     }
 
     /// Unit in which people are shown it, and the factor from the stored value to it.
     pub fn shown_unit(self) -> (&'static str, f64) {
         match self {
-            Figure::GoodPoints => ("points", 1.0),
-            Figure::EtaMean | Figure::EtaTrueMean | Figure::EtaCoverage => ("%", 100.0),
-            Figure::EtaMedianError | Figure::EtaWorstError => ("%points", 100.0),
-            Figure::HMean | Figure::HTrueMean => ("W/(m2 K)", 1.0),
-            Figure::HMedianError | Figure::HWorstError => ("%", 100.0),
-            Figure::RigMinutes => ("min", 1.0),
+            Metric::GoodPoints => ("points", 1.0),
+            Metric::EtaMean | Metric::EtaTrueMean | Metric::EtaCoverage => ("%", 100.0),
+            Metric::EtaMedianError | Metric::EtaWorstError => ("%points", 100.0),
+            Metric::HMean | Metric::HTrueMean => ("W/(m2 K)", 1.0),
+            Metric::HMedianError | Metric::HWorstError => ("%", 100.0),
+            Metric::RigMinutes => ("min", 1.0),
         }
     }
 
@@ -88,19 +88,19 @@ impl Figure {
     /// above what another compiler's rounding does (1e-9).
     pub fn floor(self) -> Floor {
         match self {
-            Figure::GoodPoints => Floor::Absolute(0.5),
-            Figure::EtaMean | Figure::EtaTrueMean | Figure::EtaMedianError | Figure::EtaWorstError => {
+            Metric::GoodPoints => Floor::Absolute(0.5),
+            Metric::EtaMean | Metric::EtaTrueMean | Metric::EtaMedianError | Metric::EtaWorstError => {
                 Floor::Absolute(5e-4)
             }
-            Figure::EtaCoverage => Floor::Absolute(0.02),
-            Figure::HMean | Figure::HTrueMean => Floor::Relative(2.5e-3),
-            Figure::HMedianError | Figure::HWorstError => Floor::Absolute(2.5e-3),
-            Figure::RigMinutes => Floor::Relative(2.5e-3),
+            Metric::EtaCoverage => Floor::Absolute(0.02),
+            Metric::HMean | Metric::HTrueMean => Floor::Relative(2.5e-3),
+            Metric::HMedianError | Metric::HWorstError => Floor::Absolute(2.5e-3),
+            Metric::RigMinutes => Floor::Relative(2.5e-3),
         }
     }
 }
 
-impl std::fmt::Display for Figure {
+impl std::fmt::Display for Metric {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.name())
     }

@@ -1,0 +1,19 @@
+//! `backend:`, opaque to everything but the backend.
+
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A backend by its name, with settings that only it understands.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BackendChoice {
+    /// Name, e.g. `virtual_lab`.
+    pub name: String,
+    /// Its settings, unchecked.
+    pub settings: serde_json::Value,
+}
+
+/// The one entry of the mapping, as the schema has it.
+pub(crate) fn backend(file: BTreeMap<String, serde_json::Value>) -> BackendChoice {
+    let (name, settings) = file.into_iter().next().unwrap_or_default();
+    BackendChoice { name, settings }
+}

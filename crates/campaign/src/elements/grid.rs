@@ -1,0 +1,258 @@
+//! `grid:`
+
+use crate::checking::Check;
+use crate::units::{Kind, Quantity, Speed};
+use mapper_core::OperatingPoint;
+use mapper_yaml::FindingKind;
+use mapper_yaml::{Content, Step, steps};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::collections::HashSet;
+
+/// Most points a grid may have: four weeks of two-minute steps.
+const POINT_LIMIT: usize = 20_000;
+/// Ways to write a grid.
+const FORMS: &str = "write `speeds` and `openings`, or `points`, a list of `{speed: 50 krpm, opening: 0.5}`";
+
+/// The operating points: every speed at every opening, or a list.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct GridFile {
+    /// Speed lines; each is visited at each of `openings`.
+    #[schemars(length(min = 1, max = 1000), extend("examples" = [["50 krpm", "80 krpm"]]))]
+    speeds: Option<Vec<SpeedFile>>,
+    /// Openings of the back-pressure valve relative to its nominal area, plain numbers above 0, at most 2.5.
+    #[schemars(length(min = 1, max = 1000), extend("examples" = [[0.5, 1.0, 2.5]]))]
+    openings: Option<Vec<Opening>>,
+    /// Points of `speeds` x `openings` that are left out.
+    #[schemars(length(min = 1, max = 20000))]
+    skip: Option<Vec<PointFile>>,
+    /// The points one by one.
+    #[schemars(length(min = 1, max = 20000))]
+    points: Option<Vec<PointFile>>,
+}
+
+/// A point.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PointFile {
+    /// Shaft speed, physical, not corrected.
+    speed: SpeedFile,
+    /// Opening of the back-pressure valve relative to its nominal area, a plain number above 0, at most 2.5.
+    opening: Opening,
+}
+
+/// Shaft speed, physical, not corrected.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(inline)]
+pub(crate) struct SpeedFile(#[schemars(extend("x-above" = "0 rpm", "x-max" = "1000 krpm"))] Quantity<Speed>);
+
+/// Opening of the back-pressure valve relative to its nominal area, a plain number above 0, at most 2.5.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(inline)]
+pub(crate) struct Opening(#[schemars(range(max = 2.5), extend("exclusiveMinimum" = 0), example = 0.5)] f64);
+
+impl From<PointFile> for OperatingPoint {
+    fn from(file: PointFile) -> Self {
+        OperatingPoint { speed_rpm: file.speed.0.inside, valve_opening_ratio: file.opening.0 }
+    }
+}
+
+impl GridFile {
+    /// The points and where each stands: its entry in `points`, or its speed in `speeds`.
+    pub(crate) fn points(&self) -> (Vec<OperatingPoint>, Vec<Vec<Step>>) {
+        if let Some(listed) = &self.points {
+            let entry = |(index, point): (usize, &PointFile)| {
+                (OperatingPoint::from(*point), steps!["grid", "points", index].to_vec())
+            };
+            return listed.iter().enumerate().map(entry).unzip();
+        }
+        let key = |point: &OperatingPoint| rounded(point.speed_rpm, point.valve_opening_ratio);
+        let skipped: HashSet<_> = self.skip.iter().flatten().map(|point| key(&(*point).into())).collect();
+        let speeds = self.speeds.as_deref().unwrap_or_default();
+        self.openings
+            .iter()
+            .flatten()
+            .flat_map(|opening| {
+                speeds.iter().enumerate().map(|(index, speed)| {
+                    let point = OperatingPoint { speed_rpm: speed.0.inside, valve_opening_ratio: opening.0 };
+                    (point, steps!["grid", "speeds", index].to_vec())
+                })
+            })
+            .filter(|(point, _)| !skipped.contains(&key(point)))
+            .unzip()
+    }
+}
+
+/// A point as a key: speeds closer than 1e-3 rpm and openings closer than 1e-6 are the same on any rig.
+fn rounded(rpm: f64, opening: f64) -> (i64, i64) {
+    ((rpm * 1e3).round() as i64, (opening * 1e6).round() as i64)
+}
+
+/// The grid is written in one of its forms, without duplicates, within the limits.
+pub(crate) fn check(check: &mut Check<'_>) {
+    let Some(grid) = check.get(&steps!["grid"]) else { return };
+    if grid.entries().is_empty() && !matches!(&grid.content, Content::Mapping(_)) {
+        return;
+    }
+    let has = |key: &str| grid.get(&steps![key]).is_some();
+    let (speeds, openings, points, skip) = (has("speeds"), has("openings"), has("points"), has("skip"));
+    let here = steps!["grid"];
+    match (speeds, openings, points) {
+        (false, false, false) => {
+            check.note(FindingKind::MissingKey, &here, "the grid has no points".into(), FORMS);
+        }
+        (true, false, false) => {
+            check.note(
+                FindingKind::MissingKey,
+                &here,
+                "`grid` has `speeds` and lacks `openings`".into(),
+                FORMS,
+            );
+        }
+        (false, true, false) => {
+            check.note(
+                FindingKind::MissingKey,
+                &here,
+                "`grid` has `openings` and lacks `speeds`".into(),
+                FORMS,
+            );
+        }
+        (true, _, true) | (_, true, true) => {
+            let message = "`points` stands beside `speeds` or `openings`".to_owned();
+            check.note_key(FindingKind::Conflict, &here, "points", message, FORMS);
+        }
+        _ => {}
+    }
+    grid_speeds(check);
+    grid_openings(check);
+    grid_points(check, "points");
+    grid_points(check, "skip");
+    if points && skip {
+        let message = "`skip` has nothing to skip in a list of points".to_owned();
+        check.note(
+            FindingKind::Conflict,
+            &steps!["grid", "skip"],
+            message,
+            "remove `skip`, or the points themselves",
+        );
+    } else if speeds && openings {
+        product(check);
+    }
+}
+
+fn grid_speeds(check: &mut Check<'_>) {
+    let mut seen = HashSet::new();
+    for index in 0..check.count(&steps!["grid", "speeds"]) {
+        let steps = steps!["grid", "speeds", index];
+        let Some((rpm, text)) = check.quantity(Kind::Speed, &steps) else { continue };
+        below_speed_limit(check, &steps, rpm, text);
+        if !seen.insert(rounded(rpm, 0.0)) {
+            let message = format!("the speed `{text}` stands here a second time");
+            check.note(FindingKind::Duplicate, &steps, message, "remove one of the two");
+        }
+    }
+}
+
+fn grid_openings(check: &mut Check<'_>) {
+    let mut seen = HashSet::new();
+    for index in 0..check.count(&steps!["grid", "openings"]) {
+        let steps = steps!["grid", "openings", index];
+        let Some(opening) = check.number(&steps) else { continue };
+        if !seen.insert(rounded(0.0, opening)) {
+            let message = format!("the opening {opening} stands here a second time");
+            check.note(FindingKind::Duplicate, &steps, message, "remove one of the two");
+        }
+    }
+}
+
+/// Duplicates and speeds of `points` or `skip`.
+fn grid_points(check: &mut Check<'_>, list: &str) {
+    let mut seen = HashSet::new();
+    for (index, (rpm, opening)) in points(check, list) {
+        let steps = steps!["grid", list, index];
+        let speed_path = steps!["grid", list, index, "speed"];
+        let text = check.text(&speed_path).unwrap_or_default();
+        if list == "points" {
+            below_speed_limit(check, &speed_path, rpm, text);
+        }
+        if !seen.insert(rounded(rpm, opening)) {
+            let message = format!("the point {text} at opening {opening} stands here a second time");
+            check.note(FindingKind::Duplicate, &steps, message, "remove one of the two");
+        }
+    }
+}
+
+fn product(check: &mut Check<'_>) {
+    let speeds: HashSet<(i64, i64)> = (0..check.count(&steps!["grid", "speeds"]))
+        .filter_map(|i| check.quantity(Kind::Speed, &steps!["grid", "speeds", i]))
+        .map(|(rpm, _)| rounded(rpm, 0.0))
+        .collect();
+    let openings: HashSet<(i64, i64)> = (0..check.count(&steps!["grid", "openings"]))
+        .filter_map(|i| check.number(&steps!["grid", "openings", i]))
+        .map(|opening| rounded(0.0, opening))
+        .collect();
+    let count = speeds.len().saturating_mul(openings.len());
+    let here = steps!["grid"];
+    if count > POINT_LIMIT {
+        let message = format!("the grid has {count} points");
+        check.note(FindingKind::TooLarge, &here, message, &format!("a grid may have at most {POINT_LIMIT}"));
+        return;
+    }
+    let mut skipped = HashSet::new();
+    for (index, (rpm, opening)) in points(check, "skip") {
+        let known = speeds.contains(&rounded(rpm, 0.0)) && openings.contains(&rounded(0.0, opening));
+        if known {
+            skipped.insert(rounded(rpm, opening));
+        } else {
+            let message = "no point of `speeds` and `openings` is the one to skip".to_owned();
+            let remedy = "name a speed and an opening of the grid, or remove the entry";
+            check.note(FindingKind::Conflict, &steps!["grid", "skip", index], message, remedy);
+        }
+    }
+    if count > 0 && skipped.len() >= count {
+        let message = "every point is skipped".to_owned();
+        check.note(FindingKind::Conflict, &steps!["grid", "skip"], message, "leave at least one point");
+    }
+}
+
+/// Index, speed in rpm and opening of each readable point of a list.
+fn points(check: &Check<'_>, list: &str) -> Vec<(usize, (f64, f64))> {
+    (0..check.count(&steps!["grid", list]))
+        .filter_map(|index| {
+            let (rpm, _) = check.quantity(Kind::Speed, &steps!["grid", list, index, "speed"])?;
+            let opening = check.number(&steps!["grid", list, index, "opening"])?;
+            Some((index, (rpm, opening)))
+        })
+        .collect()
+}
+
+fn below_speed_limit(check: &mut Check<'_>, steps: &[Step], rpm: f64, text: &str) {
+    if let Some((limit_rpm, limit)) = check.quantity(Kind::Speed, &steps!["limits", "speed"])
+        && rpm > limit_rpm
+    {
+        let message = format!("`{text}` is above `limits.speed`, `{limit}`");
+        check.note(
+            FindingKind::Range,
+            steps,
+            message,
+            "lower it, or raise the limit if the machine allows it",
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_is_every_speed_at_every_opening_without_what_is_skipped() {
+        let text = "{speeds: [50 krpm, 90 krpm], openings: [0.5, 1], skip: [{speed: 50000 rpm, opening: 1}]}";
+        let (points, places) = crate::testing::any::<GridFile>(text).unwrap().points();
+        let found: Vec<(f64, f64)> = points.iter().map(|p| (p.speed_rpm, p.valve_opening_ratio)).collect();
+        assert_eq!(found, [(50e3, 0.5), (90e3, 0.5), (90e3, 1.0)]);
+        assert_eq!(places.len(), points.len());
+    }
+}

@@ -1,0 +1,89 @@
+//! `identification:`
+
+use super::settle_bands::SettleBandsElement;
+use super::window::WindowFile;
+use mapper_core::{JointSettings, Method, SettleBands, WindowRule};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How points are identified.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Identification {
+    /// Method.
+    pub method: Method,
+    /// Part of each step that is used.
+    pub window: WindowRule,
+    /// Share of the internal area before compression that is assumed, alpha_A, 0..1.
+    pub alpha_area_ratio: f64,
+    /// When a point counts as settled.
+    pub settle_bands: SettleBands,
+    /// Which refinements the joint method makes.
+    pub joint: JointSettings,
+}
+
+/// How efficiency and heat-transfer coefficient are found.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct IdentificationFile {
+    /// `dynamic`, the default, finds both from the transient; `joint` fits all points together; `steady` is conventional mapping.
+    #[schemars(with = "Option<MethodName>")]
+    method: Option<Method>,
+    /// Part of the step that is used: `auto`, the default, begins when speed, flow and pressure ratio have settled; or `start` and `end` after the jump.
+    #[schemars(example = &"auto")]
+    window: Option<WindowFile>,
+    /// Share of the internal area before compression that identification assumes, a plain number from 0 to 1; the machine's where none is given.
+    #[schemars(range(min = 0, max = 1), example = 0.0)]
+    alpha_area: Option<f64>,
+    /// Variations within which a point counts as settled.
+    #[serde(default, deserialize_with = "SettleBandsElement::deserialize")]
+    #[schemars(with = "SettleBandsElement")]
+    stabilisation: SettleBands,
+    /// What `joint` finds and what it takes as declared; everything is found where nothing is said.
+    #[serde(default)]
+    joint: JointSettings,
+}
+
+/// The methods that a campaign may choose.
+#[derive(JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[expect(dead_code, reason = "stands for its schema alone: a map that was read has a method more")]
+enum MethodName {
+    Dynamic,
+    Joint,
+    Steady,
+}
+
+impl IdentificationFile {
+    /// With the machine's own alpha_A where the file says nothing of it.
+    pub(crate) fn identification(self, alpha_area_ratio: f64) -> Identification {
+        Identification {
+            method: self.method.unwrap_or(Method::Dynamic),
+            window: self.window.map_or(WindowRule::Auto, WindowRule::from),
+            alpha_area_ratio: self.alpha_area.unwrap_or(alpha_area_ratio),
+            settle_bands: self.stabilisation,
+            joint: self.joint,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::Choice;
+
+    #[test]
+    fn what_is_left_out_has_its_default() {
+        let read = |text| crate::testing::any::<IdentificationFile>(text).unwrap().identification(0.2);
+        let plain = Identification {
+            method: Method::Dynamic,
+            window: WindowRule::Auto,
+            alpha_area_ratio: 0.2,
+            settle_bands: SettleBands::default(),
+            joint: JointSettings::default(),
+        };
+        assert_eq!(read("{}"), plain);
+        let joint = JointSettings { probe: Choice::Fixed, ..plain.joint };
+        let said = Identification { method: Method::Joint, alpha_area_ratio: 0.0, joint, ..plain };
+        assert_eq!(read("{method: joint, alpha_area: 0, joint: {probe: fixed}}"), said);
+    }
+}

@@ -1,0 +1,112 @@
+//! `limits:`
+
+use crate::checking::Check;
+use crate::units::{Duration, Fraction, Kind, Pressure, Quantity, Speed, Temperature, TemperatureDifference};
+use mapper_core::Limits;
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// What the run must never leave.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct LimitsFile {
+    /// Highest shaft speed.
+    #[schemars(extend("x-above" = "0 rpm", "x-max" = "1000 krpm"), example = &"180 krpm")]
+    speed: Quantity<Speed>,
+    /// Lowest and highest turbine inlet pressure the rig may be told, P3.
+    turbine_inlet_pressure: PressureRangeFile,
+    /// Highest turbine inlet temperature, T3.
+    #[schemars(extend("x-min" = "250 K", "x-max" = "1400 K"), example = &"600 degC")]
+    turbine_inlet_temperature: Option<Quantity<Temperature>>,
+    /// Highest compressor outlet temperature, T2.
+    #[schemars(extend("x-min" = "250 K", "x-max" = "800 K"), example = &"250 degC")]
+    compressor_outlet_temperature: Option<Quantity<Temperature>>,
+    /// Smallest surge margin: flow over the surge flow at equal corrected speed, minus one; 0 %, the surge line, where none is given. Below 0 % for a machine that is known to be stable beyond the nominal map's line.
+    #[schemars(extend("x-min" = "-50 %", "x-max" = "200 %"), example = &"2 %")]
+    surge_margin: Option<Quantity<Fraction>>,
+    /// Largest change of the compressor housing within an identification window.
+    #[schemars(extend("x-above" = "0 K", "x-max" = "500 K"), example = &"30 K")]
+    housing_gradient: Option<Quantity<TemperatureDifference>>,
+}
+
+/// Lowest and highest pressure.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PressureRangeFile {
+    /// Lowest pressure.
+    #[schemars(extend("x-above" = "0 kPa", "x-max" = "2 MPa"), example = &"110 kPa")]
+    min: Quantity<Pressure>,
+    /// Highest pressure.
+    #[schemars(extend("x-above" = "0 kPa", "x-max" = "2 MPa"), example = &"400 kPa")]
+    max: Quantity<Pressure>,
+    /// Time the rig takes from the lowest to the highest pressure; where none is given it plays no part in the plan.
+    #[schemars(extend("x-above" = "0 s", "x-max" = "24 h"), example = &"10 s")]
+    stroke: Option<Quantity<Duration>>,
+}
+
+impl From<LimitsFile> for Limits {
+    fn from(file: LimitsFile) -> Self {
+        let p3 = file.turbine_inlet_pressure;
+        Limits {
+            speed_max_rpm: file.speed.inside,
+            p3_min_pa: p3.min.inside,
+            p3_max_pa: p3.max.inside,
+            p3_stroke_s: p3.stroke.map(|stroke| stroke.inside),
+            t3_max_k: file.turbine_inlet_temperature.map(|limit| limit.inside),
+            t2_max_k: file.compressor_outlet_temperature.map(|limit| limit.inside),
+            surge_margin_min_ratio: file.surge_margin.map(|limit| limit.inside),
+            housing_gradient_max_k: file.housing_gradient.map(|limit| limit.inside),
+        }
+    }
+}
+
+/// The limits leave room, and the boundary conditions lie within them.
+pub(crate) fn check(check: &mut Check<'_>) {
+    let low = check.quantity(Kind::Pressure, &steps!["limits", "turbine_inlet_pressure", "min"]);
+    let high_path = steps!["limits", "turbine_inlet_pressure", "max"];
+    let high = check.quantity(Kind::Pressure, &high_path);
+    if let (Some((low_pa, low)), Some((high_pa, high))) = (low, high)
+        && low_pa >= high_pa
+    {
+        let message = format!("`{high}` is not above the lowest pressure, `{low}`");
+        check.note(FindingKind::Conflict, &high_path, message, "`max` must be above `min`");
+    }
+    let outlet = check.quantity(Kind::Pressure, &steps!["boundary", "turbine_outlet_pressure"]);
+    if let (Some((outlet_pa, outlet)), Some((high_pa, high))) = (outlet, high)
+        && outlet_pa >= high_pa
+    {
+        let message =
+            format!("`{high}` is not above the turbine outlet pressure, `{outlet}`: the turbine never turns");
+        let remedy = "raise it, or lower `boundary.turbine_outlet_pressure`";
+        check.note(FindingKind::Conflict, &high_path, message, remedy);
+    }
+    let wanted_path = steps!["boundary", "turbine_inlet_temperature"];
+    let wanted = check.quantity(Kind::Temperature, &wanted_path);
+    let limit = check.quantity(Kind::Temperature, &steps!["limits", "turbine_inlet_temperature"]);
+    if let (Some((wanted_k, wanted)), Some((limit_k, limit))) = (wanted, limit)
+        && wanted_k > limit_k
+    {
+        let message = format!("`{wanted}` is above `limits.turbine_inlet_temperature`, `{limit}`");
+        check.note(FindingKind::Conflict, &wanted_path, message, "lower it, or raise the limit");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_lands_in_its_own_field() {
+        let text = "{speed: 180 krpm, turbine_inlet_pressure: {min: 110 kPa, max: 4 bar, stroke: 10 s}, turbine_inlet_temperature: 600 degC, compressor_outlet_temperature: 200 degC, surge_margin: -5 %, housing_gradient: 30 K}";
+        let limits = Limits::from(crate::testing::any::<LimitsFile>(text).unwrap());
+        let near =
+            |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-9 * expected.abs();
+        assert!(near(Some(limits.speed_max_rpm), 180e3) && near(limits.p3_stroke_s, 10.0));
+        assert!(near(Some(limits.p3_min_pa), 110e3) && near(Some(limits.p3_max_pa), 400e3));
+        assert!(near(limits.t3_max_k, 873.15) && near(limits.t2_max_k, 473.15));
+        assert!(near(limits.surge_margin_min_ratio, -0.05) && near(limits.housing_gradient_max_k, 30.0));
+        assert!(near(limits.p3_slew_max_pa_s(), 29e3), "290 kPa in 10 s");
+    }
+}

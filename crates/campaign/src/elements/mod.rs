@@ -1,0 +1,30 @@
+//! The elements of a campaign, one file each: how it is written (struct, schema, range, default), what it becomes in SI,
+//! what it must fit, and the tests of all that.
+//!
+//! Doc comments of what is deserialised become the schema's descriptions, which editors show and messages quote: they
+//! say what to write. `x-quantity`, `x-min`, `x-max` and `x-above` are explained at [`crate::units::Quantity`].
+//!
+//! Where the program's own struct stands in `mapper-core`, the element is its `serde` remote: the compiler compares the
+//! fields of both.
+
+pub(crate) mod backend;
+pub(crate) mod boundary;
+pub(crate) mod display;
+pub(crate) mod drift;
+pub(crate) mod geometry;
+pub(crate) mod grid;
+pub(crate) mod identification;
+pub(crate) mod limits;
+pub(crate) mod machine;
+pub(crate) mod order;
+pub(crate) mod outputs;
+pub(crate) mod reference;
+pub(crate) mod repeats;
+pub(crate) mod report;
+pub(crate) mod sensors;
+pub(crate) mod sequence;
+pub(crate) mod settle_bands;
+pub(crate) mod timing;
+pub(crate) mod tolerances;
+pub(crate) mod window;
+pub(crate) mod zero;

@@ -1,0 +1,26 @@
+//! `order:` and `required_sigma_eta:`, what the order called `time` has to reach. The orders themselves stand in
+//! [`mapper_core::VisitOrder`].
+
+use crate::checking::Check;
+use mapper_core::VisitOrder;
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
+
+/// An order that counts on the method needs one, and the shortest campaign an error to reach.
+pub(crate) fn check(check: &mut Check<'_>) {
+    let path = steps!["order"];
+    let Some(order) = check.text(&path) else { return };
+    if order == VisitOrder::Time.name() && check.get(&steps!["required_sigma_eta"]).is_none() {
+        let message = "the shortest campaign needs the error that it has to reach".to_owned();
+        check.note(FindingKind::MissingKey, &path, message, "add e.g. `required_sigma_eta: 1 %`");
+    }
+    let steady = check.text(&steps!["identification", "method"]) == Some("steady");
+    let counts_on_method =
+        [VisitOrder::Information, VisitOrder::Time].into_iter().any(|needs| needs.name() == order);
+    if steady && counts_on_method {
+        let message =
+            format!("`{order}` orders by what the dynamic method will find; the method is `steady`");
+        let remedy = "write `identification.method: dynamic`, or another order";
+        check.note(FindingKind::Conflict, &path, message, remedy);
+    }
+}

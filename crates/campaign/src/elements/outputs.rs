@@ -1,0 +1,64 @@
+//! `outputs:`
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Directory of the run directories where the file names none.
+const USUAL_DIRECTORY: &str = "runs";
+/// Formats that are written where the file names none.
+const USUAL_FORMATS: [&str; 4] = ["csv", "json", "svg", "fitted"];
+
+/// What is written, and where.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Outputs {
+    /// Directory of the run directories; `runs` where none is given.
+    #[schemars(length(min = 1), example = &"runs")]
+    pub directory: String,
+    /// Formats of the map, each once; csv, json, svg and fitted where none is given. docs/maps.md lists all that can be written.
+    #[schemars(extend("uniqueItems" = true, "examples" = [["csv", "json", "svg"]]))]
+    pub formats: Vec<FormatName>,
+}
+
+/// A format of the map by its name, e.g. `csv`. Which names there are is known to whoever holds the table of formats:
+/// [`crate::format_mistake`] is for a name that is not in it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(inline)]
+pub struct FormatName(#[schemars(length(min = 1), example = &"csv")] pub String);
+
+impl FormatName {
+    /// The name.
+    pub fn name(&self) -> &str {
+        &self.0
+    }
+}
+
+impl std::fmt::Display for FormatName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl Default for Outputs {
+    fn default() -> Self {
+        Outputs {
+            directory: USUAL_DIRECTORY.to_owned(),
+            formats: USUAL_FORMATS.map(|name| FormatName(name.to_owned())).to_vec(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_out_has_its_default() {
+        let read = |text| crate::testing::any::<Outputs>(text).unwrap();
+        assert_eq!(read("{}"), Outputs::default());
+        let one = Outputs { formats: vec![FormatName("npss".to_owned())], ..Outputs::default() };
+        assert_eq!(read("{formats: [npss]}"), one);
+        assert_eq!(read("{directory: elsewhere}").formats, Outputs::default().formats);
+    }
+}

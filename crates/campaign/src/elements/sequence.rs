@@ -1,0 +1,46 @@
+//! `sequence:`, a script in place of an order.
+
+use crate::checking::{Check, beside};
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
+use serde::Serialize;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A sequence script.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SequenceSource {
+    /// Path as resolved from the campaign file. Not part of the canonical JSON: the text is what counts.
+    #[serde(skip)]
+    pub path: PathBuf,
+    /// The script.
+    pub text: String,
+}
+
+/// The script that a campaign names.
+///
+/// # Errors
+/// Where it can no longer be read.
+pub(crate) fn sequence(
+    name: Option<&str>,
+    origin: &Path,
+    files: &dyn Fn(&Path) -> io::Result<String>,
+) -> io::Result<Option<SequenceSource>> {
+    let source = |name: &str| {
+        let path = beside(origin, name);
+        let text = files(&path)?;
+        Ok(SequenceSource { path, text })
+    };
+    name.map(source).transpose()
+}
+
+/// The script can be read.
+pub(crate) fn check(check: &mut Check<'_>) {
+    let steps = steps!["sequence"];
+    let Some(name) = check.text(&steps).filter(|name| name.ends_with(".rhai")) else { return };
+    if let (path, Err(error)) = check.file(name) {
+        let message = format!("the sequence script `{}` cannot be read: {error}", path.display());
+        let remedy = "write its path relative to the campaign file, or leave `sequence` out";
+        check.note(FindingKind::MissingFile, &steps, message, remedy);
+    }
+}

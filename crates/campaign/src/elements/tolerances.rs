@@ -1,0 +1,89 @@
+//! `tolerances:`
+
+use crate::si::si;
+use crate::units::{Duration, Fraction, Quantity};
+use mapper_core::ModelTolerances;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// How far the nominal model may be off without anything being wrong, one standard deviation each. The diagnosis of the gap calls nothing within them an effect.
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(remote = "ModelTolerances", default, deny_unknown_fields)]
+pub(crate) struct TolerancesElement {
+    /// Gain of the compressor's flow meter; 0.5 % where none is given.
+    #[serde(rename = "flow_meter_gain", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.5 %")]
+    flow_meter_gain_ratio: f64,
+    /// Flow of the compressor map; 0.5 % where none is given.
+    #[serde(rename = "flow_map", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.5 %")]
+    flow_map_ratio: f64,
+    /// Efficiency of the compressor map, everywhere alike; 0.5 % where none is given.
+    #[serde(rename = "compressor_efficiency", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.5 %")]
+    compressor_efficiency_ratio: f64,
+    /// Error of the efficiency map that changes smoothly over it; 0.3 % where none is given.
+    #[serde(rename = "efficiency_shape", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.3 %")]
+    efficiency_shape_ratio: f64,
+    /// Efficiency of the turbine; 1 % where none is given.
+    #[serde(rename = "turbine_efficiency", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"1 %")]
+    turbine_efficiency_ratio: f64,
+    /// Area of the back-pressure valve; 0.5 % where none is given.
+    #[serde(rename = "valve_area", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.5 %")]
+    valve_area_ratio: f64,
+    /// Convection between gas and compressor housing; 3 % where none is given.
+    #[serde(rename = "convection", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"3 %")]
+    convection_ratio: f64,
+    /// Convection of both housings to the cell; 10 % where none is given.
+    #[serde(rename = "external_convection", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"10 %")]
+    external_convection_ratio: f64,
+    /// Conductance to the oil; 5 % where none is given.
+    #[serde(rename = "oil_conductance", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"5 %")]
+    oil_conductance_ratio: f64,
+    /// Lag of the turbine inlet pressure behind its command, as declared; 0.3 s where none is given.
+    #[serde(rename = "actuator_lag", deserialize_with = "si::<Duration, _>")]
+    #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "60 s"), example = &"0.3 s")]
+    actuator_lag_s: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::any_with;
+    use crate::units::{Kind, parse};
+
+    #[test]
+    fn what_is_left_out_keeps_its_default() {
+        let read = |text| any_with(text, |yaml| TolerancesElement::deserialize(yaml));
+        let default = ModelTolerances::default();
+        assert_eq!(read("{}").unwrap(), default);
+        let convection = ModelTolerances { convection_ratio: 0.05, ..default };
+        assert_eq!(read("{convection: 5 %}").unwrap(), convection);
+        assert!(read("{convection: 0.05}").is_err() && read("{actuator_lag: 3 %}").is_err());
+    }
+
+    /// Each description names its default, which the program has elsewhere.
+    #[test]
+    fn descriptions_name_the_defaults_that_hold() {
+        let schema = schemars::schema_for!(TolerancesElement);
+        let default = serde_json::to_value(ModelTolerances::default()).unwrap();
+        let properties = schema.get("properties").unwrap().as_object().unwrap();
+        assert_eq!(properties.len(), default.as_object().unwrap().len());
+        for (key, property) in properties {
+            let description = property["description"].as_str().unwrap();
+            let (_, named) = description.rsplit_once("; ").unwrap();
+            let text = named.strip_suffix(" where none is given.").unwrap();
+            let kind = Kind::from_key(property["x-quantity"].as_str().unwrap()).unwrap();
+            let value = parse(kind, text).unwrap();
+            let fields = [format!("{key}_ratio"), format!("{key}_s")];
+            let held = fields.iter().find_map(|field| default[field].as_f64()).unwrap();
+            assert!((held - value).abs() < 1e-12, "{key}: {held} is not {text}");
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! Elements read from a text, for their tests.
+
+use crate::load::DOCUMENT;
+use mapper_yaml::{Notes, Source};
+use serde::de::DeserializeOwned;
+use serde_json::{Error, Value};
+use std::path::Path;
+
+/// The value of a text as an element.
+pub(crate) fn any<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
+    any_with(text, serde_json::from_value)
+}
+
+/// As [`any`], with a reader that is not a `Deserialize` of its own, such as a `serde` remote.
+pub(crate) fn any_with<T>(text: &str, read: impl FnOnce(Value) -> Result<T, Error>) -> Result<T, Error> {
+    let mut notes = Notes::default();
+    let root = mapper_yaml::read(&Source::new(&DOCUMENT, Path::new("test.yaml"), text), &mut notes);
+    read(root.unwrap().to_json())
+}

@@ -1,0 +1,24 @@
+//! Variations within which an operating point counts as settled.
+
+use serde::{Deserialize, Serialize};
+
+/// Largest variation (largest less smallest value) of each quantity, as a ratio of its mean, from some time to the end
+/// of a step: the operating point has settled at that time. What "settled" means is computed in one place, the
+/// `settled` module of `mapper-physics`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SettleBands {
+    /// Shaft speed, ratio.
+    pub speed_ratio: f64,
+    /// Compressor flow, ratio.
+    pub flow_ratio: f64,
+    /// Pressure ratio, ratio.
+    pub pressure_ratio_ratio: f64,
+}
+
+impl Default for SettleBands {
+    /// The typical variations of section 3 of Burke et al.: 0.8 % in speed, 1.5 % in flow, 2 % in pressure ratio.
+    fn default() -> Self {
+        SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 }
+    }
+}

@@ -1,0 +1,62 @@
+//! Which part of a step is used.
+
+use serde::{Deserialize, Serialize};
+
+/// Part of each step that is used by the methods that look at the transient.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WindowRule {
+    /// From where speed, flow and pressure ratio have settled to the end of the step.
+    #[default]
+    Auto,
+    /// From `start_s` to `end_s` after the jump; cut at the step's end.
+    Fixed {
+        /// Start after the jump, s.
+        start_s: f64,
+        /// End after the jump, s; after the start, within the dwell.
+        end_s: f64,
+    },
+}
+
+impl WindowRule {
+    /// An automatic window starts at the earliest this long after the last change of a command, s: what Burke et al.
+    /// typically need, and what probes of 1.5 mm need to follow.
+    pub const EARLIEST_S: f64 = 10.0;
+    /// Shortest useful window, s. A step that settles later gives its last so many seconds, and is doubtful.
+    pub const SHORTEST_S: f64 = 30.0;
+
+    /// Start and end of the window of a step that lasts `dwell_s`, s after its jump, where the operating point settles
+    /// `settle_s` after the jump (`None`: never within the step).
+    pub fn of_step_s(&self, settle_s: Option<f64>, dwell_s: f64) -> (f64, f64) {
+        match *self {
+            WindowRule::Fixed { start_s, end_s } => (start_s, end_s.min(dwell_s)),
+            WindowRule::Auto => {
+                let latest_s = (dwell_s - Self::SHORTEST_S).max(Self::EARLIEST_S);
+                (settle_s.unwrap_or(latest_s).clamp(Self::EARLIEST_S, latest_s), dwell_s)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_of_steps() {
+        let fixed = WindowRule::Fixed { start_s: 10.0, end_s: 110.0 };
+        // (rule, settles after, dwell, window): early, late and never settled; a short step; a cut one.
+        let table = [
+            (WindowRule::Auto, Some(4.0), 120.0, (10.0, 120.0)),
+            (WindowRule::Auto, Some(25.0), 120.0, (25.0, 120.0)),
+            (WindowRule::Auto, Some(110.0), 120.0, (90.0, 120.0)),
+            (WindowRule::Auto, None, 120.0, (90.0, 120.0)),
+            (WindowRule::Auto, None, 25.0, (10.0, 25.0)),
+            (fixed, Some(25.0), 120.0, (10.0, 110.0)),
+            (fixed, None, 90.0, (10.0, 90.0)),
+        ];
+        for (rule, settle_s, dwell_s, window_s) in table {
+            assert_eq!(rule.of_step_s(settle_s, dwell_s), window_s, "{rule:?} {settle_s:?} {dwell_s}");
+        }
+    }
+}

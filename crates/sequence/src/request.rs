@@ -1,0 +1,53 @@
+//! What a sequence is made from: the campaign's points, times and limits, and the nominal machine that judges points.
+
+use mapper_core::{Limits, OperatingPoint, SettleBands, Timing, WindowRule};
+use mapper_physics::follow_outlet::FollowOutlet;
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::reach::{clause, reach};
+use mapper_physics::steady::SteadyState;
+
+/// Asks the planner for the order of a set of points; the error is a sentence for people.
+pub type OrderPoints = Box<dyn Fn(&[OperatingPoint]) -> Result<Vec<OperatingPoint>, String> + Send>;
+
+/// Everything a sequence depends on, beside its script.
+pub struct SequenceRequest {
+    /// The campaign's grid.
+    pub points: Vec<OperatingPoint>,
+    /// Durations; the dwell holds where the script says nothing else.
+    pub timing: Timing,
+    /// Part of a step over which gradients are forecast.
+    pub window: WindowRule,
+    /// When a point counts as settled.
+    pub settle_bands: SettleBands,
+    /// The nominal machine.
+    pub model: Model,
+    /// Nominal boundary conditions; P3 and valve are the steps'.
+    pub boundary: BoundaryConditions,
+    /// What is held at the outlet temperature of each point instead.
+    pub follow_outlet: FollowOutlet,
+    /// What no step may leave.
+    pub limits: Limits,
+    /// The planner.
+    pub order: OrderPoints,
+}
+
+/// Why a step is refused.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Refusal {
+    pub message: String,
+    pub remedy: String,
+}
+
+impl SequenceRequest {
+    /// The steady state at a point, or why no step may go there.
+    pub(crate) fn check(&self, point: OperatingPoint) -> Result<SteadyState, Refusal> {
+        reach(&self.model, point, &self.boundary, self.follow_outlet, &self.limits).map_err(|obstacles| {
+            let (krpm, opening) = (point.speed_rpm / 1e3, point.valve_opening_ratio);
+            Refusal {
+                message: format!("{krpm} krpm at opening {opening} {}", clause(&obstacles)),
+                remedy: obstacles.first().map_or("", |obstacle| obstacle.remedy()).to_owned(),
+            }
+        })
+    }
+}

@@ -100,7 +100,7 @@ pub enum DriftError {
     },
     /// Nothing is left to compare.
     #[error(
-        "no stretch of the recordings can be compared with the model: readings are missing or not numbers, or all of them lie          at the surge line. Look at the channels and their units, and whether the campaign names the machine"
+        "no stretch of the recordings can be compared with the model: readings are missing or not numbers, or all of them lie at the surge line. Look at the channels and their units, and whether the campaign names the machine"
     )]
     NothingComparable,
     /// The model cannot be driven by what was recorded.

@@ -27,6 +27,8 @@ pub fn performance() -> Result<(), Error> {
     transients(&mut page, &release.join("examples/transients"))?;
     whole_run(&mut page, &release.join("mapper"))?;
     identification(&mut page)?;
+    // Measured by hand: a release build from nothing takes minutes, and its parts need a judgement.
+    page.push_str(include_str!("build_time.md"));
     let path = workspace::root().join("docs/performance.md");
     fs::write(&path, &page).map_err(|source| Error::File { path: path.clone(), source })?;
     say(&page);

@@ -1,6 +1,7 @@
 //! Why a command ended early, with what to print and what to return.
 
 use crate::exit_code::Code;
+use mapper_blind::BlindError;
 use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
 use mapper_record::ChannelMapError;
@@ -110,5 +111,18 @@ impl From<SessionError> for Failure {
             }
             error => Failure::new(code, error),
         }
+    }
+}
+
+impl From<BlindError> for Failure {
+    fn from(error: BlindError) -> Self {
+        let code = match error {
+            BlindError::Content { .. }
+            | BlindError::TooLarge { .. }
+            | BlindError::Seal { .. }
+            | BlindError::Cases { .. } => Code::BadInput,
+            _ => Code::Failure,
+        };
+        Failure::new(code, error)
     }
 }

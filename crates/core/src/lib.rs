@@ -24,6 +24,7 @@ mod map_format;
 mod map_format_error;
 mod model_tolerances;
 mod on_drift;
+mod one_line;
 mod operating_point;
 mod plan;
 mod recording;
@@ -56,6 +57,7 @@ pub use map_format::{MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, ReadMap, WriteM
 pub use map_format_error::{ExportError, ImportError};
 pub use model_tolerances::ModelTolerances;
 pub use on_drift::OnDrift;
+pub use one_line::one_line;
 pub use operating_point::OperatingPoint;
 pub use plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
 pub use recording::{Recording, RecordingError, Series};

@@ -122,6 +122,12 @@ pub enum SessionError {
     /// A suspected effect is not an effect.
     #[error(transparent)]
     Effect(Box<dyn std::error::Error + Send + Sync>),
+    /// This program has no way to read effects.
+    #[error("{}: this program does not read effects from files", .path.display())]
+    EffectUnread {
+        /// The file.
+        path: PathBuf,
+    },
     /// A suspected effect has the name of another.
     #[error("{}: there is already an effect `{id}`; choose another name", .path.display())]
     EffectTaken {
@@ -252,6 +258,7 @@ impl SessionError {
             | E::Backend(_)
             | E::Effect(_)
             | E::EffectTaken { .. }
+            | E::EffectUnread { .. }
             | E::ChannelMap(ChannelMapError::Mistakes(_))
             | E::MachineUnknown { .. }
             | E::Import { .. }

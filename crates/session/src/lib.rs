@@ -1,7 +1,35 @@
 //! The application as a library: everything between arguments and words.
 //!
 //! A [`Session`] is opened with the plug-ins it may use, somebody who looks on, and a flag that stops it. The command line,
-//! nightly runs, blind cases and any other program drive the same session.
+//! nightly runs, blind cases and any other program drive the same session. A whole campaign, from its file to its map:
+//!
+//! ```
+//! use mapper_backends::virtual_lab;
+//! use mapper_formats::FORMATS;
+//! use mapper_session::{Registry, RunRequest, Session, SessionEvent};
+//! use std::path::Path;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let registry =
+//!     Registry { backends: vec![virtual_lab::PLUGIN], formats: FORMATS, ..Registry::default() };
+//! let show = |event: &SessionEvent| {
+//!     if let SessionEvent::StepStarted(step) = event {
+//!         println!("step {} at {:.0} s", step.index + 1, step.start_s);
+//!     }
+//! };
+//! let session = Session { on_event: &show, ..Session::new(&registry) };
+//! let file = Path::new("../../campaigns/grid18.yaml");
+//! let (campaign, text) = (mapper_campaign::load(file)?, std::fs::read_to_string(file)?);
+//! let runs = tempfile::tempdir()?;
+//! let results = session.run(RunRequest::new(&campaign, &text, runs.path()))?.results?;
+//! for scored in results.points.iter().filter(|scored| scored.point.eta.is_some()) {
+//!     println!("{:?} h = {:?} W/(m2 K)", scored.point.eta, scored.point.h_w_m2k);
+//! }
+//! let map = results.compressor_map.ok_or("no map")?;
+//! assert_eq!(map.lines.len(), 6, "one line for each speed of the grid");
+//! # Ok(())
+//! # }
+//! ```
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -6,8 +6,8 @@ use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Nightly;
 use mapper_core::Method;
 use mapper_history::{RunKey, RunRow};
+use mapper_numerics::parallel;
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// All runs of a night, ready to start.
@@ -88,28 +88,13 @@ impl Session<'_> {
             .map_err(SessionError::file("create a directory in", &room))?;
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
         let jobs = jobs.unwrap_or(cores).clamp(1, runs.len().max(1));
-        let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let rows: Mutex<Vec<(usize, RunRow)>> = Mutex::new(Vec::new());
-        let work = || -> Result<(), SessionError> {
-            loop {
-                let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(run) = runs.get(index) else { return Ok(()) };
-                let row = self.nightly_run(run, &scratch.path().join(index.to_string()))?;
-                rows.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((index, row));
-                let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                self.tell(SessionEvent::PiecesDone { done, of: runs.len() });
-            }
-        };
-        std::thread::scope(|scope| {
-            let workers: Vec<_> = (0..jobs).map(|_| scope.spawn(work)).collect();
-            workers.into_iter().try_for_each(|worker| match worker.join() {
-                Ok(result) => result,
-                Err(panic) => std::panic::resume_unwind(panic),
-            })
-        })?;
-        let mut rows = rows.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-        rows.sort_by_key(|(index, _)| *index);
-        Ok(rows.into_iter().map(|(_, row)| row).collect())
+        let done = AtomicUsize::new(0);
+        parallel::try_map_on(jobs, runs, |index, run| {
+            let row = self.nightly_run(run, &scratch.path().join(index.to_string()))?;
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            self.tell(SessionEvent::PiecesDone { done, of: runs.len() });
+            Ok(row)
+        })
     }
 
     /// One run in a directory of its own, which is gone afterwards: a night of recordings need not fit on the disk.

@@ -26,6 +26,22 @@ pub struct Registry {
     pub formats: MapFormats,
 }
 
+impl Default for Registry {
+    /// No plug-ins at all.
+    fn default() -> Self {
+        Registry {
+            backends: Vec::new(),
+            effects: Vec::new(),
+            read_effect: no_effect,
+            formats: MapFormats(&[]),
+        }
+    }
+}
+
+fn no_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
+    Err(SessionError::EffectUnread { path: path.to_owned() })
+}
+
 impl Registry {
     /// The backend that a campaign asks for.
     ///

@@ -36,6 +36,13 @@ pub struct RunRequest<'a> {
     pub started_name: &'a str,
 }
 
+impl<'a> RunRequest<'a> {
+    /// A run on a simulated rig, whose time begins at 0: its directory is `<parent>/<campaign>-run`.
+    pub fn new(campaign: &'a Campaign, campaign_text: &'a str, parent: &'a Path) -> Self {
+        RunRequest { campaign, campaign_text, plan: None, parent, started_ns: 0, started_name: "run" }
+    }
+}
+
 /// A run that is ready to start: nothing has been touched yet.
 pub struct PreparedRun<'a> {
     request: RunRequest<'a>,

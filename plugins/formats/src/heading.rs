@@ -1,6 +1,6 @@
 //! What every text format says first: machine, reference state.
 
-use mapper_core::{CompressorMap, Method};
+use mapper_core::{CompressorMap, Method, one_line};
 
 /// Two comment lines that begin with `mark`.
 pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
@@ -10,13 +10,6 @@ pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
          {mark} reference state of corrected flow and speed: {t_ref_k} K, {p_ref_pa} Pa\n",
         if map.machine.is_empty() { "unnamed machine".to_owned() } else { one_line(&map.machine) },
     )
-}
-
-/// A name that cannot end a comment.
-pub(crate) fn one_line(name: &str) -> String {
-    name.chars()
-        .map(|c| if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') { ' ' } else { c })
-        .collect()
 }
 
 /// What the efficiency of a method is called.

@@ -6,7 +6,6 @@
 
 mod fitted_items;
 mod heading;
-mod heat_picture;
 mod labels;
 mod lines;
 mod map_picture;
@@ -14,16 +13,11 @@ mod monotone;
 mod reference;
 mod simulation_table;
 mod surface;
-mod thermal;
-mod turbine;
 
-pub use heat_picture::{ErrorAtGradient, error_figure, heat_transfer_figure};
 pub use lines::POINT_LIMIT;
 pub use map_picture::{map_figure, map_panel};
 pub use reference::parse_reference;
 pub use surface::efficiency_surface;
-pub use thermal::ThermalExport;
-pub use turbine::{TurbinePoint, turbine_points, turbine_text};
 
 use mapper_core::MapFormats;
 

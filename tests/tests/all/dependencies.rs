@@ -35,7 +35,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Words, pages and pictures made from data.
     ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "assemble", "gap", "drift", "history", "score"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "observe", "identify", "gap", "drift", "history", "assemble", "score", "report", "formats"]),
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "observe", "identify", "gap", "drift", "history", "assemble", "score", "report", "numerics"]),
     // The program names the plug-ins; nothing sees the program.
     ("mapper-cli",       &["core", "physics", "campaign", "planner", "sequence", "record", "drift", "history", "assemble", "reproduce", "report", "session", "backends", "blind", "effects", "formats"]),
     // Tests run the program and read its files; chores know nothing of it.

@@ -1,10 +1,8 @@
 //! `mapper gap blind`: the check of the diagnosis on withheld data.
 
-use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::subcommands::subcommands;
 use clap::Args;
-use mapper_blind::BlindError;
 
 mod calibrate;
 mod make;
@@ -26,15 +24,4 @@ impl Blind {
     pub fn run(&self) -> Result<(), Failure> {
         self.command.run()
     }
-}
-
-fn of_blind(error: BlindError) -> Failure {
-    let code = match error {
-        BlindError::Content { .. }
-        | BlindError::TooLarge { .. }
-        | BlindError::Seal { .. }
-        | BlindError::Cases { .. } => Code::BadInput,
-        _ => Code::Failure,
-    };
-    Failure::new(code, error)
 }

@@ -1,6 +1,5 @@
 //! `mapper gap blind calibrate`.
 
-use super::of_blind;
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::{output, registry};
@@ -51,7 +50,7 @@ impl Calibrate {
         };
         let found = calibrate(&campaign, &registry::registry().effects, &plan, made_by, &tell);
         progress.clear();
-        let (calibration, observed) = found.map_err(of_blind)?;
+        let (calibration, observed) = found?;
         write_new(&self.out, json_text(&calibration)?.as_bytes())?;
         if let Some(file) = &self.observed {
             write_new(file, json_text(&observed)?.as_bytes())?;

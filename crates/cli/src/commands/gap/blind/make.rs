@@ -1,6 +1,5 @@
 //! `mapper gap blind make`.
 
-use super::of_blind;
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::{output, registry};
@@ -79,7 +78,7 @@ impl Make {
         let done = |done| progress.pieces(done, self.cases);
         let made = mapper_blind::make(&campaign, &registry::registry().effects, &draw, &self.out, &done);
         progress.clear();
-        let made = made.map_err(of_blind)?;
+        let made = made?;
         if self.json {
             return output::print_json(&json!({
                 "directory": self.out,

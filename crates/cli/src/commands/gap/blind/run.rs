@@ -1,6 +1,5 @@
 //! `mapper gap blind run`.
 
-use super::of_blind;
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::output;
@@ -25,7 +24,7 @@ impl Run {
     /// Diagnoses each recording in a process of its own, as anybody would: `mapper gap diagnose ... --json`.
     pub fn run(&self) -> Result<(), Failure> {
         let failure = |message: String| Failure::new(Code::Failure, message);
-        let manifest = Manifest::read(&self.directory.join(MANIFEST_NAME)).map_err(of_blind)?;
+        let manifest = Manifest::read(&self.directory.join(MANIFEST_NAME))?;
         let program = std::env::current_exe().map_err(|error| failure(error.to_string()))?;
         let progress = Progress::new();
         let mut failed = Vec::new();

@@ -1,6 +1,5 @@
 //! `mapper gap blind score`.
 
-use super::of_blind;
 use crate::failure::Failure;
 use crate::output;
 use clap::Args;
@@ -25,9 +24,9 @@ pub struct Score {
 impl Score {
     /// Opens the seal and prints the table.
     pub fn run(&self) -> Result<(), Failure> {
-        let score = score(&self.directory).map_err(of_blind)?;
+        let score = score(&self.directory)?;
         if self.open {
-            open_answers(&self.directory).map_err(of_blind)?;
+            open_answers(&self.directory)?;
         }
         if self.json {
             return output::print_json(&score);

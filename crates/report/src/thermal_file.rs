@@ -1,7 +1,6 @@
 //! The thermal model of the machine for other programs: convection law, alpha_A, heat capacities, conductances.
 
-use crate::heading::one_line;
-use mapper_core::{ExportError, Origin, SharedValue, ThermalModel};
+use mapper_core::{Origin, SharedValue, ThermalModel, one_line};
 use mapper_physics::housing::{bearing_conductance_w_k, compressor_capacity_j_k, turbine_capacity_j_k};
 use mapper_physics::params::Params;
 use serde_json::json;
@@ -25,8 +24,8 @@ impl ThermalExport<'_> {
     /// One JSON object; keys carry units, what the recording did not give is marked `declared`.
     ///
     /// # Errors
-    /// [`ExportError::Failed`].
-    pub fn json(&self) -> Result<Vec<u8>, ExportError> {
+    /// That of serde_json; numbers and texts never fail.
+    pub fn json(&self) -> Result<Vec<u8>, serde_json::Error> {
         let (params, compressor) = (self.params, &self.params.compressor);
         let mut bytes = serde_json::to_vec_pretty(&json!({
             "machine": self.machine,
@@ -47,8 +46,7 @@ impl ThermalExport<'_> {
                 "bearing_to_oil_conductance_w_k": params.bearing.oil_conductance_w_k,
                 "t2_probe_diameter_m": params.t2_probe_diameter_m,
             },
-        }))
-        .map_err(ExportError::failed("json"))?;
+        }))?;
         bytes.push(b'\n');
         Ok(bytes)
     }

@@ -5,8 +5,7 @@
 //! housing that still warms up makes it too low. Shaft acceleration is not corrected for: the speed has settled. The gas
 //! is taken for air. Expansion is from the total inlet pressure to the outlet pressure as tapped.
 
-use crate::heading::one_line;
-use mapper_core::{Channel, IdentifiedPoint, Recording};
+use mapper_core::{Channel, IdentifiedPoint, Recording, one_line};
 use mapper_physics::air;
 use mapper_physics::compression::isentropic_rise_ratio;
 use serde::Serialize;

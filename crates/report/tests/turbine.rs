@@ -3,10 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 #[allow(dead_code)]
+#[path = "../../../plugins/formats/tests/support/mod.rs"]
 mod support;
 
 use mapper_core::{Channel, IdentifiedPoint, OperatingPoint, Recording, Series, StepKind, StepMarker};
-use mapper_formats::{turbine_points, turbine_text};
+use mapper_report::{turbine_points, turbine_text};
 
 /// Steady states of the nominal model at openings 0.5 and 1 (docs/physics.md; T1 298.15 K, P1 100 kPa, T3 773.15 K, P4
 /// 110 kPa): speed rpm, P3 Pa, P2 Pa, compressor flow kg/s, turbine flow kg/s, efficiency, T4 K. The turbine's

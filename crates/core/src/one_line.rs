@@ -1,0 +1,18 @@
+//! Names in files of other programs.
+
+/// A name that cannot end a comment: control characters and line separators become blanks.
+pub fn one_line(name: &str) -> String {
+    name.chars()
+        .map(|c| if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') { ' ' } else { c })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::one_line;
+
+    #[test]
+    fn no_line_ends_within() {
+        assert_eq!(one_line("a\nb\u{2028}c\rd"), "a b c d");
+    }
+}

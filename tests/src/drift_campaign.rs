@@ -13,7 +13,7 @@ pub struct DriftCampaign<'a> {
     pub seed: u32,
     /// Speeds of the grid at openings 0.55 (0.5 is beyond the surge line of some rigs), 0.7 and 1.0.
     pub speeds: &'a str,
-    /// Most steps between repeats of the jump from 70 to 130 krpm.
+    /// Maximum number of steps between repeats of the jump from 70 to 130 krpm.
     pub every: u32,
     /// Further lines at the top level.
     pub more: &'a str,

@@ -20,7 +20,7 @@ usage: cargo xtask COMMAND
 
   quick          formatting, lints and the tests that are fast: while working; names what it leaves out
   test           run every test of the repository; installs what they need, skips nothing
-  docs           make the generated documents anew
+  docs           make the generated documents again
   docs --check   fail where a generated document is not what the program makes now
   performance    measure, beside peers where they can be built, and write docs/performance.md
 ";

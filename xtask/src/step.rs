@@ -39,7 +39,7 @@ impl Steps {
             say(&format!("{:>8.1} s  {verdict:6}  {name}\n", took.as_secs_f64()));
         }
         let total: Duration = self.done.iter().map(|(_, took, _)| *took).sum();
-        say(&format!("{:>8.1} s  in all\n", total.as_secs_f64()));
+        say(&format!("{:>8.1} s  in total\n", total.as_secs_f64()));
         let failed: Vec<_> =
             self.done.into_iter().filter(|(.., well)| !well).map(|(name, ..)| name).collect();
         if failed.is_empty() { Ok(()) } else { Err(Error::Steps { failed }) }

@@ -1,6 +1,6 @@
 //! Why points make no map.
 
-use mapper_core::Method;
+use mapper_core::{Method, with_unit};
 
 /// Why points make no map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -10,7 +10,8 @@ pub enum AssembleError {
     NoPoints,
     /// A coordinate of a point is not a number, so that it has no place on the map.
     #[error(
-        "step {step}: {quantity} is {value} {unit}, so the point has no place on the map; leave the step out or repair the channel"
+        "step {step}: {quantity} is {}, so the point has no place on the map; leave the step out or repair the channel",
+        with_unit(value, unit)
     )]
     NoPlace {
         /// Index of the step.
@@ -34,7 +35,7 @@ pub enum AssembleError {
         /// Method of the point.
         found: Method,
     },
-    /// The gap between speed lines is no usable number.
+    /// The gap between speed lines is not a usable number.
     #[error("the speed gap is {speed_gap_ratio}; it must be above 0 and below 1, e.g. 0.04")]
     SpeedGap {
         /// What was given.

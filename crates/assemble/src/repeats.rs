@@ -1,4 +1,4 @@
-//! Repeats were made to see drift: they are no points of the map.
+//! Repeats were made to see drift: they are not points of the map.
 
 use mapper_core::{IdentifiedPoint, StepKind, Verdict};
 

@@ -84,7 +84,7 @@ proptest! {
 
     #[test]
     fn well_separated_speeds_are_found_without_targets(scatter in proptest::collection::vec(-0.01..0.01f64, 32)) {
-        // Lines 10 % or more apart, held within 1 %: the least gap is 7.8 %, the largest step within a line 2 %.
+        // Lines 10 % or more apart, held within 1 %: the smallest gap is 7.8 %, the largest step within a line 2 %.
         let lines: [f64; 8] = [50e3, 65e3, 80e3, 95e3, 110e3, 125e3, 140e3, 155e3];
         let points: Vec<_> = scatter.iter().enumerate()
             .map(|(i, s)| point(i, None, lines[i % 8] * (1.0 + s), 0.02 + 0.001 * i as f64)).collect();

@@ -80,7 +80,7 @@ fn lines_that_were_left_out_are_found() {
 #[test]
 fn a_machine_of_other_shape_is_found_too_with_and_without_noise() {
     let eta = |line: &LeftOutLine| line.eta.unwrap();
-    // The closed form is no member of the family (its efficiency is a parabola of flow, with a kink in its peak): what
+    // The closed form is not a member of the family (its efficiency is a parabola of flow, with a kink in its peak): what
     // remains without noise is the family's error.
     let exact = turbo_a(0.0, 1);
     let fitted = MapFit::new(&exact).unwrap();
@@ -223,7 +223,7 @@ fn two_maps_are_compared_in_units_and_in_their_uncertainty() {
     let other = compare(&first, &better).unwrap();
     assert!((other.eta_mean - same.eta_mean - 0.06).abs() < 0.005);
     assert!(other.eta_differs_ratio > 0.9);
-    // A change of the reference state is no difference.
+    // A change of the reference state is not a difference.
     let turned = compare(&first, &second.at_reference(mapper_core::ReferenceState::GARRETT)).unwrap();
     assert!((turned.eta_rms - same.eta_rms).abs() < 2e-3 && turned.distance_rms_ratio < 0.01);
 }

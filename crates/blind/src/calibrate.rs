@@ -142,7 +142,7 @@ fn errors_sigma(case: &Case, study: &Study, fit: &Fit) -> Vec<f64> {
 
 /// Share of the effect-free cases that stay below the threshold.
 const QUIET: f64 = 0.985;
-/// Least threshold: odds of e^3 for the cause, whatever the effect-free cases say.
+/// Minimum threshold: odds of e^3 for the cause, whatever the effect-free cases say.
 const LEAST_THRESHOLD: f64 = 3.0;
 /// Weakest signature that temperature and logistic are fitted to, sigmas: an outside cause that can hardly be seen cannot be
 /// told from one inside, and would teach the logistic to doubt everything.

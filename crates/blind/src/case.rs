@@ -163,7 +163,7 @@ mod tests {
         assert_eq!(seen.len(), catalogue.len());
     }
 
-    /// What is reserved is no candidate, and what calibrates is not what is checked.
+    /// What is reserved is not a candidate, and what calibrates is not what is checked.
     #[test]
     fn outside_causes_are_apart_from_the_catalogue_and_from_each_other() {
         let ids = |kinds: Vec<Arc<dyn Effect>>| -> Vec<String> {

@@ -85,7 +85,7 @@ pub enum BlindError {
     Cases {
         /// Number asked for.
         cases: usize,
-        /// Most that can be made at once.
+        /// Maximum that can be made at once.
         most: usize,
     },
 }

@@ -12,7 +12,7 @@ pub enum CaseKind {
     Single,
     /// Two effects of the catalogue.
     Pair,
-    /// A cause that is no candidate.
+    /// A cause that is not a candidate.
     Outside,
 }
 

@@ -1,7 +1,7 @@
 //! The check of the gap diagnosis on withheld data: draws cases on the virtual lab, seals their causes, scores diagnoses.
 //!
 //! [`make`] writes recordings and sealed answers, [`score`](score::score) opens them. What diagnoses is not this crate's
-//! business: it sees recordings alone. The causes reserved as "outside" live here and are no part of the catalogue.
+//! business: it sees recordings alone. The causes reserved as "outside" live here and are not part of the catalogue.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

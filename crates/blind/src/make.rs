@@ -15,7 +15,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Most cases of one directory.
+/// Maximum number of cases of one directory.
 const MOST_CASES: usize = 100_000;
 
 /// What was made.

@@ -1,4 +1,4 @@
-//! Causes that are no candidates of the diagnosis: reserved ones for the check, other ones for calibration.
+//! Causes that are not candidates of the diagnosis: reserved ones for the check, other ones for calibration.
 //!
 //! They are effects like those of the catalogue and never part of it. Their ids begin with `X_`: that is how answers tell
 //! them.

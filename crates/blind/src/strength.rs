@@ -14,7 +14,7 @@ pub trait Ruler {
 
 /// Relative distance from the wanted length that is near enough.
 const NEAR_RATIO: f64 = 0.1;
-/// Most looks for a strength.
+/// Maximum number of looks for a strength.
 const LOOKS: usize = 6;
 /// Share of the housing that an inner wall takes.
 const INNER_SHARE: std::ops::Range<f64> = 0.15..0.6;

@@ -128,7 +128,7 @@ pub(crate) struct CampaignFile {
     zero: Option<ZeroFile>,
     /// How efficiency and heat-transfer coefficient are found.
     identification: Option<IdentificationFile>,
-    /// Order of the points. `sum_gradient`, the default, makes the thermal gradients large in all, `worst_gradient` the smallest of them; `information` makes the predicted error of the efficiency small; `time` makes the campaign short and chooses each dwell; `greedy` looks one step ahead; `listed` keeps the order of the grid.
+    /// Order of the points. `sum_gradient`, the default, maximises the sum of the thermal gradients, `worst_gradient` the smallest of them; `information` minimises the predicted error of the efficiency; `time` makes the campaign as short as possible and chooses each dwell; `greedy` looks one step ahead; `listed` keeps the order of the grid.
     #[serde(default)]
     order: VisitOrder,
     /// A rhai script that says which step comes next, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/sequences.md says what it may call.
@@ -147,7 +147,7 @@ pub(crate) struct CampaignFile {
     seed: Option<u64>,
     /// What the run must never leave.
     limits: LimitsFile,
-    /// State to which corrected flow and speed refer: SAE (298 K, 100 kPa), Garrett (545 degR, 13.95 psia), BorgWarner (293 K, 98.1 kPa), or `temperature` and `pressure`. SAE where none is given.
+    /// State to which corrected flow and speed refer: SAE (298 K, 100 kPa), Garrett (545 degR, 13.95 psia), BorgWarner (293 K, 98.1 kPa), or `temperature` and `pressure`. SAE if none is given.
     #[schemars(example = &"SAE")]
     reference: Option<ReferenceFile>,
     /// What is written, and where.

@@ -143,7 +143,7 @@ fn finish(
     let file: CampaignFile = match root.deserialise() {
         Ok(file) => file,
         Err(ReadError { steps, source: error }) => {
-            let remedy = "put the value into quotes, or write it more plainly".to_owned();
+            let remedy = "put the value into quotes, or write it in a simpler form".to_owned();
             let kind = FindingKind::WrongValue;
             notes.push(source.finding(
                 kind,
@@ -162,7 +162,7 @@ fn finish(
             let map = steps!["machine", "map", "file"];
             let sequence = steps!["sequence"];
             let steps: &[Step] = if root.get(&map).is_some() { &map } else { &sequence };
-            let message = format!("a file of the campaign cannot be read any more: {error}");
+            let message = format!("a file of the campaign can no longer be read: {error}");
             let remedy = "write its path relative to the campaign file".to_owned();
             let kind = FindingKind::MissingFile;
             notes.push(source.finding(kind, path_text(steps), root.place(steps), message, remedy));

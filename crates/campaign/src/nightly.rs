@@ -71,7 +71,7 @@ struct NightlyFile {
     /// Name; nights of other names are never compared.
     #[schemars(regex(pattern = r"\S"), example = &"turbo_a")]
     nightly: String,
-    /// File of the history, relative to the working directory; `runs/history.db` where none is given.
+    /// File of the history, relative to the working directory; `runs/history.db` if none is given.
     #[schemars(example = &"runs/history.db")]
     history: Option<PathBuf>,
     /// How the band of earlier nights is made.
@@ -97,10 +97,10 @@ struct GroupFile {
     /// The campaign file, relative to this file.
     #[schemars(length(min = 1), example = &"nightly/turbo_a.yaml")]
     campaign: PathBuf,
-    /// Methods by which each recording is identified; the campaign's own where none is given.
+    /// Methods by which each recording is identified; the campaign's own if none is given.
     #[schemars(extend("uniqueItems" = true, "examples" = [["dynamic", "steady"]]))]
     methods: Option<Vec<String>>,
-    /// Seeds, whole numbers from 0; the campaign's own where none is given.
+    /// Seeds, whole numbers from 0; the campaign's own if none is given.
     #[schemars(extend("uniqueItems" = true, "examples" = [[1, 2, 3]]))]
     seeds: Option<Vec<u64>>,
 }
@@ -133,7 +133,7 @@ fn check(text: &str, path: &Path) -> Result<Nightly, Findings> {
                     steps,
                     kind: FindingKind::WrongValue,
                     message: error.to_string(),
-                    remedy: "write it more plainly",
+                    remedy: "write it in a simpler form",
                 }],
             };
             for Mistake { steps, kind, message, remedy } in mistakes {
@@ -161,7 +161,7 @@ fn nightly(file: NightlyFile, folder: &Path) -> Result<Nightly, Vec<Mistake>> {
             mistakes.push(Mistake {
                 steps: steps!["runs", index, "campaign"].to_vec(),
                 kind: FindingKind::Duplicate,
-                message: format!("the campaign {} stands in `runs` twice", group.campaign.display()),
+                message: format!("the campaign {} appears twice in `runs`", group.campaign.display()),
                 remedy: "name it once with all its methods and seeds",
             });
         }
@@ -180,7 +180,7 @@ fn nightly(file: NightlyFile, folder: &Path) -> Result<Nightly, Vec<Mistake>> {
         mistakes.push(Mistake {
             steps: steps!["runs"].to_vec(),
             kind: FindingKind::Range,
-            message: format!("it asks for {runs} runs; 1 to {RUNS_LIMIT} can be made"),
+            message: format!("it asks for {runs} runs; 1 to {RUNS_LIMIT} are allowed"),
             remedy: "name at least one campaign, and fewer methods or seeds if there are too many runs",
         });
     }

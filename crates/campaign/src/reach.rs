@@ -23,7 +23,7 @@ pub struct Unreachable {
 /// The nominal model of a campaign, on its map.
 ///
 /// # Errors
-/// [`MapError`] where the map file's text is no map; a checked campaign has none.
+/// [`MapError`] where the map file's text is not a map; a checked campaign has none.
 pub fn nominal_model(campaign: &Campaign) -> Result<Model, MapError> {
     let params = campaign.machine.params;
     let map: Arc<dyn CompressorCharacteristic> = match &campaign.machine.map {

@@ -206,7 +206,7 @@ fn units() {
         "dwell: [120 s]",
         Kind::WrongType,
         "dwell",
-        "a list stands where a time is needed",
+        "a list is given where a time is needed",
         "e.g. `120 s`",
     );
     one(
@@ -269,10 +269,10 @@ fn types_and_names() {
         "map: closedform",
         Kind::WrongValue,
         "closedform",
-        "`closedform` is none of closed_form",
+        "`closedform` is not one of closed_form",
         "did you mean `closed_form`?",
     );
-    one("map: closed_form", "map: 3", Kind::WrongType, "3", "`3` is none of the forms", "closed_form");
+    one("map: closed_form", "map: 3", Kind::WrongType, "3", "`3` is not one of the forms", "closed_form");
     one("[0.7, 1.0]", "[0.7, 2.6]", Kind::Range, "2.6", "2.6 is too high", "at most 2.5");
     one("[0.7, 1.0]", "[0.7, -0.1]", Kind::Range, "-0.1", "-0.1 is too low", "above 0");
     one("[0.7, 1.0]", "[0.7, .nan]", Kind::WrongValue, ".nan", "not a finite number", "write a number");
@@ -298,7 +298,7 @@ fn types_and_names() {
         "campaign: short\nreport: {calibration: {T2: 2026-02-30}}\n",
         Kind::WrongValue,
         "2026-02-30",
-        "no day of the calendar",
+        "not a calendar date",
         "2026-09-01",
     );
     one(

@@ -1,6 +1,6 @@
 //! The one seam between a real and a simulated gas stand.
 
-use crate::{Channel, SampleBatch};
+use crate::{Channel, SampleBatch, with_unit};
 use serde::{Deserialize, Serialize};
 
 /// Whether gas flows.
@@ -99,7 +99,11 @@ pub enum BackendError {
         needed: &'static str,
     },
     /// A setpoint outside what the rig can do.
-    #[error("{quantity} = {value} {unit} is outside what the rig can do ({low} to {high} {unit})")]
+    #[error(
+        "{quantity} = {} is outside what the rig can do ({low} to {})",
+        with_unit(value, unit),
+        with_unit(high, unit)
+    )]
     SetpointOutOfRange {
         /// Which setpoint.
         quantity: &'static str,

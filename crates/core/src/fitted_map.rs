@@ -67,7 +67,7 @@ pub struct FittedMap {
     pub lines: Vec<FittedLine>,
     /// Root mean square of the points' orthogonal distance from their fitted line (measure as in [`LeftOutLine`]).
     pub distance_rms_ratio: f64,
-    /// Root mean square of the points' efficiency less the fitted one, fraction.
+    /// Root mean square of the points' efficiency minus the fitted one, fraction.
     pub eta_rms: f64,
     /// Scatter of whole lines about the smooth surface (errors of speed, of the day): of flow, ratio.
     pub line_scatter_ratio: f64,

@@ -38,6 +38,7 @@ mod thermal_model;
 mod timing;
 mod visit_order;
 mod window_rule;
+mod with_unit;
 
 pub use backend::{Backend, BackendCause, BackendError, RigDescription, RigMode, Setpoints};
 pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
@@ -69,3 +70,4 @@ pub use thermal_model::{ConvectionLaw, Entangled, Origin, ProfilePoint, SharedVa
 pub use timing::Timing;
 pub use visit_order::VisitOrder;
 pub use window_rule::WindowRule;
+pub use with_unit::with_unit;

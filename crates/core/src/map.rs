@@ -23,7 +23,7 @@ pub struct MapPoint {
 /// to speed, isentropic head to its square, efficiency unchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SpeedShift {
-    /// Corrected speed of the line less that of the point, rpm.
+    /// Corrected speed of the line minus that of the point, rpm.
     pub speed_corrected_rpm: f64,
     /// Added to the measured corrected flow, kg/s.
     pub flow_corrected_kg_s: f64,

@@ -92,7 +92,7 @@ impl MapFormats {
     }
 
     /// The format in which a file of this name is written, whatever its capitals. The longest extension counts:
-    /// `map.fitted.csv` is no plain CSV.
+    /// `map.fitted.csv` is not plain CSV.
     pub fn written_to(self, file_name: &str) -> Option<&'static MapFormat> {
         let file_name = file_name.to_ascii_lowercase();
         self.written()

@@ -17,7 +17,7 @@ pub enum ExportError {
         source: Cause,
     },
     /// A coordinate is not a number: JSON would turn it into null, and the file could not be read back.
-    #[error("step {step}: {quantity} is {value}; the format cannot hold it, leave the point out of the map")]
+    #[error("step {step}: {quantity} is {value}; the format cannot hold it; leave the point out of the map")]
     NotFinite {
         /// Index of the step.
         step: usize,
@@ -121,7 +121,7 @@ pub enum ImportError {
     /// Not a map in JSON.
     #[error("not a map as `mapper` writes it: {0}")]
     Json(#[from] serde_json::Error),
-    /// A field of a JSON map is no sensible number.
+    /// A field of a JSON map is not a sensible number.
     #[error("{place}: {quantity} = {value} has no meaning; it must be {needed}")]
     Field {
         /// Which line and point of the map.
@@ -135,7 +135,7 @@ pub enum ImportError {
     },
     /// The corrected quantities refer to nothing.
     #[error(
-        "the map does not say to which state its corrected flows and speeds refer; give `--reference`: {}, or \"298 K, 100 kPa\"",
+        "the map does not give the reference state of its corrected flows and speeds; give `--reference`: {}, or \"298 K, 100 kPa\"",
         crate::usual_references()
     )]
     NoReference,

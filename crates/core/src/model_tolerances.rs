@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// One-sigma tolerances of the nominal model, ratios to the nominal value: a deviation within them is no effect.
+/// One-sigma tolerances of the nominal model, ratios to the nominal value: a deviation within them is not an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ModelTolerances {

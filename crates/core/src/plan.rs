@@ -26,7 +26,7 @@ pub struct Predicted {
     /// Relative standard error of the heat-transfer coefficient; `None` where it was not forecast.
     pub sigma_h_rel: Option<f64>,
     /// Error that the identification method itself makes of the efficiency, without noise (fraction, signed): its
-    /// result less the model's own mean over the window. `None` where it was not forecast.
+    /// result minus the model's own mean over the window. `None` where it was not forecast.
     #[serde(default)]
     pub bias_eta: Option<f64>,
     /// The same of the heat-transfer coefficient, relative.

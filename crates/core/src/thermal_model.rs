@@ -74,12 +74,12 @@ pub struct Entangled {
     pub correlation: f64,
 }
 
-/// One point of a profile: a number held at a value, all others fitted anew.
+/// One point of a profile: a number held at a value, all others fitted again.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ProfilePoint {
     /// The value, unit of the number.
     pub value: f64,
-    /// Sum of squared residuals in standard deviations, less that of the best point of the profile: below 3.84 the
+    /// Sum of squared residuals in standard deviations, minus that of the best point of the profile: below 3.84 the
     /// recording allows the value at 95 %.
     pub square: f64,
 }
@@ -102,7 +102,7 @@ pub struct ThermalModel {
     pub direction_factor: SharedValue,
     /// Offsets of readings (reading less true value), by channel, K or Pa.
     pub offsets: BTreeMap<Channel, SharedValue>,
-    /// Numbers that are hardly told apart (correlation beyond 0.95 in size).
+    /// Numbers that can hardly be told apart (correlation beyond 0.95 in size).
     pub entangled: Vec<Entangled>,
     /// What speaks against the model, one sentence each; empty where nothing does.
     pub doubts: Vec<String>,

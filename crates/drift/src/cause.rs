@@ -1,6 +1,7 @@
 //! What may drift.
 
-use mapper_core::{Channel, Dimension};
+use mapper_core::{Channel, Dimension, with_unit};
+use mapper_physics::bearing_friction::at_150_krpm;
 use serde::{Serialize, Serializer};
 
 /// One thing that may drift.
@@ -75,6 +76,14 @@ impl Cause {
             Cause::Sensor(channel) => channel.info().dimension.unit(),
             Cause::Fouling => "1",
             Cause::BearingFriction => "W s^2/rad^2",
+        }
+    }
+
+    /// A size of it for people, SI: a ratio without a unit, friction also as its power at 150 krpm.
+    pub fn show(self, size: f64) -> String {
+        match self {
+            Cause::BearingFriction => format!("{size:.2e} {} ({})", self.unit(), at_150_krpm(size)),
+            _ => with_unit(format!("{size:.4}"), self.unit()),
         }
     }
 

@@ -60,36 +60,39 @@ pub(crate) fn conclude(
 fn reason(decision: &Decision, fit: &Fit, verdict: DriftVerdict) -> String {
     let left_out = match decision.left_out {
         (0, _) => String::new(),
-        (count, all) => format!("; {count} of {all} stretches are left out, the model cannot follow them"),
+        (count, all) => {
+            format!("; {count} of {all} stretches are left out because the model cannot follow them")
+        }
     };
     let compared = format!(
-        "the best cause has an evidence of {:.1}, one drift-free campaign in a hundred reaches {:.1}{left_out}",
+        "the best cause has an evidence of {:.1}; one drift-free campaign in a hundred reaches {:.1}{left_out}",
         decision.evidence, decision.threshold
     );
     if verdict == DriftVerdict::None {
         return format!("Nothing drifted: {compared}.");
     }
-    let unit = decision.cause.unit();
     let size = match size(fit) {
-        RateOrStep::RatePerH(rate) => format!("drifts by {rate:.4} {unit} per hour from"),
-        RateOrStep::Step(step) => format!("steps by {step:.4} {unit} at"),
+        RateOrStep::RatePerH(rate) => format!("drifts by {} per hour from", decision.cause.show(rate)),
+        RateOrStep::Step(step) => format!("steps by {} at", decision.cause.show(step)),
     };
     let what = format!("{} {size} {:.0} s on", decision.cause, fit.course.onset_s);
     let corrected = match decision.cause {
         Cause::Sensor(channel) => format!(
-            "The corrected points have this taken off the reading of {}; the recording is as it was.",
+            "The corrected points have this subtracted from the reading of {}; the recording is unchanged.",
             channel.symbol()
         ),
         Cause::Fouling => {
-            "The corrected points have their efficiency brought to the machine at the campaign's start.".to_owned()
+            "The efficiency of the corrected points is that of the machine at the campaign's start."
+                .to_owned()
         }
         Cause::BearingFriction => {
-            "Friction leaves the efficiency of the compressor as it is; the corrected points are the fitted ones.".to_owned()
+            "Friction does not change the compressor's efficiency; the corrected points are the fitted ones."
+                .to_owned()
         }
     };
     match verdict {
         DriftVerdict::Unclear => format!(
-            "Something drifted ({compared}), but the recording does not tell what; most probable: {what}. {corrected}"
+            "Something drifted ({compared}), but the recording does not show what; most probable: {what}. {corrected}"
         ),
         _ => format!("{what} ({compared}). {corrected}"),
     }

@@ -22,7 +22,7 @@ use nalgebra::{DMatrix, DVector};
 const SURGE_LIMIT: f64 = 0.97;
 /// Begin of each run that is left out, s: what the rig did before is not known, and rigs are still settling.
 const FIRST_S: f64 = 30.0;
-/// What the model leaves unexplained in the mean of a stretch, over the noise of one sample.
+/// What the model leaves unexplained on average over a stretch, over the noise of one sample.
 const MODEL_FLOOR: f64 = 0.15;
 
 /// Says whether anything drifted, and what.

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Onsets on the fine grid of the cause that is found.
 const FINE_ONSETS: usize = 280;
-/// Evidence that is no difference.
+/// Evidence that is not a difference.
 const AS_GOOD: f64 = 0.1;
 /// A cause with its best course and size.
 pub(crate) struct Fit {

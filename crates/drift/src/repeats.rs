@@ -14,7 +14,7 @@ const GAP_S: f64 = 3.0;
 pub(crate) fn groups(steps: &[CampaignStep]) -> Vec<Vec<usize>> {
     let mut by_jump: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (position, step) in steps.iter().enumerate() {
-        // A change too small to tell from staying is no jump.
+        // A change too small to tell from staying is not a jump.
         if let Some(from) = step.from.filter(|from| *from != step.condition) {
             by_jump.entry((from, step.condition)).or_default().push(position);
         }
@@ -35,7 +35,7 @@ pub(crate) fn refusal(
     {
         return Some(format!(
             "No verdict: recording {} was made with another campaign or machine than recording 1 (their fingerprints \
-             differ), so that what differs between them need not be drift. Compare runs of one campaign on one machine.",
+             differ), so differences between them need not be drift. Compare runs of one campaign on one machine.",
             other + 1
         ));
     }
@@ -55,7 +55,7 @@ pub(crate) fn refusal(
     }
     if most == 2 {
         return Some(
-            "No verdict: one repeat alone. A jump that is made twice shows a difference, but not whether it is chance, a \
+            "No verdict: only one repeat. A jump that is made twice shows a difference, but not whether it is chance, a \
              step or a steady change; repeat the reference jump at least twice more."
                 .to_owned(),
         );
@@ -93,7 +93,7 @@ fn gap(recording: &Recording) -> Option<(Channel, f64, f64)> {
         };
         let inner = times.windows(2).map(|pair| (pair[0], pair[1]));
         let mut all = inner.chain([(start_s, *first), (*last, end_s)]);
-        // A slow logger is no gap: silence counts against the channel's own usual distance.
+        // A slow logger is not a gap: silence counts against the channel's own usual distance.
         let usual_s = (last - first) / times.len().max(2) as f64;
         if let Some((from_s, to_s)) = all.find(|(from_s, to_s)| to_s - from_s > GAP_S.max(20.0 * usual_s)) {
             return Some((*channel, from_s, to_s));

@@ -40,7 +40,7 @@ pub enum RateOrStep {
 /// A cause with its probability.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Alternative {
-    /// The cause; `None` is no drift.
+    /// The cause; `None` is not drift.
     pub cause: Option<Cause>,
     /// Its probability; all of them and that of `none` sum to 1.
     pub probability: f64,
@@ -62,9 +62,9 @@ pub struct DetectionLimit {
 pub struct VisitChannel {
     /// Mean reading over the end of the step, SI.
     pub end: f64,
-    /// The same less the model's, SI: boundary conditions that wander are taken out.
+    /// The same minus the model's, SI: boundary conditions that wander are taken out.
     pub end_less_model: f64,
-    /// Mean reading over the transient less the model's, SI; `None` where the step is too short.
+    /// Mean reading over the transient minus the model's, SI; `None` where the step is too short.
     pub transient_less_model: Option<f64>,
     /// One standard error of the end, from noise, SI.
     pub sigma: f64,

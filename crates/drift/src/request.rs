@@ -60,7 +60,7 @@ pub enum DriftError {
         run: usize,
     },
     /// Channels without which drift is not judged.
-    #[error("recording {}: it has no {}; drift is judged by all of N, P2, T1, T2, the more the better", .run + 1, symbols(.channels))]
+    #[error("recording {}: it has no {}; drift is judged by all of N, P2, T1 and T2", .run + 1, symbols(.channels))]
     MissingChannels {
         /// Which recording, from 0.
         run: usize,
@@ -69,7 +69,7 @@ pub enum DriftError {
     },
     /// A channel that often reads nothing.
     #[error(
-        "recording {}: {missing} of {all} readings of {channel} are not numbers; mend the channel, or record it anew",
+        "recording {}: {missing} of {all} readings of {channel} are not numbers; repair the channel, or record again",
         .run + 1
     )]
     NotNumbers {

@@ -45,7 +45,11 @@ fn a_sensor_that_drifts_is_named_and_its_points_are_put_right() {
     assert!(report.low.unwrap() <= 0.34 && 0.34 <= report.high.unwrap(), "{rate}");
     // Two repeats: twice 16 minutes.
     assert!((report.onset_s.unwrap() - 600.0).abs() < 1920.0);
-    assert!(report.reason.contains("taken off the reading of T2"), "never in silence: {}", report.reason);
+    assert!(
+        report.reason.contains("subtracted from the reading of T2"),
+        "never in silence: {}",
+        report.reason
+    );
 
     // Against the truth, constant bias removed: at most a third of what is left without.
     let (mut corrected, mut uncorrected) = (Vec::new(), Vec::new());

@@ -286,7 +286,7 @@ fn names(study: &Study, fit: &Fit) -> Vec<String> {
     fit.hypothesis.effects.iter().map(|(index, _)| study.effects[*index].info().id.to_string()).collect()
 }
 
-/// Most causes named beside the first: a longer list helps nobody.
+/// Maximum number of causes named beside the first: a longer list helps nobody.
 const MOST_EQUIVALENT: usize = 2;
 
 /// Other causes whose scores the data do not tell from the best's, the nearest first; a cause that only adds to the best is

@@ -1,6 +1,6 @@
 //! The best fit of a hypothesis, nuisances and their priors included, and how well it is supported.
 //!
-//! Gauss and Newton on the whitened residuals. What effects do is taken anew from runs of the model in each iteration
+//! Gauss and Newton on the whitened residuals. What effects do is taken again from runs of the model in each iteration
 //! (they are strong, and bend); what nuisances do is taken once, where nothing is off (they are small), but the
 //! residual is always that of the model itself.
 
@@ -35,11 +35,11 @@ pub struct Fit {
 /// How thoroughly to fit.
 #[derive(Debug, Clone, Copy)]
 pub struct Effort {
-    /// Most iterations.
+    /// Maximum number of iterations.
     pub iterations: usize,
     /// Stop where an iteration promises less than this in the cost.
     pub enough: f64,
-    /// Most sigmas that a nuisance may move: few while an effect is far from its best, so that tolerances do not run into
+    /// Maximum number of sigmas that a nuisance may move: few while an effect is far from its best, so that tolerances do not run into
     /// its place.
     pub most_sigmas: f64,
 }
@@ -176,12 +176,12 @@ fn changes_beside(
         .collect()
 }
 
-/// Six sigma of a declared tolerance is no tolerance any more.
+/// Six sigma of a declared tolerance is no longer a tolerance.
 pub const MOST_SIGMAS: f64 = 6.0;
-/// Most typical steps an effect moves in one iteration: effects bend.
+/// Maximum number of typical steps an effect moves in one iteration: effects bend.
 const MOST_STEPS: f64 = 2.0;
 
-/// The step to the least cost within all bounds: unknowns that would leave theirs are held there, and the others
+/// The step to the minimum cost within all bounds: unknowns that would leave theirs are held there, and the others
 /// solved for again.
 fn bounded_step(
     normal: &Normal,

@@ -1,4 +1,4 @@
-//! How far the gap shrinks, on steps that were used neither to select nor to fit.
+//! How far the gap shrinks, on steps that were used neither for selection nor for fitting.
 
 use crate::adequacy::misfit_of_steps;
 use crate::fit::Fit;

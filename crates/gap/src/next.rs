@@ -65,7 +65,7 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[AllowedJump]) -> O
             Some(Next::Sensor {
                 sensor: sensor_for(study.effects[*effect].info().submodel).to_owned(),
                 reason: format!(
-                    "none of the {} {among} jumps shows the first candidates more than {sigma:.1} sigma apart",
+                    "none of the {} {among} jumps separates the first candidates by more than {sigma:.1} sigma",
                     jumps.len()
                 ),
             })
@@ -80,7 +80,7 @@ pub fn sensor_beside(places: &[Place]) -> Option<Next> {
     Some(Next::Sensor {
         sensor: sensor_for(part).to_owned(),
         reason: format!(
-            "no effect of the catalogue explains the gap, and most of it lies in {}: write a suspected effect in rhai and give it by --effect, or measure there",
+            "no effect of the catalogue explains the gap, and most of it lies in {}: write a suspected effect in rhai and give it with --effect, or measure there",
             place.submodel
         ),
     })

@@ -33,7 +33,7 @@ const HOLD_S: f64 = 30.0;
 /// Samples of a first look, and of a close one, s apart.
 const COARSE_S: f64 = 0.5;
 const FINE_S: f64 = 0.1;
-/// Most samples of a jump; a dwell that is longer is looked at up to there.
+/// Maximum number of samples of a jump; a dwell that is longer is looked at up to there.
 const MOST_S: f64 = 600.0;
 
 /// A jump made ready like a recording, of rest at its start and its dwell, with nothing in it but its inputs.

@@ -21,7 +21,7 @@ const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 
 pub struct Gain<'a> {
     /// The fit.
     pub fit: &'a Fit,
-    /// Cost of the null less its own; of a fit to some steps, in proportion.
+    /// Cost of the null minus its own; of a fit to some steps, in proportion.
     pub gain: f64,
 }
 

@@ -39,7 +39,7 @@ pub enum Problem {
     #[error(transparent)]
     Implausible(#[from] Implausible),
     /// A driver is missing altogether.
-    #[error("{channel} ({}) drives the model and is not recorded; without it no cause can be told", .channel.info().description)]
+    #[error("{channel} ({}) drives the model and is not recorded; without it no cause can be identified", .channel.info().description)]
     NoDriver {
         /// The channel.
         channel: Channel,

@@ -19,7 +19,7 @@ pub struct Screened {
 /// Strengths beyond so many times what each has alone are not believed.
 const MOST_TIMES: f64 = 4.0;
 
-/// All pairs of the fitted singles, least cost first: what each single changes at its own best, in any two amounts within
+/// All pairs of the fitted singles, lowest cost first: what each single changes at its own best, in any two amounts within
 /// their ranges, nuisances free.
 pub fn screen(
     study: &Study,
@@ -31,7 +31,7 @@ pub fn screen(
     let residual = linearised.residual(study, &linearised.base);
     let right_residual = projector.right(&residual);
     let whole = projector.product(&residual, &right_residual, &residual, &right_residual);
-    // What a single changes: its prediction less the base. What its nuisances did is projected out with the others.
+    // What a single changes: its prediction minus the base. What its nuisances did is projected out with the others.
     let mut signatures = Vec::new();
     for fit in singles {
         let [(effect, values)] = fit.hypothesis.effects.as_slice() else { continue };

@@ -25,7 +25,7 @@ pub struct Found {
 
 /// A single must take at least this off the cost to be worth a second look.
 const WORTH: f64 = 6.0;
-/// Where a single takes at least this off the cost, nuisances are linearised anew beside it: tolerances of what an
+/// Where a single takes at least this off the cost, nuisances are linearised again beside it: tolerances of what an
 /// effect changes act otherwise beside it than where nothing is off.
 const STRONG: f64 = 30.0;
 
@@ -244,7 +244,7 @@ pub fn sort(fits: &mut [Fit]) {
 }
 
 /// Whether each effect of a fit does something: one that the fit left at its neutral value explains nothing, and a pair with
-/// it is no pair.
+/// it is not a pair.
 pub fn does_something(study: &Study, fitted: &Fit) -> bool {
     fitted.hypothesis.effects.iter().all(|(index, values)| {
         study.effects[*index].info().parameters.iter().zip(values).any(|(parameter, value)| {

@@ -52,13 +52,13 @@ pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Resu
     for channel in OUTPUTS.into_iter().filter(|channel| *channel != Channel::P3 && !present.contains(channel))
     {
         warnings.push(format!(
-            "{channel} ({}) is not recorded: what shows in it alone cannot be found",
+            "{channel} ({}) is not recorded: effects that show only there cannot be found",
             channel.info().description
         ));
     }
     for channel in DRIVERS {
         if table.column(channel).is_none() {
-            warnings.push(format!("{channel} is not recorded: the campaign's value stands for it"));
+            warnings.push(format!("{channel} is not recorded: the campaign's value is used"));
         }
     }
     warnings.extend(gaps(table));
@@ -66,7 +66,7 @@ pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Resu
         if declared.of(*channel).noise_sigma <= 0.0 {
             let (usual, unit) = (declared.noise_sigma(*channel), channel.unit());
             warnings.push(format!(
-                "no noise is declared for {channel}: that of a usual sensor is taken, {usual} {unit}"
+                "no noise is declared for {channel}: that of a typical sensor is used, {usual} {unit}"
             ));
         }
     }
@@ -102,7 +102,7 @@ fn gaps(table: &Table) -> Option<String> {
     let count = table.t_s.windows(2).filter(|pair| gap(pair)).count();
     (count > 0).then(|| {
         format!(
-            "the recording has {count} gap(s), {missing_s:.1} s in all; blocks without samples are left out"
+            "the recording has {count} gap(s), {missing_s:.1} s in total; blocks without samples are left out"
         )
     })
 }

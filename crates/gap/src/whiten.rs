@@ -48,7 +48,7 @@ impl Linearised {
         Ok(Linearised { base, factors, columns: Vec::new(), products: Vec::new() })
     }
 
-    /// Linearised anew at a hypothesis; the whitening stays.
+    /// Linearised again at a hypothesis; the whitening stays.
     ///
     /// # Errors
     /// [`PredictError`] where the model cannot follow there.

@@ -6,7 +6,7 @@ use serde::Serialize;
 /// Half width of the band in such standard deviations.
 const WIDTH_SIGMAS: f64 = 4.0;
 
-/// Least half width of a band.
+/// Minimum half width of a band.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Floor {

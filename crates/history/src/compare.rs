@@ -205,11 +205,11 @@ fn conclusions(
                     "the results stayed".to_owned()
                 };
                 sentences.push(format!(
-                    "{campaign}: the true {what} moved by {truth_shift} in the mean of {truth_points} points, and {followed}: the simulated machine or its model changed."
+                    "{campaign}: the true {what} moved by {truth_shift} on average over {truth_points} points, and {followed}: the simulated machine or its model changed."
                 ));
             } else if result_points > 0 {
                 sentences.push(format!(
-                    "{campaign}: the identified {what} moved by {result_shift} in the mean of {result_points} points ({methods}), the true one stayed: planning, recording or identification changed."
+                    "{campaign}: the identified {what} moved by {result_shift} on average over {result_points} points ({methods}), the true one stayed: planning, recording or identification changed."
                 ));
             }
         }
@@ -235,11 +235,11 @@ fn changed_inputs(night: &Night, earlier: &BTreeMap<RunKey, Vec<RunRow>>) -> Vec
     let list = |names: &BTreeSet<&str>| names.iter().copied().collect::<Vec<_>>().join(", ");
     let mut sentences = Vec::new();
     if !campaigns.is_empty() {
-        sentences.push(format!("The campaign is another than in the last night: {}.", list(&campaigns)));
+        sentences.push(format!("The campaign differs from the last night's: {}.", list(&campaigns)));
     }
     if !models.is_empty() {
         sentences.push(format!(
-            "The nominal model's parameters or map are others than in the last night: {}.",
+            "The nominal model's parameters or map differ from the last night's: {}.",
             list(&models)
         ));
     }

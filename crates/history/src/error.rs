@@ -14,13 +14,13 @@ pub enum HistoryError {
         source: std::io::Error,
     },
     /// There is no such file, and only reading was asked for.
-    #[error("there is no history {}; `mapper nightly` makes one, `--db FILE` names another", .path.display())]
+    #[error("there is no history at {}; `mapper nightly` makes one, `--db FILE` names another", .path.display())]
     Missing {
         /// The file.
         path: PathBuf,
     },
     /// The file is a database of something else, or of a newer program.
-    #[error("{} is no history that this program can read: {reason}; name another file with `--db`", .path.display())]
+    #[error("{} is not a history that this program can read: {reason}; name another file with `--db`", .path.display())]
     Foreign {
         /// The file.
         path: PathBuf,

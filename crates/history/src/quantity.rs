@@ -3,7 +3,7 @@
 use crate::{Floor, PointRow};
 use serde::Serialize;
 
-/// One quantity of a point. The error is the identified value less the true one, so that a model that moves truth
+/// One quantity of a point. The error is the identified value minus the true one, so that a model that moves truth
 /// and result alike shows in the absolute values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -67,7 +67,7 @@ impl History {
     /// Opens the history, making it where there is none.
     ///
     /// # Errors
-    /// [`HistoryError`] where the file cannot be made, is no history, or was written by a newer program.
+    /// [`HistoryError`] where the file cannot be made, is not a history, or was written by a newer program.
     pub fn open(path: &Path) -> Result<History, HistoryError> {
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
             std::fs::create_dir_all(parent)
@@ -139,7 +139,7 @@ impl History {
         match (application_id, layout) {
             (APPLICATION_ID, LAYOUT) => return Ok(()),
             (APPLICATION_ID, _) => {
-                return Err(foreign(format!("its layout is {layout}, this program knows {LAYOUT}")));
+                return Err(foreign(format!("its layout is {layout}; this program reads {LAYOUT}")));
             }
             _ if tables > 0 => return Err(foreign("it is a database of another program".to_owned())),
             _ => {}
@@ -322,7 +322,7 @@ fn earlier(
     Ok(earlier)
 }
 
-/// NULL for what is no number.
+/// NULL for what is not a number.
 fn finite(value: Option<f64>) -> Option<f64> {
     value.filter(|value| value.is_finite())
 }

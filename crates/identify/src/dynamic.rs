@@ -76,7 +76,8 @@ pub(crate) fn estimate(
     let geometry =
         Geometry { alpha_area_ratio: config.alpha_area_ratio, internal_area_m2: config.internal_area_m2 };
     let Some((samples, fit)) = fit_without_outliers(samples, geometry, findings) else {
-        let message = "least squares for efficiency and heat-transfer coefficient came to no end".to_owned();
+        let message =
+            "least squares for efficiency and heat-transfer coefficient did not converge".to_owned();
         findings.refuse(code::FIT_FAILED, message);
         return estimate;
     };
@@ -145,14 +146,14 @@ fn fit_without_outliers(
         .collect();
     let inlier = |i: usize| kept.get(i).copied().unwrap_or(false);
     let outliers = (0..samples.len()).filter(|i| !inlier(*i)).count();
-    // More than a few are no accidents: then the fit is poor, and says so.
+    // More than a few are not accidents: then the fit is poor, and says so.
     if outliers == 0 || outliers * 20 > samples.len() {
         return Some((samples, first));
     }
     let samples = samples.filtered(inlier);
     let second = fit(&samples, geometry)?;
     let message = format!(
-        "{outliers} samples more than {limit_k:.1} K off the fit and off those around them are left out"
+        "{outliers} samples more than {limit_k:.1} K from the fit and from their neighbours are left out"
     );
     findings.remark(code::OUTLIERS, message);
     Some((samples, second))
@@ -210,7 +211,7 @@ fn judge_flow(drift: Option<FlowDrift>, config: &IdentifyConfig, findings: &mut 
         return;
     };
     let message = format!(
-        "the flow moved by {:+.1} % in the window and h with it, which the method takes for constant: eta is some {:+.1} points off, h some {:+.0} W/(m2 K)",
+        "the flow moved by {:+.1} % in the window and h with it, which the method assumes to be constant: eta is about {:+.1} points off, h about {:+.0} W/(m2 K)",
         100.0 * drift.flow_ratio,
         100.0 * drift.eta,
         drift.h_w_m2k
@@ -225,7 +226,7 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
     let dt2_k = dt2_k.unwrap_or(0.0);
     if fit.eta > 1.0 {
         let message = format!(
-            "the fitted efficiency is {:.3}, above 1: something that the method does not know is at work",
+            "the fitted efficiency is {:.3}, above 1: something outside the method is at work",
             fit.eta
         );
         findings.refuse(code::POOR_FIT, message);
@@ -233,11 +234,11 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
     let (rms_k, slow_k) = (fit.residual_rms_k(), slow_rms_k(fit, view.samples));
     if noise_k > 0.0 && rms_k > limits.residual_over_noise_ratio * noise_k {
         let message =
-            format!("the fit leaves {rms_k:.3} K rms of T2; the declared noise explains {noise_k:.3} K");
+            format!("the residual of T2 is {rms_k:.3} K rms; the declared noise explains {noise_k:.3} K");
         findings.doubt(code::POOR_FIT, message);
     } else if slow_k > (limits.structure_ratio * dt2_k.abs()).max(STRUCTURE_OVER_NOISE_RATIO * noise_k) {
         let message = format!(
-            "what the fit leaves of T2 has a shape: {slow_k:.3} K rms in {STRUCTURE_BLOCK_S:.0} s means, of {dt2_k:.1} K that T2 moves"
+            "the residual of T2 has a shape: {slow_k:.3} K rms in {STRUCTURE_BLOCK_S:.0} s means, while T2 moves by {dt2_k:.1} K"
         );
         findings.doubt(code::POOR_FIT, message);
     }

@@ -31,7 +31,7 @@ pub(crate) fn end_state(
         )?;
         if last_s < step.end_s - 2.0 * seconds {
             let message = format!(
-                "{channel} was lost {:.1} s before the step's end; its last values stand for it",
+                "{channel} was lost {:.1} s before the step's end; its last values are used",
                 step.end_s - last_s
             );
             findings.doubt(code::END_STATE, message);

@@ -37,7 +37,7 @@ pub enum IdentifyError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StepError {
     /// The step has no duration.
-    #[error("step {step} runs from {start_s} s to {end_s} s, which is no stretch of time")]
+    #[error("step {step} runs from {start_s} s to {end_s} s, which is not a valid time span")]
     NoDuration {
         /// Index of the step.
         step: usize,

@@ -46,7 +46,7 @@ pub struct Expected {
 /// Fits noise-free rows as a recording is fitted, and says what the declared uncertainties will do to the result.
 ///
 /// `interval_s` is that of the rows. Rows sparser than a recording's 10 Hz stand for the means of its samples: the white
-/// part of the noise averages out among them, the first-order part does not. `None` where the fit comes to no end.
+/// part of the noise averages out among them, the first-order part does not. `None` where the fit does not converge.
 pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) -> Option<Expected> {
     let column = |value: fn(&ExpectedRow) -> f64| rows.iter().map(value).collect::<Vec<f64>>();
     let samples = Samples {

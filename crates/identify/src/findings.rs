@@ -24,7 +24,7 @@ pub mod code {
     pub const FLOW_MOVED: &str = "flow_moved";
     /// The best fit lies on a bound.
     pub const AT_BOUND: &str = "at_bound";
-    /// The fit came to no end.
+    /// The fit did not converge.
     pub const FIT_FAILED: &str = "fit_failed";
     /// Temperatures still drift (steady method).
     pub const NOT_SETTLED: &str = "not_settled";

@@ -99,7 +99,7 @@ impl Samples {
         }
     }
 
-    /// Change of a column over the window: mean of its last `seconds` less that of its first.
+    /// Change of a column over the window: mean of its last `seconds` minus that of its first.
     pub(crate) fn change(&self, column: &[f64], seconds: f64) -> Option<f64> {
         let (first_s, last_s) = (*self.t_s.first()?, *self.t_s.last()?);
         let seconds = seconds.min(0.5 * (last_s - first_s));

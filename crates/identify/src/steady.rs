@@ -81,7 +81,7 @@ pub(crate) fn estimate(
     let eta = means.apparent_eta();
     if !(eta.is_finite() && eta > 0.0) {
         let message = format!(
-            "T2 - T1 is {:.2} K at a pressure ratio of {:.4}: no efficiency comes of it",
+            "T2 - T1 is {:.2} K at a pressure ratio of {:.4}: no efficiency can be derived",
             means.t2_k - means.t1_k,
             means.p2_pa / means.p1_pa
         );

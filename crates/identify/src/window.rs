@@ -6,7 +6,7 @@ use mapper_core::{Channel, Recording, Series, SettleBands, StepMarker, Window, W
 use mapper_numerics::statistics::median;
 use mapper_physics::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 
-/// Most blocks looked at, from the step's end backwards: bounds the work on absurd step times.
+/// Maximum number of blocks looked at, from the step's end backwards: bounds the work on absurd step times.
 const MOST_BLOCKS: usize = 20_000;
 
 /// The window of a step; `None` where the step has no room for any.
@@ -29,7 +29,7 @@ fn fixed(step: &StepMarker, start_s: f64, end_s: f64, findings: &mut Findings) -
     // A millisecond: step times of other loggers are rounded.
     if window.end_s + 1e-3 < asked_end_s {
         let message = format!(
-            "the window was asked to end {end_s:.1} s after the jump, the step ends after {:.1} s",
+            "the window was asked to end {end_s:.1} s after the jump; the step ends after {:.1} s",
             step.end_s - step.start_s
         );
         findings.remark(code::WINDOW_CUT, message);

@@ -54,7 +54,7 @@ pub struct IsothermalZero {
     pub start_s: f64,
     /// End of the stretch, s.
     pub end_s: f64,
-    /// Reading less what all read together, K or Pa.
+    /// Reading minus what all read together, K or Pa.
     pub offsets: BTreeMap<Channel, f64>,
     /// One standard deviation of what is left of each offset, K or Pa.
     pub left_sigma: BTreeMap<Channel, f64>,
@@ -85,13 +85,13 @@ pub enum NoZero {
     },
     /// Sensors differ by more than their declared offsets allow.
     #[error(
-        "{channel} reads {off:+.2} {} off the others in the soak, {:.1} times its declared offset: the rig is not even, or the sensor is broken",
+        "{channel} reads {off:+.2} {} off the others in the soak, {:.1} times its declared offset: the rig is not uniform, or the sensor is broken",
         channel.unit(), off.abs() / sigma
     )]
     Uneven {
         /// The channel.
         channel: Channel,
-        /// Reading less that of all, K or Pa.
+        /// Reading minus that of all, K or Pa.
         off: f64,
         /// Standard deviation expected of it, K or Pa.
         sigma: f64,

@@ -79,7 +79,7 @@ const LOOKS: usize = 24;
 
 /// Time constant of the measured P3 behind its command, s, and its standard error; `None` without jumps or P3.
 ///
-/// The least squared residual of the first seconds after each jump; the level after it is free, so that
+/// The minimum squared residual of the first seconds after each jump; the level after it is free, so that
 /// no offset enters.
 pub fn measured_lag_s(table: &Table, steps: &[StepMarker], noise_sigma: f64) -> Option<(f64, f64)> {
     let values = table.column(Channel::P3)?;

@@ -39,7 +39,7 @@ pub fn is_reading(channel: Channel, value: f64) -> bool {
 /// The middle reading of a channel is not one of a running machine.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "{channel} reads {value:.4} {unit} in the middle, which no running machine has ({low} to {high} {unit}). {remedy}",
+    "{channel} reads {value:.4} {unit} at the median, which no running machine has ({low} to {high} {unit}). {remedy}",
     unit = .channel.unit(),
     remedy = remedy(*.channel, *.value),
     low = plausible(*.channel).running.start(),

@@ -94,7 +94,7 @@ pub fn smooth(t_s: &[f64], values: &[f64], noise_sigma: f64, colour: NoiseColour
 
 fn bins(t_s: &[f64], values: &[f64]) -> Vec<Bin> {
     let (Some(first_s), Some(last_s)) = (t_s.first(), t_s.last()) else { return Vec::new() };
-    // A day at most: beyond it a file is no campaign.
+    // A day at most: beyond it a file is not a campaign.
     let count = (((last_s - first_s) / BIN_S).floor() as usize + 1).min(200_000);
     let mut sums = vec![(0.0, 0usize); count];
     for (t, value) in t_s.iter().zip(values) {
@@ -233,7 +233,7 @@ mod tests {
         let mean_square =
             (0..n).map(|i| (course.at(20.0 + f64::from(i)) - wave(20.0 + f64::from(i))).powi(2)).sum::<f64>()
                 / f64::from(n);
-        // A wave is no random walk, so its statement is not exact: within a factor of two either way.
+        // A wave is not a random walk, so its statement is not exact: within a factor of two either way.
         let ratio = mean_square.sqrt() / course.sigma;
         assert!((0.5..2.0).contains(&ratio), "{ratio}");
     }

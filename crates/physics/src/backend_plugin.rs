@@ -44,7 +44,7 @@ impl BackendPlugin {
 
 /// A campaign asks for a backend that nobody has listed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no such backend; there are {known}")]
+#[error("there is no such backend; the backends are {known}")]
 pub struct UnknownBackend {
     /// Names of the backends there are.
     pub known: String,

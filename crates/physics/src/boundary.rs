@@ -1,5 +1,6 @@
 //! What surrounds the machine, and where the running model has no meaning.
 
+use mapper_core::with_unit;
 use serde::{Deserialize, Serialize};
 
 /// What surrounds the machine and is set by rig or cell.
@@ -54,7 +55,11 @@ pub enum BoundaryError {
         p4_pa: f64,
     },
     /// A value that no rig has.
-    #[error("{name} = {value} {unit} has no physical meaning here; it must be finite and above 0 {unit}")]
+    #[error(
+        "{name} = {} has no physical meaning here; it must be finite and above {}",
+        with_unit(value, unit),
+        with_unit(0, unit)
+    )]
     NotPhysical {
         /// Name of the boundary condition.
         name: &'static str,

@@ -69,7 +69,7 @@ impl FrozenGrid {
 
 /// A drive that left what the model can do.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the driven model cannot go on at {t_s:.2} s; the inputs or parameters there are beyond it")]
+#[error("the driven model cannot continue at {t_s:.2} s; the inputs or parameters there are beyond it")]
 pub struct DriveError {
     /// Time, s.
     pub t_s: f64,

@@ -3,6 +3,7 @@
 use crate::hooks::{Hooks, TooManyExtraStates};
 use crate::instruments::Instruments;
 use crate::model::Model;
+use mapper_core::with_unit;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -22,7 +23,7 @@ impl Rig {
         Rig { model, instruments: Instruments::default() }
     }
 
-    /// Adds something that is no parameter.
+    /// Adds something that is not a parameter.
     ///
     /// # Errors
     /// [`TooManyExtraStates`].
@@ -232,7 +233,11 @@ pub enum EffectError {
         given: usize,
     },
     /// A value without meaning.
-    #[error("{name} = {value} {unit} of effect `{id}` is not between {low} and {high} {unit}")]
+    #[error(
+        "{name} = {} of effect `{id}` is not between {low} and {}",
+        with_unit(value, unit),
+        with_unit(high, unit)
+    )]
     OutOfRange {
         /// The effect.
         id: String,

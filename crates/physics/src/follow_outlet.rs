@@ -33,7 +33,7 @@ const AGREED_K: f64 = 1e-6;
 /// `boundary` has them.
 ///
 /// # Errors
-/// [`SteadyError`] of the last round; [`SteadyError::NoHeatBalance`] where the temperatures come to no end.
+/// [`SteadyError`] of the last round; [`SteadyError::NoHeatBalance`] where the temperatures do not converge.
 pub fn hold_speed(
     model: &Model,
     speed_rpm: f64,

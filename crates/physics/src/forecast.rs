@@ -8,7 +8,7 @@ use mapper_core::{Predicted, SettleBands, WindowRule};
 
 /// Interval of a forecast's samples, s.
 const SAMPLE_S: f64 = 0.5;
-/// Most samples of a forecast; steps of more than 10 000 s are sampled more coarsely.
+/// Maximum number of samples of a forecast; steps of more than 10 000 s are sampled more coarsely.
 const SAMPLE_LIMIT: f64 = 20_000.0;
 
 /// One instant of a forecast step.

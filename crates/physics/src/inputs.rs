@@ -40,7 +40,7 @@ pub struct InterpolatedInputs {
 pub enum InputsError {
     /// No rows, or more or fewer rows than times.
     #[error(
-        "{times} times and {rows} rows of boundary conditions; as many of each are needed, and at least one"
+        "{times} times and {rows} rows of boundary conditions; their numbers must be equal, and at least one"
     )]
     Lengths {
         /// Number of times.

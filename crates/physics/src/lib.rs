@@ -6,6 +6,7 @@
 
 pub mod air;
 pub mod backend_plugin;
+pub mod bearing_friction;
 pub mod boundary;
 pub mod characteristic;
 pub mod closed_form_map;

@@ -1,5 +1,6 @@
 //! The lumped turbocharger: shaft, outlet volume, two housings, and the gas paths between them.
 
+use crate::bearing_friction::friction_power_w;
 use crate::boundary::BoundaryConditions;
 pub use crate::boundary::BoundaryError;
 use crate::characteristic::CompressorCharacteristic;
@@ -238,9 +239,7 @@ impl PreparedModel<'_> {
             compressor_heat_w: q1_w + q2_w,
             wall_k,
             compressor_power_w,
-            friction_power_w: params.bearing_friction_w_s2
-                * state.shaft_speed_rad_s
-                * state.shaft_speed_rad_s,
+            friction_power_w: friction_power_w(params.bearing_friction_w_s2, state.shaft_speed_rad_s),
             radiation_w: if params.radiation_area_m2 == 0.0 {
                 0.0
             } else {

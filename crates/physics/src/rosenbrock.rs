@@ -211,7 +211,7 @@ where
     /// slightly different parameters differ smoothly, which a step-size control would spoil.
     ///
     /// # Errors
-    /// [`IntegrationError::StepTooSmall`] where the system cannot be stepped at all (rates that are no numbers).
+    /// [`IntegrationError::StepTooSmall`] where the system cannot be stepped at all (rates that are not numbers).
     pub fn step_on_grid(
         &mut self,
         system: &mut impl OdeSystem<N>,

@@ -1,7 +1,7 @@
 //! When an operating point has settled: the one definition that plan, sequence and identification share.
 //!
 //! **Definition.** A quantity has settled at a time when, from that time to the end of the stretch that is looked at,
-//! its largest less its smallest value, less the spread that its noise alone would have, is at most its band
+//! its largest minus its smallest value, minus the spread that its noise alone would have, is at most its band
 //! ([`SettleBands`]) times the mean. An operating point has settled when shaft speed, compressor flow and pressure ratio
 //! all have. Values of a model have no noise; recorded ones are condensed to medians over blocks first.
 //!

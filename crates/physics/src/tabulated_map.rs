@@ -7,7 +7,7 @@
 
 use crate::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use crate::similarity::{head_ratio as head, pressure_ratio_of_head};
-use mapper_core::ReferenceState;
+use mapper_core::{ReferenceState, with_unit};
 
 /// A row of a map file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,12 +22,13 @@ pub struct MapRow {
     pub efficiency: f64,
 }
 
-/// Why a table is no map.
+/// Why a table is not a map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MapError {
     /// A value without physical meaning.
     #[error(
-        "row {row} of the map: {quantity} = {value} {unit} has no physical meaning (it must be {needed})"
+        "row {row} of the map: {quantity} = {} has no physical meaning (it must be {needed})",
+        with_unit(value, unit)
     )]
     Value {
         /// Row, from 1, header not counted.
@@ -113,7 +114,7 @@ const SAME_LINE_RATIO: f64 = 0.01;
 impl TabulatedMap {
     /// Builds a map from rows in any order, at `reference`.
     ///
-    /// Points on the surge side of a line's highest pressure ratio are left out: there flow is no function of
+    /// Points on the surge side of a line's highest pressure ratio are left out: there flow is not a function of
     /// pressure ratio.
     ///
     /// # Errors

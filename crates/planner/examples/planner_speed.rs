@@ -81,7 +81,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bound =
         plan.bound.map_or((f64::NAN, f64::NAN), |bound| (bound.sum_gradient_k, bound.worst_gradient_k));
     println!(
-        "{count} points, {}, effort {effort}, seed {seed}: {:.1} K in all (bound {:.1}), {:.2} K at the least (bound {:.2}), {seconds:.2} s",
+        "{count} points, {}, effort {effort}, seed {seed}: {:.1} K in total (bound {:.1}), {:.2} K at minimum (bound {:.2}), {seconds:.2} s",
         plan.objective,
         plan.figures.sum_gradient_k,
         bound.0,

@@ -65,7 +65,7 @@ impl Optimistic {
     }
 
     /// The bounds for orders of the first `counted` places; what lies beyond them is visited by repeats alone.
-    /// `repeats`: the place of the point that a repeated jump ends at, and how many steps the repeats take in all; their
+    /// `repeats`: the place of the point that a repeated jump ends at, and how many steps the repeats take in total; their
     /// own gradients do not count.
     pub(crate) fn bound(&self, counted: usize, repeats: Option<(usize, usize)>) -> Bound {
         let n = self.n;

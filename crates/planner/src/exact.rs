@@ -3,7 +3,7 @@
 use crate::bound::Optimistic;
 use crate::chain::Chain;
 
-/// Most points of [`best_path`]: its table has `n 2^n` entries.
+/// Maximum number of points of [`best_path`]: its table has `n 2^n` entries.
 pub const HELD_KARP_POINTS: usize = 14;
 
 /// The path through all points with the largest sum of fixed weights (Held and Karp, J. SIAM 10:196, 1962), any start.

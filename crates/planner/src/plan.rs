@@ -17,7 +17,7 @@ use mapper_physics::forecast::warmed_up;
 use mapper_physics::model::State;
 use mapper_physics::steady::SteadyState;
 
-/// How often jumps that turn out not to be allowed are taken out and the rest is ordered anew.
+/// How often jumps that turn out not to be allowed are taken out and the rest is ordered again.
 const ROUNDS: usize = 25;
 /// Jumps tried for repeats where the request names none.
 const USUAL_JUMPS: usize = 3;
@@ -322,7 +322,7 @@ fn bound(
     let copies = visits.len() - nodes.len();
     let counted = nodes.len();
     let place = repeated.map(|jump| {
-        // Both ends of the jump, where they are no points of the grid: the housing comes by there too.
+        // Both ends of the jump, where they are not points of the grid: the housing comes by there too.
         let mut place = 0;
         for end in [jump.from, jump.to] {
             place = nodes.iter().position(|node| *node == end).unwrap_or_else(|| {

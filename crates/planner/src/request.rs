@@ -73,11 +73,13 @@ pub enum PlanError {
         order: &'static str,
     },
     /// The shortest campaign for what?
-    #[error("the order time needs the standard error to reach; set `required_sigma_eta`, e.g. `0.5 %`")]
+    #[error(
+        "the order `time` needs the standard error that it has to reach; set `required_sigma_eta`, e.g. `0.5 %`"
+    )]
     NeedsRequiredError,
     /// No order of the points avoids jumps that are not allowed.
     #[error(
-        "no order was found that avoids every jump that is not allowed: {}; widen the limits or leave points out",
+        "no order was found that avoids every forbidden jump: {}; widen the limits or leave points out",
         .0.join("; ")
     )]
     NoAdmissibleOrder(Vec<String>),

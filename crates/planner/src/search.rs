@@ -192,7 +192,7 @@ impl<'a, C: Chain> Annealing<'a, C> {
         annealing
     }
 
-    /// Works out all states and values anew.
+    /// Works out all states and values again.
     fn refresh(&mut self) {
         let mut state = None;
         for k in 0..self.order.len() {

@@ -21,7 +21,7 @@ fn the_search_beats_greedy_and_listed_orders_and_stays_below_its_bound() {
     let (sum, worst) = (plan(VisitOrder::SumGradient), plan(VisitOrder::WorstGradient));
     assert!(sum.figures.sum_gradient_k > greedy.figures.sum_gradient_k);
     assert!(greedy.figures.sum_gradient_k > 2.0 * listed.figures.sum_gradient_k);
-    // A hand-made zigzag has 14.6 K at the least on a simpler housing, a simple annealing 25.6 K.
+    // A hand-made zigzag has 14.6 K at minimum on a simpler housing, a simple annealing 25.6 K.
     assert!(worst.figures.worst_gradient_k.unwrap() > 20.0);
     for plan in [&sum, &worst] {
         let bound = plan.bound.unwrap();
@@ -39,7 +39,7 @@ fn the_search_beats_greedy_and_listed_orders_and_stays_below_its_bound() {
 }
 
 /// Housing with one time constant per point, as in `common::SimpleHousing`: the kind of housing on which a simple
-/// annealing reached 677 K in all, or 25.6 K at the least.
+/// annealing reached 677 K in total, or 25.6 K at minimum.
 #[test]
 fn known_figures_are_reached_on_the_simple_housing() {
     let (model, points) = (Model::nominal(), grid());
@@ -48,7 +48,7 @@ fn known_figures_are_reached_on_the_simple_housing() {
     let sum_of = |order: &[usize]| gradients_k(&housing, order).iter().sum::<f64>();
     let worst_of = |order: &[usize]| gradients_k(&housing, order).into_iter().fold(f64::INFINITY, f64::min);
     // The housing is the one of these figures: its two reference orders come out as they were told, to the digits
-    // that were told: along speed lines 129 K in all and 0.4 K at the least, a zigzag 640 K and 14.6 K.
+    // that were told: along speed lines 129 K in total and 0.4 K at minimum, a zigzag 640 K and 14.6 K.
     assert!((sum_of(&given) - 129.0).abs() < 0.5 && (worst_of(&given) - 0.4).abs() < 0.06);
     let zigzag: Vec<usize> =
         (0..3).flat_map(|opening| [2, 5, 0, 4, 1, 3].map(|speed| 3 * speed + opening)).collect();
@@ -154,7 +154,7 @@ fn an_appended_jump_comes_last_and_changes_nothing_before_it() {
     let listed = request(&model, &points, VisitOrder::Listed);
     let plain = make_plan(&listed).unwrap();
     let last = plain.steps.last().unwrap().to;
-    // One end is no point of the grid.
+    // One end is not a point of the grid.
     let off_grid = OperatingPoint { speed_rpm: 60e3, ..points[0] };
     for from in [points[1], last] {
         let plan = make_plan(&PlanRequest { appended: Some(Jump { from, to: off_grid }), ..listed.clone() })

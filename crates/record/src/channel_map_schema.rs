@@ -16,15 +16,15 @@ fn schema() -> Value {
         json!({
             "topic": text("Topic of the recording.", "/rig/compressor"),
             "field": text("Field of the topic's messages.", "outlet_temperature"),
-            "unit": text("Unit of the field; as the recording says where none is given.", "degC"),
+            "unit": text("Unit of the field; as the recording says if none is given.", "degC"),
         }),
     );
     let sensor = closed(
         &[],
         json!({
-            "noise": quantity("Noise of one sample; 0 where none is given.", "0.1 K"),
-            "offset": quantity("Fixed offset left after calibration; 0 where none is given.", "0.25 K"),
-            "gain": quantity("Fixed error of the gain; 0 where none is given.", "0.5 %"),
+            "noise": quantity("Noise of one sample; 0 if none is given.", "0.1 K"),
+            "offset": quantity("Fixed offset left after calibration; 0 if none is given.", "0.25 K"),
+            "gain": quantity("Fixed error of the gain; 0 if none is given.", "0.5 %"),
         }),
     );
     let constant = quantity("Value of a channel that the recording does not hold.", "100 kPa");
@@ -50,7 +50,7 @@ fn machine() -> Value {
         json!({
             "compressor_internal_area":
                 quantity("Internal area of the compressor that exchanges heat with the gas.", "29e-3 m^2"),
-            "alpha_area": quantity("Share of that area before compression, 0 to 1; 0 where none is given.", "0.2"),
+            "alpha_area": quantity("Share of that area before compression, 0 to 1; 0 if none is given.", "0.2"),
             "compressor_inlet_diameter": quantity("Diameter of the inlet pipe; for a static tap.", "40 mm"),
             "compressor_outlet_diameter": quantity("Diameter of the outlet pipe; for a static tap.", "35 mm"),
             "t2_probe_diameter":

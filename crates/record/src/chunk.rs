@@ -8,7 +8,7 @@ use zstd::zstd_safe::{DCtx, ResetDirective, get_error_name};
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ChunkError {
     /// It ends within its header.
-    #[error("its header is not whole")]
+    #[error("its header is incomplete")]
     Header,
     /// It would unpack to more than is read.
     #[error("it claims {claimed} bytes, more than the {limit} that are read")]

@@ -65,7 +65,7 @@ pub enum RecordError {
         found: FormatVersion,
     },
     /// There are topics, but none of the mapped measurements.
-    #[error("failed to read `{}`: none of the measurements looked for is in it; its topics are {}; give a channel map that names its topics and fields", path.display(), list(topics))]
+    #[error("failed to read `{}`: it contains none of the expected measurements; its topics are {}; give a channel map that names its topics and fields", path.display(), list(topics))]
     NothingMapped {
         /// The file.
         path: PathBuf,
@@ -120,7 +120,7 @@ pub enum BadBatch {
         samples: usize,
     },
     /// A column that is there twice.
-    #[error("`{name}` comes twice in a batch")]
+    #[error("`{name}` appears twice in a batch")]
     Twice {
         /// The column.
         name: String,
@@ -140,7 +140,7 @@ fn advice(source: &io::Error) -> &'static str {
             "make room on this disk or record to another one, and run again"
         }
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
-            "record to a folder that may be written, and run again"
+            "record to a writable folder, and run again"
         }
         _ => "check the disk, and run again",
     }

@@ -29,7 +29,7 @@ pub(crate) fn difference(kind: Kind) -> Kind {
 /// The unit with that spelling, as the table has it or as other programs write it.
 ///
 /// # Errors
-/// [`UnitError::WrongUnit`] for what is no unit of the kind.
+/// [`UnitError::WrongUnit`] for what is not a unit of the kind.
 pub(crate) fn unit(kind: Kind, spelling: &str) -> Result<&'static Unit, UnitError> {
     let spelling = spelling.trim();
     find(kind, spelling).ok_or_else(|| UnitError::WrongUnit { unit: spelling.to_owned(), kind })
@@ -38,7 +38,7 @@ pub(crate) fn unit(kind: Kind, spelling: &str) -> Result<&'static Unit, UnitErro
 /// A number with its unit, such as `29e-3 m^2`, in the unit used inside. A ratio may stand without a unit.
 ///
 /// # Errors
-/// [`UnitError`] for what is no finite number, for an unknown unit, and for a missing one.
+/// [`UnitError`] for what is not a finite number, for an unknown unit, and for a missing one.
 pub(crate) fn parse_quantity(kind: Kind, text: &str) -> Result<f64, UnitError> {
     parse_with(kind, text, |spelling| match spelling {
         "" => (kind == Kind::Fraction).then_some(&ONE),

@@ -7,7 +7,7 @@ use mapper_core::Channel;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ReadWarning {
     /// The file ends in the middle: the run was killed, or the file was cut.
-    #[error("the file ends in the middle, at byte {offset}: what follows the last flush is lost")]
+    #[error("the file is cut short at byte {offset}: what follows the last flush is lost")]
     Truncated {
         /// Byte offset of the first record that is not whole.
         offset: u64,

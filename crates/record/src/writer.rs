@@ -21,7 +21,7 @@ pub enum StepPhase {
     End,
 }
 
-/// A topic of numeric fields as it is being written. Batch after batch has the same ones: making schemas anew for
+/// A topic of numeric fields as it is being written. Batch after batch has the same ones: making schemas again for
 /// each would cost more than writing the samples.
 struct Layout {
     topic: &'static str,

@@ -137,7 +137,7 @@ fn missing_and_repeated_keys_and_wrong_types_are_refused_at_their_place() {
             (3, 3),
             "second time",
         ),
-        ("channels:\n  T2: [/a, x]\n", Kind::WrongType, (2, 3), "a list stands where a mapping is needed"),
+        ("channels:\n  T2: [/a, x]\n", Kind::WrongType, (2, 3), "a list is given where a mapping is needed"),
         ("channels:\n  T2: {topic: /a, field: x, unit: 1}\n", Kind::WrongType, (2, 35), "text is needed"),
         ("channels: {T2: {topic: /a, field: x}}\nreference: SEA\n", Kind::WrongValue, (2, 12), "none of SAE"),
         (
@@ -150,7 +150,7 @@ fn missing_and_repeated_keys_and_wrong_types_are_refused_at_their_place() {
             "channels: {T2: {topic: /a, field: x}}\nconstants: {P1: [1 bar]}\n",
             Kind::WrongType,
             (2, 13),
-            "a list stands where text or a plain number is needed",
+            "a list is given where text or a plain number is needed",
         ),
         ("channels: {}", Kind::Range, (1, 1), "the mapping is empty"),
         ("channels: &a {T2: {topic: /a, field: x}}", Kind::Unsupported, (1, 11), "not read in a channel map"),

@@ -7,10 +7,12 @@ use std::fmt::Write;
 /// The answer for people.
 pub fn drift_text(report: &DriftReport) -> String {
     let mut text = format!("{}\n", report.reason);
-    if let (Some(low), Some(high), Some(unit)) = (report.low, report.high, report.unit) {
+    if let (Some(low), Some(high), Some(cause)) = (report.low, report.high, report.cause) {
         let _ = writeln!(
             text,
-            "95 % interval: {low:.4} to {high:.4} {unit}{}",
+            "95 % interval: {} to {}{}",
+            cause.show(low),
+            cause.show(high),
             match report.size {
                 Some(RateOrStep::RatePerH(_)) => " per hour",
                 _ => "",
@@ -32,10 +34,13 @@ pub fn drift_text(report: &DriftReport) -> String {
         let _ = write!(text, "\nFrom {} to {}\n{}\n", group.from, group.to, group_table(group));
     }
     if !report.detection_limits.is_empty() {
-        text.push_str("\nSmallest steady drift over the campaign that is seen:");
+        text.push_str("\nSmallest steady drift over the campaign that can be detected:");
         for limit in &report.detection_limits {
             let _ = match limit.unit {
                 "1" => write!(text, " {} {:.2} %,", limit.cause, 100.0 * limit.change),
+                _ if limit.cause == Cause::BearingFriction => {
+                    write!(text, " {} {},", limit.cause, limit.cause.show(limit.change))
+                }
                 unit if limit.change < 1e-3 => write!(text, " {} {:.1e} {unit},", limit.cause, limit.change),
                 unit => write!(text, " {} {:.3} {unit},", limit.cause, limit.change),
             };

@@ -1,7 +1,9 @@
 //! A diagnosis as a page for a terminal.
 
 use crate::number::four_figures;
+use mapper_core::with_unit;
 use mapper_gap::report::{Candidate, Diagnosis, Gap, Next, Verdict};
+use mapper_physics::bearing_friction::at_150_krpm;
 
 /// Causes shown.
 const CAUSES: usize = 5;
@@ -15,7 +17,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         text += "\nwhere\n";
         for place in diagnosis.r#where.iter().take(PLACES) {
             text += &format!(
-                "  {:20} {:>3.0} % of the gap, {:.0} sigma; most in {}, {} after the jump, {}: {} {}\n",
+                "  {:20} {:>3.0} % of the gap, {:.0} sigma; largest in {}, {} after the jump, {}: {} {}\n",
                 place.submodel,
                 100.0 * place.share,
                 place.sigma,
@@ -31,7 +33,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     for candidate in diagnosis.candidates.iter().take(CAUSES) {
         text += &format!("  {:>5.1} %  {}\n", 100.0 * candidate.probability, cause(candidate));
         for set in &candidate.equivalent {
-            text += &format!("           cannot be told from {}\n", set.join(" + "));
+            text += &format!("           cannot be told apart from {}\n", set.join(" + "));
         }
     }
     text += &format!("  {:>5.1} %  nothing beyond tolerance\n", 100.0 * diagnosis.probability_none);
@@ -41,7 +43,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         text += "\nwhat next\n";
         text += &match next {
             Next::Jump { from, to, expected_probability, minutes } => format!(
-                "  jump from {:.0} krpm at opening {} to {:.0} krpm at {}: {minutes:.1} min, after which the true cause should have {:.0} %\n  mapper plan CAMPAIGN --append {:.0}krpm@{} {:.0}krpm@{} --out PLAN puts it behind the points\n",
+                "  jump from {:.0} krpm at opening {} to {:.0} krpm at {}: {minutes:.1} min, after which the true cause should reach {:.0} %\n  mapper plan CAMPAIGN --append {:.0}krpm@{} {:.0}krpm@{} --out PLAN puts it after the points\n",
                 from.speed_rpm / 1e3,
                 from.valve,
                 to.speed_rpm / 1e3,
@@ -73,7 +75,7 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
         Verdict::PartlyExplained => {
             format!("{first} explains most of the gap; what is left is more than tolerance")
         }
-        Verdict::Unexplained => "something is there that no effect of the catalogue explains".to_owned(),
+        Verdict::Unexplained => "no effect of the catalogue explains the gap".to_owned(),
     }
 }
 
@@ -84,20 +86,25 @@ pub fn cause(candidate: &Candidate) -> String {
         .iter()
         .map(|(name, e)| {
             format!(
-                "{name} = {} {} ({} .. {})",
-                four_figures(e.value),
-                e.unit,
+                "{name} = {} ({} .. {}){}",
+                with_unit(four_figures(e.value), &e.unit),
                 four_figures(e.low),
-                four_figures(e.high)
+                four_figures(e.high),
+                beside(e.value, &e.unit)
             )
         })
         .collect();
     format!("{}: {}", candidate.effects.join(" + "), parameters.join(", "))
 }
 
+/// What engineers judge a parameter by, where its unit says little.
+fn beside(value: f64, unit: &str) -> String {
+    if unit == "W s2/rad2" { format!(", {}", at_150_krpm(value)) } else { String::new() }
+}
+
 fn how_far(gap: &Gap) -> String {
     let mut text = format!(
-        "\nhow far, on {} steps that were used neither to select nor to fit\n  {:.1} % of the gap removed ({:.1} .. {:.1} %)\n",
+        "\nhow far, on {} steps that were used neither for selection nor for fitting\n  {:.1} % of the gap removed ({:.1} .. {:.1} %)\n",
         gap.held_out_steps.len(),
         100.0 * gap.shrink,
         100.0 * gap.shrink_low,

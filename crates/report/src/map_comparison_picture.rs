@@ -19,7 +19,7 @@ pub fn map_comparison_figure(
     let second = second.clone().at_reference(first.reference);
     Figure::new("Comparison of two maps")
         .subtitle(format!(
-            "{} less {}; both corrected to {}. Lines differ beyond their uncertainty at {:.0} % of places, efficiencies at {:.0} %.",
+            "{} minus {}; both corrected to {}. Lines differ beyond their uncertainty at {:.0} % of places, efficiencies at {:.0} %.",
             names[1],
             names[0],
             first.reference,
@@ -76,7 +76,7 @@ fn map_panel(
 fn eta_panel(comparison: &MapComparison) -> Panel {
     let mut panel =
         Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new("difference of efficiency, points"))
-            .title("(b) efficiency, second less first, with its 95 % interval")
+            .title("(b) efficiency, second minus first, with its 95 % interval")
             .with(Rule::new(RuleAt::Y(0.0)));
     let last = comparison.lines.len().saturating_sub(1).max(1) as f64;
     for (index, line) in comparison.lines.iter().enumerate() {

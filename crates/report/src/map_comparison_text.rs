@@ -11,7 +11,7 @@ pub fn map_comparison_text(comparison: &MapComparison) -> String {
         "corrected rpm",
         "places",
         "flow kg/s",
-        "PR 1",
+        "PR",
         "distance %",
         "+/- %",
         "eta points",
@@ -40,11 +40,11 @@ pub fn map_comparison_text(comparison: &MapComparison) -> String {
         ]);
     }
     let mut text = format!(
-        "{table}\n\nSecond less first, means over each line; +/- is the 95 % interval of one place. "
+        "{table}\n\nSecond minus first, means over each line; +/- is the 95 % interval of one place. "
     );
     let _ = writeln!(
         text,
-        "Over all places: distance {:.2} % rms, efficiency {:+.2} points in the mean, {:.2} rms; lines differ beyond their \
+        "Over all places: distance {:.2} % rms, efficiency {:+.2} points on average, {:.2} rms; lines differ beyond their \
          uncertainty at {:.0} % of places, efficiencies at {:.0} %.",
         100.0 * comparison.distance_rms_ratio,
         100.0 * comparison.eta_mean,

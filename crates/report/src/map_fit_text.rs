@@ -1,4 +1,4 @@
-//! A map fit for people: what each line reaches, and how well lines that were left out are foretold.
+//! A map fit for people: what each line reaches, and how well lines that were left out are predicted.
 
 use crate::number::number;
 use crate::table;
@@ -62,7 +62,7 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
         let eta = || lines().filter_map(|l| l.eta);
         let _ = writeln!(
             text,
-            "Left out, {name} lines: distance {:.2} % in the mean, {:.2} % at worst; efficiency {:.2} points in the mean, {:.2} at worst (medians of each line's points).",
+            "Left out, {name} lines: distance {:.2} % on average, {:.2} % at worst; efficiency {:.2} points on average, {:.2} at worst (medians of each line's points).",
             mean(lines().map(|l| l.distance_ratio).sum()),
             100.0 * lines().map(|l| l.distance_ratio).fold(0.0, f64::max),
             mean(eta().sum()),
@@ -82,7 +82,7 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
     if let (Some(distance), Some(eta)) = (held(|l| l.distance_held_ratio), held(|l| l.eta_held_ratio)) {
         let _ = writeln!(
             text,
-            "Of the points of inner lines that were left out, the 95 % intervals hold {distance:.0} % of distances and {eta:.0} % of efficiencies."
+            "At inner lines that were left out, the 95 % intervals contain {distance:.0} % of the points' distances and {eta:.0} % of their efficiencies."
         );
     }
     if fitted.crossings > 0 {

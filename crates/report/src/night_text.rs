@@ -32,7 +32,7 @@ pub fn night_text(night: &Night, comparison: &Comparison, path: &Path) -> String
         let shift = |shift| moved.quantity.show_shift(shift, moved.mean_level);
         let _ = write!(
             text,
-            "moved    {}: {} at {} of {} points, by {} in the mean",
+            "moved    {}: {} at {} of {} points, by {} on average",
             moved.run,
             moved.quantity.words(),
             moved.moved,
@@ -41,7 +41,7 @@ pub fn night_text(night: &Night, comparison: &Comparison, path: &Path) -> String
         );
         if let Some(largest) = &moved.largest {
             let by = moved.quantity.show_shift(largest.value - largest.band.median, largest.band.median);
-            let _ = write!(text, ", most at {} ({by})", largest.place);
+            let _ = write!(text, ", largest at {} ({by})", largest.place);
         }
         text.push('\n');
     }

@@ -10,7 +10,7 @@ use std::fmt::Write;
 
 fn bound_text(bound: &PlanBound) -> String {
     let mut text = format!(
-        "No order has more than {:.1} K in all, or {:.1} K at the least",
+        "No order has a sum above {:.1} K, or a minimum above {:.1} K",
         bound.sum_gradient_k, bound.worst_gradient_k
     );
     // Writing to a String cannot fail.
@@ -37,7 +37,7 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
         format!("to {} @ opening", campaign.display.speed),
         display.pressure_head("P3"),
         display.flow_head("flow"),
-        "PR 1".to_owned(),
+        "PR".to_owned(),
         display.temperature_head("T2"),
         "dT2 K".to_owned(),
         "dTc K".to_owned(),
@@ -78,7 +78,7 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
     // Writing to a String cannot fail.
     let _ = writeln!(
         text,
-        "{}: {} steps, order {}, {} in all ({}warm-up {}, cool-down {}).",
+        "{}: {} steps, order {}, {} in total ({}warm-up {}, cool-down {}).",
         plan.campaign,
         plan.steps.len(),
         plan.objective,
@@ -89,7 +89,7 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
     );
     let _ = writeln!(
         text,
-        "Housing gradient within the windows: {:.1} K in all, {} K at the least.",
+        "Housing gradient within the windows: {:.1} K in total, {} K at minimum.",
         figures.sum_gradient_k,
         number(figures.worst_gradient_k, 1),
     );

@@ -34,8 +34,8 @@ pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits) -> String {
 /// How far the points are from what the simulator knows.
 pub fn score_text(score: &ScoreSummary) -> String {
     let mut text = format!(
-        "Against the simulator's truth ({} points): efficiency off by {:.2} points in the median, {:.2} at worst, {:.0} % \
-         within 1 point; the 95 % interval holds it at {:.0} %.\n",
+        "Against the simulator's truth ({} points): median error of efficiency {:.2} points, {:.2} at worst, {:.0} % \
+         within 1 point; the 95 % interval contains the truth at {:.0} %.\n",
         score.points,
         100.0 * score.eta_median_error,
         100.0 * score.eta_worst_error,
@@ -45,7 +45,7 @@ pub fn score_text(score: &ScoreSummary) -> String {
     if let (Some(median), Some(worst)) = (score.h_median_error_ratio, score.h_worst_error_ratio) {
         let _ = writeln!(
             text,
-            "Heat-transfer coefficient off by {:.1} % in the median, {:.1} % at worst.",
+            "Median error of the heat-transfer coefficient {:.1} %, {:.1} % at worst.",
             100.0 * median,
             100.0 * worst
         );
@@ -59,9 +59,9 @@ fn points_table(points: &[ScoredPoint], units: &DisplayUnits) -> comfy_table::Ta
     let mut heads = vec![
         "step".to_owned(),
         display.speed_head("speed"),
-        "opening 1".to_owned(),
+        "opening".to_owned(),
         display.flow_head("corr. flow"),
-        "PR 1".to_owned(),
+        "PR".to_owned(),
         "eta %".to_owned(),
         "+/- points".to_owned(),
         "h W/(m2 K)".to_owned(),

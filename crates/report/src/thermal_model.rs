@@ -16,7 +16,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
                 writeln!(text, "  {name:<34} {:.decimals$} +/- {half:.decimals$} {unit}", scale * number)
             }
             (None, _) => {
-                writeln!(text, "  {name:<34} the recording can not tell (+/- {half:.decimals$} {unit})")
+                writeln!(text, "  {name:<34} the recording cannot tell (+/- {half:.decimals$} {unit})")
             }
         };
     };
@@ -52,13 +52,13 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     {
         let _ = writeln!(
             text,
-            "  the profile of alpha_A is flat: {first:.1} to {last:.1} fit the recording alike"
+            "  the profile of alpha_A is flat: {first:.1} to {last:.1} fit the recording equally well"
         );
     }
     for pair in &thermal.entangled {
         let _ = writeln!(
             text,
-            "  {} and {} are hardly told apart (correlation {:+.2})",
+            "  {} and {} can hardly be told apart (correlation {:+.2})",
             pair.first, pair.second, pair.correlation
         );
     }
@@ -96,9 +96,9 @@ mod tests {
             doubts: Vec::new(),
         };
         let text = thermal_text(&thermal);
-        assert!(text.contains("the recording can not tell"), "{text}");
+        assert!(text.contains("the recording cannot tell"), "{text}");
         assert!(text.contains("flat: 0.0 to 0.2"), "{text}");
-        assert!(text.contains("alpha_A and direction factor are hardly told apart"), "{text}");
+        assert!(text.contains("alpha_A and direction factor can hardly be told apart"), "{text}");
         let json = serde_json::to_value(&thermal).unwrap_or_default();
         assert_eq!(json["alpha_area_profile"][3]["value"], 0.3);
         assert_eq!(json["entangled"][0]["correlation"], 0.97);

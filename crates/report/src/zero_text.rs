@@ -12,7 +12,7 @@ pub fn zero_text(zero: &ZeroOutcome) -> String {
         }
         ZeroOutcome::Found(zero) => {
             let mut text = format!(
-                "\nisothermal zero from {:.0} to {:.0} s, taken off the readings (+/- 95 %):\n",
+                "\nisothermal zero from {:.0} to {:.0} s, subtracted from the readings (+/- 95 %):\n",
                 zero.start_s, zero.end_s
             );
             for (channel, offset) in &zero.offsets {

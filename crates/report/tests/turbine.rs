@@ -109,7 +109,7 @@ fn what_is_not_known_is_absent_and_never_a_number() {
     assert!(
         text.contains("1 points without a compressor efficiency") && text.lines().all(|l| l.starts_with('#'))
     );
-    // No expansion, a channel that is missing, one that is no number: no row.
+    // No expansion, a channel that is missing, one that is not a number: no row.
     let mut backwards = recording(&state);
     backwards.series.get_mut(&Channel::P3).unwrap().values.fill(100_000.0);
     let mut missing = recording(&state);

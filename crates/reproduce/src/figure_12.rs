@@ -158,7 +158,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
         Statement::new(
             "The highest errors in efficiency occur with the smallest changes of T2; larger gradients give higher accuracy.",
             format!(
-                "rms {} points below 2 K, {} above 15 K. Without the points that say that their flow moved: {} and {}. The largest jumps down to 50 krpm are no gain, for the flow goes on moving after them.",
+                "rms {} points below 2 K, {} above 15 K. Without the points that say that their flow moved: {} and {}. The largest jumps down to 50 krpm bring no gain, because the flow keeps moving after them.",
                 fixed(small, 1),
                 fixed(large, 1),
                 fixed(small_steady, 1),

@@ -123,7 +123,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
             Verdict::holds_if(low.is_some_and(|(a, b)| a > -6.5 && b < -3.5)),
         ),
         Statement::new(
-            "Under adiabatic conditions (footnote 4) the apparent efficiency is the sought one.",
+            "Under adiabatic conditions (footnote 4) the apparent efficiency is the one sought.",
             format!(
                 "Within {} points, with turbine gas and oil as warm as the compressor outlet and no external area.",
                 fixed(adiabatic_worst, 2)

@@ -44,7 +44,7 @@ mapper reproduce --out docs
 R. D. Burke and others, dynamic identification of thermodynamic parameters for turbocharger compressor models: the
 figures made in simulation (5 to 10), and figure 12, redone on the virtual laboratory's nominal model. Its map and air
 tables are not printed in the paper and are closed forms here, so numbers agree in kind, not in digits. Each statement
-of the paper stands beside what came out: *holds*, *partly* or *differs*. An efficiency error is identified less model
+of the paper stands beside what came out: *holds*, *partly* or *differs*. An efficiency error is identified minus model
 value, in points (1 point = 0.01); ranges run over the valve openings.
 
 Errata of the paper followed here: eq. 2 lacks T1' on its right side; the nRMSE of the heat-transfer coefficient is 3.2 %

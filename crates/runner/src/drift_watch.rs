@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, VecDeque};
 const END_S: f64 = 20.0;
 /// A difference counts beyond so many declared standard deviations: 95 %.
 const WIDTH: f64 = 1.96;
-/// What is compared. T2 is taken over T1 and P2 over P1, whose own wander is no drift.
+/// What is compared. T2 is taken over T1 and P2 over P1, whose own wander is not drift.
 const WATCHED: [Channel; 4] = [Channel::T2, Channel::P2, Channel::CompressorFlow, Channel::Tc];
 
 /// Steps of another source, with the reference jump made again where a repeat differs from its first visit.

@@ -73,7 +73,7 @@ fn run(on_drift: OnDrift, drift: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<String>)
         watch.on_batch(&SampleBatch {
             t_s: times.clone(),
             columns: vec![
-                // An inlet that warms by itself is no drift.
+                // An inlet that warms by itself is not drift.
                 column(Channel::T1, times.iter().map(|t_s| 298.0 + 0.01 * t_s).collect()),
                 column(Channel::T2, times.iter().map(|t_s| 350.0 + 0.01 * t_s + drift(*t_s)).collect()),
             ],

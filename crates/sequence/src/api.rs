@@ -81,7 +81,7 @@ table! {
                 valve_opening_ratio: 0.5 * (a.0.valve_opening_ratio + b.0.valve_opening_ratio),
             }));
         };
-        "reachable(p)", "Whether a step may go to `p`: within all limits, and held by the nominal machine." => |engine, session| {
+        "reachable(p)", "Whether a step may go to `p`: it is within all limits, and the nominal machine can hold it." => |engine, session| {
             let session = session.clone();
             engine.register_fn("reachable", move |point: Point| lock(&session).reachable(point.0));
         };
@@ -109,7 +109,7 @@ table! {
                 session.step(point.0, dwell_s, Hold::Dwell)
             });
         };
-        "jump(p, time)", "The same with a time of its own." => |engine, session| {
+        "jump(p, time)", "The same with its own time." => |engine, session| {
             let session = session.clone();
             engine.register_fn("jump", move |point: Point, time: &str| {
                 let dwell_s = quantity(Kind::Duration, time)?;
@@ -123,14 +123,14 @@ table! {
                 lock(&session).settle(point.0, max_s, SETTLED_RATE_K_S)
             });
         };
-        "settle(p, longest, rate)", "The same with a drift of its own, e.g. `\"0.005 K/s\"`." => |engine, session| {
+        "settle(p, longest, rate)", "The same with its own drift limit, e.g. `\"0.005 K/s\"`." => |engine, session| {
             let session = session.clone();
             engine.register_fn("settle", move |point: Point, longest: &str, rate: &str| {
                 let (max_s, rate_k_s) = (quantity(Kind::Duration, longest)?, quantity(Kind::TemperatureRate, rate)?);
                 lock(&session).settle(point.0, max_s, rate_k_s)
             });
         };
-        "repeat(n)", "Does step `n` once more by the same jump, so that the two compare: goes to where it came from, unless there already, and jumps as it did. Returns the result of the jump." => |engine, session| {
+        "repeat(n)", "Repeats step `n` by the same jump, so that the two can be compared: goes to where it came from, unless already there, and jumps again. Returns the result of the jump." => |engine, session| {
             let session = session.clone();
             engine.register_fn("repeat", move |number: INT| lock(&session).repeat(number));
         };
@@ -149,7 +149,7 @@ table! {
         "r.step", "Number of the step, from 1." => |engine, _| {
             engine.register_get("step", |result: &mut StepResult| result.number as INT);
         };
-        "r.point", "Where it aimed." => |engine, _| {
+        "r.point", "The point it was to reach." => |engine, _| {
             engine.register_get("point", |result: &mut StepResult| Point(result.target));
         };
         "r.verdict", "`\"good\"`, `\"doubtful\"` or `\"unusable\"`." => |engine, _| {

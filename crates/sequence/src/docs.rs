@@ -22,7 +22,7 @@ yields steps; `order(grid())` asks the planner.
     }
 
 `mapper plan` rehearses the script on the virtual lab of the nominal machine and prints the forecast plan: an adaptive
-script may take another way on the rig. `mapper run` rehearses it first and then runs it; a script that fails in the
+script may take another path on the rig. `mapper run` rehearses it first and then runs it; a script that fails in the
 rehearsal never touches the rig.
 
 - Every step is checked before it leaves the script: shaft speed, valve range, P3, T2, T3 and surge margin within the
@@ -34,8 +34,8 @@ rehearsal never touches the rig.
 - There are no files, no network, no clock, no modules, no `eval`, no `this`, and functions do not
   capture variables. Operations
   (5 million), depth of calls (32), length of strings (4096 bytes), arrays (4096 elements, or twice the grid) and maps
-  (1024 entries), variables (128), steps (20 000) and time (a day a step, four weeks in all) are bounded.
-- An error ends the run in its safe state; what was recorded is kept, identified and reported. The steps that were made
+  (1024 entries), variables (128), steps (20 000) and time (a day a step, four weeks in total) are bounded.
+- An error ends the run in its safe state; what was recorded is kept, identified and reported. The steps that were run
   stand in `executed_plan.json` of the run directory.
 
 Examples with their campaigns are in `examples/sequences`.

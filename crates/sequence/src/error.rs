@@ -19,7 +19,7 @@ pub enum SequenceError {
     #[error("the thread of the sequence script could not be started: {0}")]
     Thread(#[source] std::io::Error),
     /// The script's thread is gone: a fault of the program.
-    #[error("the sequence script ended without a word: a fault of the program")]
+    #[error("the sequence script ended without a result: this is a fault of the program")]
     Lost,
 }
 

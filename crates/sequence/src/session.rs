@@ -96,8 +96,8 @@ impl Session {
     fn check(&mut self, point: OperatingPoint) -> Result<mapper_physics::steady::SteadyState, Thrown> {
         let limit = self.check_limit();
         if self.checks >= limit {
-            let message = format!("the script has had {limit} points judged without going there");
-            return Err(throw(message, "judge fewer points"));
+            let message = format!("the script has checked {limit} points without going there");
+            return Err(throw(message, "check fewer points"));
         }
         self.checks += 1;
         self.request.check(point).map_err(|Refusal { message, remedy }| throw(message, &remedy))
@@ -116,7 +116,7 @@ impl Session {
         let limit = 1000 + 4 * self.request.points.len();
         self.ordered += points.len();
         if self.ordered > limit {
-            let message = format!("the planner has been asked to order more than {limit} points in all");
+            let message = format!("the planner has been asked to order more than {limit} points in total");
             return Err(throw(message, "order a set once and keep the result"));
         }
         if points.is_empty() {

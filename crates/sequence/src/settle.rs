@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 
 /// Samples over which drifts are judged, s.
 const SPAN_S: f64 = 30.0;
-/// Most samples that are kept; a rig that is faster is looked at over a shorter span.
+/// Maximum number of samples that are kept; a rig that is faster is looked at over a shorter span.
 const SAMPLE_LIMIT: usize = 100_000;
 
 /// When a step that waits may end.

@@ -239,7 +239,7 @@ fn hostile_scripts_end_with_an_error() {
         ("throw;", "stopped itself"),
         ("throw \"\\u001b[2J\";", "?[2J"),
         ("loop { order(grid()); }", "more than"),
-        ("loop { reachable(point(\"250 krpm\", 1.0)); }", "judged"),
+        ("loop { reachable(point(\"250 krpm\", 1.0)); }", "checked"),
     ] {
         let error = error_of(text);
         assert!(error.message.contains(word), "{text}: {error}");
@@ -304,11 +304,11 @@ fn the_documentation_is_what_the_functions_say() {
     assert!(written == api_markdown(), "docs/sequences.md is stale: run `cargo xtask docs`");
 }
 
-/// Refusals that a script swallows cost it operations, and points that are judged in vain are counted: it ends.
+/// Refusals that a script swallows cost it operations, and points that are checked in vain are counted: it ends.
 #[test]
 fn a_script_that_never_takes_no_for_an_answer_ends() {
     let error = error_of("loop { try { jump(point(\"175 krpm\", 0.2)); } catch { } }");
     assert!(error.to_string().contains("operations"), "{error}");
     let error = error_of("loop { reachable(point(\"175 krpm\", 0.2)); }");
-    assert!(error.to_string().contains("points judged"), "{error}");
+    assert!(error.to_string().contains("has checked"), "{error}");
 }

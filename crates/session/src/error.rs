@@ -50,7 +50,7 @@ pub enum SessionError {
         path: PathBuf,
     },
     /// Two runs of a night have the same campaign, machine, method and seed.
-    #[error("{key} stands in the nightly campaign twice; give each campaign its own name")]
+    #[error("{key} appears twice in the nightly campaign; give each campaign its own name")]
     NightlyTwice {
         /// The run.
         key: String,
@@ -79,7 +79,7 @@ pub enum SessionError {
     },
     /// A stored plan was made from something else.
     #[error(
-        "{} is stale: {} changed since it was made; make it anew with `mapper plan CAMPAIGN --out FILE`",
+        "{} is stale: {} changed since it was made; make it again with `mapper plan CAMPAIGN --out FILE`",
         .path.display(), .changed.join(" and ")
     )]
     StalePlan {
@@ -129,7 +129,7 @@ pub enum SessionError {
         path: PathBuf,
     },
     /// A suspected effect has the name of another.
-    #[error("{}: there is an effect `{id}` already; choose another name", .path.display())]
+    #[error("{}: there is already an effect `{id}`; choose another name", .path.display())]
     EffectTaken {
         /// The script.
         path: PathBuf,
@@ -178,7 +178,7 @@ pub enum SessionError {
         source: ImportError,
     },
     /// A map format that does not exist.
-    #[error("there is no map format `{name}`; there are {}", .known.join(", "))]
+    #[error("there is no map format `{name}`; the formats are {}", .known.join(", "))]
     UnknownFormat {
         /// What was asked for.
         name: String,
@@ -196,7 +196,7 @@ pub enum SessionError {
         known: Vec<&'static str>,
     },
     /// A new file of no known map format.
-    #[error("{}: say the format by extension or `--to`: {}", .path.display(), .known.join(", "))]
+    #[error("{}: give the format by the extension or by `--to`: {}", .path.display(), .known.join(", "))]
     FormatUnsaid {
         /// The file.
         path: PathBuf,
@@ -222,7 +222,7 @@ pub enum SessionError {
         source: io::Error,
     },
     /// A parent directory is full of runs.
-    #[error("{} holds 999 runs of this second already", .parent.display())]
+    #[error("{} already holds 999 runs from this second", .parent.display())]
     TooManyRuns {
         /// The directory.
         parent: PathBuf,

@@ -38,7 +38,7 @@ pub enum SessionEvent {
     PiecesDone {
         /// Pieces done.
         done: usize,
-        /// Pieces in all.
+        /// Pieces in total.
         of: usize,
     },
 }

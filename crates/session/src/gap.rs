@@ -118,9 +118,9 @@ fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     let Some(drift) = drift else { return };
     let taken_off = drift.cause.is_some_and(|cause| cause.kind() == CauseKind::Sensor);
     let consequence = if taken_off {
-        "this was taken off its reading before the diagnosis"
+        "this was subtracted from its reading before the diagnosis"
     } else {
-        "the diagnosis looks for what does not change, so that no cause is named while this is so"
+        "the diagnosis assumes a rig that does not change, so no cause is named"
     };
     diagnosis
         .warnings

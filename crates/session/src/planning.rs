@@ -61,7 +61,7 @@ pub fn with_plan_request<T, E: From<SessionError>>(
     })
 }
 
-/// A plan from a file, refused where what it was made from has changed; `made` is the plan made anew.
+/// A plan from a file, refused where what it was made from has changed; `made` is the plan made again.
 ///
 /// # Errors
 /// [`SessionError::StalePlan`] with what has changed; [`SessionError::NotAPlan`] and [`SessionError::File`] where the

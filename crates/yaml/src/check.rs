@@ -149,7 +149,7 @@ impl Check<'_> {
             _ => {
                 let complaint = Complaint {
                     kind: FindingKind::WrongType,
-                    message: format!("{} is none of the forms allowed here", quoted(value)),
+                    message: format!("{} is not one of the forms allowed here", quoted(value)),
                     remedy: with_description(example_sentence(schema), Some(schema)),
                 };
                 self.note(steps, complaint);

@@ -42,7 +42,7 @@ pub(crate) fn complain(rule: &Rule<'_>, schema: &Map<String, Value>, value: &Val
         }
         Rule::Repeated => Complaint {
             kind: FindingKind::Duplicate,
-            message: "an entry stands twice".to_owned(),
+            message: "an entry appears twice".to_owned(),
             remedy: "remove one of the two".to_owned(),
         },
         Rule::SeveralForms => Complaint {
@@ -72,7 +72,7 @@ fn wrong_type(schema: &Map<String, Value>, value: &Value) -> Complaint {
         message: match value {
             Value::Null => "there is no value".into(),
             Value::Array(_) | Value::Object(_) => {
-                format!("{} stands where {needed} is needed", name_of(value))
+                format!("{} is given where {needed} is needed", name_of(value))
             }
             _ => format!("{} is {}, but {needed} is needed", quoted(value), name_of(value)),
         },
@@ -97,7 +97,7 @@ pub(crate) fn wrong_name(options: &[&str], schema: &Map<String, Value>, value: &
     let guess = value.as_str().map(|text| guess(text, options)).unwrap_or_default();
     Complaint {
         kind: FindingKind::WrongValue,
-        message: format!("{} is none of {}", quoted(value), options.join(", ")),
+        message: format!("{} is not one of {}", quoted(value), options.join(", ")),
         remedy: with_description(format!("{guess}write one of {}", options.join(", ")), Some(schema)),
     }
 }

@@ -31,7 +31,7 @@ pub(crate) fn check(schema: &Map<String, Value>, value: &Value) -> Option<Compla
         _ => {
             return Some(Complaint {
                 kind: FindingKind::WrongType,
-                message: format!("{} stands where {} is needed", name_of(value), kind.name()),
+                message: format!("{} is given where {} is needed", name_of(value), kind.name()),
                 remedy: format!("write e.g. `{example}` (units: {})", kind.unit_list()),
             });
         }

@@ -201,7 +201,7 @@ impl Reader<'_> {
             self.note(
                 FindingKind::Syntax,
                 span,
-                "a key must be plain text, but a list or mapping stands here".into(),
+                "a key must be plain text, but this is a list or a mapping".into(),
                 SYNTAX_REMEDY,
             );
             return Err(Stop);
@@ -238,7 +238,7 @@ impl Reader<'_> {
             self.note(
                 FindingKind::DuplicateKey,
                 span,
-                format!("the key `{key}` stands here a second time"),
+                format!("the key `{key}` appears here a second time"),
                 "remove one of the two",
             );
         }
@@ -262,4 +262,4 @@ impl Reader<'_> {
 }
 
 const SYNTAX_REMEDY: &str =
-    "check indentation (blanks, no tabs), the blank after each colon, quotes and brackets up to here";
+    "check the indentation (spaces, no tabs), the space after each colon, quotes and brackets up to here";

@@ -27,7 +27,7 @@ pub enum ReplayError {
     #[error(transparent)]
     Unreadable(#[from] RecordError),
     /// More was asked for than was recorded.
-    #[error("the recording being replayed is over")]
+    #[error("the recording being replayed has ended")]
     Over,
 }
 

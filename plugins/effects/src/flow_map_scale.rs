@@ -17,7 +17,7 @@ effect_parameters! {
 impl EffectKind for FlowMapScale {
     const ABOUT: About = About {
         id: "flow_map_scale",
-        description: "the compressor moves more or less at equal speed and pressure ratio",
+        description: "the compressor delivers more or less flow at equal speed and pressure ratio",
         equation: "m_corr = s m_corr,nominal; the efficiency stays where it is on the speed line",
         source: "worn or fouled compressor, other trim",
         submodel: Submodel::CompressorFlow,

@@ -65,7 +65,7 @@ fn over_ratio(ratios: &[f64], values: &[f64], wanted: f64) -> f64 {
     let mut last = values[0];
     for i in 1..ratios.len() {
         if ratios[i] <= ratios[i - 1] {
-            // Beyond the highest pressure ratio flow is no function of it.
+            // Beyond the highest pressure ratio flow is not a function of it.
             break;
         }
         if wanted <= ratios[i] {

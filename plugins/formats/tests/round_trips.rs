@@ -1,4 +1,4 @@
-//! What is written is read back; what is no map is refused with its line.
+//! What is written is read back; what is not a map is refused with its line.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

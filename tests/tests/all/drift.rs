@@ -69,7 +69,7 @@ fn nights_of_one_campaign_are_judged_together_and_another_machine_is_refused() {
     // The first night alone has nothing.
     assert_eq!(drift(&[&first])["verdict"], "none");
 
-    // The seed is no part of the machine: it is the weather of the night.
+    // The seed is not part of the machine: it is the weather of the night.
     let another_seed = night(32, "", same_rig);
     let two = drift(&[&first, &another_seed]);
     assert!(!two["reason"].as_str().unwrap().starts_with("No verdict"), "{}", two["reason"]);
@@ -88,7 +88,7 @@ fn nights_of_one_campaign_are_judged_together_and_another_machine_is_refused() {
     }
 }
 
-/// An ordinary drift is no effect, and the diagnosis says that it was there.
+/// An ordinary drift is not an effect, and the diagnosis says that it was there.
 #[test]
 fn the_gap_diagnosis_looks_for_drift_first() {
     let scratch = scratch();
@@ -106,5 +106,5 @@ fn the_gap_diagnosis_looks_for_drift_first() {
     assert_eq!([&diagnosis["drift"]["verdict"], &diagnosis["drift"]["cause"]], ["sensor", "T2"]);
     assert_eq!(diagnosis["verdict"], "within_tolerance", "{}", diagnosis["candidates"][0]);
     let warning = diagnosis["warnings"][0].as_str().unwrap();
-    assert!(warning.contains("T2 drifts by") && warning.contains("taken off"), "{warning}");
+    assert!(warning.contains("T2 drifts by") && warning.contains("subtracted from"), "{warning}");
 }

@@ -1,4 +1,4 @@
-//! Output whose reader goes away, and output that is no terminal.
+//! Output whose reader goes away, and output that is not a terminal.
 
 use mapper_tests::{SHIPPED, mapper, mapper_command};
 use std::io::{BufRead, BufReader};

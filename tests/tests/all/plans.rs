@@ -93,7 +93,7 @@ fn orders_do_what_they_are_for() {
     }
 }
 
-/// The standard error that the plan states is the scatter of what is found: 48 seeds draw noise and offsets anew. The
+/// The standard error that the plan states is the scatter of what is found: 48 seeds draw noise and offsets again. The
 /// standard deviation of 48 is itself known to 10.3 %; three of that, beside 4 % by which the prediction may be off: over 300
 /// seeds the ratios were 0.95 and 0.95, which are known to 4 % themselves.
 #[test]

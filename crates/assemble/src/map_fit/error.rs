@@ -11,7 +11,7 @@ pub enum MapFitError {
     },
     /// Too little to determine a line.
     #[error(
-        "the map has {points} points and {with_eta} efficiencies; a fit needs at least 8 and 6, best 5 and more on each line"
+        "the map has {points} points and {with_eta} efficiencies; a fit needs at least 8 and 6, preferably 5 or more on each line"
     )]
     TooFewPoints {
         /// Points with flow and pressure ratio.
@@ -55,7 +55,7 @@ pub enum MapFitError {
     },
     /// The equations of the fit became singular.
     #[error(
-        "the fit did not settle: its equations became singular; look for points that stand far off their line, and for lines with equal speeds"
+        "the fit did not settle: its equations became singular; look for points that lie far off their line, and for lines with equal speeds"
     )]
     Singular,
 }

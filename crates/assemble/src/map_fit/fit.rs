@@ -8,13 +8,13 @@ use super::surface::MapFit;
 use super::table::{MapFitOptions, table};
 use mapper_core::{CompressorMap, FittedLine};
 
-/// Factors on the least penalty that are tried until no lines cross.
+/// Factors on the smallest penalty that are tried until no lines cross.
 const STIFFNESSES: [f64; 3] = [1.0, 30.0, 1000.0];
 
 impl MapFit {
     /// Fits all lines of a map, every point at its own corrected speed.
     ///
-    /// Where lines cross, the fit is made anew with stiffer parameters over speed.
+    /// Where lines cross, the fit is made again with stiffer parameters over speed.
     ///
     /// # Errors
     /// [`MapFitError`] where there is too little, too much or nothing sensible to fit.

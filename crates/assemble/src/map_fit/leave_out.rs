@@ -1,4 +1,4 @@
-//! How well a line is foretold by the others.
+//! How well a line is predicted by the others.
 
 use super::observations::Observations;
 use super::surface::MapFit;
@@ -6,7 +6,7 @@ use mapper_core::LeftOutLine;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{NORMAL_975, median};
 
-/// Leaves each line out in turn, fits the others anew from the beginning, and measures the line's points against what
+/// Leaves each line out in turn, fits the others again from the beginning, and measures the line's points against what
 /// that fit says at its speed. Lines without which too little is left are passed over.
 pub fn leave_out(fit: &MapFit) -> Vec<LeftOutLine> {
     let count = fit.data.lines_rpm.len();

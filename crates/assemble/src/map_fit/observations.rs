@@ -4,7 +4,7 @@ use super::MapFitError;
 use mapper_core::{CompressorMap, MapPoint, Verdict};
 use mapper_physics::similarity::head_ratio;
 
-/// Most points and lines that a fit takes: several times what the largest measured maps have.
+/// Maximum number of points and lines that a fit takes: several times what the largest measured maps have.
 const MOST_POINTS: usize = 2000;
 const MOST_LINES: usize = 60;
 

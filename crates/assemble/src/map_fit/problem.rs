@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector};
 /// Parameters that an offset of a whole line moves together: flow; head with work, as an error of speed does, which
 /// leaves efficiency alone; work alone, which is efficiency.
 pub(super) const LINE_OFFSETS: [&[usize]; 3] = [&[CHOKE_FLOW], &[ZERO_SLOPE_HEAD, WORK], &[WORK]];
-/// Most knots over speed.
+/// Maximum number of knots over speed.
 const MOST_KNOTS: usize = 10;
 /// Standard deviations of the level of each parameter about its starting value: wide for what points determine.
 const LEVEL_SD: Parameters = [2.0, 2.0, 0.7, 0.25, 0.4, 0.4, 0.03, 0.03, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5];

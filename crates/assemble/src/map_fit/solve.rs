@@ -44,7 +44,7 @@ enum Phase {
     Settle,
 }
 
-/// Fits. `stiffness` (1 or more) is the factor on the least penalty that the estimation may choose.
+/// Fits. `stiffness` (1 or more) is the factor on the smallest penalty that the estimation may choose.
 ///
 /// Where the points end far from their lines, the estimation may have settled on scatter where there is shape, or on
 /// outliers where there are none: then it is made again from other scales, and the most probable is kept.

@@ -179,7 +179,7 @@ fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Ve
             let angle = walk[after - 1] + share * (walk[after] - walk[after - 1]);
             let place = shape.physical(angle, speed_ratio);
             let error = errors.at(angle, scales);
-            // A hair's breadth beyond the last point is no extrapolation.
+            // A hair's breadth beyond the last point is not an extrapolation.
             let extrapolated = supported.is_none_or(|(low, high)| angle < low - 0.02 || angle > high + 0.02);
             let eta = fit.believed(place.eta, extrapolated);
             let work = shape.at(angle).work * speed_ratio * speed_ratio;

@@ -67,7 +67,7 @@ impl Problem<'_> {
             let trace: f64 = (first..first + lines).map(|i| inverse[(i, i)]).sum();
             let wanted = (lines as f64 - *precision * trace).max(0.01)
                 / (unknowns.offsets.row(index).norm_squared() + 1e-9);
-            // Between 0.05 % and 3 %: less is no error of speed, more is another machine.
+            // Between 0.05 % and 3 %: less is not an error of speed, more is another machine.
             let next = (*precision * (wanted / *precision).clamp(0.5, 2.0)).clamp(1.0 / 9e-4, 4e6);
             set(precision, next);
         }
@@ -81,7 +81,7 @@ impl Problem<'_> {
                 let own = if c == 1 { p.eta_error.powi(2) } else { 0.0 };
                 let variance = precisions.scales[c].powi(2) + own;
                 let robust = 1.0 / (1.0 + r[c] * r[c] / variance / (ROBUST * ROBUST));
-                // What a point declares of itself is no scatter of the fit's.
+                // What a point declares of itself is not scatter of the fit's.
                 let share = precisions.scales[c].powi(2) / variance;
                 let leverage = projected.row(2 * i + c).dot(&jacobian.row(2 * i + c));
                 sum[0] += robust * share * share * (r[c] * r[c] - own).max(0.0);

@@ -17,7 +17,7 @@ pub(crate) struct BoundaryFile {
     /// Compressor inlet total pressure, P1.
     #[schemars(extend("x-min" = "20 kPa", "x-max" = "400 kPa"))]
     inlet_pressure: Quantity<Pressure>,
-    /// Temperature around the housings; `inlet_temperature` where none is given.
+    /// Temperature around the housings; `inlet_temperature` if none is given.
     #[schemars(extend("x-min" = "200 K", "x-max" = "400 K"))]
     ambient_temperature: Option<Quantity<Temperature>>,
     /// Turbine inlet total temperature, T3.
@@ -29,7 +29,7 @@ pub(crate) struct BoundaryFile {
     /// Oil inlet temperature.
     #[schemars(extend("x-min" = "230 K", "x-max" = "450 K"), example = &"50 degC")]
     oil_temperature: Quantity<Temperature>,
-    /// What is held at the compressor's outlet temperature instead, at each point at that of the nominal machine settled there: `[turbine_inlet_temperature, oil_temperature]` for adiabatic mapping. Nothing where none is given.
+    /// What is held at the compressor's outlet temperature instead, at each point at that of the nominal machine settled there: `[turbine_inlet_temperature, oil_temperature]` for adiabatic mapping. Nothing if none is given.
     #[serde(default)]
     #[schemars(extend("uniqueItems" = true, "examples" = [["turbine_inlet_temperature", "oil_temperature"]]))]
     follow_outlet: Vec<FollowerName>,

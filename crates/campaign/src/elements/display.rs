@@ -9,16 +9,16 @@ use serde_json::json;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DisplayUnits {
-    /// Unit of temperatures; degC where none is given.
+    /// Unit of temperatures; degC if none is given.
     #[schemars(extend("enum" = symbols(Kind::Temperature)), example = &"degC")]
     pub temperature: String,
-    /// Unit of pressures; kPa where none is given.
+    /// Unit of pressures; kPa if none is given.
     #[schemars(extend("enum" = symbols(Kind::Pressure)), example = &"kPa")]
     pub pressure: String,
-    /// Unit of shaft speeds; krpm where none is given.
+    /// Unit of shaft speeds; krpm if none is given.
     #[schemars(extend("enum" = symbols(Kind::Speed)), example = &"krpm")]
     pub speed: String,
-    /// Unit of mass flows; g/s where none is given.
+    /// Unit of mass flows; g/s if none is given.
     #[schemars(extend("enum" = symbols(Kind::MassFlow)), example = &"g/s")]
     pub flow: String,
 }

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::HashSet;
 
-/// Most points a grid may have: four weeks of two-minute steps.
+/// Maximum number of points a grid may have: four weeks of two-minute steps.
 const POINT_LIMIT: usize = 20_000;
 /// Ways to write a grid.
 const FORMS: &str = "write `speeds` and `openings`, or `points`, a list of `{speed: 50 krpm, opening: 0.5}`";
@@ -121,7 +121,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
             );
         }
         (true, _, true) | (_, true, true) => {
-            let message = "`points` stands beside `speeds` or `openings`".to_owned();
+            let message = "`points` is given together with `speeds` or `openings`".to_owned();
             check.note_key(FindingKind::Conflict, &here, "points", message, FORMS);
         }
         _ => {}
@@ -150,7 +150,7 @@ fn grid_speeds(check: &mut Check<'_>) {
         let Some((rpm, text)) = check.quantity(Kind::Speed, &steps) else { continue };
         below_speed_limit(check, &steps, rpm, text);
         if !seen.insert(rounded(rpm, 0.0)) {
-            let message = format!("the speed `{text}` stands here a second time");
+            let message = format!("the speed `{text}` appears here a second time");
             check.note(FindingKind::Duplicate, &steps, message, "remove one of the two");
         }
     }
@@ -162,7 +162,7 @@ fn grid_openings(check: &mut Check<'_>) {
         let steps = steps!["grid", "openings", index];
         let Some(opening) = check.number(&steps) else { continue };
         if !seen.insert(rounded(0.0, opening)) {
-            let message = format!("the opening {opening} stands here a second time");
+            let message = format!("the opening {opening} appears here a second time");
             check.note(FindingKind::Duplicate, &steps, message, "remove one of the two");
         }
     }
@@ -179,7 +179,7 @@ fn grid_points(check: &mut Check<'_>, list: &str) {
             below_speed_limit(check, &speed_path, rpm, text);
         }
         if !seen.insert(rounded(rpm, opening)) {
-            let message = format!("the point {text} at opening {opening} stands here a second time");
+            let message = format!("the point {text} at opening {opening} appears here a second time");
             check.note(FindingKind::Duplicate, &steps, message, "remove one of the two");
         }
     }

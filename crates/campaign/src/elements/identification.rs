@@ -31,7 +31,7 @@ pub(crate) struct IdentificationFile {
     /// Part of the step that is used: `auto`, the default, begins when speed, flow and pressure ratio have settled; or `start` and `end` after the jump.
     #[schemars(example = &"auto")]
     window: Option<WindowFile>,
-    /// Share of the internal area before compression that identification assumes, a plain number from 0 to 1; the machine's where none is given.
+    /// Share of the internal area before compression that identification assumes, a plain number from 0 to 1; the machine's if none is given.
     #[schemars(range(min = 0, max = 1), example = 0.0)]
     alpha_area: Option<f64>,
     /// Variations within which a point counts as settled.

@@ -23,7 +23,7 @@ pub(crate) struct LimitsFile {
     /// Highest compressor outlet temperature, T2.
     #[schemars(extend("x-min" = "250 K", "x-max" = "800 K"), example = &"250 degC")]
     compressor_outlet_temperature: Option<Quantity<Temperature>>,
-    /// Smallest surge margin: flow over the surge flow at equal corrected speed, minus one; 0 %, the surge line, where none is given. Below 0 % for a machine that is known to be stable beyond the nominal map's line.
+    /// Smallest surge margin: flow over the surge flow at equal corrected speed, minus one; 0 %, the surge line, if none is given. Below 0 % for a machine that is known to be stable beyond the nominal map's line.
     #[schemars(extend("x-min" = "-50 %", "x-max" = "200 %"), example = &"2 %")]
     surge_margin: Option<Quantity<Fraction>>,
     /// Largest change of the compressor housing within an identification window.
@@ -41,7 +41,7 @@ pub(crate) struct PressureRangeFile {
     /// Highest pressure.
     #[schemars(extend("x-above" = "0 kPa", "x-max" = "2 MPa"), example = &"400 kPa")]
     max: Quantity<Pressure>,
-    /// Time the rig takes from the lowest to the highest pressure; where none is given it plays no part in the plan.
+    /// Time the rig takes from the lowest to the highest pressure; if none is given it plays no part in the plan.
     #[schemars(extend("x-above" = "0 s", "x-max" = "24 h"), example = &"10 s")]
     stroke: Option<Quantity<Duration>>,
 }

@@ -127,7 +127,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
         // Whether a table is a map does not depend on its reference state, which may be missing yet.
         Ok(text) => {
             if let Err(error) = TabulatedMap::from_csv(&text, ReferenceState::SAE) {
-                let message = format!("the map file `{}` is no map: {error}", path.display());
+                let message = format!("the map file `{}` is not a map: {error}", path.display());
                 let remedy = "each row needs corrected rpm, corrected kg/s, pressure ratio and efficiency";
                 check.note(FindingKind::WrongValue, &steps, message, remedy);
             }

@@ -11,15 +11,16 @@ pub(crate) fn check(check: &mut Check<'_>) {
     let path = steps!["order"];
     let Some(order) = check.text(&path) else { return };
     if order == VisitOrder::Time.name() && check.get(&steps!["required_sigma_eta"]).is_none() {
-        let message = "the shortest campaign needs the error that it has to reach".to_owned();
+        let message = "`order: time` needs the error that it has to reach".to_owned();
         check.note(FindingKind::MissingKey, &path, message, "add e.g. `required_sigma_eta: 1 %`");
     }
     let steady = check.text(&steps!["identification", "method"]) == Some("steady");
     let counts_on_method =
         [VisitOrder::Information, VisitOrder::Time].into_iter().any(|needs| needs.name() == order);
     if steady && counts_on_method {
-        let message =
-            format!("`{order}` orders by what the dynamic method will find; the method is `steady`");
+        let message = format!(
+            "`{order}` orders by the predicted result of the dynamic method, but the method is `steady`"
+        );
         let remedy = "write `identification.method: dynamic`, or another order";
         check.note(FindingKind::Conflict, &path, message, remedy);
     }

@@ -12,10 +12,10 @@ const USUAL_FORMATS: [&str; 4] = ["csv", "json", "svg", "fitted"];
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Outputs {
-    /// Directory of the run directories; `runs` where none is given.
+    /// Directory of the run directories; `runs` if none is given.
     #[schemars(length(min = 1), example = &"runs")]
     pub directory: String,
-    /// Formats of the map, each once; csv, json, svg and fitted where none is given. docs/maps.md lists all that can be written.
+    /// Formats of the map, each once; csv, json, svg and fitted if none is given. docs/maps.md lists all that can be written.
     #[schemars(extend("uniqueItems" = true, "examples" = [["csv", "json", "svg"]]))]
     pub formats: Vec<FormatName>,
 }

@@ -32,12 +32,12 @@ pub(crate) enum NamedRepeats {
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RepeatedJumpFile {
-    /// The jump; where none is given, from the slowest to the fastest point of the middle opening, or the next best jump that is allowed.
+    /// The jump; if none is given, from the slowest to the fastest point of the middle opening, or the next best jump that is allowed.
     jump: Option<JumpFile>,
-    /// Steps between two repeats, at most; 12 where none is given.
+    /// Steps between two repeats, at most; 12 if none is given.
     #[schemars(range(min = 2, max = 20000), example = 12)]
     every: Option<usize>,
-    /// Fewest repeats; 2 where none is given.
+    /// Minimum number of repeats; 2 if none is given.
     #[schemars(range(min = 1, max = 1000), example = 2)]
     at_least: Option<usize>,
 }

@@ -78,7 +78,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
             && (29..=31).contains(&day)
             && day > days_of(year, month)
         {
-            let message = format!("`{text}` is no day of the calendar");
+            let message = format!("`{text}` is not a calendar date");
             let remedy = "write year-month-day, e.g. `2026-09-01`";
             check.note(FindingKind::WrongValue, &steps, message, remedy);
         }

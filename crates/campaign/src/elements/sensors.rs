@@ -128,10 +128,10 @@ pub(crate) struct SpeedSensor {
     /// Noise of one sample.
     #[schemars(extend("x-min" = "0 rpm"), example = &"30 rpm")]
     noise: Quantity<Speed>,
-    /// Fixed offset left after calibration; 0 where none is given.
+    /// Fixed offset left after calibration; 0 if none is given.
     #[schemars(extend("x-min" = "0 rpm"), example = &"0 rpm")]
     offset: Option<Quantity<Speed>>,
-    /// Fixed error of the gain; 0 where none is given.
+    /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
 }
@@ -149,10 +149,10 @@ pub(crate) struct FlowSensor {
     /// Noise of one sample.
     #[schemars(extend("x-min" = "0 kg/s"))]
     noise: Quantity<MassFlow>,
-    /// Fixed offset left after calibration; 0 where none is given.
+    /// Fixed offset left after calibration; 0 if none is given.
     #[schemars(extend("x-min" = "0 kg/s"), example = &"0 kg/s")]
     offset: Option<Quantity<MassFlow>>,
-    /// Fixed error of the gain; 0 where none is given.
+    /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
 }
@@ -170,10 +170,10 @@ pub(crate) struct PressureSensor {
     /// Noise of one sample.
     #[schemars(extend("x-min" = "0 Pa"), example = &"20 Pa")]
     noise: Quantity<PressureDifference>,
-    /// Fixed offset left after calibration; 0 where none is given.
+    /// Fixed offset left after calibration; 0 if none is given.
     #[schemars(extend("x-min" = "0 Pa"))]
     offset: Option<Quantity<PressureDifference>>,
-    /// Fixed error of the gain; 0 where none is given.
+    /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
     /// What the tap feels: `total` (the default), or `static`, converted with `pipe_diameter`.
@@ -205,10 +205,10 @@ pub(crate) struct TemperatureSensor {
     /// Noise of one sample.
     #[schemars(extend("x-min" = "0 K"), example = &"0.1 K")]
     noise: Quantity<TemperatureDifference>,
-    /// Fixed offset left after calibration; 0 where none is given.
+    /// Fixed offset left after calibration; 0 if none is given.
     #[schemars(extend("x-min" = "0 K"))]
     offset: Option<Quantity<TemperatureDifference>>,
-    /// Fixed error of the gain; 0 where none is given.
+    /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
 }
@@ -226,10 +226,10 @@ pub(crate) struct ProbeSensor {
     /// Noise of one sample.
     #[schemars(extend("x-min" = "0 K"), example = &"0.1 K")]
     noise: Quantity<TemperatureDifference>,
-    /// Fixed offset left after calibration; 0 where none is given.
+    /// Fixed offset left after calibration; 0 if none is given.
     #[schemars(extend("x-min" = "0 K"))]
     offset: Option<Quantity<TemperatureDifference>>,
-    /// Fixed error of the gain; 0 where none is given.
+    /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
     /// Diameter of the probe's tip; 0 mm, the default, is a probe without inertia.

@@ -13,7 +13,7 @@ pub(crate) struct ZeroFile {
     /// Time at rest before the warm-up, air off: until oil and housing have the temperature of the cell. Its last ten minutes are used, and refused where a temperature still drifts by more than 0.1 K/min.
     #[schemars(extend("x-min" = "1 min", "x-max" = "24 h"), example = &"30 min")]
     soak: Quantity<Duration>,
-    /// Oil inlet temperature in the meantime; that of the inlet air where none is given.
+    /// Oil inlet temperature in the meantime; that of the inlet air if none is given.
     #[schemars(extend("x-min" = "250 K", "x-max" = "450 K"), example = &"25 degC")]
     oil_temperature: Option<Quantity<Temperature>>,
 }

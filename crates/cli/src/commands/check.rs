@@ -11,7 +11,7 @@ use mapper_session::{nominal_model, soak_s};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Check a campaign file and print all its mistakes, each with its line and what would be right
+/// Check a campaign file and print all its mistakes, each with its line and a remedy
 #[derive(Debug, Args)]
 pub struct Check {
     /// Campaign file (YAML)

@@ -11,19 +11,19 @@ use mapper_session::{Recorded, Session, SessionError, write_new};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Say whether the rig stayed the same while a map was made: which sensor drifts, or the machine, since when, how fast
+/// Say whether the rig stayed the same while a map was made: which sensor drifts, or the machine, since when and how fast
 #[derive(Debug, Args)]
 pub struct Drift {
     /// Run directories in the order in which they were made; with `--recording`, the one campaign of the recordings
     #[arg(required = true, value_name = "RUN|CAMPAIGN")]
     pub paths: Vec<PathBuf>,
-    /// MCAP recording, also of another program; may be given more than once, in the order in which they were made
+    /// MCAP recording, of this program or another; may be given more than once, in the order in which they were made
     #[arg(long, value_name = "FILE")]
     pub recording: Vec<PathBuf>,
-    /// Where recordings made by another program hold the rig's channels (YAML)
+    /// Channel map: where recordings made by another program hold the rig's channels (YAML)
     #[arg(long, value_name = "FILE", requires = "recording")]
     pub channels: Option<PathBuf>,
-    /// Write the points without the drift into this new CSV file
+    /// Write the points corrected for drift to this new CSV file
     #[arg(long, value_name = "FILE")]
     pub corrected: Option<PathBuf>,
     /// Print one JSON object on standard output
@@ -73,7 +73,7 @@ impl Drift {
             return Ok((&self.paths, None));
         }
         let [campaign] = self.paths.as_slice() else {
-            let message = "with `--recording` one campaign is needed, which says what machine was recorded";
+            let message = "`--recording` needs one campaign, that of the machine that was recorded";
             return Err(Failure::new(Code::BadInput, message));
         };
         let campaign = mapper_campaign::load(campaign).map_err(Failure::of_campaign)?;

@@ -10,7 +10,7 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// List, filter and draw what the nightly runs gave
+/// List, filter and plot the results of the nightly runs
 #[derive(Debug, Args)]
 pub struct History {
     /// The history
@@ -22,10 +22,10 @@ pub struct History {
     /// Only this method
     #[arg(long, value_name = "METHOD")]
     pub method: Option<String>,
-    /// Show this figure instead of the usual ones; may be given more than once
+    /// Show this figure instead of the default ones; may be given more than once
     #[arg(long, value_name = "FIGURE", value_parser = figure)]
     pub figure: Vec<Metric>,
-    /// Only nights from this day on (UTC)
+    /// Only nights since this day (UTC)
     #[arg(long, value_name = "YYYY-MM-DD", value_parser = day)]
     pub since: Option<jiff::Timestamp>,
     /// A row for each run, instead of the medians over the seeds
@@ -42,7 +42,7 @@ pub struct History {
 fn figure(text: &str) -> Result<Metric, String> {
     Metric::find(text).ok_or_else(|| {
         let names: Vec<&str> = Metric::ALL.into_iter().map(Metric::name).collect();
-        format!("there is no figure `{text}`; there are {}", names.join(", "))
+        format!("there is no figure `{text}`; the figures are {}", names.join(", "))
     })
 }
 

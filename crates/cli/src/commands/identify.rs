@@ -15,10 +15,10 @@ use std::path::PathBuf;
 pub struct Identify {
     /// Run directory, or MCAP file
     pub recording: PathBuf,
-    /// Where a recording made by another program holds the rig's channels (YAML)
+    /// Channel map: where a recording made by another program holds the rig's channels (YAML)
     #[arg(long, value_name = "FILE")]
     pub channels: Option<PathBuf>,
-    /// Campaign that says machine, sensors and window, instead of the one attached to the recording
+    /// Campaign with machine, sensors and window, instead of the one attached to the recording
     #[arg(long, value_name = "FILE")]
     pub campaign: Option<PathBuf>,
     /// How to identify [default: the campaign's method, or dynamic]

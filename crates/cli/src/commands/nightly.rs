@@ -20,10 +20,10 @@ pub struct Nightly {
     /// History to compare with and append to, instead of the file's `history`
     #[arg(long, value_name = "FILE")]
     pub db: Option<PathBuf>,
-    /// What moves tonight is right: begin a new band with this night
+    /// Accept what moved tonight: begin a new band with this night
     #[arg(long)]
     pub accept: bool,
-    /// Runs at a time [default: all cores]
+    /// Number of parallel runs [default: all cores]
     #[arg(long, value_name = "COUNT")]
     pub jobs: Option<usize>,
     /// End with one JSON object on standard output
@@ -74,7 +74,7 @@ impl Nightly {
             return Ok(());
         }
         let message =
-            "tonight is not as the nights before; what is right after all is made the new band by `--accept`";
+            "tonight differs from the nights before; if the change is right, `--accept` begins a new band";
         Err(if self.json { Failure::told(Code::Moved) } else { Failure::new(Code::Moved, message) })
     }
 }

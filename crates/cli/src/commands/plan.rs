@@ -33,20 +33,20 @@ pub struct Plan {
     /// Also compare with conventional mapping and with the same points along speed lines
     #[arg(long)]
     pub compare: bool,
-    /// Make this jump after all else, e.g. the one that a gap diagnosis asks for: 130krpm@0.5 50krpm@0.7
+    /// Make this jump after all other steps, e.g. the one that a gap diagnosis asks for: 130krpm@0.5 50krpm@0.7
     #[arg(long, num_args = 2, value_names = ["FROM", "TO"], value_parser = operating_point)]
     pub append: Vec<OperatingPoint>,
     /// Say what the jump between two points gives and what forbids it, e.g. 110krpm@0.5 50krpm@0.7
     #[arg(long, num_args = 2, value_names = ["FROM", "TO"], value_parser = operating_point)]
     pub why: Vec<OperatingPoint>,
-    /// Work of the search: 1 is the usual, 100 takes a hundred times as long
+    /// Effort of the search: 1 is normal, 100 takes a hundred times as long
     #[arg(long, value_name = "FACTOR", hide_short_help = true)]
     pub effort: Option<f64>,
 }
 
 /// A point as `speed@opening`; the speed carries its unit.
 fn operating_point(text: &str) -> Result<OperatingPoint, String> {
-    let form = || format!("`{text}` is no point; write speed@opening, e.g. 110krpm@0.5");
+    let form = || format!("`{text}` is not a point; write speed@opening, e.g. 110krpm@0.5");
     let (speed, opening) = text.split_once('@').ok_or_else(form)?;
     let opening: f64 = opening.trim().parse().map_err(|_| form())?;
     let digits = speed.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(speed.len());

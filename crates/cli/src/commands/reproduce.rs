@@ -9,13 +9,13 @@ use mapper_reproduce::{FIGURES, FigureResult, picture_path};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Redo the paper's figures 5 to 10 and 12 on the nominal model, beside what the paper states
+/// Reproduce the paper's figures 5 to 10 and 12 on the nominal model and compare with what the paper states
 #[derive(Debug, Args)]
 pub struct Reproduce {
     /// Directory for `reproduction.md` and the pictures; files of an earlier reproduction there are replaced
     #[arg(long, value_name = "DIR", default_value = "reproduction")]
     pub out: PathBuf,
-    /// Print what the paper states beside what came out as one JSON object on standard output
+    /// Print the paper's statements and the results here as one JSON object on standard output
     #[arg(long)]
     pub json: bool,
 }

@@ -40,7 +40,7 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
         let stuck = stuck_of(&samples.t_s, column);
         if let (Some(first), Some(last)) = (stuck.first(), stuck.last()) {
             let message = format!(
-                "{channel} shows one and the same value for {:.0} s though noise is declared: these samples are left out",
+                "{channel} shows the same value for {:.0} s though noise is declared: these samples are left out",
                 samples
                     .t_s
                     .get(*last)
@@ -56,7 +56,7 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
         }
     }
     if spikes > 0 {
-        findings.remark(code::OUTLIERS, format!("{spikes} samples far off those around them are left out"));
+        findings.remark(code::OUTLIERS, format!("{spikes} samples far from their neighbours are left out"));
     }
     if kept.iter().all(|keep| *keep) {
         return samples;

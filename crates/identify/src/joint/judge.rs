@@ -18,7 +18,7 @@ const MODEL_SQUARE: f64 = 1.4;
 const SLOW_SQUARE: f64 = 1.3;
 /// Rows of a stretch, 5 to 10 s: what the model does not know is slower than noise.
 const STRETCH_ROWS: usize = 10;
-/// Scatter of the points about the convection law above which it is no law, ratio.
+/// Scatter of the points about the convection law above which it is not a law, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;
 /// Standard errors by which a number must lie outside its range to count against the model.
 const OUTSIDE_SIGMAS: f64 = 2.0;
@@ -75,8 +75,7 @@ pub(crate) fn judge_step(
     let Some(member) = problem.members.get(index) else { return };
     let eta = member.local[ETA];
     if !(0.05..=1.0).contains(&eta) {
-        let message =
-            format!("the fitted efficiency is {eta:.3}: something that the model does not know is at work");
+        let message = format!("the fitted efficiency is {eta:.3}: something outside the model is at work");
         findings.refuse(code::POOR_FIT, message);
     }
     let limits = &config.thresholds;
@@ -94,12 +93,13 @@ pub(crate) fn judge_step(
     let declared = !config.declared.is_empty();
     let square = mean_square(problem, member);
     if declared && square > DOUBT_SQUARE {
-        let message = format!("the fit leaves {:.1} times the declared noise of T2", square.sqrt());
+        let message = format!("the residual of T2 is {:.1} times the declared noise", square.sqrt());
         findings.doubt(code::POOR_FIT, message);
     }
     if !member.shares {
         let message =
-            "this step fits so much worse than the others that it has no say in what they share".to_owned();
+            "this step fits so much worse than the others that it does not count in what they share"
+                .to_owned();
         findings.doubt(code::LEFT_OUT, message);
     }
     let deviation = member.local[LN_DEVIATION];
@@ -136,13 +136,13 @@ pub(crate) fn doubts(
     let slow = mean(&slow).unwrap_or(0.0);
     if !config.declared.is_empty() && overall > MODEL_SQUARE {
         doubts.push(format!(
-            "all steps together leave {:.2} times the declared noise: something that the model does not know is at work",
+            "the residual over all steps is {:.2} times the declared noise: something outside the model is at work",
             overall.sqrt()
         ));
     }
     if !config.declared.is_empty() && slow > SLOW_SQUARE {
         doubts.push(format!(
-            "what all steps leave of T2 has a shape: its slow part is {:.2} times that of the declared noise",
+            "the residual of T2 over all steps has a shape: its slow part is {:.2} times that of the declared noise",
             slow.sqrt()
         ));
     }
@@ -159,7 +159,7 @@ pub(crate) fn doubts(
         let outside = (EXPONENT_RANGE.0 - exponent).max(exponent - EXPONENT_RANGE.1);
         if outside > OUTSIDE_SIGMAS * sigma {
             doubts.push(format!(
-                "the convection law's exponent comes out as {exponent:.2} +/- {:.2}, which no flow in a housing has",
+                "the convection law's exponent comes out as {exponent:.2} +/- {:.2}, which is impossible for flow in a housing",
                 1.96 * sigma
             ));
         }
@@ -168,7 +168,7 @@ pub(crate) fn doubts(
         let square = problem.shared[PROBE_MM2];
         if square - OUTSIDE_SIGMAS * sigma > LARGEST_PROBE_MM * LARGEST_PROBE_MM {
             doubts.push(format!(
-                "T2 lags as behind a probe of {:.1} mm, which no outlet has: something else delays it",
+                "T2 lags as if behind a probe of {:.1} mm, which no outlet has: something else delays it",
                 square.sqrt()
             ));
         }
@@ -188,7 +188,7 @@ pub(crate) fn doubts(
     }
     if smoothed.strain > STRAIN_SIGMAS {
         doubts.push(format!(
-            "the efficiencies bend towards low speed as no map does; taken for offsets they are {:.1} times the declared ones",
+            "the efficiencies bend towards low speed more than in any map; attributed to offsets, these are {:.1} times the declared ones",
             smoothed.strain
         ));
     }

@@ -77,8 +77,8 @@ pub(crate) fn estimate(
         // Each step on its own is better than nothing.
         let mut estimates = vec![Estimate::default(); recording.steps.len()];
         for step in &steps {
-            let message =
-                "least squares over all steps came to no end: this step stands for itself alone".to_owned();
+            let message = "least squares over all steps did not converge: this step was identified by itself"
+                .to_owned();
             findings[step.position].doubt(code::FIT_FAILED, message);
             estimates[step.position] = alone[step.position];
         }
@@ -161,7 +161,7 @@ impl<'a> Attempt<'a> {
     fn instead_of(mut self, doubted: Option<Attempt<'_>>) -> Self {
         let doubts = match doubted {
             Some(doubted) => doubted.thermal.doubts,
-            None => vec!["least squares over all steps came to no end".to_owned()],
+            None => vec!["least squares over all steps did not converge".to_owned()],
         };
         let mut doubts: Vec<String> = doubts
             .into_iter()

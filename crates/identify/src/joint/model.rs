@@ -24,7 +24,7 @@ pub(crate) struct Setting {
     pub(crate) shaped: bool,
 }
 
-/// A step as the model needs it: its rows, and the surface's terms at each less those at the step's end.
+/// A step as the model needs it: its rows, and the surface's terms at each minus those at the step's end.
 #[derive(Debug, Clone)]
 pub(crate) struct Course<'a> {
     pub(crate) rows: &'a [Row],

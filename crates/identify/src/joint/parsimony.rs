@@ -62,7 +62,7 @@ fn weights(problem: &Problem<'_>, covariance: &Covariance) -> Vec<(usize, f64)> 
     active.iter().zip(on).map(|((index, ..), weight)| (*index, weight)).collect()
 }
 
-/// The same from what was found (less what was declared), the standard deviations beforehand, and the covariance after.
+/// The same from what was found (minus what was declared), the standard deviations beforehand, and the covariance after.
 fn at_work(found: &[f64], sigmas: &[f64], spread: &DMatrix<f64>) -> Vec<f64> {
     let count = found.len();
     // For each set of those that are not at work the logarithm of its probability, but for a constant.

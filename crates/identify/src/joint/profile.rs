@@ -10,8 +10,8 @@ const GRID: [f64; 9] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
 /// Decrease of the sum of squares that is enough: a profile is read against 3.84.
 const ENOUGH_SQUARE: f64 = 0.1;
 
-/// All others fitted anew at each value, without what was believed of alpha_A beforehand; empty where it is not fitted
-/// or a fit comes to no end.
+/// All others fitted again at each value, without what was believed of alpha_A beforehand; empty where it is not fitted
+/// or a fit does not converge.
 pub(crate) fn alpha_area(problem: &Problem<'_>) -> Vec<ProfilePoint> {
     if !problem.active[ALPHA] {
         return Vec::new();

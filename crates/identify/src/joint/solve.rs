@@ -10,7 +10,7 @@ use mapper_numerics::coloured_noise::WhiteningFilter;
 use mapper_numerics::least_squares::{Arrow, ArrowBlock, Damping, DampingRule, Reduced};
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 
-/// Most iterations: a good start needs about ten.
+/// Maximum number of iterations: a good start needs about ten.
 const MOST_ITERATIONS: usize = 60;
 /// Relative decrease of the cost below which the search ends.
 const ENOUGH_RATIO: f64 = 1e-10;
@@ -315,7 +315,7 @@ impl Problem<'_> {
     }
 
     /// What the recording alone knows of a shared parameter when all others are free: one over its variance by least
-    /// squares, less the prior's part.
+    /// squares, minus the prior's part.
     pub(crate) fn information(&self, index: usize) -> Option<f64> {
         let fitted = self.fitted();
         let row = fitted.iter().position(|other| *other == index)?;

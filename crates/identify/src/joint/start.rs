@@ -29,7 +29,7 @@ use mapper_physics::air;
 /// tell the two apart by tens of kelvin; without noise they only show where the surface is none.
 const START_S: f64 = 3.0;
 const START_WITH_NOISE_S: f64 = 1.5;
-/// Least spread of the points' efficiencies about the surface: maps are no polynomials.
+/// Minimum spread of the points' efficiencies about the surface: maps are not polynomials.
 const LEAST_SURFACE_SIGMA: f64 = 3e-3;
 /// Share of what the surface moves a prediction by that is wrong: surfaces through a few points bend otherwise than maps.
 const SHAPE_ERROR_RATIO: f64 = 0.03;
@@ -37,7 +37,7 @@ const SHAPE_ERROR_RATIO: f64 = 0.03;
 /// that it fits the others.
 const SUSPECT_RATIO: f64 = 6.0;
 const SUSPECT_K: f64 = 0.5;
-/// Least spread of the points' h about the law, ratio.
+/// Minimum spread of the points' h about the law, ratio.
 const LEAST_LAW_SIGMA: f64 = 3e-3;
 /// Standard deviation of a sample of T2 where nothing is declared, K; refined from the residual.
 const UNDECLARED_NOISE_K: f64 = 0.1;

@@ -65,7 +65,7 @@ fn wrong_unit_remedy(unit: &str, kind: Kind, units: &str) -> String {
             if ["psi", "psig", "barg", "bara", "bar(g)", "bar(a)", "kpag"].contains(&lower.as_str()) =>
         {
             format!(
-                "all pressures are absolute, and the unit must leave no doubt of it; write one of {units}"
+                "all pressures are absolute, and the unit must leave no doubt about it; write one of {units}"
             )
         }
         Kind::TemperatureDifference if Kind::Temperature.unit(unit).is_some() => {

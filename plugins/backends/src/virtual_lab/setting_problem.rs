@@ -1,7 +1,7 @@
 //! What can be wrong with a value below `virtual_lab:`.
 
 use super::lab::NAME;
-use mapper_core::BackendError;
+use mapper_core::{BackendError, with_unit};
 use mapper_physics::effect::EffectError;
 use mapper_yaml::units::{Kind, UnitError};
 
@@ -12,7 +12,7 @@ pub enum SettingProblem {
     #[error(transparent)]
     Form(#[from] serde_json::Error),
     /// A value without meaning.
-    #[error("{value}{} is not between {low} and {high}{}", spaced(unit), spaced(unit))]
+    #[error("{} is not between {low} and {}", with_unit(value, unit), with_unit(high, unit))]
     OutOfRange {
         /// The value.
         value: f64,
@@ -64,7 +64,7 @@ pub enum SettingProblem {
         unit: String,
     },
     /// An effect that is not in the catalogue.
-    #[error("there is no such effect; there are {known}")]
+    #[error("there is no such effect; the effects are {known}")]
     UnknownEffect {
         /// Ids of the effects there are.
         known: String,
@@ -105,9 +105,4 @@ impl SettingProblem {
     pub(super) fn at(self, path: impl Into<String>) -> BackendError {
         BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(self) }
     }
-}
-
-/// A unit behind its number.
-fn spaced(unit: &str) -> String {
-    if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }

@@ -6,7 +6,7 @@ use mapper_core::{Backend, BackendError, SampleBatch, Setpoints};
 pub struct Candidate {
     /// Its name, as it describes itself.
     pub name: &'static str,
-    /// Makes it anew, each time the same.
+    /// Makes it again, each time the same.
     pub make: fn() -> Box<dyn Backend>,
     /// Setpoints that it can follow.
     pub setpoints: Setpoints,

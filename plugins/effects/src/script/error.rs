@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// Longest line and message that are shown, characters.
 const SHOWN_LIMIT: usize = 200;
 
-/// A script that is no effect.
+/// A script that is not an effect.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{}{}: {message}{}", path.display(), place(*line), shown(source_line))]
 pub struct ScriptEffectError {

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 /// A line, from 1, where one is meant, and what is wrong.
 pub(super) type Mistake = (Option<usize>, String);
 
-/// Most parameters of a script: each is a dimension of the fit.
+/// Maximum number of parameters of a script: each is a dimension of the fit.
 const PARAMETER_LIMIT: usize = 4;
 
 /// How a parameter is written.
@@ -40,7 +40,7 @@ pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
             }
             other => {
                 let keys = "effect, description, equation, source, submodel, parameter";
-                return Err(here(format!("`{other}` is not a key of an effect; there are {keys}")));
+                return Err(here(format!("`{other}` is not a key of an effect; the keys are {keys}")));
             }
         }
     }
@@ -63,7 +63,7 @@ pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
 fn submodel_called(name: &str) -> Result<Submodel, String> {
     Submodel::ALL.into_iter().find(|submodel| submodel.name() == name).ok_or_else(|| {
         let names: Vec<&str> = Submodel::ALL.iter().map(|submodel| submodel.name()).collect();
-        format!("`{name}` is not a submodel; there are {}", names.join(", "))
+        format!("`{name}` is not a submodel; the submodels are {}", names.join(", "))
     })
 }
 

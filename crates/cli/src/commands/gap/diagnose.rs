@@ -11,15 +11,15 @@ use mapper_session::{Recorded, Session, SessionError, write_new};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Say where a recording leaves the nominal model, which effect causes it, how far that closes the gap, what is next
+/// Say where a recording departs from the nominal model, which effect causes it, how far that closes the gap, what to do next
 #[derive(Debug, Args)]
 pub struct Diagnose {
-    /// Campaign that says machine, declared uncertainties and tolerances (YAML)
+    /// Campaign with machine, declared uncertainties and tolerances (YAML)
     pub campaign: PathBuf,
     /// Run directory, or MCAP file
     #[arg(long, value_name = "FILE")]
     pub recording: PathBuf,
-    /// Where a recording made by another program holds the rig's channels (YAML)
+    /// Channel map: where a recording made by another program holds the rig's channels (YAML)
     #[arg(long, value_name = "MAP")]
     pub channels: Option<PathBuf>,
     /// Also try a suspected effect written in rhai; may be repeated
@@ -28,7 +28,7 @@ pub struct Diagnose {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
-    /// Also write a page with pictures to this new file
+    /// Also write an HTML page with pictures to this new file
     #[arg(long, value_name = "OUT")]
     pub html: Option<PathBuf>,
 }

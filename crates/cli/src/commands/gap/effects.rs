@@ -7,7 +7,7 @@ use mapper_report::with_heads;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// List the effects that a rig may have and the nominal model has not
+/// List the effects that a rig may have and the nominal model does not
 #[derive(Debug, Args)]
 pub struct Effects {
     /// Also check and list a suspected effect written in rhai; may be repeated
@@ -35,7 +35,7 @@ impl Effects {
                     info.id.to_string(),
                     info.submodel.name().to_owned(),
                     parameter.name.to_string(),
-                    parameter.unit.to_string(),
+                    if parameter.unit == "1" { "-".to_owned() } else { parameter.unit.to_string() },
                     parameter.neutral.to_string(),
                     format!("{}..{}", parameter.low, parameter.high),
                     info.description.to_string(),

@@ -9,17 +9,17 @@ use mapper_report::{map_comparison_figure, map_comparison_text};
 use mapper_session::write_new;
 use std::path::PathBuf;
 
-/// Show where two maps differ, in units and in their uncertainty
+/// Show where two maps differ, in units and against their uncertainty
 #[derive(Debug, Args)]
 pub struct Compare {
-    /// Map that counts as the known one
+    /// Map to compare with
     pub first: PathBuf,
-    /// Map that is compared with it
+    /// Map to compare
     pub second: PathBuf,
-    /// State of the first map, where its file does not say
+    /// Reference state of the first map, if its file does not give it
     #[arg(long, value_name = "STATE")]
     pub reference: Option<String>,
-    /// State of the second map, where its file does not say
+    /// Reference state of the second map, if its file does not give it
     #[arg(long, value_name = "STATE")]
     pub second_reference: Option<String>,
     /// Draw both maps and their difference in this new file (.svg or .png)

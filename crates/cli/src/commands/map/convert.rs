@@ -13,15 +13,15 @@ use std::path::PathBuf;
 pub struct Convert {
     /// Map (CSV, JSON or SAE text)
     pub map: PathBuf,
-    /// New file; the extension says the format, unless `--to` does
+    /// New file; its extension gives the format unless `--to` does
     pub out: PathBuf,
     /// Format of the new file
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
-    /// State to which the file's corrected quantities refer, where the file does not say: SAE, Garrett, BorgWarner or "T, P"
+    /// Reference state of the file's corrected quantities, if the file does not give it: SAE, Garrett, BorgWarner or "T, P"
     #[arg(long, value_name = "STATE")]
     pub reference: Option<String>,
-    /// State to which the new file shall refer [default: as before]
+    /// Reference state of the new file [default: unchanged]
     #[arg(long, value_name = "STATE")]
     pub to_reference: Option<String>,
     /// Print one JSON object on standard output

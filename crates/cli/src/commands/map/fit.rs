@@ -16,22 +16,22 @@ use std::path::PathBuf;
 pub struct Fit {
     /// Map (CSV, JSON or SAE text)
     pub map: PathBuf,
-    /// State to which the file's corrected quantities refer, where the file does not say: SAE, Garrett, BorgWarner or "T, P"
+    /// Reference state of the file's corrected quantities, if the file does not give it: SAE, Garrett, BorgWarner or "T, P"
     #[arg(long, value_name = "STATE")]
     pub reference: Option<String>,
-    /// Corrected speeds of further lines, rpm, instead of two below and one above the measured ones
+    /// Corrected speeds of additional lines, rpm, instead of two below and one above the measured ones
     #[arg(long, value_delimiter = ',', value_name = "RPM,...")]
     pub speeds: Option<Vec<f64>>,
     /// Nodes on each line
     #[arg(long, default_value_t = 41, value_parser = clap::value_parser!(u16).range(5..=400))]
     pub nodes: u16,
-    /// Write the fitted map to this new file; the extension says the format, unless `--to` does
+    /// Write the fitted map to this new file; its extension gives the format unless `--to` does
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Format of `--out`
     #[arg(long, value_name = "FORMAT", requires = "out")]
     pub to: Option<String>,
-    /// Do not leave lines out
+    /// Skip the error at lines that are left out
     #[arg(long)]
     pub no_leave_out: bool,
     /// Print one JSON object on standard output

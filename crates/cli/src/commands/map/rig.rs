@@ -8,15 +8,15 @@ use mapper_record::ChannelMap;
 use mapper_session::{Recorded, Session};
 use std::path::PathBuf;
 
-/// Write what a run gave beside the map: thermal model, turbine, pictures of h and of errors
+/// Write the other results of a run: thermal model, turbine, pictures of h and of errors
 #[derive(Debug, Args)]
 pub struct Rig {
     /// Run directory, or MCAP file of a run
     pub recording: PathBuf,
-    /// Directory for the files; those that are there are not replaced
+    /// Directory for the files; existing files are not replaced
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Campaign that says machine, sensors and window, instead of the one attached to the recording
+    /// Campaign with machine, sensors and window, instead of the one attached to the recording
     #[arg(long, value_name = "FILE")]
     pub campaign: Option<PathBuf>,
     /// Print one JSON object on standard output

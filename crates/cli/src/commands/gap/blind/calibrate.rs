@@ -9,13 +9,13 @@ use mapper_session::{json_text, write_new};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Find the numbers behind the probabilities on cases of its own, with outside causes that the check does not use
+/// Calibrate the probabilities on separate cases, whose outside causes are not used in the check
 #[derive(Debug, Args)]
 pub struct Calibrate {
-    /// Campaign that says machine, schedule, declared uncertainties and tolerances (YAML)
+    /// Campaign with machine, schedule, declared uncertainties and tolerances (YAML)
     #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
     pub campaign: PathBuf,
-    /// Seed of everything that is drawn
+    /// Seed of all random draws
     #[arg(long)]
     pub seed: u64,
     /// Number of cases without a cause, which set the threshold
@@ -27,13 +27,13 @@ pub struct Calibrate {
     /// New file for the calibration (JSON)
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Also write what each case gave to this new file (JSON)
+    /// Also write the result of each case to this new file (JSON)
     #[arg(long, value_name = "FILE")]
     pub observed: Option<PathBuf>,
 }
 
 impl Calibrate {
-    /// Draws, records and diagnoses cases of its own, and writes the calibration that fits them.
+    /// Draws, records and diagnoses separate cases, and writes the calibration that fits them.
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let plan = Plan { seed: self.seed, nulls: self.nulls, others: self.cases };

@@ -11,25 +11,25 @@ use std::path::PathBuf;
 /// Draw cases on the virtual lab, record them, seal their causes and print the seal
 #[derive(Debug, Args)]
 pub struct Make {
-    /// Campaign that says machine, schedule, declared uncertainties and tolerances (YAML)
+    /// Campaign with machine, schedule, declared uncertainties and tolerances (YAML)
     #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
     pub campaign: PathBuf,
     /// Directory for the cases
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Seed of everything that is drawn
+    /// Seed of all random draws
     #[arg(long)]
     pub seed: u64,
     /// Number of cases
     #[arg(long)]
     pub cases: usize,
-    /// Draw cases of this kind alone; may be repeated
+    /// Draw only cases of this kind; may be repeated
     #[arg(long = "kind", value_name = "KIND")]
     kinds: Vec<BlindKind>,
-    /// Shortest signature of a cause, in sigmas
+    /// Minimum signature of a cause, in sigmas
     #[arg(long, value_name = "SIGMAS", default_value_t = mapper_blind::SIGMA_RANGE[0])]
     pub least_sigma: f64,
-    /// Longest signature of a cause, in sigmas
+    /// Maximum signature of a cause, in sigmas
     #[arg(long, value_name = "SIGMAS", default_value_t = mapper_blind::SIGMA_RANGE[1])]
     pub most_sigma: f64,
     /// Draw outside causes from those kept for calibration, not from those reserved for the check

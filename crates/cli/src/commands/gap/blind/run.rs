@@ -15,7 +15,7 @@ use std::process::{Command, Stdio};
 pub struct Run {
     /// Directory of the cases
     pub directory: PathBuf,
-    /// Campaign that the diagnosis is told (YAML)
+    /// Campaign given to the diagnosis (YAML)
     #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
     pub campaign: PathBuf,
 }

@@ -1,7 +1,8 @@
-//! Chores of the repository: `cargo xtask quick`, `test`, `docs` and `performance`.
+//! Chores of the repository: `cargo xtask quick`, `test`, `fmt`, `docs` and `performance`.
 
 mod docs;
 mod error;
+mod formatting;
 mod machine;
 mod offered;
 mod performance;
@@ -20,6 +21,7 @@ usage: cargo xtask COMMAND
 
   quick          formatting, lints and the tests that are fast: while working; names what it leaves out
   test           run every test of the repository; installs what they need, skips nothing
+  fmt            format every file, those included that a macro declares and `cargo fmt` does not see
   docs           make the generated documents again
   docs --check   fail where a generated document is not what the program makes now
   performance    measure, beside peers where they can be built, and write docs/performance.md
@@ -32,6 +34,7 @@ fn main() -> ExitCode {
     let done = match arguments.as_slice() {
         ["quick"] => quick::quick(),
         ["test"] => test::test(),
+        ["fmt"] => formatting::formatting(formatting::Mode::Write),
         ["docs"] => docs::docs(docs::Mode::Write),
         ["docs", "--check"] => docs::docs(docs::Mode::Check),
         ["performance"] => performance::performance(),

@@ -1,6 +1,7 @@
 //! `cargo xtask quick`: what one runs while working.
 
 use crate::error::Error;
+use crate::formatting::{Mode, formatting};
 use crate::step::{Steps, command, run, say};
 use crate::tally::Tally;
 use crate::{machine, test_programs, workspace};
@@ -13,7 +14,7 @@ LEFT OUT, run by `cargo xtask test`: tests of the whole program and of documents
 /// Formatting, lints, fast tests.
 pub fn quick() -> Result<(), Error> {
     let mut steps = Steps::default();
-    steps.run("formatting", || run(cargo(&["fmt", "--all", "--check"])));
+    steps.run("formatting", || formatting(Mode::Check));
     steps.run("lints", || {
         run(cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"]))
     });

@@ -1,7 +1,8 @@
 //! `cargo xtask test`: everything that has to hold.
 
-use crate::docs::{self, Mode};
+use crate::docs;
 use crate::error::Error;
+use crate::formatting::{Mode, formatting};
 use crate::offered::{Offered, with_program};
 use crate::step::{Steps, command, run, say};
 use crate::tally::Tally;
@@ -22,7 +23,7 @@ pub fn test() -> Result<(), Error> {
     }
     let Some(python) = python else { return steps.finish() };
     let offered = Offered::with(python);
-    steps.run("formatting", || run(cargo(&["fmt", "--all", "--check"])));
+    steps.run("formatting", || formatting(Mode::Check));
     steps.run("lints", || {
         run(cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"]))
     });
@@ -41,7 +42,7 @@ pub fn test() -> Result<(), Error> {
         run(offered.to(cargo(&["build", "--workspace", "--bins", "--tests", "--quiet"])))
     });
     steps.run("tests", || tests(&offered));
-    steps.run("generated documents", || docs::docs(Mode::Check));
+    steps.run("generated documents", || docs::docs(docs::Mode::Check));
     let result = steps.finish();
     if !offered.mountable {
         say(

@@ -1,9 +1,11 @@
 //! A set of commands as clap sees it.
 
-/// An enum with one variant for each `module::Options`, named like the options, whose help is their documentation; its
+/// Declares the modules, and an enum with one variant for each `module::Options`, whose help is their documentation; its
 /// `run` runs the one that was asked for.
 macro_rules! subcommands {
     ($name:ident: $($module:ident::$options:ident),+ $(,)?) => {
+        $(mod $module;)+
+
         /// One variant a command.
         #[derive(Debug, clap::Subcommand)]
         pub enum $name {

@@ -38,10 +38,14 @@ mod tests {
     #[test]
     fn only_metal_hotter_than_its_gas_has_another_convection() {
         // The housing at 340 K is colder than the gas behind the wheel: nothing changes.
-        assert_eq!(Instant::with(DirectionalHtc { hot_metal_ratio: 0.65 }).outputs.t2_k, Instant::nominal().outputs.t2_k);
+        assert_eq!(
+            Instant::with(DirectionalHtc { hot_metal_ratio: 0.65 }).outputs.t2_k,
+            Instant::nominal().outputs.t2_k
+        );
         // At 460 K it is hotter: the conductance, heat over driving difference, is 0.65 times as large.
         let conductance_w_k = |effects: Option<f64>| {
-            let mut at = effects.map_or_else(Instant::nominal, |f| Instant::with(DirectionalHtc { hot_metal_ratio: f }));
+            let mut at = effects
+                .map_or_else(Instant::nominal, |f| Instant::with(DirectionalHtc { hot_metal_ratio: f }));
             at.state.tc_k = 460.0;
             at.evaluate();
             at.outputs.compressor_heat_w / (at.outputs.t2_k - 460.0)

@@ -37,7 +37,8 @@ mod tests {
 
     #[test]
     fn the_temperature_rise_grows_as_efficiency_falls() {
-        let (nominal, worn) = (Instant::nominal().outputs, Instant::with(EfficiencyScale { scale_ratio: 0.97 }).outputs);
+        let (nominal, worn) =
+            (Instant::nominal().outputs, Instant::with(EfficiencyScale { scale_ratio: 0.97 }).outputs);
         let ratio = (worn.t2_prime_k - T1_K) / (nominal.t2_prime_k - T1_K);
         assert!((ratio - 1.0 / 0.97).abs() < 1e-12 && worn.flow_kg_s == nominal.flow_kg_s);
     }

@@ -37,7 +37,8 @@ mod tests {
 
     #[test]
     fn flow_is_multiplied_at_equal_efficiency() {
-        let (nominal, other) = (Instant::nominal().outputs, Instant::with(FlowMapScale { scale_ratio: 1.03 }).outputs);
+        let (nominal, other) =
+            (Instant::nominal().outputs, Instant::with(FlowMapScale { scale_ratio: 1.03 }).outputs);
         assert!((other.flow_kg_s / nominal.flow_kg_s - 1.03).abs() < 1e-12);
         assert_eq!(other.efficiency, nominal.efficiency);
     }

@@ -37,7 +37,8 @@ mod tests {
 
     #[test]
     fn h_is_multiplied() {
-        let ratio = Instant::with(HtcScale { scale_ratio: 1.2 }).outputs.h_w_m2k / Instant::nominal().outputs.h_w_m2k;
+        let ratio =
+            Instant::with(HtcScale { scale_ratio: 1.2 }).outputs.h_w_m2k / Instant::nominal().outputs.h_w_m2k;
         assert!((ratio - 1.2).abs() < 1e-12);
     }
 }

@@ -41,14 +41,14 @@ mod tests {
     #[test]
     fn constants_are_those_of_the_mixture_and_flow_falls() {
         let w = 0.01;
-        let (nominal, moist) = (Instant::nominal().outputs, Instant::with(Humidity { water_kg_kg: w }).outputs);
+        let (nominal, moist) =
+            (Instant::nominal().outputs, Instant::with(Humidity { water_kg_kg: w }).outputs);
         let gas_constant = (287.05 + w * 461.5) / (1.0 + w);
         let flow_ratio = moist.flow_kg_s / nominal.flow_kg_s;
         assert!((flow_ratio - (287.05 / gas_constant).sqrt()).abs() < 1e-4, "{flow_ratio}");
         // kappa = R/cp: ln(1 + rise) over ln PR.
-        let kappa = |at: &Outputs| {
-            ((at.t2_prime_k / T1_K - 1.0) * at.efficiency).ln_1p() / at.pressure_ratio.ln()
-        };
+        let kappa =
+            |at: &Outputs| ((at.t2_prime_k / T1_K - 1.0) * at.efficiency).ln_1p() / at.pressure_ratio.ln();
         let cp_ratio = (1.0 + w * 1850.0 / CP1_J_KGK) / (1.0 + w);
         let expected = gas_constant / 287.05 / cp_ratio;
         assert!((kappa(&moist) / kappa(&nominal) - expected).abs() < 2e-4);

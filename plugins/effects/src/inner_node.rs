@@ -56,7 +56,8 @@ mod tests {
         let through_w = 15.0 * (thin.state.inner_k - thin.state.tc_k);
         assert!((thin.outputs.compressor_heat_w - through_w).abs() < 1e-6 && through_w.abs() > 1.0);
         // As 1/G goes to 0 the two nodes become one.
-        let one = steady::hold_speed(&Instant::nominal().rig.model, 110e3, &Instant::nominal().boundary).unwrap();
+        let one =
+            steady::hold_speed(&Instant::nominal().rig.model, 110e3, &Instant::nominal().boundary).unwrap();
         let apart_k = |g_w_k: f64| (rest(0.4, g_w_k).state.tc_k - one.state.tc_k).abs();
         assert!(apart_k(500.0) < 0.06 * apart_k(20.0) && apart_k(20.0) > 0.1);
     }

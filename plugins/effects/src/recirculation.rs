@@ -39,7 +39,8 @@ mod tests {
     #[test]
     fn the_wheel_works_on_the_mixed_gas() {
         let r = 0.05;
-        let (nominal, at) = (Instant::nominal().outputs, Instant::with(Recirculation { back_ratio: r }).outputs);
+        let (nominal, at) =
+            (Instant::nominal().outputs, Instant::with(Recirculation { back_ratio: r }).outputs);
         assert!((at.flow_kg_s * (1.0 + r) / nominal.flow_kg_s - 1.0).abs() < 1e-12);
         let mixed_k = (at.t1_prime_k + r * at.t2_prime_k) / (1.0 + r);
         let rise = nominal.t2_prime_k / nominal.t1_prime_k;

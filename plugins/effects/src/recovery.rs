@@ -40,7 +40,8 @@ mod tests {
     fn a_probe_without_recovery_reads_the_static_temperature() {
         let at = Instant::with(Recovery { recovery_ratio: 0.0 });
         let density_kg_m3 = at.state.p2_pa / (287.05 * at.outputs.t2_k);
-        let velocity_m_s = at.outputs.flow_kg_s / (density_kg_m3 * std::f64::consts::PI / 4.0 * 0.035 * 0.035);
+        let velocity_m_s =
+            at.outputs.flow_kg_s / (density_kg_m3 * std::f64::consts::PI / 4.0 * 0.035 * 0.035);
         let cp = 1002.5 + 275e-6 * (at.outputs.t2_k - 200.0).powi(2);
         let missing_k = velocity_m_s * velocity_m_s / (2.0 * cp);
         assert!((at.outputs.t2_k - at.outputs.t2_probe_k - missing_k).abs() < 1e-9 && missing_k > 0.1);

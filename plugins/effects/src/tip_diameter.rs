@@ -34,9 +34,9 @@ impl EffectKind for TipDiameter {
 mod tests {
     use super::*;
     use crate::testing::Instant;
-    use mapper_physics::steady;
-    use mapper_physics::simulate::{Simulator, Watch};
     use mapper_physics::model::State;
+    use mapper_physics::simulate::{Simulator, Watch};
+    use mapper_physics::steady;
 
     /// A tip that is 10 K off is off by 10/e K after its own time constant: nothing in the machine depends on it.
     #[test]

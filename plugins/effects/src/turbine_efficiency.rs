@@ -38,7 +38,8 @@ mod tests {
     #[test]
     fn the_drop_over_the_wheel_is_multiplied() {
         let drop_k = |at: Instant| at.outputs.turbine.t3_prime_k - at.outputs.turbine.t4_k;
-        let ratio = drop_k(Instant::with(TurbineEfficiency { scale_ratio: 0.96 })) / drop_k(Instant::nominal());
+        let ratio =
+            drop_k(Instant::with(TurbineEfficiency { scale_ratio: 0.96 })) / drop_k(Instant::nominal());
         assert!((ratio - 0.96).abs() < 1e-12);
     }
 }

@@ -45,7 +45,10 @@ mod tests {
                 prepared.turbine_housing_balance_w(&at.state, &at.outputs),
             ]
         };
-        let (dark, shining) = (balances(&Instant::nominal()), balances(&Instant::with(TurbineRadiation { view_area_m2: 0.01 })));
+        let (dark, shining) = (
+            balances(&Instant::nominal()),
+            balances(&Instant::with(TurbineRadiation { view_area_m2: 0.01 })),
+        );
         for (found_w, expected_w) in [(shining[0] - dark[0], 27.863), (shining[1] - dark[1], -27.863)] {
             assert!((found_w - expected_w).abs() < 1e-3, "{found_w} W");
         }

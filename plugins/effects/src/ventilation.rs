@@ -41,8 +41,14 @@ mod tests {
         let (nominal, windy) = (Instant::nominal(), Instant::with(Ventilation { convection_ratio: 2.0 }));
         let more_w = |area_m2: f64, wall_k: f64| 1.25 * area_m2 * (wall_k - 298.15).powf(4.0 / 3.0);
         for (found_w, expected_w) in [
-            (windy.outputs.compressor_external_heat_w - nominal.outputs.compressor_external_heat_w, more_w(79e-3, nominal.state.tc_k)),
-            (windy.outputs.turbine_external_heat_w - nominal.outputs.turbine_external_heat_w, more_w(80e-3, nominal.state.tt_k)),
+            (
+                windy.outputs.compressor_external_heat_w - nominal.outputs.compressor_external_heat_w,
+                more_w(79e-3, nominal.state.tc_k),
+            ),
+            (
+                windy.outputs.turbine_external_heat_w - nominal.outputs.turbine_external_heat_w,
+                more_w(80e-3, nominal.state.tt_k),
+            ),
         ] {
             assert!((found_w - expected_w).abs() < 1e-9, "{found_w} W, {expected_w} W");
         }

@@ -10,11 +10,11 @@ use serde::Deserialize;
 #[derive(Deserialize, JsonSchema)]
 #[serde(remote = "Timing", deny_unknown_fields)]
 pub(crate) struct TimingElement {
-    /// Time at the first point before its step begins; 0 s if none is given.
+    /// Time at the first point before its step begins; 0 s where none is given.
     #[serde(rename = "warm_up", default, deserialize_with = "si::<Duration, _>")]
     #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "24 h"), example = &"10 min")]
     warm_up_s: f64,
-    /// Time without flow after the last step; 0 s if none is given.
+    /// Time without flow after the last step; 0 s where none is given.
     #[serde(rename = "cool_down", default, deserialize_with = "si::<Duration, _>")]
     #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "24 h"), example = &"0 s")]
     cool_down_s: f64,
@@ -39,7 +39,7 @@ mod tests {
             ("{dwell: 2 min, dwel: 2 min}", None),
         ];
         for (text, expected) in table {
-            let timing: Option<Timing> = any_with(text, |yaml| TimingElement::deserialize(yaml)).ok();
+            let timing: Option<Timing> = any_with(text, TimingElement::deserialize).ok();
             let found = timing.map(|timing| (timing.warm_up_s, timing.cool_down_s, timing.dwell_s));
             assert_eq!(found, expected, "{text}");
         }

@@ -4,10 +4,6 @@ use crate::failure::Failure;
 use crate::subcommands::subcommands;
 use clap::Args;
 
-mod blind;
-mod diagnose;
-mod effects;
-
 /// Diagnose the gap between nominal model and rig, and check that diagnosis on withheld data
 #[derive(Debug, Args)]
 pub struct Gap {
@@ -16,7 +12,11 @@ pub struct Gap {
     command: GapCommand,
 }
 
-subcommands! { GapCommand: diagnose::Diagnose, blind::Blind, effects::Effects }
+subcommands! { GapCommand:
+    diagnose::Diagnose,
+    blind::Blind,
+    effects::Effects,
+}
 
 impl Gap {
     /// Runs the sub-command that was asked for.

@@ -4,11 +4,6 @@ use crate::failure::Failure;
 use crate::subcommands::subcommands;
 use clap::Args;
 
-mod compare;
-mod convert;
-mod fit;
-mod rig;
-
 /// Fit, convert and compare compressor maps
 #[derive(Debug, Args)]
 pub struct Map {
@@ -17,7 +12,12 @@ pub struct Map {
     command: MapCommand,
 }
 
-subcommands! { MapCommand: fit::Fit, convert::Convert, compare::Compare, rig::Rig }
+subcommands! { MapCommand:
+    fit::Fit,
+    convert::Convert,
+    compare::Compare,
+    rig::Rig,
+}
 
 impl Map {
     /// Runs the sub-command that was asked for.

@@ -4,11 +4,6 @@ use crate::failure::Failure;
 use crate::subcommands::subcommands;
 use clap::Args;
 
-mod calibrate;
-mod make;
-mod run;
-mod score;
-
 /// Check the diagnosis on data whose causes are withheld
 #[derive(Debug, Args)]
 pub struct Blind {
@@ -17,7 +12,12 @@ pub struct Blind {
     command: BlindCommand,
 }
 
-subcommands! { BlindCommand: make::Make, run::Run, score::Score, calibrate::Calibrate }
+subcommands! { BlindCommand:
+    make::Make,
+    run::Run,
+    score::Score,
+    calibrate::Calibrate,
+}
 
 impl Blind {
     /// Runs the sub-command that was asked for.

@@ -31,7 +31,7 @@ mod tests {
 
     #[test]
     fn what_is_left_out_keeps_its_default() {
-        let read = |text| any_with(text, |yaml| SettleBandsElement::deserialize(yaml));
+        let read = |text| any_with(text, SettleBandsElement::deserialize);
         let default = SettleBands::default();
         assert_eq!(read("{}").unwrap(), default);
         assert_eq!(read("{flow: 3 %}").unwrap(), SettleBands { flow_ratio: 0.03, ..default });

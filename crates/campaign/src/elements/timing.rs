@@ -39,7 +39,7 @@ mod tests {
             ("{dwell: 2 min, dwel: 2 min}", None),
         ];
         for (text, expected) in table {
-            let timing: Option<Timing> = any_with(text, |yaml| TimingElement::deserialize(yaml)).ok();
+            let timing: Option<Timing> = any_with(text, TimingElement::deserialize).ok();
             let found = timing.map(|timing| (timing.warm_up_s, timing.cool_down_s, timing.dwell_s));
             assert_eq!(found, expected, "{text}");
         }

@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn what_is_left_out_keeps_its_default() {
-        let read = |text| any_with(text, |yaml| TolerancesElement::deserialize(yaml));
+        let read = |text| any_with(text, TolerancesElement::deserialize);
         let default = ModelTolerances::default();
         assert_eq!(read("{}").unwrap(), default);
         let convection = ModelTolerances { convection_ratio: 0.05, ..default };

@@ -6,8 +6,9 @@ use crate::workspace;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Folders whose modules are declared by a macro (`formats!`, `effects!`, `subcommands!`): rustfmt does not look into it.
-const DECLARED_BY_MACRO: &[&str] = &["plugins/formats/src", "plugins/effects/src", "crates/cli/src/commands"];
+/// Folders whose modules are declared by a macro (`backends!`, `formats!`, `effects!`, `subcommands!`): rustfmt does not look into it.
+const DECLARED_BY_MACRO: &[&str] =
+    &["plugins/backends/src", "plugins/formats/src", "plugins/effects/src", "crates/cli/src/commands"];
 
 /// Whether files are written or compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -261,7 +261,7 @@ fn types_and_names() {
         "campaign: short\norder: greddy\n",
         Kind::WrongValue,
         "greddy",
-        "none of sum_gradient, worst_gradient, information, time, greedy, listed",
+        "not one of sum_gradient, worst_gradient, information, time, greedy, listed",
         "did you mean `greedy`?",
     );
     one(
@@ -322,7 +322,7 @@ fn types_and_names() {
         "campaign: short\ndisplay: {pressure: kpa}\n",
         Kind::WrongValue,
         "kpa",
-        "`kpa` is none of",
+        "`kpa` is not one of",
         "did you mean `kPa`?",
     );
     one("campaign: short\n", "campaign: short\nseed: -1\n", Kind::Range, "-1", "too low", "at least 0");
@@ -361,7 +361,7 @@ fn what_must_fit_together() {
         "  openings: [0.7, 1.0]\n  points: [{speed: 91 krpm, opening: 0.7}]\n",
         Kind::Conflict,
         "points",
-        "beside",
+        "together with",
         "`speeds` and `openings`, or `points`",
     );
     one(

@@ -1,6 +1,6 @@
 //! The one place that names plug-ins.
 
-use mapper_backends::{replay, virtual_lab};
+use mapper_backends::BACKENDS;
 use mapper_effects::ScriptEffect;
 use mapper_formats::FORMATS;
 use mapper_physics::effect::Effect;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Every plug-in of this program.
 pub fn registry() -> Registry {
     Registry {
-        backends: vec![virtual_lab::PLUGIN, replay::PLUGIN],
+        backends: BACKENDS.to_vec(),
         effects: mapper_effects::catalogue(),
         read_effect,
         formats: FORMATS,

@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// While a worker waits for a nested call it may begin another item: long work whose number at a time matters belongs to
 /// [`try_map_on`].
 pub fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    items.par_iter().with_max_len(1).map(|item| work(item)).collect()
+    items.par_iter().with_max_len(1).map(&work).collect()
 }
 
 /// The same with work that may fail. After a failure no later item is begun; items before it are still done, so that the

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 /// A recording of another machine than the campaign's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the recording was made on {what} `{recorded}`, the campaign names `{expected}`")]
+#[error("the recording was made on another machine: {what} `{recorded}`, the campaign names `{expected}`")]
 pub struct OtherMachine {
     /// What differs: `machine` or `serial number`.
     pub what: &'static str,

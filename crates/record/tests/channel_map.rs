@@ -139,7 +139,12 @@ fn missing_and_repeated_keys_and_wrong_types_are_refused_at_their_place() {
         ),
         ("channels:\n  T2: [/a, x]\n", Kind::WrongType, (2, 3), "a list is given where a mapping is needed"),
         ("channels:\n  T2: {topic: /a, field: x, unit: 1}\n", Kind::WrongType, (2, 35), "text is needed"),
-        ("channels: {T2: {topic: /a, field: x}}\nreference: SEA\n", Kind::WrongValue, (2, 12), "none of SAE"),
+        (
+            "channels: {T2: {topic: /a, field: x}}\nreference: SEA\n",
+            Kind::WrongValue,
+            (2, 12),
+            "not one of SAE",
+        ),
         (
             "channels: {T2: {topic: /a, field: x}}\nwindow: {start: 10 s, end: 5 s}\n",
             Kind::Conflict,

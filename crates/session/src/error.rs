@@ -9,7 +9,7 @@ use mapper_identify::IdentifyError;
 use mapper_observe::OtherMachine;
 use mapper_planner::PlanError;
 use mapper_record::{ChannelMapError, RecordError};
-use mapper_runner::RunError;
+use mapper_runner::{RunError, StepSourceError};
 use mapper_sequence::SequenceError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -102,7 +102,10 @@ pub enum SessionError {
     /// A sequence script has a mistake.
     #[error(transparent)]
     Sequence(#[from] SequenceError),
-    /// A sequence script failed while it was rehearsed.
+    /// A sequence script failed at one of its steps.
+    #[error(transparent)]
+    Script(StepSourceError),
+    /// The rehearsal of a sequence script failed.
     #[error("the rehearsal failed: {0}")]
     Rehearsal(#[source] RunError),
     /// A guard tripped in the rehearsal of a script.
@@ -268,7 +271,7 @@ impl SessionError {
             | E::Fit { .. }
             | E::Drift(DriftError::NoRun)
             | E::Export(ExportError::NeedsFit { .. })
-            | E::Rehearsal(RunError::Source(_)) => ErrorKind::BadInput,
+            | E::Script(_) => ErrorKind::BadInput,
             E::Plan(_)
             | E::NotAPlan { .. }
             | E::StalePlan { .. }

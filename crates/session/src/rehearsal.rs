@@ -8,7 +8,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{BackendChoice, SequenceSource};
 use mapper_core::{Plan, PlanStep, SampleBatch, StepMarker, VisitOrder};
 use mapper_physics::model::Model;
-use mapper_runner::{RunEnd, RunObserver, StepSource, StepSourceError};
+use mapper_runner::{RunEnd, RunError, RunObserver, StepSource, StepSourceError};
 
 /// What the plan of a script says of its objective.
 const OBJECTIVE: &str = "sequence";
@@ -40,7 +40,11 @@ pub fn rehearse(
     let mut backend = session.registry.make_backend(&nominal, model)?;
     let mut steps = Rehearsing { steps: ScriptedSteps::new(campaign, model, source)?, notes: Vec::new() };
     let end = drive(&nominal, &mut steps, backend.as_mut(), &mut Nobody, session.stop);
-    match end.map_err(SessionError::Rehearsal)? {
+    let failed = |error| match error {
+        RunError::Source(error) => SessionError::Script(error),
+        error => SessionError::Rehearsal(error),
+    };
+    match end.map_err(failed)? {
         RunEnd::Completed => {}
         RunEnd::Tripped(trip) => {
             return Err(SessionError::RehearsalTripped { t_s: trip.t_s, reason: trip.reason });

@@ -1,6 +1,7 @@
 //! Files from disk, never more of them than a limit.
 
-use crate::finding::{FindingKind, Findings};
+use crate::finding::FindingKind;
+use crate::findings::Findings;
 use crate::source::{Document, Source};
 use std::io::{self, Read};
 use std::path::Path;

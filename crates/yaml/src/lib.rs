@@ -12,6 +12,7 @@ mod check;
 mod complaint;
 mod file;
 mod finding;
+mod findings;
 mod keywords;
 mod notes;
 mod quantity_check;
@@ -26,7 +27,8 @@ mod tree;
 pub mod units;
 
 pub use file::{open, read_limited};
-pub use finding::{Finding, FindingKind, Findings};
+pub use finding::{Finding, FindingKind};
+pub use findings::Findings;
 pub use notes::Notes;
 pub use reader::read;
 pub use schema::{Schema, json_schema_of};

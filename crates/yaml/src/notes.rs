@@ -1,6 +1,6 @@
 //! Findings while they are collected.
 
-use crate::finding::{Finding, Findings};
+use crate::finding::{Finding, SHOWN_LIMIT};
 
 /// Findings as they are collected; a hostile file must not fill the memory with them.
 #[derive(Debug, Default)]
@@ -11,7 +11,7 @@ pub struct Notes {
 
 impl Notes {
     /// Ten times what is shown, so that sorting by position shows the first ones of the file.
-    const LIMIT: usize = 10 * Findings::LIMIT;
+    const LIMIT: usize = 10 * SHOWN_LIMIT;
 
     /// Adds one.
     pub fn push(&mut self, finding: Finding) {

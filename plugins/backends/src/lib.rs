@@ -1,7 +1,23 @@
-//! Backends that come with `mapper`: one module each, registered in the cli's registry.
+//! Backends that come with `mapper`, one module each. To add one, write its module with a constant `PLUGIN`, and its line
+//! below.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-pub mod replay;
 mod setpoint_limits;
-pub mod virtual_lab;
+
+use mapper_physics::backend_plugin::BackendPlugin;
+
+/// Declares the backends' modules and the list of them.
+macro_rules! backends {
+    ($($name:ident),+ $(,)?) => {
+        $(pub mod $name;)+
+
+        /// Every backend, in the order of lists for people.
+        pub const BACKENDS: &[BackendPlugin] = &[$($name::PLUGIN),+];
+    };
+}
+
+backends! {
+    virtual_lab,
+    replay,
+}

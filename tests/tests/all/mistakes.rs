@@ -22,12 +22,12 @@ fn all_are_shown(campaign: &CampaignFile, message: &str) {
     let lines: Vec<&str> = message.lines().collect();
     for (_, wrong, at) in MISTAKES {
         let number = campaign.line_of(wrong);
+        // The end of a long line may be cut, never what is wrong.
         let source = campaign.text.lines().nth(number - 1).unwrap();
+        let source = &source[..source.find(wrong.trim()).unwrap() + wrong.trim().len()];
         let shown = lines
             .iter()
-            .position(|line| {
-                line.trim_start().starts_with(&format!("{number} |")) && line.contains(source.trim_end())
-            })
+            .position(|line| line.trim_start().starts_with(&format!("{number} |")) && line.contains(source))
             .unwrap_or_else(|| panic!("line {number}, `{wrong}`, is not shown in\n{message}"));
         let carets = lines[shown + 1];
         let place = lines[shown].find(at).unwrap();

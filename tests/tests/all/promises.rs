@@ -14,8 +14,22 @@ struct Promise {
     shown_by: (&'static [&'static str], &'static str),
 }
 
-const PROMISES: &[Promise] =
-    &[Promise { patch: "effect.patch", shown_by: (&["gap", "effects"], "seal_friction") }];
+/// Stands for a campaign whose rig nobody knows.
+const ELSEWHERE: &str = "ELSEWHERE";
+
+const PROMISES: &[Promise] = &[
+    Promise { patch: "effect.patch", shown_by: (&["gap", "effects"], "seal_friction") },
+    // A name that is not known is answered with those that are.
+    Promise {
+        patch: "format.patch",
+        shown_by: (&["map", "convert", "campaigns/turbo_a.yaml", "x.unknown"], "names (.names)"),
+    },
+    Promise {
+        patch: "command.patch",
+        shown_by: (&["--help"], "List the quantities that a recording may hold"),
+    },
+    Promise { patch: "backend.patch", shown_by: (&["check", ELSEWHERE], "empty_cell") },
+];
 
 /// What git says of a patch: lines added and removed, by file.
 fn changes(patch: &Path) -> BTreeMap<String, (usize, usize)> {
@@ -130,16 +144,23 @@ fn what_is_promised_is_built_and_seen() {
         .output()
         .unwrap();
     assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    let scratch = scratch();
+    let elsewhere = scratch.path().join("elsewhere.yaml");
+    let campaign = std::fs::read_to_string(repository().join("campaigns/turbo_a.yaml")).unwrap();
+    std::fs::write(&elsewhere, campaign.replace("virtual_lab: {}", "nowhere: {}")).unwrap();
     for Promise { patch, shown_by: (arguments, word) } in PROMISES {
-        let shown = |program: &Path| {
-            let output = Command::new(program).args(*arguments).current_dir(&tree).output().unwrap();
-            String::from_utf8_lossy(&output.stdout).contains(word)
+        let shown = |mut program: Command| {
+            let arguments = arguments.iter().map(|argument| match *argument {
+                ELSEWHERE => elsewhere.as_os_str(),
+                argument => argument.as_ref(),
+            });
+            let output = program.args(arguments).current_dir(&tree).output().unwrap();
+            let printed = [output.stdout, output.stderr].concat();
+            String::from_utf8_lossy(&printed).contains(word)
         };
-        assert!(
-            shown(&programs.join("debug").join(format!("mapper{}", std::env::consts::EXE_SUFFIX))),
-            "{patch}"
-        );
-        let without = mapper_tests::mapper(*arguments).exits(0);
-        assert!(!without.stdout.contains(word), "{patch}: the program prints `{word}` without it");
+        let with = programs.join("debug").join(format!("mapper{}", std::env::consts::EXE_SUFFIX));
+        assert!(shown(Command::new(with)), "{patch}: the program does not print `{word}`");
+        let without = mapper_tests::mapper_command::<&str>([]);
+        assert!(!shown(without), "{patch}: the program prints `{word}` without it");
     }
 }

@@ -149,8 +149,12 @@ fn a_step_beyond_the_limits_is_refused_at_its_line() {
     let campaign = scripted("jump(grid()[0]);\njump(point(\"190 krpm\", 1.0));\n", &[]);
     for command in ["plan", "run"] {
         let failed = mapper([command.as_ref(), campaign.path.as_os_str()]).exits(3);
-        let expected =
-            ["steps.rhai:2:1", "190 krpm", "speed limit of 180 krpm", "2 | jump(point(\"190 krpm\", 1.0));"];
+        let expected = [
+            "steps.rhai:2:1",
+            "190 krpm",
+            "above the speed limit, `limits.speed` = 180 krpm",
+            "2 | jump(point(\"190 krpm\", 1.0));",
+        ];
         assert!(expected.iter().all(|part| failed.stderr.contains(part)), "{}", failed.stderr);
     }
 }

@@ -112,9 +112,4 @@ impl Figure {
         (self.panel_width_px, self.panel_height_px) = (width_px, height_px);
         self
     }
-
-    /// The picture as an SVG document. The same figure gives the same bytes.
-    pub fn to_svg(&self) -> String {
-        crate::svg::document(&crate::draw::figure(self))
-    }
 }

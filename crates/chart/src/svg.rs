@@ -127,6 +127,13 @@ fn list(points: &[(f64, f64)]) -> String {
     out
 }
 
+impl crate::Figure {
+    /// The picture as an SVG document. The same figure gives the same bytes.
+    pub fn to_svg(&self) -> String {
+        document(&crate::draw::figure(self))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::px;

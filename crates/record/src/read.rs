@@ -1,5 +1,6 @@
 //! Reading a recording, one's own or another program's.
 
+use crate::read_options::ReadOptions;
 use crate::rig_sink::RigSink;
 use crate::scan::{Scanned, scan};
 use crate::series_builder::{SeriesBuilder, run_time_s};
@@ -10,22 +11,6 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
-
-/// Bounds on what a file may make the reader do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ReadOptions {
-    /// Chunks that claim to be larger unpacked are left out, bytes.
-    pub max_chunk_bytes: u64,
-    /// Messages beyond these are left out.
-    pub max_messages: u64,
-}
-
-impl Default for ReadOptions {
-    /// 256 MiB; 100 million, which is a month of four groups at 10 Hz.
-    fn default() -> Self {
-        ReadOptions { max_chunk_bytes: 256 << 20, max_messages: 100_000_000 }
-    }
-}
 
 /// A recording with all that is known about how it was read.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -54,15 +54,7 @@ pub fn groups_text(runs: &[ListedRun], figures: &[Metric]) -> String {
             group.first().map(|listed| state(listed)).unwrap_or_default().to_owned(),
         ];
         row.extend(figures.iter().map(|figure| {
-            shown(
-                *figure,
-                median(
-                    &mut group
-                        .iter()
-                        .filter_map(|listed| listed.run.figures.get(figure).copied())
-                        .collect::<Vec<f64>>(),
-                ),
-            )
+            shown(*figure, median(group.iter().filter_map(|listed| listed.run.figures.get(figure).copied())))
         }));
         table.add_row(row);
     }

@@ -30,8 +30,11 @@ pub fn out_of_order<T: std::fmt::Debug>(result: Result<T, BackendError>) {
     assert!(matches!(result, Err(BackendError::OutOfOrder { .. })), "{result:?}");
 }
 
+/// First sequence number, times, and columns of a batch, to the bit.
+type Bits = (u64, Vec<u64>, Vec<(String, Vec<u64>)>);
+
 /// What a batch holds, to the bit: NaN is equal to NaN here.
-pub fn bits(batch: &SampleBatch) -> (u64, Vec<u64>, Vec<(String, Vec<u64>)>) {
+pub fn bits(batch: &SampleBatch) -> Bits {
     let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
     let columns = batch.columns.iter().map(|column| (column.channel.to_string(), bits(&column.values)));
     (batch.first_sequence, bits(&batch.t_s), columns.collect())

@@ -1,5 +1,5 @@
 //! The campaign as a whole: how the file is written, and what it becomes, units resolved and defaults filled in. Its
-//! elements stand in [`crate::elements`], one file each.
+//! elements stand in `elements`, one file each.
 
 use crate::elements::backend::backend;
 use crate::elements::boundary::BoundaryFile;

@@ -158,7 +158,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
     Ok(FigureResult {
         number: "5".to_owned(),
         title: "conventional mapping at several turbine inlet temperatures".to_owned(),
-        method: "Settled points; apparent efficiency from the temperature rise, T1 (PR^kappa - 1)/(T2 - T1), less \
+        method: "Settled points; apparent efficiency from the temperature rise, T1 (PR^kappa - 1)/(T2 - T1), minus \
                  the model's efficiency at the same point. The flow is that at 500 degC."
             .to_owned(),
         statements,

@@ -15,5 +15,6 @@ pub(crate) fn any<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
 pub(crate) fn any_with<T>(text: &str, read: impl FnOnce(Value) -> Result<T, Error>) -> Result<T, Error> {
     let mut notes = Notes::default();
     let root = mapper_yaml::read(&Source::new(&DOCUMENT, Path::new("test.yaml"), text), &mut notes);
+    // This module is compiled for tests alone.
     read(root.unwrap().to_json())
 }

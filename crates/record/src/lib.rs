@@ -2,7 +2,7 @@
 //!
 //! A recording is one MCAP file: a message in JSON per device group and sample, units in each channel's metadata and
 //! in its schema, step markers on `/step`, events on `/event`, plan and campaign attached. What only a simulator
-//! knows lies under `/truth`; [`read_recording`] never returns it, [`read_truth`] is for scoring alone.
+//! knows lies under `/truth`; [`read_recording`] never returns it, [`score`] alone reads it.
 //!
 //! Everything read here is treated as hostile: files may be truncated, damaged, or not MCAP at all. What can be
 //! saved is returned beside a list of [`ReadWarning`]s.
@@ -24,6 +24,7 @@ mod records;
 mod rig_sink;
 mod scan;
 mod schema;
+pub mod score;
 mod series_builder;
 mod steps;
 mod truth;
@@ -40,6 +41,5 @@ pub use mapper_yaml::units::{Kind, Unit, UnitError};
 pub use read::{ReadReport, read_recording, read_recording_from};
 pub use read_options::ReadOptions;
 pub use recording_file::RecordingHeader;
-pub use truth::{Truth, read_truth};
 pub use warning::{DamagedPart, ReadWarning};
 pub use writer::{RecordingWriter, StepPhase};

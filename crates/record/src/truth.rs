@@ -31,8 +31,6 @@ impl Truth {
 
 /// Reads the truth of a recording; empty where it has none.
 ///
-/// For the score crate alone: whatever identifies, corrects or diagnoses must not see it.
-///
 /// # Errors
 /// As [`read_recording`](crate::read_recording).
 pub fn read_truth(path: &Path) -> Result<Truth, RecordError> {

@@ -7,7 +7,7 @@ use common::{batch, header, part, step, write};
 use mapper_core::{CHANNELS, ChannelColumn, SampleBatch, TruthColumn};
 use mapper_record::{
     ChannelMap, FormatVersion, ReadOptions, ReadReport, ReadWarning, RecordError, RecordingWriter, StepPhase,
-    read_recording, read_truth,
+    read_recording, score::read_truth,
 };
 use proptest::prelude::*;
 use std::path::Path;

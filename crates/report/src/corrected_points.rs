@@ -1,29 +1,16 @@
 //! Points without the drift, for other programs.
 
 use mapper_drift::DriftReport;
-use std::fmt::Write;
 
-/// Corrected points for other programs.
-pub fn corrected_csv(report: &DriftReport) -> String {
-    let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
-    let mut text =
-        "run,step,speed_rpm,valve,eta,sigma_eta,h_w_m2k,eta_identified,eta_uncorrected,correction\n"
-            .to_owned();
+/// Corrected points as CSV, one row each under the names of [`CorrectedPoint`](mapper_drift::CorrectedPoint); a number
+/// that is not there is empty.
+///
+/// # Errors
+/// None in practice: the writer's own, which memory never raises.
+pub fn corrected_csv(report: &DriftReport) -> std::io::Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
     for point in &report.corrected_points {
-        let _ = writeln!(
-            text,
-            "{},{},{},{},{},{},{},{},{},{}",
-            point.run,
-            point.step,
-            point.speed_rpm,
-            point.valve,
-            point.eta,
-            point.sigma_eta,
-            point.h_w_m2k,
-            number(point.eta_identified),
-            number(point.eta_uncorrected),
-            point.correction,
-        );
+        writer.serialize(point)?;
     }
-    text
+    writer.into_inner().map_err(csv::IntoInnerError::into_error)
 }

@@ -7,59 +7,97 @@ use mapper_core::Channel;
 use mapper_gap::diagnose::Diagnosed;
 use mapper_gap::nuisance::OUTPUTS;
 use mapper_gap::study::Study;
-use std::fmt::Write;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+const STYLE: &str = "\
+body{font:15px/1.5 sans-serif;max-width:1100px;margin:2em auto;color:#222}
+table{border-collapse:collapse}td,th{padding:.2em .6em;text-align:right}
+td:first-child,th:first-child,td.left{text-align:left}
+.bar{background:#4477aa;height:1em;display:inline-block}
+svg{max-width:100%;height:auto}
+pre{background:#f4f4f4;padding:1em;overflow:auto;white-space:pre-wrap}";
 
 /// The page.
 pub fn gap_page(title: &str, done: &Diagnosed) -> String {
     let diagnosis = &done.diagnosis;
-    let mut html = String::from(
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>gap diagnosis</title>\
-         <style>body{font:15px/1.5 sans-serif;max-width:1100px;margin:2em auto;color:#222}\
-         table{border-collapse:collapse}td,th{padding:.2em .6em;text-align:right}\
-         td:first-child,th:first-child{text-align:left}.bar{background:#4477aa;height:1em;display:inline-block}\
-         svg{max-width:100%;height:auto}pre{background:#f4f4f4;padding:1em;overflow:auto;white-space:pre-wrap}</style>",
-    );
-    let _ = write!(html, "<h1>{}</h1><p>{}</p>", escape(&headline(diagnosis)), escape(title));
-    html += "<h2>Which</h2><table><tr><th>cause</th><th>probability</th><th></th></tr>";
-    let mut row = |name: &str, probability: f64| {
-        let _ = write!(
-            html,
-            "<tr><td>{}</td><td>{:.1} %</td><td style=\"text-align:left\"><span class=\"bar\" style=\"width:{:.0}px\"></span></td></tr>",
-            escape(name),
-            100.0 * probability,
-            300.0 * probability.clamp(0.0, 1.0)
-        );
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { "gap diagnosis" }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { (headline(diagnosis)) }
+                p { (title) }
+                h2 { "Which" }
+                (causes(done))
+                h2 { "Where" }
+                (places(done))
+                (PreEscaped(map_of_where(done)))
+                h2 { "Residuals without the cause, step by channel, in sigma" }
+                p {
+                    "Each number is the root mean square of a step and channel in units of what is declared: 1 is noise. \
+                     Tolerances are those fitted together with the first cause."
+                }
+                (heat_map(done, &done.without_cause.1))
+                @if let Some(best) = done.fits.first() {
+                    h2 { "Residuals with the first cause" }
+                    (heat_map(done, &best.residual))
+                    h2 { "Before and after" }
+                    (PreEscaped(traces(done)))
+                }
+                h2 { "In words" }
+                pre { (gap_text(diagnosis)) }
+            }
+        }
     };
-    for candidate in diagnosis.candidates.iter().take(8) {
-        row(&candidate.effects.join(" + "), candidate.probability);
+    page.into_string()
+}
+
+/// The first causes with their probabilities as bars.
+fn causes(done: &Diagnosed) -> Markup {
+    let diagnosis = &done.diagnosis;
+    let candidates = diagnosis.candidates.iter().take(8);
+    let rows = candidates.map(|candidate| (candidate.effects.join(" + "), candidate.probability)).chain([
+        ("nothing beyond tolerance".to_owned(), diagnosis.probability_none),
+        ("a cause outside the catalogue".to_owned(), diagnosis.probability_outside),
+    ]);
+    html! {
+        table {
+            tr { th { "cause" } th { "probability" } th {} }
+            @for (name, probability) in rows {
+                tr {
+                    td { (name) }
+                    td { (format!("{:.1} %", 100.0 * probability)) }
+                    td.left {
+                        span.bar style=(format!("width:{:.0}px", 300.0 * probability.clamp(0.0, 1.0))) {}
+                    }
+                }
+            }
+        }
     }
-    row("nothing beyond tolerance", diagnosis.probability_none);
-    row("a cause outside the catalogue", diagnosis.probability_outside);
-    html += "</table><h2>Where</h2><table><tr><th>part</th><th>share</th><th>sigma</th><th>channel</th><th>phase</th><th>region</th></tr>";
-    for place in &diagnosis.r#where {
-        let _ = write!(
-            html,
-            "<tr><td>{}</td><td>{:.0} %</td><td>{:.0}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            escape(&place.submodel),
-            100.0 * place.share,
-            place.sigma,
-            escape(&place.channel),
-            escape(&place.phase),
-            escape(&place.region)
-        );
+}
+
+/// The parts of the machine in order of their share of the gap.
+fn places(done: &Diagnosed) -> Markup {
+    html! {
+        table {
+            tr { @for head in ["part", "share", "sigma", "channel", "phase", "region"] { th { (head) } } }
+            @for place in &done.diagnosis.r#where {
+                tr {
+                    td { (place.submodel) }
+                    td { (format!("{:.0} %", 100.0 * place.share)) }
+                    td { (format!("{:.0}", place.sigma)) }
+                    td { (place.channel) }
+                    td { (place.phase) }
+                    td { (place.region) }
+                }
+            }
+        }
     }
-    html += "</table>";
-    html += &map_of_where(done);
-    html += "<h2>Residuals without the cause, step by channel, in sigma</h2><p>Each number is the root mean square of a step and channel in units of what is declared: 1 is noise. Tolerances are those fitted together with the first cause.</p>";
-    html += &heat_map(done, &done.without_cause.1);
-    if let Some(best) = done.fits.first() {
-        html += "<h2>Residuals with the first cause</h2>";
-        html += &heat_map(done, &best.residual);
-        html += "<h2>Before and after</h2>";
-        html += &traces(done);
-    }
-    let _ = writeln!(html, "<h2>In words</h2><pre>{}</pre></html>", escape(&gap_text(diagnosis)));
-    html
 }
 
 /// Classes of residuals in the map of where: up to so many sigma, colour and name.
@@ -115,35 +153,35 @@ fn place_on_map(study: &Study, step: usize) -> Option<(f64, f64)> {
 }
 
 /// Root mean square of the whitened residual of each step and channel, as a table of colours with its numbers.
-fn heat_map(done: &Diagnosed, residual: &[f64]) -> String {
-    let mut html = String::from("<table><tr><th>channel</th>");
-    for step in 0..done.study.steps.len() {
-        let _ = write!(html, "<th>{}</th>", step + 1);
-    }
-    html += "</tr>";
-    for (output, channel) in OUTPUTS.iter().enumerate() {
-        let _ = write!(html, "<tr><td>{channel}</td>");
-        for step in 0..done.study.steps.len() {
-            let group = done.study.groups.iter().find(|g| g.step == step && g.output == output);
-            let Some(group) = group else {
-                html += "<td>-</td>";
-                continue;
-            };
-            let here = &residual[group.rows.clone()];
-            let rms = (here.iter().map(|r| r * r).sum::<f64>() / here.len().max(1) as f64).sqrt();
-            // White at 1, red from 30 on, evenly in the logarithm.
-            let heat = (rms.max(1.0).ln() / 30f64.ln()).clamp(0.0, 1.0);
-            let fade = (255.0 * (1.0 - heat)) as u8;
-            let ink = if heat > 0.6 { "#fff" } else { "#222" };
-            let _ = write!(
-                html,
-                "<td style=\"color:{ink};background:rgb({},{fade},{fade})\">{rms:.1}</td>",
-                255 - (60.0 * heat) as u8
-            );
+fn heat_map(done: &Diagnosed, residual: &[f64]) -> Markup {
+    let steps = done.study.steps.len();
+    html! {
+        table {
+            tr {
+                th { "channel" }
+                @for step in 1..=steps { th { (step) } }
+            }
+            @for (output, channel) in OUTPUTS.iter().enumerate() {
+                tr {
+                    td { (channel) }
+                    @for step in 0..steps { (heat_cell(done, residual, step, output)) }
+                }
+            }
         }
-        html += "</tr>";
     }
-    html + "</table>"
+}
+
+fn heat_cell(done: &Diagnosed, residual: &[f64], step: usize, output: usize) -> Markup {
+    let group = done.study.groups.iter().find(|g| g.step == step && g.output == output);
+    let Some(group) = group else { return html! { td { "-" } } };
+    let here = &residual[group.rows.clone()];
+    let rms = (here.iter().map(|r| r * r).sum::<f64>() / here.len().max(1) as f64).sqrt();
+    // White at 1, red from 30 on, evenly in the logarithm.
+    let heat = (rms.max(1.0).ln() / 30f64.ln()).clamp(0.0, 1.0);
+    let fade = (255.0 * (1.0 - heat)) as u8;
+    let ink = if heat > 0.6 { "#fff" } else { "#222" };
+    let style = format!("color:{ink};background:rgb({},{fade},{fade})", 255 - (60.0 * heat) as u8);
+    html! { td style=(style) { (format!("{rms:.1}")) } }
 }
 
 /// Measured minus predicted over time, before and after, for the four channels with the largest gap.
@@ -178,8 +216,4 @@ fn traces(done: &Diagnosed) -> String {
         figure = figure.panel(panel);
     }
     figure.to_svg()
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

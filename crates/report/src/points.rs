@@ -5,7 +5,7 @@ use crate::number::{number, percent};
 use crate::table;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{IdentifiedPoint, StepKind, Verdict};
-use mapper_score::{ScoreSummary, ScoredPoint};
+use mapper_record::score::{ScoreSummary, ScoredPoint};
 use std::fmt::Write;
 
 /// Identified points as a table, their doubts below, and how far they are from the truth where it is known.
@@ -25,7 +25,7 @@ pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits) -> String {
         count(Verdict::Doubtful),
         count(Verdict::Unusable),
     );
-    if let Some(score) = mapper_score::summarise(points) {
+    if let Some(score) = mapper_record::score::summarise(points) {
         text.push_str(&score_text(&score));
     }
     text

@@ -2,14 +2,14 @@
 
 use crate::display::Display;
 use crate::duration::duration;
-use crate::markdown;
+use crate::markdown::{self, Align};
 use crate::number::{number, percent};
 use crate::points::{score_text, step_name, verdict_word};
 use crate::repeated_jumps::repeated_jumps_text;
 use mapper_assemble::RepeatedJump;
 use mapper_campaign::Campaign;
 use mapper_core::{Event, Plan};
-use mapper_score::{ScoreSummary, ScoredPoint};
+use mapper_record::score::{ScoreSummary, ScoredPoint};
 use std::fmt::Write;
 
 /// Everything a test report needs.
@@ -43,14 +43,14 @@ pub fn run_report(report: &RunReport<'_>) -> String {
     }
     let rows: Vec<[String; 2]> =
         head_rows(campaign, plan).into_iter().map(|(what, value)| [what.to_owned(), value]).collect();
-    text.push_str(&markdown::table(&["", ""], &rows));
+    text.push_str(&markdown::table(&["", ""], Align::Left, &rows));
     text.push('\n');
     if !campaign.report.calibration.is_empty() {
         let calibrated = campaign.report.calibration.iter();
         let rows: Vec<[String; 2]> = calibrated
             .map(|(channel, day)| [format!("{channel} ({})", channel.info().description), day.to_string()])
             .collect();
-        text.push_str(&markdown::table(&["sensor", "last calibration"], &rows));
+        text.push_str(&markdown::table(&["sensor", "last calibration"], Align::Left, &rows));
         text.push('\n');
     }
     if let Some(score) = score {
@@ -153,7 +153,7 @@ fn points_section(text: &mut String, campaign: &Campaign, points: &[ScoredPoint]
             ]
         })
         .collect();
-    text.push_str(&markdown::table(&heads, &rows));
+    text.push_str(&markdown::table(&heads, Align::Left, &rows));
     text.push_str("\n## Doubts and remarks\n\n");
     let mut none = true;
     for ScoredPoint { point, .. } in points {

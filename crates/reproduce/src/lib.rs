@@ -1,6 +1,6 @@
 //! The paper's simulated figures redone on the virtual laboratory's model, each beside what the paper states.
 //!
-//! [`reproduce`] gives data and pictures, [`markdown`] the page made of them. Nothing depends on time or machine:
+//! [`reproduce`] gives data and pictures. Nothing depends on time or machine:
 //! the same program gives the same bytes.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
@@ -15,7 +15,6 @@ mod figure_8;
 mod figure_9;
 mod format;
 mod lab;
-mod markdown;
 #[cfg(test)]
 mod model_table;
 mod outcome;
@@ -23,8 +22,7 @@ mod picture;
 mod result;
 
 pub use error::ReproduceError;
-pub use markdown::{markdown, picture_path};
-pub use result::{FigureResult, Statement, Table, Verdict};
+pub use result::{FigureResult, Statement, Table, Verdict, picture_path};
 
 /// Numbers of the figures that [`reproduce`] redoes, in its order.
 pub const FIGURES: [&str; 7] = ["5", "6", "7", "8", "9", "10", "12"];

@@ -79,3 +79,8 @@ impl Table {
         self.rows.push(cells.to_vec());
     }
 }
+
+/// Where a page of the figures expects this one's picture, relative to the page.
+pub fn picture_path(result: &FigureResult) -> String {
+    format!("reproduction/figure_{}.svg", result.number)
+}

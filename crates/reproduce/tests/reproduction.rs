@@ -1,7 +1,7 @@
 //! The page as a whole.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_reproduce::{FIGURES, markdown, picture_path, reproduce};
+use mapper_reproduce::{FIGURES, reproduce};
 
 #[test]
 fn every_figure_has_statements_a_table_and_a_picture_and_the_same_bytes_twice() {
@@ -17,8 +17,5 @@ fn every_figure_has_statements_a_table_and_a_picture_and_the_same_bytes_twice() 
         let texts = result.statements.iter().map(|statement| &statement.here);
         assert!(cells.chain(texts).all(|text| !text.contains("NaN") && !text.contains("inf")));
     }
-    let page = markdown(&results);
-    assert!(page.contains("`mapper reproduce") || page.contains("mapper reproduce --out"));
-    assert!(results.iter().all(|result| page.contains(&picture_path(result))));
     assert_eq!(reproduce(|_| {}).unwrap(), results);
 }

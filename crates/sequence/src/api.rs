@@ -12,7 +12,8 @@ use std::sync::{Arc, Mutex};
 pub(crate) type Shared = Arc<Mutex<Session>>;
 
 /// One function or property.
-pub(crate) struct Entry {
+pub struct Entry {
+    /// The chapter of the documentation it stands in.
     pub group: &'static str,
     /// As a script writes it.
     pub signature: &'static str,
@@ -36,10 +37,15 @@ const SIGMA_H_MAX_W_M2K: f64 = 1e6;
 macro_rules! table {
     ($($group:literal { $($signature:literal, $doc:literal => $register:expr;)+ })+) => {
         /// Every row, in the order of the documentation.
-        pub(crate) const TABLE: &[Entry] = &[$($(
+        const TABLE: &[Entry] = &[$($(
             Entry { group: $group, signature: $signature, doc: $doc, register: $register },
         )+)+];
     };
+}
+
+/// Every function and property that a script may use, in the order of the documentation.
+pub fn functions() -> &'static [Entry] {
+    TABLE
 }
 
 /// Registers everything of [`TABLE`], and how points and results are shown.

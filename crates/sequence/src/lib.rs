@@ -7,12 +7,11 @@
 //!
 //! [`SequenceRunner`] runs a script on its own thread and meets it at each step: the script stands still while a step
 //! is run, and the caller stands still while the script thinks. What a script may call is one table, from which both
-//! the functions and their documentation ([`api_markdown`]) are made.
+//! the functions and their documentation ([`functions`]) are made.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod api;
-mod docs;
 mod error;
 mod forecast;
 mod request;
@@ -23,7 +22,7 @@ mod session;
 mod settle;
 mod step;
 
-pub use docs::api_markdown;
+pub use api::{Entry, functions};
 pub use error::{ScriptError, SequenceError};
 pub use request::{OrderPoints, SequenceRequest};
 pub use result::StepResult;

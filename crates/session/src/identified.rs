@@ -6,7 +6,7 @@ use crate::{Session, SessionError, SessionEvent};
 use mapper_core::{IdentifiedPoint, Method, Recording, ReferenceState, ThermalModel};
 use mapper_identify::{IdentifyConfig, WindowRule, ZeroOutcome, identify_recording};
 use mapper_record::ChannelMap;
-use mapper_score::{ScoreSummary, ScoredPoint};
+use mapper_record::score::{ScoreSummary, ScoredPoint};
 
 /// What a recording gives.
 #[derive(Debug)]
@@ -77,8 +77,8 @@ impl Session<'_> {
         for point in &points {
             self.tell(SessionEvent::PointIdentified(Box::new(point.clone())));
         }
-        let points = mapper_score::score(&recorded.path, &recording.steps, points)?;
-        let score = mapper_score::summarise(&points);
+        let points = mapper_record::score::score(&recorded.path, &recording.steps, points)?;
+        let score = mapper_record::score::summarise(&points);
         Ok(Identified { recording, config, points, thermal: found.thermal, zero, score })
     }
 }

@@ -10,7 +10,7 @@ use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Plan, ThermalMode
 use mapper_identify::ZeroOutcome;
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::{RunReport, run_report};
-use mapper_score::{ScoreSummary, ScoredPoint};
+use mapper_record::score::{ScoreSummary, ScoredPoint};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeMap;

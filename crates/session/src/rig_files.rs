@@ -10,7 +10,7 @@ use mapper_report::{
     ErrorAtGradient, ThermalExport, TurbinePoint, error_figure, heat_transfer_figure, turbine_points,
     turbine_text,
 };
-use mapper_score::ScoredPoint;
+use mapper_record::score::ScoredPoint;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

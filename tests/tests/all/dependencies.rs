@@ -16,13 +16,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-planner",   &["core", "numerics", "physics"]),
     ("mapper-runner",    &["core"]),
     ("mapper-sequence",  &["core", "numerics", "physics", "yaml"]),
-    ("mapper-record",    &["core", "yaml"]),
+    ("mapper-record",    &["core", "numerics", "yaml"]),
     ("mapper-observe",   &["core", "numerics", "physics"]),
     ("mapper-identify",  &["core", "numerics", "physics", "observe"]),
     ("mapper-assemble",  &["core", "numerics", "physics", "identify"]),
     ("mapper-drift",     &["core", "numerics", "physics", "observe", "identify"]),
     ("mapper-gap",       &["core", "numerics", "physics", "observe"]),
-    ("mapper-score",     &["core", "numerics", "record"]),
     ("mapper-history",   &["numerics"]),
     ("mapper-reproduce", &["core", "numerics", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
@@ -33,9 +32,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
     ("mapper-blind",     &["core", "numerics", "physics", "campaign", "record", "observe", "gap", "backends", "effects"]),
     // Words, pages and pictures made from data.
-    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "assemble", "gap", "drift", "history", "score"]),
+    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "assemble", "gap", "drift", "history", "record", "reproduce", "sequence"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "observe", "identify", "gap", "drift", "history", "assemble", "score", "report", "numerics"]),
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "observe", "identify", "gap", "drift", "history", "assemble", "report", "numerics"]),
     // The program names the plug-ins; nothing sees the program.
     ("mapper-cli",       &["core", "physics", "campaign", "planner", "sequence", "record", "drift", "history", "assemble", "reproduce", "report", "session", "backends", "blind", "effects", "formats"]),
     // Tests run the program and read its files; chores know nothing of it.
@@ -45,11 +44,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
 
 /// Tests may use more than what they test, but what works from recordings alone is tested from recordings alone.
 const NEVER_IN_TESTS: &[(&str, &[&str])] = &[
-    ("mapper-observe", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
-    ("mapper-identify", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
-    ("mapper-assemble", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
-    ("mapper-drift", &["mapper-backends", "mapper-effects", "mapper-score", "mapper-cli"]),
-    ("mapper-gap", &["mapper-backends", "mapper-blind", "mapper-score", "mapper-cli"]),
+    ("mapper-observe", &["mapper-backends", "mapper-effects", "mapper-cli"]),
+    ("mapper-identify", &["mapper-backends", "mapper-effects", "mapper-cli"]),
+    ("mapper-assemble", &["mapper-backends", "mapper-effects", "mapper-cli"]),
+    ("mapper-drift", &["mapper-backends", "mapper-effects", "mapper-cli"]),
+    ("mapper-gap", &["mapper-backends", "mapper-blind", "mapper-cli"]),
 ];
 
 /// Libraries that only some packages may use.

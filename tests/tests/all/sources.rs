@@ -13,8 +13,13 @@ struct Rule {
 const RULES: &[Rule] = &[
     Rule {
         word: ("read_", "truth"),
-        places: &["crates/record/", "crates/score/"],
+        places: &["crates/record/"],
         why: "what only a simulator knows is read by scoring alone",
+    },
+    Rule {
+        word: ("record::", "score"),
+        places: &["crates/record/", "crates/report/", "crates/session/"],
+        why: "whatever identifies, corrects or diagnoses never sees what only a simulator knows",
     },
     Rule {
         word: ("saphyr_", "parser"),

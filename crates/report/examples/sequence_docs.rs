@@ -3,5 +3,5 @@
 use std::io::Write;
 
 fn main() -> std::io::Result<()> {
-    std::io::stdout().write_all(mapper_sequence::api_markdown().as_bytes())
+    std::io::stdout().write_all(mapper_report::sequence_page().as_bytes())
 }

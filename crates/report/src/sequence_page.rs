@@ -1,7 +1,18 @@
 //! The documentation of what a script may call, from the same table that registers it.
 
-use crate::api;
-use std::fmt::Write;
+use crate::markdown::{Align, table};
+use mapper_sequence::functions;
+
+/// The page, Markdown.
+pub fn sequence_page() -> String {
+    let mut text = HEAD.to_owned();
+    for functions in functions().chunk_by(|one, next| one.group == next.group) {
+        let Some(first) = functions.first() else { continue };
+        let rows = functions.iter().map(|entry| [format!("`{}`", entry.signature), entry.doc.to_owned()]);
+        text.push_str(&format!("\n## {}\n\n{}", first.group, table(&["", ""], Align::Left, rows)));
+    }
+    text
+}
 
 const HEAD: &str = "\
 # Sequences
@@ -40,18 +51,3 @@ rehearsal never touches the rig.
 
 Examples with their campaigns are in `examples/sequences`.
 ";
-
-/// The page as Markdown.
-pub fn api_markdown() -> String {
-    let mut text = HEAD.to_owned();
-    let mut group = "";
-    for entry in api::TABLE {
-        if entry.group != group {
-            group = entry.group;
-            // Writing to a String cannot fail.
-            let _ = write!(text, "\n## {group}\n\n| | |\n|---|---|\n");
-        }
-        let _ = writeln!(text, "| `{}` | {} |", entry.signature, entry.doc);
-    }
-    text
-}

@@ -4,7 +4,7 @@
 
 use mapper_core::{IdentifiedPoint, Plan, StepKind, Verdict};
 use mapper_numerics::statistics::{median, quantile};
-use mapper_score::{PointTruth, ScoredPoint, summarise};
+use mapper_record::score::{PointTruth, ScoredPoint, summarise};
 use serde::Deserialize;
 use std::path::Path;
 

@@ -1,0 +1,41 @@
+//! The reproduction of the paper's figures as a page.
+
+use crate::markdown::{Align, table};
+use mapper_reproduce::{FigureResult, picture_path};
+
+/// The page, Markdown; pictures are linked where [`picture_path`] says, beside it. The same results give the same bytes.
+pub fn reproduction_page(results: &[FigureResult]) -> String {
+    let figures = results.iter().map(|result| {
+        let statements = result.statements.iter();
+        let rows = statements.map(|said| [said.paper.clone(), said.here.clone(), said.verdict.to_string()]);
+        format!(
+            "\n## Figure {}: {}\n\n{}\n\n{}\n![Figure {}]({})\n\n{}",
+            result.number,
+            result.title,
+            result.method,
+            table(&["the paper states", "here", ""], Align::Left, rows),
+            result.number,
+            picture_path(result),
+            table(&result.table.head, Align::Right, &result.table.rows),
+        )
+    });
+    HEAD.to_owned() + &figures.collect::<String>()
+}
+
+const HEAD: &str = "# The paper's figures, redone
+
+Generated; do not edit. The command that makes this page and its pictures:
+
+```
+mapper reproduce --out docs
+```
+
+R. D. Burke and others, dynamic identification of thermodynamic parameters for turbocharger compressor models: the
+figures made in simulation (5 to 10), and figure 12, redone on the virtual laboratory's nominal model. Its map and air
+tables are not printed in the paper and are closed forms here, so numbers agree in kind, not in digits. Each statement
+of the paper stands beside what came out: *holds*, *partly* or *differs*. An efficiency error is identified minus model
+value, in points (1 point = 0.01); ranges run over the valve openings.
+
+Errata of the paper followed here: eq. 2 lacks T1' on its right side; the nRMSE of the heat-transfer coefficient is 3.2 %
+(section 5.1, conclusion 2), not the abstract's 1 %; table 1's \"110000 to 50000\" means target 50 krpm from 110 krpm.
+";

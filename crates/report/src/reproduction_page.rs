@@ -19,7 +19,7 @@ pub fn reproduction_page(results: &[FigureResult]) -> String {
             table(&result.table.head, Align::Right, &result.table.rows),
         )
     });
-    HEAD.to_owned() + &figures.collect::<String>()
+    std::iter::once(HEAD.to_owned()).chain(figures).collect()
 }
 
 const HEAD: &str = "# The paper's figures, redone

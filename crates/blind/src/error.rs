@@ -1,10 +1,10 @@
 //! What can go wrong with blind cases.
 
-use mapper_core::BackendError;
 use mapper_physics::effect::EffectError;
 use mapper_physics::steady::SteadyError;
 use mapper_physics::tabulated_map::MapError;
 use mapper_record::RecordError;
+use mapper_runner::RunError;
 use std::path::PathBuf;
 
 /// Why cases cannot be made or scored.
@@ -51,13 +51,13 @@ pub enum BlindError {
         /// The hash it had.
         expected: String,
     },
-    /// The lab stopped.
+    /// The lab stopped, or what it gave cannot be kept.
     #[error("case {name}: {source}")]
-    Lab {
+    Run {
         /// The case.
         name: String,
         /// Why.
-        source: BackendError,
+        source: RunError,
     },
     /// A point of the campaign that the nominal model cannot hold.
     #[error(transparent)]

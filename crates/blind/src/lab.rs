@@ -2,56 +2,35 @@
 
 use crate::case::Case;
 use crate::error::BlindError;
+use crate::keep::{ToFile, ToMemory};
+use crate::steps::{StepsOfCase, steps_of_case};
 use crate::truth::Truth;
-use crate::truth::TruthPoint;
 use mapper_backends::virtual_lab::{
     ActuatorDynamics, LabSettings, SensorErrors, Start, VirtualLab, Weather, draw_tolerances,
 };
 use mapper_campaign::Campaign;
-use mapper_core::{
-    Backend, Channel, NoiseColour, OperatingPoint, Recording, RigMode, SampleBatch, Setpoints, StepKind,
-    StepMarker,
-};
+use mapper_core::{Channel, NoiseColour, PlanStep, Recording, UnpacedClock};
 use mapper_physics::effect::{self, Rig};
 use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::steady;
-use mapper_record::{RecordingHeader, RecordingWriter, StepPhase};
+use mapper_record::{RecordingHeader, RecordingWriter};
+use mapper_runner::{RunObserver, Runner};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// What all cases of a campaign share: its points with the P3 that the nominal model needs for them.
 pub(crate) struct Schedule<'a> {
     campaign: &'a Campaign,
     nominal: &'a Model,
-    points: Vec<(OperatingPoint, Setpoints)>,
+    steps: Vec<PlanStep>,
 }
 
 impl<'a> Schedule<'a> {
     /// The points in the campaign's own order, P3 commanded open loop.
     pub(crate) fn new(campaign: &'a Campaign, nominal: &'a Model) -> Result<Self, BlindError> {
-        let points = campaign
-            .points
-            .iter()
-            .map(|point| {
-                let boundary = BoundaryConditions {
-                    valve_opening_ratio: point.valve_opening_ratio,
-                    ..campaign.boundary
-                };
-                let held = steady::hold_speed(nominal, point.speed_rpm, &boundary)?;
-                let setpoints = Setpoints {
-                    mode: RigMode::Running,
-                    p3_pa: held.boundary.p3_pa,
-                    t3_k: boundary.t3_k,
-                    valve_opening_ratio: point.valve_opening_ratio,
-                    oil_temperature_k: boundary.oil_temperature_k,
-                };
-                Ok((*point, setpoints))
-            })
-            .collect::<Result<_, BlindError>>()?;
-        Ok(Schedule { campaign, nominal, points })
+        Ok(Schedule { campaign, nominal, steps: steps_of_case(campaign, nominal)? })
     }
 
     /// The lab of a case: nominal machine, drawn tolerances, then the causes.
@@ -112,10 +91,9 @@ impl<'a> Schedule<'a> {
         file: &Path,
         header: &RecordingHeader,
     ) -> Result<Truth, BlindError> {
-        let mut writer = RecordingWriter::create(file, header)?;
-        let points = self.drive(case, &mut writer)?;
-        writer.finish()?;
-        Ok(Truth::new(case, points))
+        let mut kept = ToFile::new(RecordingWriter::create(file, header)?);
+        self.drive(case, &mut kept)?;
+        Ok(Truth::new(case, kept.finish()?))
     }
 
     /// Runs a case into memory.
@@ -123,94 +101,22 @@ impl<'a> Schedule<'a> {
     /// # Errors
     /// Where the lab stops.
     pub(crate) fn record(&self, case: &Case) -> Result<Recording, BlindError> {
-        let mut recording = Recording::default();
-        self.drive(case, &mut recording)?;
-        Ok(recording)
+        let mut kept = ToMemory::default();
+        self.drive(case, &mut kept)?;
+        Ok(kept.recording)
     }
 
-    fn drive(&self, case: &Case, keeper: &mut impl Keeper) -> Result<Vec<TruthPoint>, BlindError> {
-        let of_lab = |source| BlindError::Lab { name: case.name.clone(), source };
-        let mut lab = self.lab(case)?;
-        lab.arm().map_err(of_lab)?;
-        let timing = &self.campaign.timing;
-        let mut truths = Vec::with_capacity(self.points.len());
-        let mut now_s = 0.0;
-        let mut before: Option<OperatingPoint> = None;
-        for (index, (point, setpoints)) in self.points.iter().enumerate() {
-            lab.set(setpoints).map_err(of_lab)?;
-            if index == 0 && timing.warm_up_s > 0.0 {
-                now_s += timing.warm_up_s;
-                let mut batch = lab.poll(now_s).map_err(of_lab)?;
-                batch.truth.clear();
-                keeper.batch(&batch)?;
-            }
-            let step = StepMarker {
-                index,
-                kind: StepKind::Point,
-                start_s: now_s,
-                end_s: now_s + timing.dwell_s,
-                from: before.replace(*point),
-                to: Some(*point),
-                p3_pa: setpoints.p3_pa,
-                valve_opening_ratio: setpoints.valve_opening_ratio,
-            };
-            keeper.step(&step, StepPhase::Start)?;
-            now_s = step.end_s;
-            let mut batch = lab.poll(now_s).map_err(of_lab)?;
-            truths.push(truth_at_end(&batch, point));
-            // Truth is what the answers hold; a recording that is to be diagnosed has none.
-            batch.truth.clear();
-            keeper.batch(&batch)?;
-            keeper.step(&step, StepPhase::End)?;
-        }
-        lab.disarm().map_err(of_lab)?;
-        Ok(truths)
-    }
-}
-
-/// Where a run goes.
-trait Keeper {
-    fn batch(&mut self, batch: &SampleBatch) -> Result<(), BlindError>;
-    fn step(&mut self, step: &StepMarker, phase: StepPhase) -> Result<(), BlindError>;
-}
-
-impl Keeper for RecordingWriter {
-    fn batch(&mut self, batch: &SampleBatch) -> Result<(), BlindError> {
-        Ok(self.write_batch(batch)?)
-    }
-
-    fn step(&mut self, step: &StepMarker, phase: StepPhase) -> Result<(), BlindError> {
-        Ok(self.write_step(step, phase)?)
-    }
-}
-
-impl Keeper for Recording {
-    fn batch(&mut self, batch: &SampleBatch) -> Result<(), BlindError> {
-        for column in &batch.columns {
-            let series = self.series.entry(column.channel).or_default();
-            series.t_s.extend(&batch.t_s);
-            series.values.extend(&column.values);
-        }
-        Ok(())
-    }
-
-    fn step(&mut self, step: &StepMarker, phase: StepPhase) -> Result<(), BlindError> {
-        if phase == StepPhase::End {
-            self.steps.push(*step);
-        }
-        Ok(())
-    }
-}
-
-fn truth_at_end(batch: &SampleBatch, point: &OperatingPoint) -> TruthPoint {
-    let last = |name: &str| {
-        let column = batch.truth.iter().find(|column| column.name == name);
-        column.and_then(|column| column.values.last().copied()).unwrap_or(f64::NAN)
-    };
-    TruthPoint {
-        valve: point.valve_opening_ratio,
-        speed_rpm: last("speed_rpm"),
-        eta: last("eta"),
-        h: last("h_w_m2k"),
+    /// The runner of every campaign, without guards: nothing that is drawn endangers a virtual machine.
+    fn drive(&self, case: &Case, observer: &mut dyn RunObserver) -> Result<(), BlindError> {
+        let runner = Runner {
+            steps: &mut StepsOfCase::new(&self.steps, self.campaign.timing.warm_up_s),
+            backend: &mut self.lab(case)?,
+            clock: &mut UnpacedClock,
+            guards: Vec::new(),
+            observer,
+            stop: &AtomicBool::new(false),
+        };
+        let of_case = |source| BlindError::Run { name: case.name.clone(), source };
+        runner.run().map(|_| ()).map_err(of_case)
     }
 }

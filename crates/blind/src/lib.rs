@@ -11,6 +11,7 @@ mod cause;
 mod error;
 mod interval;
 mod kind;
+mod keep;
 mod lab;
 mod logistic;
 mod make;
@@ -18,6 +19,7 @@ mod outside;
 mod ruler;
 pub mod score;
 mod seal;
+mod steps;
 mod strength;
 mod truth;
 

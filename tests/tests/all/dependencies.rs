@@ -30,7 +30,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-formats",   &["core", "numerics", "physics", "chart"]),
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
-    ("mapper-blind",     &["core", "numerics", "physics", "campaign", "record", "observe", "gap", "backends", "effects"]),
+    ("mapper-blind",     &["core", "numerics", "physics", "campaign", "runner", "record", "observe", "gap", "backends", "effects"]),
     // Words, pages and pictures made from data.
     ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "assemble", "gap", "drift", "history", "record", "reproduce", "sequence"]),
     // The application: everything between arguments and words. Plug-ins are handed in.

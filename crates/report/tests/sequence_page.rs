@@ -5,8 +5,5 @@
 fn the_documentation_is_what_the_functions_say() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/sequences.md");
     let written = std::fs::read_to_string(path).unwrap();
-    assert!(
-        written == mapper_report::sequence_page(),
-        "docs/sequences.md is stale: run `cargo xtask docs`"
-    );
+    assert!(written == mapper_report::sequence_page(), "docs/sequences.md is stale: run `cargo xtask docs`");
 }

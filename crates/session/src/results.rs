@@ -8,9 +8,9 @@ use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble, r
 use mapper_campaign::Campaign;
 use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Plan, ThermalModel};
 use mapper_identify::ZeroOutcome;
+use mapper_record::score::{ScoreSummary, ScoredPoint};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::{RunReport, run_report};
-use mapper_record::score::{ScoreSummary, ScoredPoint};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeMap;

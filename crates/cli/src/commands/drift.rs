@@ -47,7 +47,8 @@ impl Drift {
         let registry = registry::registry();
         let drift = Session::new(&registry).drift(&recorded, campaign, &map)?;
         if let Some(path) = &self.corrected {
-            let corrected = corrected_csv(&drift.report).map_err(|error| Failure::new(Code::Failure, error))?;
+            let corrected =
+                corrected_csv(&drift.report).map_err(|error| Failure::new(Code::Failure, error))?;
             write_new(path, &corrected)?;
         }
         let warnings = recorded.iter().flat_map(|recorded| &recorded.read.warnings);

@@ -17,6 +17,12 @@ pub const SHORT_GRID: &[(&str, &str)] = &[
     ("seed: 1 ", "repeats: off\nseed: 1 "),
 ];
 
+/// The two-parameter method of the paper, each step by itself, and no rest before the run.
+pub const BY_ITSELF: &[(&str, &str)] = &[
+    ("zero: {soak: 30 min, evenness: 0.03 K, pressure_evenness: 3 Pa}\n", ""),
+    ("method: joint ", "method: dynamic "),
+];
+
 /// A campaign file in a directory of its own.
 #[derive(Debug)]
 pub struct CampaignFile {

@@ -8,7 +8,7 @@ mod program;
 mod python;
 pub mod tree;
 
-pub use campaign::{CampaignFile, SHIPPED, SHORT_GRID};
+pub use campaign::{BY_ITSELF, CampaignFile, SHIPPED, SHORT_GRID};
 pub use drift_campaign::DriftCampaign;
 pub use program::{Finished, mapper, mapper_command, mapper_in};
 pub use python::python;

@@ -17,11 +17,10 @@ pub enum Mode {
 }
 
 /// What is generated below docs: files, and folders with all that is in them.
-const GENERATED: &[&str] = &["methods.md", "reproduction.md", "reproduction", "sequences.md", "turbo_a.svg"];
+const GENERATED: &[&str] = &["reproduction.md", "reproduction", "sequences.md", "turbo_a.svg"];
 
-/// Methods of mapping, and the campaigns that map one grid by them.
-const METHODS: &[(&str, &str)] =
-    &[("dynamic", "turbo_a"), ("conventional", "turbo_a_conventional"), ("adiabatic", "turbo_a_adiabatic")];
+/// The README's picture is the map of this campaign.
+const SHIPPED: &str = "campaigns/turbo_a.yaml";
 
 /// Writes or checks everything that is generated.
 pub fn docs(mode: Mode) -> Result<(), Error> {
@@ -36,28 +35,15 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
     let page = output(command(&programs.sequence_docs, &[]))? + "\n";
     write(&made.join("sequences.md"), page.as_bytes())?;
 
-    // The README's picture is the map of the shipped campaign; the other campaigns map the same grid by other methods.
     let runs = workspace::target_dir().join("xtask-docs-runs");
     if runs.exists() {
         fs::remove_dir_all(&runs).map_err(at(&runs))?;
     }
-    let mut methods: Vec<String> = Vec::new();
-    for (name, campaign) in METHODS {
-        let out = runs.join(campaign);
-        let file = format!("campaigns/{campaign}.yaml");
-        run(command(&programs.mapper, &["run", &file, "--out", &out.to_string_lossy()]))?;
-        for run in fs::read_dir(&out).map_err(at(&out))? {
-            let run = run.map_err(at(&out))?.path();
-            methods.extend([(*name).to_owned(), run.to_string_lossy().into_owned()]);
-            if *campaign == "turbo_a" {
-                let map = run.join("map.svg");
-                write(&made.join("turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
-            }
-        }
+    run(command(&programs.mapper, &["run", SHIPPED, "--out", &runs.to_string_lossy()]))?;
+    for run in fs::read_dir(&runs).map_err(at(&runs))? {
+        let map = run.map_err(at(&runs))?.path().join("map.svg");
+        write(&made.join("turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
     }
-    let methods: Vec<&str> = methods.iter().map(String::as_str).collect();
-    let page = output(command(&programs.methods_table, &methods))? + "\n";
-    write(&made.join("methods.md"), page.as_bytes())?;
 
     let (new, old) = (contents(&made)?, contents(&docs)?);
     let names: BTreeSet<&PathBuf> = new.keys().chain(old.keys()).collect();
@@ -92,7 +78,6 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
 struct Programs {
     mapper: PathBuf,
     sequence_docs: PathBuf,
-    methods_table: PathBuf,
 }
 
 /// Builds them as the tests are built: what is computed is the same to the bit in every profile, and a clone that is
@@ -100,15 +85,11 @@ struct Programs {
 fn build() -> Result<Programs, Error> {
     // The whole workspace is named so that libraries have the features that they have in the tests.
     let arguments = ["build", "--quiet", "--workspace", "--tests", "--bin", "mapper"];
-    let examples = ["--example", "sequence_docs", "--example", "methods_table"];
+    let examples = ["--example", "sequence_docs"];
     run(command(workspace::cargo(), &[&arguments[..], &examples].concat()))?;
     let built = workspace::target_dir().join("debug");
     let program = |name: &str| built.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
-    Ok(Programs {
-        mapper: program("mapper"),
-        sequence_docs: program("examples/sequence_docs"),
-        methods_table: program("examples/methods_table"),
-    })
+    Ok(Programs { mapper: program("mapper"), sequence_docs: program("examples/sequence_docs") })
 }
 
 fn write(path: &Path, content: &[u8]) -> Result<(), Error> {

@@ -571,7 +571,9 @@ fn a_table_is_read_with_its_reference_state_and_its_points_are_judged() {
         "map: {file: maps/there.csv, reference: {temperature: 20 degC, pressure: 1 bar}}",
     );
     let campaign = run(&text).unwrap_or_else(|findings| panic!("{findings}"));
-    let MapSource::Table { path, text: table, reference } = &campaign.machine.map else { panic!("a table") };
+    let MapSource::Table { path, text: table, reference, .. } = &campaign.machine.map else {
+        panic!("a table")
+    };
     assert_eq!((path.as_path(), table.as_str()), (Path::new("dir/maps/there.csv"), TABLE));
     assert_eq!((reference.t_ref_k, reference.p_ref_pa), (293.15, 100_000.0));
     let findings = mistakes(&text.replace("max: 500 kPa", "max: 115 kPa"));

@@ -18,6 +18,8 @@ const ENTERING: [Channel; 6] =
 pub(crate) struct DeclaredEffect {
     /// Standard errors of eta and h from fixed offsets and gains.
     pub(crate) bias_standard_errors: [f64; 2],
+    /// What the assumed alpha_A may cost eta and h, one standard deviation.
+    pub(crate) assumed_alpha: [f64; 2],
     /// Variance of (measured less fitted T2) from sample noise, K2.
     pub(crate) noise_k2: f64,
 }
@@ -47,6 +49,18 @@ pub(crate) fn declared_effect(
         effect.noise_k2 += mean_square * declared.noise_sigma * declared.noise_sigma;
     }
     effect.bias_standard_errors = squares.map(f64::sqrt);
+    if config.alpha_area_sigma_ratio > 0.0 {
+        // As if T2 had been measured off by what the other alpha_A makes of it.
+        let fitted_k = |row: Row, by: f64| {
+            let geometry = Geometry { alpha_area_ratio: geometry.alpha_area_ratio + by, ..geometry };
+            t2_k(geometry, row, fit.eta, fit.h_w_m2k)
+        };
+        // Towards the middle, so that the share stays one.
+        let away = if geometry.alpha_area_ratio > 0.5 { -1.0 } else { 1.0 };
+        let sigma = away * config.alpha_area_sigma_ratio;
+        let moved_k = rows(samples).map(|row| fitted_k(row, sigma) - fitted_k(row, 0.0));
+        effect.assumed_alpha = fit.response(moved_k);
+    }
     effect
 }
 

@@ -17,6 +17,9 @@ pub struct IdentifyConfig {
     pub settle_bands: SettleBands,
     /// Assumed share of the internal area before compression, alpha_A, 0..1.
     pub alpha_area_ratio: f64,
+    /// How far the true share may be off the assumed one, one standard deviation: part of the intervals of the dynamic
+    /// method, which cannot find it. 0 believes the assumption.
+    pub alpha_area_sigma_ratio: f64,
     /// Internal area of the compressor housing A_c, m2, > 0.
     pub internal_area_m2: f64,
     /// Diameter of the outlet pipe, m, > 0: characteristic length of the convection law, and where the T2 probe stands.
@@ -47,6 +50,7 @@ impl Default for IdentifyConfig {
             window: WindowRule::default(),
             settle_bands: SettleBands::default(),
             alpha_area_ratio: 0.0,
+            alpha_area_sigma_ratio: 0.0,
             internal_area_m2: 29e-3,
             outlet_diameter_m: 35e-3,
             probe_diameter_m: 0.0,

@@ -97,6 +97,7 @@ pub(crate) fn estimate(
     estimate.h_w_m2k = Some((fit.h_w_m2k, Some(h)));
     let view = View { fit: &fit, samples: &samples, config, noise_k: declared.noise_k2.sqrt() };
     judge_gradient(&view, sensors.combined_standard_error(), estimate.dt2_k, findings);
+    judge_assumption(declared.assumed_alpha[0], config, findings);
     judge_flow(drift, config, findings);
     judge_residual(&view, estimate.dt2_k, findings);
     estimate
@@ -171,7 +172,8 @@ fn uncertainties(
     // A short residual may look quieter than the sensors are.
     let expected =
         correlation.standard_errors_for(NoiseVariances::split(declared.noise_k2, config.noise_colour));
-    let assumed = drift.map_or([0.0; 2], |drift| [drift.eta, drift.h_w_m2k]);
+    let moving = drift.map_or([0.0; 2], |drift| [drift.eta, drift.h_w_m2k]);
+    let assumed = [0, 1].map(|i| moving[i].hypot(declared.assumed_alpha[i]));
     [0, 1].map(|i| EstimateUncertainty {
         noise_standard_error: found[i].max(expected[i]),
         bias_standard_error: declared.bias_standard_errors[i].hypot(assumed[i]),
@@ -203,6 +205,20 @@ fn judge_gradient(view: &View<'_>, sigma_eta: f64, dt2_k: Option<f64>, findings:
     } else {
         findings.doubt(code::SMALL_GRADIENT, message);
     }
+}
+
+/// Whether the assumed alpha_A is known well enough. `off_eta`: what it may cost, one standard deviation.
+fn judge_assumption(off_eta: f64, config: &IdentifyConfig, findings: &mut Findings) {
+    if off_eta.abs() <= config.thresholds.sigma_eta {
+        return;
+    }
+    let message = format!(
+        "alpha_A is assumed to be {} within {} (1 sigma), which leaves eta uncertain by {:.1} points; `joint` finds it",
+        config.alpha_area_ratio,
+        config.alpha_area_sigma_ratio,
+        100.0 * off_eta.abs()
+    );
+    findings.doubt(code::ASSUMED_ALPHA, message);
 }
 
 /// Whether the flow held still enough for a constant h.

@@ -36,6 +36,8 @@ pub mod code {
     pub const NOTHING_DECLARED: &str = "nothing_declared";
     /// A noisy channel stood still.
     pub const STUCK: &str = "stuck";
+    /// The efficiency rests on an alpha_A that is not known well enough (dynamic method).
+    pub const ASSUMED_ALPHA: &str = "assumed_alpha";
     /// The step has no say in what the points share (joint method).
     pub const LEFT_OUT: &str = "left_out";
     /// The point's h is far off the law of the others (joint method).

@@ -3,6 +3,7 @@
 use crate::dynamic::Estimate;
 use crate::end_state::{EndState, end_state};
 use crate::findings::Findings;
+use crate::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, dynamic, joint, steady};
 use mapper_core::{
     Channel, EstimateUncertainty, IdentifiedPoint, Method, Recording, StepMarker, ThermalModel, WindowRule,
@@ -43,6 +44,8 @@ pub struct Identified {
     pub points: Vec<Result<IdentifiedPoint, StepError>>,
     /// What the points share; `None` where the method finds nothing of the kind.
     pub thermal: Option<ThermalModel>,
+    /// What the two-parameter method makes of the same steps, where it makes anything of them and was not the one asked for.
+    pub two_parameter: Vec<TwoParameter>,
 }
 
 /// As [`identify_each`], with what the points share (joint method alone).
@@ -85,13 +88,14 @@ pub fn identify_recording(
             end_state(recording, step, config, findings)
         })
         .collect();
-    let mut thermal = None;
+    let (mut thermal, mut two_parameter) = (None, Vec::new());
     let estimates: Vec<Estimate> = match config.method {
         Method::Joint => {
             let known: Vec<Option<EndState>> =
                 states.iter().map(|state| state.as_ref().ok().copied()).collect();
             let joint = joint::estimate(recording, &known, config, &mut findings);
             thermal = joint.thermal;
+            two_parameter = joint.two_parameter;
             joint.estimates
         }
         method => findings
@@ -112,7 +116,7 @@ pub fn identify_recording(
         .zip(findings)
         .map(|(((step, state), estimate), findings)| Ok(point(step, &state?, &estimate, findings, config)))
         .collect();
-    Ok(Identified { points, thermal })
+    Ok(Identified { points, thermal, two_parameter })
 }
 
 pub(crate) fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {
@@ -121,6 +125,12 @@ pub(crate) fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {
             "alpha_area_ratio",
             config.alpha_area_ratio,
             (0.0..=1.0).contains(&config.alpha_area_ratio),
+            "a share from 0 to 1",
+        ),
+        (
+            "alpha_area_sigma_ratio",
+            config.alpha_area_sigma_ratio,
+            (0.0..=1.0).contains(&config.alpha_area_sigma_ratio),
             "a share from 0 to 1",
         ),
         (

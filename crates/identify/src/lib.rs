@@ -23,6 +23,7 @@ mod one_fit;
 mod samples;
 mod steady;
 mod taps;
+mod two_parameter;
 mod window;
 mod zero;
 mod zero_outcome;
@@ -38,5 +39,6 @@ pub use mapper_core::{
 };
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
+pub use two_parameter::TwoParameter;
 pub use zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};
 pub use zero_outcome::ZeroOutcome;

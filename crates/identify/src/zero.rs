@@ -6,7 +6,7 @@
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
-use mapper_core::{Channel, DeclaredUncertainty, Recording, Series};
+use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, Soak, StepMarker};
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::mean;
 use mapper_observe::plausible::is_reading;
@@ -30,14 +30,26 @@ pub struct ZeroSettings {
 }
 
 impl Default for ZeroSettings {
-    /// Even to 0.05 K and 5 Pa, recognised from the last minute to ten minutes that drift by less than 0.1 K/min.
+    /// Even as a soak is if nothing is declared, recognised from the last minute to ten minutes that drift by less than
+    /// 0.1 K/min.
     fn default() -> Self {
         ZeroSettings {
-            temperature_sigma_k: 0.05,
-            pressure_sigma_pa: 5.0,
+            temperature_sigma_k: Soak::TEMPERATURE_SIGMA_K,
+            pressure_sigma_pa: Soak::PRESSURE_SIGMA_PA,
             longest_s: 600.0,
             shortest_s: 60.0,
             drift_k_min: 0.1,
+        }
+    }
+}
+
+impl From<Soak> for ZeroSettings {
+    /// Even as declared.
+    fn from(soak: Soak) -> Self {
+        ZeroSettings {
+            temperature_sigma_k: soak.temperature_sigma_k,
+            pressure_sigma_pa: soak.pressure_sigma_pa,
+            ..ZeroSettings::default()
         }
     }
 }
@@ -179,9 +191,15 @@ pub fn zeroed(
     (recording, config)
 }
 
-/// The last stretch before the first step in which the shaft rests.
+/// The last stretch in which the shaft rests before the first step that leaves it running: where steps were found in the
+/// readings, the soak may count as one.
 fn at_rest(recording: &Recording) -> (f64, f64) {
-    let first_s = recording.steps.first().map_or(f64::INFINITY, |step| step.start_s);
+    let runs = |step: &&StepMarker| {
+        let speed = recording.series.get(&Channel::ShaftSpeed);
+        let last = speed.and_then(|speed| speed.slice(step.start_s, step.end_s).1.last());
+        last.is_none_or(|speed_rpm| speed_rpm.abs() >= AT_REST_RPM)
+    };
+    let first_s = recording.steps.iter().find(runs).map_or(f64::INFINITY, |step| step.start_s);
     let Some(speed) = recording.series.get(&Channel::ShaftSpeed) else { return (0.0, 0.0) };
     let before = speed.t_s.partition_point(|t| *t < first_s);
     let rests = |i: usize| speed.values.get(i).is_some_and(|value| value.abs() < AT_REST_RPM);

@@ -2,7 +2,7 @@
 
 use crate::IdentifyConfig;
 use crate::zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};
-use mapper_core::Recording;
+use mapper_core::{Recording, Soak};
 use serde::{Serialize, Serializer};
 
 /// Whether offsets were taken off a recording.
@@ -18,12 +18,10 @@ pub enum ZeroOutcome {
 }
 
 impl ZeroOutcome {
-    /// Looks for the zero of a recording where one is asked for.
-    pub fn of(recording: &Recording, config: &IdentifyConfig, asked: bool) -> Self {
-        if !asked {
-            return ZeroOutcome::NotAsked;
-        }
-        isothermal_zero(recording, config, &ZeroSettings::default())
+    /// Looks for the zero of a recording where a soak was asked for.
+    pub fn of(recording: &Recording, config: &IdentifyConfig, soak: Option<Soak>) -> Self {
+        let Some(soak) = soak else { return ZeroOutcome::NotAsked };
+        isothermal_zero(recording, config, &ZeroSettings::from(soak))
             .map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
     }
 

@@ -3,7 +3,7 @@
 use crate::effect::Effect;
 use crate::model::Model;
 use crate::params::BoundaryConditions;
-use mapper_core::{Channel, DeclaredUncertainty, ModelTolerances};
+use mapper_core::{Channel, DeclaredUncertainty, ModelTolerances, Soak};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -22,6 +22,8 @@ pub struct NominalRig {
     pub static_tap_pipe_diameters_m: BTreeMap<Channel, f64>,
     /// Declared tolerances of the model.
     pub tolerances: ModelTolerances,
+    /// The rest before the run as declared, where there is one.
+    pub soak: Option<Soak>,
     /// Effects that a simulated machine may be given by their ids.
     pub effects: Vec<Arc<dyn Effect>>,
     /// Seed of all noise and of all that is drawn.

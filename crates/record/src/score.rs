@@ -6,7 +6,7 @@ pub use crate::truth::{Truth, read_truth};
 
 use crate::RecordError;
 use mapper_core::{IdentifiedPoint, StepMarker};
-use mapper_numerics::statistics::median;
+use mapper_numerics::statistics::{mean, median};
 use serde::Serialize;
 use std::path::Path;
 
@@ -42,6 +42,8 @@ pub struct ScoreSummary {
     pub eta_worst_error: f64,
     /// Share of the points whose 95 % interval of the efficiency holds the truth, ratio.
     pub eta_coverage_ratio: f64,
+    /// Share of the points with an h whose 95 % interval of it holds the truth, ratio; `None` where no point has one.
+    pub h_coverage_ratio: Option<f64>,
     /// Median absolute relative error of h; `None` where no point has h.
     pub h_median_error_ratio: Option<f64>,
     /// Largest absolute relative error of h; `None` where no point has h.
@@ -80,6 +82,7 @@ pub fn summarise(points: &[ScoredPoint]) -> Option<ScoreSummary> {
     let mut eta_errors = Vec::new();
     let mut h_errors = Vec::new();
     let mut covered = 0;
+    let mut h_covered = Vec::new();
     for ScoredPoint { point, truth } in points {
         let (Some(eta), Some(truth)) = (point.eta, truth) else { continue };
         eta_errors.push((eta - truth.eta).abs());
@@ -88,6 +91,9 @@ pub fn summarise(points: &[ScoredPoint]) -> Option<ScoreSummary> {
         }
         if let Some(h_w_m2k) = point.h_w_m2k {
             h_errors.push((h_w_m2k / truth.h_w_m2k - 1.0).abs());
+            if let (Some(low), Some(high)) = (point.h_low_w_m2k, point.h_high_w_m2k) {
+                h_covered.push(f64::from(u8::from((low..=high).contains(&truth.h_w_m2k))));
+            }
         }
     }
     let count = eta_errors.len();
@@ -98,6 +104,7 @@ pub fn summarise(points: &[ScoredPoint]) -> Option<ScoreSummary> {
         eta_within_one_point_ratio: share(eta_errors.iter().filter(|error| **error <= 0.01).count()),
         eta_worst_error: eta_errors.iter().copied().fold(0.0, f64::max),
         eta_coverage_ratio: share(covered),
+        h_coverage_ratio: mean(&h_covered),
         h_median_error_ratio: median(&h_errors),
         h_worst_error_ratio: h_errors.iter().copied().reduce(f64::max),
     })

@@ -7,7 +7,9 @@
 
 mod comparison_text;
 mod corrected_points;
+mod disagreement;
 mod display;
+mod doubts;
 mod drift_text;
 mod duration;
 mod gap_page;
@@ -37,6 +39,7 @@ mod zero_text;
 
 pub use comparison_text::{comparison_json, comparison_text};
 pub use corrected_points::corrected_csv;
+pub use disagreement::disagreement_text;
 pub use display::Display;
 pub use drift_text::drift_text;
 pub use duration::duration;

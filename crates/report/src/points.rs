@@ -1,6 +1,7 @@
 //! Identified points, their doubts, and how far they are from the truth.
 
 use crate::display::Display;
+use crate::doubts::doubts;
 use crate::number::{number, percent};
 use crate::table;
 use mapper_campaign::campaign::DisplayUnits;
@@ -11,10 +12,9 @@ use std::fmt::Write;
 /// Identified points as a table, their doubts below, and how far they are from the truth where it is known.
 pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits) -> String {
     let mut text = format!("{}\n\n", points_table(points, units));
-    for ScoredPoint { point, .. } in points.iter().filter(|scored| scored.point.verdict != Verdict::Good) {
-        for warning in &point.warnings {
-            let _ = writeln!(text, "step {}: {}", point.step + 1, warning.message);
-        }
+    let doubted = points.iter().map(|scored| &scored.point).filter(|point| point.verdict != Verdict::Good);
+    for doubt in doubts(doubted) {
+        let _ = writeln!(text, "{}: {}", doubt.steps(), doubt.message);
     }
     let count = |verdict| points.iter().filter(|scored| scored.point.verdict == verdict).count();
     let _ = writeln!(
@@ -45,9 +45,12 @@ pub fn score_text(score: &ScoreSummary) -> String {
     if let (Some(median), Some(worst)) = (score.h_median_error_ratio, score.h_worst_error_ratio) {
         let _ = writeln!(
             text,
-            "Median error of the heat-transfer coefficient {:.1} %, {:.1} % at worst.",
+            "Median error of the heat-transfer coefficient {:.1} %, {:.1} % at worst; its 95 % interval contains the truth at {}.",
             100.0 * median,
-            100.0 * worst
+            100.0 * worst,
+            score
+                .h_coverage_ratio
+                .map_or_else(|| "no point".to_owned(), |ratio| format!("{:.0} %", 100.0 * ratio)),
         );
     }
     text

@@ -1,6 +1,8 @@
 //! The test report of a run, as Markdown.
 
+use crate::disagreement::disagreement_text;
 use crate::display::Display;
+use crate::doubts::doubts;
 use crate::duration::duration;
 use crate::markdown::{self, Align};
 use crate::number::{number, percent};
@@ -9,6 +11,7 @@ use crate::repeated_jumps::repeated_jumps_text;
 use mapper_assemble::RepeatedJump;
 use mapper_campaign::Campaign;
 use mapper_core::{Event, Plan};
+use mapper_identify::TwoParameter;
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 use std::fmt::Write;
 
@@ -26,6 +29,8 @@ pub struct RunReport<'a> {
     pub points: &'a [ScoredPoint],
     /// Jumps that were made more than once.
     pub repeats: &'a [RepeatedJump],
+    /// What the two-parameter method makes of the same steps, where another method was used.
+    pub two_parameter: &'a [TwoParameter],
     /// How far the points are from the simulator's truth; `None` on a real rig.
     pub score: Option<&'a ScoreSummary>,
     /// Whether a picture of the map stands beside the report as `map.svg`.
@@ -34,9 +39,13 @@ pub struct RunReport<'a> {
 
 /// The report as Markdown.
 pub fn run_report(report: &RunReport<'_>) -> String {
-    let RunReport { campaign, plan, outcome, events, points, repeats, score, has_picture } = *report;
+    let RunReport { campaign, plan, outcome, events, points, repeats, two_parameter, score, has_picture } =
+        *report;
     // Writing to a String cannot fail, here and below.
     let mut text = format!("# Compressor map of {}\n\n", campaign.machine.name);
+    if let Some(disagreement) = disagreement_text(points, two_parameter, &campaign.display) {
+        let _ = writeln!(text, "**{}**\n", disagreement.trim_end());
+    }
     let _ = writeln!(text, "{outcome}\n");
     if has_picture {
         text.push_str("![map](map.svg)\n\n");
@@ -155,14 +164,11 @@ fn points_section(text: &mut String, campaign: &Campaign, points: &[ScoredPoint]
         .collect();
     text.push_str(&markdown::table(&heads, Align::Left, &rows));
     text.push_str("\n## Doubts and remarks\n\n");
-    let mut none = true;
-    for ScoredPoint { point, .. } in points {
-        for warning in &point.warnings {
-            none = false;
-            let _ = writeln!(text, "- step {} ({}): {}", point.step + 1, warning.code, warning.message);
-        }
+    let doubts = doubts(points.iter().map(|scored| &scored.point));
+    for doubt in &doubts {
+        let _ = writeln!(text, "- {} ({}): {}", doubt.steps(), doubt.code, doubt.message);
     }
-    if none {
+    if doubts.is_empty() {
         text.push_str("None.\n");
     }
 }

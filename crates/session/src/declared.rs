@@ -22,6 +22,7 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         window: chosen.window,
         settle_bands: chosen.settle_bands,
         alpha_area_ratio: chosen.alpha_area_ratio,
+        alpha_area_sigma_ratio: chosen.alpha_area_sigma_ratio,
         outlet_diameter_m: campaign.machine.params.compressor.outlet_diameter_m,
         probe_diameter_m: campaign.machine.params.t2_probe_diameter_m,
         joint: chosen.joint,

@@ -67,7 +67,7 @@ fn zeroed_alike(
     campaign: &Campaign,
 ) -> (Vec<Recording>, IdentifyConfig, ZeroOutcome) {
     let zero = recorded.first().map_or(ZeroOutcome::NotAsked, |first| {
-        ZeroOutcome::of(&first.read.recording, &config, campaign.zero.is_some())
+        ZeroOutcome::of(&first.read.recording, &config, campaign.zero)
     });
     let off = |recorded: &Recorded| zero.take_off(recorded.read.recording.clone(), config.clone()).0;
     let recordings = recorded.iter().map(off).collect();

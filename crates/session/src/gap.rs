@@ -50,7 +50,7 @@ impl Session<'_> {
         let recording = taken_off(recorded.read.recording.clone(), drift.as_ref());
         let config = identification_with(campaign, map);
         // A zero leaves less of the offsets.
-        let zero = ZeroOutcome::of(&recording, &config, campaign.zero.is_some());
+        let zero = ZeroOutcome::of(&recording, &config, campaign.zero);
         let (recording, zeroed) = zero.take_off(recording, config);
         let declared = Declared {
             sensors: zeroed.declared,

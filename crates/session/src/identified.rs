@@ -4,7 +4,7 @@ use crate::declared::identification_with;
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_core::{IdentifiedPoint, Method, Recording, ReferenceState, ThermalModel};
-use mapper_identify::{IdentifyConfig, WindowRule, ZeroOutcome, identify_recording};
+use mapper_identify::{IdentifyConfig, TwoParameter, WindowRule, ZeroOutcome, identify_recording};
 use mapper_record::ChannelMap;
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 
@@ -19,6 +19,8 @@ pub struct Identified {
     pub points: Vec<ScoredPoint>,
     /// What the points share (joint method).
     pub thermal: Option<ThermalModel>,
+    /// What the two-parameter method makes of the same steps (joint method).
+    pub two_parameter: Vec<TwoParameter>,
     /// What came of the zero.
     pub zero: ZeroOutcome,
     /// How far the points are from the truth; `None` on a real rig.
@@ -51,6 +53,7 @@ impl Session<'_> {
         let mut config = match (&recorded.campaign, &map.machine) {
             (Some(campaign), _) => identification_with(campaign, map),
             (None, Some(machine)) => IdentifyConfig {
+                method: Method::Joint,
                 alpha_area_ratio: machine.alpha_area_ratio,
                 internal_area_m2: machine.compressor_internal_area_m2,
                 reference: map.reference.unwrap_or(ReferenceState::SAE),
@@ -69,8 +72,8 @@ impl Session<'_> {
             }
         };
         config.method = method.unwrap_or(config.method);
-        let zero_asked = recorded.campaign.as_ref().is_some_and(|campaign| campaign.zero.is_some());
-        let zero = ZeroOutcome::of(&recorded.read.recording, &config, zero_asked);
+        let soak = recorded.campaign.as_ref().and_then(|campaign| campaign.zero);
+        let zero = ZeroOutcome::of(&recorded.read.recording, &config, soak);
         let (recording, config) = zero.take_off(recorded.read.recording, config);
         let found = identify_recording(&recording, &config)?;
         let points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
@@ -79,6 +82,14 @@ impl Session<'_> {
         }
         let points = mapper_record::score::score(&recorded.path, &recording.steps, points)?;
         let score = mapper_record::score::summarise(&points);
-        Ok(Identified { recording, config, points, thermal: found.thermal, zero, score })
+        Ok(Identified {
+            recording,
+            config,
+            points,
+            thermal: found.thermal,
+            two_parameter: found.two_parameter,
+            zero,
+            score,
+        })
     }
 }

@@ -84,6 +84,7 @@ fn nominal_rig(campaign: &Campaign, model: &Model, effects: &[Arc<dyn Effect>]) 
             .filter_map(|(channel, sensor)| Some((*channel, sensor.static_tap_pipe_diameter_m?)))
             .collect(),
         tolerances: campaign.tolerances,
+        soak: campaign.zero,
         effects: effects.to_vec(),
         seed: campaign.seed,
     }

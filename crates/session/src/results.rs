@@ -7,7 +7,7 @@ use crate::{Registry, Session, SessionError, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble, repeated_jumps};
 use mapper_campaign::Campaign;
 use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Plan, ThermalModel};
-use mapper_identify::ZeroOutcome;
+use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::{RunReport, run_report};
@@ -35,6 +35,8 @@ pub struct Results {
     pub repeats: Vec<RepeatedJump>,
     /// What the points share (joint method).
     pub thermal: Option<ThermalModel>,
+    /// What the two-parameter method makes of the same steps (joint method).
+    pub two_parameter: Vec<TwoParameter>,
     /// What came of the isothermal zero.
     pub zero: ZeroOutcome,
     /// What else is to be known.
@@ -67,9 +69,9 @@ impl Session<'_> {
             Some(map) => export(self.registry, campaign, map, directory, &mut remarks)?,
             None => BTreeMap::new(),
         };
-        let Identified { recording: recorded, config, points, thermal, zero, score } = identified;
-        let points_file =
-            json!({"reference": config.reference, "points": points, "thermal": thermal, "zero": zero});
+        let Identified { recording: recorded, config, points, thermal, two_parameter, zero, score } =
+            identified;
+        let points_file = json!({"reference": config.reference, "points": points, "thermal": thermal, "two_parameter": two_parameter, "zero": zero});
         write_new(&directory.join(run_directory::POINTS), json_text(&points_file)?.as_bytes())?;
         let report = directory.join(run_directory::REPORT);
         let alone: Vec<IdentifiedPoint> = points.iter().map(|scored| scored.point.clone()).collect();
@@ -81,6 +83,7 @@ impl Session<'_> {
             events: &recorded.events,
             points: &points,
             repeats: &repeats,
+            two_parameter: &two_parameter,
             score: score.as_ref(),
             has_picture: map.contains_key("svg"),
         });
@@ -94,6 +97,7 @@ impl Session<'_> {
             score,
             repeats,
             thermal,
+            two_parameter,
             zero,
             remarks,
             compressor_map,

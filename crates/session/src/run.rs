@@ -10,6 +10,7 @@ use crate::results::Results;
 use crate::scripted_steps::ScriptedSteps;
 use crate::{Session, SessionError, run_directory};
 use mapper_campaign::Campaign;
+use mapper_campaign::campaign::MapSource;
 use mapper_core::{Backend, Plan, RigDescription};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
@@ -156,6 +157,9 @@ impl PreparedRun<'_> {
         let plan_json = json_text(&self.plan)?;
         write_new(&directory.join(run_directory::CAMPAIGN), self.request.campaign_text.as_bytes())?;
         write_new(&directory.join(run_directory::PLAN), plan_json.as_bytes())?;
+        if let MapSource::Table { named, text, .. } = &campaign.machine.map {
+            run_directory::keep_beside(&directory, named, text)?;
+        }
         if let Some(source) = &campaign.sequence {
             write_new(&directory.join(run_directory::SEQUENCE), source.text.as_bytes())?;
         }

@@ -1,8 +1,9 @@
 //! Where a run's files go: one new directory each, never an old one.
 
 use crate::SessionError;
+use crate::files::write_new;
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// The file names within a run directory.
 pub const RECORDING: &str = "recording.mcap";
@@ -35,6 +36,20 @@ pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, Sess
         }
     }
     Err(SessionError::TooManyRuns { parent: parent.to_owned() })
+}
+
+/// Keeps a file that the campaign names where the campaign of the run directory names it. One outside the campaign's own
+/// directory is found where it is, or given with `--campaign` later.
+pub(crate) fn keep_beside(directory: &Path, named: &str, text: &str) -> Result<(), SessionError> {
+    let named = Path::new(named);
+    if !named.components().all(|part| matches!(part, Component::Normal(_))) {
+        return Ok(());
+    }
+    let path = directory.join(named);
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(SessionError::file("create", folder))?;
+    }
+    write_new(&path, text.as_bytes())
 }
 
 /// The recording of a run directory, or the file itself.

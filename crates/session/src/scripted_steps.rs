@@ -120,12 +120,13 @@ impl StepSource for ScriptedSteps {
     }
 }
 
+/// Each step by itself. What is assumed of alpha_A is left out of the standard errors: no further visit would improve it.
 fn single_steps(config: IdentifyConfig) -> IdentifyConfig {
     let method = match config.method {
         Method::Joint => Method::Dynamic,
         method => method,
     };
-    IdentifyConfig { method, ..config }
+    IdentifyConfig { method, alpha_area_sigma_ratio: 0.0, ..config }
 }
 
 fn source_error(error: impl std::error::Error + Send + Sync + 'static) -> StepSourceError {

@@ -102,11 +102,11 @@ fn what_a_killed_run_has_recorded_can_be_identified() {
     let (_campaign, recording) = killed_run();
     let report = read(&recording);
     let finished_steps = report.recording.steps.len();
-    // Half an hour each after a minute of warm-up; the last one was under way.
+    // Half an hour each after half an hour of rest and a minute of warm-up; the last one was under way.
     let samples = report.recording.series.values().map(|series| series.t_s.len()).min().unwrap();
     let seconds = samples as f64 / 10.0;
     assert!(seconds > 3000.0, "{seconds} s were saved");
-    assert_eq!(finished_steps, 1 + ((seconds - 60.0) / 1800.0).floor() as usize);
+    assert_eq!(finished_steps, 1 + ((seconds - 60.0 - 1800.0) / 1800.0).floor() as usize);
     let run = recording.parent().unwrap();
     let result = mapper(["identify".as_ref(), run.as_os_str(), "--json".as_ref()]).exits(0).json();
     let points = result["points"].as_array().unwrap();
@@ -154,7 +154,7 @@ fn one_interrupt_makes_the_rig_safe_and_keeps_what_is_done() {
     assert!(only_run(&campaign.runs()).join("points.json").is_file());
 }
 
-/// A T2 sensor that reads 400 K too much is above its limit from the first samples on, in the warm-up.
+/// A T2 sensor that reads 400 K too much is above its limit from the first samples on, while the machine rests.
 #[test]
 fn a_guard_that_trips_before_the_first_step_says_so() {
     let campaign =
@@ -165,5 +165,5 @@ fn a_guard_that_trips_before_the_first_step_says_so() {
     assert_eq!(finished.json()["points"].as_array().unwrap().len(), 0);
     let recording = only_run(&campaign.runs()).join("recording.mcap");
     let kinds: Vec<EventKind> = read(&recording).recording.events.iter().map(|event| event.kind).collect();
-    assert_eq!(kinds, [EventKind::GuardTripped, EventKind::SafeState]);
+    assert_eq!(kinds, [EventKind::SoakStarted, EventKind::GuardTripped, EventKind::SafeState]);
 }

@@ -1,6 +1,6 @@
 //! What a plan says comes true on the virtual lab, whatever it was ordered by.
 
-use mapper_tests::{CampaignFile, SHORT_GRID, mapper};
+use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper};
 use serde_json::Value;
 
 /// Six points of the shipped campaign, ordered by `order`.
@@ -18,6 +18,7 @@ fn campaign(order: &str, more: &[(&str, &str)]) -> CampaignFile {
                 },
             )
         })
+        .chain(BY_ITSELF.iter().copied())
         .chain([("order: sum_gradient ", order.as_str())])
         .chain(more.iter().copied())
         .collect();

@@ -103,7 +103,20 @@ fn patched_tree() -> PathBuf {
             std::fs::remove_file(file).unwrap();
         }
     }
+    remove_empty_folders(&tree);
     tree
+}
+
+/// What a folder is left with when its last file has gone would still be a crate to Cargo.
+fn remove_empty_folders(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            remove_empty_folders(&path);
+            // Fails where it is not empty, as it should.
+            let _ = std::fs::remove_dir(&path);
+        }
+    }
 }
 
 fn files_below(folder: &Path) -> Vec<PathBuf> {

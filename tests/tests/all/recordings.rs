@@ -241,3 +241,41 @@ fn a_recording_of_another_program_gives_the_same_points() {
         }
     }
 }
+
+/// A table of the nominal machine's own map (shared/physics, closed form), which the campaign names in a folder of its own.
+fn table_of_turbo_a() -> String {
+    let mut table = "speed,flow,pressure ratio,efficiency\n".to_owned();
+    for krpm in (50..=170).step_by(10).map(f64::from) {
+        let (n, tip_m_s) = (krpm / 100.0, std::f64::consts::PI * 0.052 * krpm * 1e3 / 60.0);
+        let zero_slope = (1.0 + 1.06 * tip_m_s * tip_m_s / (2.0 * 1005.0 * 298.0)).powf(3.5);
+        let choke = 1.0 + 0.15 * (zero_slope - 1.0);
+        let (surge_kg_s, choke_kg_s) = (0.0265 * n.powf(1.35), 0.052 + 0.058 * n.powf(1.25));
+        for x in (0..=10).map(|i| f64::from(i) / 10.0) {
+            let flow_kg_s = surge_kg_s + (choke_kg_s - surge_kg_s) * (1.0 - x.powf(2.2)).sqrt();
+            let away = (flow_kg_s - surge_kg_s) / (choke_kg_s - surge_kg_s) - 0.42;
+            let eta = (0.74 - 0.07 * (n - 1.05).powi(2)) * (1.0 - 0.9 * away * away);
+            let pressure_ratio = choke + (zero_slope - choke) * x;
+            table += &format!("{},{flow_kg_s},{pressure_ratio},{eta}\n", krpm * 1e3);
+        }
+    }
+    table
+}
+
+/// The run directory keeps what its campaign names, so that it can be moved and identified again.
+#[test]
+fn a_run_with_a_map_of_its_own_is_identified_from_its_directory() {
+    let map = ("map: closed_form", "map: {file: maps/mine.csv, reference: SAE}");
+    let replacements: Vec<_> = SHORT_GRID.iter().copied().chain([map]).collect();
+    let campaign = CampaignFile::shipped_with(&replacements);
+    std::fs::create_dir(campaign.directory().join("maps")).unwrap();
+    std::fs::write(campaign.directory().join("maps/mine.csv"), table_of_turbo_a()).unwrap();
+    let out = campaign.runs();
+    let arguments =
+        ["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref(), "--out".as_ref(), out.as_os_str()];
+    let result = mapper(arguments).exits(0).json();
+    let elsewhere = scratch();
+    let moved = elsewhere.path().join("moved");
+    std::fs::rename(only_run(&out), &moved).unwrap();
+    let again = mapper(["identify".as_ref(), moved.as_os_str(), "--json".as_ref()]).exits(0).json();
+    assert_eq!(again["points"], result["points"]);
+}

@@ -6,6 +6,9 @@ use mapper_core::{JointSettings, Method, SettleBands, WindowRule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Where nobody has measured it, a twentieth of the area is what can be believed of an assumed alpha_A.
+const ALPHA_AREA_SIGMA_RATIO: f64 = 0.05;
+
 /// How points are identified.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Identification {
@@ -15,6 +18,8 @@ pub struct Identification {
     pub window: WindowRule,
     /// Share of the internal area before compression that is assumed, alpha_A, 0..1.
     pub alpha_area_ratio: f64,
+    /// How far the true share may be off that, one standard deviation.
+    pub alpha_area_sigma_ratio: f64,
     /// When a point counts as settled.
     pub settle_bands: SettleBands,
     /// Which refinements the joint method makes.
@@ -25,7 +30,7 @@ pub struct Identification {
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct IdentificationFile {
-    /// `dynamic`, the default, finds both from the transient; `joint` fits all points together; `steady` is conventional mapping.
+    /// `joint`, the default, fits all points together; `dynamic` finds both from the transient of each step by itself, as the paper does; `steady` is conventional mapping.
     #[schemars(with = "Option<MethodName>")]
     method: Option<Method>,
     /// Part of the step that is used: `auto`, the default, begins when speed, flow and pressure ratio have settled; or `start` and `end` after the jump.
@@ -34,6 +39,9 @@ pub(crate) struct IdentificationFile {
     /// Share of the internal area before compression that identification assumes, a plain number from 0 to 1; the machine's if none is given.
     #[schemars(range(min = 0, max = 1), example = 0.0)]
     alpha_area: Option<f64>,
+    /// How far the true share may be off the assumed one, one standard deviation, a plain number; 0.05 if none is given. `dynamic` cannot find the share, so its intervals contain this; 0 believes the assumption.
+    #[schemars(range(min = 0, max = 1), example = 0.05)]
+    alpha_area_sigma: Option<f64>,
     /// Variations within which a point counts as settled.
     #[serde(default, deserialize_with = "SettleBandsElement::deserialize")]
     #[schemars(with = "SettleBandsElement")]
@@ -57,9 +65,10 @@ impl IdentificationFile {
     /// With the machine's own alpha_A where the file says nothing of it.
     pub(crate) fn identification(self, alpha_area_ratio: f64) -> Identification {
         Identification {
-            method: self.method.unwrap_or(Method::Dynamic),
+            method: self.method.unwrap_or(Method::Joint),
             window: self.window.map_or(WindowRule::Auto, WindowRule::from),
             alpha_area_ratio: self.alpha_area.unwrap_or(alpha_area_ratio),
+            alpha_area_sigma_ratio: self.alpha_area_sigma.unwrap_or(ALPHA_AREA_SIGMA_RATIO),
             settle_bands: self.stabilisation,
             joint: self.joint,
         }
@@ -75,15 +84,25 @@ mod tests {
     fn what_is_left_out_has_its_default() {
         let read = |text| crate::testing::any::<IdentificationFile>(text).unwrap().identification(0.2);
         let plain = Identification {
-            method: Method::Dynamic,
+            method: Method::Joint,
             window: WindowRule::Auto,
             alpha_area_ratio: 0.2,
+            alpha_area_sigma_ratio: 0.05,
             settle_bands: SettleBands::default(),
             joint: JointSettings::default(),
         };
         assert_eq!(read("{}"), plain);
         let joint = JointSettings { probe: Choice::Fixed, ..plain.joint };
-        let said = Identification { method: Method::Joint, alpha_area_ratio: 0.0, joint, ..plain };
-        assert_eq!(read("{method: joint, alpha_area: 0, joint: {probe: fixed}}"), said);
+        let said = Identification {
+            method: Method::Dynamic,
+            alpha_area_ratio: 0.0,
+            alpha_area_sigma_ratio: 0.0,
+            joint,
+            ..plain
+        };
+        assert_eq!(
+            read("{method: dynamic, alpha_area: 0, alpha_area_sigma: 0, joint: {probe: fixed}}"),
+            said
+        );
     }
 }

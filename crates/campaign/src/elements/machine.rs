@@ -37,6 +37,9 @@ pub enum MapSource {
         /// Path as resolved from the campaign file. Not part of the canonical JSON: the text is what counts.
         #[serde(skip)]
         path: PathBuf,
+        /// The path as the campaign writes it. Not part of the canonical JSON either.
+        #[serde(skip)]
+        named: String,
         /// The file's text, which [`crate::nominal_model`] reads.
         text: String,
         /// State to which its corrected quantities refer.
@@ -103,7 +106,7 @@ impl MachineFile {
             MapFile::Table(table) => {
                 let path = beside(origin, &table.file);
                 let text = files(&path)?;
-                MapSource::Table { path, text, reference: table.reference.into() }
+                MapSource::Table { path, named: table.file, text, reference: table.reference.into() }
             }
         };
         let mut params = Params::default();

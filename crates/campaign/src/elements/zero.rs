@@ -1,7 +1,7 @@
 //! `zero:`
 
 use crate::si::or;
-use crate::units::{Duration, Quantity, Temperature};
+use crate::units::{Duration, PressureDifference, Quantity, Temperature, TemperatureDifference};
 use mapper_core::Soak;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -16,6 +16,12 @@ pub(crate) struct ZeroFile {
     /// Oil inlet temperature in the meantime; that of the inlet air if none is given.
     #[schemars(extend("x-min" = "250 K", "x-max" = "450 K"), example = &"25 degC")]
     oil_temperature: Option<Quantity<Temperature>>,
+    /// How even the rig is at rest, one standard deviation of the temperature at one sensor about that at all: what is left of each offset after the zero; 0.05 K if none is given.
+    #[schemars(extend("x-min" = "0 K", "x-max" = "10 K"), example = &"0.05 K")]
+    evenness: Option<Quantity<TemperatureDifference>>,
+    /// The same of the pressure at P1 and P2; 5 Pa if none is given.
+    #[schemars(extend("x-min" = "0 Pa", "x-max" = "1 kPa"), example = &"5 Pa")]
+    pressure_evenness: Option<Quantity<PressureDifference>>,
 }
 
 impl ZeroFile {
@@ -24,6 +30,27 @@ impl ZeroFile {
         Soak {
             duration_s: self.soak.inside,
             oil_temperature_k: or(self.oil_temperature, inlet_temperature_k),
+            temperature_sigma_k: or(self.evenness, Soak::TEMPERATURE_SIGMA_K),
+            pressure_sigma_pa: or(self.pressure_evenness, Soak::PRESSURE_SIGMA_PA),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_out_has_its_default() {
+        let read = |text| crate::testing::any::<ZeroFile>(text).unwrap().soak(298.15);
+        let plain = Soak {
+            duration_s: 1800.0,
+            oil_temperature_k: 298.15,
+            temperature_sigma_k: 0.05,
+            pressure_sigma_pa: 5.0,
+        };
+        assert_eq!(read("{soak: 30 min}"), plain);
+        let said = Soak { temperature_sigma_k: 0.15, pressure_sigma_pa: 15.0, ..plain };
+        assert_eq!(read("{soak: 0.5 h, evenness: 0.15 K, pressure_evenness: 15 Pa}"), said);
     }
 }

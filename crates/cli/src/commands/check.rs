@@ -59,8 +59,13 @@ impl Check {
                 "omitted": 0,
             }));
         }
+        let apart = match (&campaign.sequence, campaign.repeats) {
+            (Some(_), _) => " if the script visits each once for as long as `timing.dwell`",
+            (None, Some(_)) => ", repeats for drift not counted (`mapper plan` shows them)",
+            (None, None) => "",
+        };
         output::print(&format!(
-            "{}: no mistakes. {} points on `{}` in {} of the rig's time.\n",
+            "{}: no mistakes. {} points on `{}` in {} of the rig's time{apart}.\n",
             self.campaign.display(),
             campaign.points.len(),
             campaign.backend.name,

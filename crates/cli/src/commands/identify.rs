@@ -5,7 +5,7 @@ use crate::given::{channel_map, given_campaign};
 use crate::{output, registry};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
-use mapper_report::{points_text, thermal_text, zero_text};
+use mapper_report::{disagreement_text, points_text, thermal_text, zero_text};
 use mapper_session::{Recorded, Session};
 use serde_json::json;
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ pub struct Identify {
     /// Campaign with machine, sensors and window, instead of the one attached to the recording
     #[arg(long, value_name = "FILE")]
     pub campaign: Option<PathBuf>,
-    /// How to identify [default: the campaign's method, or dynamic]
+    /// How to identify [default: the campaign's method, or joint]
     #[arg(long, value_enum)]
     pub method: Option<MethodArgument>,
     /// Print one JSON object on standard output
@@ -46,12 +46,15 @@ impl Identify {
                 "reference": found.config.reference,
                 "points": found.points,
                 "thermal": found.thermal,
+                "two_parameter": found.two_parameter,
                 "zero": found.zero,
                 "score": found.score,
                 "recording_warnings": warnings,
             }));
         }
-        let mut text = points_text(&found.points, &display);
+        let disagreement = disagreement_text(&found.points, &found.two_parameter, &display);
+        let mut text = disagreement.unwrap_or_default();
+        text.push_str(&points_text(&found.points, &display));
         if let Some(thermal) = &found.thermal {
             text.push_str(&thermal_text(thermal));
         }

@@ -6,7 +6,10 @@ use crate::progress::Progress;
 use crate::{interrupt, output, registry};
 use clap::Args;
 use mapper_campaign::Campaign;
-use mapper_report::{Display, plan_text, points_text, repeated_jumps_text, thermal_text, zero_text};
+use mapper_core::Verdict;
+use mapper_report::{
+    Display, disagreement_text, plan_text, points_text, repeated_jumps_text, thermal_text, zero_text,
+};
 use mapper_session::{Ended, PreparedRun, Results, RunOutcome, RunRequest, Session, SessionError, soak_s};
 use serde_json::json;
 use std::fmt::Write;
@@ -63,6 +66,9 @@ impl Run {
 
     fn tell(&self, campaign: &Campaign, outcome: RunOutcome) -> Result<(), Failure> {
         let RunOutcome { directory, recording, end, results } = outcome;
+        let unusable = results.as_ref().is_ok_and(|results| {
+            results.points.iter().all(|scored| scored.point.verdict == Verdict::Unusable)
+        });
         match results {
             Ok(results) if self.json => output::print_json(&results)?,
             Ok(results) => output::print(&results_text(campaign, &results))?,
@@ -77,6 +83,10 @@ impl Run {
         }
         let kept = "the rig is safe and the recording is kept";
         let (code, why) = match end {
+            Ended::Completed if unusable => (
+                Code::BadRecording,
+                "no point is usable: the reasons stand above and in the report".to_owned(),
+            ),
             Ended::Completed => return Ok(()),
             Ended::Drifted { reason } => {
                 (Code::Rig, format!("{reason}. The rig is safe and the recording is kept"))
@@ -118,7 +128,9 @@ impl Run {
 
 /// A table with what to know below it.
 fn results_text(campaign: &Campaign, results: &Results) -> String {
-    let mut text = points_text(&results.points, &campaign.display);
+    let disagreement = disagreement_text(&results.points, &results.two_parameter, &campaign.display);
+    let mut text = disagreement.unwrap_or_default();
+    text.push_str(&points_text(&results.points, &campaign.display));
     text.push_str(&repeated_jumps_text(&results.repeats, &Display::new(&campaign.display)));
     if let Some(thermal) = &results.thermal {
         text.push_str(&thermal_text(thermal));

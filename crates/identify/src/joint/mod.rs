@@ -28,8 +28,12 @@ use crate::findings::{Findings, code};
 use crate::joint::parameters::{FLOW_GAIN, OFFSETS, PROBE_MM2, SHARED};
 use crate::joint::smoothness::{Judged, Smoothed};
 use crate::joint::solve::{Covariance, FULLY, Problem, ROUGHLY};
+use crate::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, commands};
-use mapper_core::{Choice, EstimateUncertainty, JointSettings, Recording, ThermalModel, Window};
+use mapper_core::{
+    Choice, EstimateUncertainty, JointSettings, Recording, ThermalModel, Verdict, Window,
+    confidence_interval_95,
+};
 use mapper_numerics::statistics::rms;
 
 /// Fits before the last one.
@@ -41,6 +45,8 @@ pub(crate) struct Joint {
     pub(crate) estimates: Vec<Estimate>,
     /// What the points share; `None` where nothing is.
     pub(crate) thermal: Option<ThermalModel>,
+    /// What the two-parameter method makes of the steps that it can use.
+    pub(crate) two_parameter: Vec<TwoParameter>,
 }
 
 /// Identifies all steps. `end_states` and `findings`: one for each step; no end state, no estimate.
@@ -50,10 +56,18 @@ pub(crate) fn estimate(
     config: &IdentifyConfig,
     findings: &mut [Findings],
 ) -> Joint {
-    let alone: Vec<Estimate> = (0..recording.steps.len())
-        .map(|position| {
+    let mut two_parameter = Vec::new();
+    let alone: Vec<Estimate> = recording
+        .steps
+        .iter()
+        .enumerate()
+        .map(|(position, step)| {
             let mut own = Findings::new();
             let estimate = dynamic::estimate(recording, position, config, &mut own);
+            if let (Some((eta, Some(error))), true) = (estimate.eta, own.verdict != Verdict::Unusable) {
+                let (eta_low, eta_high) = confidence_interval_95(eta, error.combined_standard_error());
+                two_parameter.push(TwoParameter { step: step.index, eta, eta_low, eta_high });
+            }
             if config.joint == JointSettings::all_off() {
                 findings[position].take(own);
             }
@@ -61,7 +75,7 @@ pub(crate) fn estimate(
         })
         .collect();
     if config.joint == JointSettings::all_off() {
-        return Joint { estimates: alone, thermal: None };
+        return Joint { estimates: alone, thermal: None, two_parameter: Vec::new() };
     }
     let steps = start::steps(recording, end_states, config, findings);
     let careful = carefully(config);
@@ -82,7 +96,7 @@ pub(crate) fn estimate(
             findings[step.position].doubt(code::FIT_FAILED, message);
             estimates[step.position] = alone[step.position];
         }
-        return Joint { estimates, thermal: None };
+        return Joint { estimates, thermal: None, two_parameter };
     };
     let Attempt { problem, smoothed, thermal } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
@@ -129,7 +143,7 @@ pub(crate) fn estimate(
             own.doubt(code::MODEL_DOUBTED, doubt.clone());
         }
     }
-    Joint { estimates, thermal: Some(thermal) }
+    Joint { estimates, thermal: Some(thermal), two_parameter }
 }
 
 /// A fit with what is made of it.

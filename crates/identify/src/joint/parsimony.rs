@@ -19,14 +19,16 @@ const DECLARED_HOLDS: f64 = 0.67;
 /// Weight of a refinement above which it is left alone.
 const SURE: f64 = 0.999;
 
-/// Weighs the refinements, draws each by its weight, and fits again.
+/// Weighs the refinements, draws the least needed by its weight, fits again, and weighs those that are left: one that was
+/// only balanced by another shows what it is when the other is gone.
 pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<()> {
-    let covariance = problem.covariance()?;
-    let mut weights = weights(problem, &covariance);
-    // The least needed first: what is found of the others without it is what counts.
-    weights.sort_by(|a, b| a.1.total_cmp(&b.1));
-    for (index, weight) in weights {
-        if weight > SURE || !problem.active[index] {
+    let mut settled = Vec::new();
+    loop {
+        let covariance = problem.covariance()?;
+        let left = weights(problem, &covariance).into_iter().filter(|(index, _)| !settled.contains(index));
+        let Some((index, weight)) = left.min_by(|a, b| a.1.total_cmp(&b.1)) else { return Some(()) };
+        settled.push(index);
+        if weight > SURE {
             continue;
         }
         let information = problem.information(index)?;
@@ -41,7 +43,6 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<()> {
         }
         problem.minimise(FULLY)?;
     }
-    Some(())
 }
 
 /// Probability of each active refinement to be at work.

@@ -22,12 +22,12 @@ const AMPLITUDES: [f64; 3] = [0.05, 0.1, 0.2];
 /// Lengths over which efficiency changes with speed, in halves of the range of the points.
 const SPEED_LENGTHS: [f64; 4] = [0.7, 1.0, 1.4, 2.0];
 /// The same with flow at equal speed.
-const FLOW_LENGTHS: [f64; 2] = [1.0, 2.0];
+const FLOW_LENGTHS: [f64; 5] = [0.35, 0.5, 0.7, 1.0, 2.0];
 /// What no smooth function follows, fraction.
-const ROUGHNESS: f64 = 1e-3;
+const ROUGHNESSES: [f64; 2] = [1e-3, 4e-3];
 /// Efficiency that small Reynolds numbers and leakage cost beyond that, fraction, one standard deviation, times the
 /// middle speed over the speed, squared, less 1: it can not be told from an offset at all.
-const SLOW_LOSS: f64 = 1.5e-3;
+const SLOW_LOSS: f64 = 1e-2;
 /// Mean of efficiencies and its standard deviation, fraction: any.
 const MEAN: (f64, f64) = (0.65, 1.0);
 /// Points from which on the weights are found from a part of them: the effort grows with the cube.
@@ -66,6 +66,8 @@ pub(crate) struct Smoothed {
 struct Quantity {
     value: f64,
     by_eta: DVector<f64>,
+    /// The part of `by_eta` that smoothness may speak of: what offsets and a step's own noise bring.
+    by_smooth: DVector<f64>,
     variance: f64,
     by_shared: DVector<f64>,
 }
@@ -127,10 +129,11 @@ pub(crate) fn smoothed(
             solved
                 .iter()
                 .map(|one| {
-                    let pull = one.factors.solve(&quantity.by_eta);
-                    let variance = quantity.variance - quantity.by_eta.dot(&pull);
+                    let pull = one.factors.solve(&quantity.by_smooth);
+                    let gain = 2.0 * quantity.by_eta.dot(&pull) - quantity.by_smooth.dot(&pull);
                     let bias = bias_of(quantity, Some(&pull));
-                    (one.weight, quantity.value - quantity.by_eta.dot(&one.drive), variance, bias)
+                    let value = quantity.value - quantity.by_smooth.dot(&one.drive);
+                    (one.weight, value, quantity.variance - gain, bias)
                 })
                 .collect()
         };
@@ -174,7 +177,26 @@ fn of_shared(covariance: &Covariance, row: usize) -> Quantity {
         covariance.answers.len(),
         covariance.answers.iter().map(|answer| answer.row(ETA).transpose().dot(&by_shared)),
     );
-    Quantity { value: 0.0, by_eta, variance: covariance.shared[(row, row)], by_shared }
+    let by_smooth = by_offsets(covariance, &by_shared);
+    Quantity { value: 0.0, by_eta, by_smooth, variance: covariance.shared[(row, row)], by_shared }
+}
+
+/// Covariance of a quantity with every point's efficiency through the offsets alone.
+fn by_offsets(covariance: &Covariance, by_shared: &DVector<f64>) -> DVector<f64> {
+    let carried: Vec<(usize, f64)> = (0..covariance.fitted.len())
+        .filter(|row| is_offset(covariance.fitted[*row]))
+        .map(|row| (row, by_shared[row] / covariance.shared[(row, row)]))
+        .collect();
+    let of_step = |(_, mixed): &(_, nalgebra::Matrix4xX<f64>)| {
+        carried.iter().map(|(row, factor)| factor * mixed[(ETA, *row)]).sum::<f64>()
+    };
+    DVector::from_iterator(covariance.own.len(), covariance.own.iter().map(of_step))
+}
+
+/// Covariance of one of a step's numbers with its efficiency when all that is shared is known.
+fn alone(covariance: &Covariance, step: usize, index: usize) -> f64 {
+    let (own, mixed) = &covariance.own[step];
+    own[(index, ETA)] - mixed.row(index).dot(&covariance.answers[step].row(ETA))
 }
 
 /// Efficiency, and ln h over what the fit has, of every step.
@@ -193,7 +215,10 @@ fn quantities(
             let mut by_eta =
                 DVector::from_iterator(count, answers.iter().map(|answer| answer.dot(&by_shared)));
             by_eta[i] = own[(ETA, ETA)];
-            Quantity { value: problem.members[i].local[ETA], by_eta, variance: own[(ETA, ETA)], by_shared }
+            let mut by_smooth = by_offsets(covariance, &by_shared);
+            by_smooth[i] += alone(covariance, i, ETA);
+            let value = problem.members[i].local[ETA];
+            Quantity { value, by_eta, by_smooth, variance: own[(ETA, ETA)], by_shared }
         })
         .collect();
     let ln_hs = (0..count)
@@ -225,7 +250,9 @@ fn quantities(
                 DVector::from_iterator(count, answers.iter().map(|answer| answer.dot(&by_shared)));
             by_eta[i] = own[(LN_DEVIATION, ETA)] + mixed.row(ETA).transpose().dot(&weights);
             let variance = own[(LN_DEVIATION, LN_DEVIATION)] + weights.dot(&(&by_shared + &deviation));
-            Quantity { value: 0.0, by_eta, variance, by_shared }
+            let mut by_smooth = by_offsets(covariance, &by_shared);
+            by_smooth[i] += alone(covariance, i, LN_DEVIATION);
+            Quantity { value: 0.0, by_eta, by_smooth, variance, by_shared }
         })
         .collect();
     (etas, ln_hs)
@@ -238,7 +265,9 @@ fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'
     let mut choices = Vec::new();
     for amplitude in AMPLITUDES {
         for speed_length in SPEED_LENGTHS {
-            choices.extend(FLOW_LENGTHS.map(|flow_length| [amplitude, speed_length, flow_length]));
+            for flow_length in FLOW_LENGTHS {
+                choices.extend(ROUGHNESSES.map(|rough| [amplitude, speed_length, flow_length, rough]));
+            }
         }
     }
     loop {
@@ -294,14 +323,14 @@ fn matrix(
     etas: &[Quantity],
     coordinates: &[(f64, f64, f64)],
     points: &[usize],
-    [amplitude, speed_length, flow_length]: &[f64; 3],
+    [amplitude, speed_length, flow_length, roughness]: &[f64; 4],
     used: &[bool],
 ) -> DMatrix<f64> {
     DMatrix::from_fn(points.len(), points.len(), |row, column| {
         let (i, j) = (points[row], points[column]);
         let ((u, v, slow), (other_u, other_v, other_slow)) = (coordinates[i], coordinates[j]);
         let (by_speed, by_flow) = ((u - other_u) / speed_length, (v - other_v) / flow_length);
-        let own = if i == j { ROUGHNESS * ROUGHNESS + if used[i] { 0.0 } else { 1e4 } } else { 0.0 };
+        let own = if i == j { roughness * roughness + if used[i] { 0.0 } else { 1e4 } } else { 0.0 };
         0.5 * (etas[i].by_eta[j] + etas[j].by_eta[i])
             + amplitude * amplitude * (-0.5 * (by_speed * by_speed + by_flow * by_flow)).exp()
             + SLOW_LOSS * SLOW_LOSS * slow * other_slow
@@ -315,7 +344,7 @@ fn evidence(
     etas: &[Quantity],
     coordinates: &[(f64, f64, f64)],
     points: &[usize],
-    choice: &[f64; 3],
+    choice: &[f64; 4],
 ) -> Option<f64> {
     let factors = matrix(etas, coordinates, points, choice, &vec![true; etas.len()]).cholesky()?;
     let off = DVector::from_iterator(points.len(), points.iter().map(|i| etas[*i].value - MEAN.0));

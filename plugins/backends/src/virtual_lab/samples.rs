@@ -76,7 +76,8 @@ impl SampleCollector {
                 Some(pipe_diameter_m) => at_the_wall_pa(row.channel, total, *pipe_diameter_m, instant),
                 None => total,
             };
-            let truth = follower.read(t_s, truth);
+            let uneven = settings.uneven_at_rest.get(&row.channel).filter(|_| instant.running.is_none());
+            let truth = follower.read(t_s, truth) + uneven.copied().unwrap_or(0.0);
             let sensor = sensors.iter_mut().find(|(channel, _)| *channel == row.channel);
             let reading = sensor.map_or(truth, |(_, sensor)| sensor.read(truth));
             column.push(drift::drifted_reading(&settings.drifts, row.channel, t_s, reading));

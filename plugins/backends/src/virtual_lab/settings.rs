@@ -45,6 +45,8 @@ pub struct LabSettings {
     pub oil_actuator: ActuatorDynamics,
     /// Errors of the sensors; channels without an entry are ideal.
     pub sensors: BTreeMap<Channel, SensorErrors>,
+    /// What the sensors see at rest beyond what the cell has throughout, in the channel's unit: no rig is quite even.
+    pub uneven_at_rest: BTreeMap<Channel, f64>,
     /// What drifts while the lab runs.
     pub drifts: Vec<LabDrift>,
     /// Pressures that are tapped at the wall of a pipe, with its inner diameter, m; the others are total.
@@ -81,6 +83,7 @@ impl LabSettings {
             valve_actuator: at_once,
             oil_actuator: at_once,
             sensors: BTreeMap::new(),
+            uneven_at_rest: BTreeMap::new(),
             drifts: Vec::new(),
             static_tap_pipe_diameters_m: BTreeMap::new(),
             trip_speed_rpm: f64::INFINITY,

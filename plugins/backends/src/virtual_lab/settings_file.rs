@@ -180,6 +180,10 @@ pub fn read_settings(
         valve_actuator: actuators.valve.dynamics("valve", 0.2, 1.0)?,
         oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", 30.0, 1.0)?,
         sensors: sensors(&file, nominal)?,
+        uneven_at_rest: match file.offsets {
+            OffsetsName::Drawn => uneven_at_rest(nominal),
+            OffsetsName::None => BTreeMap::new(),
+        },
         drifts: drift_file::read(&file.drift)?,
         static_tap_pipe_diameters_m: nominal.static_tap_pipe_diameters_m.clone(),
         trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.inside),
@@ -264,6 +268,18 @@ fn draw(seed: u64, channel: Channel) -> (f64, f64) {
     (StandardNormal.sample(&mut random), StandardNormal.sample(&mut random))
 }
 
+/// Drawn from the declared evenness of the soak; nothing where there is none.
+fn uneven_at_rest(nominal: &NominalRig) -> BTreeMap<Channel, f64> {
+    let Some(soak) = nominal.soak else { return BTreeMap::new() };
+    // Another stream than that of the offsets.
+    let seed = nominal.seed ^ 0x6A09_E667_F3BC_C908;
+    let drawn = |channel: Channel, sigma: f64| (channel, sigma * draw(seed, channel).0);
+    let temperatures = [Channel::T1, Channel::T2, Channel::Tc, Channel::TOil];
+    let temperatures = temperatures.map(|channel| drawn(channel, soak.temperature_sigma_k));
+    let pressures = [Channel::P1, Channel::P2].map(|channel| drawn(channel, soak.pressure_sigma_pa));
+    temperatures.into_iter().chain(pressures).collect()
+}
+
 fn offset_kind(channel: Channel) -> Kind {
     match channel.info().dimension {
         mapper_core::Dimension::RotationalSpeed => Kind::Speed,
@@ -302,6 +318,7 @@ mod tests {
             speed_max_rpm: 180e3,
             sensors: [(Channel::T1, declared), (Channel::T2, declared)].into(),
             static_tap_pipe_diameters_m: BTreeMap::new(),
+            soak: None,
             tolerances: ModelTolerances::default(),
             effects: mapper_effects::catalogue(),
             seed: 5,

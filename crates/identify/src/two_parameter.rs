@@ -1,0 +1,16 @@
+//! What the two-parameter method makes of a step that another method has identified.
+
+use serde::Serialize;
+
+/// The efficiency that the two-parameter method (`dynamic`) finds in a step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TwoParameter {
+    /// Index of the step.
+    pub step: usize,
+    /// Isentropic efficiency, total to total, fraction.
+    pub eta: f64,
+    /// Lower end of its 95 % interval.
+    pub eta_low: f64,
+    /// Upper end.
+    pub eta_high: f64,
+}

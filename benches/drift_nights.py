@@ -3,7 +3,7 @@
 usage: python3 benches/drift_nights.py PROGRAM FIRST_SEED COUNT [CAUSE...]
 
 PROGRAM is the built `mapper`. A night is the campaign of the gap rig with six openings and eight minutes a point, 5 h 30 min
-in all, the jump from 70 to 130 krpm made five times, on a rig with drawn tolerances and offsets in weather that wanders. Prints
+in total, the jump from 70 to 130 krpm made five times, on a rig with drawn tolerances and offsets in weather that wanders. Prints
 one line a night on standard error and a table as Markdown. Needs nothing but Python; a night takes some 7 s of one core.
 """
 

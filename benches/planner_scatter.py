@@ -3,7 +3,7 @@
     cargo build --release -p mapper-cli
     python3 benches/planner_scatter.py target/release/mapper [RUNS]
 
-Four points of campaigns/turbo_a.yaml at one opening; each seed draws noise and fixed offsets anew. Prints, for each step,
+Four points of campaigns/turbo_a.yaml at one opening; each seed draws noise and fixed offsets again. Prints, for each step,
 what the plan says and what 200 runs scatter.
 """
 

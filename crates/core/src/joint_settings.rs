@@ -83,3 +83,7 @@ impl JointSettings {
         }
     }
 }
+
+/// How far the true alpha_A may be off the one that is assumed, one standard deviation, if nothing is said: where nobody has
+/// measured it, it is known to a twentieth of the area at best.
+pub const ALPHA_AREA_SIGMA_RATIO: f64 = 0.05;

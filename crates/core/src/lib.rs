@@ -49,7 +49,9 @@ pub use fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
 pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
 };
-pub use joint_settings::{Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings};
+pub use joint_settings::{
+    ALPHA_AREA_SIGMA_RATIO, Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings,
+};
 pub use jump::{Jump, Repeats};
 pub use limits::{Limits, SURGE_ALLOWED_S};
 pub use map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};

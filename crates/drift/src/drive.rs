@@ -226,7 +226,7 @@ fn start_state(
     Ok(if metal == [true; 2] { State { tc_k, inner_k: tc_k, tt_k, ..settled } } else { settled })
 }
 
-/// Inputs with the drift of a sensor taken off.
+/// Inputs with the drift of a sensor subtracted.
 struct Undrifted<'a> {
     inputs: Shifted<'a, AveragedInputs>,
     planted: Option<Planted>,

@@ -127,7 +127,7 @@ pub struct CorrectedPoint {
     pub eta_identified: Option<f64>,
     /// Efficiency identified from this step as recorded, fraction.
     pub eta_uncorrected: Option<f64>,
-    /// What was taken off the drifting quantity at the end of this step, unit of the cause.
+    /// What was subtracted from the drifting quantity at the end of this step, unit of the cause.
     pub correction: f64,
 }
 

@@ -109,7 +109,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     })?;
     progress(0.75, "all steps");
     let everywhere = Selection::all(&study);
-    let beside = found.anew.as_ref().map_or(&linearised, |(linearised, _)| linearised);
+    let beside = found.refound.as_ref().map_or(&linearised, |(linearised, _)| linearised);
     // Far behind the best without the held-out steps is far behind it with them.
     let hopeless = |f: &&Fit| found.fits.first().is_some_and(|best| best.score - f.score > HOPELESS);
     let mut finalists: Vec<&Fit> = found
@@ -137,14 +137,14 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     fits.retain(|fit| does_something(&study, fit));
     by_weight(&calibration, &study, &mut fits);
     // Close races are run where the best stands, not where nothing is off.
-    let anew = match (fits.first(), &found.anew) {
+    let refound = match (fits.first(), &found.refound) {
         (Some(best), Some((_, there))) if members(&best.hypothesis) != *there => {
             linearised.at(&study, &best.hypothesis).ok()
         }
         _ => None,
     };
-    let beside = anew.as_ref().unwrap_or(beside);
-    if anew.is_some() {
+    let beside = refound.as_ref().unwrap_or(beside);
+    if refound.is_some() {
         let finals = Search {
             study: &study,
             nominal: &linearised,

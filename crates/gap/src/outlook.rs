@@ -87,7 +87,7 @@ fn imagined(recorded: &Study, jump: &AllowedJump, interval_s: f64) -> Option<Stu
 }
 
 /// A fit's hypothesis at a new start, of which its own start says nothing.
-fn anew(study: &Study, fit: &Fit) -> Hypothesis {
+fn refound(study: &Study, fit: &Fit) -> Hypothesis {
     let mut hypothesis = fit.hypothesis.clone();
     for (nuisance, sigmas) in study.nuisances.iter().zip(&mut hypothesis.nuisances) {
         if is_start(nuisance.kind) {
@@ -110,7 +110,7 @@ pub fn apart_at_first_sight(recorded: &Study, jump: &AllowedJump, fits: &[&Fit])
     let predictions: Option<Vec<Vec<f64>>> = fits
         .iter()
         .map(|fit| {
-            let mut values = study.predict(&anew(&study, fit)).ok()?.values;
+            let mut values = study.predict(&refound(&study, fit)).ok()?.values;
             linearised.whiten(&study, &mut values);
             Some(values)
         })
@@ -130,7 +130,7 @@ pub fn apart(recorded: &Study, jump: &AllowedJump, fits: &[&Fit]) -> Option<Vec<
     let nominal = Linearised::new(&study).ok()?;
     let mut predicted = Vec::new();
     for fit in fits {
-        let hypothesis = anew(&study, fit);
+        let hypothesis = refound(&study, fit);
         let here = nominal.at(&study, &hypothesis).ok()?;
         let mut values = here.base.values.clone();
         nominal.whiten(&study, &mut values);

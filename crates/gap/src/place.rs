@@ -1,6 +1,6 @@
 //! Where the gap lies: the parts of the model whose freedom accounts for most of it.
 //!
-//! A part's gain is what the best effect that sits in it takes off the misfit, nuisances refitted. Channel, phase and
+//! A part's gain is by how much the best effect that sits in it reduces the misfit, nuisances refitted. Channel, phase and
 //! region are those in which that effect shows most.
 
 use crate::fit::Fit;
@@ -10,13 +10,13 @@ use crate::study::{PointState, Study, members};
 use crate::whiten::Linearised;
 use mapper_physics::effect::Submodel;
 
-/// A part that takes off less, in squared sigmas, is not a place.
+/// A part that reduces it by less, in squared sigmas, is not a place.
 const LEAST_GAIN: f64 = 4.0;
 
 /// Phases of a step: name and first second after the jump.
 const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 30.0)];
 
-/// A fit with what it takes off the misfit of all steps.
+/// A fit with its reduction of the misfit of all steps.
 #[derive(Debug)]
 pub struct Gain<'a> {
     /// The fit.
@@ -50,7 +50,7 @@ pub fn places(
     if let (true, Some(best)) = (named, fits.first()) {
         let of_best = members(&best.fit.hypothesis);
         for effect in &of_best {
-            // What this one takes off beside the others.
+            // By how much this one reduces it beside the others.
             let without: Vec<usize> = of_best.iter().copied().filter(|other| other != effect).collect();
             let others = fits.iter().find(|f| members(&f.fit.hypothesis) == without).map_or(0.0, |f| f.gain);
             let gain = (best.gain - others).max(0.0);

@@ -20,7 +20,7 @@ pub struct Found {
     /// Singles and pairs, best score first.
     pub fits: Vec<Fit>,
     /// Linearised beside the best single, where the nominal point is far from it, and that single.
-    pub anew: Option<(Linearised, Vec<usize>)>,
+    pub refound: Option<(Linearised, Vec<usize>)>,
 }
 
 /// A single must take at least this off the cost to be worth a second look.
@@ -53,16 +53,16 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
     let null = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
     progress(0.15, "single effects");
     let mut singles = singles(search);
-    let anew = match singles.first() {
+    let refound = match singles.first() {
         Some(best) if null.cost - best.cost > STRONG => {
             let beside = search.linearised.at(study, &best.hypothesis).ok();
             beside.map(|linearised| (linearised, members(&best.hypothesis)))
         }
         _ => None,
     };
-    let linearised = anew.as_ref().map_or(search.linearised, |(linearised, _)| linearised);
+    let linearised = refound.as_ref().map_or(search.linearised, |(linearised, _)| linearised);
     let beside = Search { linearised, ..search };
-    if anew.is_some() {
+    if refound.is_some() {
         refit(beside, &mut singles, 4, Effort::default());
     }
     progress(0.5, "pairs");
@@ -97,7 +97,7 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
     }
     fits.append(&mut singles);
     sort(&mut fits);
-    Ok(Found { null, fits, anew })
+    Ok(Found { null, fits, refound })
 }
 
 /// Fits of all single effects, best first.

@@ -37,7 +37,7 @@ fn study(planted: Option<(&dyn Effect, &[f64])>, seed: u64) -> Study {
 
 /// Signatures at least so long, in sigmas, are planted: shorter ones hide behind tolerances.
 const PLAIN: f64 = 8.0;
-/// What one effect too many takes off the misfit by chance: of 25, one exceeds this in three campaigns of a thousand
+/// By how much one effect too many reduces the misfit by chance: of 25, one exceeds this in three campaigns of a thousand
 /// (chi-square with one degree of freedom).
 const CHANCE: f64 = 15.0;
 /// Rivals that promise most are fitted.
@@ -91,7 +91,7 @@ fn complaint(clean: &Study, nominal: &Linearised, index: usize, effect: &dyn Eff
     let mut more = additions(&study, nominal, &everywhere, &own);
     more.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     if more[0].gain > CHANCE {
-        return Some(format!("{} takes off {:.1} beside it", name(more[0].effect), more[0].gain));
+        return Some(format!("{} reduces it by {:.1} beside it", name(more[0].effect), more[0].gain));
     }
     let mut rivals = additions(&study, nominal, &everywhere, &null);
     rivals.retain(|rival| rival.effect != index);

@@ -84,7 +84,7 @@ fn a_probe_of_two_millimetres_is_named_measured_and_closes_the_gap() {
     assert!(diagnosis.gap.channels["T2"].after < 0.2 * diagnosis.gap.channels["T2"].before);
 }
 
-/// Neither hides the other, and what a signature is long is what its effect takes off the misfit.
+/// Neither hides the other, and the length of a signature is by how much its effect reduces the misfit.
 #[test]
 fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {
     let truth: [(&str, &[f64]); 2] = [("stem_conduction", &[0.03]), ("flowmeter_gain", &[1.02])];

@@ -20,7 +20,7 @@ pub(crate) struct DeclaredEffect {
     pub(crate) bias_standard_errors: [f64; 2],
     /// What the assumed alpha_A may cost eta and h, one standard deviation.
     pub(crate) assumed_alpha: [f64; 2],
-    /// Variance of (measured less fitted T2) from sample noise, K2.
+    /// Variance of (measured minus fitted T2) from sample noise, K2.
     pub(crate) noise_k2: f64,
 }
 
@@ -75,7 +75,7 @@ fn column(samples: &Samples, channel: Channel) -> &[f64] {
     }
 }
 
-/// Derivative of (measured less fitted T2) by the reading of a channel, per row.
+/// Derivative of (measured minus fitted T2) by the reading of a channel, per row.
 fn sensitivity(fit: &Fit, samples: &Samples, geometry: Geometry, channel: Channel) -> Vec<f64> {
     if channel == Channel::T2 {
         return vec![1.0; samples.len()];

@@ -185,7 +185,7 @@ struct View<'a> {
     fit: &'a Fit,
     samples: &'a Samples,
     config: &'a IdentifyConfig,
-    /// Standard deviation of (measured less fitted T2) that the declared noise explains, K.
+    /// Standard deviation of (measured minus fitted T2) that the declared noise explains, K.
     noise_k: f64,
 }
 

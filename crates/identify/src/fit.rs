@@ -27,7 +27,7 @@ pub(crate) struct Geometry {
 pub(crate) struct Fit {
     pub(crate) eta: f64,
     pub(crate) h_w_m2k: f64,
-    /// Measured less fitted T2, K.
+    /// Measured minus fitted T2, K.
     pub(crate) residual_k: Vec<f64>,
     /// Derivatives of T2 by eta (K) and by h (K m2 K/W).
     pub(crate) jacobian: [Vec<f64>; 2],

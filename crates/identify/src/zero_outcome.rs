@@ -5,10 +5,10 @@ use crate::zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed}
 use mapper_core::{Recording, Soak};
 use serde::{Serialize, Serializer};
 
-/// Whether offsets were taken off a recording.
+/// Whether offsets were subtracted from a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum ZeroOutcome {
-    /// Offsets were taken off.
+    /// Offsets were subtracted.
     Found(IsothermalZero),
     /// A zero was asked for and the recording has none; the declared offsets stand.
     Refused(NoZero),

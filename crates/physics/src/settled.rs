@@ -19,7 +19,7 @@ const NOISE_SPREAD_SIGMAS: f64 = 5.0;
 const NOISE_LAG_BLOCKS: usize = 4;
 
 /// How many values, from the last one backwards, vary together by at most `allowed_ratio` of their mean, once
-/// `noise_spread` (in the values' own unit, >= 0) is taken off. NaN counts as settled; nothing but NaN never settles.
+/// `noise_spread` (in the values' own unit, >= 0) is subtracted. NaN counts as settled; nothing but NaN never settles.
 pub fn settled_count(
     backwards: impl IntoIterator<Item = f64>,
     allowed_ratio: f64,

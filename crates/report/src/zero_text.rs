@@ -3,7 +3,7 @@
 use mapper_identify::ZeroOutcome;
 use std::fmt::Write;
 
-/// Offsets taken off the readings with what is not known of them, or why there are none; empty where none was asked for.
+/// Offsets subtracted from the readings, with what is not known of them, or why there are none; empty where none was asked for.
 pub fn zero_text(zero: &ZeroOutcome) -> String {
     match zero {
         ZeroOutcome::NotAsked => String::new(),

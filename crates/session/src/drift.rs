@@ -9,7 +9,7 @@ use mapper_drift::{DriftReport, DriftRequest, RecordedRun, diagnose};
 use mapper_identify::{IdentifyConfig, ZeroOutcome};
 use mapper_record::ChannelMap;
 
-/// What is said of the recordings, and the zero that was taken off them.
+/// What is said of the recordings, and the zero that was subtracted from them.
 #[derive(Debug)]
 pub struct Drift {
     /// The answer.
@@ -60,7 +60,7 @@ impl Session<'_> {
     }
 }
 
-/// The zero of the first run, taken off all: a zero of its own for each would hide what drifted between them.
+/// The zero of the first run, subtracted from all: a zero of its own for each would hide what drifted between them.
 fn zeroed_alike(
     recorded: &[Recorded],
     config: IdentifyConfig,

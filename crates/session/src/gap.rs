@@ -1,4 +1,4 @@
-//! The gap between nominal model and rig: drift is looked for first, a zero taken off, then the diagnosis.
+//! The gap between nominal model and rig: drift is looked for first, a zero subtracted, then the diagnosis.
 
 use crate::declared::identification_with;
 use crate::planning::{nominal_model, with_plan_request};
@@ -104,12 +104,12 @@ fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<AllowedJump>,
     })
 }
 
-/// The recording to be diagnosed: a sensor's drift is taken off.
+/// The recording to be diagnosed: the drift of a sensor is subtracted.
 fn taken_off(recording: Recording, drift: Option<&DriftReport>) -> Recording {
     drift.and_then(|drift| without_drift(&recording, drift)).unwrap_or(recording)
 }
 
-/// Probability of a cause outside the catalogue below which nothing is made of it where a drift was taken off: how well the
+/// Probability of a cause outside the catalogue below which nothing is made of it where a drift was subtracted: how well the
 /// drift's course is known is in no tolerance of the diagnosis, and what is left of it looks like a small unknown cause.
 const SURELY_OUTSIDE: f64 = 0.9;
 

@@ -3,7 +3,7 @@
 use crate::declared::identification_with;
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
-use mapper_core::{IdentifiedPoint, Method, Recording, ReferenceState, ThermalModel};
+use mapper_core::{ALPHA_AREA_SIGMA_RATIO, IdentifiedPoint, Method, Recording, ReferenceState, ThermalModel};
 use mapper_identify::{IdentifyConfig, TwoParameter, WindowRule, ZeroOutcome, identify_recording};
 use mapper_record::ChannelMap;
 use mapper_record::score::{ScoreSummary, ScoredPoint};
@@ -11,7 +11,7 @@ use mapper_record::score::{ScoreSummary, ScoredPoint};
 /// What a recording gives.
 #[derive(Debug)]
 pub struct Identified {
-    /// The recording as it was identified: what the isothermal zero takes off is off.
+    /// The recording as it was identified: the isothermal zero is subtracted.
     pub recording: Recording,
     /// How it was identified.
     pub config: IdentifyConfig,
@@ -55,6 +55,7 @@ impl Session<'_> {
             (None, Some(machine)) => IdentifyConfig {
                 method: Method::Joint,
                 alpha_area_ratio: machine.alpha_area_ratio,
+                alpha_area_sigma_ratio: ALPHA_AREA_SIGMA_RATIO,
                 internal_area_m2: machine.compressor_internal_area_m2,
                 reference: map.reference.unwrap_or(ReferenceState::SAE),
                 window: map.window.map_or_else(WindowRule::default, |window| WindowRule::Fixed {

@@ -2,12 +2,9 @@
 
 use super::settle_bands::SettleBandsElement;
 use super::window::WindowFile;
-use mapper_core::{JointSettings, Method, SettleBands, WindowRule};
+use mapper_core::{ALPHA_AREA_SIGMA_RATIO, JointSettings, Method, SettleBands, WindowRule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// Where nobody has measured it, a twentieth of the area is what can be believed of an assumed alpha_A.
-const ALPHA_AREA_SIGMA_RATIO: f64 = 0.05;
 
 /// How points are identified.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

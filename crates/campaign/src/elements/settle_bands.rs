@@ -10,15 +10,15 @@ use serde::Deserialize;
 #[derive(Default, Deserialize, JsonSchema)]
 #[serde(remote = "SettleBands", default, deny_unknown_fields)]
 pub(crate) struct SettleBandsElement {
-    /// Shaft speed; 0.8 % where none is given.
+    /// Shaft speed; 0.8 % if none is given.
     #[serde(rename = "speed", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.8 %")]
     speed_ratio: f64,
-    /// Compressor flow; 1.5 % where none is given.
+    /// Compressor flow; 1.5 % if none is given.
     #[serde(rename = "flow", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-above" = "0 %", "x-max" = "100 %"), example = &"1.5 %")]
     flow_ratio: f64,
-    /// Pressure ratio; 2 % where none is given.
+    /// Pressure ratio; 2 % if none is given.
     #[serde(rename = "pressure_ratio", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-above" = "0 %", "x-max" = "100 %"), example = &"2 %")]
     pressure_ratio_ratio: f64,

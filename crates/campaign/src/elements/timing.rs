@@ -10,11 +10,11 @@ use serde::Deserialize;
 #[derive(Deserialize, JsonSchema)]
 #[serde(remote = "Timing", deny_unknown_fields)]
 pub(crate) struct TimingElement {
-    /// Time at the first point before its step begins; 0 s where none is given.
+    /// Time at the first point before its step begins; 0 s if none is given.
     #[serde(rename = "warm_up", default, deserialize_with = "si::<Duration, _>")]
     #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "24 h"), example = &"10 min")]
     warm_up_s: f64,
-    /// Time without flow after the last step; 0 s where none is given.
+    /// Time without flow after the last step; 0 s if none is given.
     #[serde(rename = "cool_down", default, deserialize_with = "si::<Duration, _>")]
     #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "24 h"), example = &"0 s")]
     cool_down_s: f64,

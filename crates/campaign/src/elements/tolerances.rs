@@ -10,43 +10,43 @@ use serde::Deserialize;
 #[derive(Default, Deserialize, JsonSchema)]
 #[serde(remote = "ModelTolerances", default, deny_unknown_fields)]
 pub(crate) struct TolerancesElement {
-    /// Gain of the compressor's flow meter; 0.5 % where none is given.
+    /// Gain of the compressor's flow meter; 0.5 % if none is given.
     #[serde(rename = "flow_meter_gain", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.5 %")]
     flow_meter_gain_ratio: f64,
-    /// Flow of the compressor map; 0.5 % where none is given.
+    /// Flow of the compressor map; 0.5 % if none is given.
     #[serde(rename = "flow_map", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.5 %")]
     flow_map_ratio: f64,
-    /// Efficiency of the compressor map, everywhere alike; 0.5 % where none is given.
+    /// Efficiency of the compressor map, everywhere alike; 0.5 % if none is given.
     #[serde(rename = "compressor_efficiency", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.5 %")]
     compressor_efficiency_ratio: f64,
-    /// Error of the efficiency map that changes smoothly over it; 0.3 % where none is given.
+    /// Error of the efficiency map that changes smoothly over it; 0.3 % if none is given.
     #[serde(rename = "efficiency_shape", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.3 %")]
     efficiency_shape_ratio: f64,
-    /// Efficiency of the turbine; 1 % where none is given.
+    /// Efficiency of the turbine; 1 % if none is given.
     #[serde(rename = "turbine_efficiency", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"1 %")]
     turbine_efficiency_ratio: f64,
-    /// Area of the back-pressure valve; 0.5 % where none is given.
+    /// Area of the back-pressure valve; 0.5 % if none is given.
     #[serde(rename = "valve_area", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.5 %")]
     valve_area_ratio: f64,
-    /// Convection between gas and compressor housing; 3 % where none is given.
+    /// Convection between gas and compressor housing; 3 % if none is given.
     #[serde(rename = "convection", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"3 %")]
     convection_ratio: f64,
-    /// Convection of both housings to the cell; 10 % where none is given.
+    /// Convection of both housings to the cell; 10 % if none is given.
     #[serde(rename = "external_convection", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"10 %")]
     external_convection_ratio: f64,
-    /// Conductance to the oil; 5 % where none is given.
+    /// Conductance to the oil; 5 % if none is given.
     #[serde(rename = "oil_conductance", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"5 %")]
     oil_conductance_ratio: f64,
-    /// Lag of the turbine inlet pressure behind its command, as declared; 0.3 s where none is given.
+    /// Lag of the turbine inlet pressure behind its command, as declared; 0.3 s if none is given.
     #[serde(rename = "actuator_lag", deserialize_with = "si::<Duration, _>")]
     #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "60 s"), example = &"0.3 s")]
     actuator_lag_s: f64,
@@ -78,7 +78,7 @@ mod tests {
         for (key, property) in properties {
             let description = property["description"].as_str().unwrap();
             let (_, named) = description.rsplit_once("; ").unwrap();
-            let text = named.strip_suffix(" where none is given.").unwrap();
+            let text = named.strip_suffix(" if none is given.").unwrap();
             let kind = Kind::from_key(property["x-quantity"].as_str().unwrap()).unwrap();
             let value = parse(kind, text).unwrap();
             let fields = [format!("{key}_ratio"), format!("{key}_s")];

@@ -6,7 +6,7 @@ use mapper_core::Soak;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// The isothermal zero: the run begins with the machine at rest, and the identification takes off what T1, T2, Tc and T_oil, and P1 and P2, then differ by.
+/// The isothermal zero: the run begins with the machine at rest, and the identification subtracts by how much T1, T2, Tc and T_oil, and P1 and P2, then differ.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ZeroFile {

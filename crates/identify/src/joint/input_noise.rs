@@ -2,7 +2,7 @@
 //!
 //! T1, Tc, flow and pressures drive the predicted gas temperature, their noise included; the real gas knows nothing of
 //! it. A probe that lags smooths the prediction and so removes some of that noise from the residual: least squares would
-//! take every rig for one with a slow probe. The expected sum of squares of this noise is therefore taken off (corrected
+//! take every rig for one with a slow probe. The expected sum of squares of this noise is therefore subtracted (corrected
 //! least squares, e.g. Carroll et al., Measurement Error in Nonlinear Models, ch. 7). It is found by sending noise of the
 //! declared kind the same way: smoothing, model, probe, whitening.
 

@@ -115,7 +115,7 @@ impl Problem<'_> {
         (0..SHARED).filter(|index| self.active[*index] && !(OFFSETS..SURFACE).contains(index)).collect()
     }
 
-    /// Whitened residuals of a step (measured less predicted), and derivatives of the prediction by its own parameters
+    /// Whitened residuals of a step (measured minus predicted), and derivatives of the prediction by its own parameters
     /// and by the shared ones named in `by`.
     pub(crate) fn residual(
         &self,

@@ -26,7 +26,7 @@ pub fn variance_of_mean(variance: f64, length_s: f64, time_constant_s: f64) -> f
 }
 
 /// Covariance of the process's means over two neighbouring blocks of `length_s` each, before the memory of a block's length
-/// is taken off: blocks `k` apart (1 or more) have `block_covariance * memory(k * length_s)`.
+/// is subtracted: blocks `k` apart (1 or more) have `block_covariance * memory(k * length_s)`.
 ///
 /// `variance * (2 cosh(x) - 2) / x^2` with `x` the length in time constants. It grows without bound with the length, as the
 /// memory falls; in the unit of `variance`. For a time constant of 0 it is infinite.

@@ -20,6 +20,7 @@ mod flow_drift;
 mod identify;
 mod joint;
 mod one_fit;
+mod relaxation;
 mod samples;
 mod steady;
 mod taps;

@@ -6,6 +6,7 @@
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
+use crate::relaxation;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, Soak, StepMarker};
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::mean;
@@ -56,6 +57,10 @@ impl From<Soak> for ZeroSettings {
 
 /// Shaft speed below which the machine is at rest, rpm: far below any idle, far above any sensor's noise.
 const AT_REST_RPM: f64 = 1000.0;
+/// Shortest rest from which the limit of a relaxing reading is found, s.
+const SHORTEST_RELAXATION_S: f64 = 600.0;
+/// Stretches over which readings are averaged for that, s.
+const BLOCK_S: f64 = 30.0;
 /// Standard deviations by which readings may differ before the soak itself is in doubt.
 const UNEVEN_SIGMAS: f64 = 5.0;
 
@@ -127,6 +132,7 @@ pub fn isothermal_zero(
     if (end_s - start_s).is_nan() || end_s - start_s < settings.shortest_s {
         return Err(no_soak);
     }
+    let rest = (start_s, end_s);
     let start_s = start_s.max(end_s - settings.longest_s);
     let mut zero = IsothermalZero { start_s, end_s, ..IsothermalZero::default() };
     let temperatures = [Channel::T1, Channel::T2, Channel::Tc, Channel::TOil];
@@ -152,8 +158,15 @@ pub fn isothermal_zero(
                 end_s - start_s,
                 colour.time_constant_s,
             );
-            let own = sigma.hypot(declared.noise_sigma * averaged.sqrt());
-            readings.push((*channel, reading.mean, own, own.hypot(declared.offset_sigma)));
+            let mut mean = reading.mean;
+            let mut own = sigma.hypot(declared.noise_sigma * averaged.sqrt());
+            // The housing is the last to come to the cell's temperature, and drifts by less than shows.
+            if *channel == Channel::Tc
+                && let Some((limit, error)) = housing_limit(recording, rest, config)
+            {
+                (mean, own) = (limit, sigma.hypot(error));
+            }
+            readings.push((*channel, mean, own, own.hypot(declared.offset_sigma)));
         }
         let weight: f64 = readings.iter().map(|(.., total)| total.powi(-2)).sum();
         let common = readings.iter().map(|(_, mean, _, total)| mean * total.powi(-2)).sum::<f64>() / weight;
@@ -207,6 +220,34 @@ fn at_rest(recording: &Recording) -> (f64, f64) {
     let first = (0..last).rev().find(|i| !rests(*i)).map_or(0, |i| i + 1);
     // The last sample at rest may already belong to the start of the machine.
     (speed.t_s[first], speed.t_s[last.saturating_sub(1).max(first)])
+}
+
+/// Where the housing's reading is going, K, by the last two thirds of the rest, and its standard error; `None` for a rest of
+/// less than ten minutes and for a sensor of which no noise is declared.
+fn housing_limit(
+    recording: &Recording,
+    (start_s, end_s): (f64, f64),
+    config: &IdentifyConfig,
+) -> Option<(f64, f64)> {
+    let first_s = start_s + (end_s - start_s) / 3.0;
+    let noise_sigma = config.declared.get(&Channel::Tc)?.noise_sigma;
+    if end_s - start_s < SHORTEST_RELAXATION_S {
+        return None;
+    }
+    let series = recording.series.get(&Channel::Tc)?;
+    let (mut t_s, mut means, mut fewest) = (Vec::new(), Vec::new(), usize::MAX);
+    for block in 0..((end_s - first_s) / BLOCK_S) as usize {
+        let from_s = first_s + block as f64 * BLOCK_S;
+        let (_, values) = series.slice(from_s, from_s + BLOCK_S);
+        let usable: Vec<f64> =
+            values.iter().copied().filter(|value| is_reading(Channel::Tc, *value)).collect();
+        let Some(mean) = mean(&usable) else { continue };
+        t_s.push(from_s + 0.5 * BLOCK_S);
+        means.push(mean);
+        fewest = fewest.min(usable.len());
+    }
+    let variance = coloured(config.noise_colour).variance_of_mean(fewest, BLOCK_S);
+    relaxation::limit(&t_s, &means, noise_sigma * variance.sqrt())
 }
 
 struct SoakMean {

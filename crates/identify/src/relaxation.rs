@@ -1,0 +1,84 @@
+//! Where a reading that relaxes is going: a housing at rest comes to the cell's temperature within an hour, a soak is shorter.
+
+/// Time constants that housings of turbochargers have at rest, s: 1 to 2 kg of aluminium at 1 to 2 W/K. Longer ones that the
+/// readings cannot exclude would draw the limit their way.
+const TIME_CONSTANTS_S: [f64; 5] = [400.0, 550.0, 700.0, 900.0, 1200.0];
+/// How far it may be from there at the beginning, one standard deviation beforehand, K.
+const START_SIGMA_K: f64 = 3.0;
+
+/// The limit of `values` (at `t_s`, each with the standard error `sigma`) under `limit + start exp(-t/tau)`, and its
+/// standard error. Limit and start are found by least squares for each time constant; these are averaged over with the weights
+/// that the values give them. `None` for fewer than six values.
+pub(crate) fn limit(t_s: &[f64], values: &[f64], sigma: f64) -> Option<(f64, f64)> {
+    let first_s = *t_s.first()?;
+    if values.len() < 6 || values.len() != t_s.len() || sigma.is_nan() || sigma <= 0.0 {
+        return None;
+    }
+    // Around the first value, so that sums of squares keep their digits.
+    let origin = *values.first()?;
+    let weight = sigma.powi(-2);
+    let fits: Vec<(f64, f64, f64)> = TIME_CONSTANTS_S
+        .iter()
+        .map(|tau_s| {
+            let (mut n, mut e1, mut e2, mut y1, mut ey) = (0.0, 0.0, START_SIGMA_K.powi(-2), 0.0, 0.0);
+            let mut y2 = 0.0;
+            for (t, value) in t_s.iter().zip(values) {
+                let (e, y) = ((-(t - first_s) / tau_s).exp(), value - origin);
+                n += weight;
+                e1 += weight * e;
+                e2 += weight * e * e;
+                y1 += weight * y;
+                ey += weight * e * y;
+                y2 += weight * y * y;
+            }
+            let determinant = n * e2 - e1 * e1;
+            let (limit, start) = ((e2 * y1 - e1 * ey) / determinant, (n * ey - e1 * y1) / determinant);
+            let square = y2 - limit * y1 - start * ey;
+            (limit, e2 / determinant, -0.5 * (square + determinant.ln()))
+        })
+        .collect();
+    let best = fits.iter().map(|(.., log)| *log).fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = fits.iter().map(|(.., log)| (log - best).exp()).sum();
+    let share = |log: f64| (log - best).exp() / total;
+    let mean: f64 = fits.iter().map(|(limit, _, log)| share(*log) * limit).sum();
+    let variance: f64 =
+        fits.iter().map(|(limit, own, log)| share(*log) * (own + (limit - mean).powi(2))).sum();
+    (mean.is_finite() && variance.is_finite()).then_some((origin + mean, variance.sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_pcg::Pcg64;
+
+    /// 0.5 K above the cell at the beginning, 0.09 K at the end: the mean of the last half would be 0.14 K off.
+    #[test]
+    fn the_limit_is_found_and_its_error_is_that_of_many_draws() {
+        let t_s: Vec<f64> = (0..40).map(|i| 30.0 * f64::from(i)).collect();
+        let mut random = Pcg64::seed_from_u64(1);
+        let (mut squares, mut claimed) = (0.0, 0.0);
+        for _ in 0..200 {
+            let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
+            let values: Vec<f64> =
+                t_s.iter().map(|t| 298.15 + 0.5 * (-t / 680.0).exp() + 0.03 * noise()).collect();
+            let (found, sigma) = limit(&t_s, &values, 0.03).unwrap();
+            squares += (found - 298.15).powi(2) / 200.0;
+            claimed += sigma * sigma / 200.0;
+        }
+        // Half of what the mean is off; the time constant is known to a factor of two from such data.
+        assert!(squares.sqrt() < 0.07, "{} K rms", squares.sqrt());
+        // 200 draws know their standard deviation to 5 %; the weights of five time constants are no exact posterior.
+        let ratio = (squares / claimed).sqrt();
+        assert!((0.75..1.25).contains(&ratio), "errors are {ratio} of what is claimed");
+    }
+
+    #[test]
+    fn a_reading_that_rests_is_its_own_limit() {
+        let t_s: Vec<f64> = (0..40).map(|i| 30.0 * f64::from(i)).collect();
+        let (found, sigma) = limit(&t_s, &[301.5; 40], 0.01).unwrap();
+        assert!((found - 301.5).abs() < 1e-9 && sigma < 0.02, "{found} +/- {sigma} K");
+        assert_eq!(limit(&t_s[..5], &[301.5; 5], 0.01), None);
+    }
+}

@@ -236,7 +236,8 @@ Generated; do not edit. The command, some fifteen minutes on two cores:
     python3 benches/seeds.py --mapper target/release/mapper --write docs/methods.md
 
 {seeds} seeds a row, each with its own noise and offsets drawn from the declared spread, on the virtual lab, whose truth is
-known. The soak before a zero is drawn as uneven as it is declared: 0.03 K and 3 Pa (one standard deviation). The same 48 points of `campaigns/turbo_a.yaml` by
+known. The soak before a zero is drawn as uneven as it is declared: 0.03 K and 3 Pa (one standard deviation). The same 48
+points of `campaigns/turbo_a.yaml` by
 
 - conventional mapping: along speed lines, each point held until T2 and housing hardly drift any more, efficiency from the
   temperature rise;

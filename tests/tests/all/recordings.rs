@@ -2,7 +2,7 @@
 
 use mapper_core::{CHANNELS, Group};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_tests::{CampaignFile, SHORT_GRID, mapper, mapper_command, only_run, python, scratch};
+use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, mapper_command, only_run, python, scratch};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -78,7 +78,8 @@ fn runs_at_the_same_time_go_to_directories_of_their_own() {
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn an_independent_reader_finds_what_the_run_recorded() {
     let scratch = scratch();
-    let campaign = CampaignFile::shipped_with(SHORT_GRID);
+    let replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
+    let campaign = CampaignFile::shipped_with(&replacements);
     let recording = recording_of(&run_into(&campaign.path, scratch.path()));
     let seen = python("read_recording.py", [&recording]);
     assert_eq!(seen["complete"], true);
@@ -158,9 +159,10 @@ fn scipy_finds_the_same_efficiency_and_heat_transfer() {
     let scratch = scratch();
     // Once as shipped, once with a share of the area before the wheel, so that eq. 1 counts.
     for (number, alpha) in ["alpha_area: 0  ", "alpha_area: 0.2"].into_iter().enumerate() {
-        let mut replacements = SHORT_GRID.to_vec();
+        let mut replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
         replacements.push(("  alpha_area: 0       #", ""));
-        let line = format!("  {alpha}     #");
+        // Known for certain, so that points are good.
+        let line = format!("  alpha_area_sigma: 0\n  {alpha}     #");
         replacements.last_mut().unwrap().1 = &line;
         let campaign = CampaignFile::shipped_with(&replacements);
         let result = run_into(&campaign.path, &scratch.path().join(number.to_string()));
@@ -217,7 +219,7 @@ fn a_stored_plan_is_run_and_a_stale_one_refused() {
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_recording_of_another_program_gives_the_same_points() {
     let scratch = scratch();
-    let mut replacements = SHORT_GRID.to_vec();
+    let mut replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
     // The window that the shipped channel map names.
     replacements.push(("window: auto ", "window: {start: 10 s, end: 110 s} "));
     let campaign = CampaignFile::shipped_with(&replacements);

@@ -9,7 +9,7 @@ const NODES: usize = 25;
 /// How far apart the end lines of two maps may be and still count as one speed, ratio: a speed is held within a percent.
 const END_SLACK: f64 = 0.01;
 
-/// A place of the second map beside the nearest place of the first at equal corrected speed. Differences: second less
+/// A place of the second map beside the nearest place of the first at equal corrected speed. Differences: second minus
 /// first.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ComparedPlace {
@@ -25,8 +25,8 @@ pub struct ComparedPlace {
     pub pressure_ratio_difference: f64,
     /// Distance across the line, in units of the first line's largest flow and largest PR - 1, positive outwards.
     pub distance_ratio: f64,
-    /// Standard error of the distance, both maps together.
-    pub distance_standard_error: f64,
+    /// Standard error of the distance, both maps together, in the same units.
+    pub distance_standard_error_ratio: f64,
     /// Difference of efficiency, fraction.
     pub eta_difference: f64,
     /// Standard error of the difference of efficiency, both maps together, fraction.
@@ -36,7 +36,7 @@ pub struct ComparedPlace {
 impl ComparedPlace {
     /// Whether the 95 % interval of the distance leaves 0 out.
     pub fn line_differs(&self) -> bool {
-        beyond(self.distance_ratio, self.distance_standard_error)
+        beyond(self.distance_ratio, self.distance_standard_error_ratio)
     }
 
     /// Whether the 95 % interval of the difference of efficiency leaves 0 out.
@@ -69,9 +69,9 @@ pub struct MapComparison {
     /// Root mean square of the distance over all places, ratio.
     pub distance_rms_ratio: f64,
     /// Root mean square of the difference of efficiency, fraction.
-    pub eta_rms: f64,
+    pub eta_difference_rms: f64,
     /// Mean difference of efficiency, fraction.
-    pub eta_mean: f64,
+    pub eta_difference_mean: f64,
     /// Share of places where the lines differ beyond their 95 % interval.
     pub line_differs_ratio: f64,
     /// Share of places where the efficiencies differ beyond their 95 % interval.
@@ -133,8 +133,8 @@ fn summary(lines: Vec<ComparedLine>, not_compared_rpm: Vec<f64>) -> MapCompariso
     let share = |differs: fn(&ComparedPlace) -> bool| places().filter(|p| differs(p)).count() as f64 / count;
     MapComparison {
         distance_rms_ratio: mean(|p| p.distance_ratio.powi(2)).sqrt(),
-        eta_rms: mean(|p| p.eta_difference.powi(2)).sqrt(),
-        eta_mean: mean(|p| p.eta_difference),
+        eta_difference_rms: mean(|p| p.eta_difference.powi(2)).sqrt(),
+        eta_difference_mean: mean(|p| p.eta_difference),
         line_differs_ratio: share(ComparedPlace::line_differs),
         eta_differs_ratio: share(ComparedPlace::eta_differs),
         lines,
@@ -189,7 +189,7 @@ fn compare_place(
         flow_difference_kg_s,
         pressure_ratio_difference,
         distance_ratio,
-        distance_standard_error: across(node).hypot(across(known[i])),
+        distance_standard_error_ratio: across(node).hypot(across(known[i])),
         eta_difference: node.eta - between(|n| n.eta),
         eta_standard_error: node.eta_standard_error.hypot(known[i].eta_standard_error),
     })

@@ -221,11 +221,14 @@ fn two_maps_are_compared_in_units_and_in_their_uncertainty() {
         point.eta = point.eta.map(|eta| eta + 0.06);
     }
     let other = compare(&first, &better).unwrap();
-    assert!((other.eta_mean - same.eta_mean - 0.06).abs() < 0.005);
+    assert!((other.eta_difference_mean - same.eta_difference_mean - 0.06).abs() < 0.005);
     assert!(other.eta_differs_ratio > 0.9);
     // A change of the reference state is not a difference.
     let turned = compare(&first, &second.at_reference(mapper_core::ReferenceState::GARRETT)).unwrap();
-    assert!((turned.eta_rms - same.eta_rms).abs() < 2e-3 && turned.distance_rms_ratio < 0.01);
+    assert!(
+        (turned.eta_difference_rms - same.eta_difference_rms).abs() < 2e-3
+            && turned.distance_rms_ratio < 0.01
+    );
 }
 
 #[test]

@@ -35,19 +35,8 @@ pub(crate) fn steps_of_case(campaign: &Campaign, nominal: &Model) -> Result<Vec<
 }
 
 fn at_rest(held: &SteadyState, dwell_s: f64) -> Predicted {
-    Predicted {
-        dt2_k: None,
-        dtc_k: None,
-        sigma_eta: None,
-        sigma_h_rel: None,
-        bias_eta: None,
-        bias_h_rel: None,
-        flow_kg_s: held.outputs.flow_kg_s,
-        pressure_ratio: held.outputs.pressure_ratio,
-        t2_k: held.outputs.t2_k,
-        settle_s: None,
-        minutes: dwell_s / 60.0,
-    }
+    let outputs = &held.outputs;
+    Predicted::settled(outputs.flow_kg_s, outputs.pressure_ratio, outputs.t2_k, dwell_s)
 }
 
 /// Yields them.

@@ -2,7 +2,7 @@
 
 use crate::load::DOCUMENT;
 use mapper_yaml::{Notes, Source};
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Error as _};
 use serde_json::{Error, Value};
 use std::path::Path;
 
@@ -15,6 +15,5 @@ pub(crate) fn any<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
 pub(crate) fn any_with<T>(text: &str, read: impl FnOnce(Value) -> Result<T, Error>) -> Result<T, Error> {
     let mut notes = Notes::default();
     let root = mapper_yaml::read(&Source::new(&DOCUMENT, Path::new("test.yaml"), text), &mut notes);
-    // This module is compiled for tests alone.
-    read(root.unwrap().to_json())
+    read(root.ok_or_else(|| Error::custom("the text is not YAML"))?.to_json())
 }

@@ -44,6 +44,25 @@ pub struct Predicted {
     pub minutes: f64,
 }
 
+impl Predicted {
+    /// A step of which only the settled state is known: flow in kg/s, T2 in K, dwell in s.
+    pub fn settled(flow_kg_s: f64, pressure_ratio: f64, t2_k: f64, dwell_s: f64) -> Self {
+        Predicted {
+            dt2_k: None,
+            dtc_k: None,
+            sigma_eta: None,
+            sigma_h_rel: None,
+            bias_eta: None,
+            bias_h_rel: None,
+            flow_kg_s,
+            pressure_ratio,
+            t2_k,
+            settle_s: None,
+            minutes: dwell_s / 60.0,
+        }
+    }
+}
+
 /// One step: go to a point and stay there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanStep {

@@ -7,8 +7,8 @@
 //! Each campaign has a twin: same seed, same noise, without the drift. What the points of the drifting one differ by is the
 //! error that the drift makes; what its corrected points still differ by is what the correction leaves of it.
 
-// A study stops at the first surprise and says where; it prints its table.
-#![allow(clippy::expect_used, clippy::panic, clippy::print_stdout)]
+// It prints its table.
+#![allow(clippy::print_stdout)]
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -18,8 +18,6 @@ use mapper_core::{Channel, Method};
 use mapper_drift::{Cause, Course, CourseKind, RateOrStep};
 use mapper_identify::{IdentifyConfig, identify_each};
 use std::collections::BTreeMap;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 const CAUSES: [Cause; 8] = [
     Cause::Sensor(Channel::T1),
@@ -46,19 +44,20 @@ struct Row {
     said: String,
 }
 
-fn main() {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |index: usize, usual: f64| {
-        arguments.get(index).map_or(usual, |text| text.parse().expect("arguments are numbers"))
+        let given = arguments.get(index);
+        given.map_or(Ok(usual), |text| text.parse::<f64>().map_err(|_| format!("`{text}` is not a number")))
     };
     let (nulls, per_cause, first) =
-        (number(0, 20.0) as usize, number(1, 3.0) as usize, number(2, 1000.0) as u64);
-    let factor = number(3, 3.0);
+        (number(0, 20.0)? as usize, number(1, 3.0)? as usize, number(2, 1000.0)? as u64);
+    let factor = number(3, 3.0)?;
     let method = match arguments.get(4).map(String::as_str) {
         None | Some("dynamic") => Method::Dynamic,
         Some("joint") => Method::Joint,
         Some("steady") => Method::Steady,
-        Some(other) => panic!("{other} is no method"),
+        Some(other) => return Err(format!("`{other}` is not a method: dynamic, joint, steady").into()),
     };
     let config = IdentifyConfig { method, ..identification() };
     let limits: BTreeMap<Cause, f64> = judge(&campaign(first, None).recording)
@@ -71,26 +70,12 @@ fn main() {
         .filter(|cause| arguments.get(5).is_none_or(|only| cause.name() == only.as_str()))
         .collect();
     let total = nulls + per_cause * causes.len();
-    let next = AtomicUsize::new(0);
-    let rows = Mutex::new(Vec::new());
-    let work = || {
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= total {
-                return;
-            }
-            let cause = index.checked_sub(nulls).map(|index| causes[index % causes.len()]);
-            let row = one(first + 1 + index as u64, cause, &limits, factor, &config);
-            rows.lock().expect("no thread panics while it holds the rows").push((index, row));
-        }
-    };
-    std::thread::scope(|scope| {
-        scope.spawn(work);
-        scope.spawn(work);
+    let rows = mapper_numerics::parallel::map(&(0..total).collect::<Vec<_>>(), |index| {
+        let cause = index.checked_sub(nulls).map(|index| causes[index % causes.len()]);
+        one(first + 1 + *index as u64, cause, &limits, factor, &config)
     });
-    let mut rows = rows.into_inner().expect("threads are joined");
-    rows.sort_by_key(|(index, _)| *index);
-    print(rows.into_iter().map(|(_, row)| row).collect());
+    print(rows);
+    Ok(())
 }
 
 fn one(

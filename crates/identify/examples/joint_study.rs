@@ -1,14 +1,12 @@
 //! Error and coverage of the joint method over seeded campaigns of the lumped model:
 //! `cargo run --release -p mapper-identify --example joint_study -- ALPHA PROBE_MM DIRECTION NOISE OFFSETS SEEDS FIRST`
 //! (noise and offsets in multiples of a good rig's; FIRST is the first seed, 0 where it is left out).
-#![allow(
-    clippy::unwrap_used,
-    reason = "a study of recordings that it makes itself: what fails is to stop it"
-)]
 #![allow(clippy::print_stdout, missing_docs, reason = "what it prints is all it is for")]
 #[path = "../tests/common/mod.rs"]
+#[allow(clippy::unwrap_used, reason = "shared with the tests")]
 mod common;
 #[path = "../tests/common/lab.rs"]
+#[allow(clippy::unwrap_used, reason = "shared with the tests")]
 mod lab;
 
 use lab::{Machine, campaign, eighteen, measured};
@@ -17,7 +15,7 @@ use mapper_identify::{IdentifyConfig, WindowRule, identify, identify_recording};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
-fn main() {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let argument = |i: usize, otherwise: f64| {
         std::env::args().nth(i).and_then(|text| text.parse().ok()).unwrap_or(otherwise)
     };
@@ -36,17 +34,16 @@ fn main() {
         if noise + offsets > 0.0 {
             config.declared = declared;
         }
-        let found = identify_recording(&recording, &config).unwrap();
-        let dynamic =
-            identify(&recording, &IdentifyConfig { method: Method::Dynamic, ..config.clone() }).unwrap();
+        let found = identify_recording(&recording, &config)?;
+        let dynamic = identify(&recording, &IdentifyConfig { method: Method::Dynamic, ..config.clone() })?;
         let (mut own_held, mut own_count, mut joint_square, mut dynamic_square) = (0.0, 0.0, 0.0, 0.0);
         for ((point, dynamic), truth) in found.points.iter().zip(&dynamic).zip(&clean.truth) {
-            let point = point.as_ref().unwrap();
+            let Ok(point) = point else { continue };
             let (Some(eta), Some(other)) = (point.eta, dynamic.eta) else { continue };
-            let interval = point.eta_low.unwrap()..=point.eta_high.unwrap();
+            let interval = ends(point.eta_low, point.eta_high)?;
             own_held += f64::from(u8::from(interval.contains(&truth.eta)));
             own_count += 1.0;
-            let h_interval = point.h_low_w_m2k.unwrap()..=point.h_high_w_m2k.unwrap();
+            let h_interval = ends(point.h_low_w_m2k, point.h_high_w_m2k)?;
             h_held += f64::from(u8::from(h_interval.contains(&truth.h_w_m2k)));
             if truth.speed_rpm < 55e3 {
                 slow += 1.0;
@@ -92,4 +89,10 @@ fn main() {
         slow_held / slow,
         slow_within / slow
     );
+    Ok(())
+}
+
+/// A 95 % interval; the joint method gives both ends with every efficiency.
+fn ends(low: Option<f64>, high: Option<f64>) -> Result<std::ops::RangeInclusive<f64>, &'static str> {
+    Ok(low.ok_or("an efficiency without an interval")?..=high.ok_or("an efficiency without an interval")?)
 }

@@ -59,6 +59,8 @@ impl From<Soak> for ZeroSettings {
 const AT_REST_RPM: f64 = 1000.0;
 /// Shortest rest from which the limit of a relaxing reading is found, s.
 const SHORTEST_RELAXATION_S: f64 = 600.0;
+/// Longest part of it that is looked at, s: three time constants of a heavy housing, however far apart the samples of a recording lie.
+const LONGEST_RELAXATION_S: f64 = 3600.0;
 /// Stretches over which readings are averaged for that, s.
 const BLOCK_S: f64 = 30.0;
 /// Standard deviations by which readings may differ before the soak itself is in doubt.
@@ -229,7 +231,7 @@ fn housing_limit(
     (start_s, end_s): (f64, f64),
     config: &IdentifyConfig,
 ) -> Option<(f64, f64)> {
-    let first_s = start_s + (end_s - start_s) / 3.0;
+    let first_s = (start_s + (end_s - start_s) / 3.0).max(end_s - LONGEST_RELAXATION_S);
     let noise_sigma = config.declared.get(&Channel::Tc)?.noise_sigma;
     if end_s - start_s < SHORTEST_RELAXATION_S {
         return None;

@@ -47,7 +47,7 @@ pub fn heat_transfer_figure(machine: &str, points: &[IdentifiedPoint], exponent:
 pub struct ErrorAtGradient {
     /// Change of T2 over the window, K.
     pub dt2_k: f64,
-    /// Identified less true efficiency, fraction.
+    /// Identified minus true efficiency, fraction.
     pub eta_error: f64,
     /// Half width of the point's 95 % interval, fraction.
     pub eta_half_interval: Option<f64>,

@@ -32,7 +32,7 @@ pub fn map_comparison_text(comparison: &MapComparison) -> String {
             number(mean(|p| p.flow_difference_kg_s), 5),
             number(mean(|p| p.pressure_ratio_difference), 4),
             number(mean(|p| 100.0 * p.distance_ratio), 2),
-            number(mean(|p| 196.0 * p.distance_standard_error), 2),
+            number(mean(|p| 196.0 * p.distance_standard_error_ratio), 2),
             number(mean(|p| 100.0 * p.eta_difference), 2),
             number(mean(|p| 196.0 * p.eta_standard_error), 2),
             number(share(ComparedPlace::line_differs), 0),
@@ -47,8 +47,8 @@ pub fn map_comparison_text(comparison: &MapComparison) -> String {
         "Over all places: distance {:.2} % rms, efficiency {:+.2} points on average, {:.2} rms; lines differ beyond their \
          uncertainty at {:.0} % of places, efficiencies at {:.0} %.",
         100.0 * comparison.distance_rms_ratio,
-        100.0 * comparison.eta_mean,
-        100.0 * comparison.eta_rms,
+        100.0 * comparison.eta_difference_mean,
+        100.0 * comparison.eta_difference_rms,
         100.0 * comparison.line_differs_ratio,
         100.0 * comparison.eta_differs_ratio,
     );

@@ -25,19 +25,7 @@ fn step(index: usize) -> PlanStep {
         oil_temperature_k: 323.15,
         dwell_s: 100.0,
         start_s: 100.0 * index as f64,
-        predicted: Predicted {
-            dt2_k: None,
-            dtc_k: None,
-            sigma_eta: None,
-            sigma_h_rel: None,
-            bias_eta: None,
-            bias_h_rel: None,
-            flow_kg_s: 0.05,
-            pressure_ratio: 1.5,
-            t2_k: 350.0,
-            settle_s: None,
-            minutes: 2.0,
-        },
+        predicted: Predicted::settled(0.05, 1.5, 350.0, 120.0),
     }
 }
 

@@ -23,19 +23,7 @@ fn plan() -> Plan {
         oil_temperature_k: 323.15,
         dwell_s: 20.0,
         start_s: 10.0 + 20.0 * index as f64,
-        predicted: Predicted {
-            dt2_k: None,
-            dtc_k: None,
-            sigma_eta: None,
-            sigma_h_rel: None,
-            bias_eta: None,
-            bias_h_rel: None,
-            flow_kg_s: 0.0,
-            pressure_ratio: 1.0,
-            t2_k: 300.0,
-            settle_s: None,
-            minutes: 20.0 / 60.0,
-        },
+        predicted: Predicted::settled(0.0, 1.0, 300.0, 20.0),
     };
     Plan {
         campaign: "test".to_owned(),

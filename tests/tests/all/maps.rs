@@ -124,7 +124,7 @@ fn a_map_differs_from_itself_nowhere() {
     ];
     let result = run(arguments).exits(0).json();
     assert_eq!([&result["line_differs_ratio"], &result["eta_differs_ratio"]], [0.0, 0.0]);
-    assert!(result["eta_rms"].as_f64().unwrap() < 1e-9);
+    assert!(result["eta_difference_rms"].as_f64().unwrap() < 1e-9);
     assert_eq!(result["lines"].as_array().unwrap().len(), 13);
     assert!(std::fs::read_to_string(picture).unwrap().starts_with("<svg"));
 }

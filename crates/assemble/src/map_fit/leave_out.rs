@@ -31,7 +31,7 @@ fn left_out(data: &Observations, line: usize, outermost: bool) -> Option<LeftOut
             point.ratio_scale,
         );
         distances.push(place.distance_ratio);
-        distances_held += held(place.distance_ratio, place.distance_standard_error, distance_rms);
+        distances_held += held(place.distance_ratio, place.distance_standard_error_ratio, distance_rms);
         if let Some(eta) = point.eta {
             let off = (eta - place.eta).abs();
             errors.push(off);

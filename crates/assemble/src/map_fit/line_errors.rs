@@ -9,11 +9,11 @@ use nalgebra::{DMatrix, DVector};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlaceError {
     /// Across the line, in units of the line's scales.
-    pub distance: f64,
+    pub distance_ratio: f64,
     /// The part of it along the axis of flow, not negative.
-    pub flow_part: f64,
+    pub flow_part_ratio: f64,
     /// The part of it along the axis of pressure ratio, not negative.
-    pub ratio_part: f64,
+    pub pressure_part_ratio: f64,
     /// Of efficiency at the foot, fraction.
     pub eta: f64,
 }
@@ -68,9 +68,9 @@ impl LineErrors {
         let error = |gradient: &DVector<f64>| gradient.dot(&(&self.covariance * gradient)).max(0.0).sqrt();
         let distance = error(&across);
         PlaceError {
-            distance,
-            flow_part: distance * nx.abs(),
-            ratio_part: distance * ny.abs(),
+            distance_ratio: distance,
+            flow_part_ratio: distance * nx.abs(),
+            pressure_part_ratio: distance * ny.abs(),
             eta: error(&eta),
         }
     }

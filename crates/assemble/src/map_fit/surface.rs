@@ -24,7 +24,7 @@ pub struct NearestPlace {
     /// Efficiency of the line at the nearest place, fraction.
     pub eta: f64,
     /// One standard error of the line there, across it, in units of the line's scales.
-    pub distance_standard_error: f64,
+    pub distance_standard_error_ratio: f64,
     /// One standard error of the efficiency, fraction.
     pub eta_standard_error: f64,
 }
@@ -52,7 +52,7 @@ impl MapFit {
         NearestPlace {
             distance_ratio: x.hypot(y),
             eta: self.believed(foot.place.eta, self.outside(speed_ratio)),
-            distance_standard_error: error.distance,
+            distance_standard_error_ratio: error.distance_ratio,
             eta_standard_error: error.eta,
         }
     }

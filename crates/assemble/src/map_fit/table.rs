@@ -188,8 +188,8 @@ fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Ve
                 pressure_ratio: place.pressure_ratio,
                 eta,
                 work_ratio: if eta < place.eta { work * place.eta / eta } else { work },
-                flow_standard_error_kg_s: error.flow_part * scales.flow_kg_s,
-                pressure_ratio_standard_error: error.ratio_part * scales.ratio,
+                flow_standard_error_kg_s: error.flow_part_ratio * scales.flow_kg_s,
+                pressure_ratio_standard_error: error.pressure_part_ratio * scales.ratio,
                 eta_standard_error: error.eta,
                 extrapolated,
             }

@@ -115,15 +115,12 @@ def main():
     parser.add_argument("--points", action="store_true", help="also each point's error")
     parser.add_argument("--shared", action="store_true", help="also what the points share")
     options = parser.parse_args()
-    arguments = ["--channels", options.channels] if options.channels else ["--campaign", options.campaign]
+    arguments = ["--campaign", options.campaign]
+    arguments += ["--channels", options.channels] if options.channels else []
     wanted = [c for c in cases(options.directory) if options.only in c[0] + " ".join(c[2])]
 
     def one(case):
-        # What does not change while joint is worked on: looked up again.
-        kept = case[1].with_suffix(".dynamic.json")
-        if not kept.exists():
-            kept.write_text(json.dumps(identified(options.mapper, case[1], "dynamic", arguments)))
-        return json.loads(kept.read_text()), identified(options.mapper, case[1], "joint", arguments)
+        return tuple(identified(options.mapper, case[1], method, arguments) for method in ("dynamic", "joint"))
 
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         found = list(pool.map(one, wanted))

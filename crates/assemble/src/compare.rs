@@ -25,11 +25,12 @@ pub struct ComparedPlace {
     pub pressure_ratio_difference: f64,
     /// Distance across the line, in units of the first line's largest flow and largest PR - 1, positive outwards.
     pub distance_ratio: f64,
-    /// Standard error of the distance, both maps together, in the same units.
+    /// Standard error of the distance, both maps together and with the gains and offsets that each map's points share, in
+    /// the same units.
     pub distance_standard_error_ratio: f64,
     /// Difference of efficiency, fraction.
     pub eta_difference: f64,
-    /// Standard error of the difference of efficiency, both maps together, fraction.
+    /// Standard error of the difference of efficiency, likewise, fraction.
     pub eta_standard_error: f64,
 }
 
@@ -144,53 +145,106 @@ fn summary(lines: Vec<ComparedLine>, not_compared_rpm: Vec<f64>) -> MapCompariso
 
 fn compare_lines(first: &FittedLine, second: &FittedLine) -> Vec<ComparedPlace> {
     let known: Vec<&FittedNode> = first.nodes.iter().filter(|n| !n.extrapolated).collect();
-    let flow_scale = known.iter().map(|n| n.flow_corrected_kg_s).fold(1e-12, f64::max);
+    let flow_scale_kg_s = known.iter().map(|n| n.flow_corrected_kg_s).fold(1e-12, f64::max);
     let ratio_scale = known.iter().map(|n| n.pressure_ratio - 1.0).fold(1e-6, f64::max);
-    let compared = |node: &FittedNode| compare_place(&known, node, flow_scale, ratio_scale);
-    second.nodes.iter().step_by(4).filter(|node| !node.extrapolated).filter_map(compared).collect()
+    let known = Known { nodes: &known, flow_scale_kg_s, ratio_scale };
+    let nodes = second.nodes.iter().step_by(4).filter(|node| !node.extrapolated);
+    nodes.filter_map(|node| known.compared(node)).collect()
 }
 
-/// The nearest place of the first line; none where it is the line's very end: there the other line goes on alone.
-fn compare_place(
-    known: &[&FittedNode],
-    node: &FittedNode,
-    flow_scale: f64,
+/// A place of one line nearest to a node of the other.
+struct Nearest<'a> {
+    /// Second minus first.
+    flow_difference_kg_s: f64,
+    pressure_ratio_difference: f64,
+    distance_ratio: f64,
+    eta_difference: f64,
+    /// Node of the first line just before the place.
+    before: &'a FittedNode,
+}
+
+/// The first line, and the units in which distances from it are measured.
+struct Known<'a> {
+    nodes: &'a [&'a FittedNode],
+    flow_scale_kg_s: f64,
     ratio_scale: f64,
-) -> Option<ComparedPlace> {
-    let scaled = |n: &FittedNode| (n.flow_corrected_kg_s / flow_scale, n.pressure_ratio / ratio_scale);
-    let (px, py) = scaled(node);
-    let mut best: Option<(f64, usize, f64)> = None;
-    for (i, pair) in known.windows(2).enumerate() {
-        let ((ax, ay), (bx, by)) = (scaled(pair[0]), scaled(pair[1]));
-        let (dx, dy) = (bx - ax, by - ay);
-        let share = ((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy).max(1e-30);
-        let inside = share.clamp(0.0, 1.0);
-        let distance = (px - ax - inside * dx).hypot(py - ay - inside * dy);
-        let end = (i == 0 && share < -1e-6) || (i + 2 == known.len() && share > 1.0 + 1e-6);
-        if best.is_none_or(|(least, ..)| distance < least) {
-            best = Some((distance, i, if end { f64::NAN } else { inside }));
+}
+
+impl Known<'_> {
+    /// None where the nearest place is the line's very end: there the other line goes on alone.
+    fn nearest(&self, node: &FittedNode) -> Option<Nearest<'_>> {
+        let scaled = |n: &FittedNode| {
+            (n.flow_corrected_kg_s / self.flow_scale_kg_s, n.pressure_ratio / self.ratio_scale)
+        };
+        let (px, py) = scaled(node);
+        let mut best: Option<(f64, usize, f64)> = None;
+        for (i, pair) in self.nodes.windows(2).enumerate() {
+            let ((ax, ay), (bx, by)) = (scaled(pair[0]), scaled(pair[1]));
+            let (dx, dy) = (bx - ax, by - ay);
+            let share = ((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy).max(1e-30);
+            let inside = share.clamp(0.0, 1.0);
+            let distance = (px - ax - inside * dx).hypot(py - ay - inside * dy);
+            let end = (i == 0 && share < -1e-6) || (i + 2 == self.nodes.len() && share > 1.0 + 1e-6);
+            if best.is_none_or(|(least, ..)| distance < least) {
+                best = Some((distance, i, if end { f64::NAN } else { inside }));
+            }
         }
+        let (_, i, share) = best.filter(|(.., share)| share.is_finite())?;
+        let (before, after) = (self.nodes[i], self.nodes[i + 1]);
+        let between = |value: fn(&FittedNode) -> f64| value(before) + share * (value(after) - value(before));
+        let flow_difference_kg_s = node.flow_corrected_kg_s - between(|n| n.flow_corrected_kg_s);
+        let pressure_ratio_difference = node.pressure_ratio - between(|n| n.pressure_ratio);
+        let (x, y) =
+            (flow_difference_kg_s / self.flow_scale_kg_s, pressure_ratio_difference / self.ratio_scale);
+        Some(Nearest {
+            flow_difference_kg_s,
+            pressure_ratio_difference,
+            // Outwards is where flow and pressure ratio grow.
+            distance_ratio: x.hypot(y) * (x + y).signum(),
+            eta_difference: node.eta - between(|n| n.eta),
+            before,
+        })
     }
-    let (_, i, share) = best.filter(|(.., share)| share.is_finite())?;
-    let between =
-        |value: fn(&FittedNode) -> f64| value(known[i]) + share * (value(known[i + 1]) - value(known[i]));
-    let flow_difference_kg_s = node.flow_corrected_kg_s - between(|n| n.flow_corrected_kg_s);
-    let pressure_ratio_difference = node.pressure_ratio - between(|n| n.pressure_ratio);
-    let (x, y) = (flow_difference_kg_s / flow_scale, pressure_ratio_difference / ratio_scale);
-    // Outwards is where flow and pressure ratio grow.
-    let distance_ratio = x.hypot(y) * (x + y).signum();
-    let across = |n: &FittedNode| {
-        (n.flow_standard_error_kg_s / flow_scale).hypot(n.pressure_ratio_standard_error / ratio_scale)
-    };
-    Some(ComparedPlace {
-        flow_corrected_kg_s: node.flow_corrected_kg_s,
-        pressure_ratio: node.pressure_ratio,
-        eta: node.eta,
-        flow_difference_kg_s,
-        pressure_ratio_difference,
-        distance_ratio,
-        distance_standard_error_ratio: across(node).hypot(across(known[i])),
-        eta_difference: node.eta - between(|n| n.eta),
-        eta_standard_error: node.eta_standard_error.hypot(known[i].eta_standard_error),
-    })
+
+    fn compared(&self, node: &FittedNode) -> Option<ComparedPlace> {
+        let found = self.nearest(node)?;
+        let across = |n: &FittedNode| {
+            (n.flow_standard_error_kg_s / self.flow_scale_kg_s)
+                .hypot(n.pressure_ratio_standard_error / self.ratio_scale)
+        };
+        let (mut distance, mut eta) = (
+            across(node).hypot(across(found.before)),
+            node.eta_standard_error.hypot(found.before.eta_standard_error),
+        );
+        // What a gain or an offset does to all flows or pressure ratios of a map moves the place over the line.
+        let flow_kg_s =
+            node.flow_common_standard_error_kg_s.hypot(found.before.flow_common_standard_error_kg_s);
+        let pressure_ratio = node
+            .pressure_ratio_common_standard_error
+            .hypot(found.before.pressure_ratio_common_standard_error);
+        for (flow_kg_s, pressure_ratio) in [(flow_kg_s, 0.0), (0.0, pressure_ratio)] {
+            let moved = [1.0, -1.0].into_iter().find_map(|sign| {
+                self.nearest(&FittedNode {
+                    flow_corrected_kg_s: node.flow_corrected_kg_s + sign * flow_kg_s,
+                    pressure_ratio: node.pressure_ratio + sign * pressure_ratio,
+                    ..*node
+                })
+            });
+            if let Some(moved) = moved {
+                distance = distance.hypot(moved.distance_ratio - found.distance_ratio);
+                eta = eta.hypot(moved.eta_difference - found.eta_difference);
+            }
+        }
+        Some(ComparedPlace {
+            flow_corrected_kg_s: node.flow_corrected_kg_s,
+            pressure_ratio: node.pressure_ratio,
+            eta: node.eta,
+            flow_difference_kg_s: found.flow_difference_kg_s,
+            pressure_ratio_difference: found.pressure_ratio_difference,
+            distance_ratio: found.distance_ratio,
+            distance_standard_error_ratio: distance,
+            eta_difference: found.eta_difference,
+            eta_standard_error: eta,
+        })
+    }
 }

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_assemble::{AssembleError, Grouping, assemble};
-use mapper_core::{IdentifiedPoint, Method, OperatingPoint, ReferenceState, StepKind, Verdict};
+use mapper_core::{CommonErrors, IdentifiedPoint, Method, OperatingPoint, ReferenceState, StepKind, Verdict};
 use proptest::prelude::*;
 
 fn point(
@@ -32,6 +32,7 @@ fn point(
         h_low_w_m2k: None,
         h_high_w_m2k: None,
         h_uncertainty: None,
+        common: CommonErrors::default(),
         method: Method::Dynamic,
         verdict: Verdict::Good,
         warnings: Vec::new(),

@@ -56,8 +56,10 @@ pub struct Campaign {
     pub follow_outlet: FollowOutlet,
     /// Declared uncertainty of each channel that has a sensor.
     pub sensors: BTreeMap<Channel, SensorDeclaration>,
-    /// Declared tolerances of the nominal model.
+    /// Declared tolerances of the nominal model; the usual ones where the file gives none.
     pub tolerances: ModelTolerances,
+    /// Whether the file gives any: only then the machine is declared to be like its nominal map.
+    pub tolerances_declared: bool,
     /// The rig.
     pub backend: BackendChoice,
     /// The grid in the order of the file, no point twice: `points` as listed, or for each opening all speeds.
@@ -112,9 +114,9 @@ pub(crate) struct CampaignFile {
     /// Declared uncertainty of each measured channel, by its symbol.
     sensors: SensorsFile,
     /// Declared tolerances of the nominal model; the defaults where none are given.
-    #[serde(default, deserialize_with = "TolerancesElement::deserialize")]
+    #[serde(default, deserialize_with = "TolerancesElement::declared")]
     #[schemars(with = "TolerancesElement")]
-    tolerances: ModelTolerances,
+    tolerances: Option<ModelTolerances>,
     /// The rig, by the name of its backend, with the backend's own settings below it, e.g. `virtual_lab: {}`. What stands there is checked by the backend.
     #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"virtual_lab": {}}))]
     backend: BTreeMap<String, serde_json::Value>,
@@ -181,7 +183,8 @@ impl CampaignFile {
             boundary,
             follow_outlet,
             sensors: self.sensors.declarations(),
-            tolerances: self.tolerances,
+            tolerances: self.tolerances.unwrap_or_default(),
+            tolerances_declared: self.tolerances.is_some(),
             backend: backend(self.backend),
             points,
             timing: self.timing,

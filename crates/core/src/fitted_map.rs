@@ -18,8 +18,18 @@ pub struct FittedNode {
     pub flow_standard_error_kg_s: f64,
     /// Standard error across the line: its part along the pressure ratio.
     pub pressure_ratio_standard_error: f64,
-    /// Standard error of `eta`, fraction.
+    /// Standard error of `eta`, what all points share included, fraction.
     pub eta_standard_error: f64,
+    /// The part of it that all places share, as far as the points say: it moves the whole surface, fraction.
+    #[serde(default)]
+    pub eta_common_standard_error: f64,
+    /// Standard error that the corrected flows of all places share (the flow meter's gain), kg/s; not part of that across
+    /// the line.
+    #[serde(default)]
+    pub flow_common_standard_error_kg_s: f64,
+    /// The same of the pressure ratio.
+    #[serde(default)]
+    pub pressure_ratio_common_standard_error: f64,
     /// Whether no measured point supports this place: beyond the ends of the measured lines, or between two lines
     /// beyond the outermost speeds.
     pub extrapolated: bool,
@@ -100,6 +110,7 @@ impl FittedMap {
             for node in &mut line.nodes {
                 node.flow_corrected_kg_s *= flow_factor;
                 node.flow_standard_error_kg_s *= flow_factor;
+                node.flow_common_standard_error_kg_s *= flow_factor;
             }
         }
         for line in &mut self.left_out {

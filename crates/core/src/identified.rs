@@ -1,6 +1,6 @@
 //! What identification says of one point, and how sure it is.
 
-use crate::{OperatingPoint, StepKind};
+use crate::{CommonErrors, OperatingPoint, StepKind};
 use serde::{Deserialize, Serialize};
 
 /// How a point was identified.
@@ -75,11 +75,17 @@ impl EstimateUncertainty {
     }
 }
 
+/// 97.5 % quantile of the standard normal distribution.
+const Z_975: f64 = 1.959_963_984_540_054;
+
 /// The 95 % interval of a normally distributed estimate: value -/+ 1.96 standard errors.
 pub fn confidence_interval_95(value: f64, standard_error: f64) -> (f64, f64) {
-    // 97.5 % quantile of the standard normal distribution.
-    const Z_975: f64 = 1.959_963_984_540_054;
     (value - Z_975 * standard_error, value + Z_975 * standard_error)
+}
+
+/// The standard error whose 95 % interval this is: the reverse of [`confidence_interval_95`].
+pub fn standard_error_of(low: f64, high: f64) -> f64 {
+    0.5 * (high - low) / Z_975
 }
 
 /// One identified point of the map. Absent numbers are `None`, never made up.
@@ -125,6 +131,9 @@ pub struct IdentifiedPoint {
     pub h_high_w_m2k: Option<f64>,
     /// Standard errors of `h_w_m2k` by origin, W/(m2 K).
     pub h_uncertainty: Option<EstimateUncertainty>,
+    /// Which part of these errors the recording's other points share.
+    #[serde(default)]
+    pub common: CommonErrors,
     /// How it was identified.
     pub method: Method,
     /// Whether to use it.
@@ -139,4 +148,23 @@ pub struct IdentifiedPoint {
     pub dt2_k: Option<f64>,
     /// Change of the housing temperature over the window, K.
     pub dtc_k: Option<f64>,
+}
+
+impl IdentifiedPoint {
+    /// Standard error of `eta` that no other point shares, fraction; `None` without an interval.
+    pub fn eta_own_standard_error(&self) -> Option<f64> {
+        let all = standard_error_of(self.eta_low?, self.eta_high?);
+        Some(beside(all, self.common.eta_standard_error()))
+    }
+
+    /// Standard error of `h` that no other point shares, W/(m2 K); `None` without an interval.
+    pub fn h_own_standard_error_w_m2k(&self) -> Option<f64> {
+        let all = standard_error_of(self.h_low_w_m2k?, self.h_high_w_m2k?);
+        Some(beside(all, self.common.h_standard_error_w_m2k()))
+    }
+}
+
+/// What is left of a standard error when an independent part is taken out.
+fn beside(all: f64, part: f64) -> f64 {
+    (all * all - part * part).max(0.0).sqrt()
 }

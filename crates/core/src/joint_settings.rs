@@ -85,5 +85,5 @@ impl JointSettings {
 }
 
 /// How far the true alpha_A may be off the one that is assumed, one standard deviation, if nothing is said: where nobody has
-/// measured it, it is known to a twentieth of the area at best.
-pub const ALPHA_AREA_SIGMA_RATIO: f64 = 0.05;
+/// measured it, a tenth to a quarter of the area may lie before the wheel.
+pub const ALPHA_AREA_SIGMA_RATIO: f64 = 0.15;

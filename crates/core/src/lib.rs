@@ -12,6 +12,7 @@
 mod backend;
 mod channel;
 mod clock;
+mod common_errors;
 mod declared_uncertainty;
 mod event;
 mod fitted_map;
@@ -43,11 +44,13 @@ mod with_unit;
 pub use backend::{Backend, BackendCause, BackendError, RigDescription, RigMode, Setpoints};
 pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
 pub use clock::{Clock, UnpacedClock};
+pub use common_errors::CommonErrors;
 pub use declared_uncertainty::{DeclaredUncertainty, NoiseColour};
 pub use event::{Event, EventKind};
 pub use fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
 pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
+    standard_error_of,
 };
 pub use joint_settings::{
     ALPHA_AREA_SIGMA_RATIO, Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings,

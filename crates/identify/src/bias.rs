@@ -14,10 +14,13 @@ const ENTERING: [Channel; 6] =
     [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
 
 /// Effect of the declared uncertainties.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct DeclaredEffect {
     /// Standard errors of eta and h from fixed offsets and gains.
     pub(crate) bias_standard_errors: [f64; 2],
+    /// What each offset, each gain and the assumed alpha_A change by one standard deviation, with sign: all points share
+    /// them. In an order that depends on the declaration alone.
+    pub(crate) common: [Vec<f64>; 2],
     /// What the assumed alpha_A may cost eta and h, one standard deviation.
     pub(crate) assumed_alpha: [f64; 2],
     /// Variance of (measured minus fitted T2) from sample noise, K2.
@@ -41,9 +44,13 @@ pub(crate) fn declared_effect(
             fit.response(sensitivity.iter().map(|s| s * declared.offset_sigma)),
             fit.response(sensitivity.iter().zip(values).map(|(s, v)| s * v * declared.gain_sigma_ratio)),
         ];
-        for response in responses {
+        for (response, sigma) in responses.into_iter().zip([declared.offset_sigma, declared.gain_sigma_ratio])
+        {
             squares[0] += response[0] * response[0];
             squares[1] += response[1] * response[1];
+            if sigma > 0.0 {
+                effect.push(response);
+            }
         }
         let mean_square = sensitivity.iter().map(|s| s * s).sum::<f64>() / samples.len().max(1) as f64;
         effect.noise_k2 += mean_square * declared.noise_sigma * declared.noise_sigma;
@@ -60,8 +67,17 @@ pub(crate) fn declared_effect(
         let sigma = away * config.alpha_area_sigma_ratio;
         let moved_k = rows(samples).map(|row| fitted_k(row, sigma) - fitted_k(row, 0.0));
         effect.assumed_alpha = fit.response(moved_k);
+        effect.push(effect.assumed_alpha);
     }
     effect
+}
+
+impl DeclaredEffect {
+    fn push(&mut self, response: [f64; 2]) {
+        for (common, change) in self.common.iter_mut().zip(response) {
+            common.push(change);
+        }
+    }
 }
 
 fn column(samples: &Samples, channel: Channel) -> &[f64] {

@@ -26,10 +26,12 @@ const STRUCTURE_BLOCK_S: f64 = 10.0;
 const STRUCTURE_OVER_NOISE_RATIO: f64 = 0.75;
 
 /// What a method makes of one step.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Estimate {
     pub(crate) eta: Option<(f64, Option<EstimateUncertainty>)>,
     pub(crate) h_w_m2k: Option<(f64, Option<EstimateUncertainty>)>,
+    /// What the errors that points share do to eta and h: see [`CommonErrors`](mapper_core::CommonErrors).
+    pub(crate) common: [Vec<f64>; 2],
     pub(crate) window: Option<Window>,
     pub(crate) residual_rms_k: Option<f64>,
     pub(crate) dt2_k: Option<f64>,
@@ -100,6 +102,7 @@ pub(crate) fn estimate(
     judge_assumption(declared.assumed_alpha[0], config, findings);
     judge_flow(drift, config, findings);
     judge_residual(&view, estimate.dt2_k, findings);
+    estimate.common = declared.common;
     estimate
 }
 

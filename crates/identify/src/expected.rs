@@ -82,6 +82,6 @@ pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) 
 pub fn expected_steady(row: &ExpectedRow, config: &IdentifyConfig) -> Option<(f64, f64)> {
     let means = Means { t1_k: row.t1_k, t2_k: row.t2_k, p1_pa: row.p1_pa, p2_pa: row.p2_pa };
     let eta = means.apparent_eta();
-    let sigma = uncertainty(&means, &Samples::default(), config).bias_standard_error;
+    let sigma = uncertainty(&means, &Samples::default(), config).0.bias_standard_error;
     (eta.is_finite() && eta > 0.0 && sigma.is_finite()).then_some((eta, sigma))
 }

@@ -44,6 +44,8 @@ pub mod code {
     pub const OFF_THE_LAW: &str = "off_the_law";
     /// Something speaks against the joint model as a whole.
     pub const MODEL_DOUBTED: &str = "model_doubted";
+    /// The efficiencies lie off the nominal map beyond its declared tolerances (joint method).
+    pub const OFF_THE_NOMINAL_MAP: &str = "off_the_nominal_map";
     /// The step has no transient of its own: its efficiency rests on what is shared (joint method).
     pub const THROUGH_THE_LAW: &str = "through_the_law";
     /// Part of the state at the step's end is not from its last seconds.

@@ -6,8 +6,8 @@ use crate::findings::Findings;
 use crate::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, dynamic, joint, steady};
 use mapper_core::{
-    Channel, EstimateUncertainty, IdentifiedPoint, Method, Recording, StepMarker, ThermalModel, WindowRule,
-    confidence_interval_95,
+    Channel, CommonErrors, EstimateUncertainty, IdentifiedPoint, Method, Recording, StepMarker, ThermalModel,
+    WindowRule, confidence_interval_95,
 };
 
 /// Identifies every step of a recording, in order. Steps of which not even the place on the map is known are left
@@ -200,6 +200,7 @@ fn point(
         h_low_w_m2k: h_interval.map(|(low, _)| low),
         h_high_w_m2k: h_interval.map(|(_, high)| high),
         h_uncertainty: estimate.h_w_m2k.and_then(|(_, uncertainty)| uncertainty),
+        common: common_errors(state, estimate, config),
         method: config.method,
         verdict: findings.verdict,
         warnings: findings.warnings,
@@ -207,5 +208,26 @@ fn point(
         residual_rms_k: estimate.residual_rms_k,
         dt2_k: estimate.dt2_k,
         dtc_k: estimate.dtc_k,
+    }
+}
+
+/// What all points share: of their numbers as the method has it, of their place as declared.
+fn common_errors(state: &EndState, estimate: &Estimate, config: &IdentifyConfig) -> CommonErrors {
+    let relative = |channel: Channel, reading: f64| {
+        let declared = config.declared.get(&channel).copied().unwrap_or_default();
+        let relative = (declared.offset_sigma / reading).hypot(declared.gain_sigma_ratio);
+        // A reading of 0 has no relative error, and no place on a map.
+        if relative.is_finite() { relative } else { 0.0 }
+    };
+    let flow = relative(Channel::CompressorFlow, state.flow_kg_s);
+    let p1 = relative(Channel::P1, state.p1_pa);
+    let p2 = relative(Channel::P2, state.p1_pa * state.pressure_ratio);
+    let [eta, h_w_m2k] = estimate.common.clone();
+    CommonErrors {
+        eta,
+        h_w_m2k,
+        // Corrected flow goes with the root of T1 and with 1/P1.
+        flow_corrected_ratio: flow.hypot(p1).hypot(0.5 * relative(Channel::T1, state.t1_k)),
+        pressure_ratio: state.pressure_ratio * p1.hypot(p2),
     }
 }

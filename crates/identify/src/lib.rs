@@ -19,6 +19,7 @@ mod fit;
 mod flow_drift;
 mod identify;
 mod joint;
+mod nominal_map;
 mod one_fit;
 mod relaxation;
 mod samples;
@@ -38,6 +39,7 @@ pub use joint::surface::EfficiencySurface;
 pub use mapper_core::{
     Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings, SettleBands, WindowRule,
 };
+pub use nominal_map::doubt_off_the_nominal_map;
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
 pub use two_parameter::TwoParameter;

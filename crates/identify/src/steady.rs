@@ -88,7 +88,7 @@ pub(crate) fn estimate(
         findings.refuse(code::NO_COMPRESSION, message);
         return estimate;
     }
-    let uncertainty = uncertainty(&means, &samples, config);
+    let (uncertainty, common) = uncertainty(&means, &samples, config);
     let trend_window = Window { start_s: (step.end_s - DRIFT_SPAN_S).max(step.start_s), end_s: step.end_s };
     let trend = Samples::of(recording, trend_window, config, false);
     for (name, column) in [("T2", &trend.t2_k), ("Tc", &trend.tc_k)] {
@@ -116,6 +116,7 @@ pub(crate) fn estimate(
         findings.remark(code::NOTHING_DECLARED, message);
     }
     estimate.eta = Some((eta, Some(uncertainty)));
+    estimate.common[0] = common;
     estimate
 }
 
@@ -131,17 +132,21 @@ fn slope_per_s(t_s: &[f64], values: &[f64]) -> Option<f64> {
 }
 
 /// Noise from the scatter of the samples' own efficiencies (or the declared noise where that is more), offsets and
-/// gains one sensor at a time.
-pub(crate) fn uncertainty(means: &Means, samples: &Samples, config: &IdentifyConfig) -> EstimateUncertainty {
-    let (mut bias_square, mut declared_square) = (0.0, 0.0);
+/// gains one sensor at a time; what each of these changes is also returned, since all points share it.
+pub(crate) fn uncertainty(
+    means: &Means,
+    samples: &Samples,
+    config: &IdentifyConfig,
+) -> (EstimateUncertainty, Vec<f64>) {
+    let (mut common, mut declared_square) = (Vec::new(), 0.0);
     for channel in [Channel::T1, Channel::T2, Channel::P1, Channel::P2] {
         let Some(declared) = config.declared.get(&channel) else { continue };
         let value = means.value(channel);
         let step = 1e-5 * value;
         let slope = (means.moved(channel, step).apparent_eta() - means.moved(channel, -step).apparent_eta())
             / (2.0 * step);
-        bias_square +=
-            (slope * declared.offset_sigma).powi(2) + (slope * value * declared.gain_sigma_ratio).powi(2);
+        let spreads = [declared.offset_sigma, value * declared.gain_sigma_ratio];
+        common.extend(spreads.iter().filter(|sigma| **sigma > 0.0).map(|sigma| slope * sigma));
         declared_square += (slope * declared.noise_sigma).powi(2);
     }
     let etas: Vec<f64> = (0..samples.len())
@@ -152,5 +157,10 @@ pub(crate) fn uncertainty(means: &Means, samples: &Samples, config: &IdentifyCon
     let span_s = samples.t_s.last().copied().unwrap_or(0.0) - samples.t_s.first().copied().unwrap_or(0.0);
     let averaging = coloured(config.noise_colour).variance_of_mean(etas.len(), span_s);
     let noise_square = scatter.max(declared_square) * averaging;
-    EstimateUncertainty { noise_standard_error: noise_square.sqrt(), bias_standard_error: bias_square.sqrt() }
+    let bias_square: f64 = common.iter().map(|change: &f64| change * change).sum();
+    let uncertainty = EstimateUncertainty {
+        noise_standard_error: noise_square.sqrt(),
+        bias_standard_error: bias_square.sqrt(),
+    };
+    (uncertainty, common)
 }

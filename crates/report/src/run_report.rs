@@ -8,6 +8,7 @@ use crate::markdown::{self, Align};
 use crate::number::{number, percent};
 use crate::points::{score_text, step_name, verdict_word};
 use crate::repeated_jumps::repeated_jumps_text;
+use crate::shared_errors::shared_errors_text;
 use mapper_assemble::RepeatedJump;
 use mapper_campaign::Campaign;
 use mapper_core::{Event, Plan};
@@ -133,6 +134,9 @@ fn points_section(text: &mut String, campaign: &Campaign, points: &[ScoredPoint]
     text.push_str(
         "## Points\n\nIntervals are 95 %: noise, declared sensor offsets, and what moving flow is estimated to cost the method.\n\n",
     );
+    if let Some(shared) = shared_errors_text(points.iter().map(|scored| &scored.point), &campaign.display) {
+        let _ = writeln!(text, "{shared}\n");
+    }
     let heads = [
         "step",
         &display.speed_head("speed"),

@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
-    IdentifiedPoint, Limits, Method, OperatingPoint, SettleBands, StepKind, Timing, Verdict, WindowRule,
+    CommonErrors, IdentifiedPoint, Limits, Method, OperatingPoint, SettleBands, StepKind, Timing, Verdict,
+    WindowRule,
 };
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
@@ -67,6 +68,7 @@ fn answer(step: &SequenceStep) -> StepResult {
         h_low_w_m2k: None,
         h_high_w_m2k: None,
         h_uncertainty: None,
+        common: CommonErrors::default(),
         method: Method::Dynamic,
         verdict: if step.index == 0 { Verdict::Unusable } else { Verdict::Good },
         warnings: Vec::new(),

@@ -3,8 +3,11 @@
 use crate::declared::identification_with;
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
+use mapper_campaign::nominal_model;
 use mapper_core::{ALPHA_AREA_SIGMA_RATIO, IdentifiedPoint, Method, Recording, ReferenceState, ThermalModel};
-use mapper_identify::{IdentifyConfig, TwoParameter, WindowRule, ZeroOutcome, identify_recording};
+use mapper_identify::{
+    IdentifyConfig, TwoParameter, WindowRule, ZeroOutcome, doubt_off_the_nominal_map, identify_recording,
+};
 use mapper_record::ChannelMap;
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 
@@ -77,7 +80,16 @@ impl Session<'_> {
         let zero = ZeroOutcome::of(&recorded.read.recording, &config, soak);
         let (recording, config) = zero.take_off(recorded.read.recording, config);
         let found = identify_recording(&recording, &config)?;
-        let points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
+        let mut points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
+        if let Some(campaign) = recorded.campaign.as_ref().filter(|campaign| campaign.tolerances_declared) {
+            let model = nominal_model(campaign)?;
+            doubt_off_the_nominal_map(
+                &mut points,
+                model.map.as_ref(),
+                config.reference,
+                &campaign.tolerances,
+            );
+        }
         for point in &points {
             self.tell(SessionEvent::PointIdentified(Box::new(point.clone())));
         }

@@ -13,7 +13,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
 };
 
 /// Column names, in order.
-const COLUMNS: [&str; 11] = [
+const COLUMNS: [&str; 14] = [
     "speed_corrected_rpm",
     "beta",
     "flow_corrected_kg_s",
@@ -23,6 +23,9 @@ const COLUMNS: [&str; 11] = [
     "flow_standard_error_kg_s",
     "pressure_ratio_standard_error",
     "eta_standard_error",
+    "flow_common_standard_error_kg_s",
+    "pressure_ratio_common_standard_error",
+    "eta_common_standard_error",
     "line",
     "support",
 ];
@@ -45,6 +48,7 @@ fn header(map: &CompressorMap, fitted: &FittedMap) -> String {
         "{}\
          # fitted speed lines; scatter of the points about them: {:.2} % of distance, {:.2} points of efficiency\n\
          # *_standard_error: one standard error; flow and pressure ratio: the parts of the error across the line\n\
+         # *_common_standard_error: what all places share (gains, offsets); in eta_standard_error it is included\n\
          # beta: 0 at the choke end, 1 at the surge end; line: measured or not; support: measured or extrapolated\n",
         heading(map, "#"),
         100.0 * fitted.distance_rms_ratio,
@@ -52,7 +56,7 @@ fn header(map: &CompressorMap, fitted: &FittedMap) -> String {
     )
 }
 
-fn row(line: &FittedLine, beta_ratio: f64, node: &FittedNode) -> [String; 11] {
+fn row(line: &FittedLine, beta_ratio: f64, node: &FittedNode) -> [String; 14] {
     // Shortest text that reads back to the same number.
     let number = |value: f64| value.to_string();
     [
@@ -65,6 +69,9 @@ fn row(line: &FittedLine, beta_ratio: f64, node: &FittedNode) -> [String; 11] {
         number(node.flow_standard_error_kg_s),
         number(node.pressure_ratio_standard_error),
         number(node.eta_standard_error),
+        number(node.flow_common_standard_error_kg_s),
+        number(node.pressure_ratio_common_standard_error),
+        number(node.eta_common_standard_error),
         (if line.measured { "measured" } else { "between_or_beyond" }).to_owned(),
         (if node.extrapolated { "extrapolated" } else { "measured" }).to_owned(),
     ]

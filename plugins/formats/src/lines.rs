@@ -2,8 +2,8 @@
 
 use crate::reference;
 use mapper_core::{
-    CompressorMap, IdentifiedPoint, ImportError, MapPoint, Method, ReferenceState, SpeedLine, SpeedShift,
-    StepKind, Verdict,
+    CommonErrors, CompressorMap, IdentifiedPoint, ImportError, MapPoint, Method, ReferenceState, SpeedLine,
+    SpeedShift, StepKind, Verdict,
 };
 use mapper_physics::similarity::at_speed;
 
@@ -82,6 +82,7 @@ impl Row {
             h_low_w_m2k: None,
             h_high_w_m2k: None,
             h_uncertainty: None,
+            common: CommonErrors::default(),
             method: Method::Imported,
             verdict: if self.eta.is_some() { Verdict::Good } else { Verdict::Unusable },
             warnings: Vec::new(),

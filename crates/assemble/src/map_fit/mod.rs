@@ -1,5 +1,6 @@
 //! A smooth surface through all speed lines together.
 
+mod common_errors;
 mod crossing;
 mod error;
 mod fit;

@@ -1,6 +1,7 @@
 //! What a map says to a fit: its points as measured, each at its own speed.
 
 use super::MapFitError;
+use super::common_errors::CommonErrorField;
 use mapper_core::{CompressorMap, MapPoint, Verdict};
 use mapper_physics::similarity::head_ratio;
 
@@ -18,7 +19,7 @@ pub(crate) struct Observation {
     pub flow_kg_s: f64,
     pub pressure_ratio: f64,
     pub eta: Option<f64>,
-    /// Standard error that the point itself declares, fraction; 0 without one.
+    /// Standard error of the efficiency that no other point shares, fraction; 0 where none is known.
     pub eta_error: f64,
     /// The line's largest flow, kg/s, and largest pressure ratio less 1: units of the distance.
     pub flow_scale_kg_s: f64,
@@ -45,6 +46,8 @@ pub(crate) struct Observations {
     /// Corrected speeds of the lines, rpm, rising.
     pub lines_rpm: Vec<f64>,
     pub points: Vec<Observation>,
+    /// What the points have in common that the fit cannot see.
+    pub common: CommonErrorField,
 }
 
 impl Observations {
@@ -73,7 +76,7 @@ impl Observations {
             });
         }
         let nominal_speed_rpm = lines.get(lines.len() / 2).map_or(1.0, |line| line.0);
-        let mut points = Vec::with_capacity(count);
+        let (mut points, mut common) = (Vec::with_capacity(count), CommonErrorField::default());
         for (index, (speed_corrected_rpm, members)) in lines.iter().enumerate() {
             let largest =
                 |value: fn(&MapPoint) -> f64| members.iter().map(|p| value(p)).fold(f64::MIN, f64::max);
@@ -82,14 +85,14 @@ impl Observations {
             if ratio_scale <= 1e-4 {
                 return Err(MapFitError::NoCompression { speed_corrected_rpm: *speed_corrected_rpm });
             }
-            points.extend(
-                members
-                    .iter()
-                    .map(|point| observation(point, index, nominal_speed_rpm, flow_scale_kg_s, ratio_scale)),
-            );
+            for point in members {
+                let own = observation(point, index, nominal_speed_rpm, flow_scale_kg_s, ratio_scale);
+                common.add(own.speed_ratio, own.flow_kg_s / flow_scale_kg_s, point);
+                points.push(own);
+            }
         }
-        let all =
-            Observations { nominal_speed_rpm, lines_rpm: lines.iter().map(|line| line.0).collect(), points };
+        let lines_rpm = lines.iter().map(|line| line.0).collect();
+        let all = Observations { nominal_speed_rpm, lines_rpm, points, common };
         all.enough()?;
         Ok(all)
     }
@@ -103,8 +106,12 @@ impl Observations {
             .iter()
             .filter(|p| p.line != line)
             .map(|p| Observation { line: if p.line > line { p.line - 1 } else { p.line }, ..*p });
-        let rest =
-            Observations { nominal_speed_rpm: self.nominal_speed_rpm, lines_rpm, points: points.collect() };
+        let rest = Observations {
+            nominal_speed_rpm: self.nominal_speed_rpm,
+            lines_rpm,
+            points: points.collect(),
+            common: self.common.clone(),
+        };
         rest.enough()?;
         Ok(rest)
     }
@@ -132,8 +139,7 @@ fn observation(
 ) -> Observation {
     let p = &point.identified;
     let eta = point.eta.filter(|eta| p.verdict != Verdict::Unusable && (-1.0..=1.5).contains(eta));
-    // Half the 95 % interval over 1.96.
-    let eta_error = p.eta_low.zip(p.eta_high).map_or(0.0, |(low, high)| (high - low) / 3.92);
+    let eta_error = p.eta_own_standard_error().unwrap_or(0.0);
     Observation {
         line,
         speed_ratio: p.speed_corrected_rpm / nominal_speed_rpm,

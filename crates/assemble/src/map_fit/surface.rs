@@ -25,7 +25,7 @@ pub struct NearestPlace {
     pub eta: f64,
     /// One standard error of the line there, across it, in units of the line's scales.
     pub distance_standard_error_ratio: f64,
-    /// One standard error of the efficiency, fraction.
+    /// One standard error of the efficiency, without what all points share, fraction.
     pub eta_standard_error: f64,
 }
 

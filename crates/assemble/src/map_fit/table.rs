@@ -182,6 +182,7 @@ fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Ve
             // A hair's breadth beyond the last point is not an extrapolation.
             let extrapolated = supported.is_none_or(|(low, high)| angle < low - 0.02 || angle > high + 0.02);
             let eta = fit.believed(place.eta, extrapolated);
+            let common = fit.data.common.at(speed_ratio, place.flow_kg_s / scales.flow_kg_s);
             let work = shape.at(angle).work * speed_ratio * speed_ratio;
             FittedNode {
                 flow_corrected_kg_s: place.flow_kg_s,
@@ -190,7 +191,10 @@ fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Ve
                 work_ratio: if eta < place.eta { work * place.eta / eta } else { work },
                 flow_standard_error_kg_s: error.flow_part_ratio * scales.flow_kg_s,
                 pressure_ratio_standard_error: error.pressure_part_ratio * scales.ratio,
-                eta_standard_error: error.eta,
+                eta_standard_error: error.eta.hypot(common.eta),
+                eta_common_standard_error: common.eta,
+                flow_common_standard_error_kg_s: common.flow_ratio * place.flow_kg_s,
+                pressure_ratio_common_standard_error: common.pressure_ratio,
                 extrapolated,
             }
         })

@@ -1,7 +1,8 @@
 //! Maps from rows of numbers.
 
 use mapper_core::{
-    CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceState, SpeedLine, StepKind, Verdict,
+    CommonErrors, CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceState, SpeedLine, StepKind,
+    Verdict,
 };
 
 /// Corrected speed (rpm), corrected flow (kg/s), pressure ratio, efficiency.
@@ -49,6 +50,7 @@ fn point(row: &Row) -> MapPoint {
         h_low_w_m2k: None,
         h_high_w_m2k: None,
         h_uncertainty: None,
+        common: CommonErrors::default(),
         method: Method::Imported,
         verdict: Verdict::Good,
         warnings: Vec::new(),

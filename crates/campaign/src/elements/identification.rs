@@ -36,8 +36,8 @@ pub(crate) struct IdentificationFile {
     /// Share of the internal area before compression that identification assumes, a plain number from 0 to 1; the machine's if none is given.
     #[schemars(range(min = 0, max = 1), example = 0.0)]
     alpha_area: Option<f64>,
-    /// How far the true share may be off the assumed one, one standard deviation, a plain number; 0.05 if none is given. `dynamic` cannot find the share, so its intervals contain this; 0 believes the assumption.
-    #[schemars(range(min = 0, max = 1), example = 0.05)]
+    /// How far the true share may be off the assumed one, one standard deviation, a plain number; 0.15 if none is given. `dynamic` cannot find the share, so its intervals contain this; 0 believes the assumption.
+    #[schemars(range(min = 0, max = 1), example = 0.15)]
     alpha_area_sigma: Option<f64>,
     /// Variations within which a point counts as settled.
     #[serde(default, deserialize_with = "SettleBandsElement::deserialize")]
@@ -84,7 +84,7 @@ mod tests {
             method: Method::Joint,
             window: WindowRule::Auto,
             alpha_area_ratio: 0.2,
-            alpha_area_sigma_ratio: 0.05,
+            alpha_area_sigma_ratio: 0.15,
             settle_bands: SettleBands::default(),
             joint: JointSettings::default(),
         };

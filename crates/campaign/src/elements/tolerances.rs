@@ -4,7 +4,7 @@ use crate::si::si;
 use crate::units::{Duration, Fraction, Quantity};
 use mapper_core::ModelTolerances;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 
 /// How far the nominal model may be off without anything being wrong, one standard deviation each. The diagnosis of the gap calls nothing within them an effect.
 #[derive(Default, Deserialize, JsonSchema)]
@@ -50,6 +50,15 @@ pub(crate) struct TolerancesElement {
     #[serde(rename = "actuator_lag", deserialize_with = "si::<Duration, _>")]
     #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "60 s"), example = &"0.3 s")]
     actuator_lag_s: f64,
+}
+
+impl TolerancesElement {
+    /// What the file declares; a field of [`CampaignFile`](crate::campaign::CampaignFile) that is there is `Some`.
+    pub(crate) fn declared<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<ModelTolerances>, D::Error> {
+        TolerancesElement::deserialize(deserializer).map(Some)
+    }
 }
 
 #[cfg(test)]

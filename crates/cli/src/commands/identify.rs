@@ -5,7 +5,7 @@ use crate::given::{channel_map, given_campaign};
 use crate::{output, registry};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
-use mapper_report::{disagreement_text, points_text, thermal_text, zero_text};
+use mapper_report::{disagreement_text, points_text, shared_errors_text, thermal_text, zero_text};
 use mapper_session::{Recorded, Session};
 use serde_json::json;
 use std::path::PathBuf;
@@ -55,6 +55,9 @@ impl Identify {
         let disagreement = disagreement_text(&found.points, &found.two_parameter, &display);
         let mut text = disagreement.unwrap_or_default();
         text.push_str(&points_text(&found.points, &display));
+        if let Some(shared) = shared_errors_text(found.points.iter().map(|scored| &scored.point), &display) {
+            text.push_str(&format!("{shared}\n"));
+        }
         if let Some(thermal) = &found.thermal {
             text.push_str(&thermal_text(thermal));
         }

@@ -8,7 +8,8 @@ use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::Verdict;
 use mapper_report::{
-    Display, disagreement_text, plan_text, points_text, repeated_jumps_text, thermal_text, zero_text,
+    Display, disagreement_text, plan_text, points_text, repeated_jumps_text, shared_errors_text,
+    thermal_text, zero_text,
 };
 use mapper_session::{Ended, PreparedRun, Results, RunOutcome, RunRequest, Session, SessionError, soak_s};
 use serde_json::json;
@@ -131,6 +132,10 @@ fn results_text(campaign: &Campaign, results: &Results) -> String {
     let disagreement = disagreement_text(&results.points, &results.two_parameter, &campaign.display);
     let mut text = disagreement.unwrap_or_default();
     text.push_str(&points_text(&results.points, &campaign.display));
+    let points = results.points.iter().map(|scored| &scored.point);
+    if let Some(shared) = shared_errors_text(points, &campaign.display) {
+        let _ = writeln!(text, "{shared}");
+    }
     text.push_str(&repeated_jumps_text(&results.repeats, &Display::new(&campaign.display)));
     if let Some(thermal) = &results.thermal {
         text.push_str(&thermal_text(thermal));

@@ -49,15 +49,20 @@ fn slow_square(problem: &Problem<'_>, member: &Member<'_>) -> Option<f64> {
 
 /// Takes steps that fit far worse than the others out of what is shared; true where that changed anything.
 pub(crate) fn exclude(problem: &mut Problem<'_>) -> bool {
-    let squares: Vec<f64> = problem.members.iter().map(|member| mean_square(problem, member)).collect();
-    let Some(middle) = median(&squares) else { return false };
+    let squares: Vec<f64> = problem
+        .members
+        .iter()
+        .map(|member| if member.barred { f64::INFINITY } else { mean_square(problem, member) })
+        .collect();
+    let open = || squares.iter().copied().filter(|square| square.is_finite());
+    let Some(middle) = median(open()) else { return false };
     let limit = EXCLUDE_SQUARE * middle.max(1.0);
     let mut changed = false;
     // Never more than a third: then it is the model that is wrong, not the steps.
-    let bad = squares.iter().filter(|square| **square > limit).count();
-    let few = 3 * bad <= squares.len();
+    let bad = open().filter(|square| *square > limit).count();
+    let few = 3 * bad <= open().count();
     for (member, square) in problem.members.iter_mut().zip(&squares) {
-        let shares = !(few && *square > limit);
+        let shares = !(member.barred || few && *square > limit);
         changed |= shares != member.shares;
         member.shares = shares;
     }
@@ -96,7 +101,7 @@ pub(crate) fn judge_step(
         let message = format!("the residual of T2 is {:.1} times the declared noise", square.sqrt());
         findings.doubt(code::POOR_FIT, message);
     }
-    if !member.shares {
+    if !member.shares && !member.barred {
         let message =
             "this step fits so much worse than the others that it does not count in what they share"
                 .to_owned();

@@ -6,6 +6,7 @@
 //! `docs/identification.md`.
 
 pub(crate) mod cleaning;
+pub(crate) mod common_part;
 pub(crate) mod explained;
 pub(crate) mod input_noise;
 pub(crate) mod judge;
@@ -14,6 +15,8 @@ pub(crate) mod parameters;
 pub(crate) mod parsimony;
 pub(crate) mod probe;
 pub(crate) mod profile;
+pub(crate) mod quantity;
+pub(crate) mod regions;
 pub(crate) mod rows;
 pub(crate) mod shared;
 pub(crate) mod smoothing;
@@ -38,6 +41,9 @@ use mapper_numerics::statistics::rms;
 
 /// Fits before the last one.
 const ROUNDS: usize = 3;
+
+/// Growth of the points' standard errors above which leaving a region out costs more than it gains.
+const MOST_LOST_RATIO: f64 = 2.0;
 
 /// What the method makes of a recording.
 #[derive(Debug)]
@@ -80,11 +86,15 @@ pub(crate) fn estimate(
     let steps = start::steps(recording, end_states, config, findings);
     let careful = carefully(config);
     let late: Vec<rows::StepRows> = steps.iter().map(rows::StepRows::settled).collect();
-    let attempt = match Attempt::new(&steps, &alone, config) {
-        Some(attempt) if attempt.thermal.doubts.is_empty() || careful.joint == config.joint => Some(attempt),
-        first => match Attempt::new(&late, &alone, &careful) {
-            Some(other) => Some(other.instead_of(first)),
-            None => first,
+    let attempt = match Attempt::new(&steps, &alone, config, &[]) {
+        Some(attempt) if attempt.thermal.doubts.is_empty() => Some(attempt),
+        first => match first.as_ref().and_then(|first| first.without_a_region(&steps, &alone, config)) {
+            Some(other) => Some(other),
+            None if careful.joint == config.joint => first,
+            None => match Attempt::new(&late, &alone, &careful, &[]) {
+                Some(other) => Some(other.instead_of(first)),
+                None => first,
+            },
         },
     };
     let Some(attempt) = attempt else {
@@ -94,11 +104,11 @@ pub(crate) fn estimate(
             let message = "least squares over all steps did not converge: this step was identified by itself"
                 .to_owned();
             findings[step.position].doubt(code::FIT_FAILED, message);
-            estimates[step.position] = alone[step.position];
+            estimates[step.position] = alone[step.position].clone();
         }
         return Joint { estimates, thermal: None, two_parameter };
     };
-    let Attempt { problem, smoothed, thermal } = attempt;
+    let Attempt { problem, smoothed, thermal, left_out, .. } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
         let own = &mut findings[step.position];
@@ -124,12 +134,19 @@ pub(crate) fn estimate(
         estimates[step.position] = Estimate {
             eta: Some((eta, Some(eta_error))),
             h_w_m2k: Some((h_w_m2k, Some(h_error))),
+            common: [
+                smoothed.common[0][i].clone(),
+                smoothed.common[1][i].iter().map(|by_ln_h| h_w_m2k * by_ln_h).collect(),
+            ],
             window: first.zip(last).map(|(first, last)| Window { start_s: first.t_s, end_s: last.t_s }),
             residual_rms_k: rms(residual),
             dt2_k: change(|row| row.t2_k),
             dtc_k: change(|row| row.tc_k),
         };
         judge::judge_step(&problem, i, eta_error.combined_standard_error(), config, own);
+        if let Some(message) = left_out.as_ref().filter(|_| member.barred) {
+            own.doubt(code::LEFT_OUT, message.clone());
+        }
         if !commands::begins_with_jump(&recording.steps, step.position) {
             let message =
                 "no jump leads to this step: its efficiency rests on what the points share".to_owned();
@@ -149,13 +166,26 @@ pub(crate) fn estimate(
 /// A fit with what is made of it.
 struct Attempt<'a> {
     problem: Problem<'a>,
+    covariance: Covariance,
     smoothed: Smoothed,
     thermal: ThermalModel,
+    /// Why the barred steps are barred, if any are.
+    left_out: Option<String>,
 }
 
 impl<'a> Attempt<'a> {
-    fn new(steps: &'a [rows::StepRows], alone: &[Estimate], config: &IdentifyConfig) -> Option<Self> {
+    /// `barred`: indices of steps that have no say in what is shared.
+    fn new(
+        steps: &'a [rows::StepRows],
+        alone: &[Estimate],
+        config: &IdentifyConfig,
+        barred: &[usize],
+    ) -> Option<Self> {
         let mut problem = start::problem(steps, alone, config)?;
+        for index in barred {
+            let member = problem.members.get_mut(*index)?;
+            (member.shares, member.barred) = (false, true);
+        }
         let covariance = fitted(&mut problem, steps, config)?;
         let mut smoothed = smoothness::smoothed(&problem, &covariance, steps, config.reference);
         if smoothed.strain > smoothness::STRAIN_SIGMAS {
@@ -168,7 +198,37 @@ impl<'a> Attempt<'a> {
             smoothed.strain = strain;
         }
         let thermal = shared::thermal_model(&problem, &covariance, &smoothed, steps, config);
-        Some(Attempt { problem, smoothed, thermal })
+        Some(Attempt { problem, covariance, smoothed, thermal, left_out: None })
+    }
+
+    /// The fit without the region of the map that disagrees most, if there is one.
+    fn without_a_region(
+        &self,
+        steps: &'a [rows::StepRows],
+        alone: &[Estimate],
+        config: &IdentifyConfig,
+    ) -> Option<Self> {
+        regions::regions(steps, config.reference).into_iter().find_map(|of_size| {
+            let rests = of_size.into_iter().filter_map(|region| {
+                let rest = Attempt::new(steps, alone, config, &region.steps)?;
+                let undoubted = rest.thermal.doubts.is_empty();
+                let sigmas = regions::disagreement(
+                    (&self.problem, &self.covariance),
+                    (&rest.problem, &rest.covariance),
+                )?;
+                // What is left must still know what it is about.
+                let knows = rest.smoothed.middle_error() < MOST_LOST_RATIO * self.smoothed.middle_error();
+                (undoubted && knows).then_some((region, rest, sigmas))
+            });
+            let (region, mut rest, sigmas) = rests.max_by(|a, b| a.2.total_cmp(&b.2))?;
+            rest.left_out = Some(format!(
+                "the steps {} disagree with all others on what they share ({sigmas:.0} standard errors; with them, {}): they do not \
+                 count in it",
+                region.name,
+                self.thermal.doubts.join("; "),
+            ));
+            Some(rest)
+        })
     }
 
     /// This one after another was doubted: the doubts remain.

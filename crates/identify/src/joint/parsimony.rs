@@ -5,10 +5,12 @@
 //! them are at work is weighed: the density, after the fit, of the declared values of those that are not, over their
 //! density before (Savage and Dickey; e.g. Kass and Raftery, Bayes Factors, 1995), with an error of its own for what the
 //! model does not know. A refinement is then drawn towards the declared value by the weight of the choices without it, and
-//! what that leaves open (the spread between the two answers) is carried on as variance.
+//! what that leaves open is carried on as variance: enough that the 95 % interval about the drawn value reaches as far as
+//! the mixture of both answers does. Its plain variance would not, since the mixture has a long tail on one side.
 
 use crate::joint::parameters::{ALPHA, LN_DIRECTION, PROBE_MM2, SHARED};
 use crate::joint::solve::{Covariance, FULLY, Problem};
+use mapper_numerics::statistics::{NORMAL_975, normal_quantile};
 use nalgebra::{DMatrix, DVector};
 
 /// The refinements, and for each what small faults of the model can pass for: a clearance that grows by a percent as the
@@ -36,13 +38,23 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<()> {
             continue;
         }
         let found = problem.shared[index] - problem.priors[index].mean;
-        problem.extra_variances[index] = weight * (1.0 - weight) * found * found;
+        problem.extra_variances[index] = extra_variance(weight, found.abs(), information.powf(-0.5));
         let needed = information * (1.0 / weight.max(1e-6) - 1.0);
         if needed > problem.priors[index].weight() {
             problem.priors[index].sigma = needed.powf(-0.5);
         }
         problem.minimise(FULLY)?;
     }
+}
+
+/// Variance beyond that of the drawn fit, which is `weight` times the square of `sigma`: see above. `found`: distance of
+/// what was found from the declared value; `sigma`: its standard error.
+fn extra_variance(weight: f64, found: f64, sigma: f64) -> f64 {
+    let plain = weight * (1.0 - weight) * found * found;
+    // Where less than 2.5 % is beyond the declared value, the tail ends there.
+    let Some(quantile) = normal_quantile(1.0 - (1.0 - 0.975) / weight) else { return plain };
+    let reach = (found + quantile * sigma - weight * found).max(0.0) / NORMAL_975;
+    plain.max(reach * reach - weight * sigma * sigma)
 }
 
 /// Probability of each active refinement to be at work.
@@ -102,6 +114,24 @@ mod tests {
 
     fn diagonal(errors: &[f64]) -> DMatrix<f64> {
         DMatrix::from_diagonal(&DVector::from_iterator(errors.len(), errors.iter().map(|e| e * e)))
+    }
+
+    /// The interval about the drawn value leaves 2.5 % of the mixture beyond it, by counting (numbers at equal ranks).
+    #[test]
+    fn the_interval_reaches_as_far_as_the_mixture() {
+        for (weight, found, sigma) in [(0.1, 0.05, 0.02), (0.3, 0.05, 0.03), (0.9, 0.08, 0.03)] {
+            let variance = weight * sigma * sigma + extra_variance(weight, found, sigma);
+            let upper = weight * found + NORMAL_975 * variance.sqrt();
+            let ranks = 1_000_000;
+            let beyond = (1..ranks)
+                .filter(|rank| {
+                    let share = f64::from(*rank) / f64::from(ranks);
+                    normal_quantile(share).is_some_and(|z| found + z * sigma > upper)
+                })
+                .count();
+            let left = weight * beyond as f64 / f64::from(ranks);
+            assert!(left < 0.0251, "{weight} {found} {sigma}: {left}");
+        }
     }
 
     #[test]

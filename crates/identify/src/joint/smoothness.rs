@@ -7,13 +7,13 @@
 //! the weights that the points give them. On a map that bends much by itself the offsets then keep their declared spread;
 //! on a flat one they lose about half of it. Everything that errs with the efficiencies is corrected along with them.
 
-use crate::joint::parameters::{
-    ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SURFACE, SharedVector,
-};
+use crate::joint::common_part::common_part;
+use crate::joint::quantity::{Quantity, is_offset, of_shared, quantities};
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
 use crate::joint::surface::SurfaceScale;
 use mapper_core::{EstimateUncertainty, ReferenceState};
+use mapper_numerics::statistics::median;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Standard deviations of the efficiencies about their mean, fraction: what maps of compressors show along a valve opening
@@ -55,21 +55,20 @@ pub(crate) struct Smoothed {
     pub(crate) eta: Vec<Judged>,
     /// ln of h at the step's end, over what the fit has.
     pub(crate) ln_h: Vec<Judged>,
+    /// What each of the errors that the points share does to every point's efficiency, and to its ln h.
+    pub(crate) common: [Vec<Vec<f64>>; 2],
     /// For each shared parameter that was fitted or carried: by how much it moves, and its standard error then.
     pub(crate) shared: Vec<(f64, f64)>,
     /// How far the offsets were moved, in declared standard deviations.
     pub(crate) strain: f64,
 }
 
-/// A number that errs with the parameters: its covariance with every point's efficiency, its variance, its covariances
-/// with the shared parameters.
-struct Quantity {
-    value: f64,
-    by_eta: DVector<f64>,
-    /// The part of `by_eta` that smoothness may speak of: what offsets and a step's own noise bring.
-    by_smooth: DVector<f64>,
-    variance: f64,
-    by_shared: DVector<f64>,
+impl Smoothed {
+    /// Middle one of the efficiencies' standard errors, fraction; infinite without any.
+    pub(crate) fn middle_error(&self) -> f64 {
+        let errors = self.eta.iter().map(|judged| judged.uncertainty.combined_standard_error());
+        median(errors).unwrap_or(f64::INFINITY)
+    }
 }
 
 /// One choice of amplitude and lengths, solved.
@@ -159,103 +158,40 @@ pub(crate) fn smoothed(
         .map(|row| shared[*row].0.powi(2) / covariance.shared[(*row, *row)])
         .sum::<f64>()
         .sqrt();
-    Smoothed {
-        eta: etas.iter().map(&judge).collect(),
-        ln_h: ln_hs.iter().map(&judge).collect(),
-        shared,
-        strain,
-    }
+    let (eta, ln_h): (Vec<Judged>, Vec<Judged>) =
+        (etas.iter().map(&judge).collect(), ln_hs.iter().map(&judge).collect());
+    let best = solved.iter().max_by(|a, b| a.weight.total_cmp(&b.weight));
+    let common = [(&etas, &eta), (&ln_hs, &ln_h)].map(|(quantities, judged)| {
+        let (covariance, own) = together(quantities, &etas, best);
+        let errors: Vec<f64> = judged.iter().map(|one| one.uncertainty.combined_standard_error()).collect();
+        common_part(&covariance, &own, &errors)
+    });
+    Smoothed { eta, ln_h, common, shared, strain }
 }
 
-fn is_offset(index: usize) -> bool {
-    (OFFSETS..SURFACE).contains(&index)
-}
-
-fn of_shared(covariance: &Covariance, row: usize) -> Quantity {
-    let by_shared: DVector<f64> = covariance.shared.column(row).into_owned();
-    let by_eta = DVector::from_iterator(
-        covariance.answers.len(),
-        covariance.answers.iter().map(|answer| answer.row(ETA).transpose().dot(&by_shared)),
-    );
-    let by_smooth = by_offsets(covariance, &by_shared);
-    Quantity { value: 0.0, by_eta, by_smooth, variance: covariance.shared[(row, row)], by_shared }
-}
-
-/// Covariance of a quantity with every point's efficiency through the offsets alone.
-fn by_offsets(covariance: &Covariance, by_shared: &DVector<f64>) -> DVector<f64> {
-    let carried: Vec<(usize, f64)> = (0..covariance.fitted.len())
-        .filter(|row| is_offset(covariance.fitted[*row]))
-        .map(|row| (row, by_shared[row] / covariance.shared[(row, row)]))
-        .collect();
-    let of_step = |(_, mixed): &(_, nalgebra::Matrix4xX<f64>)| {
-        carried.iter().map(|(row, factor)| factor * mixed[(ETA, *row)]).sum::<f64>()
+/// Covariance of a number of all steps, and the part of its diagonal that is each step's own, after the correction by the
+/// best of the choices.
+fn together(quantities: &[Quantity], etas: &[Quantity], best: Option<&Solved>) -> (DMatrix<f64>, Vec<f64>) {
+    let count = quantities.len();
+    let mut matrix = DMatrix::from_fn(count, count, |i, j| {
+        let (one, other) = (&quantities[i], &quantities[j]);
+        // The noise of one step is not that of another.
+        if i == j { one.variance } else { one.answer.dot(&other.by_shared) }
+    });
+    let mut own: Vec<f64> = quantities.iter().map(|quantity| quantity.own_variance).collect();
+    let Some(best) = best else { return (matrix, own) };
+    let columns = |of: fn(&Quantity) -> &DVector<f64>| {
+        DMatrix::from_columns(&quantities.iter().map(|quantity| of(quantity).clone()).collect::<Vec<_>>())
     };
-    DVector::from_iterator(covariance.own.len(), covariance.own.iter().map(of_step))
-}
-
-/// Covariance of one of a step's numbers with its efficiency when all that is shared is known.
-fn alone(covariance: &Covariance, step: usize, index: usize) -> f64 {
-    let (own, mixed) = &covariance.own[step];
-    own[(index, ETA)] - mixed.row(index).dot(&covariance.answers[step].row(ETA))
-}
-
-/// Efficiency, and ln h over what the fit has, of every step.
-fn quantities(
-    problem: &Problem<'_>,
-    covariance: &Covariance,
-    steps: &[StepRows],
-) -> (Vec<Quantity>, Vec<Quantity>) {
-    let count = problem.members.len();
-    let answers: Vec<DVector<f64>> =
-        covariance.answers.iter().map(|answer| answer.row(ETA).transpose()).collect();
-    let etas: Vec<Quantity> = (0..count)
-        .map(|i| {
-            let (own, mixed) = &covariance.own[i];
-            let by_shared: DVector<f64> = mixed.row(ETA).transpose();
-            let mut by_eta =
-                DVector::from_iterator(count, answers.iter().map(|answer| answer.dot(&by_shared)));
-            by_eta[i] = own[(ETA, ETA)];
-            let mut by_smooth = by_offsets(covariance, &by_shared);
-            by_smooth[i] += alone(covariance, i, ETA);
-            let value = problem.members[i].local[ETA];
-            Quantity { value, by_eta, by_smooth, variance: own[(ETA, ETA)], by_shared }
-        })
-        .collect();
-    let ln_hs = (0..count)
-        .map(|i| {
-            let (own, mixed) = &covariance.own[i];
-            let mut weights = [0.0; SHARED];
-            if problem.setting.with_law {
-                let at = |shared: &SharedVector| {
-                    problem.setting.h_at_end(&steps[i].end, shared, &problem.members[i].local)
-                };
-                let (h_w_m2k, ln_re) = at(&problem.shared);
-                weights[LN_COEFFICIENT] = 1.0;
-                weights[EXPONENT] = ln_re;
-                // The law is evaluated at the readings: an error of the flow is one of h by itself.
-                for index in covariance.fitted.iter().copied().filter(|index| is_offset(*index)) {
-                    let step = 0.1 * problem.priors[index].sigma;
-                    let mut moved = problem.shared;
-                    moved[index] += step;
-                    weights[index] = (at(&moved).0 / h_w_m2k).ln() / step;
-                }
-            }
-            let weights = DVector::from_iterator(
-                covariance.fitted.len(),
-                covariance.fitted.iter().map(|k| weights[*k]),
-            );
-            let deviation: DVector<f64> = mixed.row(LN_DEVIATION).transpose();
-            let by_shared = &deviation + &covariance.shared * &weights;
-            let mut by_eta =
-                DVector::from_iterator(count, answers.iter().map(|answer| answer.dot(&by_shared)));
-            by_eta[i] = own[(LN_DEVIATION, ETA)] + mixed.row(ETA).transpose().dot(&weights);
-            let variance = own[(LN_DEVIATION, LN_DEVIATION)] + weights.dot(&(&by_shared + &deviation));
-            let mut by_smooth = by_offsets(covariance, &by_shared);
-            by_smooth[i] += alone(covariance, i, LN_DEVIATION);
-            Quantity { value: 0.0, by_eta, by_smooth, variance, by_shared }
-        })
-        .collect();
-    (etas, ln_hs)
+    let (by_eta, by_smooth) = (columns(|quantity| &quantity.by_eta), columns(|quantity| &quantity.by_smooth));
+    let pulls = best.factors.solve(&by_smooth);
+    let cross = pulls.tr_mul(&by_eta);
+    matrix += by_smooth.tr_mul(&pulls) - &cross - cross.transpose();
+    for (i, own) in own.iter_mut().enumerate() {
+        let pull = pulls[(i, i)];
+        *own += pull * (pull * etas[i].own_variance - 2.0 * quantities[i].own_with_eta);
+    }
+    (matrix, own)
 }
 
 /// All choices of amplitude and lengths that have a say.

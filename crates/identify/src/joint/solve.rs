@@ -39,6 +39,8 @@ pub(crate) struct Member<'a> {
     pub(crate) priors: [Prior; LOCAL],
     /// Whether the step takes part in the shared parameters.
     pub(crate) shares: bool,
+    /// Whether it never does: its region of the map disagrees with the rest.
+    pub(crate) barred: bool,
 }
 
 /// The whole fit.

@@ -195,6 +195,7 @@ pub(crate) fn problem<'a>(
                 local,
                 priors: own,
                 shares: found.and_then(|found| found.residual_rms_k).is_none_or(|rms_k| rms_k <= suspect_k),
+                barred: false,
             }
         })
         .collect();

@@ -1,12 +1,17 @@
 //! Quantiles of the distributions that intervals are made of.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// 97.5 % quantile of the standard normal distribution: half of a 95 % interval, standard errors.
 pub const NORMAL_975: f64 = 1.959_963_984_540_054;
 
 /// 95 % quantile of chi-square with one degree of freedom: the square of [`NORMAL_975`].
 pub const CHI_SQUARE_1_95: f64 = 3.841_458_820_694_124;
+
+/// Quantile of the standard normal distribution at `share` (between 0 and 1); `None` elsewhere.
+pub fn normal_quantile(share: f64) -> Option<f64> {
+    (share > 0.0 && share < 1.0).then(|| Normal::standard().inverse_cdf(share))
+}
 
 /// Quantile of Student's t distribution at `share` (between 0 and 1), for `degrees_of_freedom` above 0; `None` elsewhere.
 pub fn student_quantile(share: f64, degrees_of_freedom: f64) -> Option<f64> {
@@ -18,14 +23,16 @@ pub fn student_quantile(share: f64, degrees_of_freedom: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use statrs::distribution::{ChiSquared, Normal};
+    use statrs::distribution::ChiSquared;
 
     /// scipy: `scipy.stats.norm.ppf(0.975)`, `scipy.stats.chi2.ppf(0.95, 1)`; statrs as a second witness.
     #[test]
     fn the_constants_are_those_of_scipy() {
         assert!((NORMAL_975 - 1.959963984540054).abs() < 1e-15);
         assert!((CHI_SQUARE_1_95 - 3.841458820694124).abs() < 1e-14);
-        assert!((NORMAL_975 - Normal::standard().inverse_cdf(0.975)).abs() < 1e-10);
+        assert!((NORMAL_975 - normal_quantile(0.975).unwrap()).abs() < 1e-10);
+        assert_eq!(normal_quantile(1.0), None);
+        assert_eq!(normal_quantile(f64::NAN), None);
         assert!((CHI_SQUARE_1_95 - ChiSquared::new(1.0).unwrap().inverse_cdf(0.95)).abs() < 1e-6);
     }
 

@@ -5,7 +5,7 @@ use crate::lines::{Row, line, map_of_rows, room_for_one_more};
 use crate::reference;
 use ::csv::{ReaderBuilder, StringRecord, Trim};
 use mapper_core::{
-    CompressorMap, ImportError, MapPoint, Method, ReferenceState, SpeedShift, Verdict, Warning,
+    CommonErrors, CompressorMap, ImportError, MapPoint, Method, ReferenceState, SpeedShift, Verdict, Warning,
 };
 
 /// Names under which the four columns are found, lower case without blanks and underscores.
@@ -25,6 +25,9 @@ const FLOW: &[&str] = &[
 ];
 const RATIO: &[&str] = &["pressureratio", "prc", "pic", "pr", "pi", "ratio"];
 const ETA: &[&str] = &["eta", "etac", "eff", "efficiency", "eta(ts)", "eta(tt)"];
+
+/// Most common errors that are read of a point; `mapper` writes up to 13.
+const MOST_COMMON: usize = 64;
 
 /// What stands in the `#` lines and the column names.
 struct Head {
@@ -142,16 +145,25 @@ impl Columns {
         record.get(self.find(name)?).filter(|text| !text.is_empty())
     }
 
+    /// Numbers separated by semicolons; none where the column or the field is empty.
+    fn list(&self, record: &StringRecord, name: &str) -> Result<Vec<f64>, ImportError> {
+        let Some(text) = self.text(record, name) else { return Ok(Vec::new()) };
+        text.split(';').take(MOST_COMMON).map(|part| finite(part, record, name)).collect()
+    }
+
     fn number(&self, record: &StringRecord, name: &str) -> Result<Option<f64>, ImportError> {
         let Some(text) = self.text(record, name) else { return Ok(None) };
-        let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-        let shown: String = text.chars().take(40).collect();
-        value.map(Some).ok_or_else(|| ImportError::NotANumber {
-            line: at(record),
-            quantity: format!("column {name}"),
-            text: shown,
-        })
+        finite(text, record, name).map(Some)
     }
+}
+
+fn finite(text: &str, record: &StringRecord, name: &str) -> Result<f64, ImportError> {
+    let value = text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    value.ok_or_else(|| ImportError::NotANumber {
+        line: at(record),
+        quantity: format!("column {name}"),
+        text: text.chars().take(40).collect(),
+    })
 }
 
 fn row(record: &StringRecord, columns: &Columns) -> Result<Row, ImportError> {
@@ -222,6 +234,12 @@ fn own_point(
     (point.eta_low, point.eta_high) = (number("eta_low")?, number("eta_high")?);
     (point.h_w_m2k, point.h_low_w_m2k, point.h_high_w_m2k) =
         (number("h_w_m2k")?, number("h_low_w_m2k")?, number("h_high_w_m2k")?);
+    point.common = CommonErrors {
+        eta: columns.list(record, "eta_common")?,
+        h_w_m2k: columns.list(record, "h_common_w_m2k")?,
+        flow_corrected_ratio: or("flow_common_ratio", 0.0)?,
+        pressure_ratio: or("pressure_ratio_common", 0.0)?,
+    };
     (point.residual_rms_k, point.dt2_k, point.dtc_k) =
         (number("residual_rms_k")?, number("dt2_k")?, number("dtc_k")?);
     point.method = columns.text(record, "method").and_then(method_of).unwrap_or(Method::Imported);

@@ -3,7 +3,7 @@
 use mapper_core::{CompressorMap, ExportError, MapPoint, SpeedLine, Verdict};
 
 /// Column names, in order. An absent number is an empty field; `eta*` are fractions, 95 % intervals.
-const COLUMNS: [&str; 24] = [
+const COLUMNS: [&str; 28] = [
     "line_speed_corrected_rpm",
     "speed_corrected_rpm",
     "flow_corrected_kg_s",
@@ -28,6 +28,10 @@ const COLUMNS: [&str; 24] = [
     "step",
     "flow_measured_corrected_kg_s",
     "pressure_ratio_measured",
+    "eta_common",
+    "h_common_w_m2k",
+    "flow_common_ratio",
+    "pressure_ratio_common",
 ];
 
 pub(super) fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
@@ -49,6 +53,8 @@ fn header(map: &CompressorMap) -> String {
          # units: SI as in the column names, speeds in rpm; pressures and temperatures are total; ratios and eta are fractions\n\
          # eta: isentropic, total to total ({}); *_low and *_high bound the 95 % interval; empty where undefined\n\
          # flow_corrected_kg_s and pressure_ratio: brought to line_speed_corrected_rpm by similarity; *_measured: before\n\
+         # *_common: what one standard deviation of each error that all points share changes, separated by semicolons; \
+         the rest of an interval is the point's own\n\
          # h: heat-transfer coefficient between gas and compressor housing; warnings: codes separated by semicolons\n",
         crate::heading::heading(map, "#"),
         map.method,
@@ -56,11 +62,12 @@ fn header(map: &CompressorMap) -> String {
     )
 }
 
-fn row(line: &SpeedLine, point: &MapPoint) -> [String; 24] {
+fn row(line: &SpeedLine, point: &MapPoint) -> [String; 28] {
     let p = &point.identified;
     // Shortest text that reads back to the same number.
     let number = |value: f64| value.to_string();
     let option = |value: Option<f64>| value.map(number).unwrap_or_default();
+    let list = |values: &[f64]| values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(";");
     let with_eta = |value: Option<f64>| option(value.filter(|_| point.eta.is_some()));
     let verdict = match p.verdict {
         Verdict::Good => "good",
@@ -92,5 +99,9 @@ fn row(line: &SpeedLine, point: &MapPoint) -> [String; 24] {
         p.step.to_string(),
         number(p.flow_corrected_kg_s),
         number(p.pressure_ratio),
+        list(&p.common.eta),
+        list(&p.common.h_w_m2k),
+        number(p.common.flow_corrected_ratio),
+        number(p.common.pressure_ratio),
     ]
 }

@@ -2,8 +2,8 @@
 //! physics crate: this crate may not see it.
 
 use mapper_core::{
-    CompressorMap, EstimateUncertainty, IdentifiedPoint, MapPoint, Method, OperatingPoint, ReferenceState,
-    SpeedLine, StepKind, Verdict, Warning, confidence_interval_95,
+    CommonErrors, CompressorMap, EstimateUncertainty, IdentifiedPoint, MapPoint, Method, OperatingPoint,
+    ReferenceState, SpeedLine, StepKind, Verdict, Warning, confidence_interval_95,
 };
 
 /// Flow (kg/s), pressure ratio, efficiency at corrected speed (rpm) and x, 1 at surge, 0 at choke, below 0 beyond.
@@ -92,6 +92,7 @@ fn point(step: usize, speed_rpm: f64, x: f64, valve_opening_ratio: f64) -> MapPo
         h_low_w_m2k: h.map(|h| 0.95 * h),
         h_high_w_m2k: h.map(|h| 1.05 * h),
         h_uncertainty: None,
+        common: CommonErrors::default(),
         method: Method::Dynamic,
         verdict,
         warnings: code

@@ -1,0 +1,39 @@
+//! Errors that the points of one recording share: they hit or miss all of them together.
+
+use serde::{Deserialize, Serialize};
+
+/// What the common errors of a recording do to one of its points, with sign.
+///
+/// Entry `k` of a list is what one standard deviation of error `k` changes; error `k` is the same at every point of the
+/// recording, and errors of different `k` are independent. So the covariance of two points is the sum of the products of
+/// their entries, and the variance of one point is the sum of the squares of its entries plus its own part, which no other
+/// point shares. The lists of `eta` and of `h` number their errors independently.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct CommonErrors {
+    /// Changes of `eta`, fraction; empty where nothing is known to be shared.
+    pub eta: Vec<f64>,
+    /// Changes of `h`, W/(m2 K); empty where nothing is known to be shared.
+    pub h_w_m2k: Vec<f64>,
+    /// Standard error that all corrected flows share (gain and offset of the flow meter, offsets of P1 and T1), ratio to
+    /// the flow.
+    pub flow_corrected_ratio: f64,
+    /// Standard error that all pressure ratios share (offsets and gains of P1 and P2), absolute.
+    pub pressure_ratio: f64,
+}
+
+impl CommonErrors {
+    /// Standard error of `eta` from what points share, fraction.
+    pub fn eta_standard_error(&self) -> f64 {
+        root_sum_of_squares(&self.eta)
+    }
+
+    /// Standard error of `h` from what points share, W/(m2 K).
+    pub fn h_standard_error_w_m2k(&self) -> f64 {
+        root_sum_of_squares(&self.h_w_m2k)
+    }
+}
+
+fn root_sum_of_squares(changes: &[f64]) -> f64 {
+    changes.iter().map(|change| change * change).sum::<f64>().sqrt()
+}

@@ -1,0 +1,71 @@
+//! The part of the points' errors that they share, as a few independent errors.
+
+use nalgebra::DMatrix;
+
+/// Most errors that a covariance is described by.
+const MOST: usize = 8;
+/// Share of the common variance below which an error is left to the points' own part.
+const LEAST_RATIO: f64 = 2e-3;
+
+/// For each quantity, what one standard deviation of each common error changes.
+///
+/// `covariance` of the quantities, `own_variances` the part of its diagonal that no other quantity shares. The rest is
+/// described by its leading eigenvectors (factor analysis by principal factors), scaled so that each quantity has the
+/// standard error in `errors`.
+pub(crate) fn common_part(covariance: &DMatrix<f64>, own_variances: &[f64], errors: &[f64]) -> Vec<Vec<f64>> {
+    let count = errors.len();
+    let none = vec![Vec::new(); count];
+    let mut rest = covariance.clone();
+    for (i, own) in own_variances.iter().enumerate() {
+        rest[(i, i)] = (rest[(i, i)] - own.max(0.0)).max(0.0);
+    }
+    if count < 2 || !rest.iter().all(|x| x.is_finite()) {
+        return none;
+    }
+    let trace = rest.trace();
+    let eigen = rest.symmetric_eigen();
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+    let leading = order.iter().take(MOST).filter(|k| eigen.eigenvalues[**k] > LEAST_RATIO * trace);
+    let mut changes = none;
+    for k in leading {
+        let vector = eigen.eigenvectors.column(*k);
+        // An eigenvector has no sign of its own: upwards on the whole.
+        let size = eigen.eigenvalues[*k].sqrt() * if vector.sum() < 0.0 { -1.0 } else { 1.0 };
+        for (i, changes) in changes.iter_mut().enumerate() {
+            changes.push(size * vector[i]);
+        }
+    }
+    for (i, (changes, error)) in changes.iter_mut().zip(errors).enumerate() {
+        let all = covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt();
+        let shared = changes.iter().map(|change| change * change).sum::<f64>().sqrt();
+        // No part is more than the whole.
+        let scale = error / all.max(shared);
+        changes.iter_mut().for_each(|change| *change *= scale);
+    }
+    changes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two common errors and an own one for each quantity, put together and taken apart again.
+    #[test]
+    fn what_was_put_in_comes_out() {
+        let [first, second] = [[1.0, 2.0, 3.0, 2.0, 1.0], [0.5, -0.5, 0.0, 0.5, -0.5]];
+        let own: [f64; 5] = [0.1, 0.4, 0.2, 0.3, 0.1];
+        let covariance = DMatrix::from_fn(5, 5, |i, j| {
+            first[i] * first[j] + second[i] * second[j] + if i == j { own[i] } else { 0.0 }
+        });
+        let errors: Vec<f64> = (0..5).map(|i| covariance[(i, i)].sqrt()).collect();
+        let found = common_part(&covariance, &own, &errors);
+        for i in 0..5 {
+            for j in 0..5 {
+                let shared: f64 = found[i].iter().zip(&found[j]).map(|(a, b)| a * b).sum();
+                let expected = covariance[(i, j)] - if i == j { own[i] } else { 0.0 };
+                assert!((shared - expected).abs() < 1e-9, "{i} {j}: {shared} and {expected}");
+            }
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! The efficiencies found beside the nominal map, where a campaign declares how far the machine may be off it.
+//!
+//! Offsets far beyond their declaration and heat that eqs. 1-3 do not know bend the efficiencies smoothly, which the points
+//! alone cannot tell from a map that bends. The nominal map can, as far as it is declared to be true.
+
+use crate::findings::code;
+use mapper_core::{IdentifiedPoint, Method, ModelTolerances, ReferenceState, Verdict, Warning};
+use mapper_physics::characteristic::CompressorCharacteristic;
+use nalgebra::{DMatrix, DVector};
+
+/// Declared standard deviations of the efficiency's scale that are allowed for: a machine may be better or worse than its
+/// map all over without any of its points being wrong.
+const SCALE_SIGMAS: f64 = 6.0;
+/// The same of the map's smooth error, and the least that is allowed for, fraction.
+const SHAPE_SIGMAS: f64 = 3.0;
+const LEAST_SHAPE: f64 = 3e-3;
+/// Lengths of that error: of speed in halves of the range of the points, of pressure ratio likewise.
+const LENGTH: f64 = 0.7;
+/// Standard deviations of chi-square above its mean beyond which the points are doubted: one in a thousand of 20 points.
+const DOUBT_SIGMAS: f64 = 4.0;
+/// How far along its speed line a point may be misplaced by the tolerances of flow map and valve, in units of the line's
+/// largest flow and largest PR - 1, one standard deviation.
+const PLACE_RATIO: f64 = 0.01;
+/// Places of a speed line among which the nearest is sought.
+const PLACES: usize = 200;
+/// Fewest points that say anything of a map, and most that are looked at: the effort grows with the cube.
+const FEWEST: usize = 5;
+const MOST: usize = 500;
+
+/// Doubts all points of a recording whose efficiencies lie off the nominal map by more than its declared tolerances, the
+/// points' own intervals and a common scale together explain. `reference`: of the points' corrected speeds.
+pub fn doubt_off_the_nominal_map(
+    points: &mut [IdentifiedPoint],
+    map: &dyn CompressorCharacteristic,
+    reference: ReferenceState,
+    tolerances: &ModelTolerances,
+) {
+    let Some(message) = off_the_map(points, map, reference, tolerances) else { return };
+    for point in points.iter_mut().filter(|point| point.method == Method::Joint && point.eta.is_some()) {
+        if point.verdict == Verdict::Good {
+            point.verdict = Verdict::Doubtful;
+        }
+        let warning = Warning { code: code::OFF_THE_NOMINAL_MAP.to_owned(), message: message.clone() };
+        point.warnings.push(warning);
+    }
+}
+
+/// The nominal map at the place of a speed line that is nearest to a point.
+#[derive(Debug, Clone, Copy)]
+struct Nominal {
+    /// Efficiency, fraction.
+    eta: f64,
+    /// Its slope along the line, per unit of the line's largest flow and largest PR - 1.
+    slope: f64,
+}
+
+/// By flow near choke and by pressure ratio near surge at once: each alone says little of the place at the other end.
+fn nearest(
+    point: &IdentifiedPoint,
+    map: &dyn CompressorCharacteristic,
+    speed_corrected_rpm: f64,
+    flow_factor: f64,
+) -> Option<Nominal> {
+    let (_, top) = map.surge_point(speed_corrected_rpm);
+    let largest_kg_s = map.choke_flow_corrected_kg_s(speed_corrected_rpm);
+    if !(top > 1.0 && largest_kg_s > 0.0) {
+        return None;
+    }
+    // A little beyond both ends: a rig may reach further than its map.
+    let line: Vec<(f64, f64, f64)> = (0..=PLACES)
+        .map(|k| {
+            let pressure_ratio = 1.0 + (top - 1.0) * 1.03 * k as f64 / PLACES as f64;
+            let place = map.evaluate(speed_corrected_rpm, pressure_ratio);
+            (place.flow_corrected_kg_s / largest_kg_s, (pressure_ratio - 1.0) / (top - 1.0), place.efficiency)
+        })
+        .collect();
+    let here =
+        (point.flow_corrected_kg_s * flow_factor / largest_kg_s, (point.pressure_ratio - 1.0) / (top - 1.0));
+    let distance = |pair: &[(f64, f64, f64)]| {
+        let ((ax, ay, _), (bx, by, _)) = (pair[0], pair[1]);
+        let (dx, dy) = (bx - ax, by - ay);
+        let share = ((here.0 - ax) * dx + (here.1 - ay) * dy) / (dx * dx + dy * dy).max(1e-30);
+        let share = share.clamp(0.0, 1.0);
+        ((here.0 - ax - share * dx).hypot(here.1 - ay - share * dy), share)
+    };
+    let (pair, (_, share)) =
+        line.windows(2).map(|pair| (pair, distance(pair))).min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    let ((ax, ay, a), (bx, by, b)) = (pair[0], pair[1]);
+    Some(Nominal { eta: a + share * (b - a), slope: (b - a) / (bx - ax).hypot(by - ay).max(1e-9) })
+}
+
+fn off_the_map(
+    points: &[IdentifiedPoint],
+    map: &dyn CompressorCharacteristic,
+    reference: ReferenceState,
+    tolerances: &ModelTolerances,
+) -> Option<String> {
+    let speed_factor = reference.speed_factor_to(map.reference());
+    let flow_factor = reference.flow_factor_to(map.reference());
+    let used: Vec<(&IdentifiedPoint, Nominal, f64)> = points
+        .iter()
+        .filter(|point| point.method == Method::Joint && point.verdict == Verdict::Good)
+        .filter_map(|point| {
+            let nominal = nearest(point, map, point.speed_corrected_rpm * speed_factor, flow_factor)?;
+            let off = point.eta? - nominal.eta;
+            (off.is_finite() && point.eta_own_standard_error().is_some()).then_some((point, nominal, off))
+        })
+        .take(MOST)
+        .collect();
+    let count = used.len();
+    if count < FEWEST {
+        return None;
+    }
+    let scaled = |of: fn(&IdentifiedPoint) -> f64| -> Vec<f64> {
+        let values: Vec<f64> = used.iter().map(|(point, ..)| of(point)).collect();
+        let (low, high) =
+            values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+        values.iter().map(|x| 2.0 * (x - low) / (high - low).max(f64::MIN_POSITIVE)).collect()
+    };
+    let (u, v) = (scaled(|point| point.speed_corrected_rpm), scaled(|point| point.pressure_ratio));
+    let shape = (SHAPE_SIGMAS * tolerances.efficiency_shape_ratio).max(LEAST_SHAPE);
+    let scale = SCALE_SIGMAS * tolerances.compressor_efficiency_ratio;
+    let covariance = DMatrix::from_fn(count, count, |i, j| {
+        let ((one, nominal, _), (other, other_nominal, _)) = (used[i], used[j]);
+        let common: f64 = one.common.eta.iter().zip(&other.common.eta).map(|(a, b)| a * b).sum();
+        let own = if i == j {
+            let own = one.eta_own_standard_error().unwrap_or(0.0);
+            own * own + (PLACE_RATIO * nominal.slope).powi(2) + 1e-6
+        } else {
+            0.0
+        };
+        let square = ((u[i] - u[j]).powi(2) + (v[i] - v[j]).powi(2)) / (LENGTH * LENGTH);
+        common
+            + own
+            + scale * scale * nominal.eta * other_nominal.eta
+            + shape * shape * nominal.eta * other_nominal.eta * (-0.5 * square).exp()
+    });
+    let off = DVector::from_iterator(count, used.iter().map(|(.., off)| *off));
+    let chi_square = off.dot(&covariance.cholesky()?.solve(&off));
+    let freedom = count as f64;
+    if chi_square <= freedom + DOUBT_SIGMAS * (2.0 * freedom).sqrt() {
+        return None;
+    }
+    Some(format!(
+        "the efficiencies lie {:+.1} to {:+.1} points off the nominal map, more than its declared tolerances and these intervals \
+         explain (chi-square {chi_square:.0} of {count} points): a sensor is off beyond its declaration, heat goes a way the model \
+         lacks, or the machine is another; `mapper gap diagnose` tells which",
+        100.0 * off.min(),
+        100.0 * off.max(),
+    ))
+}

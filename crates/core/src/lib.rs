@@ -16,6 +16,7 @@ mod declared_uncertainty;
 mod event;
 mod fitted_map;
 mod identified;
+mod inlet_convection;
 mod joint_settings;
 mod jump;
 mod limits;
@@ -49,6 +50,7 @@ pub use fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
 pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
 };
+pub use inlet_convection::InletConvection;
 pub use joint_settings::{
     ALPHA_AREA_SIGMA_RATIO, Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings,
 };
@@ -68,7 +70,9 @@ pub use sample::{ChannelColumn, SampleBatch, TruthColumn};
 pub use settle_bands::SettleBands;
 pub use soak::Soak;
 pub use step_marker::StepMarker;
-pub use thermal_model::{ConvectionLaw, Entangled, Origin, ProfilePoint, SharedValue, ThermalModel};
+pub use thermal_model::{
+    ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
+};
 pub use timing::Timing;
 pub use visit_order::VisitOrder;
 pub use window_rule::WindowRule;

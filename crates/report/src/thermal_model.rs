@@ -85,6 +85,7 @@ mod tests {
             alpha_area_profile: [(0.0, 0.0), (0.1, 0.5), (0.2, 1.1), (0.3, 9.0)]
                 .map(|(value, square)| ProfilePoint { value, square })
                 .to_vec(),
+            inlet: None,
             probe_diameter_m: SharedValue::assumed(0.0),
             direction_factor: SharedValue::assumed(1.0),
             offsets: std::collections::BTreeMap::new(),

@@ -8,7 +8,7 @@
 //! on a flat one they lose about half of it. Everything that errs with the efficiencies is corrected along with them.
 
 use crate::joint::parameters::{
-    ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SURFACE, SharedVector,
+    ETA, EXPONENT, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SURFACE, SharedVector,
 };
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
@@ -107,9 +107,12 @@ pub(crate) fn smoothed(
             solve(&etas, &coordinates, problem)
         }
     };
-    // Errors that offsets bring, before and after.
+    // Errors that offsets and what is assumed bring, before and after.
+    let biased: Vec<usize> = (0..covariance.fitted.len())
+        .filter(|row| (OFFSETS..SURFACE).contains(&covariance.fitted[*row]))
+        .collect();
     let bias_of = |quantity: &Quantity, pull: Option<&DVector<f64>>| -> f64 {
-        carried
+        biased
             .iter()
             .map(|row| {
                 let sigma2 = covariance.shared[(*row, *row)];
@@ -168,7 +171,7 @@ pub(crate) fn smoothed(
 }
 
 fn is_offset(index: usize) -> bool {
-    (OFFSETS..SURFACE).contains(&index)
+    (OFFSETS..=FLOW_GAIN).contains(&index)
 }
 
 fn of_shared(covariance: &Covariance, row: usize) -> Quantity {

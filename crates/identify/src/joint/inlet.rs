@@ -16,8 +16,11 @@ const AT_WORK_SIGMAS: f64 = 2.0;
 /// Probability of the other reading below which the recording has decided.
 const DECIDED: f64 = 0.05;
 /// Share of the distance between the readings that is one standard deviation at least where it has not: the 95 % interval
-/// then reaches from one to the other.
-const OPEN_SIGMA: f64 = 0.55;
+/// then reaches from one to the other and a quarter beyond, for what noise adds to the other.
+const OPEN_SIGMA: f64 = 0.65;
+
+/// Beyond this the straight line says nothing of the distance, and so neither does its ratio to it.
+const LARGEST_STRETCH: f64 = 2.0;
 
 /// How far h before the wheel follows the inlet's own law.
 pub(crate) fn power_of(convection: InletConvection) -> f64 {
@@ -66,7 +69,26 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Covariance> {
     let sigma = if decided { left.sqrt() } else { left.sqrt().max(OPEN_SIGMA) };
     problem.priors[INLET] = Prior { mean: problem.shared[INLET], sigma };
     problem.active[INLET] = true;
+    let covariance = problem.covariance()?;
+    problem.priors[INLET].sigma *= stretch(problem, &other, &covariance);
     problem.covariance()
+}
+
+/// How much farther apart the two fits are than the straight line from one towards the other says: alpha_A and the level of
+/// h answer to each other's product, which bends.
+fn stretch(problem: &Problem<'_>, other: &Problem<'_>, covariance: &Covariance) -> f64 {
+    let Some(own) = covariance.row_of(INLET) else { return 1.0 };
+    let way = other.shared[INLET] - problem.shared[INLET];
+    [ALPHA, LN_COEFFICIENT]
+        .into_iter()
+        .filter_map(|index| Some((index, covariance.row_of(index)?)))
+        .map(|(index, row)| {
+            let straight = way * covariance.shared[(row, own)] / covariance.shared[(own, own)];
+            (other.shared[index] - problem.shared[index]) / straight
+        })
+        .filter(|ratio| ratio.is_finite())
+        .fold(1.0, f64::max)
+        .min(LARGEST_STRETCH)
 }
 
 /// The problem at its minimum with the other reading; `None` where it comes to none.

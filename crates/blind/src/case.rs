@@ -158,9 +158,11 @@ mod tests {
                 assert!((parameter.low..=parameter.high).contains(value) && *value != parameter.neutral);
             }
         }
-        // Dealt, not drawn: forty singles hold every effect of the catalogue with each of its signs.
-        let singles = Draw { kinds: vec![CaseKind::Single], cases: 40, ..Draw::new(5, 1, OutsideUse::Check) }
-            .cases(&catalogue, &Even);
+        // Dealt, not drawn: as many singles as there are effects with a sign hold every effect of the catalogue.
+        let dealt = catalogue.iter().map(|effect| signs(effect).len()).sum();
+        let singles =
+            Draw { kinds: vec![CaseKind::Single], cases: dealt, ..Draw::new(5, 1, OutsideUse::Check) }
+                .cases(&catalogue, &Even);
         let seen: BTreeSet<String> =
             singles.iter().map(|c| c.causes[0].effect.info().id.to_string()).collect();
         assert_eq!(seen.len(), catalogue.len());

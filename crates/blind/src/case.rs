@@ -3,7 +3,7 @@
 use crate::cause::Cause;
 use crate::kind::CaseKind;
 use crate::outside::{OutsideUse, outside_kinds};
-use crate::strength::{Ruler, strength};
+use crate::strength::{Ruler, shows, strength};
 use mapper_physics::effect::Effect;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -53,7 +53,10 @@ impl Draw {
     /// lengths of the signatures even in their logarithm. Equal draws give equal cases.
     pub fn cases(&self, catalogue: &[Arc<dyn Effect>], ruler: &dyn Ruler) -> Vec<Case> {
         let mut random = Pcg64::seed_from_u64(self.seed);
-        let mut catalogue = Deck::new(catalogue);
+        // What this machine has no place for (convection before the wheel without area there) is no cause.
+        let placed: Vec<Arc<dyn Effect>> =
+            catalogue.iter().filter(|effect| shows(effect, ruler)).cloned().collect();
+        let mut catalogue = Deck::new(&placed);
         let mut outside = Deck::new(&outside_kinds(self.outside));
         let kinds = if self.kinds.is_empty() { &CaseKind::ALL[..] } else { &self.kinds[..] };
         (0..self.cases)
@@ -155,9 +158,11 @@ mod tests {
                 assert!((parameter.low..=parameter.high).contains(value) && *value != parameter.neutral);
             }
         }
-        // Dealt, not drawn: forty singles hold every effect of the catalogue with each of its signs.
-        let singles = Draw { kinds: vec![CaseKind::Single], cases: 40, ..Draw::new(5, 1, OutsideUse::Check) }
-            .cases(&catalogue, &Even);
+        // Dealt, not drawn: as many singles as there are effects with a sign hold every effect of the catalogue.
+        let dealt = catalogue.iter().map(|effect| signs(effect).len()).sum();
+        let singles =
+            Draw { kinds: vec![CaseKind::Single], cases: dealt, ..Draw::new(5, 1, OutsideUse::Check) }
+                .cases(&catalogue, &Even);
         let seen: BTreeSet<String> =
             singles.iter().map(|c| c.causes[0].effect.info().id.to_string()).collect();
         assert_eq!(seen.len(), catalogue.len());

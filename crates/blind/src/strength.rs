@@ -54,6 +54,16 @@ pub(crate) fn strength(
     vec![value_at(parameter, sign * steps)]
 }
 
+/// Whether an effect does anything to the machine that the ruler measures.
+pub(crate) fn shows(effect: &Arc<dyn Effect>, ruler: &dyn Ruler) -> bool {
+    // Where the rig cannot run with half a step it can with less.
+    [0.5, 0.1].into_iter().any(|steps| {
+        let values = effect.info().parameters.iter().map(|parameter| value_at(parameter, steps)).collect();
+        let cause = Cause { effect: effect.clone(), values };
+        ruler.lengths(std::slice::from_ref(&cause)).iter().any(|length| *length > 0.0)
+    })
+}
+
 /// The value so many typical steps from neutral, within the range.
 fn value_at(parameter: &EffectParameter, steps: f64) -> f64 {
     (parameter.neutral + steps * parameter.typical_step).clamp(parameter.low, parameter.high)

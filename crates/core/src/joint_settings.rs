@@ -49,6 +49,9 @@ pub struct JointSettings {
     pub probe: Choice,
     /// Factor on the heat-transfer coefficient where the metal is hotter than the gas; 1 where `fixed`.
     pub direction: Choice,
+    /// Whether the heat-transfer coefficient before the wheel is that after it or follows the inlet's own diameter; as
+    /// `machine.geometry` has it where `fixed`.
+    pub inlet_h: Choice,
     /// Offsets of the sensors, with their declared uncertainty as prior.
     pub offsets: Choice,
     /// Efficiency within a step: `constant`, or as a surface through all points has it.
@@ -63,6 +66,7 @@ impl Default for JointSettings {
             alpha_area: Choice::Fitted,
             probe: Choice::Fitted,
             direction: Choice::Fitted,
+            inlet_h: Choice::Fitted,
             offsets: Choice::Fitted,
             efficiency: EfficiencyWithinStep::Shaped,
             h: ConvectionWithinStep::Law,
@@ -77,6 +81,7 @@ impl JointSettings {
             alpha_area: Choice::Fixed,
             probe: Choice::Fixed,
             direction: Choice::Fixed,
+            inlet_h: Choice::Fixed,
             offsets: Choice::Fixed,
             efficiency: EfficiencyWithinStep::Constant,
             h: ConvectionWithinStep::Constant,

@@ -17,6 +17,7 @@ mod declared_uncertainty;
 mod event;
 mod fitted_map;
 mod identified;
+mod inlet_convection;
 mod joint_settings;
 mod jump;
 mod limits;
@@ -52,6 +53,7 @@ pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
     standard_error_of,
 };
+pub use inlet_convection::InletConvection;
 pub use joint_settings::{
     ALPHA_AREA_SIGMA_RATIO, Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings,
 };
@@ -71,7 +73,9 @@ pub use sample::{ChannelColumn, SampleBatch, TruthColumn};
 pub use settle_bands::SettleBands;
 pub use soak::Soak;
 pub use step_marker::StepMarker;
-pub use thermal_model::{ConvectionLaw, Entangled, Origin, ProfilePoint, SharedValue, ThermalModel};
+pub use thermal_model::{
+    ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
+};
 pub use timing::Timing;
 pub use visit_order::VisitOrder;
 pub use window_rule::WindowRule;

@@ -1,6 +1,6 @@
 //! What all points of a campaign share: how gas and compressor housing exchange heat, and what the sensors add.
 
-use crate::{Channel, EstimateUncertainty};
+use crate::{Channel, EstimateUncertainty, InletConvection};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -84,6 +84,23 @@ pub struct ProfilePoint {
     pub square: f64,
 }
 
+/// What the heat-transfer coefficient before the wheel was taken to follow.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FoundInlet {
+    /// What it follows in the numbers that stand beside this.
+    pub convection: InletConvection,
+    /// Diameter of the inlet that its own law takes, m.
+    pub diameter_m: f64,
+    /// `Assumed` where it was declared and the recording was not asked, `Fitted` where the recording tells,
+    /// `NotIdentifiable` where it does not: then the intervals contain what the other would have given.
+    pub origin: Origin,
+    /// Probability that it is so, 0..1, from the recording and that what is declared holds more often than not; 1 where
+    /// the recording was not asked.
+    pub probability: f64,
+    /// alpha_A as the other reading has it; `None` where it was not tried, or alpha_A is not sought.
+    pub alpha_area_otherwise_ratio: Option<f64>,
+}
+
 /// Result of a joint identification that belongs to no single point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ThermalModel {
@@ -96,6 +113,9 @@ pub struct ThermalModel {
     /// How much worse everything else fits with alpha_A held at a value; empty where it was not fitted.
     #[serde(default)]
     pub alpha_area_profile: Vec<ProfilePoint>,
+    /// What h before the wheel follows; `None` where it makes no difference, since no area lies there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inlet: Option<FoundInlet>,
     /// Tip diameter of the T2 probe (eqs. 11-12), m; 0 is an ideal probe.
     pub probe_diameter_m: SharedValue,
     /// Factor on the coefficient where the metal is hotter than the gas it touches.

@@ -116,6 +116,7 @@ fn singles(search: Search<'_>) -> Vec<Fit> {
     for fitted in tried.into_iter().flatten() {
         keep_best(&mut singles, fitted);
     }
+    singles.retain(acts);
     sort(&mut singles);
     refit(search, &mut singles, 7, Effort { iterations: 6, enough: 0.2, ..Effort::default() });
     singles
@@ -243,13 +244,24 @@ pub fn sort(fits: &mut [Fit]) {
     fits.sort_by(|a, b| b.score.total_cmp(&a.score));
 }
 
-/// Whether each effect of a fit does something: one that the fit left at its neutral value explains nothing, and a pair with
-/// it is not a pair.
+/// Whether each effect of a fit does something: one that the fit left at its neutral value, or that this machine has no place
+/// for (convection before the wheel without area there), explains nothing, and a pair with it is not a pair.
 pub fn does_something(study: &Study, fitted: &Fit) -> bool {
-    fitted.hypothesis.effects.iter().all(|(index, values)| {
-        study.effects[*index].info().parameters.iter().zip(values).any(|(parameter, value)| {
-            (value - parameter.neutral).abs() > NEUTRAL_STEPS * parameter.typical_step.abs()
+    acts(fitted)
+        && fitted.hypothesis.effects.iter().all(|(index, values)| {
+            study.effects[*index].info().parameters.iter().zip(values).any(|(parameter, value)| {
+                (value - parameter.neutral).abs() > NEUTRAL_STEPS * parameter.typical_step.abs()
+            })
         })
+}
+
+/// Whether each effect of a fit changes anything on this machine.
+fn acts(fitted: &Fit) -> bool {
+    let mut columns = fitted.effect_columns.as_slice();
+    fitted.hypothesis.effects.iter().all(|(_, values)| {
+        let (own, rest) = columns.split_at(values.len().min(columns.len()));
+        columns = rest;
+        own.iter().any(|column| column.iter().any(|change| *change != 0.0))
     })
 }
 

@@ -218,3 +218,37 @@ fn a_suspected_effect_in_rhai_is_named_and_measured() {
     let room = 1.5 * (estimate.high - estimate.low);
     assert!((estimate.value - 4.0).abs() < room && room < 1.0, "{estimate:?}");
 }
+
+/// Convection before the wheel acts much as the share of the area there does: on a machine that has such a share it is named
+/// or left open beside it, never ruled out; on one that has none it is no candidate.
+#[test]
+fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
+    let mut model = Model::nominal();
+    model.params.compressor.alpha_area_ratio = 0.2;
+    let mut rig = Rig::new(model.clone());
+    add(&mut rig, mapper_effects::find("inlet_htc").unwrap().as_ref(), &[1.6]).unwrap();
+    let effects = |ids: &[&str]| ids.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
+    let question = |recording, model, ids: &[&str]| Question {
+        jumps: Vec::new(),
+        recording,
+        declared: declared(),
+        model,
+        effects: effects(ids),
+        calibration: Calibration::shipped().unwrap(),
+        progress: &|_, _| {},
+    };
+    let recording = record_of(&rig, 12);
+    let ids = ["inlet_htc", "area_split", "tip_diameter"];
+    let diagnosis = diagnose(question(&recording, model, &ids)).unwrap().diagnosis;
+    assert_eq!(diagnosis.verdict, Verdict::Explained);
+    let first = &diagnosis.candidates[0];
+    let mut open: Vec<Vec<String>> = first.equivalent.clone();
+    open.push(first.effects.clone());
+    assert!(open.iter().any(|cause| cause == &["inlet_htc"]), "{open:?}");
+
+    let recording = record(&[("tip_diameter", &[2e-3])], 6);
+    let diagnosis = diagnose(question(&recording, Model::nominal(), &ids)).unwrap().diagnosis;
+    assert_eq!(diagnosis.candidates[0].effects, ["tip_diameter"]);
+    let named = diagnosis.candidates.iter().flat_map(|candidate| &candidate.effects);
+    assert!(named.into_iter().all(|id| id != "inlet_htc"));
+}

@@ -1,6 +1,8 @@
 //! Error and coverage of the joint method over seeded campaigns of the lumped model:
-//! `cargo run --release -p mapper-identify --example joint_study -- ALPHA PROBE_MM DIRECTION NOISE OFFSETS SEEDS FIRST`
-//! (noise and offsets in multiples of a good rig's; FIRST is the first seed, 0 where it is left out).
+//! `cargo run --release -p mapper-identify --example joint_study -- ALPHA PROBE_MM DIRECTION NOISE OFFSETS SEEDS FIRST OWN ASK DECLARED`
+//! (noise and offsets in multiples of a good rig's; FIRST is the first seed, 0 where it is left out; OWN 1 gives the machine
+//! h of its own before the wheel; ASK 0 does not ask the recording for it; DECLARED is an alpha_A that is held, sought where
+//! it is left out).
 #![allow(clippy::print_stdout, missing_docs, reason = "what it prints is all it is for")]
 #[path = "../tests/common/mod.rs"]
 #[allow(clippy::unwrap_used, reason = "shared with the tests")]
@@ -10,8 +12,8 @@ mod common;
 mod lab;
 
 use lab::{Machine, campaign, eighteen, measured};
-use mapper_core::Method;
-use mapper_identify::{IdentifyConfig, WindowRule, identify, identify_recording};
+use mapper_core::{InletConvection, Method};
+use mapper_identify::{Choice, IdentifyConfig, JointSettings, WindowRule, identify, identify_recording};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
@@ -19,18 +21,36 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let argument = |i: usize, otherwise: f64| {
         std::env::args().nth(i).and_then(|text| text.parse().ok()).unwrap_or(otherwise)
     };
-    let machine =
-        Machine { alpha: argument(1, 0.0), probe_m: 1e-3 * argument(2, 0.0), direction: argument(3, 1.0) };
+    let inlet = if argument(8, 0.0) > 0.0 { InletConvection::Own } else { InletConvection::Shared };
+    let machine = Machine {
+        alpha: argument(1, 0.0),
+        probe_m: 1e-3 * argument(2, 0.0),
+        direction: argument(3, 1.0),
+        inlet,
+    };
+    let mut settings = JointSettings::default();
+    if argument(9, 1.0) == 0.0 {
+        settings.inlet_h = Choice::Fixed;
+    }
+    let declared_alpha = argument(10, f64::NAN);
+    if declared_alpha.is_finite() {
+        settings.alpha_area = Choice::Fixed;
+    }
     let (noise, offsets, seeds) = (argument(4, 1.0), argument(5, 1.0), argument(6, 20.0) as u64);
     let first = argument(7, 0.0) as u64;
     let clean = campaign(&eighteen(), 120.0, machine);
+    let mut h_sum = 0.0;
     let (mut h_held, mut slow_held, mut slow_within, mut slow) = (0.0, 0.0, 0.0, 0.0);
     let (mut held, mut count, mut joint_sum, mut dynamic_sum) = (0.0, 0.0, 0.0, 0.0);
     for seed in first..first + seeds {
         let (recording, declared) =
             measured(&clean.recording, noise, offsets, &mut Pcg64::seed_from_u64(seed));
         let window = WindowRule::Fixed { start_s: 10.0, end_s: 110.0 };
-        let mut config = IdentifyConfig { method: Method::Joint, window, ..IdentifyConfig::default() };
+        let mut config =
+            IdentifyConfig { method: Method::Joint, window, joint: settings, ..IdentifyConfig::default() };
+        if declared_alpha.is_finite() {
+            config.alpha_area_ratio = declared_alpha;
+        }
         if noise + offsets > 0.0 {
             config.declared = declared;
         }
@@ -50,6 +70,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 slow_held += f64::from(u8::from(interval.contains(&truth.eta)));
                 slow_within += f64::from(u8::from((eta - truth.eta).abs() < 0.012));
             }
+            h_sum += (point.h_w_m2k.unwrap_or(f64::NAN) / truth.h_w_m2k - 1.0).powi(2);
             joint_square += (eta - truth.eta).powi(2);
             dynamic_square += (other - truth.eta).powi(2);
         }
@@ -75,15 +96,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 shown(&thermal.direction_factor),
                 thermal.doubts.len()
             );
+            if let Some(inlet) = thermal.inlet {
+                print!(
+                    ", h before the wheel {:?} ({:.3}; alpha_A otherwise {:.4})",
+                    inlet.convection,
+                    inlet.probability,
+                    inlet.alpha_area_otherwise_ratio.unwrap_or(f64::NAN)
+                );
+            }
         }
         println!();
         (held, count) = (held + own_held, count + own_count);
         (joint_sum, dynamic_sum) = (joint_sum + joint_square, dynamic_sum + dynamic_square);
     }
     println!(
-        "all {count}: joint {:.3}, dynamic {:.3} points rms, intervals hold {:.3} (eta), {:.3} (h); at 50 krpm hold {:.3}, within 1.2 points {:.3}",
+        "all {count}: joint {:.3}, dynamic {:.3} points rms, h {:.2} % rms, intervals hold {:.3} (eta), {:.3} (h); at 50 krpm hold {:.3}, within 1.2 points {:.3}",
         100.0 * f64::sqrt(joint_sum / count),
         100.0 * f64::sqrt(dynamic_sum / count),
+        100.0 * f64::sqrt(h_sum / count),
         held / count,
         h_held / count,
         slow_held / slow,

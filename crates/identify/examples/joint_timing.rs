@@ -27,7 +27,7 @@ fn thirty() -> Vec<(f64, f64)> {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let rounds: usize = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(5).max(1);
-    let machine = Machine { alpha: 0.2, probe_m: 1.5e-3, direction: 1.0 };
+    let machine = Machine { alpha: 0.2, probe_m: 1.5e-3, ..Machine::default() };
     let clean = campaign(&thirty(), 120.0, machine);
     let (recording, declared) = measured(&clean.recording, 1.0, 0.0, &mut Pcg64::seed_from_u64(1));
     let config = IdentifyConfig { method: Method::Joint, declared, ..IdentifyConfig::default() };

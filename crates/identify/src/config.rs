@@ -1,6 +1,6 @@
 //! What identification is told: method, window, geometry, declared uncertainty, thresholds.
 
-use mapper_core::{Channel, JointSettings, Method, ReferenceState, SettleBands, WindowRule};
+use mapper_core::{Channel, InletConvection, JointSettings, Method, ReferenceState, SettleBands, WindowRule};
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,10 @@ pub struct IdentifyConfig {
     pub alpha_area_sigma_ratio: f64,
     /// Internal area of the compressor housing A_c, m2, > 0.
     pub internal_area_m2: f64,
+    /// What h before the wheel is declared to follow.
+    pub inlet_convection: InletConvection,
+    /// Diameter of the inlet pipe, m, > 0: characteristic length of the convection law before the wheel.
+    pub inlet_diameter_m: f64,
     /// Diameter of the outlet pipe, m, > 0: characteristic length of the convection law, and where the T2 probe stands.
     pub outlet_diameter_m: f64,
     /// Declared diameter of the T2 probe's tip, m, >= 0; 0 is a probe without inertia. The joint method alone uses it.
@@ -52,6 +56,8 @@ impl Default for IdentifyConfig {
             alpha_area_ratio: 0.0,
             alpha_area_sigma_ratio: 0.0,
             internal_area_m2: 29e-3,
+            inlet_convection: InletConvection::Shared,
+            inlet_diameter_m: 40e-3,
             outlet_diameter_m: 35e-3,
             probe_diameter_m: 0.0,
             joint: JointSettings::default(),

@@ -75,8 +75,7 @@ pub(crate) fn estimate(
         findings.refuse(code::NO_COMPRESSION, message);
         return estimate;
     }
-    let geometry =
-        Geometry { alpha_area_ratio: config.alpha_area_ratio, internal_area_m2: config.internal_area_m2 };
+    let geometry = Geometry::of(config);
     let Some((samples, fit)) = fit_without_outliers(samples, geometry, findings) else {
         let message =
             "least squares for efficiency and heat-transfer coefficient did not converge".to_owned();

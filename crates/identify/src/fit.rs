@@ -1,9 +1,13 @@
 //! The two-parameter fit: efficiency and heat-transfer coefficient, constant over the window, by least squares on T2
 //! with eqs. 1-3 of the paper and the measured T1, Tc, flow and pressure ratio.
 
+use crate::IdentifyConfig;
 use crate::samples::Samples;
+use mapper_core::InletConvection;
 use mapper_physics::air;
-use mapper_physics::compression::{CompressionInputs, compress};
+use mapper_physics::compression::{CompressionInputs, compress, compressed_k};
+use mapper_physics::inlet_convection::InletLaw;
+use mapper_physics::params::Params;
 use rmpfit::{MPConfig, MPFitter, MPPar, MPResult, MPSide};
 
 /// Efficiencies searched, fraction. Above 1 is impossible, and said so; the fit may go there to be seen.
@@ -20,6 +24,30 @@ const DERIVATIVE_STEP_H_W_M2K: f64 = 1e-2;
 pub(crate) struct Geometry {
     pub(crate) alpha_area_ratio: f64,
     pub(crate) internal_area_m2: f64,
+    /// The law of h before the wheel, where it is not h.
+    pub(crate) inlet: Option<InletLaw>,
+}
+
+impl Geometry {
+    /// As declared. The exponent of the inlet's law is Appendix A's: a step by itself tells none.
+    pub(crate) fn of(config: &IdentifyConfig) -> Self {
+        let own = InletLaw {
+            exponent: Params::default().compressor.nusselt_exponent,
+            inlet_diameter_m: config.inlet_diameter_m,
+            outlet_diameter_m: config.outlet_diameter_m,
+        };
+        Geometry {
+            alpha_area_ratio: config.alpha_area_ratio,
+            internal_area_m2: config.internal_area_m2,
+            inlet: (config.inlet_convection == InletConvection::Own).then_some(own),
+        }
+    }
+
+    /// h before the wheel over h after it.
+    fn inlet_h_ratio(&self, row: Row, eta: f64) -> f64 {
+        let bulk_k = || compressed_k(row.t1_k, row.rise_ratio, eta);
+        self.inlet.map_or(1.0, |law| law.h_ratio(row.t1_k, bulk_k()))
+    }
 }
 
 /// A fit with what it takes to judge it.
@@ -76,6 +104,7 @@ pub(crate) fn t2_k(geometry: Geometry, row: Row, eta: f64, h_w_m2k: f64) -> f64 
         isentropic_rise_ratio: row.rise_ratio,
         efficiency: eta,
         h_w_m2k,
+        inlet_h_ratio: geometry.inlet_h_ratio(row, eta),
         alpha_area_ratio: geometry.alpha_area_ratio,
         internal_area_m2: geometry.internal_area_m2,
     };
@@ -219,7 +248,9 @@ fn start(samples: &Samples, geometry: Geometry) -> [f64; 2] {
     let mut normal = [[0.0; 2]; 2];
     let mut right = [0.0; 2];
     for (row, t2_k) in rows(samples).zip(&samples.t2_k) {
-        let before = geometry.alpha_area_ratio * geometry.internal_area_m2
+        let before = geometry.inlet_h_ratio(row, 1.0 / apparent)
+            * geometry.alpha_area_ratio
+            * geometry.internal_area_m2
             / (row.flow_kg_s * air::heat_capacity_j_kgk(row.t1_k));
         let after = (1.0 - geometry.alpha_area_ratio) * geometry.internal_area_m2
             / (row.flow_kg_s * air::heat_capacity_j_kgk(*t2_k));

@@ -22,8 +22,10 @@ pub struct CompressionInputs {
     pub isentropic_rise_ratio: f64,
     /// Isentropic efficiency, fraction.
     pub efficiency: f64,
-    /// Heat-transfer coefficient, W/(m2 K).
+    /// Heat-transfer coefficient after the wheel, W/(m2 K).
     pub h_w_m2k: f64,
+    /// Heat-transfer coefficient before the wheel over that after it; eqs. 1 and 3 have 1.
+    pub inlet_h_ratio: f64,
     /// Share of the internal area before compression, alpha_A.
     pub alpha_area_ratio: f64,
     /// Internal area A_c, m2.
@@ -103,7 +105,7 @@ pub fn after_wheel(
 #[inline]
 pub fn compress(inputs: &CompressionInputs, bulk_heat_capacity_k: Option<f64>) -> Compression {
     let &CompressionInputs { t1_k, tc_k, flow_kg_s, isentropic_rise_ratio, efficiency, h_w_m2k, .. } = inputs;
-    let before_w_k = h_w_m2k * (inputs.alpha_area_ratio * inputs.internal_area_m2);
+    let before_w_k = h_w_m2k * inputs.inlet_h_ratio * (inputs.alpha_area_ratio * inputs.internal_area_m2);
     let after_w_k = h_w_m2k * ((1.0 - inputs.alpha_area_ratio) * inputs.internal_area_m2);
     let (q1_w, t1_prime_k) = before_wheel(before_w_k, t1_k, tc_k, flow_kg_s, air::heat_capacity_j_kgk(t1_k));
     let t2_prime_k = compressed_k(t1_prime_k, isentropic_rise_ratio, efficiency);
@@ -126,19 +128,23 @@ mod tests {
             0.3..1.0f64,
             0.0..4000.0f64,
             0.0..1.0f64,
+            0.3..2.0f64,
         )
-            .prop_map(|(t1_k, tc_k, flow_kg_s, pr, efficiency, h_w_m2k, alpha_area_ratio)| {
-                CompressionInputs {
-                    t1_k,
-                    tc_k,
-                    flow_kg_s,
-                    isentropic_rise_ratio: isentropic_rise_ratio(pr, t1_k),
-                    efficiency,
-                    h_w_m2k,
-                    alpha_area_ratio,
-                    internal_area_m2: 29e-3,
-                }
-            })
+            .prop_map(
+                |(t1_k, tc_k, flow_kg_s, pr, efficiency, h_w_m2k, alpha_area_ratio, inlet_h_ratio)| {
+                    CompressionInputs {
+                        t1_k,
+                        tc_k,
+                        flow_kg_s,
+                        isentropic_rise_ratio: isentropic_rise_ratio(pr, t1_k),
+                        efficiency,
+                        h_w_m2k,
+                        inlet_h_ratio,
+                        alpha_area_ratio,
+                        internal_area_m2: 29e-3,
+                    }
+                },
+            )
     }
 
     /// Air tables (Moran and Shapiro, table A-22): from 300 K (pr = 1.3860) at pressure ratio 4 the isentropic end lies at
@@ -156,7 +162,7 @@ mod tests {
         #[test]
         fn ideal_compression_is_isentropic(pr in 1.0..4.0f64, t1_k in 250.0..330.0f64) {
             let ideal = CompressionInputs {
-                t1_k, tc_k: 350.0, flow_kg_s: 0.05, efficiency: 1.0, h_w_m2k: 0.0, alpha_area_ratio: 0.3,
+                t1_k, tc_k: 350.0, flow_kg_s: 0.05, efficiency: 1.0, h_w_m2k: 0.0, inlet_h_ratio: 1.0, alpha_area_ratio: 0.3,
                 isentropic_rise_ratio: isentropic_rise_ratio(pr, t1_k), internal_area_m2: 29e-3,
             };
             let isentropic_k = t1_k * pr.powf(287.05 / (1002.5 + 275e-6 * (t1_k - 200.0).powi(2)));

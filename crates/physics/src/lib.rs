@@ -19,6 +19,7 @@ pub mod follow_outlet;
 pub mod forecast;
 pub mod hooks;
 pub mod housing;
+pub mod inlet_convection;
 pub mod inputs;
 pub mod instruments;
 pub mod model;

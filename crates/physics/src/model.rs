@@ -11,7 +11,7 @@ use crate::params::Params;
 use crate::state::MAX_STATES;
 pub use crate::state::{State, rad_s_of_rpm};
 use crate::turbine::TurbineInlet;
-use crate::{air, housing, nusselt, orifice, thermocouple};
+use crate::{air, housing, inlet_convection, nusselt, orifice, thermocouple};
 use std::sync::Arc;
 
 /// Flow below which the gas path is not evaluated (it divides by the flow), kg/s.
@@ -166,7 +166,10 @@ impl PreparedModel<'_> {
             if wall_k > gas_k { conductance_w_k * compressor.hot_metal_h_ratio } else { conductance_w_k }
         };
         let (q1_w, mut t1_prime_k) = compression::before_wheel(
-            directed_w_k(boundary.t1_k) * compressor.alpha_area_ratio + compressor.inlet_conductance_w_k,
+            directed_w_k(boundary.t1_k)
+                * inlet_convection::h_ratio(compressor, boundary.t1_k, bulk_k)
+                * compressor.alpha_area_ratio
+                + compressor.inlet_conductance_w_k,
             boundary.t1_k,
             wall_k,
             flow_kg_s,

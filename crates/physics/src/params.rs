@@ -1,7 +1,7 @@
 //! Every parameter of the lumped turbocharger model, with Appendix A's values as default.
 
 pub use crate::boundary::BoundaryConditions;
-use mapper_core::ReferenceState;
+use mapper_core::{InletConvection, ReferenceState};
 use serde::{Deserialize, Serialize};
 
 /// The machine: geometry, masses, conductances, probe. Effects and fits change these numbers, never the equations.
@@ -42,6 +42,13 @@ pub struct CompressorParams {
     pub internal_area_m2: f64,
     /// Share of `internal_area_m2` before compression, alpha_A, 0..1 (eqs. 1 and 3).
     pub alpha_area_ratio: f64,
+    /// Inlet pipe diameter, m: characteristic length of the Nusselt correlation before the wheel where `inlet_convection` is
+    /// `own`.
+    pub inlet_diameter_m: f64,
+    /// What h before the wheel follows; without meaning where `alpha_area_ratio` is 0.
+    pub inlet_convection: InletConvection,
+    /// Multiplies h before the wheel, > 0; 1.
+    pub inlet_h_ratio: f64,
     /// Outlet pipe diameter: characteristic length of the Nusselt correlation, m.
     pub outlet_diameter_m: f64,
     /// Wheel diameter at the exit, m; tip speed of the map.
@@ -135,6 +142,9 @@ impl Default for Params {
             compressor: CompressorParams {
                 internal_area_m2: 29e-3,
                 alpha_area_ratio: 0.0,
+                inlet_diameter_m: 40e-3,
+                inlet_convection: InletConvection::Shared,
+                inlet_h_ratio: 1.0,
                 outlet_diameter_m: 35e-3,
                 wheel_diameter_m: 52e-3,
                 nusselt_coefficient: 0.004,

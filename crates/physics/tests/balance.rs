@@ -1,6 +1,7 @@
 //! Energy balance of steady states, in the model's own bookkeeping.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use mapper_core::InletConvection;
 use mapper_physics::housing;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
@@ -17,11 +18,15 @@ proptest! {
         speed_rpm in 40e3..160e3f64,
         valve_opening_ratio in 0.5..2.5f64,
         alpha in 0.0..0.5f64,
+        own_inlet in any::<bool>(),
         t3_k in 400.0..900.0f64,
         oil_k in 300.0..380.0f64,
     ) {
         let mut model = Model::nominal();
         model.params.compressor.alpha_area_ratio = alpha;
+        if own_inlet {
+            model.params.compressor.inlet_convection = InletConvection::Own;
+        }
         let boundary = BoundaryConditions { valve_opening_ratio, t3_k, oil_temperature_k: oil_k, ..Default::default() };
         let rest = steady::hold_speed(&model, speed_rpm, &boundary).unwrap();
         let outputs = rest.outputs;

@@ -1,5 +1,6 @@
 //! The thermal model of the machine for other programs: convection law, alpha_A, heat capacities, conductances.
 
+use crate::thermal_model::inlet_text;
 use mapper_core::{Origin, SharedValue, ThermalModel, one_line};
 use mapper_physics::housing::{bearing_conductance_w_k, compressor_capacity_j_k, turbine_capacity_j_k};
 use mapper_physics::params::Params;
@@ -27,7 +28,7 @@ impl ThermalExport<'_> {
     /// That of serde_json; numbers and texts never fail.
     pub fn json(&self) -> Result<Vec<u8>, serde_json::Error> {
         let (params, compressor) = (self.params, &self.params.compressor);
-        let mut bytes = serde_json::to_vec_pretty(&json!({
+        let mut file = json!({
             "machine": self.machine,
             "identified": self.found,
             "declared": {
@@ -46,7 +47,14 @@ impl ThermalExport<'_> {
                 "bearing_to_oil_conductance_w_k": params.bearing.oil_conductance_w_k,
                 "t2_probe_diameter_m": params.t2_probe_diameter_m,
             },
-        }))?;
+        });
+        if compressor.alpha_area_ratio > 0.0
+            && let Some(declared) = file["declared"].as_object_mut()
+        {
+            declared.insert("inlet_convection".to_owned(), json!(compressor.inlet_convection));
+            declared.insert("inlet_diameter_m".to_owned(), json!(compressor.inlet_diameter_m));
+        }
+        let mut bytes = serde_json::to_vec_pretty(&file)?;
         bytes.push(b'\n');
         Ok(bytes)
     }
@@ -79,6 +87,10 @@ impl ThermalExport<'_> {
         shared("alpha_area", "1", self.found.map(|f| &f.alpha_area_ratio), compressor.alpha_area_ratio);
         shared("t2_probe_diameter", "m", self.found.map(|f| &f.probe_diameter_m), params.t2_probe_diameter_m);
         shared("direction_factor", "1", self.found.map(|f| &f.direction_factor), 1.0);
+        if let Some(inlet) = self.found.and_then(|found| found.inlet) {
+            let _ =
+                writeln!(text, "inlet_diameter {} m # declared\n# {}", inlet.diameter_m, inlet_text(&inlet));
+        }
         for (name, value, unit) in [
             ("diameter", law.map_or(compressor.outlet_diameter_m, |l| l.diameter_m), "m"),
             ("internal_area", compressor.internal_area_m2, "m2"),

@@ -1,6 +1,6 @@
 //! What the points of a campaign share, for people.
 
-use mapper_core::{Origin, SharedValue, ThermalModel};
+use mapper_core::{FoundInlet, InletConvection, Origin, SharedValue, ThermalModel};
 use std::fmt::Write;
 
 /// The thermal model as lines of text, one for each number.
@@ -55,6 +55,9 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
             "  the profile of alpha_A is flat: {first:.1} to {last:.1} fit the recording equally well"
         );
     }
+    if let Some(inlet) = &thermal.inlet {
+        let _ = writeln!(text, "  {}", inlet_text(inlet));
+    }
     for pair in &thermal.entangled {
         let _ = writeln!(
             text,
@@ -68,10 +71,55 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     text
 }
 
+/// What h before the wheel follows, and whether the recording tells, as one line without its end.
+pub(crate) fn inlet_text(inlet: &FoundInlet) -> String {
+    let named = |convection: InletConvection| match convection {
+        InletConvection::Shared => "that behind it".to_owned(),
+        InletConvection::Own => format!("the same law at the inlet's {:.1} mm", 1e3 * inlet.diameter_m),
+    };
+    let here = named(inlet.convection);
+    match (inlet.origin, inlet.alpha_area_otherwise_ratio) {
+        (Origin::Assumed, _) => format!("h before the wheel: {here} (declared)"),
+        (Origin::Fitted, _) => {
+            format!("h before the wheel: {here}, says the recording (probability {:.2})", inlet.probability)
+        }
+        (Origin::NotIdentifiable, None) => format!(
+            "h before the wheel: {here}; the recording does not tell it from {} (probability {:.2}): the intervals contain both",
+            named(inlet.convection.other()),
+            inlet.probability
+        ),
+        (Origin::NotIdentifiable, Some(alpha)) => format!(
+            "h before the wheel: {here}; the recording does not tell it from {}, with which alpha_A would be {alpha:.3} (probability {:.2}): the intervals contain both",
+            named(inlet.convection.other()),
+            inlet.probability
+        ),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use mapper_core::{Entangled, ProfilePoint};
+
+    #[test]
+    fn of_h_before_the_wheel_the_law_and_what_speaks_for_it_are_said() {
+        let open = FoundInlet {
+            convection: InletConvection::Shared,
+            diameter_m: 0.04,
+            origin: Origin::NotIdentifiable,
+            probability: 0.67,
+            alpha_area_otherwise_ratio: Some(0.2069),
+        };
+        let text = inlet_text(&open);
+        assert!(text.contains("inlet's 40.0 mm") && text.contains("0.207"), "{text}");
+        assert!(text.contains("the intervals contain both"), "{text}");
+        let told = FoundInlet { convection: InletConvection::Own, origin: Origin::Fitted, ..open };
+        assert!(
+            inlet_text(&told)
+                .ends_with("the same law at the inlet's 40.0 mm, says the recording (probability 0.67)")
+        );
+        assert!(inlet_text(&FoundInlet { origin: Origin::Assumed, ..open }).ends_with("(declared)"));
+    }
 
     /// What the recording cannot tell reaches people and programs.
     #[test]
@@ -85,6 +133,7 @@ mod tests {
             alpha_area_profile: [(0.0, 0.0), (0.1, 0.5), (0.2, 1.1), (0.3, 9.0)]
                 .map(|(value, square)| ProfilePoint { value, square })
                 .to_vec(),
+            inlet: None,
             probe_diameter_m: SharedValue::assumed(0.0),
             direction_factor: SharedValue::assumed(1.0),
             offsets: std::collections::BTreeMap::new(),
@@ -96,6 +145,7 @@ mod tests {
             doubts: Vec::new(),
         };
         let text = thermal_text(&thermal);
+        assert!(!text.contains("before the wheel"), "nothing is said of what makes no difference: {text}");
         assert!(text.contains("the recording cannot tell"), "{text}");
         assert!(text.contains("flat: 0.0 to 0.2"), "{text}");
         assert!(text.contains("alpha_A and direction factor can hardly be told apart"), "{text}");

@@ -23,6 +23,8 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         settle_bands: chosen.settle_bands,
         alpha_area_ratio: chosen.alpha_area_ratio,
         alpha_area_sigma_ratio: chosen.alpha_area_sigma_ratio,
+        inlet_convection: campaign.machine.params.compressor.inlet_convection,
+        inlet_diameter_m: campaign.machine.params.compressor.inlet_diameter_m,
         outlet_diameter_m: campaign.machine.params.compressor.outlet_diameter_m,
         probe_diameter_m: campaign.machine.params.t2_probe_diameter_m,
         joint: chosen.joint,

@@ -28,6 +28,7 @@ macro_rules! effects {
 
 effects! {
     area_split::AreaSplit,
+    inlet_htc::InletHtc,
     tip_diameter::TipDiameter,
     stem_conduction::StemConduction,
     recovery::Recovery,

@@ -11,8 +11,11 @@ use mapper_physics::steady;
 use proptest::prelude::*;
 use std::sync::Arc;
 
+/// The nominal machine with some area before the wheel: without it what happens there would not show.
 fn nominal() -> Rig {
-    Rig::new(Model::nominal())
+    let mut model = Model::nominal();
+    model.params.compressor.alpha_area_ratio = 0.1;
+    Rig::new(model)
 }
 
 /// 110 -> 70 krpm at opening 0.7, P3 behind its command: every channel's readings, each second for a minute.

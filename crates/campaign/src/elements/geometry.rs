@@ -2,6 +2,7 @@
 
 use crate::si::set;
 use crate::units::{Area, Conductance, Conductivity, Inertia, Length, Mass, MassFlow, Quantity, Volume};
+use mapper_core::InletConvection;
 use mapper_physics::params::Params;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -68,6 +69,11 @@ pub(crate) struct CompressorFile {
     /// Share of the internal area before compression, alpha_A: a plain number from 0 to 1.
     #[schemars(range(min = 0, max = 1), example = 0.0)]
     alpha_area: Option<f64>,
+    /// Diameter of the inlet pipe.
+    #[schemars(extend("x-above" = "0 mm"))]
+    inlet_diameter: Option<Quantity<Length>>,
+    /// Heat-transfer coefficient before the wheel: `shared`, the default, is that after it; `own` follows the same Nusselt law at the inlet's diameter and temperature. It matters where `alpha_area` is above 0.
+    inlet_convection: Option<InletConvection>,
     /// Diameter of the outlet pipe.
     #[schemars(extend("x-above" = "0 mm"))]
     outlet_diameter: Option<Quantity<Length>>,
@@ -92,6 +98,8 @@ impl CompressorFile {
         let to = &mut params.compressor;
         set(&mut to.internal_area_m2, self.internal_area);
         set_number(&mut to.alpha_area_ratio, self.alpha_area);
+        set(&mut to.inlet_diameter_m, self.inlet_diameter);
+        to.inlet_convection = self.inlet_convection.unwrap_or(to.inlet_convection);
         set(&mut to.outlet_diameter_m, self.outlet_diameter);
         set(&mut to.wheel_diameter_m, self.wheel_diameter);
         set(&mut to.housing_mass_kg, self.housing_mass);

@@ -8,6 +8,7 @@
 pub(crate) mod cleaning;
 pub(crate) mod common_part;
 pub(crate) mod explained;
+pub(crate) mod inlet;
 pub(crate) mod input_noise;
 pub(crate) mod judge;
 pub(crate) mod model;
@@ -253,6 +254,7 @@ fn carefully(config: &IdentifyConfig) -> IdentifyConfig {
         alpha_area: Choice::Fixed,
         probe: Choice::Fixed,
         direction: Choice::Fixed,
+        inlet_h: Choice::Fixed,
         ..config.joint
     };
     IdentifyConfig { joint: held, ..config.clone() }
@@ -274,5 +276,5 @@ fn fitted(
     }
     problem.minimise(FULLY)?;
     parsimony::settle(problem)?;
-    problem.covariance()
+    inlet::settle(problem)
 }

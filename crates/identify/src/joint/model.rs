@@ -1,7 +1,7 @@
 //! The reading of T2 that a step's rows give under given parameters, and its derivatives.
 
 use crate::joint::parameters::{
-    ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL,
+    ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, INLET, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL,
     LocalVector, OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
 };
 use crate::joint::probe::Lag;
@@ -9,6 +9,7 @@ use crate::joint::rows::Row;
 use crate::joint::surface::{TERM_COUNT, dot};
 use mapper_physics::air;
 use mapper_physics::compression::{CompressionInputs, compress, compressed_k, isentropic_rise_ratio};
+use mapper_physics::inlet_convection::InletLaw;
 use mapper_physics::{nusselt, thermocouple};
 
 /// What is fixed for all steps.
@@ -16,6 +17,7 @@ use mapper_physics::{nusselt, thermocouple};
 pub(crate) struct Setting {
     pub(crate) internal_area_m2: f64,
     pub(crate) outlet_diameter_m: f64,
+    pub(crate) inlet_diameter_m: f64,
     /// Reynolds number at which the law's coefficient is taken.
     pub(crate) reynolds_reference: f64,
     /// Whether h follows the law; else it holds still within a step.
@@ -51,16 +53,32 @@ struct Gas {
     eta: f64,
 }
 
+/// Convection on the way, one row.
+#[derive(Debug, Clone, Copy)]
+struct Convection {
+    /// After the wheel, W/(m2 K).
+    h_w_m2k: f64,
+    /// Temperature of its properties, K.
+    bulk_k: f64,
+    /// h before the wheel over that after it.
+    inlet_h_ratio: f64,
+}
+
 impl Setting {
-    /// Heat-transfer coefficient by the law, W/(m2 K), and the bulk temperature.
-    fn h(&self, gas: &Gas, shared: &SharedVector, ln_deviation: f64) -> (f64, f64) {
+    /// Heat-transfer coefficients by the law.
+    fn h(&self, gas: &Gas, shared: &SharedVector, ln_deviation: f64) -> Convection {
         let bulk_k = compressed_k(gas.t1_k, gas.rise_ratio, gas.eta);
+        let inlet_h_ratio = if shared[INLET] == 0.0 {
+            1.0
+        } else {
+            (shared[INLET] * self.ln_inlet_ratio(gas, shared, bulk_k)).exp()
+        };
         if !self.with_law {
-            return (ln_deviation.exp(), bulk_k);
+            return Convection { h_w_m2k: ln_deviation.exp(), bulk_k, inlet_h_ratio };
         }
         let exponent = shared[EXPONENT];
         let ln_coefficient = shared[LN_COEFFICIENT] + ln_deviation - exponent * self.reynolds_reference.ln();
-        let h = nusselt::coefficient_w_m2k(
+        let h_w_m2k = nusselt::coefficient_w_m2k(
             ln_coefficient.exp(),
             exponent,
             self.outlet_diameter_m,
@@ -68,12 +86,23 @@ impl Setting {
             bulk_k,
             gas.tc_k,
         );
-        (h, bulk_k)
+        Convection { h_w_m2k, bulk_k, inlet_h_ratio }
+    }
+
+    /// ln of h before over h after the wheel by the inlet's own law.
+    fn ln_inlet_ratio(&self, gas: &Gas, shared: &SharedVector, bulk_k: f64) -> f64 {
+        let law = InletLaw {
+            exponent: shared[EXPONENT],
+            inlet_diameter_m: self.inlet_diameter_m,
+            outlet_diameter_m: self.outlet_diameter_m,
+        };
+        law.h_ratio(gas.t1_k, bulk_k).ln()
     }
 
     /// T2 by eqs. 1-3. The direction factor scales h where the metal is the hotter; eqs. 1-3 have one h, so each part of
     /// the area is scaled instead.
-    fn t2_k(&self, gas: &Gas, (h_w_m2k, bulk_k): (f64, f64), alpha: f64, ln_direction: f64) -> f64 {
+    fn t2_k(&self, gas: &Gas, convection: Convection, alpha: f64, ln_direction: f64) -> f64 {
+        let Convection { h_w_m2k, bulk_k, inlet_h_ratio } = convection;
         let outward = |hotter: bool| if hotter && ln_direction != 0.0 { ln_direction.exp() } else { 1.0 };
         let before_m2 = outward(gas.tc_k > gas.t1_k) * alpha * self.internal_area_m2;
         let pass = |after_m2: f64| {
@@ -84,6 +113,7 @@ impl Setting {
                 isentropic_rise_ratio: gas.rise_ratio,
                 efficiency: gas.eta,
                 h_w_m2k,
+                inlet_h_ratio,
                 alpha_area_ratio: before_m2 / (before_m2 + after_m2),
                 internal_area_m2: before_m2 + after_m2,
             };
@@ -116,10 +146,16 @@ impl Setting {
         }
     }
 
+    /// ln of h before over h after the wheel by the inlet's own law, at a step's end.
+    pub(crate) fn ln_inlet_ratio_at(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> f64 {
+        let gas = self.gas(end, &[0.0; TERM_COUNT], shared, local);
+        self.ln_inlet_ratio(&gas, shared, compressed_k(gas.t1_k, gas.rise_ratio, gas.eta))
+    }
+
     /// h at a step's end, W/(m2 K), and ln of its Reynolds number over the reference.
     pub(crate) fn h_at_end(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> (f64, f64) {
         let gas = self.gas(end, &[0.0; TERM_COUNT], shared, local);
-        let (h_w_m2k, bulk_k) = self.h(&gas, shared, local[LN_DEVIATION]);
+        let Convection { h_w_m2k, bulk_k, .. } = self.h(&gas, shared, local[LN_DEVIATION]);
         (h_w_m2k, (self.reynolds(gas.flow_kg_s, bulk_k) / self.reynolds_reference).ln())
     }
 
@@ -188,8 +224,13 @@ impl Setting {
                 (self.t2_k(&moved, self.h(&moved, shared, deviation), alpha, ln_direction) - t2_k) / step
             };
             let by_eta = full(Gas { eta: gas.eta + STEP_RATIO, ..gas }, STEP_RATIO);
-            let by_ln_h =
-                (self.t2_k(&gas, (h.0 * (1.0 + STEP_RATIO), h.1), alpha, ln_direction) - t2_k) / STEP_RATIO;
+            let by_ln_h = (self.t2_k(
+                &gas,
+                Convection { h_w_m2k: h.h_w_m2k * (1.0 + STEP_RATIO), ..h },
+                alpha,
+                ln_direction,
+            ) - t2_k)
+                / STEP_RATIO;
             let mut put = |index: usize, value: f64| {
                 if let Some(cell) = columns[index].get_mut(i) {
                     *cell = value;
@@ -205,7 +246,21 @@ impl Setting {
             }
             if self.with_law {
                 put(LN_COEFFICIENT, by_ln_h);
-                put(EXPONENT, by_ln_h * (self.reynolds(gas.flow_kg_s, h.1) / self.reynolds_reference).ln());
+                let ln_reynolds = (self.reynolds(gas.flow_kg_s, h.bulk_k) / self.reynolds_reference).ln();
+                put(EXPONENT, by_ln_h * ln_reynolds);
+            }
+            if active[INLET] || shared[INLET] != 0.0 {
+                let moved = Convection { inlet_h_ratio: h.inlet_h_ratio * (1.0 + STEP_RATIO), ..h };
+                let by_ln_inlet = (self.t2_k(&gas, moved, alpha, ln_direction) - t2_k) / STEP_RATIO;
+                put(INLET, by_ln_inlet * self.ln_inlet_ratio(&gas, shared, h.bulk_k));
+                if self.with_law {
+                    // The exponent is that of the Reynolds numbers on both sides.
+                    let ln_reynolds = (self.reynolds(gas.flow_kg_s, h.bulk_k) / self.reynolds_reference).ln();
+                    let ln_inlet_over_outlet = (self.outlet_diameter_m * air::viscosity_pa_s(h.bulk_k)
+                        / (self.inlet_diameter_m * air::viscosity_pa_s(gas.t1_k)))
+                    .ln();
+                    put(EXPONENT, by_ln_h * ln_reynolds + by_ln_inlet * shared[INLET] * ln_inlet_over_outlet);
+                }
             }
             if active[ALPHA] {
                 put(ALPHA, (self.t2_k(&gas, h, alpha + STEP_RATIO, ln_direction) - t2_k) / STEP_RATIO);

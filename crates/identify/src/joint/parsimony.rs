@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector};
 /// housing warms up by 100 K looks like 0.06 of alpha_A.
 const REFINEMENTS: [(usize, f64); 3] = [(PROBE_MM2, 0.1), (LN_DIRECTION, 0.015), (ALPHA, 0.025)];
 /// Probability beforehand that a refinement is not at work.
-const DECLARED_HOLDS: f64 = 0.67;
+pub(crate) const DECLARED_HOLDS: f64 = 0.67;
 /// Weight of a refinement above which it is left alone.
 const SURE: f64 = 0.999;
 

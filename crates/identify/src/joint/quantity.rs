@@ -1,7 +1,7 @@
 //! Numbers that err with the parameters of a joint fit, and how they err together.
 
 use crate::joint::parameters::{
-    ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SURFACE, SharedVector,
+    ETA, EXPONENT, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SharedVector,
 };
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
@@ -24,7 +24,7 @@ pub(crate) struct Quantity {
 }
 
 pub(crate) fn is_offset(index: usize) -> bool {
-    (OFFSETS..SURFACE).contains(&index)
+    (OFFSETS..=FLOW_GAIN).contains(&index)
 }
 
 /// A shared parameter, about what the fit has.

@@ -65,6 +65,7 @@ pub(crate) fn thermal_model(
         internal_area_m2: problem.setting.internal_area_m2,
         alpha_area_ratio: of(ALPHA, &|x| x),
         alpha_area_profile: profile::alpha_area(problem),
+        inlet: problem.inlet,
         probe_diameter_m: probe(problem, covariance),
         direction_factor: of(LN_DIRECTION, &f64::exp),
         offsets: OFFSET_CHANNELS
@@ -96,7 +97,7 @@ fn value(
     let slope = (transform(fitted + 1e-6) - transform(fitted - 1e-6)) / 2e-6;
     let mut bias = 0.0;
     for (other, index) in covariance.fitted.iter().enumerate() {
-        if (OFFSETS..=FLOW_GAIN).contains(index) {
+        if (OFFSETS..SURFACE).contains(index) {
             bias += covariance.shared[(row, other)].powi(2) * problem.priors[*index].weight();
         }
     }

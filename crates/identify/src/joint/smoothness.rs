@@ -8,6 +8,7 @@
 //! on a flat one they lose about half of it. Everything that errs with the efficiencies is corrected along with them.
 
 use crate::joint::common_part::common_part;
+use crate::joint::parameters::{OFFSETS, SURFACE};
 use crate::joint::quantity::{Quantity, is_offset, of_shared, quantities};
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
@@ -106,9 +107,12 @@ pub(crate) fn smoothed(
             solve(&etas, &coordinates, problem)
         }
     };
-    // Errors that offsets bring, before and after.
+    // Errors that offsets and what is assumed bring, before and after.
+    let biased: Vec<usize> = (0..covariance.fitted.len())
+        .filter(|row| (OFFSETS..SURFACE).contains(&covariance.fitted[*row]))
+        .collect();
     let bias_of = |quantity: &Quantity, pull: Option<&DVector<f64>>| -> f64 {
-        carried
+        biased
             .iter()
             .map(|row| {
                 let sigma2 = covariance.shared[(*row, *row)];

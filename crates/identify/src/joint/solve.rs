@@ -6,6 +6,7 @@ use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
     ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, SHARED, SURFACE, SharedVector,
 };
+use mapper_core::FoundInlet;
 use mapper_numerics::coloured_noise::WhiteningFilter;
 use mapper_numerics::least_squares::{Arrow, ArrowBlock, Damping, DampingRule, Reduced};
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
@@ -61,6 +62,10 @@ pub(crate) struct Problem<'a> {
     pub(crate) probe_fitted: bool,
     /// Variance of shared parameters beyond that of the fit: whether they are at work at all.
     pub(crate) extra_variances: SharedVector,
+    /// Whether the recording is asked what h before the wheel follows.
+    pub(crate) inlet_sought: bool,
+    /// What came of that; `None` where it makes no difference.
+    pub(crate) inlet: Option<FoundInlet>,
 }
 
 /// The normal equations where the parameters stand, and the cost there.
@@ -255,6 +260,23 @@ impl Problem<'_> {
         let members = self.members.iter().zip(locals).filter(|(member, _)| member.shares);
         self.shared_cost(shared)
             + members.map(|(member, local)| self.local_cost(member, shared, local)).sum::<f64>()
+    }
+
+    /// The sum of squares where the parameters stand.
+    pub(crate) fn square(&self) -> f64 {
+        let locals: Vec<LocalVector> = self.members.iter().map(|member| member.local).collect();
+        self.cost(&self.shared, &locals)
+    }
+
+    /// ln of h before over h after the wheel by the inlet's own law, at the end of each step.
+    pub(crate) fn ln_inlet_ratios(&self) -> Vec<f64> {
+        self.members
+            .iter()
+            .filter_map(|member| {
+                let end = member.course.rows.last()?;
+                Some(self.setting.ln_inlet_ratio_at(end, &self.shared, &member.local))
+            })
+            .collect()
     }
 
     /// Finds the minimum from where the parameters stand; `None` where it comes to no finite end. `enough_square`: see

@@ -5,12 +5,13 @@ use crate::end_state::EndState;
 use crate::findings::{Findings, code};
 use crate::joint::cleaning::cleaned;
 use crate::joint::explained::Explained;
+use crate::joint::inlet;
 use crate::joint::input_noise;
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
-    ALPHA, ALPHA_SIGMA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION,
-    LN_DIRECTION_SIGMA, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, PROBE_SIGMA_MM2, Prior, SHARED, SLOPE,
-    SURFACE,
+    ALPHA, ALPHA_SIGMA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, INLET, LN_COEFFICIENT, LN_DEVIATION,
+    LN_DIRECTION, LN_DIRECTION_SIGMA, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, PROBE_SIGMA_MM2, Prior,
+    SHARED, SLOPE, SURFACE,
 };
 use crate::joint::parsimony::NO_EXTRA;
 use crate::joint::rows::{StepRows, condensed};
@@ -105,6 +106,7 @@ pub(crate) fn problem<'a>(
     let setting = Setting {
         internal_area_m2: config.internal_area_m2,
         outlet_diameter_m: config.outlet_diameter_m,
+        inlet_diameter_m: config.inlet_diameter_m,
         reynolds_reference: ln_reference.exp(),
         with_law,
         shaped,
@@ -133,6 +135,7 @@ pub(crate) fn problem<'a>(
     lowest[PROBE_MM2] = 0.0;
     priors[LN_DIRECTION] = Prior { mean: 0.0, sigma: LN_DIRECTION_SIGMA };
     active[LN_DIRECTION] = choice.direction == Choice::Fitted;
+    shared[INLET] = inlet::power_of(config.inlet_convection);
     if choice.offsets == Choice::Fitted {
         for (i, channel) in OFFSET_CHANNELS.iter().enumerate() {
             let sigma = config.declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);
@@ -211,6 +214,8 @@ pub(crate) fn problem<'a>(
         explained: Explained::default(),
         probe_fitted: choice.probe == Choice::Fitted,
         extra_variances: NO_EXTRA,
+        inlet_sought: choice.inlet_h == Choice::Fitted,
+        inlet: None,
     })
 }
 

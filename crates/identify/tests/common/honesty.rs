@@ -1,4 +1,5 @@
 //! Errors beside what was said of them: whether intervals are as wide as they have to be, and no wider.
+#![allow(dead_code, reason = "each user takes its own part")]
 
 use mapper_core::confidence_interval_95;
 

@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each user takes its own part")]
 
 use super::common::add_noise;
-use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
+use mapper_core::{Channel, InletConvection, OperatingPoint, Recording, StepKind, StepMarker};
 use mapper_identify::DeclaredUncertainty;
 use mapper_physics::compression::{CompressionInputs, compress, isentropic_rise_ratio};
 use mapper_physics::model::Model;
@@ -33,11 +33,13 @@ pub struct Machine {
     pub probe_m: f64,
     /// On h where the metal is hotter than the gas it touches.
     pub direction: f64,
+    /// What h before the wheel follows.
+    pub inlet: InletConvection,
 }
 
 impl Default for Machine {
     fn default() -> Self {
-        Machine { alpha: 0.0, probe_m: 0.0, direction: 1.0 }
+        Machine { alpha: 0.0, probe_m: 0.0, direction: 1.0, inlet: InletConvection::Shared }
     }
 }
 
@@ -45,6 +47,7 @@ impl Machine {
     fn model(&self) -> Model {
         let mut model = Model::nominal();
         model.params.compressor.alpha_area_ratio = self.alpha;
+        model.params.compressor.inlet_convection = self.inlet;
         model.params.t2_probe_diameter_m = self.probe_m;
         model
     }
@@ -138,6 +141,8 @@ fn directional(
             isentropic_rise_ratio: rise,
             efficiency: outputs.efficiency,
             h_w_m2k: outputs.h_w_m2k,
+            // Machines of the tests have a direction or an inlet of their own, not both.
+            inlet_h_ratio: 1.0,
             alpha_area_ratio: before_m2 / (before_m2 + after_m2),
             internal_area_m2: before_m2 + after_m2,
         };

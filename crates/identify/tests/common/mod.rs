@@ -49,6 +49,7 @@ impl Transient {
             isentropic_rise_ratio: isentropic_rise_ratio(self.pressure_ratio, self.t1_k),
             efficiency: self.eta,
             h_w_m2k: self.h_w_m2k,
+            inlet_h_ratio: 1.0,
             alpha_area_ratio: self.alpha_area_ratio,
             internal_area_m2: INTERNAL_AREA_M2,
         };

@@ -1,0 +1,110 @@
+//! Whether h before the wheel is that after it or follows the inlet's own diameter.
+//!
+//! Both readings have the same numbers to find, and nearly the same T2: a recording sees `h alpha_A` before the wheel and
+//! `h (1 - alpha_A)` behind it, so with another h before it alpha_A and h come out otherwise, and the efficiencies do not.
+//! The ratio of the two laws varies by a few percent over a map (with the gas temperature behind the wheel), which is all
+//! that a recording can tell them by, unless alpha_A is held as declared. So both are fitted and weighed; where the recording
+//! does not decide, what is declared stays, and the difference is carried on as an error of everything that it moves.
+
+use crate::joint::parameters::{ALPHA, INLET, LN_COEFFICIENT, Prior};
+use crate::joint::parsimony::DECLARED_HOLDS;
+use crate::joint::solve::{Covariance, FULLY, Problem};
+use mapper_core::{FoundInlet, InletConvection, Origin};
+
+/// Standard errors of alpha_A below which the readings differ by less than what is left open of it anyway.
+const AT_WORK_SIGMAS: f64 = 2.0;
+/// Probability of the other reading below which the recording has decided.
+const DECIDED: f64 = 0.05;
+/// Share of the distance between the readings that is one standard deviation at least where it has not: the 95 % interval
+/// then reaches from one to the other and a quarter beyond, for what noise adds to the other.
+const OPEN_SIGMA: f64 = 0.65;
+
+/// Beyond this the straight line says nothing of the distance, and so neither does its ratio to it.
+const LARGEST_STRETCH: f64 = 2.0;
+
+/// How far h before the wheel follows the inlet's own law.
+pub(crate) fn power_of(convection: InletConvection) -> f64 {
+    match convection {
+        InletConvection::Shared => 0.0,
+        InletConvection::Own => 1.0,
+    }
+}
+
+fn convection_of(power: f64) -> InletConvection {
+    if power == 0.0 { InletConvection::Shared } else { InletConvection::Own }
+}
+
+/// Weighs both readings on a problem that is at its minimum, takes the likelier one, and gives the covariance there.
+pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Covariance> {
+    let covariance = problem.covariance()?;
+    let error = covariance.error_of(ALPHA).unwrap_or(0.0);
+    if problem.shared[ALPHA].abs() <= AT_WORK_SIGMAS * error {
+        return Some(covariance);
+    }
+    let declared = FoundInlet {
+        convection: convection_of(problem.shared[INLET]),
+        diameter_m: problem.setting.inlet_diameter_m,
+        origin: Origin::Assumed,
+        probability: 1.0,
+        alpha_area_otherwise_ratio: None,
+    };
+    problem.inlet = Some(declared);
+    let Some(mut other) = problem.inlet_sought.then(|| otherwise(problem)).flatten() else {
+        return Some(covariance);
+    };
+    let ln_odds = 0.5 * (problem.square() - other.square()) + ((1.0 - DECLARED_HOLDS) / DECLARED_HOLDS).ln();
+    let mut left = 1.0 / (1.0 + (-ln_odds).exp());
+    if left > 0.5 {
+        std::mem::swap(problem, &mut other);
+        left = 1.0 - left;
+    }
+    let decided = left < DECIDED;
+    problem.inlet = Some(FoundInlet {
+        convection: convection_of(problem.shared[INLET]),
+        origin: if decided { Origin::Fitted } else { Origin::NotIdentifiable },
+        probability: 1.0 - left,
+        alpha_area_otherwise_ratio: problem.active[ALPHA].then_some(other.shared[ALPHA]),
+        ..declared
+    });
+    let sigma = if decided { left.sqrt() } else { left.sqrt().max(OPEN_SIGMA) };
+    problem.priors[INLET] = Prior { mean: problem.shared[INLET], sigma };
+    problem.active[INLET] = true;
+    let covariance = problem.covariance()?;
+    problem.priors[INLET].sigma *= stretch(problem, &other, &covariance);
+    problem.covariance()
+}
+
+/// How much farther apart the two fits are than the straight line from one towards the other says: alpha_A and the level of
+/// h answer to each other's product, which bends.
+fn stretch(problem: &Problem<'_>, other: &Problem<'_>, covariance: &Covariance) -> f64 {
+    let Some(own) = covariance.row_of(INLET) else { return 1.0 };
+    let way = other.shared[INLET] - problem.shared[INLET];
+    [ALPHA, LN_COEFFICIENT]
+        .into_iter()
+        .filter_map(|index| Some((index, covariance.row_of(index)?)))
+        .map(|(index, row)| {
+            let straight = way * covariance.shared[(row, own)] / covariance.shared[(own, own)];
+            (other.shared[index] - problem.shared[index]) / straight
+        })
+        .filter(|ratio| ratio.is_finite())
+        .fold(1.0, f64::max)
+        .min(LARGEST_STRETCH)
+}
+
+/// The problem at its minimum with the other reading; `None` where it comes to none.
+fn otherwise<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
+    let mut other = problem.clone();
+    other.shared[INLET] = 1.0 - problem.shared[INLET];
+    let alpha = problem.shared[ALPHA];
+    if problem.active[ALPHA] && alpha > 0.0 && alpha < 1.0 {
+        // Where both give the same heats: h alpha_A and h (1 - alpha_A) times the ratio before the wheel stay.
+        let ln_ratios = problem.ln_inlet_ratios();
+        let ln_ratio = mapper_numerics::statistics::mean(&ln_ratios)?;
+        let towards_own = other.shared[INLET] - problem.shared[INLET];
+        let odds = alpha / (1.0 - alpha) * (-towards_own * ln_ratio).exp();
+        other.shared[ALPHA] = odds / (1.0 + odds);
+        other.shared[LN_COEFFICIENT] += ((1.0 - alpha) * (1.0 + odds)).ln();
+    }
+    other.minimise(FULLY)?;
+    Some(other)
+}

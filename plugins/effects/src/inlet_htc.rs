@@ -1,0 +1,52 @@
+//! Convection before the wheel is not that behind it.
+
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::effect_parameters;
+use mapper_physics::hooks::TooManyExtraStates;
+
+effect_parameters! {
+    /// Convection before the wheel is not that behind it.
+    #[derive(Debug)]
+    pub(crate) struct InletHtc {
+        /// h before the wheel over the nominal model's there; 0.75 is what Appendix A's 40 mm before 35 mm give.
+        inlet_ratio = "inlet_htc" ["1"] 0.2 .. 3.0, neutral 1.0, step -0.25;
+    }
+}
+
+impl EffectKind for InletHtc {
+    const ABOUT: About = About {
+        id: "inlet_htc",
+        description: "convection before the wheel differs from that behind it, as in an inlet of another diameter; shows only where alpha_A is above 0",
+        equation: "q1 = s h alpha_A A_c (T1 - Tc); by the law of the inlet's own diameter s is about (d_out/d_in)^(1 + b)",
+        source: "Burke et al., section 5.2 and Appendix A (inlet diameter)",
+        submodel: Submodel::CompressorGas,
+        also_shows_in: &[Submodel::CompressorHousing],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.compressor.inlet_h_ratio *= self.inlet_ratio;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Instant, T1_K};
+
+    /// Eq. 1: the gas before the wheel warms up by as much less as h there is smaller; without area there it has no say.
+    #[test]
+    fn heat_before_the_wheel_is_multiplied_where_area_lies_there() {
+        let at = |alpha_area_ratio: f64, inlet_ratio: f64| {
+            let mut at = Instant::with(InletHtc { inlet_ratio });
+            at.rig.model.params.compressor.alpha_area_ratio = alpha_area_ratio;
+            at.evaluate();
+            at.outputs
+        };
+        let rise_k = |inlet_ratio: f64| at(0.2, inlet_ratio).t1_prime_k - T1_K;
+        assert!((rise_k(0.75) / rise_k(1.0) - 0.75).abs() < 1e-9);
+        assert_eq!(at(0.2, 0.75).h_w_m2k, at(0.2, 1.0).h_w_m2k, "h is told for behind the wheel");
+        assert_eq!(at(0.0, 0.75), at(0.0, 1.0));
+    }
+}

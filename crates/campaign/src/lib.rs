@@ -12,6 +12,7 @@ mod consistency;
 mod elements;
 mod load;
 mod nightly;
+mod prospects;
 mod reach;
 mod schema;
 mod si;
@@ -21,8 +22,10 @@ mod testing;
 pub use campaign::Campaign;
 pub use load::{
     CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
+    warnings,
 };
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
 pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
+pub use prospects::Concern;
 pub use reach::{Unreachable, nominal_model, unreachable_points};
 pub use schema::json_schema;

@@ -60,8 +60,7 @@ pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) 
         rise_ratio: column(|row| isentropic_rise_ratio(row.p2_pa / row.p1_pa, row.t1_k)),
         lost: 0,
     };
-    let geometry =
-        Geometry { alpha_area_ratio: config.alpha_area_ratio, internal_area_m2: config.internal_area_m2 };
+    let geometry = Geometry::of(config);
     let fit = fit(&samples, geometry)?;
     let declared = declared_effect(&fit, &samples, geometry, config);
     let mut noise = NoiseVariances::split(declared.noise_k2, config.noise_colour);

@@ -49,12 +49,7 @@ pub fn largest_assignment(n: usize, weight: impl Fn(usize, usize) -> f64) -> f64
 }
 
 /// Largest threshold at which all rows but `spared` of them still find columns of their own with at least that weight.
-pub fn bottleneck(
-    rows: usize,
-    columns: usize,
-    spared: usize,
-    weight: impl Fn(usize, usize) -> f64,
-) -> f64 {
+pub fn bottleneck(rows: usize, columns: usize, spared: usize, weight: impl Fn(usize, usize) -> f64) -> f64 {
     let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
     let mut thresholds: Vec<f64> = places.map(|(i, j)| weight(i, j)).collect();
     thresholds.retain(|w| w.is_finite());

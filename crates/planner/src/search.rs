@@ -270,7 +270,11 @@ impl<'a, C: Chain> Annealing<'a, C> {
         }
         let first = match self.pieces.first() {
             Some(piece) if self.begin == 0 => {
-                if piece.reversed { self.order[piece.end - 1] } else { self.order[piece.start] }
+                if piece.reversed {
+                    self.order[piece.end - 1]
+                } else {
+                    self.order[piece.start]
+                }
             }
             _ => self.order[0],
         };

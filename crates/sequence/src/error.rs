@@ -1,5 +1,6 @@
 //! What stops a script, with its place in the script.
 
+use crate::runner::Script;
 use rhai::{Dynamic, EvalAltResult, ParseError, Position};
 use std::fmt;
 use std::path::PathBuf;
@@ -97,6 +98,11 @@ impl ScriptError {
             remedy,
             called_from: Vec::new(),
         }
+    }
+
+    /// A mistake that is seen without running the script.
+    pub(crate) fn at(script: &Script, at: Position, message: String, remedy: String) -> Self {
+        Self::new(script.path.clone(), &script.text, at, message, remedy)
     }
 
     pub(crate) fn parsing(path: PathBuf, text: &str, error: &ParseError) -> Self {

@@ -12,7 +12,6 @@ pub(crate) mod judge;
 pub(crate) mod model;
 pub(crate) mod parameters;
 pub(crate) mod parsimony;
-pub(crate) mod probe;
 pub(crate) mod profile;
 pub(crate) mod rows;
 pub(crate) mod shared;
@@ -129,7 +128,8 @@ pub(crate) fn estimate(
             dt2_k: change(|row| row.t2_k),
             dtc_k: change(|row| row.tc_k),
         };
-        judge::judge_step(&problem, i, eta_error.combined_standard_error(), config, own);
+        let dt2_k = estimates[step.position].dt2_k;
+        judge::judge_step(&problem, i, eta_error, dt2_k, config, own);
         if !commands::begins_with_jump(&recording.steps, step.position) {
             let message =
                 "no jump leads to this step: its efficiency rests on what the points share".to_owned();

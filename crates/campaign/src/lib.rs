@@ -8,6 +8,7 @@
 
 pub mod campaign;
 mod checking;
+mod concern;
 mod consistency;
 mod elements;
 mod load;
@@ -20,12 +21,12 @@ mod si;
 mod testing;
 
 pub use campaign::Campaign;
+pub use concern::Concern;
 pub use load::{
     CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
     warnings,
 };
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
 pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
-pub use prospects::Concern;
 pub use reach::{Unreachable, nominal_model, unreachable_points};
 pub use schema::json_schema;

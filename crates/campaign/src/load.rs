@@ -1,8 +1,9 @@
 //! From a text, or a file, to a campaign or all its mistakes.
 
 use crate::campaign::{Campaign, CampaignFile};
+use crate::concern::Concern;
 use crate::consistency;
-use crate::prospects::{self, Concern};
+use crate::prospects;
 use crate::reach::{self, Unreachable};
 use crate::schema::SCHEMA;
 use mapper_yaml::{Document, FindingKind, Findings, Node, Notes, ReadError, Source, Step, path_text, steps};

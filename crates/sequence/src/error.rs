@@ -1,6 +1,5 @@
 //! What stops a script, with its place in the script.
 
-use crate::runner::Script;
 use rhai::{Dynamic, EvalAltResult, ParseError, Position};
 use std::fmt;
 use std::path::PathBuf;
@@ -101,8 +100,8 @@ impl ScriptError {
     }
 
     /// A mistake that is seen without running the script.
-    pub(crate) fn at(script: &Script, at: Position, message: String, remedy: String) -> Self {
-        Self::new(script.path.clone(), &script.text, at, message, remedy)
+    pub(crate) fn at(path: PathBuf, text: &str, at: Position, message: String, remedy: String) -> Self {
+        Self::new(path, text, at, message, remedy)
     }
 
     pub(crate) fn parsing(path: PathBuf, text: &str, error: &ParseError) -> Self {

@@ -1,8 +1,6 @@
 //! Functions and properties that a script names and nobody has, found without running it: a branch that is seldom taken may
 //! be the first to fail, at night.
 
-use crate::error::ScriptError;
-use crate::runner::Script;
 use mapper_yaml::closest;
 use rhai::{AST, ASTNode, Engine, Expr, Position, Stmt};
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,9 +26,16 @@ const GETTER: &str = "get$";
 /// Everything that may be called, with the numbers of arguments it takes.
 type Known = BTreeMap<String, BTreeSet<usize>>;
 
+/// A name that nothing has: where, what is wrong, and what to do.
+pub(crate) struct Unknown {
+    pub(crate) at: Position,
+    pub(crate) message: String,
+    pub(crate) remedy: String,
+}
+
 /// Refuses the first call of a function that does not exist, or not with so many arguments, and the first property that
 /// nothing has.
-pub(crate) fn check(engine: &Engine, ast: &AST, script: &Script) -> Result<(), Box<ScriptError>> {
+pub(crate) fn check(engine: &Engine, ast: &AST) -> Result<(), Unknown> {
     let mut known = Known::new();
     let registered = |function: rhai::FuncInfo<'_>| {
         Some((function.metadata.name.to_string(), function.metadata.num_params))
@@ -77,7 +82,7 @@ pub(crate) fn check(engine: &Engine, ast: &AST, script: &Script) -> Result<(), B
     wrong.sort_by_key(|(at, ..)| (at.line(), at.position()));
     match wrong.into_iter().next() {
         None => Ok(()),
-        Some((at, message, remedy)) => Err(Box::new(ScriptError::at(script, at, message, remedy))),
+        Some((at, message, remedy)) => Err(Unknown { at, message, remedy }),
     }
 }
 

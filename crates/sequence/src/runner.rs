@@ -1,6 +1,7 @@
 //! A script on its own thread, met at each step.
 
 use crate::error::{ScriptError, SequenceError};
+use crate::names::Unknown;
 use crate::request::SequenceRequest;
 use crate::result::StepResult;
 use crate::sandbox::{SCRIPT_LIMIT, STACK_BYTES, engine};
@@ -126,7 +127,12 @@ fn run(script: &Script, session: Session) {
     let mut engine = engine(session.request.points.len());
     let session = Arc::new(Mutex::new(session));
     api::register(&mut engine, &session);
-    let compiled = compile(&engine, script).and_then(|ast| names::check(&engine, &ast, script).map(|()| ast));
+    let compiled = compile(&engine, script).and_then(|ast| match names::check(&engine, &ast) {
+        Ok(()) => Ok(ast),
+        Err(Unknown { at, message, remedy }) => {
+            Err(Box::new(ScriptError::at(script.path.clone(), &script.text, at, message, remedy)))
+        }
+    });
     let begun = lock(&session).wait();
     if begun.is_err() {
         return;

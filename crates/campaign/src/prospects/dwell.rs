@@ -1,7 +1,7 @@
 //! A dwell that leaves the identification no window.
 
-use super::Concern;
 use crate::campaign::Campaign;
+use crate::concern::Concern;
 use mapper_core::{Method, WindowRule};
 use mapper_yaml::steps;
 

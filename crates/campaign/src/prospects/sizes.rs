@@ -2,8 +2,8 @@
 //! with the square of the wheel, masses with the cube, inertia with the fifth power. The measure is the machine of Burke et
 //! al., Appendix A.
 
-use super::{Concern, mm};
 use crate::campaign::Campaign;
+use crate::concern::{Concern, mm};
 use mapper_physics::params::Params;
 use mapper_yaml::{Step, steps};
 

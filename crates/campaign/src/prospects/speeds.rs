@@ -1,7 +1,7 @@
 //! Speeds that no wheel stands, and speeds of which the nominal map says nothing.
 
-use super::{Concern, mm};
 use crate::campaign::{Campaign, MapSource};
+use crate::concern::{Concern, mm};
 use mapper_core::OperatingPoint;
 use mapper_physics::tabulated_map::TabulatedMap;
 use mapper_yaml::{Step, steps};

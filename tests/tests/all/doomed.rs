@@ -13,7 +13,7 @@ fn short(more: &[(&str, &str)]) -> CampaignFile {
 fn what_will_come_to_little_is_a_warning() {
     for (old, new, at, message) in [
         ("soak: 30 min", "soak: 5 min", "5 min", "after 5 min at rest, housings that were 3 K warmer"),
-        ("probe_diameter: 0 mm", "probe_diameter: 8 mm", "8 mm", "a probe of 8.00 mm has a time constant of"),
+        ("probe_diameter: 0 mm", "probe_diameter: 15 mm", "15 mm", "a probe of 15.00 mm has a time constant of"),
         ("dwell: 120 s ", "dwell: 30 s ", "30 s", "every point would be doubtful"),
     ] {
         let campaign = short(&[(old, new)]);

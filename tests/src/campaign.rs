@@ -14,7 +14,7 @@ pub const SHORT_GRID: &[(&str, &str)] = &[
     ),
     ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.4]"),
     ("warm_up: 10 min ", "warm_up: 60 s "),
-    ("seed: 1 ", "repeats: off\nseed: 1 "),
+    ("seed: 1 ", "repeats: off\nreturn_to_first: false\nseed: 1 "),
 ];
 
 /// The two-parameter method of the paper, each step by itself, and no rest before the run.

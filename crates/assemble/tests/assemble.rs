@@ -121,6 +121,17 @@ fn repeats_are_kept_out_of_the_lines() {
     assert_eq!(steps(&[lost.clone(), repeat(7), doubtful]), [7]);
     let elsewhere = OperatingPoint { speed_rpm: 5e4, valve_opening_ratio: 0.5 };
     assert_eq!(steps(&[lost, IdentifiedPoint { target: Some(elsewhere), ..repeat(7) }]), [0]);
+    // The first point, visited again because no jump had led to it: the surer of the two visits stands for it.
+    let first = |half: f64| IdentifiedPoint {
+        eta_low: Some(0.7 - half),
+        eta_high: Some(0.7 + half),
+        ..point(0, Some(5e4), 5e4, 0.03)
+    };
+    let again = |half: f64| IdentifiedPoint { step: 12, kind: StepKind::Return, ..first(half) };
+    assert_eq!(steps(&[first(0.02), repeat(7), again(0.01)]), [12]);
+    assert_eq!(steps(&[first(0.01), repeat(7), again(0.02)]), [0]);
+    let lost_again = IdentifiedPoint { verdict: Verdict::Unusable, ..again(0.001) };
+    assert_eq!(steps(&[first(0.02), lost_again]), [0]);
     // A campaign of repeats alone has no points.
     assert_eq!(make(&[repeat(3)]), Err(AssembleError::NoPoints));
 }

@@ -80,6 +80,8 @@ pub struct Campaign {
     pub required_sigma_eta: Option<f64>,
     /// The jump that is repeated, if any.
     pub repeats: Option<Repeats>,
+    /// Whether the first point, which no jump leads to, is visited once more at the end of the plan.
+    pub return_to_first: bool,
     /// What is done when repeats differ by more than is declared; `None`: they are not watched.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on_drift: Option<OnDrift>,
@@ -121,7 +123,7 @@ pub(crate) struct CampaignFile {
     #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"virtual_lab": {}}))]
     backend: BTreeMap<String, serde_json::Value>,
     /// The operating points: `speeds` and `openings`, or `points`.
-    grid: GridFile,
+    pub(crate) grid: GridFile,
     /// How long things take.
     #[serde(deserialize_with = "TimingElement::deserialize")]
     #[schemars(with = "TimingElement")]
@@ -142,6 +144,9 @@ pub(crate) struct CampaignFile {
     /// A jump that is repeated, so that drift shows: at least twice, and every 12 steps where nothing else is said; `off` for none. A sequence script makes its own repeats.
     #[schemars(example = &"off")]
     repeats: Option<RepeatsFile>,
+    /// Whether the first point is visited once more at the end, with a jump that leads to it: without one it has no transient to identify. `true` if it is left out; the method `steady` and sequence scripts make no such visit.
+    #[schemars(example = true)]
+    return_to_first: Option<bool>,
     /// Watches the repeats while the campaign runs: one that differs from its first visit by more than is declared is made again, and what differs again is drift.
     drift: Option<DriftFile>,
     /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.
@@ -194,6 +199,7 @@ impl CampaignFile {
             sequence: sequence(self.sequence.as_deref(), origin, files)?,
             required_sigma_eta: self.required_sigma_eta.map(|error| error.inside),
             repeats: repeats(self.repeats),
+            return_to_first: self.return_to_first.unwrap_or(true),
             on_drift: self.drift.map(|drift| drift.on_drift),
             seed: self.seed.unwrap_or(USUAL_SEED),
             limits: self.limits.into(),

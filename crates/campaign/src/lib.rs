@@ -8,10 +8,12 @@
 
 pub mod campaign;
 mod checking;
+mod concern;
 mod consistency;
 mod elements;
 mod load;
 mod nightly;
+mod prospects;
 mod reach;
 mod schema;
 mod si;
@@ -19,8 +21,10 @@ mod si;
 mod testing;
 
 pub use campaign::Campaign;
+pub use concern::Concern;
 pub use load::{
     CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
+    warnings,
 };
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
 pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};

@@ -1,7 +1,9 @@
 //! From a text, or a file, to a campaign or all its mistakes.
 
 use crate::campaign::{Campaign, CampaignFile};
+use crate::concern::Concern;
 use crate::consistency;
+use crate::prospects;
 use crate::reach::{self, Unreachable};
 use crate::schema::SCHEMA;
 use mapper_yaml::{Document, FindingKind, Findings, Node, Notes, ReadError, Source, Step, path_text, steps};
@@ -132,6 +134,25 @@ pub fn format_mistake(text: &str, origin: &Path, format: &str, known: &[&str]) -
     Findings::new(source, notes)
 }
 
+/// What in a campaign without mistakes is rarely meant, each at its place in the text. `more`: what others know of it.
+pub fn warnings(text: &str, origin: &Path, campaign: &Campaign, more: Vec<Concern>) -> Findings {
+    let source = Source::new(&DOCUMENT, origin, text);
+    let mut notes = Notes::default();
+    if let Some(root) = mapper_yaml::read(&source, &mut notes) {
+        let paths = root.deserialise().map(|file: CampaignFile| file.grid.points().1).unwrap_or_default();
+        let own = prospects::concerns(campaign, &paths).into_iter().filter(|concern| !concern.grave);
+        for concern in own.chain(more) {
+            note(&source, &root, &mut notes, FindingKind::Unusual, concern);
+        }
+    }
+    Findings::new(source, notes)
+}
+
+fn note(source: &Source, root: &Node, notes: &mut Notes, kind: FindingKind, concern: Concern) {
+    let Concern { at, message, remedy, .. } = concern;
+    notes.push(source.finding(kind, path_text(&at), root.place(&at), message, remedy));
+}
+
 /// Deserialises a text without known mistakes. `None` with at least one finding.
 fn finish(
     source: &Source,
@@ -169,6 +190,12 @@ fn finish(
             return None;
         }
     };
+    for concern in prospects::concerns(&campaign, &point_paths).into_iter().filter(|concern| concern.grave) {
+        note(source, root, notes, FindingKind::Implausible, concern);
+    }
+    if !notes.is_empty() {
+        return None;
+    }
     for Unreachable { point, reason, remedy } in unreachable(&campaign) {
         let steps = point_paths.get(point).map(Vec::as_slice).unwrap_or_default();
         let kind = FindingKind::Unreachable;

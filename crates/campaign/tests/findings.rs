@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_campaign::campaign::MapSource;
-use mapper_campaign::{Campaign, Finding, FindingKind as Kind, Findings, check, check_with};
+use mapper_campaign::{
+    Campaign, Concern, Finding, FindingKind as Kind, Findings, check, check_with, warnings,
+};
 use std::io;
 use std::path::Path;
 
@@ -115,6 +117,89 @@ fn orders_and_repeats_fit_the_rest() {
     // Silence switches nothing off.
     let silent = run(RIGHT).unwrap_or_else(|findings| panic!("{findings}")).repeats.unwrap();
     assert_eq!((silent.jump, silent.at_least), (None, 2));
+}
+
+/// What no machine does is a mistake: 44 cm at 110 krpm are pi 0.44 110e3/60 = 2534 m/s.
+#[test]
+fn doomed_campaigns_are_refused_with_their_numbers() {
+    one(
+        "machine: {name: a, map: closed_form}",
+        "machine: {name: a, map: closed_form, geometry: {compressor: {wheel_diameter: 44 cm}}}",
+        Kind::Implausible,
+        "44 cm",
+        "wheel of 440 mm has a tip speed of 2534 m/s at the grid's highest speed, 110.0 krpm",
+        "lower the highest speed",
+    );
+    one("dwell: 120 s", "dwell: 9 s", Kind::Implausible, "9 s", "shorter than the 40 s", "at least 40 s");
+    let table = "machine: {name: a, map: {file: maps/there.csv, reference: SAE}}";
+    for (speed, message) in [("60 krpm", "begins at 80.0 krpm"), ("140 krpm", "ends at 120.0 krpm")] {
+        let (text, _) = with("machine: {name: a, map: closed_form}", table);
+        let findings = mistakes(&text.replace("[90 krpm, 110 krpm]", &format!("[90 krpm, {speed}]")));
+        assert_eq!(findings.list.len(), 1, "{findings}");
+        let finding = &findings.list[0];
+        assert_eq!(
+            (finding.kind, finding.path.as_str()),
+            (Kind::Implausible, "grid.speeds[1]"),
+            "{findings}"
+        );
+        assert!(
+            finding.message.contains(message)
+                && finding.message.contains(&format!("{}.0", &speed[..speed.len() - 5])),
+            "{findings}"
+        );
+    }
+}
+
+/// What few machines do is a warning at its key, and the campaign is one that can be run.
+#[test]
+fn rare_values_are_warned_of() {
+    let told = |old: &str, new: &str| {
+        let (text, _) = with(old, new);
+        let campaign = run(&text).unwrap_or_else(|findings| panic!("{findings}"));
+        (warnings(&text, Path::new("dir/short.yaml"), &campaign, Vec::new()), text)
+    };
+    assert_eq!(told("campaign: short", "campaign: short").0.count(), 0);
+    let geometry = |inside: &str| format!("machine: {{name: a, map: closed_form, geometry: {inside}}}");
+    for (old, new, at, message) in [
+        (
+            "timing: {dwell: 120 s}",
+            "timing: {dwell: 30 s}".to_owned(),
+            "30 s",
+            "every point would be doubtful",
+        ),
+        (
+            "machine: {name: a, map: closed_form}",
+            geometry("{compressor: {housing_mass: 93 kg}}"),
+            "93 kg",
+            "the housing of the compressor is 93 kg; with a compressor wheel of 52 mm 0.093 to 9.3 kg would be usual",
+        ),
+        (
+            "machine: {name: a, map: closed_form}",
+            geometry("{compressor: {wheel_diameter: 110 mm}}"),
+            "110 mm",
+            "tip speed of 634 m/s",
+        ),
+        (
+            "machine: {name: a, map: closed_form}",
+            geometry("{turbine: {peak_efficiency: 0.95}}"),
+            "0.95",
+            "more than any turbocharger's turbine",
+        ),
+    ] {
+        let (found, text) = told(old, &new);
+        assert_eq!(found.count(), 1, "{new}: {found}");
+        let finding = &found.list[0];
+        assert!(finding.kind == Kind::Unusual && finding.kind.is_warning(), "{found}");
+        assert_eq!(&text[finding.span.start..finding.span.start + at.len()], at, "{found}");
+        assert!(finding.message.contains(message), "{found}");
+        let shown = found.to_string();
+        assert!(shown.starts_with("warning: ") && shown.ends_with("dir/short.yaml: 1 warning\n"), "{shown}");
+    }
+    // What others know of the campaign stands beside it.
+    let campaign = run(RIGHT).unwrap_or_else(|findings| panic!("{findings}"));
+    let concern = Concern::warning(&["timing", "dwell"], "too long a night".to_owned(), "sleep".to_owned());
+    let found = warnings(RIGHT, Path::new("dir/short.yaml"), &campaign, vec![concern]);
+    assert!(found.to_string().contains("timing.dwell: too long a night"), "{found}");
 }
 
 #[test]

@@ -14,6 +14,12 @@ pub fn print(text: &str) -> Result<(), Failure> {
     })
 }
 
+/// Writes what is already laid out to standard error: warnings, which no program reads.
+#[allow(clippy::print_stderr, reason = "beside the output, as errors are")]
+pub fn warn(text: &str) {
+    eprint!("{text}");
+}
+
 /// Writes one JSON object and a line end to standard output.
 pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
     print(&mapper_session::json_text(value)?)

@@ -79,4 +79,4 @@ pub use thermal_model::{
 pub use timing::Timing;
 pub use visit_order::VisitOrder;
 pub use window_rule::WindowRule;
-pub use with_unit::with_unit;
+pub use with_unit::{readable, temperature, with_unit};

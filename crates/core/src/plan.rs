@@ -12,6 +12,18 @@ pub enum StepKind {
     Point,
     /// A revisit, to see drift.
     Repeat,
+    /// The first point once more, at the end: no jump led to it at the start.
+    Return,
+}
+
+impl StepKind {
+    /// Whether the step measures a point for the map: a repeat is there to compare.
+    pub fn measures(self) -> bool {
+        match self {
+            StepKind::Point | StepKind::Return => true,
+            StepKind::Repeat => false,
+        }
+    }
 }
 
 /// What the nominal model expects of a step.
@@ -68,7 +80,7 @@ impl Predicted {
 pub struct PlanStep {
     /// Position in the plan, from 0.
     pub index: usize,
-    /// Point or repeat.
+    /// Point, repeat, or the first point once more.
     pub kind: StepKind,
     /// Point before the jump; `None` for the first step.
     pub from: Option<OperatingPoint>,

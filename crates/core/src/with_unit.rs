@@ -10,9 +10,31 @@ pub fn with_unit(value: impl Display, unit: &str) -> String {
     }
 }
 
+/// A temperature as limits are written and as files hold it: `300.0 degC (573.2 K)`.
+pub fn temperature(value_k: f64) -> String {
+    format!("{:.1} degC ({value_k:.1} K)", value_k - 273.15)
+}
+
+/// A reading as limits are written: temperatures as [`temperature`], pressures in kPa, speeds in krpm; others in `unit`.
+pub fn readable(value: f64, unit: &str) -> String {
+    match unit {
+        "K" => temperature(value),
+        "Pa" => format!("{:.1} kPa", value / 1e3),
+        "rpm" => format!("{:.2} krpm", value / 1e3),
+        unit => with_unit(format!("{value:.1}"), unit),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn readings_have_the_units_of_limits() {
+        assert_eq!(readable(573.15, "K"), "300.0 degC (573.1 K)");
+        assert_eq!(readable(512_345.0, "Pa"), "512.3 kPa");
+        assert_eq!(readable(155e3, "rpm"), "155.00 krpm");
+    }
 
     #[test]
     fn ratios_stand_without_a_unit() {

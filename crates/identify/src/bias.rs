@@ -23,7 +23,8 @@ pub(crate) struct DeclaredEffect {
     pub(crate) common: [Vec<f64>; 2],
     /// What the assumed alpha_A may cost eta and h, one standard deviation.
     pub(crate) assumed_alpha: [f64; 2],
-    /// Variance of (measured minus fitted T2) from sample noise, K2.
+    /// Variance of (measured minus fitted T2) from sample noise, K2; for a probe with inertia an upper bound, since it evens
+    /// out what the noise of the other channels makes of the gas.
     pub(crate) noise_k2: f64,
 }
 
@@ -40,9 +41,14 @@ pub(crate) fn declared_effect(
         let Some(declared) = config.declared.get(&channel) else { continue };
         let values = column(samples, channel);
         let sensitivity = sensitivity(fit, samples, geometry, channel);
+        let read = |change_k: Vec<f64>| {
+            // The probe's own error is not seen through the probe.
+            let change_k = if channel == Channel::T2 { change_k } else { fit.read(change_k) };
+            fit.response(change_k.into_iter())
+        };
         let responses = [
-            fit.response(sensitivity.iter().map(|s| s * declared.offset_sigma)),
-            fit.response(sensitivity.iter().zip(values).map(|(s, v)| s * v * declared.gain_sigma_ratio)),
+            read(sensitivity.iter().map(|s| s * declared.offset_sigma).collect()),
+            read(sensitivity.iter().zip(values).map(|(s, v)| s * v * declared.gain_sigma_ratio).collect()),
         ];
         for (response, sigma) in responses.into_iter().zip([declared.offset_sigma, declared.gain_sigma_ratio])
         {
@@ -65,8 +71,8 @@ pub(crate) fn declared_effect(
         // Towards the middle, so that the share stays one.
         let away = if geometry.alpha_area_ratio > 0.5 { -1.0 } else { 1.0 };
         let sigma = away * config.alpha_area_sigma_ratio;
-        let moved_k = rows(samples).map(|row| fitted_k(row, sigma) - fitted_k(row, 0.0));
-        effect.assumed_alpha = fit.response(moved_k);
+        let moved_k = rows(samples).map(|row| fitted_k(row, sigma) - fitted_k(row, 0.0)).collect();
+        effect.assumed_alpha = fit.response(fit.read(moved_k).into_iter());
         effect.push(effect.assumed_alpha);
     }
     effect

@@ -28,7 +28,7 @@ pub struct IdentifyConfig {
     pub inlet_diameter_m: f64,
     /// Diameter of the outlet pipe, m, > 0: characteristic length of the convection law, and where the T2 probe stands.
     pub outlet_diameter_m: f64,
-    /// Declared diameter of the T2 probe's tip, m, >= 0; 0 is a probe without inertia. The joint method alone uses it.
+    /// Declared diameter of the T2 probe's tip, m, >= 0; 0 is a probe without inertia.
     pub probe_diameter_m: f64,
     /// Which refinements the joint method makes.
     pub joint: JointSettings,

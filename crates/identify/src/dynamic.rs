@@ -7,7 +7,7 @@ use crate::fit::{Fit, Geometry, fit};
 use crate::flow_drift::{FlowDrift, flow_drift};
 use crate::samples::Samples;
 use crate::window;
-use crate::{IdentifyConfig, commands};
+use crate::{IdentifyConfig, commands, width};
 use mapper_core::{EstimateUncertainty, Recording, Window};
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 
@@ -24,6 +24,9 @@ const STRUCTURE_BLOCK_S: f64 = 10.0;
 
 /// Means over such a block keep about this much of the noise at most (first-order part, 2 s): four tenths of 0.6, twice.
 const STRUCTURE_OVER_NOISE_RATIO: f64 = 0.75;
+
+/// What helps where the model does not fit.
+const POOR_FIT_REMEDY: &str = "declare the noise and the probe that T2 really has; `joint` finds probe and alpha_A, `mapper gap` looks for other causes";
 
 /// What a method makes of one step.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -97,7 +100,7 @@ pub(crate) fn estimate(
     estimate.eta = Some((fit.eta, Some(eta)));
     estimate.h_w_m2k = Some((fit.h_w_m2k, Some(h)));
     let view = View { fit: &fit, samples: &samples, config, noise_k: declared.noise_k2.sqrt() };
-    judge_gradient(&view, sensors.combined_standard_error(), estimate.dt2_k, findings);
+    judge_width(&view, sensors, estimate.dt2_k, findings);
     judge_assumption(declared.assumed_alpha[0], config, findings);
     judge_flow(drift, config, findings);
     judge_residual(&view, estimate.dt2_k, findings);
@@ -191,21 +194,18 @@ struct View<'a> {
     noise_k: f64,
 }
 
-/// Whether enough happens in the window. `sigma_eta`: from noise and declared offsets.
-fn judge_gradient(view: &View<'_>, sigma_eta: f64, dt2_k: Option<f64>, findings: &mut Findings) {
+/// Whether enough happens in the window, and is seen. `eta`: from noise and declared offsets.
+fn judge_width(view: &View<'_>, eta: EstimateUncertainty, dt2_k: Option<f64>, findings: &mut Findings) {
     let limits = &view.config.thresholds;
-    let dt2_k = dt2_k.unwrap_or(0.0);
+    let (sigma_eta, dt2_k) = (eta.combined_standard_error(), dt2_k.unwrap_or(0.0));
     if sigma_eta <= limits.sigma_eta && dt2_k.abs() >= limits.dt2_k {
         return;
     }
-    let message = format!(
-        "T2 moves by {dt2_k:.2} K in the window; noise and declared offsets leave eta uncertain by {:.1} points (1 sigma)",
-        100.0 * sigma_eta
-    );
+    let (code, message) = width::cause(eta, dt2_k, limits.dt2_k, "");
     if sigma_eta > limits.unusable_sigma_eta {
-        findings.refuse(code::SMALL_GRADIENT, message);
+        findings.refuse(code, message);
     } else {
-        findings.doubt(code::SMALL_GRADIENT, message);
+        findings.doubt(code, message);
     }
 }
 
@@ -251,12 +251,13 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
     }
     let (rms_k, slow_k) = (fit.residual_rms_k(), slow_rms_k(fit, view.samples));
     if noise_k > 0.0 && rms_k > limits.residual_over_noise_ratio * noise_k {
-        let message =
-            format!("the residual of T2 is {rms_k:.3} K rms; the declared noise explains {noise_k:.3} K");
+        let message = format!(
+            "the residual of T2 is {rms_k:.3} K rms; the declared noise explains {noise_k:.3} K: {POOR_FIT_REMEDY}"
+        );
         findings.doubt(code::POOR_FIT, message);
     } else if slow_k > (limits.structure_ratio * dt2_k.abs()).max(STRUCTURE_OVER_NOISE_RATIO * noise_k) {
         let message = format!(
-            "the residual of T2 has a shape: {slow_k:.3} K rms in {STRUCTURE_BLOCK_S:.0} s means, while T2 moves by {dt2_k:.1} K"
+            "the residual of T2 has a shape: {slow_k:.3} K rms in {STRUCTURE_BLOCK_S:.0} s means, while T2 moves by {dt2_k:.1} K: {POOR_FIT_REMEDY}"
         );
         findings.doubt(code::POOR_FIT, message);
     }

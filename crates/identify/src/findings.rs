@@ -18,6 +18,10 @@ pub mod code {
     pub const WINDOW_CUT: &str = "window_cut";
     /// Too little happens in the window to tell efficiency from heat transfer.
     pub const SMALL_GRADIENT: &str = "small_gradient";
+    /// Declared offsets leave the efficiency uncertain, however much happens.
+    pub const OFFSETS_DOMINATE: &str = "offsets_dominate";
+    /// Noise leaves the efficiency uncertain, although enough happens.
+    pub const NOISE_DOMINATES: &str = "noise_dominates";
     /// The fit leaves more than noise.
     pub const POOR_FIT: &str = "poor_fit";
     /// The flow, and h with it, moved within the window.

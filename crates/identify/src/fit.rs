@@ -1,7 +1,8 @@
 //! The two-parameter fit: efficiency and heat-transfer coefficient, constant over the window, by least squares on T2
-//! with eqs. 1-3 of the paper and the measured T1, Tc, flow and pressure ratio.
+//! with eqs. 1-3 of the paper and the measured T1, Tc, flow and pressure ratio, read through the declared probe.
 
 use crate::IdentifyConfig;
+use crate::followed::{Followed, Probe};
 use crate::samples::Samples;
 use mapper_core::InletConvection;
 use mapper_physics::air;
@@ -26,6 +27,7 @@ pub(crate) struct Geometry {
     pub(crate) internal_area_m2: f64,
     /// The law of h before the wheel, where it is not h.
     pub(crate) inlet: Option<InletLaw>,
+    pub(crate) probe: Probe,
 }
 
 impl Geometry {
@@ -40,6 +42,7 @@ impl Geometry {
             alpha_area_ratio: config.alpha_area_ratio,
             internal_area_m2: config.internal_area_m2,
             inlet: (config.inlet_convection == InletConvection::Own).then_some(own),
+            probe: Probe { diameter_m: config.probe_diameter_m, pipe_diameter_m: config.outlet_diameter_m },
         }
     }
 
@@ -57,14 +60,26 @@ pub(crate) struct Fit {
     pub(crate) h_w_m2k: f64,
     /// Measured minus fitted T2, K.
     pub(crate) residual_k: Vec<f64>,
-    /// Derivatives of T2 by eta (K) and by h (K m2 K/W).
+    /// Derivatives of the probe's reading by eta (K) and by h (K m2 K/W), without what its first reading can take up.
     pub(crate) jacobian: [Vec<f64>; 2],
+    /// Derivative of the gas's own T2 by h, K m2 K/W.
+    pub(crate) gas_by_h: Vec<f64>,
+    /// How the probe follows the gas; `None` where it has no inertia.
+    pub(crate) followed: Option<Followed>,
     /// `(J'J)^-1`.
     pub(crate) inverse_normal: [[f64; 2]; 2],
 }
 
 impl Fit {
-    /// Least-squares parameters that a change of T2 would add: `(J'J)^-1 J' y`.
+    /// What the probe reads of a change of the gas's T2.
+    pub(crate) fn read(&self, gas_change_k: Vec<f64>) -> Vec<f64> {
+        match &self.followed {
+            Some(followed) => followed.read(&gas_change_k),
+            None => gas_change_k,
+        }
+    }
+
+    /// Least-squares parameters that a change of the reading would add: `(J'J)^-1 J' y`.
     pub(crate) fn response(&self, t2_change_k: impl Iterator<Item = f64>) -> [f64; 2] {
         let mut right = [0.0; 2];
         for (i, change_k) in t2_change_k.enumerate() {
@@ -134,6 +149,7 @@ pub(crate) fn rows(samples: &Samples) -> impl Iterator<Item = Row> + '_ {
 struct Problem<'a> {
     samples: &'a Samples,
     geometry: Geometry,
+    followed: Option<&'a Followed>,
     config: MPConfig,
     parameters: [MPPar; 2],
 }
@@ -141,10 +157,21 @@ struct Problem<'a> {
 impl MPFitter for Problem<'_> {
     fn eval(&mut self, parameters: &[f64], deviates: &mut [f64]) -> MPResult<()> {
         let [eta, h_w_m2k] = [parameters[0], parameters[1]];
-        for ((deviate, row), measured_k) in
-            deviates.iter_mut().zip(rows(self.samples)).zip(&self.samples.t2_k)
-        {
-            *deviate = measured_k - t2_k(self.geometry, row, eta, h_w_m2k);
+        let gas_k = rows(self.samples).map(|row| t2_k(self.geometry, row, eta, h_w_m2k));
+        let measured_k = &self.samples.t2_k;
+        match self.followed {
+            None => {
+                for ((deviate, gas_k), measured_k) in deviates.iter_mut().zip(gas_k).zip(measured_k) {
+                    *deviate = measured_k - gas_k;
+                }
+            }
+            Some(followed) => {
+                let read_k = followed.read(&gas_k.collect::<Vec<f64>>());
+                for ((deviate, read_k), measured_k) in deviates.iter_mut().zip(read_k).zip(measured_k) {
+                    *deviate = measured_k - read_k;
+                }
+                followed.without_first_reading(deviates);
+            }
         }
         Ok(())
     }
@@ -181,9 +208,11 @@ pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
         return None;
     }
     let mut parameters = start(samples, geometry);
+    let followed = Followed::of(samples, geometry.probe);
     let mut problem = Problem {
         samples,
         geometry,
+        followed: followed.as_ref(),
         config: MPConfig { ftol: 1e-15, xtol: 1e-13, gtol: 1e-14, max_iter: 100, ..MPConfig::new() },
         parameters: [
             parameter(ETA_BOUNDS, 0.0, DERIVATIVE_STEP_RATIO),
@@ -195,21 +224,20 @@ pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
     if !(eta.is_finite() && h_w_m2k.is_finite()) {
         return None;
     }
-    judged(samples, geometry, eta, h_w_m2k, status.resid)
+    judged(samples, geometry, followed, [eta, h_w_m2k], status.resid)
 }
 
 /// Residual, derivatives and normal matrix at given parameters.
 fn judged(
     samples: &Samples,
     geometry: Geometry,
-    eta: f64,
-    h_w_m2k: f64,
+    followed: Option<Followed>,
+    [eta, h_w_m2k]: [f64; 2],
     residual_k: Vec<f64>,
 ) -> Option<Fit> {
     let step_eta = DERIVATIVE_STEP_RATIO * eta;
     let step_h = DERIVATIVE_STEP_H_W_M2K.max(DERIVATIVE_STEP_RATIO * h_w_m2k);
     let mut jacobian = [Vec::with_capacity(samples.len()), Vec::with_capacity(samples.len())];
-    let mut normal = [[0.0; 2]; 2];
     for row in rows(samples) {
         let by_eta = (t2_k(geometry, row, eta + step_eta, h_w_m2k)
             - t2_k(geometry, row, eta - step_eta, h_w_m2k))
@@ -218,13 +246,18 @@ fn judged(
             / (2.0 * step_h);
         jacobian[0].push(by_eta);
         jacobian[1].push(by_h);
-        normal[0][0] += by_eta * by_eta;
-        normal[0][1] += by_eta * by_h;
-        normal[1][1] += by_h * by_h;
     }
-    normal[1][0] = normal[0][1];
-    let inverse_normal = inverted(normal)?;
-    Some(Fit { eta, h_w_m2k, residual_k, jacobian, inverse_normal })
+    let gas_by_h = jacobian[1].clone();
+    if let Some(followed) = &followed {
+        for column in &mut jacobian {
+            *column = followed.read(column);
+            followed.without_first_reading(column);
+        }
+    }
+    let product = |i: usize, j: usize| jacobian[i].iter().zip(&jacobian[j]).map(|(a, b)| a * b).sum::<f64>();
+    let crossed = product(0, 1);
+    let inverse_normal = inverted([[product(0, 0), crossed], [crossed, product(1, 1)]])?;
+    Some(Fit { eta, h_w_m2k, residual_k, jacobian, gas_by_h, followed, inverse_normal })
 }
 
 /// Inverse of a symmetric positive definite matrix; `None` where it is singular to rounding.

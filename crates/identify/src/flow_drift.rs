@@ -29,8 +29,8 @@ pub(crate) fn flow_drift(fit: &Fit, samples: &Samples, end_s: f64) -> Option<Flo
     let relative: Vec<f64> = (0..samples.len()).map(|i| relative_h(fit, samples, &compressor, i)).collect();
     let end = mean(&relative[late..])?;
     let departure = relative.iter().map(|h| h / end - 1.0);
-    let response =
-        fit.response(departure.zip(&fit.jacobian[1]).map(|(ratio, by_h)| by_h * fit.h_w_m2k * ratio));
+    let gas_k = departure.zip(&fit.gas_by_h).map(|(ratio, by_h)| by_h * fit.h_w_m2k * ratio).collect();
+    let response = fit.response(fit.read(gas_k).into_iter());
     let drift = FlowDrift {
         flow_ratio: flow_change_kg_s / (flow_end_kg_s - flow_change_kg_s),
         eta: response[0],

@@ -3,14 +3,15 @@
 //! Whatever heat flows between gas and housing counts as work here; the error against the adiabatic efficiency is what
 //! the dynamic method is for (fig. 5 of the paper).
 
-use crate::IdentifyConfig;
 use crate::config::coloured;
 use crate::dynamic::{Estimate, enough};
 use crate::findings::{Findings, code};
 use crate::samples::Samples;
+use crate::{IdentifyConfig, width};
 use mapper_core::{Channel, EstimateUncertainty, Recording, Window};
 use mapper_numerics::statistics::{mean, standard_deviation};
 use mapper_physics::compression::isentropic_rise_ratio;
+use mapper_physics::thermocouple::time_constant_s;
 
 /// Stretch at the end of a step over which temperatures must not drift, s: noise of 0.1 K leaves their slope uncertain by
 /// less than 0.1 K/min then.
@@ -72,9 +73,12 @@ pub(crate) fn estimate(
     estimate.dt2_k = samples.change(&samples.t2_k, limits.end_mean_s);
     estimate.dtc_k = samples.change(&samples.tc_k, limits.end_mean_s);
     let of = |column: &[f64]| mean(column).unwrap_or(f64::NAN);
+    let trend_window = Window { start_s: (step.end_s - DRIFT_SPAN_S).max(step.start_s), end_s: step.end_s };
+    let trend = Samples::of(recording, trend_window, config, false);
+    let lag_k = lag_k(&samples, &trend, config);
     let means = Means {
         t1_k: of(&samples.t1_k),
-        t2_k: of(&samples.t2_k),
+        t2_k: of(&samples.t2_k) + lag_k,
         p1_pa: of(&samples.p1_pa),
         p2_pa: of(&samples.p2_pa),
     };
@@ -88,9 +92,10 @@ pub(crate) fn estimate(
         findings.refuse(code::NO_COMPRESSION, message);
         return estimate;
     }
-    let (uncertainty, common) = uncertainty(&means, &samples, config);
-    let trend_window = Window { start_s: (step.end_s - DRIFT_SPAN_S).max(step.start_s), end_s: step.end_s };
-    let trend = Samples::of(recording, trend_window, config, false);
+    let (mut uncertainty, common) = uncertainty(&means, &samples, config);
+    // The drift is no line: as much as the correction itself may be wrong with it.
+    let lag_eta = eta * lag_k / (means.t2_k - means.t1_k);
+    uncertainty.bias_standard_error = uncertainty.bias_standard_error.hypot(lag_eta);
     for (name, column) in [("T2", &trend.t2_k), ("Tc", &trend.tc_k)] {
         let Some(drift_k_min) = slope_per_s(&trend.t_s, column).map(|slope| 60.0 * slope) else { continue };
         if drift_k_min.abs() > limits.steady_drift_k_min {
@@ -102,12 +107,8 @@ pub(crate) fn estimate(
         }
     }
     if uncertainty.combined_standard_error() > limits.sigma_eta {
-        let message = format!(
-            "the temperature rise of {:.2} K gives eta with a standard error of {:.1} points",
-            means.t2_k - means.t1_k,
-            100.0 * uncertainty.combined_standard_error()
-        );
-        findings.doubt(code::SMALL_GRADIENT, message);
+        let (code, message) = width::cause_of_rise(uncertainty, means.t2_k - means.t1_k);
+        findings.doubt(code, message);
     }
     let message = "apparent efficiency: heat exchanged with the housing counts as work".to_owned();
     findings.remark(code::APPARENT, message);
@@ -118,6 +119,13 @@ pub(crate) fn estimate(
     estimate.eta = Some((eta, Some(uncertainty)));
     estimate.common[0] = common;
     estimate
+}
+
+/// By how much the declared probe still lags behind the gas, K: its time constant times the drift of its reading.
+fn lag_k(samples: &Samples, trend: &Samples, config: &IdentifyConfig) -> f64 {
+    let (Some(flow_kg_s), Some(t2_k)) = (mean(&samples.flow_kg_s), mean(&samples.t2_k)) else { return 0.0 };
+    let tau_s = time_constant_s(config.probe_diameter_m, config.outlet_diameter_m, flow_kg_s, t2_k);
+    slope_per_s(&trend.t_s, &trend.t2_k).map_or(0.0, |slope_k_s| tau_s * slope_k_s)
 }
 
 /// Least-squares slope of a column, 1/s; `None` without two finite samples.

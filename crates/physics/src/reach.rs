@@ -8,7 +8,7 @@ use crate::follow_outlet::{FollowOutlet, hold_speed};
 use crate::model::Model;
 use crate::params::BoundaryConditions;
 use crate::steady::{SteadyError, SteadyState};
-use mapper_core::{Limits, OperatingPoint};
+use mapper_core::{Limits, OperatingPoint, temperature};
 
 /// What is in the way of a point, in words that follow its name.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -68,7 +68,8 @@ pub enum Obstacle {
     },
     /// The compressor outlet gets too hot.
     #[error(
-        "heats the compressor outlet to T2 = {t2_k:.1} K, above `limits.compressor_outlet_temperature` = {limit_k:.1} K"
+        "heats the compressor outlet to T2 = {}, above `limits.compressor_outlet_temperature` = {}",
+        temperature(*.t2_k), temperature(*.limit_k)
     )]
     T2 {
         /// Outlet temperature, K.
@@ -77,7 +78,9 @@ pub enum Obstacle {
         limit_k: f64,
     },
     /// The turbine inlet is too hot.
-    #[error("has T3 = {t3_k:.1} K, above `limits.turbine_inlet_temperature` = {limit_k:.1} K")]
+    #[error(
+        "has T3 = {}, above `limits.turbine_inlet_temperature` = {}", temperature(*.t3_k), temperature(*.limit_k)
+    )]
     T3 {
         /// Turbine inlet temperature, K.
         t3_k: f64,

@@ -69,6 +69,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             housing_gradient_max_k: None,
         },
         repeats: None,
+        return_to_first: false,
         appended: None,
         required_sigma_eta: None,
         method: None,

@@ -66,13 +66,15 @@ impl Optimistic {
 
     /// The bounds for orders of the first `counted` places; what lies beyond them is visited by repeats alone.
     /// `repeats`: the place of the point that a repeated jump ends at, and how many steps the repeats take in total; their
-    /// own gradients do not count.
-    pub(crate) fn bound(&self, counted: usize, repeats: Option<(usize, usize)>) -> Bound {
+    /// own gradients do not count. `returns`: the order ends with a jump back to its first point, which counts.
+    pub(crate) fn bound(&self, counted: usize, repeats: Option<(usize, usize)>, returns: bool) -> Bound {
         let n = self.n;
         let (repeated, copies) = repeats.unwrap_or((0, 0));
         let real = |i: usize| if i < n { i } else { repeated };
-        // One more node closes the path to a circle: the first point follows it, and it follows the last.
+        // One more node closes the path to a circle: the first point follows it, and it follows the last. The way back
+        // closes it by itself.
         let end = n + copies;
+        let size = if returns { end } else { end + 1 };
         let weight = |i: usize, j: usize| {
             if i == end {
                 if j < n { self.first_k[j] } else { -1e9 }
@@ -84,20 +86,19 @@ impl Optimistic {
             }
         };
         let sum_k = if end <= EXACT_POINTS {
-            largest_assignment(end + 1, weight)
+            largest_assignment(size, weight)
         } else {
-            let size = end + 1;
             let table: Vec<f64> = (0..size * size).map(|place| weight(place / size, place % size)).collect();
             prices(size, &table, INCREMENTS_K).bound
         };
         let worst_k = if n <= MATCHING_POINTS {
-            bottleneck(counted, end, |j, i| self.weight_k(real(i), j))
+            bottleneck(counted, end, usize::from(!returns), |j, i| self.weight_k(real(i), j))
         } else {
-            // All points but the first have a step that leads to them.
+            // All points have a step that leads to them, but for the first where nothing goes back to it.
             let into = |j: usize| (0..n).map(|i| self.weight_k(i, j)).fold(f64::NEG_INFINITY, f64::max);
             let mut best: Vec<f64> = (0..counted).map(into).collect();
             best.sort_by(f64::total_cmp);
-            best.get(1).copied().unwrap_or(f64::INFINITY)
+            best.get(usize::from(!returns)).copied().unwrap_or(f64::INFINITY)
         };
         Bound { sum_k, worst_k }
     }

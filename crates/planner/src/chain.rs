@@ -39,9 +39,22 @@ pub trait Chain {
     fn gradient_max_k(&self) -> f64 {
         f64::INFINITY
     }
+
+    /// Whether an order of two points and more ends with a jump back to its first point, which counts like the others.
+    fn returns(&self) -> bool {
+        false
+    }
 }
 
-/// The gradients of an order, K (absolute values), one for each step that has a jump.
+/// The jump back from the end of an order to its first point, where the chain makes one.
+pub(crate) fn way_back<C: Chain>(chain: &C, order: &[usize]) -> Option<(usize, usize)> {
+    match order {
+        [first, .., last] if chain.returns() => Some((*last, *first)),
+        _ => None,
+    }
+}
+
+/// The gradients of an order, K (absolute values), one for each step that has a jump, the way back included.
 pub fn gradients_k<C: Chain>(chain: &C, order: &[usize]) -> Vec<f64> {
     let mut gradients = Vec::with_capacity(order.len());
     let Some(&first) = order.first() else { return gradients };
@@ -52,5 +65,6 @@ pub fn gradients_k<C: Chain>(chain: &C, order: &[usize]) -> Vec<f64> {
         gradients.push(gradient_k.abs());
         state = next;
     }
+    gradients.extend(way_back(chain, order).map(|(last, first)| chain.step(last, first, state).0.abs()));
     gradients
 }

@@ -4,7 +4,7 @@ use crate::forecast::forecast;
 use crate::method::ForecastRow;
 use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest};
-use mapper_core::{OperatingPoint, Plan, StepKind, VisitOrder};
+use mapper_core::{OperatingPoint, Plan, VisitOrder};
 use mapper_numerics::statistics::mean;
 use mapper_physics::forecast::{self, hold};
 use mapper_physics::model::{Outputs, State};
@@ -20,7 +20,7 @@ const LONGEST_WAIT_S: f64 = 3600.0;
 /// A way to map the points, in three numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WayOfMapping {
-    /// Points in order.
+    /// Points in order, the first once more where it is visited again.
     pub order: Vec<OperatingPoint>,
     /// Duration without warm-up and cool-down, minutes.
     pub minutes: f64,
@@ -67,7 +67,7 @@ pub fn compare(request: &PlanRequest<'_>, plan: &Plan) -> Result<Comparison, Pla
             // A repeat measures no point.
             plan.steps
                 .iter()
-                .filter(|step| step.kind == StepKind::Point)
+                .filter(|step| step.kind.measures())
                 .map(|step| error(step.predicted.sigma_eta, step.predicted.bias_eta)),
         ),
         conventional: conventional(request, &order, &targets)?,
@@ -154,12 +154,15 @@ fn dynamic(
     let first = targets.first().ok_or(PlanError::NoPoints)?;
     let mut state = warmed_up(request, first)?;
     let dwell_s = request.timing.dwell_s;
-    let mut errors = Vec::with_capacity(order.len());
-    for (i, (&to, target)) in order.iter().zip(targets).enumerate() {
+    // No jump leads to the first point here either.
+    let back = usize::from(request.return_to_first && order.len() > 1);
+    let steps: Vec<_> = order.iter().zip(targets).cycle().take(order.len() + back).collect();
+    let mut errors = Vec::with_capacity(steps.len());
+    for (i, &(&to, target)) in steps.iter().enumerate() {
         let step = forecast(request, state, &target.boundary, dwell_s, i > 0)
             .map_err(|source| PlanError::Forecast { to, source })?;
         errors.push(error(step.predicted.sigma_eta, step.predicted.bias_eta));
         state = step.end;
     }
-    Ok(way(order.to_vec(), dwell_s * order.len() as f64, errors.into_iter()))
+    Ok(way(steps.iter().map(|(to, _)| **to).collect(), dwell_s * steps.len() as f64, errors.into_iter()))
 }

@@ -1,7 +1,7 @@
 //! Exact orders: dynamic programming for fixed weights, branch and bound under thermal memory.
 
 use crate::bound::Optimistic;
-use crate::chain::Chain;
+use crate::chain::{Chain, way_back};
 
 /// Maximum number of points of [`best_path`]: its table has `n 2^n` entries.
 pub const HELD_KARP_POINTS: usize = 14;
@@ -107,6 +107,7 @@ pub(crate) fn branch_and_bound<C: Chain>(
 fn value_of<C: Chain>(chain: &C, order: &[usize], figure: Figure) -> f64 {
     let gradients = crate::chain::gradients_k(chain, order);
     let barred = order.windows(2).any(|pair| !chain.admissible(pair[0], pair[1]))
+        || way_back(chain, order).is_some_and(|(last, first)| !chain.admissible(last, first))
         || gradients.iter().any(|gradient_k| *gradient_k > chain.gradient_max_k());
     match figure {
         _ if barred => f64::NEG_INFINITY,
@@ -138,9 +139,11 @@ impl<C: Chain> Walk<'_, C> {
         self.path.push(place);
         self.used[place] = true;
         if self.path.len() == self.points.len() {
-            if so_far > self.best {
-                self.best = so_far;
-                self.best_order = self.path.iter().map(|place| self.points[*place]).collect();
+            let order: Vec<usize> = self.path.iter().map(|place| self.points[*place]).collect();
+            let whole = self.with_way_back(&order, state, so_far);
+            if whole > self.best {
+                self.best = whole;
+                self.best_order = order;
             }
         } else if self.possible(place, so_far) > self.best * self.keep_ratio {
             let from = self.points[place];
@@ -165,6 +168,19 @@ impl<C: Chain> Walk<'_, C> {
         self.path.pop();
     }
 
+    /// The figure of a whole order, from that of its steps and what the last of them leaves.
+    fn with_way_back(&self, order: &[usize], state: C::State, so_far: f64) -> f64 {
+        let Some((last, first)) = way_back(self.chain, order) else { return so_far };
+        let gradient_k = self.chain.step(last, first, state).0.abs();
+        match self.figure {
+            _ if gradient_k > self.chain.gradient_max_k() || !self.chain.admissible(last, first) => {
+                f64::NEG_INFINITY
+            }
+            Figure::Sum => so_far + gradient_k,
+            Figure::Worst => so_far.min(gradient_k),
+        }
+    }
+
     /// What this partial order can come to at most.
     fn possible(&self, last: usize, so_far: f64) -> f64 {
         let remaining = || (0..self.points.len()).filter(|place| !self.used[*place]);
@@ -172,10 +188,13 @@ impl<C: Chain> Walk<'_, C> {
             let inner = remaining().filter(|from| *from != to).map(|from| self.optimistic.weight_k(from, to));
             inner.fold(self.optimistic.weight_k(last, to), f64::max)
         };
+        // The first point too has yet to be reached, where the order goes back to it.
+        let first = self.path.first().copied().filter(|_| self.chain.returns());
+        let reached = || remaining().chain(first);
         match self.figure {
             // The tighter of two: what each point can be reached with from what is left, or from anywhere.
-            Figure::Sum => so_far + remaining().map(|to| into(to).min(self.best_into[to])).sum::<f64>(),
-            Figure::Worst => remaining().map(into).fold(so_far, f64::min),
+            Figure::Sum => so_far + reached().map(|to| into(to).min(self.best_into[to])).sum::<f64>(),
+            Figure::Worst => reached().map(into).fold(so_far, f64::min),
         }
     }
 }
@@ -188,31 +207,38 @@ mod tests {
     use proptest::prelude::*;
 
     /// Fixed weights: a machine without memory.
-    struct Fixed(Vec<f64>, usize);
+    struct Fixed {
+        weights: Vec<f64>,
+        n: usize,
+        returns: bool,
+    }
 
     impl Chain for Fixed {
         type State = ();
         fn len(&self) -> usize {
-            self.1
+            self.n
         }
         fn first(&self, _: usize) -> (Option<f64>, ()) {
             (None, ())
         }
         fn step(&self, from: usize, to: usize, (): ()) -> (f64, ()) {
-            (self.0[from * self.1 + to], ())
+            (self.weights[from * self.n + to], ())
         }
         fn settled(&self, _: usize) {}
         fn alike(&self, (): (), (): ()) -> bool {
             true
         }
+        fn returns(&self) -> bool {
+            self.returns
+        }
     }
 
     fn best_of_all(chain: &Fixed, path: &mut Vec<usize>) -> f64 {
-        if path.len() == chain.1 {
+        if path.len() == chain.n {
             return crate::chain::gradients_k(chain, path).iter().sum();
         }
         let mut best = f64::NEG_INFINITY;
-        for next in 0..chain.1 {
+        for next in 0..chain.n {
             if !path.contains(&next) {
                 path.push(next);
                 best = best.max(best_of_all(chain, path));
@@ -226,7 +252,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(48))]
         #[test]
         fn brute_force_agrees(weights in prop::collection::vec(0.0..30.0f64, 49), n in 2usize..=7) {
-            let chain = Fixed(weights[..n * n].to_vec(), n);
+            let mut chain = Fixed { weights: weights[..n * n].to_vec(), n, returns: false };
             let best = best_of_all(&chain, &mut Vec::new());
             let (sum, path) = best_path(n, |i, j| chain.step(i, j, ()).0).unwrap();
             // Sums of at most six numbers, in another order.
@@ -234,6 +260,11 @@ mod tests {
             prop_assert!((crate::chain::gradients_k(&chain, &path).iter().sum::<f64>() - best).abs() < 1e-9);
             // So small that the search has no excuse.
             let given: Vec<usize> = (0..n).collect();
+            let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7);
+            prop_assert!((Objective::Sum.figure(&chain, &found) - best).abs() < 1e-9);
+            // The same with the way back to the first point.
+            chain.returns = true;
+            let best = best_of_all(&chain, &mut Vec::new());
             let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7);
             prop_assert!((Objective::Sum.figure(&chain, &found) - best).abs() < 1e-9);
         }

@@ -7,7 +7,7 @@
 use crate::forecast::{Forecast, forecast};
 use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest};
-use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S};
+use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S, readable, temperature};
 use mapper_physics::steady::SteadyState;
 use petgraph::graph::DiGraph;
 
@@ -23,7 +23,7 @@ pub enum Rejection {
         allowed_s: f64,
     },
     /// The shaft overshoots its limit.
-    #[error("the shaft reaches {highest_rpm:.0} rpm; its limit is {limit_rpm:.0} rpm")]
+    #[error("the shaft reaches {}; its limit is {}", readable(*.highest_rpm, "rpm"), readable(*.limit_rpm, "rpm"))]
     Overspeed {
         /// Highest speed on the way, rpm.
         highest_rpm: f64,
@@ -31,7 +31,7 @@ pub enum Rejection {
         limit_rpm: f64,
     },
     /// The outlet gets too hot.
-    #[error("T2 reaches {highest_k:.1} K; its limit is {limit_k:.1} K")]
+    #[error("T2 reaches {}; its limit is {}", temperature(*.highest_k), temperature(*.limit_k))]
     OutletTemperature {
         /// Highest on the way, K.
         highest_k: f64,
@@ -39,7 +39,7 @@ pub enum Rejection {
         limit_k: f64,
     },
     /// The turbine inlet is too hot.
-    #[error("T3 is {t3_k:.1} K; its limit is {limit_k:.1} K")]
+    #[error("T3 is {}; its limit is {}", temperature(*.t3_k), temperature(*.limit_k))]
     TurbineInletTemperature {
         /// T3, K.
         t3_k: f64,

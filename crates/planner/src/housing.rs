@@ -103,6 +103,8 @@ pub(crate) struct Housing {
     forbidden: HashSet<(usize, usize)>,
     gradient_max_k: f64,
     alike: [f64; 2],
+    /// Whether orders end where they begin.
+    pub(crate) returns: bool,
 }
 
 /// Middle and half width of what is reached.
@@ -159,6 +161,7 @@ impl Housing {
             forbidden: HashSet::new(),
             gradient_max_k: request.limits.housing_gradient_max_k.unwrap_or(f64::INFINITY),
             alike: [ALIKE_K / scale.half[0], ALIKE_K / scale.half[1]],
+            returns: false,
         })
     }
 
@@ -275,6 +278,10 @@ impl Chain for Housing {
         };
         // Below a tenth of a kelvin nothing is identified.
         times_square / (gradient_k * gradient_k).max(0.01)
+    }
+
+    fn returns(&self) -> bool {
+        self.returns
     }
 
     fn gradient_max_k(&self) -> f64 {

@@ -1,7 +1,7 @@
 //! What an order is judged by. Every objective is a sum over steps, so that a change of the order is judged by the few
 //! steps it touches.
 
-use crate::chain::Chain;
+use crate::chain::{Chain, way_back};
 
 /// What is made large.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,12 +56,13 @@ impl Objective {
         let mut sum = self.first_value(chain, first, gradient_k);
         let mut smallest_k = gradient_k.map_or(f64::INFINITY, f64::abs);
         let mut barred = 0.0;
-        for pair in order.windows(2) {
-            let (gradient_k, next) = chain.step(pair[0], pair[1], state);
+        let jumps = order.windows(2).map(|pair| (pair[0], pair[1])).chain(way_back(chain, order));
+        for (from, to) in jumps {
+            let (gradient_k, next) = chain.step(from, to, state);
             let size_k = gradient_k.abs();
             smallest_k = smallest_k.min(size_k);
-            sum += self.value(chain, pair[0], pair[1], gradient_k);
-            if size_k > chain.gradient_max_k() || !chain.admissible(pair[0], pair[1]) {
+            sum += self.value(chain, from, to, gradient_k);
+            if size_k > chain.gradient_max_k() || !chain.admissible(from, to) {
                 barred += NOT_ALLOWED;
             }
             state = next;

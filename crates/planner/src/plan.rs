@@ -7,7 +7,7 @@ use crate::graph::rejections;
 use crate::housing::Housing;
 use crate::order::{Ordered, PROOF_TOLERANCE_RATIO, objective, order_on};
 use crate::reach::reachable;
-use crate::repeats::{RepeatedJump, Visit, append, plain, usual_jumps, with_repeats};
+use crate::repeats::{RepeatedJump, Visit, append, plain, put_return, usual_jumps, with_repeats};
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::{
     Jump, OperatingPoint, Plan, PlanBound, PlanFigures, PlanStep, Repeats, StepKind, VisitOrder, WindowRule,
@@ -41,19 +41,29 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
         return Err(PlanError::NeedsRequiredError);
     }
     let targets = reachable(request, request.points)?;
-    let Some(repeats) = request.repeats else { return plan_with(request, &targets, None) };
+    let made = plan_to(request, &targets);
+    let (true, Err(PlanError::NoAdmissibleOrder(_))) = (request.return_to_first, &made) else { return made };
+    // It may be the way back alone that is not allowed: nobody asked for it by name.
+    let mut plan = plan_to(&PlanRequest { return_to_first: false, ..request.clone() }, &targets)?;
+    plan.remarks.push("a limit forbids the way back to the first point at the end".to_owned());
+    Ok(plan)
+}
+
+/// The plan with the repeats that the request asks for. `targets`: the steady states of its points.
+fn plan_to(request: &PlanRequest<'_>, targets: &[SteadyState]) -> Result<Plan, PlanError> {
+    let Some(repeats) = request.repeats else { return plan_with(request, targets, None) };
     if let Some(jump) = repeats.jump {
-        return plan_with(request, &targets, Some((repeats, jump)));
+        return plan_with(request, targets, Some((repeats, jump)));
     }
     let mut barred = None;
-    for jump in usual_jumps(request, &targets)?.into_iter().take(USUAL_JUMPS) {
-        match plan_with(request, &targets, Some((repeats, jump))) {
+    for jump in usual_jumps(request, targets)?.into_iter().take(USUAL_JUMPS) {
+        match plan_with(request, targets, Some((repeats, jump))) {
             // It may be the repeated jump itself that is not allowed from where the machine comes to it.
             Err(error @ PlanError::NoAdmissibleOrder(_)) => barred = Some(error),
             made => return made,
         }
     }
-    let mut plan = plan_with(request, &targets, None).map_err(|error| barred.unwrap_or(error))?;
+    let mut plan = plan_with(request, targets, None).map_err(|error| barred.unwrap_or(error))?;
     plan.remarks.push("no jump between the points can be repeated, so that drift would not show".to_owned());
     Ok(plan)
 }
@@ -85,6 +95,7 @@ fn plan_with(
     // Only the search for information needs the method at every start of the reduced housing.
     let without_method = PlanRequest { method: request.method.filter(|_| needs_method), ..request.clone() };
     let mut housing = Housing::of(&without_method, &points, &targets, None)?;
+    housing.returns = request.return_to_first;
     let given: Vec<usize> = (0..request.points.len()).collect();
     let mut barred: Vec<String> = Vec::new();
     for _ in 0..ROUNDS {
@@ -93,11 +104,15 @@ fn plan_with(
             Some(jump) => with_repeats(&housing, &ordered.order, jump, objective(request.order)),
             None => plain(&ordered.order),
         };
+        let returned = request.return_to_first && put_return(&mut visits);
         if let Some((from, to)) = appended {
             append(&mut visits, from, to);
         }
         let (steps, forbidden) = walk(request, &points, &targets, &visits, repeated.map(|jump| jump.to))?;
         if forbidden.is_empty() {
+            // What was searched, proven and bounded is an order with its way back.
+            let proven = ordered.proven && (returned || !request.return_to_first || given.len() < 2);
+            let ordered = Ordered { proven, ..ordered };
             return Ok(finished(request, &housing, &ordered, &visits, repeated, steps));
         }
         let before = barred.len();
@@ -279,7 +294,12 @@ fn remarks(request: &PlanRequest<'_>, steps: &[PlanStep], repeated: Option<Opera
     }
     if let Some(first) = steps.first() {
         let again = steps[1..].iter().any(|step| step.to == first.to);
-        if !again {
+        if steps.iter().any(|step| step.kind == StepKind::Return) {
+            remarks.push(format!(
+                "the first point, {}, is visited again at the end: no jump led to it at the start",
+                first.to
+            ));
+        } else if !again {
             remarks.push(format!(
                 "no jump leads to the first point, {}: it has no transient to identify",
                 first.to
@@ -319,7 +339,8 @@ fn bound(
         return None;
     }
     let mut nodes: Vec<usize> = ordered.order.clone();
-    let copies = visits.len() - nodes.len();
+    let returns = visits.iter().any(|visit| visit.kind == StepKind::Return);
+    let copies = visits.iter().filter(|visit| visit.kind == StepKind::Repeat).count();
     let counted = nodes.len();
     let place = repeated.map(|jump| {
         // Both ends of the jump, where they are not points of the grid: the housing comes by there too.
@@ -332,7 +353,7 @@ fn bound(
         }
         place
     });
-    let bound = Optimistic::of(housing, &nodes)?.bound(counted, place.map(|place| (place, copies)));
+    let bound = Optimistic::of(housing, &nodes)?.bound(counted, place.map(|place| (place, copies)), returns);
     let order: Vec<usize> = visits.iter().map(|visit| visit.index).collect();
     let reduced_k = crate::chain::gradients_k(housing, &order);
     let full_k = steps.iter().skip(1).map(|step| step.predicted.dtc_k.unwrap_or(0.0).abs());
@@ -359,9 +380,9 @@ fn bound(
     })
 }
 
-/// The four figures, of the points alone: a repeat is there to compare, not to measure.
+/// The figures, of the steps that measure a point: a repeat is there to compare.
 fn figures(steps: &[PlanStep], minutes: f64) -> PlanFigures {
-    let points = || steps.iter().filter(|step| step.kind == StepKind::Point).map(|step| &step.predicted);
+    let points = || steps.iter().filter(|step| step.kind.measures()).map(|step| &step.predicted);
     let gradients = || points().filter_map(|predicted| predicted.dtc_k).map(f64::abs);
     let errors: Vec<f64> = points().filter_map(error_eta).collect();
     let largest = |values: &mut dyn Iterator<Item = f64>| values.max_by(f64::total_cmp);

@@ -1,6 +1,6 @@
 //! Repeats for drift: one jump, made again at a spacing, where it costs least.
 
-use crate::chain::Chain;
+use crate::chain::{Chain, way_back};
 use crate::graph::jump;
 use crate::objective::{NOT_ALLOWED, Objective};
 use crate::request::{PlanError, PlanRequest};
@@ -131,6 +131,18 @@ pub(crate) fn with_repeats<C: Chain>(
     visits
 }
 
+/// The first point once more behind all visits, unless they end there; whether it was put there.
+pub(crate) fn put_return(visits: &mut Vec<Visit>) -> bool {
+    match visits.as_slice() {
+        [first, .., last] if first.index != last.index => {
+            let index = first.index;
+            visits.push(Visit { index, kind: StepKind::Return });
+            true
+        }
+        _ => false,
+    }
+}
+
 /// A jump behind all visits; one step less where they end at its start.
 pub(crate) fn append(visits: &mut Vec<Visit>, from: usize, to: usize) {
     for index in [from, to] {
@@ -155,12 +167,14 @@ fn value<C: Chain>(chain: &C, visits: &[Visit], objective: Objective) -> f64 {
     let Some(first) = visits.first() else { return 0.0 };
     let (gradient_k, mut state) = chain.first(first.index);
     let mut sum = objective.first_value(chain, first.index, gradient_k);
-    for pair in visits.windows(2) {
-        let (gradient_k, next) = chain.step(pair[0].index, pair[1].index, state);
-        let value = objective.value(chain, pair[0].index, pair[1].index, gradient_k);
-        let allowed =
-            chain.admissible(pair[0].index, pair[1].index) && gradient_k.abs() <= chain.gradient_max_k();
-        if pair[1].kind == StepKind::Point || !allowed {
+    let order: Vec<usize> = visits.iter().map(|visit| visit.index).collect();
+    let back = way_back(chain, &order).filter(|(last, first)| last != first);
+    let jumps = visits.windows(2).map(|pair| (pair[0].index, pair[1].index, pair[1].kind));
+    for (from, to, kind) in jumps.chain(back.map(|(last, first)| (last, first, StepKind::Return))) {
+        let (gradient_k, next) = chain.step(from, to, state);
+        let value = objective.value(chain, from, to, gradient_k);
+        let allowed = chain.admissible(from, to) && gradient_k.abs() <= chain.gradient_max_k();
+        if kind.measures() || !allowed {
             sum += value;
         }
         state = next;

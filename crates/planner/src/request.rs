@@ -34,6 +34,8 @@ pub struct PlanRequest<'a> {
     pub limits: Limits,
     /// Repeats for drift, if any.
     pub repeats: Option<Repeats>,
+    /// Whether the first point, which no jump leads to, is visited once more at the end.
+    pub return_to_first: bool,
     /// A jump to be made after all else, e.g. what a gap diagnosis asks for.
     pub appended: Option<Jump>,
     /// Standard error of the efficiency (fraction) that [`VisitOrder::Time`] has to reach.

@@ -161,7 +161,8 @@ struct Annealing<'a, C: Chain> {
     order: Vec<usize>,
     /// Position of each point of the chain; of no meaning for points that are not in the order.
     place: Vec<usize>,
-    /// What is known of each position's step; no state at 0, and behind the last position what its step leaves.
+    /// What is known of each position's step; no state at 0, and behind the last position what its step leaves and what
+    /// the way back to the first point is worth.
     known: Vec<Known<C::State>>,
     /// The order that is proposed from the first piece's place on; what follows the pieces stays as it is.
     pieces: Vec<Piece>,
@@ -200,7 +201,19 @@ impl<'a, C: Chain> Annealing<'a, C> {
             self.known[k] = (state, value);
             state = Some(next);
         }
-        self.known[self.order.len()] = (state, 0.0);
+        let ends = self.order.first().copied().zip(self.order.last().copied());
+        self.known[self.order.len()] = (state, self.way_back(ends, state));
+    }
+
+    /// What the jump from the last point back to the first is worth, where there is one.
+    #[inline]
+    fn way_back(&self, ends: Option<(usize, usize)>, state: Option<C::State>) -> f64 {
+        match (ends, state) {
+            (Some((first, last)), Some(state)) if self.chain.returns() && first != last => {
+                self.at(Some(last), first, Some(state)).0
+            }
+            _ => 0.0,
+        }
     }
 
     #[inline]
@@ -255,7 +268,19 @@ impl<'a, C: Chain> Annealing<'a, C> {
                 done += 1;
             }
         }
-        self.log.push((n, (state, 0.0)));
+        let first = match self.pieces.first() {
+            Some(piece) if self.begin == 0 => {
+                if piece.reversed {
+                    self.order[piece.end - 1]
+                } else {
+                    self.order[piece.start]
+                }
+            }
+            _ => self.order[0],
+        };
+        let back = self.way_back(from.map(|last| (first, last)), state);
+        gain += back - self.known[n].1;
+        self.log.push((n, (state, back)));
         gain
     }
 

@@ -174,20 +174,78 @@ fn an_appended_jump_comes_last_and_changes_nothing_before_it() {
 fn few_points_are_ordered_best_and_proven_so() {
     let (model, points) = (Model::nominal(), grid());
     let few = [points[0], points[5], points[10], points[15], points[17]];
+    for return_to_first in [false, true] {
+        let plan =
+            make_plan(&PlanRequest { return_to_first, ..request(&model, &few, VisitOrder::SumGradient) })
+                .unwrap();
+        assert!(plan.bound.unwrap().proven);
+        // All 120 orders in full.
+        let mut best_k = 0.0f64;
+        permute(&mut few.clone(), 0, &mut |order| {
+            let plan =
+                make_plan(&PlanRequest { return_to_first, ..request(&model, order, VisitOrder::Listed) })
+                    .unwrap();
+            best_k = best_k.max(plan.figures.sum_gradient_k);
+        });
+        assert!(plan.bound.unwrap().sum_gradient_k >= best_k);
+        // The reduced housing may prefer another order of nearly equal worth.
+        assert!(plan.figures.sum_gradient_k > 0.999 * best_k, "{} {best_k}", plan.figures.sum_gradient_k);
+    }
     let plan = make_plan(&request(&model, &few, VisitOrder::SumGradient)).unwrap();
-    assert!(plan.bound.unwrap().proven);
     let (order, gradients) =
         order_points(&request(&model, &points, VisitOrder::SumGradient), &few, None).unwrap();
     assert_eq!(order, plan.steps.iter().map(|step| step.to).collect::<Vec<_>>());
     assert_eq!(gradients.len(), 4);
-    // All 120 orders in full.
-    let mut best_k = 0.0f64;
-    permute(&mut few.clone(), 0, &mut |order| {
-        let plan = make_plan(&request(&model, order, VisitOrder::Listed)).unwrap();
-        best_k = best_k.max(plan.figures.sum_gradient_k);
-    });
-    // The reduced housing may prefer another order of nearly equal worth.
-    assert!(plan.figures.sum_gradient_k > 0.999 * best_k, "{} {best_k}", plan.figures.sum_gradient_k);
+}
+
+/// The first point of a plan has no transient: it is visited once more, behind all points and repeats, and that visit
+/// counts in every figure as the point's own.
+#[test]
+fn the_first_point_is_visited_again_at_the_end() {
+    let (model, points) = (Model::nominal(), grid());
+    for order in [VisitOrder::Listed, VisitOrder::SumGradient, VisitOrder::WorstGradient] {
+        let mut returning = request(&model, &points, order);
+        (returning.effort, returning.return_to_first) = (0.1, true);
+        returning.repeats = Some(Repeats { jump: None, every_steps: 12, at_least: 2 });
+        let plan = make_plan(&returning).unwrap();
+        let (first, last) = (&plan.steps[0], plan.steps.last().unwrap());
+        assert_eq!((last.kind, last.to), (StepKind::Return, first.to));
+        assert_eq!(plan.steps.iter().filter(|step| step.kind == StepKind::Return).count(), 1);
+        let measured = || plan.steps.iter().filter(|step| step.kind != StepKind::Repeat);
+        assert_eq!(measured().count(), points.len() + 1);
+        let gradients_k: Vec<f64> =
+            measured().filter_map(|step| step.predicted.dtc_k).map(f64::abs).collect();
+        assert_eq!(gradients_k.len(), points.len(), "one for each point");
+        assert_eq!(plan.figures.sum_gradient_k, gradients_k.iter().sum::<f64>());
+        assert_eq!(plan.figures.worst_gradient_k, gradients_k.iter().copied().min_by(f64::total_cmp));
+        assert!((60.0 * plan.figures.minutes - (last.start_s + last.dwell_s)).abs() < 1e-6);
+        assert!(plan.remarks.iter().any(|remark| remark.contains("visited again")), "{:?}", plan.remarks);
+        if let Some(bound) = plan.bound {
+            assert!(plan.figures.sum_gradient_k <= bound.sum_gradient_k);
+            assert!(plan.figures.worst_gradient_k.unwrap() <= bound.worst_gradient_k);
+        }
+        // What a diagnosis asks for comes behind it.
+        let appended = Some(Jump { from: points[1], to: points[16] });
+        let longer = make_plan(&PlanRequest { appended, ..returning.clone() }).unwrap();
+        assert_eq!(longer.steps[..plan.steps.len()], plan.steps);
+    }
+    // One point has no way back.
+    let alone = PlanRequest { return_to_first: true, ..request(&model, &points[..1], VisitOrder::Listed) };
+    assert_eq!(make_plan(&alone).unwrap().steps.len(), 1);
+}
+
+#[test]
+fn a_way_back_that_is_not_allowed_is_left_out_and_told() {
+    let (model, points) = (Model::nominal(), grid());
+    // Up one speed line: steps of 20 krpm that move the housing by 25.3 K at most, and 100 krpm back.
+    let line: Vec<OperatingPoint> =
+        points.iter().copied().filter(|point| point.valve_opening_ratio == 0.5).collect();
+    let mut limited = request(&model, &line, VisitOrder::Listed);
+    limited.return_to_first = true;
+    limited.limits.housing_gradient_max_k = Some(26.0);
+    let plan = make_plan(&limited).unwrap();
+    assert!(plan.steps.iter().all(|step| step.kind == StepKind::Point));
+    assert!(plan.remarks.iter().any(|remark| remark.contains("forbids the way back")), "{:?}", plan.remarks);
 }
 
 fn permute(points: &mut [OperatingPoint], from: usize, visit: &mut impl FnMut(&[OperatingPoint])) {

@@ -107,6 +107,7 @@ pub fn step_name(point: &IdentifiedPoint) -> String {
     match point.kind {
         StepKind::Point => (point.step + 1).to_string(),
         StepKind::Repeat => format!("{} repeat", point.step + 1),
+        StepKind::Return => format!("{} again", point.step + 1),
     }
 }
 

@@ -1,6 +1,6 @@
 //! What ends a run before harm is done: each trip is an object beside the runner, not an `if` inside it.
 
-use mapper_core::{Channel, EventKind, SampleBatch};
+use mapper_core::{Channel, EventKind, SampleBatch, readable};
 
 /// A reason to bring the rig into its safe state.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,8 +45,10 @@ impl Guard for LimitGuard {
                 return Some(Trip {
                     t_s: *t_s,
                     reason: format!(
-                        "{} ({channel}) is {value:.1} {unit}, above its limit of {limit:.1} {unit}",
-                        channel.info().description
+                        "{} ({channel}) is {}, above its limit of {}",
+                        channel.info().description,
+                        readable(*value, unit),
+                        readable(limit, unit)
                     ),
                 });
             }

@@ -99,6 +99,11 @@ impl ScriptError {
         }
     }
 
+    /// A mistake that is seen without running the script.
+    pub(crate) fn at(path: PathBuf, text: &str, at: Position, message: String, remedy: String) -> Self {
+        Self::new(path, text, at, message, remedy)
+    }
+
     pub(crate) fn parsing(path: PathBuf, text: &str, error: &ParseError) -> Self {
         let message = format!("the sequence script cannot be read: {}", error.err_type());
         Self::new(path, text, error.position(), message, String::new())

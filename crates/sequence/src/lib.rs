@@ -14,6 +14,7 @@
 mod api;
 mod error;
 mod forecast;
+mod names;
 mod request;
 mod result;
 mod runner;

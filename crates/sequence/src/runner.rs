@@ -1,12 +1,13 @@
 //! A script on its own thread, met at each step.
 
-use crate::api;
 use crate::error::{ScriptError, SequenceError};
+use crate::names::Unknown;
 use crate::request::SequenceRequest;
 use crate::result::StepResult;
 use crate::sandbox::{SCRIPT_LIMIT, STACK_BYTES, engine};
 use crate::session::{Session, lock};
 use crate::step::{FromScript, SequenceStep};
+use crate::{api, names};
 use rhai::{AST, Engine, EvalAltResult, Scope};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -126,7 +127,12 @@ fn run(script: &Script, session: Session) {
     let mut engine = engine(session.request.points.len());
     let session = Arc::new(Mutex::new(session));
     api::register(&mut engine, &session);
-    let compiled = compile(&engine, script);
+    let compiled = compile(&engine, script).and_then(|ast| match names::check(&engine, &ast) {
+        Ok(()) => Ok(ast),
+        Err(Unknown { at, message, remedy }) => {
+            Err(Box::new(ScriptError::at(script.path.clone(), &script.text, at, message, remedy)))
+        }
+    });
     let begun = lock(&session).wait();
     if begun.is_err() {
         return;

@@ -206,6 +206,43 @@ fn an_error_shows_its_line_with_a_caret() {
     assert!(matches!(check(&script), Err(SequenceError::Script(_))));
 }
 
+/// In a branch that is not taken, before the first step.
+#[test]
+fn names_that_nothing_has_are_found_without_running_them() {
+    for (text, place, word, help) in [
+        ("jump(grid()[0]);\nif false_one() { }\n", (2, 4), "no function `false_one`", ""),
+        (
+            "let r = jump(grid()[0]);\nif r.eta > 2.0 { jmup(grid()[1]); }",
+            (2, 18),
+            "no function `jmup`",
+            "did you mean `jump`?",
+        ),
+        (
+            "let r = jump(grid()[0]);\nif r.eta > 2.0 { note(r.sigma_etta); }",
+            (2, 25),
+            "property `sigma_etta`",
+            "`sigma_eta`",
+        ),
+        ("fn late(p) { settle(p); }\njump(grid()[0]);", (1, 14), "`settle` is called with 1 arguments", ""),
+        (
+            "let a = [];\njump(grid()[0]);\nif a.len() > 3 { a.pusch(1); }",
+            (3, 20),
+            "no function `pusch`",
+            "`push`",
+        ),
+    ] {
+        let error = error_of(text);
+        assert!(error.message.contains(word), "{error}");
+        assert_eq!((error.line, error.column), (Some(place.0), Some(place.1)), "{error}");
+        assert!(error.remedy.contains(help), "{error}");
+    }
+    // Maps have the properties that a script gives them, functions of the script's own are known, and so are anonymous ones.
+    let steps = steps_of(
+        "let m = #{at: 0};\nm.more = 1;\nfn of(m) { grid()[m.at] }\nlet f = |p| p.opening;\njump(of(m));\nnote(`${f.call(of(m))}`);",
+    );
+    assert_eq!(steps.len(), 1);
+}
+
 #[test]
 fn hostile_scripts_end_with_an_error() {
     for (text, word) in [

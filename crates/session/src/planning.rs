@@ -7,7 +7,7 @@ use crate::predicted_method::Dynamic;
 use mapper_campaign::Campaign;
 use mapper_core::{Method, Plan};
 use mapper_physics::model::Model;
-use mapper_planner::{PlanRequest, make_plan};
+use mapper_planner::{PlanRequest, PredictedMethod, make_plan};
 use std::path::Path;
 
 /// The nominal model of a campaign.
@@ -37,6 +37,7 @@ pub fn with_plan_request<T, E: From<SessionError>>(
 ) -> Result<T, E> {
     let canonical = serde_json::to_string(campaign).map_err(SessionError::from)?;
     let dynamic = Dynamic::of(identification(campaign));
+    let of_transients = matches!(campaign.identification.method, Method::Dynamic | Method::Joint);
     then(&PlanRequest {
         campaign_name: &campaign.name,
         campaign_canonical: &canonical,
@@ -51,11 +52,9 @@ pub fn with_plan_request<T, E: From<SessionError>>(
         limits: campaign.limits,
         appended: None,
         repeats: campaign.repeats,
+        return_to_first: campaign.return_to_first && of_transients,
         required_sigma_eta: campaign.required_sigma_eta,
-        method: match campaign.identification.method {
-            Method::Dynamic | Method::Joint => Some(&dynamic),
-            Method::Steady | Method::Imported => None,
-        },
+        method: of_transients.then_some(&dynamic as &dyn PredictedMethod),
         effort: 1.0,
         seed: campaign.seed,
     })

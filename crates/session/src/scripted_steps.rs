@@ -158,9 +158,14 @@ fn request(campaign: &Campaign, model: &Model) -> SequenceRequest {
         follow_outlet: campaign.follow_outlet,
         limits: campaign.limits,
         order: Box::new(move |points| {
-            // Repeats are the script's own business.
-            let subset =
-                Campaign { points: points.to_vec(), sequence: None, repeats: None, ..planned.clone() };
+            // What is visited again is the script's own business.
+            let subset = Campaign {
+                points: points.to_vec(),
+                sequence: None,
+                repeats: None,
+                return_to_first: false,
+                ..planned.clone()
+            };
             let plan = plan(&subset, &machine).map_err(|error| error.to_string())?;
             Ok(plan.steps.into_iter().map(|step| step.to).collect())
         }),

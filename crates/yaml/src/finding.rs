@@ -35,6 +35,17 @@ pub enum FindingKind {
     MissingFile,
     /// A point that the machine cannot reach within the limits.
     Unreachable,
+    /// Values that no machine has, or of which nothing can come.
+    Implausible,
+    /// Nothing that is wrong, but that is rarely meant: a warning.
+    Unusual,
+}
+
+impl FindingKind {
+    /// Whether it is a warning: the file can be used as it is.
+    pub fn is_warning(self) -> bool {
+        self == FindingKind::Unusual
+    }
 }
 
 /// One mistake.

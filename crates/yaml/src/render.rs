@@ -27,7 +27,8 @@ impl Findings {
                 "" => finding.message.clone(),
                 path => format!("{path}: {}", finding.message),
             };
-            let title = Level::ERROR.primary_title(wrapped(&message));
+            let level = if finding.kind.is_warning() { Level::WARNING } else { Level::ERROR };
+            let title = level.primary_title(wrapped(&message));
             let line = Line::of(self.source.text(), finding);
             let group = if line.text.len() <= LINE_LIMIT {
                 let span = AnnotationKind::Primary.span(line.span.clone());
@@ -42,7 +43,14 @@ impl Findings {
             out.push_str("\n\n");
         }
         let count = self.count();
-        let noun = if count == 1 { "mistake" } else { "mistakes" };
+        // Warnings never stand beside mistakes: they are looked for in files without any.
+        let warnings = self.list.first().is_some_and(|finding| finding.kind.is_warning());
+        let noun = match (warnings, count) {
+            (false, 1) => "mistake",
+            (false, _) => "mistakes",
+            (true, 1) => "warning",
+            (true, _) => "warnings",
+        };
         out.push_str(&format!("{name}: {count} {noun}"));
         if self.omitted > 0 {
             out.push_str(&format!(", the first {} shown", self.list.len()));

@@ -6,6 +6,7 @@
 
 mod circles;
 mod dependencies;
+mod doomed;
 mod drift;
 mod drift_refusals;
 mod drift_watched;

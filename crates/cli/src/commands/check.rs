@@ -2,13 +2,13 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{output, registry};
+use crate::{interrupt, output, registry};
 use clap::Args;
 use mapper_campaign::CampaignError;
 use mapper_report::duration;
-use mapper_sequence::Script;
-use mapper_session::{nominal_model, soak_s};
+use mapper_session::{Session, nominal_model};
 use serde_json::json;
+use std::io::IsTerminal;
 use std::path::PathBuf;
 
 /// Check a campaign file and print all its mistakes, each with its line and a remedy
@@ -22,7 +22,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// Checks a campaign and says in a line what it is.
+    /// Checks a campaign, makes its plan or rehearses its script, and says in a line what it is; warnings come before it.
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = match mapper_campaign::load(&self.campaign) {
             Ok(campaign) => campaign,
@@ -42,30 +42,40 @@ impl Check {
             .map(drop)
             .and_then(|()| registry.check_formats(&campaign))
             .map_err(|error| Failure::in_campaign(error, &self.campaign))?;
-        if let Some(source) = &campaign.sequence {
-            let script = Script { path: source.path.clone(), text: source.text.clone() };
-            mapper_sequence::check(&script).map_err(|error| Failure::new(Code::BadInput, error))?;
-        }
-        let timing = &campaign.timing;
-        let steps_s = campaign.points.len() as f64 * timing.dwell_s;
-        let duration_s = soak_s(&campaign) + timing.warm_up_s + steps_s + timing.cool_down_s;
+        let stop = interrupt::stop_flag()?;
+        let session = Session { stop: &stop, ..Session::new(&registry) };
+        let prospects = session.prospects(&campaign, &model)?;
+        let text = std::fs::read_to_string(&self.campaign).map_err(|error| {
+            Failure::new(Code::Failure, format!("failed to read {}: {error}", self.campaign.display()))
+        })?;
+        let warnings = mapper_campaign::warnings(&text, &self.campaign, &campaign, prospects.concerns);
+        let (steps, duration_s) = (prospects.plan.steps.len(), prospects.duration_s);
         if self.json {
             return output::print_json(&json!({
                 "campaign": campaign.name,
                 "points": campaign.points.len(),
+                "steps": steps,
                 "minutes": duration_s / 60.0,
                 "backend": campaign.backend.name,
                 "findings": [],
                 "omitted": 0,
+                "warnings": warnings.list,
             }));
         }
-        let apart = match (&campaign.sequence, campaign.repeats) {
-            (Some(_), _) => " if the script visits each once for as long as `timing.dwell`",
-            (None, Some(_)) => ", repeats for drift not counted (`mapper plan` shows them)",
-            (None, None) => "",
+        if warnings.count() > 0 {
+            output::warn(&warnings.render(std::io::stderr().is_terminal()));
+        }
+        let forecast = match &campaign.sequence {
+            Some(_) => " by its script on the nominal machine",
+            None => "",
+        };
+        let number = match warnings.count() {
+            0 => String::new(),
+            1 => ", 1 warning".to_owned(),
+            count => format!(", {count} warnings"),
         };
         output::print(&format!(
-            "{}: no mistakes. {} points on `{}` in {} of the rig's time{apart}.\n",
+            "{}: no mistakes{number}. {} points in {steps} steps on `{}` in {} of the rig's time{forecast}.\n",
             self.campaign.display(),
             campaign.points.len(),
             campaign.backend.name,

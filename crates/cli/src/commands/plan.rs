@@ -119,6 +119,9 @@ impl Plan {
             let mut value = serde_json::to_value(&plan).map_err(SessionError::from)?;
             value["forecast"] = true.into();
             value["notes"] = notes.into();
+            if let Some(zero) = campaign.zero {
+                value["soak_s"] = zero.duration_s.into();
+            }
             return output::print_json(&value);
         }
         let notes: String = notes.iter().map(|note| format!("note: {note}\n")).collect();

@@ -5,6 +5,8 @@ use crate::findings::{Findings, code};
 use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
 use crate::joint::smoothness::{Judged, STRAIN_SIGMAS, Smoothed};
 use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
+use crate::width;
+use mapper_core::EstimateUncertainty;
 use mapper_numerics::statistics::{mean, median, rms};
 
 /// Whitened mean square above which a step is doubted.
@@ -73,7 +75,8 @@ pub(crate) fn exclude(problem: &mut Problem<'_>) -> bool {
 pub(crate) fn judge_step(
     problem: &Problem<'_>,
     index: usize,
-    sigma_eta: f64,
+    eta_error: EstimateUncertainty,
+    dt2_k: Option<f64>,
     config: &IdentifyConfig,
     findings: &mut Findings,
 ) {
@@ -84,21 +87,23 @@ pub(crate) fn judge_step(
         findings.refuse(code::POOR_FIT, message);
     }
     let limits = &config.thresholds;
+    let sigma_eta = eta_error.combined_standard_error();
     if sigma_eta > limits.sigma_eta {
-        let message = format!(
-            "noise, declared offsets and what is shared leave eta uncertain by {:.1} points (1 sigma)",
-            100.0 * sigma_eta
-        );
+        let (code, message) =
+            width::cause(eta_error, dt2_k.unwrap_or(0.0), limits.dt2_k, " and what is shared");
         if sigma_eta > limits.unusable_sigma_eta {
-            findings.refuse(code::SMALL_GRADIENT, message);
+            findings.refuse(code, message);
         } else {
-            findings.doubt(code::SMALL_GRADIENT, message);
+            findings.doubt(code, message);
         }
     }
     let declared = !config.declared.is_empty();
     let square = mean_square(problem, member);
     if declared && square > DOUBT_SQUARE {
-        let message = format!("the residual of T2 is {:.1} times the declared noise", square.sqrt());
+        let message = format!(
+            "the residual of T2 is {:.1} times the declared noise: something disturbed it, or more noise is to be declared",
+            square.sqrt()
+        );
         findings.doubt(code::POOR_FIT, message);
     }
     if !member.shares && !member.barred {

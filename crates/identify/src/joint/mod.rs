@@ -14,7 +14,6 @@ pub(crate) mod judge;
 pub(crate) mod model;
 pub(crate) mod parameters;
 pub(crate) mod parsimony;
-pub(crate) mod probe;
 pub(crate) mod profile;
 pub(crate) mod quantity;
 pub(crate) mod regions;
@@ -144,7 +143,8 @@ pub(crate) fn estimate(
             dt2_k: change(|row| row.t2_k),
             dtc_k: change(|row| row.tc_k),
         };
-        judge::judge_step(&problem, i, eta_error.combined_standard_error(), config, own);
+        let dt2_k = estimates[step.position].dt2_k;
+        judge::judge_step(&problem, i, eta_error, dt2_k, config, own);
         if let Some(message) = left_out.as_ref().filter(|_| member.barred) {
             own.doubt(code::LEFT_OUT, message.clone());
         }

@@ -4,13 +4,13 @@ use crate::joint::parameters::{
     ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, INLET, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL,
     LocalVector, OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
 };
-use crate::joint::probe::Lag;
 use crate::joint::rows::Row;
 use crate::joint::surface::{TERM_COUNT, dot};
+use crate::probe::{self, Lag, follow};
 use mapper_physics::air;
 use mapper_physics::compression::{CompressionInputs, compress, compressed_k, isentropic_rise_ratio};
 use mapper_physics::inlet_convection::InletLaw;
-use mapper_physics::{nusselt, thermocouple};
+use mapper_physics::nusselt;
 
 /// What is fixed for all steps.
 #[derive(Debug, Clone, Copy)]
@@ -299,17 +299,8 @@ impl Setting {
     /// The probe's lag from row to row, for the square of its diameter.
     pub(crate) fn lags(&self, rows: &[Row], gas_k: &[f64], square_mm2: f64) -> Vec<Lag> {
         let diameter_m = 1e-3 * square_mm2.max(0.0).sqrt();
-        let mut before: Option<(f64, f64)> = None;
-        let mut lags = Vec::with_capacity(rows.len());
-        for (row, gas_k) in rows.iter().zip(gas_k) {
-            let tau_s =
-                thermocouple::time_constant_s(diameter_m, self.outlet_diameter_m, row.flow_kg_s, *gas_k);
-            if let Some((before_s, before_tau_s)) = before {
-                lags.push(Lag::of(row.t_s - before_s, 0.5 * (before_tau_s + tau_s)));
-            }
-            before = Some((row.t_s, tau_s));
-        }
-        lags
+        let rows = rows.iter().zip(gas_k).map(|(row, gas_k)| (row.t_s, row.flow_kg_s, *gas_k));
+        probe::lags(rows, diameter_m, self.outlet_diameter_m)
     }
 
     /// Lets the probe follow the gas, and every derivative with it.
@@ -329,16 +320,6 @@ impl Setting {
             return Prediction { t2_k, columns };
         }
         let lags_at = |square_mm2: f64| self.lags(rows, &gas_k, square_mm2);
-        let follow = |lags: &[Lag], first: f64, course: &[f64]| {
-            let mut reading = first;
-            let mut readings = Vec::with_capacity(course.len());
-            readings.push(reading);
-            for (lag, pair) in lags.iter().zip(course.windows(2)) {
-                reading = lag.next(reading, pair[0], pair[1]);
-                readings.push(reading);
-            }
-            readings
-        };
         let lags = lags_at(shared[PROBE_MM2]);
         let first_k = local[FIRST_READING];
         let readings = follow(&lags, first_k, &gas_k);

@@ -40,6 +40,7 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
             housing_gradient_max_k: None,
         },
         repeats: None,
+        return_to_first: false,
         appended: None,
         required_sigma_eta: None,
         method: None,

@@ -1,5 +1,7 @@
 //! The reading of a probe that follows the gas with a lag, along the rows of a step.
 
+use mapper_physics::thermocouple;
+
 /// One step of the probe: what remains of its last reading, and the weights of the gas before and now. Exact for a gas
 /// temperature that is linear in between.
 #[derive(Debug, Clone, Copy)]
@@ -25,6 +27,37 @@ impl Lag {
     pub(crate) fn next(&self, reading: f64, gas_before: f64, gas_now: f64) -> f64 {
         self.kept * reading + self.before * gas_before + self.now * gas_now
     }
+}
+
+/// The lags between the rows of a course, each by time, s, flow, kg/s, and gas temperature, K; one fewer than rows. Between two
+/// rows the probe has the mean of their time constants.
+pub(crate) fn lags(
+    rows: impl Iterator<Item = (f64, f64, f64)>,
+    probe_diameter_m: f64,
+    pipe_diameter_m: f64,
+) -> Vec<Lag> {
+    let mut before: Option<(f64, f64)> = None;
+    let mut lags = Vec::with_capacity(rows.size_hint().0);
+    for (t_s, flow_kg_s, gas_k) in rows {
+        let tau_s = thermocouple::time_constant_s(probe_diameter_m, pipe_diameter_m, flow_kg_s, gas_k);
+        if let Some((before_s, before_tau_s)) = before {
+            lags.push(Lag::of(t_s - before_s, 0.5 * (before_tau_s + tau_s)));
+        }
+        before = Some((t_s, tau_s));
+    }
+    lags
+}
+
+/// What the probe reads along a course of the gas, from its reading at the first row on.
+pub(crate) fn follow(lags: &[Lag], first: f64, course: &[f64]) -> Vec<f64> {
+    let mut reading = first;
+    let mut readings = Vec::with_capacity(course.len());
+    readings.push(reading);
+    for (lag, pair) in lags.iter().zip(course.windows(2)) {
+        reading = lag.next(reading, pair[0], pair[1]);
+        readings.push(reading);
+    }
+    readings
 }
 
 #[cfg(test)]

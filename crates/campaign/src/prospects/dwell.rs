@@ -1,0 +1,43 @@
+//! A dwell that leaves the identification no window.
+
+use crate::campaign::Campaign;
+use crate::concern::Concern;
+use mapper_core::{Method, WindowRule};
+use mapper_yaml::steps;
+
+pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
+    let identification = &campaign.identification;
+    if !matches!(identification.method, Method::Dynamic | Method::Joint) {
+        return Vec::new();
+    }
+    let dwell_s = campaign.timing.dwell_s;
+    let (earliest_s, shortest_s) = (WindowRule::EARLIEST_S, WindowRule::SHORTEST_S);
+    let needed_s = earliest_s + shortest_s;
+    match identification.window {
+        WindowRule::Auto if dwell_s < needed_s => {
+            // A script may stay elsewhere for as long as it likes.
+            let none = dwell_s <= earliest_s;
+            let outcome =
+                if none { "no point would have an efficiency" } else { "every point would be doubtful" };
+            vec![Concern {
+                grave: none && campaign.sequence.is_none(),
+                at: steps!["timing", "dwell"].to_vec(),
+                message: format!(
+                    "a dwell of {dwell_s} s is shorter than the {needed_s} s that `window: auto` needs (from {earliest_s} s \
+                     after the jump, {shortest_s} s long): {outcome}"
+                ),
+                remedy: format!("stay at least {needed_s} s at each point; 120 s is usual"),
+            }]
+        }
+        WindowRule::Fixed { start_s, end_s } if end_s - start_s < shortest_s => vec![Concern {
+            grave: false,
+            at: steps!["identification", "window", "end"].to_vec(),
+            message: format!(
+                "the window is {} s long, shorter than the {shortest_s} s from which efficiency and heat transfer can be told apart",
+                end_s - start_s
+            ),
+            remedy: "end it later, or begin it earlier".to_owned(),
+        }],
+        WindowRule::Auto | WindowRule::Fixed { .. } => Vec::new(),
+    }
+}

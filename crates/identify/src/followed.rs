@@ -1,0 +1,56 @@
+//! T2 as a declared probe reads it (eqs. 11-12), for a fit of one step.
+//!
+//! The probe comes into a window with a reading that earlier seconds have made. That first reading enters linearly and fades
+//! with the probe's time constant; it is not a number anyone wants, so it is projected out of residual and derivatives
+//! (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10:413, 1973). What is left is a fit of as many
+//! parameters as without a probe.
+
+use crate::probe::{Lag, follow, lags};
+use crate::samples::Samples;
+
+/// The declared probe and the pipe it stands in.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Probe {
+    /// Diameter of its tip, m; 0 for a probe without inertia.
+    pub(crate) diameter_m: f64,
+    /// Diameter of the pipe, m.
+    pub(crate) pipe_diameter_m: f64,
+}
+
+/// The probe along the rows of a window.
+#[derive(Debug, Clone)]
+pub(crate) struct Followed {
+    lags: Vec<Lag>,
+    /// What is left of the first reading at each row.
+    memory: Vec<f64>,
+    /// Sum of its squares.
+    memory_square: f64,
+}
+
+impl Followed {
+    /// `None` for a probe without inertia, which reads what the gas has.
+    pub(crate) fn of(samples: &Samples, probe: Probe) -> Option<Self> {
+        if probe.diameter_m <= 0.0 || samples.len() < 2 {
+            return None;
+        }
+        let courses = samples.t_s.iter().zip(&samples.flow_kg_s).zip(&samples.t2_k);
+        let rows = courses.map(|((t_s, flow_kg_s), t2_k)| (*t_s, *flow_kg_s, *t2_k));
+        let lags = lags(rows, probe.diameter_m, probe.pipe_diameter_m);
+        let memory = follow(&lags, 1.0, &vec![0.0; samples.len()]);
+        let memory_square = memory.iter().map(|share| share * share).sum();
+        Some(Followed { lags, memory, memory_square })
+    }
+
+    /// What the probe makes of a course of the gas, but for what its first reading adds.
+    pub(crate) fn read(&self, gas: &[f64]) -> Vec<f64> {
+        follow(&self.lags, 0.0, gas)
+    }
+
+    /// Takes out of a column of readings what some first reading would explain of it.
+    pub(crate) fn without_first_reading(&self, column: &mut [f64]) {
+        let along: f64 = column.iter().zip(&self.memory).map(|(value, share)| value * share).sum();
+        for (value, share) in column.iter_mut().zip(&self.memory) {
+            *value -= along / self.memory_square * share;
+        }
+    }
+}

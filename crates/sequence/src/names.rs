@@ -1,0 +1,112 @@
+//! Functions and properties that a script names and nobody has, found without running it: a branch that is seldom taken may
+//! be the first to fail, at night.
+
+use mapper_yaml::closest;
+use rhai::{AST, ASTNode, Engine, Expr, Position, Stmt};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What the engine knows by itself and lists nowhere.
+const KEYWORDS: [&str; 12] = [
+    "print",
+    "debug",
+    "type_of",
+    "is_def_var",
+    "is_def_fn",
+    "is_shared",
+    "Fn",
+    "call",
+    "curry",
+    "eval",
+    "this",
+    "parse_json",
+];
+/// How the engine names the function that reads a property.
+const GETTER: &str = "get$";
+
+/// Everything that may be called, with the numbers of arguments it takes.
+type Known = BTreeMap<String, BTreeSet<usize>>;
+
+/// A name that nothing has: where, what is wrong, and what to do.
+pub(crate) struct Unknown {
+    pub(crate) at: Position,
+    pub(crate) message: String,
+    pub(crate) remedy: String,
+}
+
+/// Refuses the first call of a function that does not exist, or not with so many arguments, and the first property that
+/// nothing has.
+pub(crate) fn check(engine: &Engine, ast: &AST) -> Result<(), Unknown> {
+    let mut known = Known::new();
+    let registered = |function: rhai::FuncInfo<'_>| {
+        Some((function.metadata.name.to_string(), function.metadata.num_params))
+    };
+    for (name, count) in engine.collect_fn_metadata(None, registered, true) {
+        known.entry(name).or_default().insert(count);
+    }
+    for function in ast.iter_functions() {
+        known.entry(function.name.to_owned()).or_default().insert(function.params.len());
+    }
+    // A script's own maps have whatever properties it gives them.
+    let mut maps = false;
+    let mut wrong: Vec<(Position, String, String)> = Vec::new();
+    let mut property = None;
+    ast.walk(&mut |path: &[ASTNode<'_>]| {
+        match path.last() {
+            Some(ASTNode::Expr(Expr::FnCall(call, at)) | ASTNode::Stmt(Stmt::FnCall(call, at)))
+                if call.op_token.is_none() =>
+            {
+                wrong.extend(unknown(&known, &call.name, call.args.len()).map(|(m, r)| (*at, m, r)));
+            }
+            // The value before the dot is the first argument.
+            Some(ASTNode::Expr(Expr::MethodCall(call, at))) => {
+                wrong.extend(unknown(&known, &call.name, call.args.len() + 1).map(|(m, r)| (*at, m, r)));
+            }
+            Some(ASTNode::Expr(Expr::Property(names, at)))
+                if property.is_none() && !known.contains_key(&format!("{GETTER}{}", names.2)) =>
+            {
+                property = Some((*at, names.2.to_string()));
+            }
+            Some(ASTNode::Expr(Expr::Map(..) | Expr::DynamicConstant(..))) => maps = true,
+            _ => {}
+        }
+        true
+    });
+    if let Some((at, name)) = property.filter(|_| !maps) {
+        let getters: Vec<&str> = known.keys().filter_map(|name| name.strip_prefix(GETTER)).collect();
+        wrong.push((
+            at,
+            format!("nothing in a sequence script has a property `{name}`"),
+            remedy(&name, &getters),
+        ));
+    }
+    wrong.sort_by_key(|(at, ..)| (at.line(), at.position()));
+    match wrong.into_iter().next() {
+        None => Ok(()),
+        Some((at, message, remedy)) => Err(Unknown { at, message, remedy }),
+    }
+}
+
+fn unknown(known: &Known, name: &str, count: usize) -> Option<(String, String)> {
+    if KEYWORDS.contains(&name) {
+        return None;
+    }
+    let Some(counts) = known.get(name) else {
+        let names: Vec<&str> = known.keys().map(String::as_str).filter(|name| !name.contains('$')).collect();
+        return Some((format!("there is no function `{name}` for a sequence script"), remedy(name, &names)));
+    };
+    if counts.contains(&count) {
+        return None;
+    }
+    let takes: Vec<String> = counts.iter().map(ToString::to_string).collect();
+    let message = format!("`{name}` is called with {count} arguments, and takes {}", takes.join(" or "));
+    Some((message, LISTED.to_owned()))
+}
+
+const LISTED: &str = "docs/sequences.md lists the functions and what they take";
+
+fn remedy(name: &str, among: &[&str]) -> String {
+    match closest(name, among) {
+        Some(guess) => format!("did you mean `{guess}`? {LISTED}"),
+        None => LISTED.to_owned(),
+    }
+}

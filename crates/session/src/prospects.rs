@@ -1,0 +1,157 @@
+//! What is known of a campaign before it is run: how long it takes, and what of it will come to nothing.
+
+use crate::drive::soak_s;
+use crate::planning::plan;
+use crate::rehearsal::rehearse;
+use crate::{Session, SessionError};
+use mapper_campaign::{Campaign, Concern};
+use mapper_core::{Method, Plan, PlanStep, StepKind, WindowRule};
+use mapper_identify::ZeroSettings;
+use mapper_physics::model::Model;
+use mapper_physics::standstill::{StandstillState, relax};
+use mapper_physics::thermocouple::time_constant_s;
+
+/// How far from the cell's temperature a cold machine's housings are reckoned with, K, as the zero does when it finds the
+/// limit that Tc relaxes to.
+const WARM_K: f64 = 3.0;
+/// Longest soak that is tried, s.
+const LONGEST_SOAK_S: f64 = 86_400.0;
+/// Soaks that are tried lie this far apart, s.
+const SOAK_STEP_S: f64 = 300.0;
+
+/// Time constants of the T2 probe that a window has at least: what it has brought along is below 1 % then.
+const PROBE_TIME_CONSTANTS: f64 = 5.0;
+
+/// What a campaign will be.
+#[derive(Debug)]
+pub struct Prospects {
+    /// Its plan, or the one that its script makes on the nominal machine.
+    pub plan: Plan,
+    /// Rig time from the beginning of the soak to the end of the cool-down, s.
+    pub duration_s: f64,
+    /// What is to be feared of it.
+    pub concerns: Vec<Concern>,
+}
+
+impl Session<'_> {
+    /// Makes the plan, or rehearses the script, and looks at what will come of it.
+    ///
+    /// # Errors
+    /// [`SessionError`] where there is no plan, or the script fails.
+    pub fn prospects(&self, campaign: &Campaign, model: &Model) -> Result<Prospects, SessionError> {
+        let plan = match &campaign.sequence {
+            None => plan(campaign, model)?,
+            Some(source) => rehearse(self, campaign, model, source)?.plan,
+        };
+        let concerns = [soak(campaign, model), settling(campaign, &plan), probe(campaign, &plan)];
+        Ok(Prospects {
+            duration_s: soak_s(campaign) + plan.duration_s(),
+            concerns: concerns.into_iter().flatten().collect(),
+            plan,
+        })
+    }
+}
+
+/// A soak after which the housings are still on their way to the cell's temperature, from as far away as the zero reckons with.
+fn soak(campaign: &Campaign, model: &Model) -> Option<Concern> {
+    let soak = campaign.zero?;
+    let settings = ZeroSettings::from(soak);
+    let ambient_k = campaign.boundary.ambient_temperature_k;
+    let warm_k = ambient_k + WARM_K;
+    let start = StandstillState { tc_k: warm_k, tt_k: warm_k };
+    let tc_k = |after_s: f64| relax(&model.params, start, soak.oil_temperature_k, ambient_k, after_s).tc_k;
+    // As the zero sees it: from the first to the last third of its stretch.
+    let drift_k_min = |duration_s: f64| {
+        let third_s = duration_s.min(settings.longest_s) / 3.0;
+        let middle_k = |from_s: f64| tc_k(from_s + 0.5 * third_s);
+        (middle_k(duration_s - third_s) - middle_k(duration_s - 3.0 * third_s)) / (2.0 * third_s / 60.0)
+    };
+    let enough = |duration_s: f64| {
+        drift_k_min(duration_s).abs() <= settings.drift_k_min && tc_k(duration_s) - ambient_k <= 0.5 * WARM_K
+    };
+    if enough(soak.duration_s) {
+        return None;
+    }
+    let longer =
+        (1..).map(|i| SOAK_STEP_S * f64::from(i)).take_while(|s| *s <= LONGEST_SOAK_S).find(|s| enough(*s));
+    let remedy = longer.map_or_else(
+        || "no soak of a day is long enough: oil and cell need one temperature, and the machine its true masses".to_owned(),
+        |s| format!("soak {:.0} min or longer", s / 60.0),
+    );
+    Some(Concern::warning(
+        &["zero", "soak"],
+        format!(
+            "after {:.0} min at rest, housings that were {WARM_K} K warmer than the cell would still be {:.1} K warmer, and Tc drift by \
+             {:+.2} K/min; the zero refuses a drift of more than {:.2} K/min, and takes what is left for an offset",
+            soak.duration_s / 60.0,
+            tc_k(soak.duration_s) - ambient_k,
+            drift_k_min(soak.duration_s),
+            settings.drift_k_min
+        ),
+        remedy,
+    ))
+}
+
+/// Steps that settle so late that `window: auto` has too little left.
+fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+    let transient = matches!(campaign.identification.method, Method::Dynamic | Method::Joint);
+    let auto = campaign.identification.window == WindowRule::Auto;
+    // A script's steps are judged by what it sees itself.
+    if !(transient && auto && campaign.sequence.is_none()) {
+        return None;
+    }
+    let needed_s = |step: &PlanStep| {
+        step.predicted.settle_s.unwrap_or(f64::INFINITY).max(WindowRule::EARLIEST_S) + WindowRule::SHORTEST_S
+    };
+    let measured = || plan.steps.iter().filter(|step| step.kind != StepKind::Repeat && step.from.is_some());
+    let late: Vec<_> = measured().filter(|step| needed_s(step) > step.dwell_s).collect();
+    let worst = late.iter().max_by(|a, b| needed_s(a).total_cmp(&needed_s(b)))?;
+    let settles = worst.predicted.settle_s.map_or_else(
+        || format!("does not settle within {:.0} s", worst.dwell_s),
+        |settle_s| format!("settles {settle_s:.0} s after its jump"),
+    );
+    Some(Concern::warning(
+        &["timing", "dwell"],
+        format!(
+            "{} of {} points would not have settled {:.0} s before the end of their dwell and be doubtful \
+             (`not_stabilised`); {} {settles}",
+            late.len(),
+            measured().count(),
+            WindowRule::SHORTEST_S,
+            worst.to
+        ),
+        "lengthen `timing.dwell`, or widen `identification.stabilisation`".to_owned(),
+    ))
+}
+
+/// A window of which the declared T2 probe spends a large part on what came before.
+fn probe(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+    let params = &campaign.machine.params;
+    let (diameter_m, pipe_m) = (params.t2_probe_diameter_m, params.compressor.outlet_diameter_m);
+    let judged = |step: &PlanStep| {
+        let predicted = &step.predicted;
+        let window_s = match campaign.identification.method {
+            Method::Dynamic | Method::Joint => {
+                let (start_s, end_s) =
+                    campaign.identification.window.of_step_s(predicted.settle_s, step.dwell_s);
+                end_s - start_s
+            }
+            Method::Steady | Method::Imported => step.dwell_s,
+        };
+        (time_constant_s(diameter_m, pipe_m, predicted.flow_kg_s, predicted.t2_k), window_s, step.to)
+    };
+    let share = |(tau_s, window_s, _): &(f64, f64, _)| tau_s / window_s;
+    let worst = plan.steps.iter().map(judged).max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    let (tau_s, window_s, at) = worst;
+    (PROBE_TIME_CONSTANTS * tau_s > window_s).then(|| {
+        Concern::warning(
+            &["sensors", "T2", "probe_diameter"],
+            format!(
+                "a probe of {:.2} mm has a time constant of {tau_s:.1} s at {at}, and {window_s:.0} s are looked at there: less than \
+                 {PROBE_TIME_CONSTANTS} time constants, so that much of it is spent on what came before",
+                1e3 * diameter_m
+            ),
+            "lengthen `timing.dwell`, or use a thinner probe".to_owned(),
+        )
+    })
+}

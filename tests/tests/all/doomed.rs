@@ -1,0 +1,53 @@
+//! Campaigns of which nothing can come are told so before the night, not after it.
+
+use mapper_tests::{CampaignFile, SHORT_GRID, mapper};
+
+/// The shipped campaign on a short grid, with parts replaced.
+fn short(more: &[(&str, &str)]) -> CampaignFile {
+    let replacements: Vec<_> = SHORT_GRID.iter().chain(more).copied().collect();
+    CampaignFile::shipped_with(&replacements)
+}
+
+/// A warning stands on standard error with its line and a caret; the campaign is none the worse for it.
+#[test]
+fn what_will_come_to_little_is_a_warning() {
+    for (old, new, at, message) in [
+        ("soak: 30 min", "soak: 5 min", "5 min", "after 5 min at rest, housings that were 3 K warmer"),
+        (
+            "probe_diameter: 0 mm",
+            "probe_diameter: 15 mm",
+            "15 mm",
+            "a probe of 15.00 mm has a time constant of",
+        ),
+        ("dwell: 120 s ", "dwell: 30 s ", "30 s", "every point would be doubtful"),
+    ] {
+        let campaign = short(&[(old, new)]);
+        let checked = mapper(["check".as_ref(), campaign.path.as_os_str()]).exits(0);
+        assert!(checked.stderr.contains(message), "{}", checked.stderr);
+        assert!(checked.stdout.contains("no mistakes, "), "{}", checked.stdout);
+        let lines: Vec<&str> = checked.stderr.lines().collect();
+        let shown = format!("{} |", campaign.line_of(new));
+        let line = lines.iter().position(|line| line.trim_start().starts_with(&shown)).unwrap();
+        assert_eq!(lines[line + 1].find('^'), lines[line].find(at), "{}", checked.stderr);
+        let json = mapper(["check".as_ref(), campaign.path.as_os_str(), "--json".as_ref()]).exits(0).json();
+        let found = json["warnings"].as_array().unwrap();
+        assert!(found.iter().any(|found| found["message"].as_str().unwrap().contains(message)), "{json}");
+        assert_eq!(json["findings"].as_array().unwrap().len(), 0);
+    }
+}
+
+/// One time, however it is asked for: soak, warm-up, repeats and the way back included.
+#[test]
+fn check_and_plan_tell_the_same_time() {
+    for name in ["turbo_a", "turbo_a_adiabatic"] {
+        let campaign = format!("campaigns/{name}.yaml");
+        let checked = mapper(["check", &campaign, "--json"]).exits(0).json();
+        let plan = mapper(["plan", &campaign, "--json"]).exits(0).json();
+        let soak_min = plan["soak_s"].as_f64().unwrap() / 60.0;
+        let planned_min = soak_min + plan["figures"]["minutes"].as_f64().unwrap();
+        let minutes = checked["minutes"].as_f64().unwrap();
+        assert!((minutes - planned_min).abs() < 1e-6, "{name}: {minutes} min and {planned_min} min");
+        assert_eq!(checked["steps"].as_u64().unwrap() as usize, plan["steps"].as_array().unwrap().len());
+        assert_eq!(checked["warnings"].as_array().unwrap().len(), 0, "{checked}");
+    }
+}

@@ -173,14 +173,16 @@ impl CampaignFile {
     ) -> io::Result<(Campaign, Vec<Vec<Step>>)> {
         let (points, point_paths) = self.grid.points();
         let (boundary, follow_outlet) = (self.boundary.conditions(), self.boundary.follow_outlet());
-        let machine = self.machine.machine(self.sensors.probe_diameter_m(), origin, files)?;
+        let sensors = self.sensors.declarations();
+        let probe_diameter_m = sensors.get(&Channel::T2).map_or(0.0, |sensor| sensor.probe_diameter_m);
+        let machine = self.machine.machine(probe_diameter_m, origin, files)?;
         let alpha_area_ratio = machine.params.compressor.alpha_area_ratio;
         let campaign = Campaign {
             name: self.campaign,
             description: self.description,
             boundary,
             follow_outlet,
-            sensors: self.sensors.declarations(),
+            sensors,
             tolerances: self.tolerances,
             backend: backend(self.backend),
             points,

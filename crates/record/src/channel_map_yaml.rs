@@ -99,7 +99,7 @@ impl<'a> Reader<'a> {
             reference: self.reference(),
             window: self.has("window").then(|| self.window()),
             noise_colour: self.has("noise_colour").then(|| self.noise_colour()),
-            native: false,
+            ..ChannelMap::default()
         }
     }
 

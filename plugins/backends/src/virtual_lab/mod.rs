@@ -4,6 +4,8 @@ mod actuator;
 mod drift;
 mod drift_file;
 mod effects_file;
+mod elements;
+mod elements_file;
 mod inputs;
 mod lab;
 mod samples;
@@ -17,6 +19,7 @@ mod weather;
 
 pub use actuator::ActuatorDynamics;
 pub use drift::{Drifting, LabDrift};
+pub use elements::{LabElement, LabElements};
 pub use lab::{NAME, VirtualLab};
 pub use sensor::SensorErrors;
 pub use setting_problem::SettingProblem;

@@ -1,7 +1,7 @@
 //! What can be wrong with a value below `virtual_lab:`.
 
 use super::lab::NAME;
-use mapper_core::{BackendError, with_unit};
+use mapper_core::{BackendError, Channel, with_unit};
 use mapper_physics::effect::EffectError;
 use mapper_yaml::units::{Kind, UnitError};
 
@@ -89,6 +89,20 @@ pub enum SettingProblem {
     NoDuration {
         /// What was written, s.
         over_s: f64,
+    },
+    /// A fault of a sensor that the channel does not have.
+    #[error("{channel} has {count} sensors of which one could fail: name one of several that the campaign declares")]
+    NoElement {
+        /// The channel.
+        channel: Channel,
+        /// How many of several sensors it has; 0 where it has but one.
+        count: usize,
+    },
+    /// A probe where none is simulated.
+    #[error("only the probes of T2 have a tip here: write `lag` for {channel}")]
+    NoProbe {
+        /// The channel.
+        channel: Channel,
     },
     /// A drift after which the machine has no meaning.
     #[error("{text} is beyond {} %", 100.0 * limit_ratio)]

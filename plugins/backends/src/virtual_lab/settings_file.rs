@@ -3,12 +3,13 @@
 use super::actuator::ActuatorDynamics;
 use super::drift_file::{self, DriftFile};
 use super::effects_file::{EffectValues, put_in};
+use super::elements_file::{self, FaultFile};
 use super::sensor::SensorErrors;
 use super::setting_problem::SettingProblem;
 use super::settings::{LabSettings, Start};
 use super::tolerances::draw_tolerances;
 use super::weather::Weather;
-use mapper_core::{BackendError, Channel};
+use mapper_core::{BackendError, Channel, DeclaredUncertainty};
 use mapper_physics::effect::Rig;
 use mapper_physics::instruments::Instruments;
 use mapper_physics::model::Model;
@@ -41,6 +42,8 @@ struct SettingsFile {
     offset_of: BTreeMap<Channel, String>,
     /// What the machine has that the declared one has not.
     effects: BTreeMap<String, EffectValues>,
+    /// Which of several sensors of a channel is off, slow or stuck.
+    faults: Vec<FaultFile>,
     /// What drifts while the lab runs.
     drift: Vec<DriftFile>,
     /// `calm` (the default) or `wandering`.
@@ -162,6 +165,12 @@ pub fn read_settings(
     }
     put_in(&mut rig, &file.effects, &nominal.effects)?;
     let actuators = &file.actuators;
+    let draws = Draws {
+        seed: nominal.seed,
+        noise_ratio: if file.noise == NoiseName::Declared { 1.0 } else { 0.0 },
+        drawn: file.offsets == OffsetsName::Drawn,
+    };
+    let offset_of = offsets_of(&file)?;
     let mut lab = LabSettings {
         model: rig.model.clone(),
         instruments: Instruments::default(),
@@ -179,7 +188,8 @@ pub fn read_settings(
         t3_actuator: actuators.turbine_inlet_temperature.dynamics("turbine_inlet_temperature", 20.0, 10.0)?,
         valve_actuator: actuators.valve.dynamics("valve", 0.2, 1.0)?,
         oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", 30.0, 1.0)?,
-        sensors: sensors(&file, nominal)?,
+        sensors: sensors(&offset_of, nominal, &draws),
+        redundant: elements_file::read(&file.faults, nominal, &draws, &offset_of)?,
         uneven_at_rest: match file.offsets {
             OffsetsName::Drawn => uneven_at_rest(nominal),
             OffsetsName::None => BTreeMap::new(),
@@ -227,43 +237,64 @@ fn true_params(mut params: Params, file: &MachineFile) -> Result<Params, Backend
     Ok(params)
 }
 
-fn sensors(
-    file: &SettingsFile,
-    nominal: &NominalRig,
-) -> Result<BTreeMap<Channel, SensorErrors>, BackendError> {
-    let noise = if file.noise == NoiseName::Declared { 1.0 } else { 0.0 };
-    let mut sensors: BTreeMap<Channel, SensorErrors> = nominal
-        .sensors
-        .iter()
-        .map(|(channel, declared)| {
-            let (offset, gain) = match file.offsets {
-                OffsetsName::Drawn => draw(nominal.seed, *channel),
-                OffsetsName::None => (0.0, 0.0),
-            };
-            let errors = SensorErrors {
-                white_sigma: noise * WHITE_SHARE * declared.noise_sigma,
-                coloured_sigma: noise * COLOURED_SHARE * declared.noise_sigma,
-                coloured_time_constant_s: COLOURED_TIME_CONSTANT_S,
-                offset: offset * declared.offset_sigma,
-                gain_ratio: gain * declared.gain_sigma_ratio,
-            };
-            (*channel, errors)
-        })
-        .collect();
-    for (channel, text) in &file.offset_of {
+/// Offsets of single channels, in their units.
+fn offsets_of(file: &SettingsFile) -> Result<BTreeMap<Channel, f64>, BackendError> {
+    let parse = |(channel, text): (&Channel, &String)| {
         let kind = offset_kind(*channel);
         let offset = mapper_yaml::units::parse(kind, text)
             .map_err(|source| SettingProblem::Quantity { kind, source }.at(format!("offset_of.{channel}")))?;
-        sensors.entry(*channel).or_default().offset = offset;
+        Ok((*channel, offset))
+    };
+    file.offset_of.iter().map(parse).collect()
+}
+
+fn sensors(
+    offset_of: &BTreeMap<Channel, f64>,
+    nominal: &NominalRig,
+    draws: &Draws,
+) -> BTreeMap<Channel, SensorErrors> {
+    let declared = nominal.sensors.iter();
+    let mut sensors: BTreeMap<Channel, SensorErrors> =
+        declared.map(|(channel, declared)| (*channel, draws.errors(declared, *channel as u64))).collect();
+    for (channel, offset) in offset_of {
+        sensors.entry(*channel).or_default().offset = *offset;
     }
-    Ok(sensors)
+    sensors
+}
+
+/// How the errors of sensors are made of what is declared of them.
+pub(super) struct Draws {
+    pub(super) seed: u64,
+    /// Noise over declared noise.
+    pub(super) noise_ratio: f64,
+    /// Whether offsets and gains are drawn; they are 0 otherwise.
+    pub(super) drawn: bool,
+}
+
+impl Draws {
+    /// Errors of the sensor that has this stream of random numbers.
+    pub(super) fn errors(&self, declared: &DeclaredUncertainty, stream: u64) -> SensorErrors {
+        let (offset, gain) = self.of(stream);
+        SensorErrors {
+            white_sigma: self.noise_ratio * WHITE_SHARE * declared.noise_sigma,
+            coloured_sigma: self.noise_ratio * COLOURED_SHARE * declared.noise_sigma,
+            coloured_time_constant_s: COLOURED_TIME_CONSTANT_S,
+            offset: offset * declared.offset_sigma,
+            gain_ratio: gain * declared.gain_sigma_ratio,
+        }
+    }
+
+    /// Standard normal numbers for offset and gain of a stream.
+    pub(super) fn of(&self, stream: u64) -> (f64, f64) {
+        if self.drawn { draw(self.seed, stream) } else { (0.0, 0.0) }
+    }
 }
 
 /// Two standard normal numbers that belong to one sensor of one seed: for its offset and for its gain.
-fn draw(seed: u64, channel: Channel) -> (f64, f64) {
+fn draw(seed: u64, stream: u64) -> (f64, f64) {
     // Another stream than the sensor's noise: that one starts from the same seed with other multipliers.
     let mixed =
-        seed.wrapping_mul(0xA24B_AED4_963E_E407) ^ (channel as u64 + 1).wrapping_mul(0x9FB2_1C65_1E98_DF25);
+        seed.wrapping_mul(0xA24B_AED4_963E_E407) ^ (stream + 1).wrapping_mul(0x9FB2_1C65_1E98_DF25);
     let mut random = Pcg64::seed_from_u64(mixed);
     (StandardNormal.sample(&mut random), StandardNormal.sample(&mut random))
 }
@@ -273,14 +304,14 @@ fn uneven_at_rest(nominal: &NominalRig) -> BTreeMap<Channel, f64> {
     let Some(soak) = nominal.soak else { return BTreeMap::new() };
     // Another stream than that of the offsets.
     let seed = nominal.seed ^ 0x6A09_E667_F3BC_C908;
-    let drawn = |channel: Channel, sigma: f64| (channel, sigma * draw(seed, channel).0);
+    let drawn = |channel: Channel, sigma: f64| (channel, sigma * draw(seed, channel as u64).0);
     let temperatures = [Channel::T1, Channel::T2, Channel::Tc, Channel::TOil];
     let temperatures = temperatures.map(|channel| drawn(channel, soak.temperature_sigma_k));
     let pressures = [Channel::P1, Channel::P2].map(|channel| drawn(channel, soak.pressure_sigma_pa));
     temperatures.into_iter().chain(pressures).collect()
 }
 
-fn offset_kind(channel: Channel) -> Kind {
+pub(super) fn offset_kind(channel: Channel) -> Kind {
     match channel.info().dimension {
         mapper_core::Dimension::RotationalSpeed => Kind::Speed,
         mapper_core::Dimension::MassFlow => Kind::MassFlow,
@@ -296,7 +327,7 @@ fn rate_unit<Rate: Dimension>() -> &'static str {
 }
 
 /// Refuses a value outside its range.
-fn within(value: f64, unit: &'static str, range: RangeInclusive<f64>) -> Result<(), SettingProblem> {
+pub(super) fn within(value: f64, unit: &'static str, range: RangeInclusive<f64>) -> Result<(), SettingProblem> {
     if range.contains(&value) {
         return Ok(());
     }
@@ -306,7 +337,7 @@ fn within(value: f64, unit: &'static str, range: RangeInclusive<f64>) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{DeclaredUncertainty, ModelTolerances};
+    use mapper_core::ModelTolerances;
     use mapper_physics::params::BoundaryConditions;
     use serde_json::json;
 
@@ -317,6 +348,7 @@ mod tests {
             boundary: BoundaryConditions::default(),
             speed_max_rpm: 180e3,
             sensors: [(Channel::T1, declared), (Channel::T2, declared)].into(),
+            redundant: BTreeMap::new(),
             static_tap_pipe_diameters_m: BTreeMap::new(),
             soak: None,
             tolerances: ModelTolerances::default(),

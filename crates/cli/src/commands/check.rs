@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::{output, registry};
 use clap::Args;
 use mapper_campaign::CampaignError;
-use mapper_report::duration;
+use mapper_report::{declared_sensors_text, duration};
 use mapper_sequence::Script;
 use mapper_session::{nominal_model, soak_s};
 use serde_json::json;
@@ -65,11 +65,12 @@ impl Check {
             (None, None) => "",
         };
         output::print(&format!(
-            "{}: no mistakes. {} points on `{}` in {} of the rig's time{apart}.\n",
+            "{}: no mistakes. {} points on `{}` in {} of the rig's time{apart}.\n{}",
             self.campaign.display(),
             campaign.points.len(),
             campaign.backend.name,
             duration(duration_s),
+            declared_sensors_text(&campaign),
         ))
     }
 }

@@ -1,6 +1,6 @@
 //! Quantiles of the distributions that intervals are made of.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// 97.5 % quantile of the standard normal distribution: half of a 95 % interval, standard errors.
 pub const NORMAL_975: f64 = 1.959_963_984_540_054;
@@ -15,10 +15,15 @@ pub fn student_quantile(share: f64, degrees_of_freedom: f64) -> Option<f64> {
     Some(distribution.inverse_cdf(share))
 }
 
+/// Quantile of the standard normal distribution at `share`, between 0 and 1; infinite at both ends.
+pub fn normal_quantile(share: f64) -> f64 {
+    Normal::standard().inverse_cdf(share.clamp(0.0, 1.0))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use statrs::distribution::{ChiSquared, Normal};
+    use statrs::distribution::ChiSquared;
 
     /// scipy: `scipy.stats.norm.ppf(0.975)`, `scipy.stats.chi2.ppf(0.95, 1)`; statrs as a second witness.
     #[test]
@@ -27,6 +32,17 @@ mod tests {
         assert!((CHI_SQUARE_1_95 - 3.841458820694124).abs() < 1e-14);
         assert!((NORMAL_975 - Normal::standard().inverse_cdf(0.975)).abs() < 1e-10);
         assert!((CHI_SQUARE_1_95 - ChiSquared::new(1.0).unwrap().inverse_cdf(0.95)).abs() < 1e-6);
+    }
+
+    /// scipy: `scipy.stats.norm.ppf` of 0.975, 0.9995 and 1 - 0.00025/2.
+    #[test]
+    fn normal_quantiles_are_those_of_scipy() {
+        for (share, expected) in
+            [(0.975, 1.959963984540054), (0.9995, 3.2905267314919255), (0.999875, 3.662259930887615)]
+        {
+            assert!((normal_quantile(share) - expected).abs() < 1e-6, "{share}");
+        }
+        assert_eq!(normal_quantile(1.0), f64::INFINITY);
     }
 
     /// scipy: `scipy.stats.t.ppf(0.975, n)` for n = 1, 2, 3, 10, 1000.

@@ -6,7 +6,7 @@ use crate::progress::Progress;
 use crate::{output, registry};
 use clap::Args;
 use mapper_drift::DriftReport;
-use mapper_report::{gap_page, gap_text, zero_text};
+use mapper_report::{gap_page, gap_text, sensors_text, zero_text};
 use mapper_session::{Recorded, Session, SessionError, write_new};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -56,7 +56,7 @@ impl Diagnose {
             value["zero"] = json!(gap.zero);
             return output::print_json(&value);
         }
-        output::print(&(gap_text(diagnosis) + zero_text(&gap.zero).as_str()))
+        output::print(&(gap_text(diagnosis) + &sensors_text(&gap.sensors) + &zero_text(&gap.zero)))
     }
 }
 

@@ -58,6 +58,9 @@ impl Drift {
             let paths: Vec<&PathBuf> = recorded.iter().map(|recorded| &recorded.path).collect();
             value["recordings"] = json!(paths);
             value["zero"] = json!(drift.zero);
+            if !drift.sensors.is_empty() {
+                value["sensors"] = json!(drift.sensors);
+            }
             value["recording_warnings"] = json!(warnings);
             return output::print_json(&value);
         }

@@ -54,9 +54,12 @@ impl Diagnose {
             let mut value = serde_json::to_value(diagnosis).map_err(SessionError::from)?;
             value["drift"] = gap.drift.as_ref().map_or(Value::Null, drift_json);
             value["zero"] = json!(gap.zero);
+            if !gap.sensors.is_empty() {
+                value["sensors"] = json!(gap.sensors);
+            }
             return output::print_json(&value);
         }
-        output::print(&(gap_text(diagnosis) + &sensors_text(&gap.sensors) + &zero_text(&gap.zero)))
+        output::print(&[gap_text(diagnosis), sensors_text(&gap.sensors), zero_text(&gap.zero)].concat())
     }
 }
 

@@ -120,7 +120,13 @@ fn orders_and_repeats_fit_the_rest() {
 #[test]
 fn several_sensors() {
     for (sensors, kind, place, message, remedy) in [
-        ("[{noise: 0.1 K}, {noise: 0.1 K, count: 2}]", Kind::Conflict, "2", "`count` says nothing here", "leave `count` out"),
+        (
+            "[{noise: 0.1 K}, {noise: 0.1 K, count: 2}]",
+            Kind::Conflict,
+            "2",
+            "`count` says nothing here",
+            "leave `count` out",
+        ),
         ("{noise: 0.1 K, name: A}", Kind::Conflict, "A", "`name` says nothing here", "write a list"),
         ("{noise: 0.1 K, count: 17}", Kind::Range, "17", "16", "16"),
         ("{noise: 0.1 K, count: 0}", Kind::Range, "0", "1", "1"),
@@ -138,7 +144,13 @@ fn several_sensors() {
             "`common_offset` is 0.1 K for another sensor of T1",
             "the same value",
         ),
-        ("[{noise: 0.1 K}, {nois: 0.1 K}]", Kind::UnknownKey, "nois", "`sensors.T1[1]`", "did you mean `noise`?"),
+        (
+            "[{noise: 0.1 K}, {nois: 0.1 K}]",
+            Kind::UnknownKey,
+            "nois",
+            "`sensors.T1[1]`",
+            "did you mean `noise`?",
+        ),
     ] {
         one("  T1: {noise: 0.1 K}", &format!("  T1: {sensors}"), kind, place, message, remedy);
     }

@@ -141,7 +141,8 @@ impl RedundantSensors {
     pub fn fused(&self, in_use: impl Fn(usize) -> bool) -> DeclaredUncertainty {
         let weights = self.weights(in_use);
         let averaged = |of: fn(&DeclaredUncertainty) -> f64| {
-            let share = |(weight, element): (&f64, &DeclaredElement)| (weight * of(&element.declared)).powi(2);
+            let share =
+                |(weight, element): (&f64, &DeclaredElement)| (weight * of(&element.declared)).powi(2);
             weights.iter().zip(&self.elements).map(share).sum::<f64>().sqrt()
         };
         DeclaredUncertainty {
@@ -156,7 +157,8 @@ impl RedundantSensors {
     pub fn probe_diameter_m(&self, in_use: impl Fn(usize) -> bool) -> f64 {
         let lags = self.weights(in_use);
         let lags = lags.iter().zip(&self.elements);
-        let mean: f64 = lags.map(|(weight, element)| weight * element.probe_diameter_m.powf(LAG_EXPONENT)).sum();
+        let mean: f64 =
+            lags.map(|(weight, element)| weight * element.probe_diameter_m.powf(LAG_EXPONENT)).sum();
         mean.powf(LAG_EXPONENT.recip())
     }
 
@@ -170,10 +172,8 @@ impl RedundantSensors {
         let reads = |index: usize| readings.get(index).is_some_and(|reading| reading.is_finite());
         let near = |index: usize| {
             let declared = &self.elements[index].declared;
-            let sigma = declared
-                .noise_sigma
-                .hypot(declared.offset_sigma)
-                .hypot(declared.gain_sigma_ratio * middle);
+            let sigma =
+                declared.noise_sigma.hypot(declared.offset_sigma).hypot(declared.gain_sigma_ratio * middle);
             reads(index) && (sigma <= 0.0 || (readings[index] - middle).abs() <= LIVE_LIMIT_SIGMAS * sigma)
         };
         // Two that contradict each other are both far off their middle.
@@ -205,7 +205,10 @@ mod tests {
         assert_eq!(four.elements[2].name, "T2/3");
         let second = Element { channel: Channel::CompressorFlow, number: 2 };
         assert_eq!(second.field(), "m_c_2_kg_s");
-        assert_eq!(serde_json::from_str::<Element>(&serde_json::to_string(&second).unwrap()).unwrap(), second);
+        assert_eq!(
+            serde_json::from_str::<Element>(&serde_json::to_string(&second).unwrap()).unwrap(),
+            second
+        );
         for wrong in ["T2", "T2/0", "T2/x", "T9/1", "/1"] {
             assert!(Element::try_from(wrong.to_owned()).is_err(), "{wrong}");
         }
@@ -219,7 +222,9 @@ mod tests {
         unlike.elements[2].declared = declared(200.0, 50.0);
         let variance = |weights: &[f64]| -> f64 {
             let of = |(weight, element): (&f64, &DeclaredElement)| {
-                weight * weight * (element.declared.noise_sigma.powi(2) + element.declared.offset_sigma.powi(2))
+                weight
+                    * weight
+                    * (element.declared.noise_sigma.powi(2) + element.declared.offset_sigma.powi(2))
             };
             weights.iter().zip(&unlike.elements).map(of).sum()
         };

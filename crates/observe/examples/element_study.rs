@@ -10,7 +10,9 @@ use common::{Fault, Said, clean, judged};
 fn main() {
     let seeds: u64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(200);
     let clean = clean();
-    println!("{seeds} recordings each; four thermocouples and two taps at each of four ports, six steps of 60 s");
+    println!(
+        "{seeds} recordings each; four thermocouples and two taps at each of four ports, six steps of 60 s"
+    );
     for (what, fault) in [
         ("sound", Fault::None),
         ("off by 6 sigma", Fault::Off(6.0)),

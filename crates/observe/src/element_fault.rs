@@ -64,7 +64,10 @@ impl fmt::Display for FaultyElement {
                 write!(f, "{name} follows changes {:.1} s {later} than {others}", lag_s.abs())?;
             }
             Fault::Stuck { from_s, reading } => {
-                write!(f, "{name} stands still at {reading:.6} {unit} from {from_s:.0} s on, {others} do not")?;
+                write!(
+                    f,
+                    "{name} stands still at {reading:.6} {unit} from {from_s:.0} s on, {others} do not"
+                )?;
             }
             Fault::Silent { missing_ratio } => {
                 write!(f, "{name} gives no reading for {:.0} % of the time", 100.0 * missing_ratio)?;
@@ -143,7 +146,9 @@ impl fmt::Display for FusedChannel {
         }
         if let Some(Contradiction { name, fault, widened_by }) = &self.contradiction {
             let what = match fault {
-                Fault::Off { by, sigmas } => format!("reads {:+.2} {unit} off the others ({sigmas:.1} sigma)", by),
+                Fault::Off { by, sigmas } => {
+                    format!("reads {:+.2} {unit} off the others ({sigmas:.1} sigma)", by)
+                }
                 Fault::Slow { lag_s } => format!("follows changes {lag_s:+.1} s after the others"),
                 Fault::Stuck { .. } | Fault::Silent { .. } => "does not follow the others".to_owned(),
             };

@@ -20,8 +20,9 @@ const PARTS: usize = 4;
 const FEWEST_BLOCKS: usize = 10;
 /// Share of the recording without a reading from which on a sensor is silent, where another one has readings.
 const SILENT_RATIO: f64 = 0.5;
-/// Time over which a reading that repeats to the last digit is one that stands still, s.
-const FROZEN_S: f64 = 60.0;
+/// Time and samples over which a reading that repeats to the last digit is one that stands still, s.
+const FROZEN_S: f64 = 20.0;
+const FROZEN_SAMPLES: usize = 20;
 /// Share of samples that must differ from the one before them for a sensor to be alive: a coarse digit repeats often.
 const ALIVE_RATIO: f64 = 0.2;
 /// Noise of a block within which a reading stands still, standard deviations; that is passed by chance in 1e-8 of them.
@@ -87,7 +88,8 @@ pub(crate) fn judge(
     loop {
         let in_use = judgement.in_use(sensors.len());
         let differences = in_use.iter().filter_map(|index| judge.difference(*index, &in_use));
-        let Some(worst) = differences.filter(|found| found.severity > 1.0).max_by(Difference::by_severity) else {
+        let Some(worst) = differences.filter(|found| found.severity > 1.0).max_by(Difference::by_severity)
+        else {
             return judgement;
         };
         if in_use.len() < 3 || judgement.left_out.len() >= most_out {
@@ -168,7 +170,8 @@ impl Judge<'_> {
             let changes = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
             changes as f64 > ALIVE_RATIO * values.len() as f64
         };
-        (to_s - from_s >= FROZEN_S && others.iter().all(alive)).then_some(Fault::Stuck { from_s, reading })
+        let long = to_s - from_s >= FROZEN_S && longest.1 - longest.0 >= FROZEN_SAMPLES;
+        (long && others.iter().all(alive)).then_some(Fault::Stuck { from_s, reading })
     }
 
     /// A reading that stays within its noise while the others move far and stay away.
@@ -217,8 +220,10 @@ impl Judge<'_> {
         }
         let lag = self.lag(index, &weights, &rows);
         let (by, sigmas) = self.offset(index, &weights, &rows, lag.map_or(0.0, |lag| lag.lag_s));
-        let off = Difference { index, severity: sigmas / self.limit_sigmas, fault: Fault::Off { by, sigmas } };
-        let slow = lag.map(|Lag { lag_s, severity }| Difference { index, severity, fault: Fault::Slow { lag_s } });
+        let off =
+            Difference { index, severity: sigmas / self.limit_sigmas, fault: Fault::Off { by, sigmas } };
+        let slow =
+            lag.map(|Lag { lag_s, severity }| Difference { index, severity, fault: Fault::Slow { lag_s } });
         Some(slow.filter(|slow| slow.severity > off.severity).unwrap_or(off))
     }
 
@@ -246,7 +251,8 @@ impl Judge<'_> {
             let diameter_m = self.declared.elements[index].probe_diameter_m;
             thermocouple::time_constant_s(diameter_m, USUAL_PIPE_M, USUAL_FLOW_KG_S, USUAL_T2_K)
         };
-        let others_s: f64 = weights.iter().enumerate().map(|(other, weight)| weight * declared_s(other)).sum();
+        let others_s: f64 =
+            weights.iter().enumerate().map(|(other, weight)| weight * declared_s(other)).sum();
         let expected_s = declared_s(index) - others_s;
         let limit_s = LAG_S + LAG_RATIO * declared_s(index).max(others_s);
         Some(Lag { lag_s, severity: (lag_s - expected_s).abs() / limit_s.max(LAG_SIGMAS * standard_error_s) })
@@ -257,7 +263,8 @@ impl Judge<'_> {
         let parts = PARTS.min(rows.len() / FEWEST_BLOCKS).max(1);
         let mut worst = (0.0, 0.0);
         for part in rows.chunks(rows.len().div_ceil(parts)) {
-            let by = mean(part.iter().map(|(difference, slope, _)| difference + lag_s * slope)).unwrap_or(0.0);
+            let by =
+                mean(part.iter().map(|(difference, slope, _)| difference + lag_s * slope)).unwrap_or(0.0);
             let level = mean(part.iter().map(|row| row.2)).unwrap_or(0.0);
             let length_s = part.len() as f64 * self.blocks.length_s;
             let variance = |other: usize| {
@@ -269,7 +276,8 @@ impl Judge<'_> {
                 fixed.powi(2) + declared.noise_sigma.powi(2) * self.colour.variance_of_mean(samples, length_s)
             };
             let others = weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0);
-            let sigma = (variance(index) + others.map(|(other, w)| w * w * variance(other)).sum::<f64>()).sqrt();
+            let sigma =
+                (variance(index) + others.map(|(other, w)| w * w * variance(other)).sum::<f64>()).sqrt();
             // Nothing is declared: nothing can be said.
             let sigmas = if sigma > 0.0 { by.abs() / sigma } else { 0.0 };
             if sigmas > worst.1 {

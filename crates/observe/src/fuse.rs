@@ -60,7 +60,9 @@ pub fn fuse(
         let weights = declared.weights(|index| fused.uses(index + 1));
         let base = recording.series.get(&fused.channel);
         let base = base.or_else(|| sensors.iter().flatten().next().copied()).cloned().unwrap_or_default();
-        let Some(values) = fused_values(fused.channel, &sensors, declared, &weights, &base.t_s) else { continue };
+        let Some(values) = fused_values(fused.channel, &sensors, declared, &weights, &base.t_s) else {
+            continue;
+        };
         recording.series.insert(fused.channel, Series { t_s: base.t_s, values });
     }
     recording
@@ -81,7 +83,11 @@ fn fused_channel(
     let mut together = declared.fused(uses);
     let contradiction = judgement.contradiction.map(|(index, fault)| {
         // One of them may be right: one standard deviation reaches the farthest.
-        let widened_by = if matches!(fault, Fault::Off { .. }) { farthest(channel, sensors, declared, &uses) } else { 0.0 };
+        let widened_by = if matches!(fault, Fault::Off { .. }) {
+            farthest(channel, sensors, declared, &uses)
+        } else {
+            0.0
+        };
         together = DeclaredUncertainty { offset_sigma: together.offset_sigma.hypot(widened_by), ..together };
         Contradiction { name: name(index), fault, widened_by }
     });

@@ -39,7 +39,10 @@ fn one_of_four_that_is_off_slow_or_stuck_is_found_and_a_sound_one_is_not() {
 fn the_kind_of_fault_is_named() {
     let clean = clean();
     for (fault, is_it) in [
-        (Fault::Off(8.0), (|found| matches!(found, Found::Off { by, .. } if *by > 0.0)) as fn(&Found) -> bool),
+        (
+            Fault::Off(8.0),
+            (|found| matches!(found, Found::Off { by, .. } if *by > 0.0)) as fn(&Found) -> bool,
+        ),
         (Fault::Stuck, |found| matches!(found, Found::Stuck { .. })),
         (Fault::StuckWithNoise, |found| matches!(found, Found::Stuck { .. })),
         (Fault::Slow(4e-3), |found| matches!(found, Found::Slow { lag_s } if *lag_s > 2.0)),
@@ -58,7 +61,8 @@ fn constant(count: usize, level: f64, offsets: &[f64], noise_sigma: f64, seed: u
     let t_s: Vec<f64> = (0..count).map(|i| 0.1 * i as f64).collect();
     let mut recording = Recording::default();
     for (index, offset) in offsets.iter().enumerate() {
-        let values = noise(count, noise_sigma, &mut random).into_iter().map(|noise| level + offset + noise).collect();
+        let values =
+            noise(count, noise_sigma, &mut random).into_iter().map(|noise| level + offset + noise).collect();
         let element = Element { channel: Channel::T2, number: index + 1 };
         recording.elements.insert(element, Series { t_s: t_s.clone(), values });
     }

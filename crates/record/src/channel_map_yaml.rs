@@ -4,9 +4,7 @@ use crate::channel_map_schema::SCHEMA;
 use crate::format::TRUTH_PREFIX;
 use crate::units::{difference, kind_of, parse_quantity, remedy, unit};
 use crate::{ChannelMap, ChannelSource, MachineConstants, WindowLimits};
-use mapper_core::{
-    Channel, DeclaredUncertainty, Element, NoiseColour, RedundantSensors, ReferenceState,
-};
+use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, RedundantSensors, ReferenceState};
 use mapper_yaml::units::{Kind, UnitError};
 use mapper_yaml::{Document, FindingKind, Findings, Node, Notes, Source, Step, path_text, steps};
 use std::collections::BTreeMap;
@@ -79,7 +77,11 @@ impl<'a> Reader<'a> {
         let (mut channels, mut elements) = (BTreeMap::new(), BTreeMap::new());
         for channel in self.channels_below("channels") {
             let (topic, unit) = self.topic_and_unit(channel);
-            let source = |field: &String| ChannelSource { topic: topic.clone(), field: field.clone(), unit: unit.clone() };
+            let source = |field: &String| ChannelSource {
+                topic: topic.clone(),
+                field: field.clone(),
+                unit: unit.clone(),
+            };
             let fields = self.fields(channel);
             if let [field] = fields.as_slice() {
                 channels.insert(channel, source(field));
@@ -144,7 +146,9 @@ impl<'a> Reader<'a> {
 
     /// The field of a channel, or those of its several sensors.
     fn fields(&self, channel: Channel) -> Vec<String> {
-        let Some(node) = self.root.get(&steps!["channels", channel.symbol(), "field"]) else { return Vec::new() };
+        let Some(node) = self.root.get(&steps!["channels", channel.symbol(), "field"]) else {
+            return Vec::new();
+        };
         let texts = node.items().iter().chain(node.text().is_some().then_some(node));
         texts.filter_map(Node::text).map(str::to_owned).collect()
     }

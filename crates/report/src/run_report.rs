@@ -42,8 +42,18 @@ pub struct RunReport<'a> {
 
 /// The report as Markdown.
 pub fn run_report(report: &RunReport<'_>) -> String {
-    let RunReport { campaign, plan, outcome, events, points, repeats, two_parameter, sensors, score, has_picture } =
-        *report;
+    let RunReport {
+        campaign,
+        plan,
+        outcome,
+        events,
+        points,
+        repeats,
+        two_parameter,
+        sensors,
+        score,
+        has_picture,
+    } = *report;
     // Writing to a String cannot fail, here and below.
     let mut text = format!("# Compressor map of {}\n\n", campaign.machine.name);
     if let Some(disagreement) = disagreement_text(points, two_parameter, &campaign.display) {

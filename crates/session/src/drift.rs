@@ -74,7 +74,9 @@ fn zeroed_alike(
     config: IdentifyConfig,
     campaign: &Campaign,
 ) -> (Vec<Recording>, IdentifyConfig, ZeroOutcome) {
-    let zero = recordings.first().map_or(ZeroOutcome::NotAsked, |first| ZeroOutcome::of(first, &config, campaign.zero));
+    let zero = recordings
+        .first()
+        .map_or(ZeroOutcome::NotAsked, |first| ZeroOutcome::of(first, &config, campaign.zero));
     let off = |recording: Recording| zero.take_off(recording, config.clone()).0;
     let recordings = recordings.into_iter().map(off).collect();
     let left = zero.take_off(Recording::default(), config.clone()).1;

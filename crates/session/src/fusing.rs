@@ -32,8 +32,11 @@ pub(crate) fn fused(
     let colour = config.noise_colour;
     let judged = recordings.iter().map(|recording| judge_elements(recording, &declared, colour)).collect();
     let channels = alike(judged, &declared);
-    let recordings =
-        recordings.into_iter().zip(&channels).map(|(recording, fused)| fuse(recording, &declared, fused)).collect();
+    let recordings = recordings
+        .into_iter()
+        .zip(&channels)
+        .map(|(recording, fused)| fuse(recording, &declared, fused))
+        .collect();
     let mut config = config;
     for fused in channels.iter().flatten() {
         take_over(&mut config, fused, campaign);

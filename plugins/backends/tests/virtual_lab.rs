@@ -5,7 +5,8 @@ use mapper_backends::virtual_lab::{
     ActuatorDynamics, LabElement, LabElements, LabSettings, SensorErrors, Start, VirtualLab,
 };
 use mapper_core::{
-    Backend, BackendError, Channel, DeclaredUncertainty, EventKind, RedundantSensors, RigMode, SampleBatch, Setpoints,
+    Backend, BackendError, Channel, DeclaredUncertainty, EventKind, RedundantSensors, RigMode, SampleBatch,
+    Setpoints,
 };
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
@@ -130,7 +131,8 @@ fn each_of_several_sensors_reads_by_itself_and_the_other_channels_as_without_the
     // From 3 s on the machine speeds up, and a tip of 4 mm needs some 9 s to follow.
     assert!(sound[45] - slow[45] > 1.0, "{} {}", sound[45], slow[45]);
     // The channel is read by those that agree: 3 K are more than eight standard deviations.
-    let together: Vec<f64> = batches.iter().flat_map(|batch| batch.column(Channel::T2).unwrap().to_vec()).collect();
+    let together: Vec<f64> =
+        batches.iter().flat_map(|batch| batch.column(Channel::T2).unwrap().to_vec()).collect();
     let first = mean(&together[..30]);
     assert!((first - mean(&sound[..30])).abs() < 0.1, "{first}");
 }

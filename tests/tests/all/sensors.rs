@@ -5,7 +5,8 @@ use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, python, scratch}
 use serde_json::Value;
 use std::path::Path;
 
-const SINGLE: &str = "  T2:    {noise: 0.1 K, offset: 0.25 K, probe_diameter: 0 mm}   # 0 mm: a probe without inertia\n";
+const SINGLE: &str =
+    "  T2:    {noise: 0.1 K, offset: 0.25 K, probe_diameter: 0 mm}   # 0 mm: a probe without inertia\n";
 
 /// Four points of the shipped campaign with these sensors of T2 and these settings of the lab.
 fn campaign(sensors: &str, lab: &str) -> CampaignFile {
@@ -76,7 +77,9 @@ fn a_replayed_recording_carries_every_sensor() {
     let recording = first["recording"].as_str().unwrap();
     let read = read_recording(Path::new(recording), &ChannelMap::native(), &ReadOptions::default()).unwrap();
     assert_eq!(read.recording.elements.len(), 4);
-    let text = campaign(FOUR, "{}").text.replace("  virtual_lab: {}\n", &format!("  replay: {{recording: {recording}}}\n"));
+    let text = campaign(FOUR, "{}")
+        .text
+        .replace("  virtual_lab: {}\n", &format!("  replay: {{recording: {recording}}}\n"));
     let replayed = run(&CampaignFile::of(text), &scratch.path().join("second"));
     assert_eq!(replayed["sensors"], first["sensors"]);
 }

@@ -1,7 +1,7 @@
 //! `sensors:`
 
-use crate::checking::Check;
 use super::several_sensors::{Sensor, Sensors, Several, check_several, each_place};
+use crate::checking::Check;
 use crate::si::or;
 use crate::units::{
     Dimension, Fraction, Length, MassFlow, PressureDifference, Quantity, Speed, TemperatureDifference,
@@ -142,7 +142,7 @@ pub(crate) struct SpeedSensor {
     #[schemars(range(min = 1, max = 16), example = 4)]
     count: Option<usize>,
     /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
-    #[schemars(length(min = 1, max = 40))]
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
     name: Option<String>,
     /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
     #[schemars(extend("x-min" = "0 rpm"))]
@@ -180,7 +180,7 @@ pub(crate) struct FlowSensor {
     #[schemars(range(min = 1, max = 16), example = 4)]
     count: Option<usize>,
     /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
-    #[schemars(length(min = 1, max = 40))]
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
     name: Option<String>,
     /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
     #[schemars(extend("x-min" = "0 kg/s"))]
@@ -223,7 +223,7 @@ pub(crate) struct PressureSensor {
     #[schemars(range(min = 1, max = 16), example = 4)]
     count: Option<usize>,
     /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
-    #[schemars(length(min = 1, max = 40))]
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
     name: Option<String>,
     /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
     #[schemars(extend("x-min" = "0 Pa"))]
@@ -270,7 +270,7 @@ pub(crate) struct TemperatureSensor {
     #[schemars(range(min = 1, max = 16), example = 4)]
     count: Option<usize>,
     /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
-    #[schemars(length(min = 1, max = 40))]
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
     name: Option<String>,
     /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
     #[schemars(extend("x-min" = "0 K"))]
@@ -311,7 +311,7 @@ pub(crate) struct ProbeSensor {
     #[schemars(range(min = 1, max = 16), example = 4)]
     count: Option<usize>,
     /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
-    #[schemars(length(min = 1, max = 40))]
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
     name: Option<String>,
     /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
     #[schemars(extend("x-min" = "0 K"))]

@@ -43,15 +43,18 @@ impl<S: Sensor> Sensors<S> {
             Sensors::Alike(sensor) => vec![sensor; sensor.several().count],
             Sensors::Each(sensors) => sensors.iter().collect(),
         };
-        let common_offset_sigma = members.iter().map(|sensor| sensor.several().common_offset).fold(0.0, f64::max);
+        let common_offset_sigma =
+            members.iter().map(|sensor| sensor.several().common_offset).fold(0.0, f64::max);
         let element = |(index, sensor): (usize, &&S)| {
             let SensorDeclaration { declared, probe_diameter_m, .. } = sensor.declaration();
             let usual = || Element { channel, number: index + 1 }.to_string();
             let name = sensor.several().name.map_or_else(usual, str::to_owned);
             DeclaredElement { name, declared, probe_diameter_m }
         };
-        let redundant =
-            RedundantSensors { elements: members.iter().enumerate().map(element).collect(), common_offset_sigma };
+        let redundant = RedundantSensors {
+            elements: members.iter().enumerate().map(element).collect(),
+            common_offset_sigma,
+        };
         let first = match self {
             Sensors::Alike(sensor) => sensor.declaration(),
             // The list is checked to have one at least.
@@ -63,7 +66,10 @@ impl<S: Sensor> Sensors<S> {
         let declared = redundant.fused(|_| true);
         if members.len() < 2 {
             let offset_sigma = first.declared.offset_sigma.hypot(common_offset_sigma);
-            return SensorDeclaration { declared: DeclaredUncertainty { offset_sigma, ..first.declared }, ..first };
+            return SensorDeclaration {
+                declared: DeclaredUncertainty { offset_sigma, ..first.declared },
+                ..first
+            };
         }
         let probe_diameter_m = redundant.probe_diameter_m(|_| true);
         SensorDeclaration { declared, probe_diameter_m, redundant: Some(redundant), ..first }
@@ -98,12 +104,21 @@ pub(crate) fn check_several(check: &mut Check<'_>, symbol: &str) {
     }
     // One place in the flow and one calibration bath have one value each.
     for key in ["common_offset", "tap", "pipe_diameter"] {
-        let said = |check: &Check<'_>, place: &[Step]| check.get(&at(place, key)).and_then(Node::text).map(str::to_owned);
+        let said = |check: &Check<'_>, place: &[Step]| {
+            check.get(&at(place, key)).and_then(Node::text).map(str::to_owned)
+        };
         let first = places.iter().find_map(|place| said(check, place));
-        let other = places.iter().find(|place| said(check, place).is_some_and(|text| Some(&text) != first.as_ref()));
+        let other =
+            places.iter().find(|place| said(check, place).is_some_and(|text| Some(&text) != first.as_ref()));
         if let (Some(first), Some(other)) = (first, other) {
-            let message = format!("`{key}` is {first} for another sensor of {symbol}, and holds for all of them");
-            check.note(FindingKind::Conflict, &at(other, key), message, "write the same value for each of them");
+            let message =
+                format!("`{key}` is {first} for another sensor of {symbol}, and holds for all of them");
+            check.note(
+                FindingKind::Conflict,
+                &at(other, key),
+                message,
+                "write the same value for each of them",
+            );
         }
     }
     let mut names: Vec<String> = Vec::new();

@@ -121,7 +121,9 @@ pub fn record(clean: &Clean, fault: Fault, seed: u64) -> (Recording, Option<Elem
     // One that only stands still shows where something moves.
     let channel = if fault == Fault::StuckWithNoise { Channel::T2 } else { channel };
     let faulty = (fault != Fault::None).then(|| Element { channel, number: random.random_range(1..=4) });
-    let stuck_from = random.random_range(clean.t_s.len() / 10..clean.t_s.len() * 9 / 10);
+    // With its noise left, one that stands still after the last jump looks as sound as the others.
+    let last = if fault == Fault::StuckWithNoise { 0.8 } else { 0.9 };
+    let stuck_from = random.random_range(clean.t_s.len() / 10..(last * clean.t_s.len() as f64) as usize);
     let mut recording = Recording::default();
     for (channel, count, noise_sigma, offset_sigma) in STAND {
         let common = if count > 2 { COMMON_K * normal(&mut random) } else { 0.0 };
@@ -197,7 +199,8 @@ pub enum Said {
 /// Judges one recording.
 pub fn judged(clean: &Clean, fault: Fault, seed: u64) -> Said {
     let (recording, faulty) = record(clean, fault, seed);
-    let channels = mapper_observe::judge_elements(&recording, &declared(), mapper_core::NoiseColour::default());
+    let channels =
+        mapper_observe::judge_elements(&recording, &declared(), mapper_core::NoiseColour::default());
     let named: Vec<Element> =
         channels.iter().flat_map(|fused| &fused.left_out).map(|faulty| faulty.element).collect();
     let contradicted = channels.iter().any(|fused| fused.contradiction.is_some());

@@ -35,8 +35,8 @@ pub use crate::elements::identification::Identification;
 pub use crate::elements::machine::{Machine, MapSource};
 pub use crate::elements::outputs::{FormatName, Outputs};
 pub use crate::elements::report::Report;
-pub use crate::elements::sensors::SensorDeclaration;
 pub use crate::elements::sequence::SequenceSource;
+pub use crate::elements::several_sensors::SensorDeclaration;
 
 /// Everything a run needs to know, without mistakes that can be known beforehand.
 ///

@@ -1,11 +1,25 @@
 //! Several sensors of one channel below `sensors:`: alike by their `count`, or a list.
 
-use super::sensors::SensorDeclaration;
 use crate::checking::Check;
 use mapper_core::{Channel, DeclaredElement, DeclaredUncertainty, Element, MAX_ELEMENTS, RedundantSensors};
 use mapper_yaml::{FindingKind, Node, Step, steps};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+
+/// One sensor as declared; one standard deviation throughout, in the channel's unit (K, Pa, kg/s, rpm).
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct SensorDeclaration {
+    /// Noise, offset left after calibration, gain; of several sensors what they are together.
+    pub declared: DeclaredUncertainty,
+    /// Inner diameter of the pipe at a static tap, m; `None` where the total value is measured.
+    pub static_tap_pipe_diameter_m: Option<f64>,
+    /// Diameter of the probe's tip, m; 0 is a probe without inertia. Of several sensors that of the one probe that lags as they
+    /// do together.
+    pub probe_diameter_m: f64,
+    /// Each of several sensors; `None` where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub redundant: Option<RedundantSensors>,
+}
 
 /// The sensors of a channel: one, several alike (`count`), or a list.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -130,44 +144,5 @@ pub(crate) fn check_several(check: &mut Check<'_>, symbol: &str) {
             check.note(FindingKind::Conflict, &path, message, "give each sensor of a channel its own name");
         }
         names.push(name);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::elements::sensors::ProbeSensor;
-
-    fn declared(text: &str) -> SensorDeclaration {
-        crate::testing::any::<Sensors<ProbeSensor>>(text).unwrap().declaration(Channel::T2)
-    }
-
-    #[test]
-    fn a_count_and_a_list_of_equal_sensors_are_the_same_and_one_is_none_of_several() {
-        let one = "{noise: 0.1 K, offset: 0.24 K, probe_diameter: 1 mm}";
-        let alike = declared("{noise: 0.1 K, offset: 0.24 K, probe_diameter: 1 mm, count: 4}");
-        assert_eq!(alike, declared(&format!("[{one}, {one}, {one}, {one}]")));
-        // A fourth of the variance each.
-        assert!((alike.declared.noise_sigma - 0.05).abs() < 1e-12);
-        assert!((alike.declared.offset_sigma - 0.12).abs() < 1e-12);
-        assert!((alike.probe_diameter_m - 1e-3).abs() < 1e-12);
-        let names: Vec<String> = alike.redundant.unwrap().elements.into_iter().map(|e| e.name).collect();
-        assert_eq!(names, ["T2/1", "T2/2", "T2/3", "T2/4"]);
-        let single = declared(one);
-        assert_eq!((single.redundant.clone(), single.declared.offset_sigma), (None, 0.24));
-        assert_eq!(single, declared(&format!("[{one}]")));
-    }
-
-    #[test]
-    fn a_common_offset_does_not_average_out() {
-        let four = declared("{noise: 0.1 K, offset: 0.24 K, common_offset: 0.16 K, count: 4}");
-        // 0.12 and 0.16 in quadrature; for a single sensor 0.24 and 0.07.
-        assert!((four.declared.offset_sigma - 0.2).abs() < 1e-12);
-        let one = declared("{noise: 0.1 K, offset: 0.24 K, common_offset: 0.07 K}");
-        assert!((one.declared.offset_sigma - 0.25).abs() < 1e-12);
-        let named = declared("[{noise: 0.1 K, name: TC_21}, {noise: 0.1 K, common_offset: 0.16 K}]");
-        let redundant = named.redundant.unwrap();
-        assert_eq!(redundant.elements[0].name, "TC_21");
-        assert!((redundant.common_offset_sigma - 0.16).abs() < 1e-12);
     }
 }

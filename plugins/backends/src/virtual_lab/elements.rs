@@ -1,9 +1,9 @@
 //! Several sensors of one channel in the lab: each with its own errors, its own probe, and perhaps a fault.
 
-use super::samples::Instant;
 use super::sensor::{Sensor, SensorErrors};
 use mapper_core::{Channel, Element, ElementColumn, RedundantSensors};
 use mapper_physics::instruments::{ChannelFollower, ChannelPath};
+use mapper_physics::model::Outputs;
 use mapper_physics::thermocouple;
 
 /// One of several sensors as it truly is.
@@ -89,17 +89,17 @@ impl ElementBank {
             .map(|number| ElementColumn { element: Element { channel: self.channel, number }, values: Vec::new() })
     }
 
-    /// What each of them reads of `truth`, and what the rig makes of it. `drifted` is what drift makes of a reading.
+    /// What each of them reads of `truth`, and what the rig makes of it. `outputs`: of a running machine; `drifted` is what drift makes of a reading.
     pub(super) fn read(
         &mut self,
         t_s: f64,
         truth: f64,
-        instant: &Instant<'_>,
+        outputs: Option<&Outputs>,
         pipe_diameter_m: f64,
         drifted: impl Fn(f64) -> f64,
     ) -> (&[f64], f64) {
         for (member, reading) in self.members.iter_mut().zip(&mut self.readings) {
-            let seen = truth + member.behind_the_probe_k(t_s, instant, pipe_diameter_m);
+            let seen = truth + member.behind_the_probe_k(t_s, outputs, pipe_diameter_m);
             let read = drifted(member.sensor.read(member.follower.read(t_s, seen)));
             if t_s < member.of.stuck_after_s || member.last.is_nan() {
                 member.last = read;
@@ -112,8 +112,8 @@ impl ElementBank {
 
 impl Member {
     /// Temperature of its own tip minus that of the machine's probe, K; 0 for all but T2 probes of another diameter.
-    fn behind_the_probe_k(&mut self, t_s: f64, instant: &Instant<'_>, pipe_diameter_m: f64) -> f64 {
-        let Some((diameter_m, (_, outputs))) = self.of.probe_diameter_m.zip(instant.running) else {
+    fn behind_the_probe_k(&mut self, t_s: f64, outputs: Option<&Outputs>, pipe_diameter_m: f64) -> f64 {
+        let Some((diameter_m, outputs)) = self.of.probe_diameter_m.zip(outputs) else {
             // At rest all tips have long come to one temperature.
             self.tip = None;
             return 0.0;

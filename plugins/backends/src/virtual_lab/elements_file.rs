@@ -1,9 +1,9 @@
 //! The lab's several sensors from what is declared, and `faults:` below `virtual_lab`: which of them is off, slow or stuck.
 
+use super::draws::{Draws, offset_kind};
 use super::elements::{LabElement, LabElements, stream};
 use super::sensor::SensorErrors;
-use super::setting_problem::SettingProblem;
-use super::settings_file::{Draws, offset_kind, within};
+use super::setting_problem::{SettingProblem, within};
 use mapper_core::{BackendError, Channel, DeclaredElement, Element};
 use mapper_physics::nominal_rig::NominalRig;
 use mapper_yaml::units::{Duration, Length, Quantity};

@@ -1,6 +1,7 @@
 //! A gas stand that exists in equations only: the lumped model, actuators, sensors, standstill, surge, overspeed.
 
 mod actuator;
+mod draws;
 mod drift;
 mod drift_file;
 mod effects_file;

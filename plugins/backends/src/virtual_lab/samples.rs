@@ -94,7 +94,7 @@ impl SampleCollector {
             let drifted = |reading| drift::drifted_reading(&settings.drifts, row.channel, t_s, reading);
             if let Some(bank) = several.iter_mut().find(|bank| bank.channel == row.channel) {
                 let pipe_diameter_m = settings.model.params.compressor.outlet_diameter_m;
-                let (readings, together) = bank.read(t_s, truth, instant, pipe_diameter_m, drifted);
+                let (readings, together) = bank.read(t_s, truth, instant.outputs(), pipe_diameter_m, drifted);
                 readings.iter().zip(&mut elements).for_each(|(reading, column)| column.values.push(*reading));
                 column.push(together);
                 continue;

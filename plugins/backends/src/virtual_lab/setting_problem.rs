@@ -4,6 +4,7 @@ use super::lab::NAME;
 use mapper_core::{BackendError, Channel, with_unit};
 use mapper_physics::effect::EffectError;
 use mapper_yaml::units::{Kind, UnitError};
+use std::ops::RangeInclusive;
 
 /// What is wrong with one of the lab's settings. [`BackendError::Settings`] carries it beside the key.
 #[derive(Debug, thiserror::Error)]
@@ -119,4 +120,12 @@ impl SettingProblem {
     pub(super) fn at(self, path: impl Into<String>) -> BackendError {
         BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(self) }
     }
+}
+
+/// Refuses a value outside its range.
+pub(super) fn within(value: f64, unit: &'static str, range: RangeInclusive<f64>) -> Result<(), SettingProblem> {
+    if range.contains(&value) {
+        return Ok(());
+    }
+    Err(SettingProblem::OutOfRange { value, unit, low: *range.start(), high: *range.end() })
 }

@@ -1,30 +1,27 @@
 //! The lab's settings as a campaign writes them below `backend: {virtual_lab: ...}`.
 
 use super::actuator::ActuatorDynamics;
+use super::draws::{Draws, draw, offset_kind};
 use super::drift_file::{self, DriftFile};
 use super::effects_file::{EffectValues, put_in};
 use super::elements_file::{self, FaultFile};
 use super::sensor::SensorErrors;
-use super::setting_problem::SettingProblem;
+use super::setting_problem::{SettingProblem, within};
 use super::settings::{LabSettings, Start};
 use super::tolerances::draw_tolerances;
 use super::weather::Weather;
-use mapper_core::{BackendError, Channel, DeclaredUncertainty};
+use mapper_core::{BackendError, Channel};
 use mapper_physics::effect::Rig;
 use mapper_physics::instruments::Instruments;
 use mapper_physics::model::Model;
 use mapper_physics::nominal_rig::NominalRig;
 use mapper_physics::params::Params;
 use mapper_yaml::units::{
-    Conductance, Dimension, Duration, Fraction, Frequency, Kind, Length, PressureRate, Quantity, RatioRate,
+    Conductance, Dimension, Duration, Fraction, Frequency, Length, PressureRate, Quantity, RatioRate,
     Speed, TemperatureRate,
 };
-use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::ops::RangeInclusive;
 
 /// The keys below `virtual_lab`. Everything may be left out.
 #[derive(Debug, Default, Deserialize)]
@@ -132,11 +129,6 @@ struct MachineFile {
     /// True conductance to the oil.
     oil_conductance: Option<Quantity<Conductance>>,
 }
-
-/// Shares of white and of first-order noise (2 s) in the declared standard deviation: 0.8 and 0.6 in quadrature.
-const WHITE_SHARE: f64 = 0.8;
-const COLOURED_SHARE: f64 = 0.6;
-const COLOURED_TIME_CONSTANT_S: f64 = 2.0;
 
 /// Reads a campaign's settings for the virtual lab.
 ///
@@ -262,43 +254,6 @@ fn sensors(
     sensors
 }
 
-/// How the errors of sensors are made of what is declared of them.
-pub(super) struct Draws {
-    pub(super) seed: u64,
-    /// Noise over declared noise.
-    pub(super) noise_ratio: f64,
-    /// Whether offsets and gains are drawn; they are 0 otherwise.
-    pub(super) drawn: bool,
-}
-
-impl Draws {
-    /// Errors of the sensor that has this stream of random numbers.
-    pub(super) fn errors(&self, declared: &DeclaredUncertainty, stream: u64) -> SensorErrors {
-        let (offset, gain) = self.of(stream);
-        SensorErrors {
-            white_sigma: self.noise_ratio * WHITE_SHARE * declared.noise_sigma,
-            coloured_sigma: self.noise_ratio * COLOURED_SHARE * declared.noise_sigma,
-            coloured_time_constant_s: COLOURED_TIME_CONSTANT_S,
-            offset: offset * declared.offset_sigma,
-            gain_ratio: gain * declared.gain_sigma_ratio,
-        }
-    }
-
-    /// Standard normal numbers for offset and gain of a stream.
-    pub(super) fn of(&self, stream: u64) -> (f64, f64) {
-        if self.drawn { draw(self.seed, stream) } else { (0.0, 0.0) }
-    }
-}
-
-/// Two standard normal numbers that belong to one sensor of one seed: for its offset and for its gain.
-fn draw(seed: u64, stream: u64) -> (f64, f64) {
-    // Another stream than the sensor's noise: that one starts from the same seed with other multipliers.
-    let mixed =
-        seed.wrapping_mul(0xA24B_AED4_963E_E407) ^ (stream + 1).wrapping_mul(0x9FB2_1C65_1E98_DF25);
-    let mut random = Pcg64::seed_from_u64(mixed);
-    (StandardNormal.sample(&mut random), StandardNormal.sample(&mut random))
-}
-
 /// Drawn from the declared evenness of the soak; nothing where there is none.
 fn uneven_at_rest(nominal: &NominalRig) -> BTreeMap<Channel, f64> {
     let Some(soak) = nominal.soak else { return BTreeMap::new() };
@@ -311,33 +266,15 @@ fn uneven_at_rest(nominal: &NominalRig) -> BTreeMap<Channel, f64> {
     temperatures.into_iter().chain(pressures).collect()
 }
 
-pub(super) fn offset_kind(channel: Channel) -> Kind {
-    match channel.info().dimension {
-        mapper_core::Dimension::RotationalSpeed => Kind::Speed,
-        mapper_core::Dimension::MassFlow => Kind::MassFlow,
-        mapper_core::Dimension::Pressure => Kind::PressureDifference,
-        mapper_core::Dimension::Temperature => Kind::TemperatureDifference,
-        mapper_core::Dimension::Ratio => Kind::Fraction,
-    }
-}
-
 /// The unit in which a rate is kept.
 fn rate_unit<Rate: Dimension>() -> &'static str {
     Rate::KIND.units().first().map_or("", |unit| unit.symbol())
 }
 
-/// Refuses a value outside its range.
-pub(super) fn within(value: f64, unit: &'static str, range: RangeInclusive<f64>) -> Result<(), SettingProblem> {
-    if range.contains(&value) {
-        return Ok(());
-    }
-    Err(SettingProblem::OutOfRange { value, unit, low: *range.start(), high: *range.end() })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::ModelTolerances;
+    use mapper_core::{DeclaredUncertainty, ModelTolerances};
     use mapper_physics::params::BoundaryConditions;
     use serde_json::json;
 

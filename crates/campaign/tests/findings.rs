@@ -128,8 +128,8 @@ fn several_sensors() {
             "leave `count` out",
         ),
         ("{noise: 0.1 K, name: A}", Kind::Conflict, "A", "`name` says nothing here", "write a list"),
-        ("{noise: 0.1 K, count: 17}", Kind::Range, "17", "16", "16"),
-        ("{noise: 0.1 K, count: 0}", Kind::Range, "0", "1", "1"),
+        ("{noise: 0.1 K, count: 17}", Kind::Range, "17", "is too high", "at most 16"),
+        ("{noise: 0.1 K, count: 0}", Kind::Range, "0", "is too low", "at least 1"),
         (
             "[{noise: 0.1 K, name: A}, {noise: 0.2 K, name: A}]",
             Kind::Conflict,

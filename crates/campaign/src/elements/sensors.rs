@@ -394,4 +394,12 @@ mod tests {
         assert_eq!(redundant.elements[0].name, "TC_21");
         assert!((redundant.common_offset_sigma - 0.16).abs() < 1e-12);
     }
+
+    /// Plans carry the hash of the campaign's JSON: that of a campaign without several sensors has no word of them.
+    #[test]
+    fn the_json_of_a_single_sensor_has_no_word_of_several() {
+        let single = serde_json::to_value(several("{noise: 0.1 K, offset: 0.25 K}")).unwrap();
+        let keys: Vec<&String> = single.as_object().unwrap().keys().collect();
+        assert_eq!(keys, ["declared", "probe_diameter_m", "static_tap_pipe_diameter_m"]);
+    }
 }

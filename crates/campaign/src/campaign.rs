@@ -35,8 +35,8 @@ pub use crate::elements::identification::Identification;
 pub use crate::elements::machine::{Machine, MapSource};
 pub use crate::elements::outputs::{FormatName, Outputs};
 pub use crate::elements::report::Report;
-pub use crate::elements::sensors::SensorDeclaration;
 pub use crate::elements::sequence::SequenceSource;
+pub use crate::elements::several_sensors::SensorDeclaration;
 
 /// Everything a run needs to know, without mistakes that can be known beforehand.
 ///
@@ -180,14 +180,16 @@ impl CampaignFile {
     ) -> io::Result<(Campaign, Vec<Vec<Step>>)> {
         let (points, point_paths) = self.grid.points();
         let (boundary, follow_outlet) = (self.boundary.conditions(), self.boundary.follow_outlet());
-        let machine = self.machine.machine(self.sensors.probe_diameter_m(), origin, files)?;
+        let sensors = self.sensors.declarations();
+        let probe_diameter_m = sensors.get(&Channel::T2).map_or(0.0, |sensor| sensor.probe_diameter_m);
+        let machine = self.machine.machine(probe_diameter_m, origin, files)?;
         let alpha_area_ratio = machine.params.compressor.alpha_area_ratio;
         let campaign = Campaign {
             name: self.campaign,
             description: self.description,
             boundary,
             follow_outlet,
-            sensors: self.sensors.declarations(),
+            sensors,
             tolerances: self.tolerances.unwrap_or_default(),
             tolerances_declared: self.tolerances.is_some(),
             backend: backend(self.backend),

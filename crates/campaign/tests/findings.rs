@@ -203,6 +203,45 @@ fn rare_values_are_warned_of() {
 }
 
 #[test]
+fn several_sensors() {
+    for (sensors, kind, place, message, remedy) in [
+        (
+            "[{noise: 0.1 K}, {noise: 0.1 K, count: 2}]",
+            Kind::Conflict,
+            "2",
+            "`count` says nothing here",
+            "leave `count` out",
+        ),
+        ("{noise: 0.1 K, name: A}", Kind::Conflict, "A", "`name` says nothing here", "write a list"),
+        ("{noise: 0.1 K, count: 17}", Kind::Range, "17", "is too high", "at most 16"),
+        ("{noise: 0.1 K, count: 0}", Kind::Range, "0", "is too low", "at least 1"),
+        (
+            "[{noise: 0.1 K, name: A}, {noise: 0.2 K, name: A}]",
+            Kind::Conflict,
+            "A",
+            "another sensor of T1 is called `A` too",
+            "its own name",
+        ),
+        (
+            "[{noise: 0.1 K, common_offset: 0.1 K}, {noise: 0.1 K, common_offset: 0.2 K}]",
+            Kind::Conflict,
+            "0.2 K",
+            "`common_offset` is 0.1 K for another sensor of T1",
+            "the same value",
+        ),
+        (
+            "[{noise: 0.1 K}, {nois: 0.1 K}]",
+            Kind::UnknownKey,
+            "nois",
+            "`sensors.T1[1]`",
+            "did you mean `noise`?",
+        ),
+    ] {
+        one("  T1: {noise: 0.1 K}", &format!("  T1: {sensors}"), kind, place, message, remedy);
+    }
+}
+
+#[test]
 fn keys() {
     one(
         "  inlet_pressure: 100 kPa",

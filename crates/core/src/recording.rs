@@ -1,6 +1,6 @@
 //! A recording in memory: series per channel, steps, events. Truth is not part of it.
 
-use crate::{Channel, Event, StepMarker};
+use crate::{Channel, Element, Event, StepMarker};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -52,6 +52,9 @@ impl Series {
 pub struct Recording {
     /// What was measured and commanded.
     pub series: BTreeMap<Channel, Series>,
+    /// Each sensor of the channels that have several; empty where none has.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub elements: BTreeMap<Element, Series>,
     /// Steps in order; in recordings made by others found from changes of the command channels.
     pub steps: Vec<StepMarker>,
     /// Events in order.

@@ -1,6 +1,6 @@
 //! Samples as a backend hands them over: columns over a common time base.
 
-use crate::{Channel, Event};
+use crate::{Channel, Element, Event};
 use serde::{Deserialize, Serialize};
 
 /// The samples of one channel in a batch.
@@ -8,6 +8,15 @@ use serde::{Deserialize, Serialize};
 pub struct ChannelColumn {
     /// Which quantity.
     pub channel: Channel,
+    /// SI values, as long as the batch's `t_s`. NaN where the sensor gave nothing.
+    pub values: Vec<f64>,
+}
+
+/// The samples of one of several sensors of a channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ElementColumn {
+    /// Which sensor.
+    pub element: Element,
     /// SI values, as long as the batch's `t_s`. NaN where the sensor gave nothing.
     pub values: Vec<f64>,
 }
@@ -30,8 +39,12 @@ pub struct SampleBatch {
     pub first_sequence: u64,
     /// Sample times since arming, s, strictly increasing.
     pub t_s: Vec<f64>,
-    /// One column per channel.
+    /// One column per channel; of a channel with several sensors what they read together
+    /// ([`RedundantSensors::live`](crate::RedundantSensors::live)).
     pub columns: Vec<ChannelColumn>,
+    /// Each sensor of the channels that have several; empty where none has.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub elements: Vec<ElementColumn>,
     /// Truth of a simulated rig; empty for a real one.
     pub truth: Vec<TruthColumn>,
     /// Events since the last poll.

@@ -75,7 +75,7 @@ fn imagined(recorded: &Study, jump: &AllowedJump, interval_s: f64) -> Option<Stu
     let measured = OUTPUTS
         .into_iter()
         .filter(|channel| *channel != Channel::P3 && recorded.table.column(*channel).is_some());
-    let recording = Recording { series: measured.map(series).collect(), steps, events: Vec::new() };
+    let recording = Recording { series: measured.map(series).collect(), steps, ..Recording::default() };
     let table = Table::new(&recording)?;
     Some(Study::new(
         &recording,

@@ -10,6 +10,10 @@ pub mod averaged_inputs;
 pub mod block;
 pub mod channels;
 pub mod declared;
+mod element_blocks;
+pub mod element_fault;
+mod element_judge;
+pub mod fuse;
 pub mod knob;
 pub mod lagged_command;
 pub mod mean;
@@ -22,4 +26,6 @@ pub mod start;
 pub mod table;
 
 pub use declared::{Declared, declared_uncertainties};
+pub use element_fault::{Contradiction, Fault, FaultyElement, FusedChannel};
+pub use fuse::{fuse, judge_elements};
 pub use same_machine::{OtherMachine, same_machine};

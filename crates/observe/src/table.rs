@@ -53,7 +53,8 @@ fn median_interval_s(t_s: &[f64]) -> Option<f64> {
     median(t_s.windows(2).map(|pair| pair[1] - pair[0]))
 }
 
-fn on_base(series: &Series, t_s: &[f64], interval_s: f64) -> Vec<f64> {
+/// The values of a series at other times; NaN in its gaps. `interval_s` is the usual distance of those times.
+pub(crate) fn on_base(series: &Series, t_s: &[f64], interval_s: f64) -> Vec<f64> {
     if series.t_s == t_s {
         return series.values.clone();
     }

@@ -3,7 +3,7 @@
 use crate::effect::Effect;
 use crate::model::Model;
 use crate::params::BoundaryConditions;
-use mapper_core::{Channel, DeclaredUncertainty, ModelTolerances, Soak};
+use mapper_core::{Channel, DeclaredUncertainty, ModelTolerances, RedundantSensors, Soak};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -18,6 +18,8 @@ pub struct NominalRig {
     pub speed_max_rpm: f64,
     /// Declared one-sigma uncertainty of each sensor, in the channel's unit.
     pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
+    /// Each sensor of the channels that have several; `sensors` has what they are together.
+    pub redundant: BTreeMap<Channel, RedundantSensors>,
     /// Declared static taps with the inner diameters of their pipes, m.
     pub static_tap_pipe_diameters_m: BTreeMap<Channel, f64>,
     /// Declared tolerances of the model.

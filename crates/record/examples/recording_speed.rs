@@ -28,6 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 columns: (0..CHANNELS.len())
                     .map(|c| ChannelColumn { channel: CHANNELS[c].channel, values: column(c) })
                     .collect(),
+                elements: Vec::new(),
                 truth: (0..12)
                     .map(|c| TruthColumn {
                         name: format!("state_{c}_k"),

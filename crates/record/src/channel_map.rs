@@ -1,6 +1,10 @@
 //! Where a recording holds the rig's channels, and what it does not say itself.
 
-use mapper_core::{CHANNELS, Channel, DeclaredUncertainty, NoiseColour, ReferenceState};
+use crate::format::ELEMENTS_TOPIC;
+use mapper_core::{
+    CHANNELS, Channel, DeclaredUncertainty, Element, Group, MAX_ELEMENTS, NoiseColour, RedundantSensors,
+    ReferenceState,
+};
 use std::collections::BTreeMap;
 
 /// Maps a recording's topics and fields onto channels. SI inside; written with units in YAML.
@@ -8,6 +12,9 @@ use std::collections::BTreeMap;
 pub struct ChannelMap {
     /// Topic, field and unit of each channel.
     pub channels: BTreeMap<Channel, ChannelSource>,
+    /// Topic, field and unit of each sensor of the channels that have several; such a channel need not stand among
+    /// `channels`: its reading is then made of theirs.
+    pub elements: BTreeMap<Element, ChannelSource>,
     /// Channels that the recording does not hold and that stay at a known value; SI, in the channel's unit.
     pub constants: BTreeMap<Channel, f64>,
     /// What identification needs of the machine where there is no campaign.
@@ -18,6 +25,8 @@ pub struct ChannelMap {
     pub window: Option<WindowLimits>,
     /// Declared uncertainty of the sensors.
     pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
+    /// What is declared of each sensor of the channels that have several; `sensors` then has what they are together.
+    pub redundant: BTreeMap<Channel, RedundantSensors>,
     /// How the sensors' noise is correlated in time.
     pub noise_colour: Option<NoiseColour>,
     pub(crate) native: bool,
@@ -67,7 +76,16 @@ impl ChannelMap {
             unit: Some(row.dimension.unit().to_owned()),
         };
         let channels = CHANNELS.iter().map(|row| (row.channel, source(row))).collect();
-        ChannelMap { channels, native: true, ..ChannelMap::default() }
+        let several = |row: &'static mapper_core::ChannelInfo| {
+            (1..=MAX_ELEMENTS).map(|number| {
+                let element = Element { channel: row.channel, number };
+                let unit = Some(row.dimension.unit().to_owned());
+                (element, ChannelSource { topic: ELEMENTS_TOPIC.to_owned(), field: element.field(), unit })
+            })
+        };
+        let measured = CHANNELS.iter().filter(|row| row.group != Group::Command);
+        let elements = measured.flat_map(several).collect();
+        ChannelMap { channels, elements, native: true, ..ChannelMap::default() }
     }
 
     /// Whether this is [`ChannelMap::native`]: channels missing from the recording are then no surprise.

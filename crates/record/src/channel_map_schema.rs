@@ -3,7 +3,7 @@
 //! Quantities are plain strings or numbers here: recordings of other programs spell units in more ways than campaigns
 //! may, and a ratio may stand bare. [`crate::channel_map_yaml`] reads them.
 
-use mapper_core::{CHANNELS, NAMED_REFERENCES};
+use mapper_core::{CHANNELS, MAX_ELEMENTS, NAMED_REFERENCES};
 use mapper_yaml::Schema;
 use serde_json::{Map, Value, json};
 use std::sync::LazyLock;
@@ -15,7 +15,14 @@ fn schema() -> Value {
         &["topic", "field"],
         json!({
             "topic": text("Topic of the recording.", "/rig/compressor"),
-            "field": text("Field of the topic's messages.", "outlet_temperature"),
+            "field": {
+                "description": "Field of the topic's messages; a list of fields where several sensors measure the channel.",
+                "examples": ["outlet_temperature"],
+                "anyOf": [
+                    {"type": "string", "minLength": 1},
+                    {"type": "array", "minItems": 1, "maxItems": MAX_ELEMENTS, "uniqueItems": true, "items": {"type": "string", "minLength": 1}},
+                ],
+            },
             "unit": text("Unit of the field; as the recording says if none is given.", "degC"),
         }),
     );
@@ -25,6 +32,7 @@ fn schema() -> Value {
             "noise": quantity("Noise of one sample; 0 if none is given.", "0.1 K"),
             "offset": quantity("Fixed offset left after calibration; 0 if none is given.", "0.25 K"),
             "gain": quantity("Fixed error of the gain; 0 if none is given.", "0.5 %"),
+            "common_offset": quantity("Offset that several sensors of the channel share and that does not average out; 0 if none is given.", "0.05 K"),
         }),
     );
     let constant = quantity("Value of a channel that the recording does not hold.", "100 kPa");
@@ -38,7 +46,7 @@ fn schema() -> Value {
             "machine": machine(),
             "reference": reference(),
             "window": window(),
-            "sensors": by_channel("Declared uncertainty of the sensors, one standard deviation, by symbol.", &sensor),
+            "sensors": by_channel("Declared uncertainty of the sensors, one standard deviation, by symbol; of several sensors of a channel that of each.", &sensor),
             "noise_colour": noise_colour(),
         }),
     )

@@ -4,7 +4,7 @@ use crate::channel_map_schema::SCHEMA;
 use crate::format::TRUTH_PREFIX;
 use crate::units::{difference, kind_of, parse_quantity, remedy, unit};
 use crate::{ChannelMap, ChannelSource, MachineConstants, WindowLimits};
-use mapper_core::{Channel, DeclaredUncertainty, NoiseColour, ReferenceState};
+use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, RedundantSensors, ReferenceState};
 use mapper_yaml::units::{Kind, UnitError};
 use mapper_yaml::{Document, FindingKind, Findings, Node, Notes, Source, Step, path_text, steps};
 use std::collections::BTreeMap;
@@ -74,39 +74,63 @@ struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     fn map(&mut self) -> ChannelMap {
-        let sources = self.channels_below("channels");
-        let channels: BTreeMap<_, _> =
-            sources.into_iter().map(|channel| (channel, self.channel_source(channel))).collect();
+        let (mut channels, mut elements) = (BTreeMap::new(), BTreeMap::new());
+        for channel in self.channels_below("channels") {
+            let (topic, unit) = self.topic_and_unit(channel);
+            let source = |field: &String| ChannelSource {
+                topic: topic.clone(),
+                field: field.clone(),
+                unit: unit.clone(),
+            };
+            let fields = self.fields(channel);
+            if let [field] = fields.as_slice() {
+                channels.insert(channel, source(field));
+            }
+            for (index, field) in fields.iter().enumerate().filter(|_| fields.len() > 1) {
+                elements.insert(Element { channel, number: index + 1 }, source(field));
+            }
+        }
         let mut constants = BTreeMap::new();
         for channel in self.channels_below("constants") {
             let here = steps!["constants", channel.symbol()];
-            if channels.contains_key(&channel) {
+            let several = Element { channel, number: 1 };
+            if channels.contains_key(&channel) || elements.contains_key(&several) {
                 let message = format!("{channel} is also under `channels`");
                 self.note(FindingKind::Conflict, &here, message, "keep one of the two");
             }
             constants.insert(channel, self.quantity(&here, kind_of(channel)).unwrap_or(f64::NAN));
         }
-        let sensors = self
-            .channels_below("sensors")
-            .into_iter()
-            .map(|channel| (channel, self.sensor(channel)))
-            .collect();
+        let (mut sensors, mut redundant) = (BTreeMap::new(), BTreeMap::new());
+        for channel in self.channels_below("sensors") {
+            let (each, common_offset_sigma) = self.sensor(channel);
+            let names: Vec<String> = self.fields(channel);
+            let mut several = RedundantSensors::alike(channel, names.len().max(1), each);
+            several.common_offset_sigma = common_offset_sigma;
+            for (element, name) in several.elements.iter_mut().zip(names) {
+                element.name = name;
+            }
+            sensors.insert(channel, several.fused(|_| true));
+            if several.elements.len() > 1 {
+                redundant.insert(channel, several);
+            }
+        }
         ChannelMap {
             channels,
+            elements,
+            redundant,
             constants,
             sensors,
             machine: self.has("machine").then(|| self.machine()),
             reference: self.reference(),
             window: self.has("window").then(|| self.window()),
             noise_colour: self.has("noise_colour").then(|| self.noise_colour()),
-            native: false,
+            ..ChannelMap::default()
         }
     }
 
-    fn channel_source(&mut self, channel: Channel) -> ChannelSource {
+    fn topic_and_unit(&mut self, channel: Channel) -> (String, Option<String>) {
         let of = |key: &str| steps!["channels", channel.symbol(), key];
-        let text = |steps: &[Step]| self.root.get(steps).and_then(Node::text).unwrap_or_default().to_owned();
-        let (topic, field) = (text(&of("topic")), text(&of("field")));
+        let topic = self.root.get(&of("topic")).and_then(Node::text).unwrap_or_default().to_owned();
         let written = self.root.get(&of("unit")).and_then(Node::text).map(str::to_owned);
         if topic.starts_with(TRUTH_PREFIX) {
             let message = "topics below /truth are for scoring and cannot be mapped".to_owned();
@@ -117,7 +141,16 @@ impl<'a> Reader<'a> {
         if let Some(Err(error)) = written.as_deref().map(|name| unit(kind, name)) {
             self.note_unit(&of("unit"), kind, &error);
         }
-        ChannelSource { topic, field, unit: written }
+        (topic, written)
+    }
+
+    /// The field of a channel, or those of its several sensors.
+    fn fields(&self, channel: Channel) -> Vec<String> {
+        let Some(node) = self.root.get(&steps!["channels", channel.symbol(), "field"]) else {
+            return Vec::new();
+        };
+        let texts = node.items().iter().chain(node.text().is_some().then_some(node));
+        texts.filter_map(Node::text).map(str::to_owned).collect()
     }
 
     fn machine(&mut self) -> MachineConstants {
@@ -154,14 +187,16 @@ impl<'a> Reader<'a> {
         WindowLimits { start_s, end_s }
     }
 
-    fn sensor(&mut self, channel: Channel) -> DeclaredUncertainty {
+    /// What is declared of each sensor of a channel, and the offset that they share.
+    fn sensor(&mut self, channel: Channel) -> (DeclaredUncertainty, f64) {
         let of = |key: &str| steps!["sensors", channel.symbol(), key];
         let kind = difference(kind_of(channel));
-        DeclaredUncertainty {
+        let declared = DeclaredUncertainty {
             noise_sigma: self.not_negative(&of("noise"), kind),
             offset_sigma: self.not_negative(&of("offset"), kind),
             gain_sigma_ratio: self.not_negative(&of("gain"), Kind::Fraction),
-        }
+        };
+        (declared, self.not_negative(&of("common_offset"), kind))
     }
 
     fn noise_colour(&mut self) -> NoiseColour {

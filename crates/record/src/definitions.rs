@@ -3,10 +3,27 @@
 use crate::records::ChannelDefinition;
 use crate::units::{kind_of, unit};
 use crate::{ChannelMap, ChannelSource, ReadWarning, RecordError};
-use mapper_core::Channel;
+use mapper_core::{Channel, Element};
 use mapper_yaml::units::{Kind, Unit};
 use serde_json::Value;
 use std::path::Path;
+
+/// What a field of a recording reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Reads {
+    /// A channel.
+    Channel(Channel),
+    /// One of several sensors of a channel.
+    Element(Element),
+}
+
+impl Reads {
+    pub(crate) fn channel(self) -> Channel {
+        match self {
+            Reads::Channel(channel) | Reads::Element(Element { channel, .. }) => channel,
+        }
+    }
+}
 
 /// A mapped topic of a recording.
 #[derive(Debug)]
@@ -14,8 +31,8 @@ pub(crate) struct MappedTopic {
     pub(crate) topic: String,
     /// Fields to read, each once.
     pub(crate) fields: Vec<String>,
-    /// Index of the field, channel, unit of the field.
-    pub(crate) outputs: Vec<(usize, Channel, &'static Unit)>,
+    /// Index of the field, what it reads, unit of the field.
+    pub(crate) outputs: Vec<(usize, Reads, &'static Unit)>,
 }
 
 /// The channels that the map finds on a topic; `None` where there is none.
@@ -26,20 +43,23 @@ pub(crate) fn map_topic(
     warnings: &mut Vec<ReadWarning>,
 ) -> Result<Option<MappedTopic>, RecordError> {
     let mut mapped = MappedTopic { topic: definition.topic.clone(), fields: Vec::new(), outputs: Vec::new() };
-    let sources = map.channels.iter().filter(|(_, source)| source.topic == definition.topic);
+    let channels = map.channels.iter().map(|(channel, source)| (Reads::Channel(*channel), source));
+    let elements = map.elements.iter().map(|(element, source)| (Reads::Element(*element), source));
+    let sources = channels.chain(elements).filter(|(_, source)| source.topic == definition.topic);
     let schema: Value = serde_json::from_slice(&definition.schema).unwrap_or(Value::Null);
-    for (channel, source) in sources {
+    for (reads, source) in sources {
         if map.is_native() && !definition.metadata.contains_key(&source.field) {
             // Not measured in this run.
             continue;
         }
-        let recorded = recorded_unit(definition, &schema, source, kind_of(*channel));
-        let unit = resolve(path, *channel, source, recorded, warnings)?;
+        let channel = reads.channel();
+        let recorded = recorded_unit(definition, &schema, source, kind_of(channel));
+        let unit = resolve(path, channel, source, recorded, warnings)?;
         let index = mapped.fields.iter().position(|field| *field == source.field).unwrap_or_else(|| {
             mapped.fields.push(source.field.clone());
             mapped.fields.len() - 1
         });
-        mapped.outputs.push((index, *channel, unit));
+        mapped.outputs.push((index, reads, unit));
     }
     Ok((!mapped.outputs.is_empty()).then_some(mapped))
 }

@@ -22,6 +22,8 @@ impl std::fmt::Display for FormatVersion {
 pub(crate) const STEP_TOPIC: &str = "/step";
 /// Topic of events.
 pub(crate) const EVENT_TOPIC: &str = "/event";
+/// Topic of the single sensors of channels that have several.
+pub(crate) const ELEMENTS_TOPIC: &str = "/rig/elements";
 /// Topic of what only a simulator knows.
 pub(crate) const TRUTH_TOPIC: &str = "/truth/model";
 /// Everything below this belongs to scoring.

@@ -1,12 +1,13 @@
 //! Reading a recording, one's own or another program's.
 
+use crate::definitions::Reads;
 use crate::read_options::ReadOptions;
 use crate::rig_sink::RigSink;
 use crate::scan::{Scanned, scan};
 use crate::series_builder::{SeriesBuilder, run_time_s};
 use crate::steps::{steps_from_commands, steps_from_markers};
 use crate::{ChannelMap, FormatVersion, ReadWarning, RecordError};
-use mapper_core::{Channel, Group, Recording, Series};
+use mapper_core::{Channel, Element, Group, Recording, RedundantSensors, Series};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -78,7 +79,7 @@ fn read(
         return Err(error);
     }
     // A command alone is a chance likeness of names: nothing can be made of a recording without measurements.
-    let measured = sink.builders.keys().any(|channel| channel.info().group != Group::Command);
+    let measured = sink.builders.keys().any(|reads| reads.channel().info().group != Group::Command);
     let has_rig_topics = sink.topic_names.iter().any(|topic| !is_own(topic));
     if !measured && sink.format.is_none() && has_rig_topics {
         let topics = sink.topic_names.into_iter().collect();
@@ -96,22 +97,28 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> ReadRepo
     let mut warnings = scanned.warnings;
     warnings.append(&mut sink.warnings);
     warnings.extend(sink.damaged_messages());
-    let missing = map.channels.iter().filter(|(channel, _)| !sink.builders.contains_key(channel));
+    let channels = map.channels.iter().map(|(channel, source)| (Reads::Channel(*channel), source));
+    let elements = map.elements.iter().map(|(element, source)| (Reads::Element(*element), source));
+    let missing = channels.chain(elements).filter(|(reads, _)| !sink.builders.contains_key(reads));
     if !map.is_native() {
-        warnings.extend(missing.map(|(channel, source)| ReadWarning::MissingChannel {
-            channel: *channel,
+        warnings.extend(missing.map(|(reads, source)| ReadWarning::MissingChannel {
+            channel: reads.channel(),
             topic: source.topic.clone(),
             field: source.field.clone(),
         }));
     }
     let first_sample_ns = sink.builders.values().filter_map(SeriesBuilder::first_time_ns).min();
     let zero_ns = sink.start_time_ns.or(first_sample_ns).unwrap_or(0);
-    let mut series: BTreeMap<Channel, Series> = sink
-        .builders
-        .into_iter()
-        .map(|(channel, builder)| (channel, builder.build(channel, zero_ns, &mut warnings)))
-        .filter(|(_, series)| !series.t_s.is_empty())
-        .collect();
+    let (mut series, mut elements) = (BTreeMap::new(), BTreeMap::new());
+    for (reads, builder) in sink.builders {
+        let built = builder.build(reads.channel(), zero_ns, &mut warnings);
+        match reads {
+            _ if built.t_s.is_empty() => {}
+            Reads::Channel(channel) => drop(series.insert(channel, built)),
+            Reads::Element(element) => drop(elements.insert(element, built)),
+        }
+    }
+    read_together(map, &mut series, &elements);
     let span_s = span_s(&series);
     if let Some((first_s, last_s)) = span_s {
         for (channel, value) in &map.constants {
@@ -136,13 +143,44 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> ReadRepo
         event
     });
     ReadReport {
-        recording: Recording { events: events.collect(), series, steps },
+        recording: Recording { events: events.collect(), series, elements, steps },
         warnings,
         campaign_text: sink.campaign_text,
         plan_json: sink.plan_json,
         metadata: sink.metadata,
         format: sink.format,
         start_time_ns: zero_ns,
+    }
+}
+
+/// The readings of channels of which the recording holds single sensors alone, on the times of the first of them: what the
+/// rig would have shown. Identification judges the sensors and fuses them anew.
+fn read_together(
+    map: &ChannelMap,
+    series: &mut BTreeMap<Channel, Series>,
+    elements: &BTreeMap<Element, Series>,
+) {
+    let mut by_channel: BTreeMap<Channel, Vec<(Element, &Series)>> = BTreeMap::new();
+    for (element, readings) in elements.iter().filter(|(element, _)| !series.contains_key(&element.channel)) {
+        by_channel.entry(element.channel).or_default().push((*element, readings));
+    }
+    for (channel, members) in by_channel {
+        let Some((_, first)) = members.first() else { continue };
+        let count = members.iter().map(|(element, _)| element.number).max().unwrap_or(0);
+        let alike = || {
+            RedundantSensors::alike(channel, count, map.sensors.get(&channel).copied().unwrap_or_default())
+        };
+        let declared = map.redundant.get(&channel).filter(|declared| declared.elements.len() == count);
+        let declared = declared.cloned().unwrap_or_else(alike);
+        let at = |t_s: &f64| {
+            let mut readings = vec![f64::NAN; count];
+            for (element, series) in &members {
+                readings[element.number - 1] = series.interpolate(*t_s).unwrap_or(f64::NAN);
+            }
+            declared.live(&readings)
+        };
+        let together = Series { t_s: first.t_s.clone(), values: first.t_s.iter().map(at).collect() };
+        series.insert(channel, together);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Takes samples, steps and events out of a recording, and leaves truth where it is.
 
-use crate::definitions::{MappedTopic, map_topic};
+use crate::definitions::{MappedTopic, Reads, map_topic};
 use crate::format::{
     CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, PLAN_NAME, START_KEY, STEP_TOPIC,
 };
@@ -10,7 +10,7 @@ use crate::scan::Sink;
 use crate::series_builder::SeriesBuilder;
 use crate::steps::StepMessage;
 use crate::{ChannelMap, FormatVersion, ReadWarning, RecordError};
-use mapper_core::{Channel, Event};
+use mapper_core::Event;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -27,7 +27,7 @@ pub(crate) struct RigSink<'a> {
     map: &'a ChannelMap,
     topics: BTreeMap<u16, Topic>,
     pub(crate) topic_names: BTreeSet<String>,
-    pub(crate) builders: BTreeMap<Channel, SeriesBuilder>,
+    pub(crate) builders: BTreeMap<Reads, SeriesBuilder>,
     pub(crate) steps: Vec<(u64, StepMessage)>,
     pub(crate) events: Vec<(u64, Event)>,
     pub(crate) metadata: BTreeMap<String, String>,
@@ -103,8 +103,8 @@ impl Sink for RigSink<'_> {
             None => return,
             Some(Topic::Mapped(mapped)) => {
                 let whole = read_fields(data, &mapped.fields, &mut self.values);
-                for (index, channel, unit) in mapped.outputs.iter().filter(|_| whole) {
-                    let builder = self.builders.entry(*channel).or_default();
+                for (index, reads, unit) in mapped.outputs.iter().filter(|_| whole) {
+                    let builder = self.builders.entry(*reads).or_default();
                     match self.values.get(*index) {
                         Some(FieldValue::Number(value)) => builder.push(log_time_ns, unit.to_inside(*value)),
                         Some(FieldValue::Other) => {

@@ -1,6 +1,6 @@
 //! Writing a recording: messages per device group and sample, flushed each second of the run's clock.
 
-use crate::format::TRUTH_TOPIC;
+use crate::format::{ELEMENTS_TOPIC, TRUTH_TOPIC};
 use crate::recording_file::{McapFile, OpenedFile, RecordingHeader, add_channel, io_error, open};
 use crate::schema::{Field, numeric_schema, unit_metadata};
 use crate::{BadBatch, RecordError};
@@ -252,6 +252,15 @@ impl RecordingWriter {
                 return Err(self.bad_input(BadBatch::Length { name: name.to_owned(), length, samples }));
             }
         }
+        for (index, column) in batch.elements.iter().enumerate() {
+            let (name, length) = (column.element.to_string(), column.values.len());
+            if length != samples {
+                return Err(self.bad_input(BadBatch::Length { name, length, samples }));
+            }
+            if batch.elements[..index].iter().any(|earlier| earlier.element == column.element) {
+                return Err(self.bad_input(BadBatch::Twice { name }));
+            }
+        }
         for (index, column) in batch.columns.iter().enumerate() {
             if batch.columns[..index].iter().any(|earlier| earlier.channel == column.channel) {
                 return Err(self.bad_input(BadBatch::Twice { name: column.channel.to_string() }));
@@ -267,7 +276,7 @@ impl RecordingWriter {
 
     /// The topics of a batch, with their columns.
     fn tables<'a>(&mut self, batch: &'a SampleBatch) -> Result<Vec<Table<'a>>, RecordError> {
-        let mut tables = Vec::with_capacity(Group::ALL.len() + 1);
+        let mut tables = Vec::with_capacity(Group::ALL.len() + 2);
         if batch.t_s.is_empty() {
             return Ok(tables);
         }
@@ -280,6 +289,7 @@ impl RecordingWriter {
             let columns = members.iter().map(|column| column.values.as_slice()).collect();
             tables.extend(self.table(group.topic(), &fields, columns)?);
         }
+        tables.extend(self.elements(batch)?);
         let fields: Vec<Field<'_>> = batch
             .truth
             .iter()
@@ -293,6 +303,21 @@ impl RecordingWriter {
         let columns = batch.truth.iter().map(|column| column.values.as_slice()).collect();
         tables.extend(self.table(TRUTH_TOPIC, &fields, columns)?);
         Ok(tables)
+    }
+
+    /// The topic of single sensors; `None` for a rig that has one for each channel.
+    fn elements<'a>(&mut self, batch: &'a SampleBatch) -> Result<Option<Table<'a>>, RecordError> {
+        let mut members: Vec<_> = batch.elements.iter().collect();
+        members.sort_by_key(|column| column.element);
+        let names: Vec<(String, String)> =
+            members.iter().map(|column| (column.element.field(), column.element.to_string())).collect();
+        let mut fields = Vec::with_capacity(members.len());
+        for ((name, title), column) in names.iter().zip(&members) {
+            let row = Channel::info(column.element.channel);
+            fields.push(Field { name, title, description: row.description, unit: row.dimension.unit() });
+        }
+        let columns = members.iter().map(|column| column.values.as_slice()).collect();
+        self.table(ELEMENTS_TOPIC, &fields, columns)
     }
 
     fn table<'a>(

@@ -1,7 +1,7 @@
 //! Channel maps: the shipped one, and what is refused.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-use mapper_core::{Channel, DeclaredUncertainty, NoiseColour, ReferenceState};
+use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, ReferenceState};
 use mapper_record::{ChannelMap, ChannelMapError, MachineConstants, WindowLimits};
 use mapper_yaml::{FindingKind as Kind, Findings};
 use std::path::Path;
@@ -44,6 +44,31 @@ fn the_shipped_map_says_what_its_text_says() {
     let p3 = DeclaredUncertainty { noise_sigma: 80.0, offset_sigma: 150.0, gain_sigma_ratio: 0.0 };
     assert_eq!(map.sensors[&Channel::P3], p3);
     assert_eq!(map.noise_colour, Some(NoiseColour { first_order_share_ratio: 0.6, time_constant_s: 2.0 }));
+}
+
+#[test]
+fn a_list_of_fields_is_as_many_sensors_of_one_channel() {
+    let text = "\
+channels:
+  T2: {topic: /daq, field: [TC_21, TC_22, TC_23, TC_24], unit: degC}
+  P2: {topic: /daq, field: [P_2], unit: kPa}
+sensors: {T2: {noise: 0.1 K, offset: 0.24 K, common_offset: 0.16 K}}
+";
+    let map = read(text).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let third = &map.elements[&Element { channel: Channel::T2, number: 3 }];
+    assert_eq!((third.field.as_str(), third.unit.as_deref()), ("TC_23", Some("degC")));
+    assert_eq!(map.elements.len(), 4);
+    assert!(!map.channels.contains_key(&Channel::T2) && map.channels.contains_key(&Channel::P2));
+    // Half of 0.24 and all of 0.16 in quadrature.
+    assert!((map.sensors[&Channel::T2].offset_sigma - 0.2).abs() < 1e-12);
+    assert_eq!(map.redundant[&Channel::T2].elements[1].name, "TC_22");
+    for (wrong, path) in [
+        ("channels: {T2: {topic: /daq, field: [A, A]}}", "channels.T2.field"),
+        ("channels: {T2: {topic: /daq, field: []}}", "channels.T2.field"),
+        ("channels: {T2: {topic: /daq, field: [A, B]}}\nconstants: {T2: 300 K}", "constants.T2"),
+    ] {
+        assert_eq!(mistakes(wrong).list[0].path, path, "{wrong}");
+    }
 }
 
 #[test]

@@ -4,7 +4,9 @@
 mod common;
 
 use common::{batch, header, part, step, write};
-use mapper_core::{CHANNELS, ChannelColumn, SampleBatch, TruthColumn};
+use mapper_core::{
+    CHANNELS, Channel, ChannelColumn, Element, ElementColumn, MAX_ELEMENTS, SampleBatch, TruthColumn,
+};
 use mapper_record::{
     ChannelMap, FormatVersion, ReadOptions, ReadReport, ReadWarning, RecordError, RecordingWriter, StepPhase,
     read_recording, score::read_truth,
@@ -136,6 +138,8 @@ prop_compose! {
         steps_ms in prop::collection::vec(1u32..3000, samples),
         picked in prop::sample::subsequence((0..CHANNELS.len()).collect::<Vec<_>>(), 1..=CHANNELS.len()),
         columns in prop::collection::vec(values(samples), CHANNELS.len()),
+        several in prop::sample::subsequence((1..=MAX_ELEMENTS).collect::<Vec<_>>(), 0..=4),
+        readings in prop::collection::vec(values(samples), 4),
         truth in values(samples),
     ) -> SampleBatch {
         let mut t_ms = 0;
@@ -143,6 +147,7 @@ prop_compose! {
             first_sequence: 5,
             t_s: steps_ms.iter().map(|step_ms| { t_ms += step_ms; f64::from(t_ms) / 1e3 }).collect(),
             columns: picked.iter().zip(columns).map(|(c, values)| ChannelColumn { channel: CHANNELS[*c].channel, values }).collect(),
+            elements: several.iter().zip(&readings).map(|(number, values)| ElementColumn { element: Element { channel: Channel::T2, number: *number }, values: values.clone() }).collect(),
             truth: vec![TruthColumn { name: "a \"quoted\" name".to_owned(), unit: "K".to_owned(), values: truth }],
             events: Vec::new(),
         }
@@ -164,9 +169,17 @@ proptest! {
         write(&path, &batch, &[]);
         let report = read(&path);
         prop_assert_eq!(&report.warnings, &[]);
-        prop_assert_eq!(report.recording.series.len(), batch.columns.len());
+        // A channel of which only single sensors were recorded is read from them.
+        let from_elements = !batch.elements.is_empty() && batch.column(Channel::T2).is_none();
+        prop_assert_eq!(report.recording.series.len(), batch.columns.len() + usize::from(from_elements));
         for column in &batch.columns {
             let series = &report.recording.series[&column.channel];
+            prop_assert_eq!(&series.t_s, &batch.t_s);
+            prop_assert!(same(&series.values, &column.values));
+        }
+        prop_assert_eq!(report.recording.elements.len(), batch.elements.len());
+        for column in &batch.elements {
+            let series = &report.recording.elements[&column.element];
             prop_assert_eq!(&series.t_s, &batch.t_s);
             prop_assert!(same(&series.values, &column.values));
         }

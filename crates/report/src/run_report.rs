@@ -13,6 +13,7 @@ use mapper_assemble::RepeatedJump;
 use mapper_campaign::Campaign;
 use mapper_core::{Event, Plan};
 use mapper_identify::TwoParameter;
+use mapper_observe::FusedChannel;
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 use std::fmt::Write;
 
@@ -32,6 +33,8 @@ pub struct RunReport<'a> {
     pub repeats: &'a [RepeatedJump],
     /// What the two-parameter method makes of the same steps, where another method was used.
     pub two_parameter: &'a [TwoParameter],
+    /// What became of channels with several sensors.
+    pub sensors: &'a [FusedChannel],
     /// How far the points are from the simulator's truth; `None` on a real rig.
     pub score: Option<&'a ScoreSummary>,
     /// Whether a picture of the map stands beside the report as `map.svg`.
@@ -40,8 +43,18 @@ pub struct RunReport<'a> {
 
 /// The report as Markdown.
 pub fn run_report(report: &RunReport<'_>) -> String {
-    let RunReport { campaign, plan, outcome, events, points, repeats, two_parameter, score, has_picture } =
-        *report;
+    let RunReport {
+        campaign,
+        plan,
+        outcome,
+        events,
+        points,
+        repeats,
+        two_parameter,
+        sensors,
+        score,
+        has_picture,
+    } = *report;
     // Writing to a String cannot fail, here and below.
     let mut text = format!("# Compressor map of {}\n\n", campaign.machine.name);
     if let Some(disagreement) = disagreement_text(points, two_parameter, &campaign.display) {
@@ -62,6 +75,13 @@ pub fn run_report(report: &RunReport<'_>) -> String {
             .collect();
         text.push_str(&markdown::table(&["sensor", "last calibration"], Align::Left, &rows));
         text.push('\n');
+    }
+    if !sensors.is_empty() {
+        let lines: String = sensors.iter().map(|fused| format!("- {fused}\n")).collect();
+        let _ = writeln!(
+            text,
+            "## Several sensors\n\nFused by their declared uncertainty (one standard deviation).\n\n{lines}"
+        );
     }
     if let Some(score) = score {
         let _ = writeln!(text, "{}", score_text(score));

@@ -46,7 +46,7 @@ fn recording(state: &[f64; 7]) -> Recording {
         p3_pa: state[1],
         valve_opening_ratio: 1.0,
     };
-    Recording { series: series.into_iter().collect(), steps: vec![step], events: Vec::new() }
+    Recording { series: series.into_iter().collect(), steps: vec![step], ..Recording::default() }
 }
 
 fn identified(state: &[f64; 7]) -> IdentifiedPoint {

@@ -1,12 +1,14 @@
 //! Whether the rig stayed the same over one or more recordings.
 
 use crate::declared::identification_with;
+use crate::fusing::{Fused, fused, recordings};
 use crate::recorded::{Recorded, attached_campaign, same_machine};
 use crate::{Session, SessionError, planning};
 use mapper_campaign::Campaign;
 use mapper_core::Recording;
 use mapper_drift::{DriftReport, DriftRequest, RecordedRun, diagnose};
 use mapper_identify::{IdentifyConfig, ZeroOutcome};
+use mapper_observe::FusedChannel;
 use mapper_record::ChannelMap;
 
 /// What is said of the recordings, and the zero that was subtracted from them.
@@ -14,6 +16,8 @@ use mapper_record::ChannelMap;
 pub struct Drift {
     /// The answer.
     pub report: DriftReport,
+    /// What became of channels with several sensors; what is left out of one recording is left out of all.
+    pub sensors: Vec<FusedChannel>,
     /// What came of the isothermal zero.
     pub zero: ZeroOutcome,
 }
@@ -35,13 +39,17 @@ impl Session<'_> {
                 let reason = format!("No verdict: recording {}: {other}.", index + 1);
                 return Ok(Drift {
                     report: DriftReport::without_verdict(reason),
+                    sensors: Vec::new(),
                     zero: ZeroOutcome::NotAsked,
                 });
             }
         }
-        let model = planning::nominal_model(campaign)?;
+        let mut model = planning::nominal_model(campaign)?;
         let config = identification_with(campaign, map);
-        let (recordings, config, zero) = zeroed_alike(recorded, config, campaign);
+        let Fused { recordings, config, channels } = fused(recordings(recorded), config, Some(campaign), map);
+        let sensors = channels.into_iter().next().unwrap_or_default();
+        model.params.t2_probe_diameter_m = config.probe_diameter_m;
+        let (recordings, config, zero) = zeroed_alike(recordings, config, campaign);
         let fingerprints: Vec<Option<String>> = recorded.iter().map(fingerprint).collect();
         let runs: Vec<RecordedRun<'_>> = recordings
             .iter()
@@ -56,21 +64,21 @@ impl Session<'_> {
             identification: &config,
             seed: campaign.seed,
         })?;
-        Ok(Drift { report, zero })
+        Ok(Drift { report, sensors, zero })
     }
 }
 
 /// The zero of the first run, subtracted from all: a zero of its own for each would hide what drifted between them.
 fn zeroed_alike(
-    recorded: &[Recorded],
+    recordings: Vec<Recording>,
     config: IdentifyConfig,
     campaign: &Campaign,
 ) -> (Vec<Recording>, IdentifyConfig, ZeroOutcome) {
-    let zero = recorded.first().map_or(ZeroOutcome::NotAsked, |first| {
-        ZeroOutcome::of(&first.read.recording, &config, campaign.zero)
-    });
-    let off = |recorded: &Recorded| zero.take_off(recorded.read.recording.clone(), config.clone()).0;
-    let recordings = recorded.iter().map(off).collect();
+    let zero = recordings
+        .first()
+        .map_or(ZeroOutcome::NotAsked, |first| ZeroOutcome::of(first, &config, campaign.zero));
+    let off = |recording: Recording| zero.take_off(recording, config.clone()).0;
+    let recordings = recordings.into_iter().map(off).collect();
     let left = zero.take_off(Recording::default(), config.clone()).1;
     (recordings, left, zero)
 }

@@ -1,6 +1,7 @@
 //! The gap between nominal model and rig: drift is looked for first, a zero subtracted, then the diagnosis.
 
 use crate::declared::identification_with;
+use crate::fusing::{Fused, fused, recordings};
 use crate::planning::{nominal_model, with_plan_request};
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
@@ -12,7 +13,7 @@ use mapper_gap::diagnose::{Diagnosed, Question, diagnose};
 use mapper_gap::outlook::AllowedJump;
 use mapper_gap::report::{Diagnosis, Verdict};
 use mapper_identify::ZeroOutcome;
-use mapper_observe::Declared;
+use mapper_observe::{Declared, FusedChannel};
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use mapper_planner::PlanRequest;
@@ -26,6 +27,8 @@ pub struct Gap {
     pub diagnosed: Diagnosed,
     /// What drifted while it was recorded; `None` where nothing was seen, or where nothing can be said, as without repeats.
     pub drift: Option<DriftReport>,
+    /// What became of channels with several sensors.
+    pub sensors: Vec<FusedChannel>,
     /// What came of the isothermal zero.
     pub zero: ZeroOutcome,
 }
@@ -43,12 +46,16 @@ impl Session<'_> {
         effects: Vec<Arc<dyn Effect>>,
     ) -> Result<Gap, SessionError> {
         same_machine(recorded, campaign)?;
-        let model = nominal_model(campaign)?;
+        let mut model = nominal_model(campaign)?;
         // A recording in which drift cannot be looked for may still have a gap.
         let drift = self.drift(slice::from_ref(recorded), campaign, map).ok();
         let drift = drift.map(|drift| drift.report).filter(|report| report.cause.is_some());
-        let recording = taken_off(recorded.read.recording.clone(), drift.as_ref());
         let config = identification_with(campaign, map);
+        let Fused { recordings, config, channels } =
+            fused(recordings(slice::from_ref(recorded)), config, Some(campaign), map);
+        let sensors = channels.into_iter().next().unwrap_or_default();
+        let recording = taken_off(recordings.into_iter().next().unwrap_or_default(), drift.as_ref());
+        model.params.t2_probe_diameter_m = config.probe_diameter_m;
         // A zero leaves less of the offsets.
         let zero = ZeroOutcome::of(&recording, &config, campaign.zero);
         let (recording, zeroed) = zero.take_off(recording, config);
@@ -74,7 +81,7 @@ impl Session<'_> {
         let warnings = recorded.read.warnings.iter().map(ToString::to_string);
         diagnosed.diagnosis.warnings.extend(warnings);
         note_drift(&mut diagnosed.diagnosis, drift.as_ref());
-        Ok(Gap { diagnosed, drift, zero })
+        Ok(Gap { diagnosed, drift, sensors, zero })
     }
 }
 

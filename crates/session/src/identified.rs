@@ -1,6 +1,7 @@
 //! From a recording to identified points beside their truth, where there is any: one way for all who need it.
 
 use crate::declared::identification_with;
+use crate::fusing::fused;
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::nominal_model;
@@ -8,13 +9,14 @@ use mapper_core::{ALPHA_AREA_SIGMA_RATIO, IdentifiedPoint, Method, Recording, Re
 use mapper_identify::{
     IdentifyConfig, TwoParameter, WindowRule, ZeroOutcome, doubt_off_the_nominal_map, identify_recording,
 };
+use mapper_observe::FusedChannel;
 use mapper_record::ChannelMap;
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 
 /// What a recording gives.
 #[derive(Debug)]
 pub struct Identified {
-    /// The recording as it was identified: the isothermal zero is subtracted.
+    /// The recording as it was identified: several sensors are fused, the isothermal zero is subtracted.
     pub recording: Recording,
     /// How it was identified.
     pub config: IdentifyConfig,
@@ -24,6 +26,8 @@ pub struct Identified {
     pub thermal: Option<ThermalModel>,
     /// What the two-parameter method makes of the same steps (joint method).
     pub two_parameter: Vec<TwoParameter>,
+    /// What became of channels with several sensors.
+    pub sensors: Vec<FusedChannel>,
     /// What came of the zero.
     pub zero: ZeroOutcome,
     /// How far the points are from the truth; `None` on a real rig.
@@ -77,8 +81,11 @@ impl Session<'_> {
         };
         config.method = method.unwrap_or(config.method);
         let soak = recorded.campaign.as_ref().and_then(|campaign| campaign.zero);
-        let zero = ZeroOutcome::of(&recorded.read.recording, &config, soak);
-        let (recording, config) = zero.take_off(recorded.read.recording, config);
+        let fused = fused(vec![recorded.read.recording], config, recorded.campaign.as_ref(), map);
+        let recording = fused.recordings.into_iter().next().unwrap_or_default();
+        let sensors = fused.channels.into_iter().next().unwrap_or_default();
+        let zero = ZeroOutcome::of(&recording, &fused.config, soak);
+        let (recording, config) = zero.take_off(recording, fused.config);
         let found = identify_recording(&recording, &config)?;
         let mut points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
         if let Some(campaign) = recorded.campaign.as_ref().filter(|campaign| campaign.tolerances_declared) {
@@ -101,6 +108,7 @@ impl Session<'_> {
             points,
             thermal: found.thermal,
             two_parameter: found.two_parameter,
+            sensors,
             zero,
             score,
         })

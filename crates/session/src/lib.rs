@@ -39,6 +39,7 @@ mod drive;
 mod error;
 mod event;
 mod files;
+mod fusing;
 mod gap;
 mod guards;
 mod identified;

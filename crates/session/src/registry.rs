@@ -80,6 +80,9 @@ fn nominal_rig(campaign: &Campaign, model: &Model, effects: &[Arc<dyn Effect>]) 
         boundary: campaign.boundary,
         speed_max_rpm: campaign.limits.speed_max_rpm,
         sensors: sensors().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
+        redundant: sensors()
+            .filter_map(|(channel, sensor)| Some((*channel, sensor.redundant.clone()?)))
+            .collect(),
         static_tap_pipe_diameters_m: sensors()
             .filter_map(|(channel, sensor)| Some((*channel, sensor.static_tap_pipe_diameter_m?)))
             .collect(),

@@ -8,6 +8,7 @@ use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble, r
 use mapper_campaign::Campaign;
 use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Plan, ThermalModel};
 use mapper_identify::{TwoParameter, ZeroOutcome};
+use mapper_observe::FusedChannel;
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::{RunReport, run_report};
@@ -37,6 +38,9 @@ pub struct Results {
     pub thermal: Option<ThermalModel>,
     /// What the two-parameter method makes of the same steps (joint method).
     pub two_parameter: Vec<TwoParameter>,
+    /// What became of channels with several sensors.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sensors: Vec<FusedChannel>,
     /// What came of the isothermal zero.
     pub zero: ZeroOutcome,
     /// What else is to be known.
@@ -69,9 +73,12 @@ impl Session<'_> {
             Some(map) => export(self.registry, campaign, map, directory, &mut remarks)?,
             None => BTreeMap::new(),
         };
-        let Identified { recording: recorded, config, points, thermal, two_parameter, zero, score } =
+        let Identified { recording: recorded, config, points, thermal, two_parameter, sensors, zero, score } =
             identified;
-        let points_file = json!({"reference": config.reference, "points": points, "thermal": thermal, "two_parameter": two_parameter, "zero": zero});
+        let mut points_file = json!({"reference": config.reference, "points": points, "thermal": thermal, "two_parameter": two_parameter, "zero": zero});
+        if !sensors.is_empty() {
+            points_file["sensors"] = json!(sensors);
+        }
         write_new(&directory.join(run_directory::POINTS), json_text(&points_file)?.as_bytes())?;
         let report = directory.join(run_directory::REPORT);
         let alone: Vec<IdentifiedPoint> = points.iter().map(|scored| scored.point.clone()).collect();
@@ -84,6 +91,7 @@ impl Session<'_> {
             points: &points,
             repeats: &repeats,
             two_parameter: &two_parameter,
+            sensors: &sensors,
             score: score.as_ref(),
             has_picture: map.contains_key("svg"),
         });
@@ -98,6 +106,7 @@ impl Session<'_> {
             repeats,
             thermal,
             two_parameter,
+            sensors,
             zero,
             remarks,
             compressor_map,

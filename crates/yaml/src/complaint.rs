@@ -113,6 +113,10 @@ pub(crate) fn example_of(schema: &Value) -> Option<String> {
     if let Some(example) = schema.get("examples").and_then(|list| list.get(0)) {
         return Some(example.as_str().map_or_else(|| example.to_string(), str::to_owned));
     }
+    // Of several forms the first that shows how.
+    if let Some(forms) = schema.get("anyOf").and_then(Value::as_array) {
+        return forms.iter().find_map(example_of);
+    }
     let properties = schema.get("properties")?;
     let required: Option<Vec<String>> = schema
         .get("required")?

@@ -2,8 +2,8 @@
 
 use crate::setpoint_limits;
 use mapper_core::{
-    Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Group, Recording, RigDescription,
-    RigMode, SampleBatch, Series, Setpoints,
+    Backend, BackendError, Channel, ChannelColumn, Element, ElementColumn, Event, EventKind, Group,
+    Recording, RigDescription, RigMode, SampleBatch, Series, Setpoints,
 };
 use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::nominal_rig::NominalRig;
@@ -57,6 +57,7 @@ const SETPOINT_TOLERANCE_RATIO: f64 = 1e-4;
 pub struct ReplayBackend {
     t_s: Vec<f64>,
     columns: Vec<ChannelColumn>,
+    elements: Vec<ElementColumn>,
     events: Vec<Event>,
     armed: bool,
     /// Samples and events handed out so far.
@@ -76,6 +77,7 @@ impl ReplayBackend {
             .iter()
             .filter(|(channel, _)| only_commands || measured(channel))
             .flat_map(|(_, series)| series.t_s.iter().copied())
+            .chain(recording.elements.values().flat_map(|series| series.t_s.iter().copied()))
             .collect();
         t_s.sort_by(f64::total_cmp);
         t_s.dedup();
@@ -87,11 +89,17 @@ impl ReplayBackend {
                 ChannelColumn { channel: *channel, values }
             })
             .collect();
+        let element = |(element, series): (&Element, &Series)| ElementColumn {
+            element: *element,
+            values: at_own_times(series, &t_s),
+        };
+        let elements = recording.elements.iter().map(element).collect();
         let mut events = recording.events.clone();
         events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         ReplayBackend {
             t_s,
             columns,
+            elements,
             events,
             armed: false,
             samples_played: 0,
@@ -195,6 +203,14 @@ impl Backend for ReplayBackend {
                     values: column.values[start..end].to_vec(),
                 })
                 .collect(),
+            elements: self
+                .elements
+                .iter()
+                .map(|column| ElementColumn {
+                    element: column.element,
+                    values: column.values[start..end].to_vec(),
+                })
+                .collect(),
             truth: Vec::new(),
             events,
         })
@@ -256,8 +272,8 @@ mod tests {
         let p3 = Series { t_s: vec![0.0, 1.0, 1.7, 2.0], values: vec![1.5e5, 1.5e5, 2e5, 2e5] };
         Recording {
             series: BTreeMap::from([(Channel::T2, t2), (Channel::P3Command, p3)]),
-            steps: Vec::new(),
             events: vec![Event { t_s: 0.5, kind: EventKind::SurgeEntered, message: "surge".to_owned() }],
+            ..Recording::default()
         }
     }
 

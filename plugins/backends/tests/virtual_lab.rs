@@ -1,8 +1,13 @@
 //! The virtual lab as a rig: what it delivers when it is set, polled, tripped and stopped.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_backends::virtual_lab::{ActuatorDynamics, LabSettings, SensorErrors, Start, VirtualLab};
-use mapper_core::{Backend, BackendError, Channel, EventKind, RigMode, SampleBatch, Setpoints};
+use mapper_backends::virtual_lab::{
+    ActuatorDynamics, LabElement, LabElements, LabSettings, SensorErrors, Start, VirtualLab,
+};
+use mapper_core::{
+    Backend, BackendError, Channel, DeclaredUncertainty, EventKind, RedundantSensors, RigMode, SampleBatch,
+    Setpoints,
+};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::steady;
@@ -83,6 +88,53 @@ fn session(settings: LabSettings) -> Vec<SampleBatch> {
     let first = lab.poll(3.0).unwrap();
     lab.set(&setpoints(180e3, 1.0)).unwrap();
     vec![first, lab.poll(7.25).unwrap(), lab.poll(12.0).unwrap()]
+}
+
+/// Four T2 sensors; the second is off by 3 K, the third stuck after 5 s, the fourth has a tip of 4 mm.
+fn with_four() -> LabSettings {
+    let each = DeclaredUncertainty { noise_sigma: 0.1, offset_sigma: 0.25, gain_sigma_ratio: 0.0 };
+    let declared = RedundantSensors::alike(Channel::T2, 4, each);
+    let sound = LabElement {
+        errors: SensorErrors { white_sigma: 0.08, ..SensorErrors::default() },
+        probe_diameter_m: None,
+        lag_s: 0.0,
+        stuck_after_s: f64::INFINITY,
+    };
+    let elements = vec![
+        sound,
+        LabElement { errors: SensorErrors { offset: 3.0, ..sound.errors }, ..sound },
+        LabElement { stuck_after_s: 5.0, ..sound },
+        LabElement { probe_diameter_m: Some(4e-3), ..sound },
+    ];
+    LabSettings { redundant: [(Channel::T2, LabElements { declared, elements })].into(), ..noisy() }
+}
+
+#[test]
+fn each_of_several_sensors_reads_by_itself_and_the_other_channels_as_without_them() {
+    let (batches, without) = (session(with_four()), session(noisy()));
+    assert_eq!(batches, session(with_four()));
+    for (with, without) in batches.iter().zip(&without) {
+        assert!(without.elements.is_empty());
+        for (with, without) in with.columns.iter().zip(&without.columns) {
+            assert_eq!(with.channel, without.channel);
+            assert!(with.channel == Channel::T2 || with == without, "{}", with.channel);
+        }
+    }
+    let column = |number: usize| -> Vec<f64> {
+        batches.iter().flat_map(|batch| batch.elements[number - 1].values.clone()).collect()
+    };
+    let [sound, off, stuck, slow] = [1, 2, 3, 4].map(column);
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    // Noise of a mean of 120: 0.08/sqrt(60) K.
+    assert!((mean(&off) - mean(&sound) - 3.0).abs() < 0.05);
+    assert!(stuck[50..].iter().all(|value| *value == stuck[49]) && stuck[48] != stuck[49]);
+    // From 3 s on the machine speeds up, and a tip of 4 mm needs some 9 s to follow.
+    assert!(sound[45] - slow[45] > 1.0, "{} {}", sound[45], slow[45]);
+    // The channel is read by those that agree: 3 K are more than eight standard deviations.
+    let together: Vec<f64> =
+        batches.iter().flat_map(|batch| batch.column(Channel::T2).unwrap().to_vec()).collect();
+    let first = mean(&together[..30]);
+    assert!((first - mean(&sound[..30])).abs() < 0.1, "{first}");
 }
 
 #[test]

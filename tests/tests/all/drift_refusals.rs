@@ -33,8 +33,7 @@ fn write(recording: &Recording, path: &Path) {
             first_sequence: written as u64,
             t_s: times_s[written..until].to_vec(),
             columns: recording.series.iter().map(column).collect(),
-            truth: Vec::new(),
-            events: Vec::new(),
+            ..SampleBatch::default()
         };
         writer.write_batch(&batch).unwrap();
         written = until;

@@ -21,6 +21,7 @@ mod pipes;
 mod plans;
 mod promises;
 mod recordings;
+mod sensors;
 mod sequences;
 mod shipped_campaign;
 mod sizes;

@@ -24,6 +24,7 @@ pub(crate) mod report;
 pub(crate) mod sensors;
 pub(crate) mod sequence;
 pub(crate) mod settle_bands;
+pub(crate) mod several_sensors;
 pub(crate) mod timing;
 pub(crate) mod tolerances;
 pub(crate) mod window;

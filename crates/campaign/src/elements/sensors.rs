@@ -1,5 +1,6 @@
 //! `sensors:`
 
+use super::several_sensors::{Sensor, SensorDeclaration, Sensors, Several, check_several, each_place};
 use crate::checking::Check;
 use crate::si::or;
 use crate::units::{
@@ -9,19 +10,8 @@ use mapper_core::{Channel, DeclaredUncertainty};
 use mapper_yaml::FindingKind;
 use mapper_yaml::steps;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use std::collections::BTreeMap;
-
-/// One sensor as declared; one standard deviation throughout, in the channel's unit (K, Pa, kg/s, rpm).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct SensorDeclaration {
-    /// Noise, offset left after calibration, gain.
-    pub declared: DeclaredUncertainty,
-    /// Inner diameter of the pipe at a static tap, m; `None` where the total value is measured.
-    pub static_tap_pipe_diameter_m: Option<f64>,
-    /// Diameter of the probe's tip, m; 0 is a probe without inertia.
-    pub probe_diameter_m: f64,
-}
 
 /// Declared uncertainty of each measured channel, by its symbol; one standard deviation throughout.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -29,75 +19,73 @@ pub struct SensorDeclaration {
 pub(crate) struct SensorsFile {
     /// Shaft speed.
     #[serde(rename = "N")]
-    n: SpeedSensor,
+    n: Sensors<SpeedSensor>,
     /// Compressor mass flow.
-    m_c: FlowSensor,
+    m_c: Sensors<FlowSensor>,
     /// Compressor inlet pressure.
     #[serde(rename = "P1")]
-    p1: PressureSensor,
+    p1: Sensors<PressureSensor>,
     /// Compressor inlet total temperature.
     #[serde(rename = "T1")]
-    t1: TemperatureSensor,
+    t1: Sensors<TemperatureSensor>,
     /// Compressor outlet pressure.
     #[serde(rename = "P2")]
-    p2: PressureSensor,
+    p2: Sensors<PressureSensor>,
     /// Compressor outlet total temperature.
     #[serde(rename = "T2")]
-    t2: ProbeSensor,
+    t2: Sensors<ProbeSensor>,
     /// Compressor housing temperature.
     #[serde(rename = "Tc")]
-    tc: TemperatureSensor,
+    tc: Sensors<TemperatureSensor>,
     /// Turbine mass flow.
-    m_t: Option<FlowSensor>,
+    m_t: Option<Sensors<FlowSensor>>,
     /// Turbine inlet pressure.
     #[serde(rename = "P3")]
-    p3: Option<PressureSensor>,
+    p3: Option<Sensors<PressureSensor>>,
     /// Turbine inlet total temperature.
     #[serde(rename = "T3")]
-    t3: Option<TemperatureSensor>,
+    t3: Option<Sensors<TemperatureSensor>>,
     /// Turbine outlet pressure.
     #[serde(rename = "P4")]
-    p4: Option<PressureSensor>,
+    p4: Option<Sensors<PressureSensor>>,
     /// Turbine outlet total temperature.
     #[serde(rename = "T4")]
-    t4: Option<TemperatureSensor>,
+    t4: Option<Sensors<TemperatureSensor>>,
     /// Turbine housing temperature.
     #[serde(rename = "Tt")]
-    tt: Option<TemperatureSensor>,
+    tt: Option<Sensors<TemperatureSensor>>,
     /// Oil inlet temperature.
     #[serde(rename = "T_oil")]
-    t_oil: Option<TemperatureSensor>,
+    t_oil: Option<Sensors<TemperatureSensor>>,
     /// Ambient temperature.
     #[serde(rename = "T_amb")]
-    t_amb: Option<TemperatureSensor>,
+    t_amb: Option<Sensors<TemperatureSensor>>,
 }
 
 impl SensorsFile {
-    /// Diameter of the T2 probe's tip, m.
-    pub(crate) fn probe_diameter_m(&self) -> f64 {
-        or(self.t2.probe_diameter, 0.0)
-    }
-
     /// What is declared of each channel that has a sensor.
     pub(crate) fn declarations(&self) -> BTreeMap<Channel, SensorDeclaration> {
-        let all = [
-            (Channel::ShaftSpeed, Some(self.n.declaration())),
-            (Channel::CompressorFlow, Some(self.m_c.declaration())),
-            (Channel::P1, Some(self.p1.declaration())),
-            (Channel::T1, Some(self.t1.declaration())),
-            (Channel::P2, Some(self.p2.declaration())),
-            (Channel::T2, Some(self.t2.declaration())),
-            (Channel::Tc, Some(self.tc.declaration())),
-            (Channel::TurbineFlow, self.m_t.as_ref().map(FlowSensor::declaration)),
-            (Channel::P3, self.p3.as_ref().map(PressureSensor::declaration)),
-            (Channel::T3, self.t3.as_ref().map(TemperatureSensor::declaration)),
-            (Channel::P4, self.p4.as_ref().map(PressureSensor::declaration)),
-            (Channel::T4, self.t4.as_ref().map(TemperatureSensor::declaration)),
-            (Channel::Tt, self.tt.as_ref().map(TemperatureSensor::declaration)),
-            (Channel::TOil, self.t_oil.as_ref().map(TemperatureSensor::declaration)),
-            (Channel::TAmb, self.t_amb.as_ref().map(TemperatureSensor::declaration)),
-        ];
-        all.into_iter().filter_map(|(channel, declaration)| Some((channel, declaration?))).collect()
+        use Channel as C;
+        let mut all = BTreeMap::new();
+        let mut put = |channel: Channel, sensors: Option<SensorDeclaration>| {
+            all.extend(sensors.map(|sensors| (channel, sensors)));
+        };
+        put(C::ShaftSpeed, Some(self.n.declaration(C::ShaftSpeed)));
+        put(C::CompressorFlow, Some(self.m_c.declaration(C::CompressorFlow)));
+        put(C::P1, Some(self.p1.declaration(C::P1)));
+        put(C::T1, Some(self.t1.declaration(C::T1)));
+        put(C::P2, Some(self.p2.declaration(C::P2)));
+        put(C::T2, Some(self.t2.declaration(C::T2)));
+        put(C::Tc, Some(self.tc.declaration(C::Tc)));
+        put(C::TurbineFlow, self.m_t.as_ref().map(|s| s.declaration(C::TurbineFlow)));
+        put(C::P3, self.p3.as_ref().map(|s| s.declaration(C::P3)));
+        put(C::T3, self.t3.as_ref().map(|s| s.declaration(C::T3)));
+        put(C::P4, self.p4.as_ref().map(|s| s.declaration(C::P4)));
+        put(C::T4, self.t4.as_ref().map(|s| s.declaration(C::T4)));
+        put(C::Tt, self.tt.as_ref().map(|s| s.declaration(C::Tt)));
+        put(C::TOil, self.t_oil.as_ref().map(|s| s.declaration(C::TOil)));
+        put(C::TAmb, self.t_amb.as_ref().map(|s| s.declaration(C::TAmb)));
+        all
     }
 }
 
@@ -114,6 +102,7 @@ fn declaration<D: Dimension>(
         },
         static_tap_pipe_diameter_m: None,
         probe_diameter_m: 0.0,
+        redundant: None,
     }
 }
 
@@ -134,11 +123,28 @@ pub(crate) struct SpeedSensor {
     /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
+    /// How many sensors like this one measure the channel, 1 to 16; 1 if none is given.
+    #[schemars(range(min = 1, max = 16), example = 4)]
+    count: Option<usize>,
+    /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
+    name: Option<String>,
+    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
+    #[schemars(extend("x-min" = "0 rpm"))]
+    common_offset: Option<Quantity<Speed>>,
 }
 
-impl SpeedSensor {
+impl Sensor for SpeedSensor {
     fn declaration(&self) -> SensorDeclaration {
         declaration(self.noise, self.offset, self.gain)
+    }
+
+    fn several(&self) -> Several<'_> {
+        Several {
+            count: self.count.unwrap_or(1),
+            name: self.name.as_deref(),
+            common_offset: or(self.common_offset, 0.0),
+        }
     }
 }
 
@@ -155,11 +161,28 @@ pub(crate) struct FlowSensor {
     /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
+    /// How many sensors like this one measure the channel, 1 to 16; 1 if none is given.
+    #[schemars(range(min = 1, max = 16), example = 4)]
+    count: Option<usize>,
+    /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
+    name: Option<String>,
+    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
+    #[schemars(extend("x-min" = "0 kg/s"))]
+    common_offset: Option<Quantity<MassFlow>>,
 }
 
-impl FlowSensor {
+impl Sensor for FlowSensor {
     fn declaration(&self) -> SensorDeclaration {
         declaration(self.noise, self.offset, self.gain)
+    }
+
+    fn several(&self) -> Several<'_> {
+        Several {
+            count: self.count.unwrap_or(1),
+            name: self.name.as_deref(),
+            common_offset: or(self.common_offset, 0.0),
+        }
     }
 }
 
@@ -181,13 +204,30 @@ pub(crate) struct PressureSensor {
     /// Inner diameter of the pipe at the tap; needed for a static tap.
     #[schemars(extend("x-above" = "0 mm", "x-max" = "1 m"), example = &"40 mm")]
     pipe_diameter: Option<Quantity<Length>>,
+    /// How many sensors like this one measure the channel, 1 to 16; 1 if none is given.
+    #[schemars(range(min = 1, max = 16), example = 4)]
+    count: Option<usize>,
+    /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
+    name: Option<String>,
+    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
+    #[schemars(extend("x-min" = "0 Pa"))]
+    common_offset: Option<Quantity<PressureDifference>>,
 }
 
-impl PressureSensor {
+impl Sensor for PressureSensor {
     fn declaration(&self) -> SensorDeclaration {
         let diameter = self.pipe_diameter.map(|diameter| diameter.inside);
         let static_tap_pipe_diameter_m = diameter.filter(|_| self.tap == Some(TapName::Static));
         SensorDeclaration { static_tap_pipe_diameter_m, ..declaration(self.noise, self.offset, self.gain) }
+    }
+
+    fn several(&self) -> Several<'_> {
+        Several {
+            count: self.count.unwrap_or(1),
+            name: self.name.as_deref(),
+            common_offset: or(self.common_offset, 0.0),
+        }
     }
 }
 
@@ -211,11 +251,28 @@ pub(crate) struct TemperatureSensor {
     /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
+    /// How many sensors like this one measure the channel, 1 to 16; 1 if none is given.
+    #[schemars(range(min = 1, max = 16), example = 4)]
+    count: Option<usize>,
+    /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
+    name: Option<String>,
+    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
+    #[schemars(extend("x-min" = "0 K"))]
+    common_offset: Option<Quantity<TemperatureDifference>>,
 }
 
-impl TemperatureSensor {
+impl Sensor for TemperatureSensor {
     fn declaration(&self) -> SensorDeclaration {
         declaration(self.noise, self.offset, self.gain)
+    }
+
+    fn several(&self) -> Several<'_> {
+        Several {
+            count: self.count.unwrap_or(1),
+            name: self.name.as_deref(),
+            common_offset: or(self.common_offset, 0.0),
+        }
     }
 }
 
@@ -235,13 +292,30 @@ pub(crate) struct ProbeSensor {
     /// Diameter of the probe's tip; 0 mm, the default, is a probe without inertia.
     #[schemars(extend("x-min" = "0 mm", "x-max" = "20 mm"), example = &"1.5 mm")]
     probe_diameter: Option<Quantity<Length>>,
+    /// How many sensors like this one measure the channel, 1 to 16; 1 if none is given.
+    #[schemars(range(min = 1, max = 16), example = 4)]
+    count: Option<usize>,
+    /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
+    name: Option<String>,
+    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
+    #[schemars(extend("x-min" = "0 K"))]
+    common_offset: Option<Quantity<TemperatureDifference>>,
 }
 
-impl ProbeSensor {
+impl Sensor for ProbeSensor {
     fn declaration(&self) -> SensorDeclaration {
         SensorDeclaration {
             probe_diameter_m: or(self.probe_diameter, 0.0),
             ..declaration(self.noise, self.offset, self.gain)
+        }
+    }
+
+    fn several(&self) -> Several<'_> {
+        Several {
+            count: self.count.unwrap_or(1),
+            name: self.name.as_deref(),
+            common_offset: or(self.common_offset, 0.0),
         }
     }
 }
@@ -249,13 +323,18 @@ impl ProbeSensor {
 /// A static tap knows the pipe it sits in.
 pub(crate) fn check(check: &mut Check<'_>) {
     for symbol in ["P1", "P2", "P3", "P4"] {
-        let tap = steps!["sensors", symbol, "tap"];
-        let has_diameter = check.get(&steps!["sensors", symbol, "pipe_diameter"]).is_some();
-        if check.text(&tap) == Some("static") && !has_diameter {
-            let message =
-                "a static tap needs the pipe's inner diameter to become a total pressure".to_owned();
-            check.note(FindingKind::MissingKey, &tap, message, "add e.g. `pipe_diameter: 40 mm`");
+        for sensor in each_place(check, symbol) {
+            let of = |key: &str| [sensor.as_slice(), &steps![key]].concat();
+            let has_diameter = check.get(&of("pipe_diameter")).is_some();
+            if check.text(&of("tap")) == Some("static") && !has_diameter {
+                let message =
+                    "a static tap needs the pipe's inner diameter to become a total pressure".to_owned();
+                check.note(FindingKind::MissingKey, &of("tap"), message, "add e.g. `pipe_diameter: 40 mm`");
+            }
         }
+    }
+    for symbol in CALIBRATED {
+        check_several(check, symbol);
     }
 }
 
@@ -281,5 +360,46 @@ mod tests {
             assert!(keys.iter().any(|key| *key == symbol), "{symbol}");
             serde_json::from_value::<Channel>(symbol.into()).unwrap();
         }
+    }
+
+    fn several(text: &str) -> SensorDeclaration {
+        crate::testing::any::<Sensors<ProbeSensor>>(text).unwrap().declaration(Channel::T2)
+    }
+
+    #[test]
+    fn a_count_and_a_list_of_equal_sensors_are_the_same_and_one_is_none_of_several() {
+        let one = "{noise: 0.1 K, offset: 0.24 K, probe_diameter: 1 mm}";
+        let alike = several("{noise: 0.1 K, offset: 0.24 K, probe_diameter: 1 mm, count: 4}");
+        assert_eq!(alike, several(&format!("[{one}, {one}, {one}, {one}]")));
+        // A fourth of the variance each.
+        assert!((alike.declared.noise_sigma - 0.05).abs() < 1e-12);
+        assert!((alike.declared.offset_sigma - 0.12).abs() < 1e-12);
+        assert!((alike.probe_diameter_m - 1e-3).abs() < 1e-12);
+        let names: Vec<String> = alike.redundant.unwrap().elements.into_iter().map(|e| e.name).collect();
+        assert_eq!(names, ["T2/1", "T2/2", "T2/3", "T2/4"]);
+        let single = several(one);
+        assert_eq!((single.redundant.clone(), single.declared.offset_sigma), (None, 0.24));
+        assert_eq!(single, several(&format!("[{one}]")));
+    }
+
+    #[test]
+    fn a_common_offset_does_not_average_out() {
+        let four = several("{noise: 0.1 K, offset: 0.24 K, common_offset: 0.16 K, count: 4}");
+        // 0.12 and 0.16 in quadrature; for a single sensor 0.24 and 0.07.
+        assert!((four.declared.offset_sigma - 0.2).abs() < 1e-12);
+        let one = several("{noise: 0.1 K, offset: 0.24 K, common_offset: 0.07 K}");
+        assert!((one.declared.offset_sigma - 0.25).abs() < 1e-12);
+        let named = several("[{noise: 0.1 K, name: TC_21}, {noise: 0.1 K, common_offset: 0.16 K}]");
+        let redundant = named.redundant.unwrap();
+        assert_eq!(redundant.elements[0].name, "TC_21");
+        assert!((redundant.common_offset_sigma - 0.16).abs() < 1e-12);
+    }
+
+    /// Plans carry the hash of the campaign's JSON: that of a campaign without several sensors has no word of them.
+    #[test]
+    fn the_json_of_a_single_sensor_has_no_word_of_several() {
+        let single = serde_json::to_value(several("{noise: 0.1 K, offset: 0.25 K}")).unwrap();
+        let keys: Vec<&String> = single.as_object().unwrap().keys().collect();
+        assert_eq!(keys, ["declared", "probe_diameter_m", "static_tap_pipe_diameter_m"]);
     }
 }

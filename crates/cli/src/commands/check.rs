@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::{interrupt, output, registry};
 use clap::Args;
 use mapper_campaign::CampaignError;
-use mapper_report::duration;
+use mapper_report::{declared_sensors_text, duration};
 use mapper_session::{Session, nominal_model};
 use serde_json::json;
 use std::io::IsTerminal;
@@ -75,11 +75,12 @@ impl Check {
             count => format!(", {count} warnings"),
         };
         output::print(&format!(
-            "{}: no mistakes{number}. {} points in {steps} steps on `{}` in {} of the rig's time{forecast}.\n",
+            "{}: no mistakes{number}. {} points in {steps} steps on `{}` in {} of the rig's time{forecast}.\n{}",
             self.campaign.display(),
             campaign.points.len(),
             campaign.backend.name,
             duration(duration_s),
+            declared_sensors_text(&campaign),
         ))
     }
 }

@@ -6,7 +6,7 @@ use crate::given::channel_map;
 use crate::{output, registry};
 use clap::Args;
 use mapper_campaign::Campaign;
-use mapper_report::{corrected_csv, drift_text, zero_text};
+use mapper_report::{corrected_csv, drift_text, sensors_text, zero_text};
 use mapper_session::{Recorded, Session, SessionError, write_new};
 use serde_json::json;
 use std::path::PathBuf;
@@ -58,10 +58,14 @@ impl Drift {
             let paths: Vec<&PathBuf> = recorded.iter().map(|recorded| &recorded.path).collect();
             value["recordings"] = json!(paths);
             value["zero"] = json!(drift.zero);
+            if !drift.sensors.is_empty() {
+                value["sensors"] = json!(drift.sensors);
+            }
             value["recording_warnings"] = json!(warnings);
             return output::print_json(&value);
         }
         let mut text = drift_text(&drift.report);
+        text.push_str(&sensors_text(&drift.sensors));
         text.push_str(&zero_text(&drift.zero));
         for warning in warnings {
             text.push_str(&format!("recording: {warning}\n"));

@@ -5,7 +5,9 @@ use crate::given::{channel_map, given_campaign};
 use crate::{output, registry};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
-use mapper_report::{disagreement_text, points_text, shared_errors_text, thermal_text, zero_text};
+use mapper_report::{
+    disagreement_text, points_text, sensors_text, shared_errors_text, thermal_text, zero_text,
+};
 use mapper_session::{Recorded, Session};
 use serde_json::json;
 use std::path::PathBuf;
@@ -41,7 +43,7 @@ impl Identify {
         let registry = registry::registry();
         let found = Session::new(&registry).identify(recorded, &map, self.method.map(Method::from))?;
         if self.json {
-            return output::print_json(&json!({
+            let mut value = json!({
                 "recording": path,
                 "reference": found.config.reference,
                 "points": found.points,
@@ -50,7 +52,11 @@ impl Identify {
                 "zero": found.zero,
                 "score": found.score,
                 "recording_warnings": warnings,
-            }));
+            });
+            if !found.sensors.is_empty() {
+                value["sensors"] = json!(found.sensors);
+            }
+            return output::print_json(&value);
         }
         let disagreement = disagreement_text(&found.points, &found.two_parameter, &display);
         let mut text = disagreement.unwrap_or_default();
@@ -61,6 +67,7 @@ impl Identify {
         if let Some(thermal) = &found.thermal {
             text.push_str(&thermal_text(thermal));
         }
+        text.push_str(&sensors_text(&found.sensors));
         text.push_str(&zero_text(&found.zero));
         for warning in &warnings {
             text.push_str(&format!("recording: {warning}\n"));

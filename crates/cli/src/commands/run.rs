@@ -8,8 +8,8 @@ use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::Verdict;
 use mapper_report::{
-    Display, disagreement_text, plan_text, points_text, repeated_jumps_text, shared_errors_text,
-    thermal_text, zero_text,
+    Display, disagreement_text, plan_text, points_text, repeated_jumps_text, sensors_text,
+    shared_errors_text, thermal_text, zero_text,
 };
 use mapper_session::{Ended, PreparedRun, Results, RunOutcome, RunRequest, Session, SessionError, soak_s};
 use serde_json::json;
@@ -140,6 +140,7 @@ fn results_text(campaign: &Campaign, results: &Results) -> String {
     if let Some(thermal) = &results.thermal {
         text.push_str(&thermal_text(thermal));
     }
+    text.push_str(&sensors_text(&results.sensors));
     text.push_str(&zero_text(&results.zero));
     // Writing to a String cannot fail.
     for remark in &results.remarks {

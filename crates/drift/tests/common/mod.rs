@@ -290,7 +290,7 @@ pub fn campaign(seed: u64, planted: Option<Planted>) -> Campaign {
     series.insert(Channel::P3Command, command(&|step| step.p3_pa));
     series.insert(Channel::ValveCommand, command(&|step| step.valve_opening_ratio));
     let _ = end_s;
-    Campaign { recording: Recording { series, steps, events: Vec::new() }, eta_true }
+    Campaign { recording: Recording { series, steps, ..Recording::default() }, eta_true }
 }
 
 /// A number in 0..1 from the same stream.

@@ -105,7 +105,7 @@ pub fn record_of(rig: &Rig, visits: &Visits, seed: u64) -> Recording {
             valve_opening_ratio: boundary().valve_opening_ratio,
         })
         .collect();
-    Recording { series, steps, events: Vec::new() }
+    Recording { series, steps, ..Recording::default() }
 }
 
 pub fn declared() -> Declared {

@@ -36,6 +36,17 @@ mod tests {
         assert!((CHI_SQUARE_1_95 - ChiSquared::new(1.0).unwrap().inverse_cdf(0.95)).abs() < 1e-6);
     }
 
+    /// scipy: `scipy.stats.norm.ppf` of 0.975, 0.9995 and 1 - 0.00025/2.
+    #[test]
+    fn normal_quantiles_are_those_of_scipy() {
+        for (share, expected) in
+            [(0.975, 1.959963984540054), (0.9995, 3.2905267314919255), (0.999875, 3.662259930887615)]
+        {
+            assert!((normal_quantile(share).unwrap() - expected).abs() < 1e-6, "{share}");
+        }
+        assert_eq!(normal_quantile(1.0), None);
+    }
+
     /// scipy: `scipy.stats.t.ppf(0.975, n)` for n = 1, 2, 3, 10, 1000.
     #[test]
     fn students_quantiles_are_those_of_scipy() {

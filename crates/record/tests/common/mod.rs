@@ -28,6 +28,7 @@ pub fn batch(samples: usize) -> SampleBatch {
         columns: (0..CHANNELS.len())
             .map(|c| ChannelColumn { channel: CHANNELS[c].channel, values: column(c) })
             .collect(),
+        elements: Vec::new(),
         truth: vec![TruthColumn { name: "eta".to_owned(), unit: "1".to_owned(), values: column(30) }],
         events: vec![Event { t_s: 0.15, kind: EventKind::Note, message: "valve is 2 % off".to_owned() }],
     }
@@ -39,6 +40,9 @@ pub fn part(batch: &SampleBatch, rows: std::ops::Range<usize>) -> SampleBatch {
     part.first_sequence += rows.start as u64;
     part.t_s = batch.t_s[rows.clone()].to_vec();
     for (to, from) in part.columns.iter_mut().zip(&batch.columns) {
+        to.values = from.values[rows.clone()].to_vec();
+    }
+    for (to, from) in part.elements.iter_mut().zip(&batch.elements) {
         to.values = from.values[rows.clone()].to_vec();
     }
     for (to, from) in part.truth.iter_mut().zip(&batch.truth) {

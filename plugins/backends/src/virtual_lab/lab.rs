@@ -2,8 +2,9 @@
 
 use super::actuator::Actuator;
 use super::drift::{self, LabDrift};
+use super::elements::ElementBank;
 use super::inputs::{LOWEST_EXPANSION_RATIO, LabInputs};
-use super::samples::{Instant, SampleCollector};
+use super::samples::{Instant, Readers, SampleCollector};
 use super::sensor::Sensor;
 use super::settings::{LabSettings, Start};
 use crate::setpoint_limits;
@@ -55,8 +56,7 @@ struct Armed {
     machine: Option<Machine>,
     wanted: RigMode,
     tripped: bool,
-    sensors: Vec<(Channel, Sensor)>,
-    followers: Vec<ChannelFollower>,
+    readers: Readers,
     commands: Option<Setpoints>,
     now_s: f64,
     next_sequence: u64,
@@ -130,11 +130,18 @@ impl Backend for VirtualLab {
             },
             wanted: RigMode::Standstill,
             tripped: false,
-            sensors,
-            followers: CHANNELS
-                .iter()
-                .map(|row| ChannelFollower::new(*settings.instruments.path(row.channel)))
-                .collect(),
+            readers: Readers {
+                sensors,
+                followers: CHANNELS
+                    .iter()
+                    .map(|row| ChannelFollower::new(*settings.instruments.path(row.channel)))
+                    .collect(),
+                several: settings
+                    .redundant
+                    .iter()
+                    .map(|(channel, of)| ElementBank::new(*channel, of, sample_s, settings.seed))
+                    .collect(),
+            },
             commands: None,
             now_s: 0.0,
             next_sequence: 0,
@@ -229,7 +236,7 @@ fn running(settings: &LabSettings, t_s: f64, state: State) -> Simulator {
 
 impl Armed {
     fn advance(&mut self, settings: &LabSettings, until_s: f64) -> Result<SampleBatch, BackendError> {
-        let mut batch = SampleCollector::new(self.next_sequence);
+        let mut batch = SampleCollector::new(self.next_sequence, &self.readers);
         // A time before the first sample, or none at all, asks for nothing.
         let asks_for_the_first = self.next_sequence == 0 && until_s >= 0.0;
         while self.now_s < until_s || (self.now_s == 0.0 && asks_for_the_first) {
@@ -299,7 +306,7 @@ impl Armed {
         let first_index = self.next_sequence + batch.len() as u64;
         let rate_hz = settings.sample_rate_hz;
         let sample_times_s = (first_index..).map(|index| index as f64 / rate_hz).take_while(|t| *t <= end_s);
-        let Armed { inputs, machine, sensors, followers, commands, .. } = self;
+        let Armed { inputs, machine, readers, commands, .. } = self;
         match machine {
             None => Err(BackendError::OutOfOrder {
                 call: "poll",
@@ -320,7 +327,7 @@ impl Armed {
                             tt_k: state.tt_k,
                             running: Some((state, outputs)),
                         };
-                        batch.push(t_s, &instant, commands.as_ref(), sensors, followers, settings);
+                        batch.push(t_s, &instant, commands.as_ref(), readers, settings);
                     },
                     |event| crossings.push(event),
                 );
@@ -352,7 +359,7 @@ impl Armed {
                     let StandstillState { tc_k, tt_k } = relax_to(t_s);
                     let boundary = inputs.at(t_s);
                     let instant = Instant { speed_rpm: 0.0, boundary, tc_k, tt_k, running: None };
-                    batch.push(t_s, &instant, commands.as_ref(), sensors, followers, settings);
+                    batch.push(t_s, &instant, commands.as_ref(), readers, settings);
                 }
                 relax_to(end_s);
                 Ok(end_s)

@@ -1,9 +1,12 @@
 //! A gas stand that exists in equations only: the lumped model, actuators, sensors, standstill, surge, overspeed.
 
 mod actuator;
+mod draws;
 mod drift;
 mod drift_file;
 mod effects_file;
+mod elements;
+mod elements_file;
 mod inputs;
 mod lab;
 mod samples;
@@ -17,6 +20,7 @@ mod weather;
 
 pub use actuator::ActuatorDynamics;
 pub use drift::{Drifting, LabDrift};
+pub use elements::{LabElement, LabElements};
 pub use lab::{NAME, VirtualLab};
 pub use sensor::SensorErrors;
 pub use setting_problem::SettingProblem;

@@ -1,10 +1,11 @@
 //! What the lab's sensors read: the model's values through taps, lags and errors, collected into a batch.
 
 use super::drift;
+use super::elements::ElementBank;
 use super::sensor::Sensor;
 use super::settings::LabSettings;
 use super::truth::TruthRecorder;
-use mapper_core::{CHANNELS, Channel, ChannelColumn, Event, SampleBatch, Setpoints};
+use mapper_core::{CHANNELS, Channel, ChannelColumn, ElementColumn, Event, SampleBatch, Setpoints};
 use mapper_physics::instruments::{self, ChannelFollower};
 use mapper_physics::model::{Outputs, PreparedModel, State};
 use mapper_physics::params::BoundaryConditions;
@@ -29,20 +30,31 @@ impl Instant<'_> {
     }
 }
 
+/// Everything that reads.
+#[derive(Debug)]
+pub(super) struct Readers {
+    pub(super) sensors: Vec<(Channel, Sensor)>,
+    pub(super) followers: Vec<ChannelFollower>,
+    /// Channels with several sensors.
+    pub(super) several: Vec<ElementBank>,
+}
+
 /// Collects samples into columns.
 pub(super) struct SampleCollector {
     first_sequence: u64,
     t_s: Vec<f64>,
     columns: Vec<Vec<f64>>,
+    elements: Vec<ElementColumn>,
     truth: TruthRecorder,
 }
 
 impl SampleCollector {
-    pub(super) fn new(first_sequence: u64) -> Self {
+    pub(super) fn new(first_sequence: u64, readers: &Readers) -> Self {
         SampleCollector {
             first_sequence,
             t_s: Vec::new(),
             columns: vec![Vec::new(); CHANNELS.len()],
+            elements: readers.several.iter().flat_map(ElementBank::columns).collect(),
             truth: TruthRecorder::default(),
         }
     }
@@ -58,8 +70,7 @@ impl SampleCollector {
         t_s: f64,
         instant: &Instant<'_>,
         commands: Option<&Setpoints>,
-        sensors: &mut [(Channel, Sensor)],
-        followers: &mut [ChannelFollower],
+        readers: &mut Readers,
         settings: &LabSettings,
     ) {
         self.t_s.push(t_s);
@@ -70,6 +81,8 @@ impl SampleCollector {
             0.0
         };
         let prepared = instant.running.map(|_| settings.model.prepare(&instant.boundary));
+        let Readers { sensors, followers, several } = readers;
+        let mut elements = self.elements.iter_mut();
         for ((row, column), follower) in CHANNELS.iter().zip(&mut self.columns).zip(followers) {
             let total = true_value(row.channel, instant, prepared.as_ref(), commands, swing);
             let truth = match settings.static_tap_pipe_diameters_m.get(&row.channel) {
@@ -78,9 +91,16 @@ impl SampleCollector {
             };
             let uneven = settings.uneven_at_rest.get(&row.channel).filter(|_| instant.running.is_none());
             let truth = follower.read(t_s, truth) + uneven.copied().unwrap_or(0.0);
+            let drifted = |reading| drift::drifted_reading(&settings.drifts, row.channel, t_s, reading);
+            if let Some(bank) = several.iter_mut().find(|bank| bank.channel == row.channel) {
+                let pipe_diameter_m = settings.model.params.compressor.outlet_diameter_m;
+                let (readings, together) = bank.read(t_s, truth, instant.outputs(), pipe_diameter_m, drifted);
+                readings.iter().zip(&mut elements).for_each(|(reading, column)| column.values.push(*reading));
+                column.push(together);
+                continue;
+            }
             let sensor = sensors.iter_mut().find(|(channel, _)| *channel == row.channel);
-            let reading = sensor.map_or(truth, |(_, sensor)| sensor.read(truth));
-            column.push(drift::drifted_reading(&settings.drifts, row.channel, t_s, reading));
+            column.push(drifted(sensor.map_or(truth, |(_, sensor)| sensor.read(truth))));
         }
         self.truth.push(instant.speed_rpm, instant.tc_k, instant.tt_k, instant.outputs());
     }
@@ -90,6 +110,7 @@ impl SampleCollector {
         SampleBatch {
             first_sequence: self.first_sequence,
             columns: columns.map(|(row, values)| ChannelColumn { channel: row.channel, values }).collect(),
+            elements: self.elements,
             truth: self.truth.finish(),
             t_s: self.t_s,
             events,

@@ -1,9 +1,10 @@
 //! What can be wrong with a value below `virtual_lab:`.
 
 use super::lab::NAME;
-use mapper_core::{BackendError, with_unit};
+use mapper_core::{BackendError, Channel, with_unit};
 use mapper_physics::effect::EffectError;
 use mapper_yaml::units::{Kind, UnitError};
+use std::ops::RangeInclusive;
 
 /// What is wrong with one of the lab's settings. [`BackendError::Settings`] carries it beside the key.
 #[derive(Debug, thiserror::Error)]
@@ -90,6 +91,22 @@ pub enum SettingProblem {
         /// What was written, s.
         over_s: f64,
     },
+    /// A fault of a sensor that the channel does not have.
+    #[error(
+        "{channel} has {count} sensors of which one could fail: name one of several that the campaign declares"
+    )]
+    NoElement {
+        /// The channel.
+        channel: Channel,
+        /// How many of several sensors it has; 0 where it has but one.
+        count: usize,
+    },
+    /// A probe where none is simulated.
+    #[error("only the probes of T2 have a tip here: write `lag` for {channel}")]
+    NoProbe {
+        /// The channel.
+        channel: Channel,
+    },
     /// A drift after which the machine has no meaning.
     #[error("{text} is beyond {} %", 100.0 * limit_ratio)]
     DriftTooLarge {
@@ -105,4 +122,16 @@ impl SettingProblem {
     pub(super) fn at(self, path: impl Into<String>) -> BackendError {
         BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(self) }
     }
+}
+
+/// Refuses a value outside its range.
+pub(super) fn within(
+    value: f64,
+    unit: &'static str,
+    range: RangeInclusive<f64>,
+) -> Result<(), SettingProblem> {
+    if range.contains(&value) {
+        return Ok(());
+    }
+    Err(SettingProblem::OutOfRange { value, unit, low: *range.start(), high: *range.end() })
 }

@@ -2,6 +2,7 @@
 
 use super::actuator::ActuatorDynamics;
 use super::drift::LabDrift;
+use super::elements::LabElements;
 use super::sensor::SensorErrors;
 use super::weather::Weather;
 use mapper_core::Channel;
@@ -45,6 +46,8 @@ pub struct LabSettings {
     pub oil_actuator: ActuatorDynamics,
     /// Errors of the sensors; channels without an entry are ideal.
     pub sensors: BTreeMap<Channel, SensorErrors>,
+    /// Channels with several sensors, which read in place of the one in `sensors`.
+    pub redundant: BTreeMap<Channel, LabElements>,
     /// What the sensors see at rest beyond what the cell has throughout, in the channel's unit: no rig is quite even.
     pub uneven_at_rest: BTreeMap<Channel, f64>,
     /// What drifts while the lab runs.
@@ -83,6 +86,7 @@ impl LabSettings {
             valve_actuator: at_once,
             oil_actuator: at_once,
             sensors: BTreeMap::new(),
+            redundant: BTreeMap::new(),
             uneven_at_rest: BTreeMap::new(),
             drifts: Vec::new(),
             static_tap_pipe_diameters_m: BTreeMap::new(),

@@ -1,10 +1,12 @@
 //! The lab's settings as a campaign writes them below `backend: {virtual_lab: ...}`.
 
 use super::actuator::ActuatorDynamics;
+use super::draws::{Draws, draw, offset_kind};
 use super::drift_file::{self, DriftFile};
 use super::effects_file::{EffectValues, put_in};
+use super::elements_file::{self, FaultFile};
 use super::sensor::SensorErrors;
-use super::setting_problem::SettingProblem;
+use super::setting_problem::{SettingProblem, within};
 use super::settings::{LabSettings, Start};
 use super::tolerances::draw_tolerances;
 use super::weather::Weather;
@@ -15,15 +17,11 @@ use mapper_physics::model::Model;
 use mapper_physics::nominal_rig::NominalRig;
 use mapper_physics::params::Params;
 use mapper_yaml::units::{
-    Conductance, Dimension, Duration, Fraction, Frequency, Kind, Length, PressureRate, Quantity, RatioRate,
-    Speed, TemperatureRate,
+    Conductance, Dimension, Duration, Fraction, Frequency, Length, PressureRate, Quantity, RatioRate, Speed,
+    TemperatureRate,
 };
-use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::ops::RangeInclusive;
 
 /// The keys below `virtual_lab`. Everything may be left out.
 #[derive(Debug, Default, Deserialize)]
@@ -41,6 +39,8 @@ struct SettingsFile {
     offset_of: BTreeMap<Channel, String>,
     /// What the machine has that the declared one has not.
     effects: BTreeMap<String, EffectValues>,
+    /// Which of several sensors of a channel is off, slow or stuck.
+    faults: Vec<FaultFile>,
     /// What drifts while the lab runs.
     drift: Vec<DriftFile>,
     /// `calm` (the default) or `wandering`.
@@ -130,11 +130,6 @@ struct MachineFile {
     oil_conductance: Option<Quantity<Conductance>>,
 }
 
-/// Shares of white and of first-order noise (2 s) in the declared standard deviation: 0.8 and 0.6 in quadrature.
-const WHITE_SHARE: f64 = 0.8;
-const COLOURED_SHARE: f64 = 0.6;
-const COLOURED_TIME_CONSTANT_S: f64 = 2.0;
-
 /// Reads a campaign's settings for the virtual lab.
 ///
 /// # Errors
@@ -162,6 +157,12 @@ pub fn read_settings(
     }
     put_in(&mut rig, &file.effects, &nominal.effects)?;
     let actuators = &file.actuators;
+    let draws = Draws {
+        seed: nominal.seed,
+        noise_ratio: if file.noise == NoiseName::Declared { 1.0 } else { 0.0 },
+        drawn: file.offsets == OffsetsName::Drawn,
+    };
+    let offset_of = offsets_of(&file)?;
     let mut lab = LabSettings {
         model: rig.model.clone(),
         instruments: Instruments::default(),
@@ -179,7 +180,8 @@ pub fn read_settings(
         t3_actuator: actuators.turbine_inlet_temperature.dynamics("turbine_inlet_temperature", 20.0, 10.0)?,
         valve_actuator: actuators.valve.dynamics("valve", 0.2, 1.0)?,
         oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", 30.0, 1.0)?,
-        sensors: sensors(&file, nominal)?,
+        sensors: sensors(&offset_of, nominal, &draws),
+        redundant: elements_file::read(&file.faults, nominal, &draws, &offset_of)?,
         uneven_at_rest: match file.offsets {
             OffsetsName::Drawn => uneven_at_rest(nominal),
             OffsetsName::None => BTreeMap::new(),
@@ -227,45 +229,29 @@ fn true_params(mut params: Params, file: &MachineFile) -> Result<Params, Backend
     Ok(params)
 }
 
-fn sensors(
-    file: &SettingsFile,
-    nominal: &NominalRig,
-) -> Result<BTreeMap<Channel, SensorErrors>, BackendError> {
-    let noise = if file.noise == NoiseName::Declared { 1.0 } else { 0.0 };
-    let mut sensors: BTreeMap<Channel, SensorErrors> = nominal
-        .sensors
-        .iter()
-        .map(|(channel, declared)| {
-            let (offset, gain) = match file.offsets {
-                OffsetsName::Drawn => draw(nominal.seed, *channel),
-                OffsetsName::None => (0.0, 0.0),
-            };
-            let errors = SensorErrors {
-                white_sigma: noise * WHITE_SHARE * declared.noise_sigma,
-                coloured_sigma: noise * COLOURED_SHARE * declared.noise_sigma,
-                coloured_time_constant_s: COLOURED_TIME_CONSTANT_S,
-                offset: offset * declared.offset_sigma,
-                gain_ratio: gain * declared.gain_sigma_ratio,
-            };
-            (*channel, errors)
-        })
-        .collect();
-    for (channel, text) in &file.offset_of {
+/// Offsets of single channels, in their units.
+fn offsets_of(file: &SettingsFile) -> Result<BTreeMap<Channel, f64>, BackendError> {
+    let parse = |(channel, text): (&Channel, &String)| {
         let kind = offset_kind(*channel);
         let offset = mapper_yaml::units::parse(kind, text)
             .map_err(|source| SettingProblem::Quantity { kind, source }.at(format!("offset_of.{channel}")))?;
-        sensors.entry(*channel).or_default().offset = offset;
-    }
-    Ok(sensors)
+        Ok((*channel, offset))
+    };
+    file.offset_of.iter().map(parse).collect()
 }
 
-/// Two standard normal numbers that belong to one sensor of one seed: for its offset and for its gain.
-fn draw(seed: u64, channel: Channel) -> (f64, f64) {
-    // Another stream than the sensor's noise: that one starts from the same seed with other multipliers.
-    let mixed =
-        seed.wrapping_mul(0xA24B_AED4_963E_E407) ^ (channel as u64 + 1).wrapping_mul(0x9FB2_1C65_1E98_DF25);
-    let mut random = Pcg64::seed_from_u64(mixed);
-    (StandardNormal.sample(&mut random), StandardNormal.sample(&mut random))
+fn sensors(
+    offset_of: &BTreeMap<Channel, f64>,
+    nominal: &NominalRig,
+    draws: &Draws,
+) -> BTreeMap<Channel, SensorErrors> {
+    let declared = nominal.sensors.iter();
+    let mut sensors: BTreeMap<Channel, SensorErrors> =
+        declared.map(|(channel, declared)| (*channel, draws.errors(declared, *channel as u64))).collect();
+    for (channel, offset) in offset_of {
+        sensors.entry(*channel).or_default().offset = *offset;
+    }
+    sensors
 }
 
 /// Drawn from the declared evenness of the soak; nothing where there is none.
@@ -273,34 +259,16 @@ fn uneven_at_rest(nominal: &NominalRig) -> BTreeMap<Channel, f64> {
     let Some(soak) = nominal.soak else { return BTreeMap::new() };
     // Another stream than that of the offsets.
     let seed = nominal.seed ^ 0x6A09_E667_F3BC_C908;
-    let drawn = |channel: Channel, sigma: f64| (channel, sigma * draw(seed, channel).0);
+    let drawn = |channel: Channel, sigma: f64| (channel, sigma * draw(seed, channel as u64).0);
     let temperatures = [Channel::T1, Channel::T2, Channel::Tc, Channel::TOil];
     let temperatures = temperatures.map(|channel| drawn(channel, soak.temperature_sigma_k));
     let pressures = [Channel::P1, Channel::P2].map(|channel| drawn(channel, soak.pressure_sigma_pa));
     temperatures.into_iter().chain(pressures).collect()
 }
 
-fn offset_kind(channel: Channel) -> Kind {
-    match channel.info().dimension {
-        mapper_core::Dimension::RotationalSpeed => Kind::Speed,
-        mapper_core::Dimension::MassFlow => Kind::MassFlow,
-        mapper_core::Dimension::Pressure => Kind::PressureDifference,
-        mapper_core::Dimension::Temperature => Kind::TemperatureDifference,
-        mapper_core::Dimension::Ratio => Kind::Fraction,
-    }
-}
-
 /// The unit in which a rate is kept.
 fn rate_unit<Rate: Dimension>() -> &'static str {
     Rate::KIND.units().first().map_or("", |unit| unit.symbol())
-}
-
-/// Refuses a value outside its range.
-fn within(value: f64, unit: &'static str, range: RangeInclusive<f64>) -> Result<(), SettingProblem> {
-    if range.contains(&value) {
-        return Ok(());
-    }
-    Err(SettingProblem::OutOfRange { value, unit, low: *range.start(), high: *range.end() })
 }
 
 #[cfg(test)]
@@ -317,6 +285,7 @@ mod tests {
             boundary: BoundaryConditions::default(),
             speed_max_rpm: 180e3,
             sensors: [(Channel::T1, declared), (Channel::T2, declared)].into(),
+            redundant: BTreeMap::new(),
             static_tap_pipe_diameters_m: BTreeMap::new(),
             soak: None,
             tolerances: ModelTolerances::default(),

@@ -6,7 +6,7 @@ use crate::progress::Progress;
 use crate::{output, registry};
 use clap::Args;
 use mapper_drift::DriftReport;
-use mapper_report::{gap_page, gap_text, zero_text};
+use mapper_report::{gap_page, gap_text, sensors_text, zero_text};
 use mapper_session::{Recorded, Session, SessionError, write_new};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -54,9 +54,12 @@ impl Diagnose {
             let mut value = serde_json::to_value(diagnosis).map_err(SessionError::from)?;
             value["drift"] = gap.drift.as_ref().map_or(Value::Null, drift_json);
             value["zero"] = json!(gap.zero);
+            if !gap.sensors.is_empty() {
+                value["sensors"] = json!(gap.sensors);
+            }
             return output::print_json(&value);
         }
-        output::print(&(gap_text(diagnosis) + zero_text(&gap.zero).as_str()))
+        output::print(&[gap_text(diagnosis), sensors_text(&gap.sensors), zero_text(&gap.zero)].concat())
     }
 }
 

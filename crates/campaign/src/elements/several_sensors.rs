@@ -1,0 +1,148 @@
+//! Several sensors of one channel below `sensors:`: alike by their `count`, or a list.
+
+use crate::checking::Check;
+use mapper_core::{Channel, DeclaredElement, DeclaredUncertainty, Element, MAX_ELEMENTS, RedundantSensors};
+use mapper_yaml::{FindingKind, Node, Step, steps};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// One sensor as declared; one standard deviation throughout, in the channel's unit (K, Pa, kg/s, rpm).
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct SensorDeclaration {
+    /// Noise, offset left after calibration, gain; of several sensors what they are together.
+    pub declared: DeclaredUncertainty,
+    /// Inner diameter of the pipe at a static tap, m; `None` where the total value is measured.
+    pub static_tap_pipe_diameter_m: Option<f64>,
+    /// Diameter of the probe's tip, m; 0 is a probe without inertia. Of several sensors that of the one probe that lags as they
+    /// do together.
+    pub probe_diameter_m: f64,
+    /// Each of several sensors; `None` where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub redundant: Option<RedundantSensors>,
+}
+
+/// The sensors of a channel: one, several alike (`count`), or a list.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(crate) enum Sensors<S> {
+    /// One sensor, or as many like it as `count` says.
+    Alike(S),
+    /// Each sensor by itself.
+    Each(#[schemars(length(min = 1, max = 16))] Vec<S>),
+}
+
+/// One entry of `sensors:`.
+pub(crate) trait Sensor {
+    /// What is declared of it by itself.
+    fn declaration(&self) -> SensorDeclaration;
+
+    /// What it says of the other sensors of its channel.
+    fn several(&self) -> Several<'_>;
+}
+
+/// What an entry says of several sensors.
+pub(crate) struct Several<'a> {
+    /// How many there are like it.
+    pub count: usize,
+    /// What it is called.
+    pub name: Option<&'a str>,
+    /// Offset shared by all, in the channel's unit.
+    pub common_offset: f64,
+}
+
+impl<S: Sensor> Sensors<S> {
+    /// What is declared of the channel.
+    pub(crate) fn declaration(&self, channel: Channel) -> SensorDeclaration {
+        let members: Vec<&S> = match self {
+            Sensors::Alike(sensor) => vec![sensor; sensor.several().count],
+            Sensors::Each(sensors) => sensors.iter().collect(),
+        };
+        let common_offset_sigma =
+            members.iter().map(|sensor| sensor.several().common_offset).fold(0.0, f64::max);
+        let element = |(index, sensor): (usize, &&S)| {
+            let SensorDeclaration { declared, probe_diameter_m, .. } = sensor.declaration();
+            let usual = || Element { channel, number: index + 1 }.to_string();
+            let name = sensor.several().name.map_or_else(usual, str::to_owned);
+            DeclaredElement { name, declared, probe_diameter_m }
+        };
+        let redundant = RedundantSensors {
+            elements: members.iter().enumerate().map(element).collect(),
+            common_offset_sigma,
+        };
+        let first = match self {
+            Sensors::Alike(sensor) => sensor.declaration(),
+            // The list is checked to have one at least.
+            Sensors::Each(sensors) => match sensors.first() {
+                Some(sensor) => sensor.declaration(),
+                None => return SensorDeclaration::default(),
+            },
+        };
+        let declared = redundant.fused(|_| true);
+        if members.len() < 2 {
+            let offset_sigma = first.declared.offset_sigma.hypot(common_offset_sigma);
+            return SensorDeclaration {
+                declared: DeclaredUncertainty { offset_sigma, ..first.declared },
+                ..first
+            };
+        }
+        let probe_diameter_m = redundant.probe_diameter_m(|_| true);
+        SensorDeclaration { declared, probe_diameter_m, redundant: Some(redundant), ..first }
+    }
+}
+
+/// The places of the sensors of a channel in the file.
+pub(crate) fn each_place(check: &Check<'_>, symbol: &str) -> Vec<Vec<Step>> {
+    let channel = steps!["sensors", symbol];
+    match check.count(&channel) {
+        0 => vec![channel.to_vec()],
+        count => (0..count.min(MAX_ELEMENTS)).map(|index| [&channel[..], &steps![index]].concat()).collect(),
+    }
+}
+
+/// What the sensors of one channel may not say of each other.
+pub(crate) fn check_several(check: &mut Check<'_>, symbol: &str) {
+    let places = each_place(check, symbol);
+    let is_list = check.count(&steps!["sensors", symbol]) > 0;
+    let at = |place: &[Step], key: &str| [place, &steps![key]].concat();
+    let (misplaced, remedy) = if is_list {
+        ("count", "a list names each sensor by itself: leave `count` out, or write one mapping with it")
+    } else {
+        ("name", "a name tells the sensors of a list apart: write a list, or leave it out")
+    };
+    for place in &places {
+        let path = at(place, misplaced);
+        if check.get(&path).is_some() {
+            let message = format!("`{misplaced}` says nothing here");
+            check.note(FindingKind::Conflict, &path, message, remedy);
+        }
+    }
+    // One place in the flow and one calibration bath have one value each.
+    for key in ["common_offset", "tap", "pipe_diameter"] {
+        let said = |check: &Check<'_>, place: &[Step]| {
+            check.get(&at(place, key)).and_then(Node::text).map(str::to_owned)
+        };
+        let first = places.iter().find_map(|place| said(check, place));
+        let other =
+            places.iter().find(|place| said(check, place).is_some_and(|text| Some(&text) != first.as_ref()));
+        if let (Some(first), Some(other)) = (first, other) {
+            let message =
+                format!("`{key}` is {first} for another sensor of {symbol}, and holds for all of them");
+            check.note(
+                FindingKind::Conflict,
+                &at(other, key),
+                message,
+                "write the same value for each of them",
+            );
+        }
+    }
+    let mut names: Vec<String> = Vec::new();
+    for place in &places {
+        let path = at(place, "name");
+        let Some(name) = check.text(&path).map(str::to_owned) else { continue };
+        if names.contains(&name) {
+            let message = format!("another sensor of {symbol} is called `{name}` too");
+            check.note(FindingKind::Conflict, &path, message, "give each sensor of a channel its own name");
+        }
+        names.push(name);
+    }
+}

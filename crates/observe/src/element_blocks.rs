@@ -1,0 +1,74 @@
+//! The readings of several sensors as means over common short stretches, however each of them was sampled.
+
+use crate::plausible::is_reading;
+use mapper_core::{Channel, Series};
+
+/// Length of a block, s: longer than the memory of usual noise matters, shorter than the lag of a probe that is too large.
+const BLOCK_S: f64 = 2.0;
+/// Most blocks of a recording; a longer one has longer blocks.
+const MOST_BLOCKS: f64 = 100_000.0;
+
+/// Means of each sensor, block by block; NaN where it gives none.
+#[derive(Debug, Clone)]
+pub(crate) struct Blocks {
+    pub(crate) start_s: f64,
+    pub(crate) length_s: f64,
+    /// By sensor.
+    pub(crate) means: Vec<Vec<f64>>,
+    /// Usual number of samples in a block, by sensor.
+    pub(crate) samples: Vec<usize>,
+}
+
+impl Blocks {
+    /// The blocks of these sensors of a channel; `None` where none of them has a reading.
+    pub(crate) fn new(channel: Channel, sensors: &[Option<&Series>]) -> Option<Blocks> {
+        let all = || sensors.iter().flatten();
+        let start_s = all().filter_map(|series| series.t_s.first().copied()).reduce(f64::min)?;
+        let end_s = all().filter_map(|series| series.t_s.last().copied()).reduce(f64::max)?;
+        let span_s = (end_s - start_s).max(0.0);
+        if !span_s.is_finite() {
+            return None;
+        }
+        let length_s = BLOCK_S.max(span_s / MOST_BLOCKS);
+        let count = (span_s / length_s) as usize + 1;
+        let (mut means, mut samples) = (Vec::new(), Vec::new());
+        for series in sensors {
+            let mut sums = vec![(0.0, 0usize); count];
+            for (t_s, value) in series.iter().flat_map(|series| series.t_s.iter().zip(&series.values)) {
+                let block = sums.get_mut(((t_s - start_s) / length_s) as usize);
+                if let Some((sum, read)) = block.filter(|_| is_reading(channel, *value)) {
+                    (*sum, *read) = (*sum + value, *read + 1);
+                }
+            }
+            let all: usize = sums.iter().map(|(_, read)| read).sum();
+            let with_any = sums.iter().filter(|(_, read)| *read > 0).count().max(1);
+            samples.push(all / with_any);
+            means.push(sums.into_iter().map(|(sum, read)| sum / read as f64).collect());
+        }
+        Some(Blocks { start_s, length_s, means, samples })
+    }
+
+    /// Number of blocks.
+    pub(crate) fn count(&self) -> usize {
+        self.means.first().map_or(0, Vec::len)
+    }
+
+    /// The mean of these sensors with these weights, block by block; NaN where one of them is missing.
+    pub(crate) fn weighted(&self, weights: &[f64]) -> Vec<f64> {
+        let at = |block: usize| {
+            let used = weights.iter().zip(&self.means).filter(|(weight, _)| **weight > 0.0);
+            used.map(|(weight, means)| weight * means[block]).sum()
+        };
+        (0..self.count()).map(at).collect()
+    }
+
+    /// How fast a sensor's reading changes at each block, in its unit per second; NaN at both ends and beside gaps.
+    pub(crate) fn slope_s(&self, sensor: usize) -> Vec<f64> {
+        let means = &self.means[sensor];
+        let at = |block: usize| match (block.checked_sub(1), means.get(block + 1)) {
+            (Some(before), Some(after)) => (after - means[before]) / (2.0 * self.length_s),
+            _ => f64::NAN,
+        };
+        (0..means.len()).map(at).collect()
+    }
+}

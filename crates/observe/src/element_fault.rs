@@ -1,0 +1,180 @@
+//! What was made of the several sensors of a channel: which are left out and why, in values and in words.
+
+use mapper_core::{Channel, DeclaredUncertainty, Element};
+use serde::Serialize;
+use std::fmt;
+
+/// Why one of several sensors is left out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fault {
+    /// It reads something else than the others.
+    Off {
+        /// Its reading minus theirs, in the channel's unit.
+        by: f64,
+        /// The same in declared standard deviations of that difference.
+        sigmas: f64,
+    },
+    /// It follows changes later than the others, or earlier.
+    Slow {
+        /// Its lag minus theirs, s.
+        lag_s: f64,
+    },
+    /// It stands still while the others do not.
+    Stuck {
+        /// Run time from which on it does, s.
+        from_s: f64,
+        /// What it reads, in the channel's unit.
+        reading: f64,
+    },
+    /// It gives no reading for much of the time.
+    Silent {
+        /// Share of the recording without one.
+        missing_ratio: f64,
+    },
+}
+
+/// One of several sensors that is left out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FaultyElement {
+    /// Which.
+    pub element: Element,
+    /// What people call it.
+    pub name: String,
+    /// With how many it was compared.
+    pub others: usize,
+    /// Why.
+    pub fault: Fault,
+}
+
+impl fmt::Display for FaultyElement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (name, unit) = (&self.name, self.element.channel.unit());
+        let others = match self.others {
+            1 => "the other one".to_owned(),
+            others => format!("the other {others}"),
+        };
+        match self.fault {
+            Fault::Off { by, sigmas } => {
+                let side = if by < 0.0 { "below" } else { "above" };
+                write!(f, "{name} reads {} {unit} {side} {others} ({sigmas:.1} sigma)", Short(by.abs()))?;
+            }
+            Fault::Slow { lag_s } => {
+                let later = if lag_s < 0.0 { "earlier" } else { "later" };
+                write!(f, "{name} follows changes {:.1} s {later} than {others}", lag_s.abs())?;
+            }
+            Fault::Stuck { from_s, reading } => {
+                write!(
+                    f,
+                    "{name} stands still at {reading:.6} {unit} from {from_s:.0} s on, {others} do not"
+                )?;
+            }
+            Fault::Silent { missing_ratio } => {
+                write!(f, "{name} gives no reading for {:.0} % of the time", 100.0 * missing_ratio)?;
+            }
+        }
+        f.write_str(": left out")
+    }
+}
+
+/// A difference of any size in few digits.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            value if value >= 100.0 => write!(f, "{value:.0}"),
+            value if value >= 0.01 => write!(f, "{value:.2}"),
+            value => write!(f, "{value:.2e}"),
+        }
+    }
+}
+
+/// Sensors that contradict each other without it being known which is wrong.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Contradiction {
+    /// The one that differs most from the others in use.
+    pub name: String,
+    /// How it differs.
+    pub fault: Fault,
+    /// Largest distance of a sensor in use from the fused reading, in the channel's unit: it widens the declared offset.
+    pub widened_by: f64,
+}
+
+/// What the several sensors of a channel became.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FusedChannel {
+    /// The channel.
+    pub channel: Channel,
+    /// How many sensors it has.
+    pub sensors: usize,
+    /// Those left out.
+    pub left_out: Vec<FaultyElement>,
+    /// That those left contradict each other.
+    pub contradiction: Option<Contradiction>,
+    /// Uncertainty of the fused reading.
+    pub declared: DeclaredUncertainty,
+    /// Diameter of the one probe, m, that lags as the sensors in use do together.
+    pub probe_diameter_m: f64,
+}
+
+impl FusedChannel {
+    /// Whether the sensor of this number, from 1, is in use.
+    pub fn uses(&self, number: usize) -> bool {
+        !self.left_out.iter().any(|faulty| faulty.element.number == number)
+    }
+}
+
+impl fmt::Display for FusedChannel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unit = self.channel.unit();
+        let DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio } = self.declared;
+        let in_use = self.sensors - self.left_out.len().min(self.sensors);
+        write!(
+            f,
+            "{}: {in_use} of {} sensors, together with noise {} {unit} and offset {} {unit}",
+            self.channel,
+            self.sensors,
+            Short(noise_sigma),
+            Short(offset_sigma)
+        )?;
+        if gain_sigma_ratio > 0.0 {
+            write!(f, ", gain {:.2} %", 100.0 * gain_sigma_ratio)?;
+        }
+        for faulty in &self.left_out {
+            write!(f, "; {faulty}")?;
+        }
+        if let Some(Contradiction { name, fault, widened_by }) = &self.contradiction {
+            let what = match fault {
+                Fault::Off { by, sigmas } => {
+                    format!("reads {:+.2} {unit} off the others ({sigmas:.1} sigma)", by)
+                }
+                Fault::Slow { lag_s } => format!("follows changes {lag_s:+.1} s after the others"),
+                Fault::Stuck { .. } | Fault::Silent { .. } => "does not follow the others".to_owned(),
+            };
+            write!(
+                f,
+                "; {name} {what}, and it is not known which of them is wrong: all are used, and the offset contains them (+/- {} {unit})",
+                Short(*widened_by)
+            )?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_says_who_how_far_and_against_whom() {
+        let faulty = |fault| {
+            let element = Element { channel: Channel::T2, number: 3 };
+            FaultyElement { element, name: "T2/3".to_owned(), others: 3, fault }.to_string()
+        };
+        let off = faulty(Fault::Off { by: -1.52, sigmas: 6.1 });
+        assert_eq!(off, "T2/3 reads 1.52 K below the other 3 (6.1 sigma): left out");
+        let slow = faulty(Fault::Slow { lag_s: 7.26 });
+        assert_eq!(slow, "T2/3 follows changes 7.3 s later than the other 3: left out");
+    }
+}

@@ -231,6 +231,55 @@ fn two_maps_are_compared_in_units_and_in_their_uncertainty() {
     );
 }
 
+/// Two flow meters within their declared gain of 0.5 % measure one machine: that is no difference, and 5 % is one.
+#[test]
+fn a_declared_gain_explains_a_difference() {
+    let with_gain = |error: f64, declared: f64| {
+        let mut map = turbo_a(0.0, 21);
+        for point in map.lines.iter_mut().flat_map(|line| &mut line.points) {
+            point.flow_corrected_kg_s *= 1.0 + error;
+            point.identified.flow_corrected_kg_s *= 1.0 + error;
+            point.identified.common.flow_corrected_ratio = declared;
+        }
+        map
+    };
+    let differs = |error: f64, declared: f64| {
+        compare(&with_gain(0.0, declared), &with_gain(error, declared)).unwrap().line_differs_ratio
+    };
+    assert!(differs(0.007, 0.0) > 0.3, "without a declaration: {}", differs(0.007, 0.0));
+    assert_eq!(differs(0.007, 0.005), 0.0);
+    assert!(differs(0.05, 0.005) > 0.7, "{}", differs(0.05, 0.005));
+}
+
+/// What all points share moves the fit and is in its interval; what is a point's own is averaged.
+#[test]
+fn a_common_error_is_not_averaged_away() {
+    let with = |common: f64, own: f64| {
+        let mut map = turbo_a(own, 5);
+        for point in map.lines.iter_mut().flat_map(|line| &mut line.points) {
+            let (eta, all) = (point.eta.unwrap(), common.hypot(own));
+            point.identified.common.eta = vec![common];
+            (point.identified.eta_low, point.identified.eta_high) =
+                (Some(eta - 1.96 * all), Some(eta + 1.96 * all));
+        }
+        let fit = MapFit::new(&map).unwrap();
+        let options = MapFitOptions { leave_one_out: false, ..MapFitOptions::default() };
+        let table = fit.table(&options).unwrap();
+        let nodes: Vec<_> =
+            table.lines.iter().flat_map(|line| line.nodes.clone()).filter(|n| !n.extrapolated).collect();
+        let mean = |value: fn(&mapper_core::FittedNode) -> f64| {
+            nodes.iter().map(value).sum::<f64>() / nodes.len() as f64
+        };
+        (mean(|node| node.eta_standard_error), mean(|node| node.eta_common_standard_error))
+    };
+    let (own_alone, none) = with(0.0, 0.005);
+    assert_eq!(none, 0.0);
+    let (both, common) = with(0.01, 0.005);
+    // Means of roots of sums: their own mean differs by a few percent.
+    assert!((both / own_alone.hypot(0.01) - 1.0).abs() < 0.05, "{both} with {own_alone}, of which {common}");
+    assert!((common - 0.01).abs() < 1e-9, "{common}");
+}
+
 #[test]
 fn end_lines_whose_speeds_differ_by_a_hair_are_compared() {
     let first = turbo_a(0.002, 21);

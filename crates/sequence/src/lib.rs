@@ -27,6 +27,6 @@ pub use api::{Entry, functions};
 pub use error::{ScriptError, SequenceError};
 pub use request::{OrderPoints, SequenceRequest};
 pub use result::StepResult;
-pub use runner::{Script, SequenceRunner, check};
+pub use runner::{Script, SequenceRunner};
 pub use settle::{SettleRule, SettleWatch};
 pub use step::{Hold, SequenceStep};

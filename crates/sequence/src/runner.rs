@@ -95,22 +95,6 @@ impl Drop for SequenceRunner {
     }
 }
 
-/// Says whether a script can be read.
-///
-/// # Errors
-/// [`SequenceError::Script`] with the place of the mistake.
-pub fn check(script: &Script) -> Result<(), SequenceError> {
-    // Deeply nested text takes stack, and the caller's may be small.
-    let text = script.clone();
-    std::thread::Builder::new()
-        .stack_size(STACK_BYTES)
-        .spawn(move || compile(&engine(0), &text).map(drop))
-        .map_err(SequenceError::Thread)?
-        .join()
-        .map_err(|_| SequenceError::Lost)?
-        .map_err(SequenceError::Script)
-}
-
 fn compile(engine: &Engine, script: &Script) -> Result<AST, Box<ScriptError>> {
     let fail =
         |error: &rhai::ParseError| Box::new(ScriptError::parsing(script.path.clone(), &script.text, error));

@@ -76,6 +76,10 @@ fn csv_reads_back_to_the_same_numbers() {
     }
     assert!(text.contains("# reference state of corrected flow and speed: 298 K, 100000 Pa\n"));
     assert!(text.contains("# method: dynamic\n"));
+    let back = FORMATS.find("csv").unwrap().read(text.as_bytes(), None).unwrap();
+    for (read, written) in points(&back).iter().zip(points(&map)) {
+        assert_eq!(read.identified.common, written.identified.common);
+    }
 }
 
 #[test]

@@ -38,23 +38,23 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<()> {
             continue;
         }
         let found = problem.shared[index] - problem.priors[index].mean;
-        problem.extra_variances[index] = extra_variance(weight, found.abs(), information.powf(-0.5));
-        let needed = information * (1.0 / weight.max(1e-6) - 1.0);
-        if needed > problem.priors[index].weight() {
-            problem.priors[index].sigma = needed.powf(-0.5);
-        }
+        let before = problem.priors[index].weight();
+        let drawn = (information * (1.0 / weight.max(1e-6) - 1.0)).max(before);
+        let (sigma, left) = ((information + before).powf(-0.5), 1.0 / (information + drawn));
+        problem.extra_variances[index] = extra_variance(weight, found.abs(), sigma, left);
+        problem.priors[index].sigma = drawn.powf(-0.5);
         problem.minimise(FULLY)?;
     }
 }
 
-/// Variance beyond that of the drawn fit, which is `weight` times the square of `sigma`: see above. `found`: distance of
-/// what was found from the declared value; `sigma`: its standard error.
-fn extra_variance(weight: f64, found: f64, sigma: f64) -> f64 {
+/// Variance beyond that of the drawn fit, which is `left`: see above. `found`: distance of what was found from the declared
+/// value; `sigma`: its standard error.
+fn extra_variance(weight: f64, found: f64, sigma: f64, left: f64) -> f64 {
     let plain = weight * (1.0 - weight) * found * found;
     // Where less than 2.5 % is beyond the declared value, the tail ends there.
     let Some(quantile) = normal_quantile(1.0 - (1.0 - 0.975) / weight) else { return plain };
     let reach = (found + quantile * sigma - weight * found).max(0.0) / NORMAL_975;
-    plain.max(reach * reach - weight * sigma * sigma)
+    plain.max(reach * reach - left)
 }
 
 /// Probability of each active refinement to be at work.
@@ -120,7 +120,8 @@ mod tests {
     #[test]
     fn the_interval_reaches_as_far_as_the_mixture() {
         for (weight, found, sigma) in [(0.1, 0.05, 0.02), (0.3, 0.05, 0.03), (0.9, 0.08, 0.03)] {
-            let variance = weight * sigma * sigma + extra_variance(weight, found, sigma);
+            let left = weight * sigma * sigma;
+            let variance = left + extra_variance(weight, found, sigma, left);
             let upper = weight * found + NORMAL_975 * variance.sqrt();
             let ranks = 1_000_000;
             let beyond = (1..ranks)

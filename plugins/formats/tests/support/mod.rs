@@ -92,7 +92,12 @@ fn point(step: usize, speed_rpm: f64, x: f64, valve_opening_ratio: f64) -> MapPo
         h_low_w_m2k: h.map(|h| 0.95 * h),
         h_high_w_m2k: h.map(|h| 1.05 * h),
         h_uncertainty: None,
-        common: CommonErrors::default(),
+        common: CommonErrors {
+            eta: vec![0.8 * standard_error, -0.1 * standard_error],
+            h_w_m2k: h.map(|h| 0.01 * h).into_iter().collect(),
+            flow_corrected_ratio: 0.005,
+            pressure_ratio: 0.0012 * pressure_ratio,
+        },
         method: Method::Dynamic,
         verdict,
         warnings: code

@@ -1,0 +1,141 @@
+//! What points have in common: their errors, a region that disagrees, the map they are held against.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+#[path = "common/lab.rs"]
+mod lab;
+
+use lab::{Campaign, Machine, campaign, eighteen, measured};
+use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, ReferenceState, Verdict};
+use mapper_identify::{IdentifyConfig, code, doubt_off_the_nominal_map, identify};
+use mapper_physics::model::Model;
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+
+fn found(clean: &Campaign, seed: u64, method: Method) -> Vec<IdentifiedPoint> {
+    let (recording, declared) = measured(&clean.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(seed));
+    identify(&recording, &IdentifyConfig { method, declared, ..IdentifyConfig::default() }).unwrap()
+}
+
+/// The dynamic method's common errors are what it makes of the readings when all of them are off: T2 by its declared offset.
+#[test]
+fn a_common_error_is_what_the_offset_does() {
+    let clean = campaign(&eighteen()[..6], 120.0, Machine::default());
+    let (_, declared) = measured(&clean.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(1));
+    let config = IdentifyConfig { method: Method::Dynamic, declared, ..IdentifyConfig::default() };
+    let offset_k = config.declared[&Channel::T2].offset_sigma;
+    let base = identify(&clean.recording, &config).unwrap();
+    let mut off = clean.recording.clone();
+    off.series.get_mut(&Channel::T2).unwrap().values.iter_mut().for_each(|t2_k| *t2_k += offset_k);
+    let moved = identify(&off, &config).unwrap();
+    let mut compared = 0;
+    for (base, moved) in base.iter().zip(&moved) {
+        let (Some(eta), Some(moved_eta)) = (base.eta, moved.eta) else { continue };
+        let (h, moved_h) = (base.h_w_m2k.unwrap(), moved.h_w_m2k.unwrap());
+        // T1 comes first, then T2. Linear to a few percent of itself: 0.25 K of a rise of 15 K and more.
+        let (said, said_h) = (base.common.eta[1], base.common.h_w_m2k[1]);
+        assert!((moved_eta - eta - said).abs() < 0.04 * said.abs() + 1e-5, "{} for {said}", moved_eta - eta);
+        assert!(
+            (moved_h - h - said_h).abs() < 0.04 * said_h.abs() + 1e-3 * h,
+            "{} for {said_h}",
+            moved_h - h
+        );
+        compared += 1;
+    }
+    assert!(compared >= 4, "{compared} points");
+}
+
+/// Errors over many seeds have the covariance that the points say: whitened by it, their mean square is 1. The same errors
+/// taken for independent ones (each divided by its own part alone) would come out tens of times too large.
+#[test]
+fn errors_have_the_covariance_that_is_said() {
+    let clean = campaign(&eighteen(), 120.0, Machine::default());
+    let (mut square, mut alone, mut count) = (0.0, 0.0, 0.0);
+    for seed in 0..12 {
+        let points = found(&clean, seed, Method::Joint);
+        let n = points.len();
+        let own: Vec<f64> = points.iter().map(|point| point.eta_own_standard_error().unwrap()).collect();
+        let covariance = DMatrix::from_fn(n, n, |i, j| {
+            let common: f64 =
+                points[i].common.eta.iter().zip(&points[j].common.eta).map(|(a, b)| a * b).sum();
+            // What the fit's own faults are: a few hundredths of a point.
+            common + if i == j { own[i] * own[i] + 4e-4f64.powi(2) } else { 0.0 }
+        });
+        let errors = DVector::from_iterator(
+            n,
+            points.iter().zip(&clean.truth).map(|(point, truth)| point.eta.unwrap() - truth.eta),
+        );
+        square += errors.dot(&covariance.cholesky().unwrap().solve(&errors));
+        alone += errors.iter().zip(&own).map(|(error, own)| (error / own).powi(2)).sum::<f64>();
+        count += n as f64;
+    }
+    // 12 draws of what is common and 216 own ones; smoothness makes the common part 1.2 times too wide.
+    assert!((0.3..2.0).contains(&(square / count)), "{}", square / count);
+    assert!(alone / count > 5.0, "{}", alone / count);
+}
+
+/// At the largest opening T2 answers 1.6 times as much as anywhere else, as if convection were another there. Those steps
+/// are named and left out; the others keep their verdicts and their truth.
+#[test]
+fn one_bad_region_does_not_condemn_the_rest() {
+    let speeds = [90e3, 150e3, 50e3, 130e3, 70e3, 110e3];
+    let openings = [0.5, 0.7, 1.0, 1.4, 1.8, 2.2];
+    let points: Vec<(f64, f64)> =
+        openings.into_iter().flat_map(|opening| speeds.map(|speed| (opening, speed))).collect();
+    let mut clean = campaign(&points, 120.0, Machine::default());
+    let t2 = clean.recording.series.get_mut(&Channel::T2).unwrap();
+    for step in clean.recording.steps.iter().filter(|step| step.valve_opening_ratio > 2.0) {
+        let inside = |t_s: f64| t_s >= step.start_s && t_s < step.end_s;
+        let end_k =
+            t2.t_s.iter().zip(&t2.values).filter(|(t_s, _)| inside(**t_s)).map(|(_, t2_k)| *t2_k).next_back();
+        let end_k = end_k.unwrap();
+        for (t_s, t2_k) in t2.t_s.iter().zip(&mut t2.values) {
+            if inside(*t_s) {
+                *t2_k = end_k + 1.6 * (*t2_k - end_k);
+            }
+        }
+    }
+    for seed in 1..4 {
+        let found = found(&clean, seed, Method::Joint);
+        for (point, truth) in found.iter().zip(&clean.truth) {
+            let left_out = point.warnings.iter().any(|warning| warning.code == code::LEFT_OUT);
+            assert_eq!(left_out, point.valve_opening_ratio > 2.0, "seed {seed}: {point:?}");
+            if !left_out {
+                let error = point.eta.unwrap() - truth.eta;
+                // Three standard errors: 90 points.
+                let sigma = (point.eta_high.unwrap() - point.eta_low.unwrap()) / 3.92;
+                assert!(error.abs() < 3.0 * sigma, "seed {seed}: {error} for {sigma}");
+                assert_ne!(point.verdict, Verdict::Unusable);
+            }
+        }
+        let good = found.iter().filter(|point| point.verdict == Verdict::Good).count();
+        assert!(good >= 24, "seed {seed}: {good} good");
+    }
+}
+
+/// T2 eleven declared offsets off, which the points alone cannot tell from a map that bends: the nominal map can. On sound
+/// recordings it is silent.
+#[test]
+fn the_nominal_map_tells_an_offset_beyond_its_declaration() {
+    let clean = campaign(&eighteen(), 120.0, Machine::default());
+    let map = Model::nominal().map;
+    let doubted = |recording: &Campaign, seed: u64| {
+        let mut points = found(recording, seed, Method::Joint);
+        let tolerances = ModelTolerances::default();
+        doubt_off_the_nominal_map(&mut points, map.as_ref(), ReferenceState::SAE, &tolerances);
+        let named = |point: &IdentifiedPoint| {
+            point.warnings.iter().any(|warning| warning.code == code::OFF_THE_NOMINAL_MAP)
+        };
+        points.iter().filter(|point| named(point) && point.verdict != Verdict::Good).count()
+    };
+    for seed in 0..6 {
+        assert_eq!(doubted(&clean, seed), 0, "seed {seed}");
+    }
+    let mut off = Campaign { recording: clean.recording.clone(), truth: Vec::new() };
+    off.recording.series.get_mut(&Channel::T2).unwrap().values.iter_mut().for_each(|t2_k| *t2_k += 2.75);
+    for seed in 0..3 {
+        assert_eq!(doubted(&off, seed), 18, "seed {seed}");
+    }
+}

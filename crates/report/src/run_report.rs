@@ -141,12 +141,24 @@ fn head_rows(campaign: &Campaign, plan: &Plan) -> Vec<(&'static str, String)> {
                 campaign.identification.method, campaign.identification.alpha_area_ratio
             ),
         ),
-        ("duration", duration(plan.duration_s())),
+        ("duration", whole_duration(campaign, plan)),
         ("order", plan.objective.clone()),
         ("seed", plan.seed.to_string()),
         ("campaign SHA-256", plan.made_from.campaign_sha256.clone()),
         ("model SHA-256", plan.made_from.model_sha256.clone()),
     ]
+}
+
+/// Rest and steps, as `mapper check` and `mapper plan` count them.
+fn whole_duration(campaign: &Campaign, plan: &Plan) -> String {
+    match campaign.zero {
+        Some(soak) => format!(
+            "{}, {} of it at rest",
+            duration(soak.duration_s + plan.duration_s()),
+            duration(soak.duration_s)
+        ),
+        None => duration(plan.duration_s()),
+    }
 }
 
 fn points_section(text: &mut String, campaign: &Campaign, points: &[ScoredPoint]) {

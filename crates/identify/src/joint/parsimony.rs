@@ -6,8 +6,7 @@
 //! density before (Savage and Dickey; e.g. Kass and Raftery, Bayes Factors, 1995), with an error of its own for what the
 //! model does not know. A refinement is then drawn towards the declared value by the weight of the choices without it, and
 //! what that leaves open is carried on as variance: enough that the 95 % interval about the drawn value reaches as far as
-//! 99 % of the mixture of both answers. Its plain variance would not, since the mixture has a long tail on one side; and 97.5 %
-//! would do only if machines with and without the refinement were as frequent as is believed beforehand.
+//! the mixture of both answers does. Its plain variance would not, since the mixture has a long tail on one side.
 
 use crate::joint::parameters::{ALPHA, LN_DIRECTION, PROBE_MM2, SHARED};
 use crate::joint::solve::{Covariance, FULLY, Problem};
@@ -19,8 +18,9 @@ use nalgebra::{DMatrix, DVector};
 const REFINEMENTS: [(usize, f64); 3] = [(PROBE_MM2, 0.1), (LN_DIRECTION, 0.015), (ALPHA, 0.025)];
 /// Probability beforehand that a refinement is not at work.
 pub(crate) const DECLARED_HOLDS: f64 = 0.67;
-/// Share of the mixture that may lie beyond the interval on the side of what was found.
-const BEYOND: f64 = 0.01;
+/// Share of the mixture that may lie beyond the interval on the side of what was found. With 1 % an alpha_A of 0.05 that hardly
+/// shows is contained more often, and on all other machines the intervals of h are twice as wide as its errors.
+const BEYOND: f64 = 0.025;
 /// Weight of a refinement above which it is left alone.
 const SURE: f64 = 0.999;
 
@@ -119,7 +119,7 @@ mod tests {
         DMatrix::from_diagonal(&DVector::from_iterator(errors.len(), errors.iter().map(|e| e * e)))
     }
 
-    /// The interval about the drawn value leaves 1 % of the mixture beyond it, by counting (numbers at equal ranks).
+    /// The interval about the drawn value leaves 2.5 % of the mixture beyond it, by counting (numbers at equal ranks).
     #[test]
     fn the_interval_reaches_as_far_as_the_mixture() {
         for (weight, found, sigma) in [(0.1, 0.05, 0.02), (0.3, 0.05, 0.03), (0.9, 0.08, 0.03)] {

@@ -29,6 +29,9 @@ pub(crate) struct Region {
     pub(crate) steps: Vec<usize>,
 }
 
+/// What of a place (speed and flow, scaled) puts it first in a region.
+type Rank = fn(&(f64, f64)) -> f64;
+
 /// All regions, the small ones first; those of equal size stand together.
 pub(crate) fn regions(steps: &[StepRows], reference: ReferenceState) -> Vec<Vec<Region>> {
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
@@ -36,12 +39,12 @@ pub(crate) fn regions(steps: &[StepRows], reference: ReferenceState) -> Vec<Vec<
         return Vec::new();
     };
     let coordinates: Vec<(f64, f64)> = places.iter().map(|place| scale.coordinates(*place)).collect();
-    let sorted = |of: fn(&(f64, f64)) -> f64| {
+    let sorted = |of: Rank| {
         let mut order: Vec<usize> = (0..coordinates.len()).collect();
         order.sort_by(|a, b| of(&coordinates[*a]).total_cmp(&of(&coordinates[*b])));
         order
     };
-    let ends: [(&'static str, fn(&(f64, f64)) -> f64); 4] = [
+    let ends: [(&'static str, Rank); 4] = [
         ("near choke", |place| -place.1),
         ("near surge", |place| place.1),
         ("at the lowest speeds", |place| place.0),

@@ -2,6 +2,7 @@
 
 use crate::map_fit::{MapFit, MapFitError, MapFitOptions};
 use mapper_core::{CompressorMap, FittedLine, FittedNode, confidence_interval_95};
+use mapper_numerics::polyline::NearestOnPolyline;
 use serde::Serialize;
 
 /// Nodes compared on each line.
@@ -176,21 +177,10 @@ impl Known<'_> {
         let scaled = |n: &FittedNode| {
             (n.flow_corrected_kg_s / self.flow_scale_kg_s, n.pressure_ratio / self.ratio_scale)
         };
-        let (px, py) = scaled(node);
-        let mut best: Option<(f64, usize, f64)> = None;
-        for (i, pair) in self.nodes.windows(2).enumerate() {
-            let ((ax, ay), (bx, by)) = (scaled(pair[0]), scaled(pair[1]));
-            let (dx, dy) = (bx - ax, by - ay);
-            let share = ((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy).max(1e-30);
-            let inside = share.clamp(0.0, 1.0);
-            let distance = (px - ax - inside * dx).hypot(py - ay - inside * dy);
-            let end = (i == 0 && share < -1e-6) || (i + 2 == self.nodes.len() && share > 1.0 + 1e-6);
-            if best.is_none_or(|(least, ..)| distance < least) {
-                best = Some((distance, i, if end { f64::NAN } else { inside }));
-            }
-        }
-        let (_, i, share) = best.filter(|(.., share)| share.is_finite())?;
-        let (before, after) = (self.nodes[i], self.nodes[i + 1]);
+        let line: Vec<(f64, f64)> = self.nodes.iter().map(|node| scaled(node)).collect();
+        let place = NearestOnPolyline::of(&line, scaled(node)).filter(|place| !place.beyond_end)?;
+        let (before, after) = (self.nodes[place.segment], self.nodes[place.segment + 1]);
+        let share = place.share_ratio;
         let between = |value: fn(&FittedNode) -> f64| value(before) + share * (value(after) - value(before));
         let flow_difference_kg_s = node.flow_corrected_kg_s - between(|n| n.flow_corrected_kg_s);
         let pressure_ratio_difference = node.pressure_ratio - between(|n| n.pressure_ratio);

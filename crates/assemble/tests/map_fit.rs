@@ -239,7 +239,7 @@ fn a_declared_gain_explains_a_difference() {
         for point in map.lines.iter_mut().flat_map(|line| &mut line.points) {
             point.flow_corrected_kg_s *= 1.0 + error;
             point.identified.flow_corrected_kg_s *= 1.0 + error;
-            point.identified.common.flow_corrected_ratio = declared;
+            point.identified.common.flow_corrected_standard_error_ratio = declared;
         }
         map
     };
@@ -258,7 +258,7 @@ fn a_common_error_is_not_averaged_away() {
         let mut map = turbo_a(own, 5);
         for point in map.lines.iter_mut().flat_map(|line| &mut line.points) {
             let (eta, all) = (point.eta.unwrap(), common.hypot(own));
-            point.identified.common.eta = vec![common];
+            point.identified.common.eta_changes = vec![common];
             (point.identified.eta_low, point.identified.eta_high) =
                 (Some(eta - 1.96 * all), Some(eta + 1.96 * all));
         }

@@ -12,25 +12,31 @@ use serde::{Deserialize, Serialize};
 #[serde(default)]
 pub struct CommonErrors {
     /// Changes of `eta`, fraction; empty where nothing is known to be shared.
-    pub eta: Vec<f64>,
+    pub eta_changes: Vec<f64>,
     /// Changes of `h`, W/(m2 K); empty where nothing is known to be shared.
-    pub h_w_m2k: Vec<f64>,
+    pub h_changes_w_m2k: Vec<f64>,
     /// Standard error that all corrected flows share (gain and offset of the flow meter, offsets of P1 and T1), ratio to
     /// the flow.
-    pub flow_corrected_ratio: f64,
+    pub flow_corrected_standard_error_ratio: f64,
     /// Standard error that all pressure ratios share (offsets and gains of P1 and P2), absolute.
-    pub pressure_ratio: f64,
+    pub pressure_ratio_standard_error: f64,
 }
 
 impl CommonErrors {
     /// Standard error of `eta` from what points share, fraction.
     pub fn eta_standard_error(&self) -> f64 {
-        root_sum_of_squares(&self.eta)
+        root_sum_of_squares(&self.eta_changes)
+    }
+
+    /// Covariance of the point's `eta` with that of another point of the recording, without their own parts, fraction
+    /// squared.
+    pub fn eta_covariance(&self, other: &CommonErrors) -> f64 {
+        self.eta_changes.iter().zip(&other.eta_changes).map(|(one, other)| one * other).sum()
     }
 
     /// Standard error of `h` from what points share, W/(m2 K).
     pub fn h_standard_error_w_m2k(&self) -> f64 {
-        root_sum_of_squares(&self.h_w_m2k)
+        root_sum_of_squares(&self.h_changes_w_m2k)
     }
 }
 

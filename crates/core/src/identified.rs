@@ -40,6 +40,16 @@ pub enum Verdict {
     Unusable,
 }
 
+impl Verdict {
+    /// After a reason to doubt: what is unusable stays so.
+    pub fn doubted(self) -> Self {
+        match self {
+            Verdict::Good | Verdict::Doubtful => Verdict::Doubtful,
+            Verdict::Unusable => Verdict::Unusable,
+        }
+    }
+}
+
 /// A reason to doubt a point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Warning {

@@ -85,9 +85,7 @@ impl Findings {
 
     pub(crate) fn doubt(&mut self, code: &str, message: String) {
         self.remark(code, message);
-        if self.verdict == Verdict::Good {
-            self.verdict = Verdict::Doubtful;
-        }
+        self.verdict = self.verdict.doubted();
     }
 
     pub(crate) fn refuse(&mut self, code: &str, message: String) {

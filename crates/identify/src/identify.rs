@@ -222,12 +222,12 @@ fn common_errors(state: &EndState, estimate: &Estimate, config: &IdentifyConfig)
     let flow = relative(Channel::CompressorFlow, state.flow_kg_s);
     let p1 = relative(Channel::P1, state.p1_pa);
     let p2 = relative(Channel::P2, state.p1_pa * state.pressure_ratio);
-    let [eta, h_w_m2k] = estimate.common.clone();
+    let [eta_changes, h_changes_w_m2k] = estimate.common.clone();
     CommonErrors {
-        eta,
-        h_w_m2k,
+        eta_changes,
+        h_changes_w_m2k,
         // Corrected flow goes with the root of T1 and with 1/P1.
-        flow_corrected_ratio: flow.hypot(p1).hypot(0.5 * relative(Channel::T1, state.t1_k)),
-        pressure_ratio: state.pressure_ratio * p1.hypot(p2),
+        flow_corrected_standard_error_ratio: flow.hypot(p1).hypot(0.5 * relative(Channel::T1, state.t1_k)),
+        pressure_ratio_standard_error: state.pressure_ratio * p1.hypot(p2),
     }
 }

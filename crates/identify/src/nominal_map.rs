@@ -5,6 +5,7 @@
 
 use crate::findings::code;
 use mapper_core::{IdentifiedPoint, Method, ModelTolerances, ReferenceState, Verdict, Warning};
+use mapper_numerics::polyline::NearestOnPolyline;
 use mapper_physics::characteristic::CompressorCharacteristic;
 use nalgebra::{DMatrix, DVector};
 
@@ -37,9 +38,7 @@ pub fn doubt_off_the_nominal_map(
 ) {
     let Some(message) = off_the_map(points, map, reference, tolerances) else { return };
     for point in points.iter_mut().filter(|point| point.method == Method::Joint && point.eta.is_some()) {
-        if point.verdict == Verdict::Good {
-            point.verdict = Verdict::Doubtful;
-        }
+        point.verdict = point.verdict.doubted();
         let warning = Warning { code: code::OFF_THE_NOMINAL_MAP.to_owned(), message: message.clone() };
         point.warnings.push(warning);
     }
@@ -66,29 +65,24 @@ fn nearest(
     if !(top > 1.0 && largest_kg_s > 0.0) {
         return None;
     }
-    // A little beyond both ends: a rig may reach further than its map.
-    let line: Vec<(f64, f64, f64)> = (0..=PLACES)
+    // A little beyond the surge side: a rig may reach further than its map.
+    let places: Vec<((f64, f64), f64)> = (0..=PLACES)
         .map(|k| {
             let pressure_ratio = 1.0 + (top - 1.0) * 1.03 * k as f64 / PLACES as f64;
             let place = map.evaluate(speed_corrected_rpm, pressure_ratio);
-            (place.flow_corrected_kg_s / largest_kg_s, (pressure_ratio - 1.0) / (top - 1.0), place.efficiency)
+            let at = (place.flow_corrected_kg_s / largest_kg_s, (pressure_ratio - 1.0) / (top - 1.0));
+            (at, place.efficiency)
         })
         .collect();
+    let line: Vec<(f64, f64)> = places.iter().map(|(at, _)| *at).collect();
     let here =
         (point.flow_corrected_kg_s * flow_factor / largest_kg_s, (point.pressure_ratio - 1.0) / (top - 1.0));
-    let distance = |pair: &[(f64, f64, f64)]| {
-        let ((ax, ay, _), (bx, by, _)) = (pair[0], pair[1]);
-        let (dx, dy) = (bx - ax, by - ay);
-        let share = ((here.0 - ax) * dx + (here.1 - ay) * dy) / (dx * dx + dy * dy).max(1e-30);
-        let share = share.clamp(0.0, 1.0);
-        ((here.0 - ax - share * dx).hypot(here.1 - ay - share * dy), share)
-    };
-    let (pair, (_, share)) =
-        line.windows(2).map(|pair| (pair, distance(pair))).min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    let ((ax, ay, a), (bx, by, b)) = (pair[0], pair[1]);
-    Some(Nominal { eta: a + share * (b - a), slope: (b - a) / (bx - ax).hypot(by - ay).max(1e-9) })
+    let NearestOnPolyline { segment, share_ratio, .. } = NearestOnPolyline::of(&line, here)?;
+    let (((ax, ay), a), ((bx, by), b)) = (places[segment], places[segment + 1]);
+    Some(Nominal { eta: a + share_ratio * (b - a), slope: (b - a) / (bx - ax).hypot(by - ay).max(1e-9) })
 }
 
+/// What speaks against the points, in a sentence; `None` where all is explained.
 fn off_the_map(
     points: &[IdentifiedPoint],
     map: &dyn CompressorCharacteristic,
@@ -122,7 +116,6 @@ fn off_the_map(
     let scale = SCALE_SIGMAS * tolerances.compressor_efficiency_ratio;
     let covariance = DMatrix::from_fn(count, count, |i, j| {
         let ((one, nominal, _), (other, other_nominal, _)) = (used[i], used[j]);
-        let common: f64 = one.common.eta.iter().zip(&other.common.eta).map(|(a, b)| a * b).sum();
         let own = if i == j {
             let own = one.eta_own_standard_error().unwrap_or(0.0);
             own * own + (PLACE_RATIO * nominal.slope).powi(2) + 1e-6
@@ -130,7 +123,7 @@ fn off_the_map(
             0.0
         };
         let square = ((u[i] - u[j]).powi(2) + (v[i] - v[j]).powi(2)) / (LENGTH * LENGTH);
-        common
+        one.common.eta_covariance(&other.common)
             + own
             + scale * scale * nominal.eta * other_nominal.eta
             + shape * shape * nominal.eta * other_nominal.eta * (-0.5 * square).exp()

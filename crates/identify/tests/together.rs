@@ -35,7 +35,7 @@ fn a_common_error_is_what_the_offset_does() {
         let (Some(eta), Some(moved_eta)) = (base.eta, moved.eta) else { continue };
         let (h, moved_h) = (base.h_w_m2k.unwrap(), moved.h_w_m2k.unwrap());
         // T1 comes first, then T2. Linear to a few percent of itself: 0.25 K of a rise of 15 K and more.
-        let (said, said_h) = (base.common.eta[1], base.common.h_w_m2k[1]);
+        let (said, said_h) = (base.common.eta_changes[1], base.common.h_changes_w_m2k[1]);
         assert!((moved_eta - eta - said).abs() < 0.04 * said.abs() + 1e-5, "{} for {said}", moved_eta - eta);
         assert!(
             (moved_h - h - said_h).abs() < 0.04 * said_h.abs() + 1e-3 * h,
@@ -58,8 +58,7 @@ fn errors_have_the_covariance_that_is_said() {
         let n = points.len();
         let own: Vec<f64> = points.iter().map(|point| point.eta_own_standard_error().unwrap()).collect();
         let covariance = DMatrix::from_fn(n, n, |i, j| {
-            let common: f64 =
-                points[i].common.eta.iter().zip(&points[j].common.eta).map(|(a, b)| a * b).sum();
+            let common = points[i].common.eta_covariance(&points[j].common);
             // What the fit's own faults are: a few hundredths of a point.
             common + if i == j { own[i] * own[i] + 4e-4f64.powi(2) } else { 0.0 }
         });

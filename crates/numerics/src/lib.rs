@@ -1,5 +1,5 @@
 //! Numerics that know nothing of machines: statistics, noise with memory, damped least squares, minima and roots of
-//! scalar functions, and work spread over the cores.
+//! scalar functions, nearest places, and work spread over the cores.
 //!
 //! A leaf: no other crate of the workspace is used here. What a library does as well is the library's: rayon shares the
 //! work, nalgebra solves the equations, statrs has the distributions.
@@ -10,5 +10,6 @@ pub mod coloured_noise;
 pub mod least_squares;
 pub mod minimise;
 pub mod parallel;
+pub mod polyline;
 pub mod root;
 pub mod statistics;

@@ -14,7 +14,7 @@ pub fn shared_errors_text<'a>(
     let display = Display::new(units);
     let usable: Vec<&IdentifiedPoint> = points
         .filter(|point| point.verdict != Verdict::Unusable && point.eta_low.is_some())
-        .filter(|point| !point.common.eta.is_empty())
+        .filter(|point| !point.common.eta_changes.is_empty())
         .collect();
     let speed = |point: &IdentifiedPoint| point.target.map_or(point.speed_rpm, |target| target.speed_rpm);
     let slowest_rpm = usable.iter().map(|point| speed(point)).reduce(f64::min)?;

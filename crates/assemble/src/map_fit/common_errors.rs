@@ -25,11 +25,11 @@ struct Entry {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct CommonAt {
     /// Of efficiency, fraction.
-    pub eta: f64,
+    pub eta_standard_error: f64,
     /// Of corrected flow, ratio.
-    pub flow_ratio: f64,
+    pub flow_standard_error_ratio: f64,
     /// Of the pressure ratio.
-    pub pressure_ratio: f64,
+    pub pressure_ratio_standard_error: f64,
 }
 
 impl CommonErrorField {
@@ -43,7 +43,7 @@ impl CommonErrorField {
 
     /// Errors at a place, by the points around with weights that fall with the square of the distance.
     pub(crate) fn at(&self, speed_ratio: f64, flow_ratio: f64) -> CommonAt {
-        let most = self.points.iter().map(|point| point.common.eta.len()).max().unwrap_or(0);
+        let most = self.points.iter().map(|point| point.common.eta_changes.len()).max().unwrap_or(0);
         let mut eta = vec![0.0; most];
         let (mut all, mut with_eta) = (0.0, 0.0);
         let mut found = CommonAt::default();
@@ -51,21 +51,21 @@ impl CommonErrorField {
             let square = ((speed_ratio - speed).powi(2) + (flow_ratio - flow).powi(2)) / (REACH * REACH);
             let weight = 1.0 / (1.0 + square * square);
             all += weight;
-            found.flow_ratio += weight * common.flow_corrected_ratio;
-            found.pressure_ratio += weight * common.pressure_ratio;
-            if !common.eta.is_empty() {
+            found.flow_standard_error_ratio += weight * common.flow_corrected_standard_error_ratio;
+            found.pressure_ratio_standard_error += weight * common.pressure_ratio_standard_error;
+            if !common.eta_changes.is_empty() {
                 with_eta += weight;
-                for (sum, change) in eta.iter_mut().zip(&common.eta) {
+                for (sum, change) in eta.iter_mut().zip(&common.eta_changes) {
                     *sum += weight * change;
                 }
             }
         }
         if all > 0.0 {
-            found.flow_ratio /= all;
-            found.pressure_ratio /= all;
+            found.flow_standard_error_ratio /= all;
+            found.pressure_ratio_standard_error /= all;
         }
         if with_eta > 0.0 {
-            found.eta = eta.iter().map(|sum| (sum / with_eta).powi(2)).sum::<f64>().sqrt();
+            found.eta_standard_error = eta.iter().map(|sum| (sum / with_eta).powi(2)).sum::<f64>().sqrt();
         }
         found
     }

@@ -191,10 +191,10 @@ fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Ve
                 work_ratio: if eta < place.eta { work * place.eta / eta } else { work },
                 flow_standard_error_kg_s: error.flow_part_ratio * scales.flow_kg_s,
                 pressure_ratio_standard_error: error.pressure_part_ratio * scales.ratio,
-                eta_standard_error: error.eta.hypot(common.eta),
-                eta_common_standard_error: common.eta,
-                flow_common_standard_error_kg_s: common.flow_ratio * place.flow_kg_s,
-                pressure_ratio_common_standard_error: common.pressure_ratio,
+                eta_standard_error: error.eta.hypot(common.eta_standard_error),
+                eta_common_standard_error: common.eta_standard_error,
+                flow_common_standard_error_kg_s: common.flow_standard_error_ratio * place.flow_kg_s,
+                pressure_ratio_common_standard_error: common.pressure_ratio_standard_error,
                 extrapolated,
             }
         })

@@ -235,10 +235,10 @@ fn own_point(
     (point.h_w_m2k, point.h_low_w_m2k, point.h_high_w_m2k) =
         (number("h_w_m2k")?, number("h_low_w_m2k")?, number("h_high_w_m2k")?);
     point.common = CommonErrors {
-        eta: columns.list(record, "eta_common")?,
-        h_w_m2k: columns.list(record, "h_common_w_m2k")?,
-        flow_corrected_ratio: or("flow_common_ratio", 0.0)?,
-        pressure_ratio: or("pressure_ratio_common", 0.0)?,
+        eta_changes: columns.list(record, "eta_common_changes")?,
+        h_changes_w_m2k: columns.list(record, "h_common_changes_w_m2k")?,
+        flow_corrected_standard_error_ratio: or("flow_common_standard_error_ratio", 0.0)?,
+        pressure_ratio_standard_error: or("pressure_ratio_common_standard_error", 0.0)?,
     };
     (point.residual_rms_k, point.dt2_k, point.dtc_k) =
         (number("residual_rms_k")?, number("dt2_k")?, number("dtc_k")?);

@@ -28,10 +28,10 @@ const COLUMNS: [&str; 28] = [
     "step",
     "flow_measured_corrected_kg_s",
     "pressure_ratio_measured",
-    "eta_common",
-    "h_common_w_m2k",
-    "flow_common_ratio",
-    "pressure_ratio_common",
+    "eta_common_changes",
+    "h_common_changes_w_m2k",
+    "flow_common_standard_error_ratio",
+    "pressure_ratio_common_standard_error",
 ];
 
 pub(super) fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
@@ -53,7 +53,7 @@ fn header(map: &CompressorMap) -> String {
          # units: SI as in the column names, speeds in rpm; pressures and temperatures are total; ratios and eta are fractions\n\
          # eta: isentropic, total to total ({}); *_low and *_high bound the 95 % interval; empty where undefined\n\
          # flow_corrected_kg_s and pressure_ratio: brought to line_speed_corrected_rpm by similarity; *_measured: before\n\
-         # *_common: what one standard deviation of each error that all points share changes, separated by semicolons; \
+         # *_common_changes*: what one standard deviation of each error that all points share changes, separated by semicolons; \
          the rest of an interval is the point's own\n\
          # h: heat-transfer coefficient between gas and compressor housing; warnings: codes separated by semicolons\n",
         crate::heading::heading(map, "#"),
@@ -99,9 +99,9 @@ fn row(line: &SpeedLine, point: &MapPoint) -> [String; 28] {
         p.step.to_string(),
         number(p.flow_corrected_kg_s),
         number(p.pressure_ratio),
-        list(&p.common.eta),
-        list(&p.common.h_w_m2k),
-        number(p.common.flow_corrected_ratio),
-        number(p.common.pressure_ratio),
+        list(&p.common.eta_changes),
+        list(&p.common.h_changes_w_m2k),
+        number(p.common.flow_corrected_standard_error_ratio),
+        number(p.common.pressure_ratio_standard_error),
     ]
 }

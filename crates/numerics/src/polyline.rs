@@ -1,0 +1,61 @@
+//! The place of a polyline that is nearest to a point.
+
+/// A place on a polyline.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestOnPolyline {
+    /// Index of the segment: it begins at the vertex of that index.
+    pub segment: usize,
+    /// Place within the segment, 0 at its beginning, 1 at its end, ratio.
+    pub share_ratio: f64,
+    /// Distance of the point from it, in the unit of the coordinates.
+    pub distance: f64,
+    /// Whether the point lies beyond the polyline's first or last vertex: then that is the nearest place.
+    pub beyond_end: bool,
+}
+
+impl NearestOnPolyline {
+    /// Nearest place of the polyline through `vertices` to `point`; the first of several as near. `None` for less than two
+    /// vertices, or coordinates that are not numbers.
+    pub fn of(vertices: &[(f64, f64)], point: (f64, f64)) -> Option<Self> {
+        // A hair's breadth beyond an end is rounding.
+        const HAIR: f64 = 1e-6;
+        let last = vertices.len().checked_sub(2)?;
+        let on = |(segment, pair): (usize, &[(f64, f64)])| {
+            let ((ax, ay), (bx, by)) = (pair[0], pair[1]);
+            let (dx, dy) = (bx - ax, by - ay);
+            let share = ((point.0 - ax) * dx + (point.1 - ay) * dy) / (dx * dx + dy * dy).max(1e-30);
+            let share_ratio = share.clamp(0.0, 1.0);
+            let distance = (point.0 - ax - share_ratio * dx).hypot(point.1 - ay - share_ratio * dy);
+            let beyond_end = (segment == 0 && share < -HAIR) || (segment == last && share > 1.0 + HAIR);
+            NearestOnPolyline { segment, share_ratio, distance, beyond_end }
+        };
+        let places = vertices.windows(2).enumerate().map(on).filter(|place| !place.distance.is_nan());
+        places.min_by(|a, b| a.distance.total_cmp(&b.distance))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against the nearest of a million places counted along the line.
+    #[test]
+    fn it_is_the_nearest_of_all_places() {
+        let line = [(0.0, 0.0), (1.0, 0.5), (1.5, 2.0), (0.5, 2.5)];
+        for point in [(0.3, 0.9), (2.0, 1.0), (-1.0, -1.0), (0.2, 3.0), (1.0, 0.5)] {
+            let found = NearestOnPolyline::of(&line, point).unwrap();
+            let counted = (0..3_000_000)
+                .map(|k| {
+                    let (segment, share) = (k / 1_000_000, f64::from(k % 1_000_000) / 999_999.0);
+                    let (a, b) = (line[segment as usize], line[segment as usize + 1]);
+                    (a.0 + share * (b.0 - a.0) - point.0).hypot(a.1 + share * (b.1 - a.1) - point.1)
+                })
+                .fold(f64::INFINITY, f64::min);
+            assert!((found.distance - counted).abs() < 1e-6, "{point:?}: {found:?} and {counted}");
+        }
+        assert!(NearestOnPolyline::of(&line, (-1.0, -1.0)).unwrap().beyond_end);
+        assert!(!NearestOnPolyline::of(&line, (1.2, 0.4)).unwrap().beyond_end);
+        assert_eq!(NearestOnPolyline::of(&line[..1], (0.0, 0.0)), None);
+        assert_eq!(NearestOnPolyline::of(&line, (f64::NAN, 0.0)), None);
+    }
+}

@@ -35,6 +35,10 @@ pub struct Predicted {
     pub dtc_k: Option<f64>,
     /// Standard error of the efficiency (fraction); `None` where it was not forecast.
     pub sigma_eta: Option<f64>,
+    /// Standard error of the efficiency (fraction) where what the method can find by itself (alpha_A, the probe, the direction
+    /// factor) is not as declared, and has to be found; `None` where it was not forecast.
+    #[serde(default)]
+    pub open_sigma_eta: Option<f64>,
     /// Relative standard error of the heat-transfer coefficient; `None` where it was not forecast.
     pub sigma_h_rel: Option<f64>,
     /// Error that the identification method itself makes of the efficiency, without noise (fraction, signed): its
@@ -63,6 +67,7 @@ impl Predicted {
             dt2_k: None,
             dtc_k: None,
             sigma_eta: None,
+            open_sigma_eta: None,
             sigma_h_rel: None,
             bias_eta: None,
             bias_h_rel: None,
@@ -124,6 +129,9 @@ pub struct PlanFigures {
     /// Root of the mean square of predicted standard error and bias of the efficiency (fraction).
     #[serde(default)]
     pub rms_error_eta: Option<f64>,
+    /// Root of the mean square of the standard errors where nothing is as declared, and the method's bias (fraction).
+    #[serde(default)]
+    pub open_rms_error_eta: Option<f64>,
     /// Largest predicted error of the efficiency, standard error and bias in quadrature (fraction).
     #[serde(default)]
     pub worst_error_eta: Option<f64>,

@@ -14,10 +14,14 @@ pub enum VisitOrder {
     SumGradient,
     /// Largest smallest change.
     WorstGradient,
-    /// Smallest mean square of predicted standard error and bias of the efficiency.
+    /// Smallest mean square of what the identification method is forecast to err.
     Information,
-    /// Shortest campaign whose points reach a required error of the efficiency; the dwell is chosen for each step.
+    /// As `information`, with `required_sigma_eta`: each step's dwell is chosen so that its point reaches that error.
     Time,
+    /// Whichever of the other orders is forecast to give the smallest error for the time it takes.
+    Best,
+    /// By speed, on each line from the widest valve opening to the narrowest, as conventional mapping goes.
+    SpeedLines,
     /// Next comes the point whose jump moves the housing most.
     Greedy,
     /// As in the grid.
@@ -32,6 +36,8 @@ impl VisitOrder {
             VisitOrder::WorstGradient => "worst_gradient",
             VisitOrder::Information => "information",
             VisitOrder::Time => "time",
+            VisitOrder::Best => "best",
+            VisitOrder::SpeedLines => "speed_lines",
             VisitOrder::Greedy => "greedy",
             VisitOrder::Listed => "listed",
         }
@@ -39,7 +45,7 @@ impl VisitOrder {
 
     /// Whether the order needs to know what the identification will find at each step.
     pub fn needs_method(self) -> bool {
-        matches!(self, VisitOrder::Information | VisitOrder::Time)
+        matches!(self, VisitOrder::Information | VisitOrder::Time | VisitOrder::Best)
     }
 }
 
@@ -50,7 +56,7 @@ mod tests {
     #[test]
     fn the_name_in_plans_is_the_name_in_campaigns() {
         use VisitOrder::*;
-        for order in [SumGradient, WorstGradient, Information, Time, Greedy, Listed] {
+        for order in [SumGradient, WorstGradient, Information, Time, Best, SpeedLines, Greedy, Listed] {
             assert_eq!(serde_json::to_value(order).unwrap(), order.name());
         }
     }

@@ -25,6 +25,15 @@ impl WindowRule {
     /// Shortest useful window, s. A step that settles later gives its last so many seconds, and is doubtful.
     pub const SHORTEST_S: f64 = 30.0;
 
+    /// Share of a step, at its end, in which its operating point must have settled for a method that follows the step from
+    /// its jump on: the point's state is the mean of the last seconds, but a step that swings passes through rest now and then.
+    const AT_REST_RATIO: f64 = 0.25;
+
+    /// The same for a step of `dwell_s`, s: never more than [`Self::SHORTEST_S`].
+    pub fn rest_at_end_s(dwell_s: f64) -> f64 {
+        (Self::AT_REST_RATIO * dwell_s).min(Self::SHORTEST_S)
+    }
+
     /// Start and end of the window of a step that lasts `dwell_s`, s after its jump, where the operating point settles
     /// `settle_s` after the jump (`None`: never within the step).
     pub fn of_step_s(&self, settle_s: Option<f64>, dwell_s: f64) -> (f64, f64) {

@@ -1,4 +1,5 @@
-//! What the dynamic method will make of a step that was only forecast: for planning, before anything is measured.
+//! What a method that looks at one step alone will make of it when it was only forecast: for planning, before anything is
+//! measured. `joint` stands in `joint/expected.rs`.
 
 use crate::IdentifyConfig;
 use crate::bias::declared_effect;
@@ -9,13 +10,15 @@ use crate::steady::{Means, uncertainty};
 use mapper_physics::compression::isentropic_rise_ratio;
 
 /// Interval of the samples whose noise a campaign declares, s.
-const DECLARED_INTERVAL_S: f64 = 0.1;
+pub(crate) const DECLARED_INTERVAL_S: f64 = 0.1;
 
 /// One instant of a forecast, total values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExpectedRow {
     /// Time, s, rising.
     pub t_s: f64,
+    /// Shaft speed, rpm.
+    pub speed_rpm: f64,
     /// Inlet temperature, K.
     pub t1_k: f64,
     /// Reading of the outlet probe, K.
@@ -41,6 +44,9 @@ pub struct Expected {
     pub h_w_m2k: f64,
     /// Standard error of it, W/(m2 K).
     pub sigma_h_w_m2k: f64,
+    /// Standard error of the efficiency where nothing that the method can find (alpha_A, the probe, the direction factor) is as
+    /// declared, fraction: what the recording says without the declaration.
+    pub open_sigma_eta: f64,
 }
 
 /// Fits noise-free rows as a recording is fitted, and says what the declared uncertainties will do to the result.
@@ -67,9 +73,11 @@ pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) 
     noise.white_k2 *= (DECLARED_INTERVAL_S / interval_s).min(1.0);
     let [eta, h] = Correlation::of(&fit, &samples.t_s, config.noise_colour).standard_errors_for(noise);
     let [offset_eta, offset_h] = declared.bias_standard_errors;
+    let sigma_eta = eta.hypot(offset_eta);
     let found = Expected {
         eta: fit.eta,
-        sigma_eta: eta.hypot(offset_eta),
+        sigma_eta,
+        open_sigma_eta: sigma_eta,
         h_w_m2k: fit.h_w_m2k,
         sigma_h_w_m2k: h.hypot(offset_h),
     };

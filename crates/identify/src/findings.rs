@@ -52,6 +52,8 @@ pub mod code {
     pub const OFF_THE_NOMINAL_MAP: &str = "off_the_nominal_map";
     /// The step has no transient of its own: its efficiency rests on what is shared (joint method).
     pub const THROUGH_THE_LAW: &str = "through_the_law";
+    /// The recording is too short, or its gradients too small, to find what was declared if it does not hold.
+    pub const RESTS_ON_DECLARATION: &str = "rests_on_declaration";
     /// Part of the state at the step's end is not from its last seconds.
     pub const END_STATE: &str = "end_state";
 }

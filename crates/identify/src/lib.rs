@@ -38,7 +38,9 @@ pub use error::{IdentifyError, StepError};
 pub use expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use findings::code;
 pub use identify::{Identified, identify, identify_each, identify_recording};
+pub use joint::expected::{ExpectedStep, expected_together};
 pub use joint::surface::EfficiencySurface;
+pub use joint::worth::StepWorth;
 pub use mapper_core::{
     Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings, SettleBands, WindowRule,
 };
@@ -46,5 +48,5 @@ pub use nominal_map::doubt_off_the_nominal_map;
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
 pub use two_parameter::TwoParameter;
-pub use zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};
+pub use zero::{IsothermalZero, NoZero, ZeroSettings, expected_after_zero, isothermal_zero, zeroed};
 pub use zero_outcome::ZeroOutcome;

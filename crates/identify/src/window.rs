@@ -43,6 +43,36 @@ fn settled(
     bands: &SettleBands,
     findings: &mut Findings,
 ) -> Option<Window> {
+    let Rest { slowest, settled_s, earliest_s, whole } = rest(recording, step, bands)?;
+    let end_s = step.end_s;
+    let start_s = if whole { earliest_s } else { end_s - settled_s };
+    if end_s - start_s >= WindowRule::SHORTEST_S {
+        return Some(Window { start_s, end_s });
+    }
+    let start_s = (end_s - WindowRule::SHORTEST_S).max(earliest_s);
+    let message = format!(
+        "the {slowest} still varies beyond its limit {settled_s:.0} s before the step's end (needed: {:.0} s); the last {:.0} s are used",
+        WindowRule::SHORTEST_S,
+        end_s - start_s
+    );
+    findings.doubt(code::NOT_STABILISED, message);
+    Some(Window { start_s, end_s })
+}
+
+/// Since when an operating point has settled.
+pub(crate) struct Rest {
+    /// What settles last.
+    pub(crate) slowest: &'static str,
+    /// For how long it has at the step's end, s.
+    pub(crate) settled_s: f64,
+    /// From where on that is looked at, s.
+    earliest_s: f64,
+    /// Whether nothing varied since then.
+    pub(crate) whole: bool,
+}
+
+/// Looks at a step from its end backwards; `None` for a step that ends before it is to be looked at.
+pub(crate) fn rest(recording: &Recording, step: &StepMarker, bands: &SettleBands) -> Option<Rest> {
     let earliest_s = commands::at_rest_s(recording, step) + WindowRule::EARLIEST_S;
     let end_s = step.end_s;
     if end_s.is_nan() || earliest_s.is_nan() || earliest_s >= end_s {
@@ -61,20 +91,8 @@ fn settled(
             (name, settled_count(backwards, allowed_ratio, spread))
         })
         .min_by_key(|(_, blocks)| *blocks)?;
-    let start_s =
-        if settled_blocks == block_count { earliest_s } else { end_s - settled_blocks as f64 * BLOCK_S };
-    if end_s - start_s >= WindowRule::SHORTEST_S {
-        return Some(Window { start_s, end_s });
-    }
-    let start_s = (end_s - WindowRule::SHORTEST_S).max(earliest_s);
-    let message = format!(
-        "the {slowest} still varies beyond its limit {:.0} s before the step's end (needed: {:.0} s); the last {:.0} s are used",
-        settled_blocks as f64 * BLOCK_S,
-        WindowRule::SHORTEST_S,
-        end_s - start_s
-    );
-    findings.doubt(code::NOT_STABILISED, message);
-    Some(Window { start_s, end_s })
+    let settled_s = settled_blocks as f64 * BLOCK_S;
+    Some(Rest { slowest, settled_s, earliest_s, whole: settled_blocks == block_count })
 }
 
 /// Medians over blocks counted backwards from `end_s`; NaN where a block has no value.

@@ -6,6 +6,7 @@
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
+use crate::expected::DECLARED_INTERVAL_S;
 use crate::relaxation;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, Soak, StepMarker};
 use mapper_numerics::coloured_noise::variance_of_mean;
@@ -137,11 +138,7 @@ pub fn isothermal_zero(
     let rest = (start_s, end_s);
     let start_s = start_s.max(end_s - settings.longest_s);
     let mut zero = IsothermalZero { start_s, end_s, ..IsothermalZero::default() };
-    let temperatures = [Channel::T1, Channel::T2, Channel::Tc, Channel::TOil];
-    for (group, sigma) in [
-        (&temperatures[..], settings.temperature_sigma_k),
-        (&[Channel::P1, Channel::P2][..], settings.pressure_sigma_pa),
-    ] {
+    for (group, sigma) in groups(settings) {
         let mut readings = Vec::new();
         for channel in group {
             let Some(reading) = soak_mean(recording, *channel, start_s, end_s) else { continue };
@@ -153,15 +150,8 @@ pub fn isothermal_zero(
                 });
             }
             let declared = config.declared.get(channel).copied().unwrap_or_default();
-            // The white part of the noise averages over hundreds of samples.
-            let colour = coloured(config.noise_colour);
-            let averaged = variance_of_mean(
-                colour.first_order_variance_ratio(),
-                end_s - start_s,
-                colour.time_constant_s,
-            );
             let mut mean = reading.mean;
-            let mut own = sigma.hypot(declared.noise_sigma * averaged.sqrt());
+            let mut own = sigma.hypot(sigma_of_mean(declared.noise_sigma, end_s - start_s, config));
             // The housing is the last to come to the cell's temperature, and drifts by less than shows.
             if *channel == Channel::Tc
                 && let Some((limit, error)) = housing_limit(recording, rest, config)
@@ -204,6 +194,46 @@ pub fn zeroed(
         }
     }
     (recording, config)
+}
+
+/// What will be left of the declared offsets after a zero of `soak_s`, before it is recorded.
+pub fn expected_after_zero(
+    mut config: IdentifyConfig,
+    settings: &ZeroSettings,
+    soak_s: f64,
+) -> IdentifyConfig {
+    let stretch_s = soak_s.min(settings.longest_s);
+    for (channels, sigma) in groups(settings) {
+        for channel in channels {
+            let Some(declared) = config.declared.get(channel).copied() else { continue };
+            let averaged = sigma_of_mean(declared.noise_sigma, stretch_s, &config);
+            let error = match channel {
+                Channel::Tc => {
+                    expected_limit_error(declared.noise_sigma, soak_s, &config).unwrap_or(averaged)
+                }
+                _ => averaged,
+            };
+            let left = DeclaredUncertainty { offset_sigma: sigma.hypot(error), ..declared };
+            config.declared.insert(*channel, left);
+        }
+    }
+    config
+}
+
+/// Standard error of the mean of a reading with the standard deviation `noise_sigma` over `stretch_s`. The white part of the
+/// noise averages over hundreds of samples.
+fn sigma_of_mean(noise_sigma: f64, stretch_s: f64, config: &IdentifyConfig) -> f64 {
+    let colour = coloured(config.noise_colour);
+    noise_sigma
+        * variance_of_mean(colour.first_order_variance_ratio(), stretch_s, colour.time_constant_s).sqrt()
+}
+
+/// Channels that read alike at rest, and how even each group is.
+fn groups(settings: &ZeroSettings) -> [(&'static [Channel], f64); 2] {
+    [
+        (&[Channel::T1, Channel::T2, Channel::Tc, Channel::TOil], settings.temperature_sigma_k),
+        (&[Channel::P1, Channel::P2], settings.pressure_sigma_pa),
+    ]
 }
 
 /// The last stretch in which the shaft rests before the first step that leaves it running: where steps were found in the
@@ -250,6 +280,20 @@ fn housing_limit(
     }
     let variance = coloured(config.noise_colour).variance_of_mean(fewest, BLOCK_S);
     relaxation::limit(&t_s, &means, noise_sigma * variance.sqrt())
+}
+
+/// The standard error that [`housing_limit`] has after a rest of `soak_s`.
+fn expected_limit_error(noise_sigma: f64, soak_s: f64, config: &IdentifyConfig) -> Option<f64> {
+    if soak_s < SHORTEST_RELAXATION_S {
+        return None;
+    }
+    let used_s = (2.0 / 3.0 * soak_s).min(LONGEST_RELAXATION_S);
+    let t_s: Vec<f64> =
+        (0..(used_s / BLOCK_S) as usize).map(|block| (block as f64 + 0.5) * BLOCK_S).collect();
+    let samples = (BLOCK_S / DECLARED_INTERVAL_S) as usize;
+    let variance = coloured(config.noise_colour).variance_of_mean(samples, BLOCK_S);
+    let resting = vec![0.0; t_s.len()];
+    relaxation::limit(&t_s, &resting, noise_sigma * variance.sqrt()).map(|(_, error)| error)
 }
 
 struct SoakMean {

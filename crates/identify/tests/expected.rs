@@ -32,6 +32,7 @@ fn rows(transient: &Transient, every: usize) -> Vec<ExpectedRow> {
         .step_by(every)
         .map(|i| ExpectedRow {
             t_s: 0.1 * i as f64,
+            speed_rpm: at(Channel::ShaftSpeed, i),
             t1_k: at(Channel::T1, i),
             t2_k: at(Channel::T2, i),
             tc_k: at(Channel::Tc, i),

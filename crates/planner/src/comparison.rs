@@ -1,11 +1,12 @@
-//! What the plan is better than: conventional mapping with its waits, and the same points along speed lines.
+//! What the plan is held against: conventional mapping with its waits, and the same points under all other orders.
 
-use crate::forecast::forecast;
+use crate::best::all;
 use crate::method::ForecastRow;
+use crate::order::by_speed_line;
 use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest};
-use mapper_core::{OperatingPoint, Plan, VisitOrder};
-use mapper_numerics::statistics::mean;
+use mapper_core::{OperatingPoint, Plan};
+use mapper_numerics::statistics::rms;
 use mapper_physics::forecast::{self, hold};
 use mapper_physics::model::{Outputs, State};
 use mapper_physics::steady::SteadyState;
@@ -17,18 +18,20 @@ const LOOK_S: f64 = 10.0;
 /// Longest wait at a point, s.
 const LONGEST_WAIT_S: f64 = 3600.0;
 
-/// A way to map the points, in three numbers.
+/// A way to map the points, in four numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WayOfMapping {
-    /// Points in order, the first once more where it is visited again.
+    /// Points in order, repeats and the first once more where it is visited again.
     pub order: Vec<OperatingPoint>,
-    /// Duration without warm-up and cool-down, minutes.
+    /// Duration without soak, warm-up and cool-down, minutes.
     pub minutes: f64,
+    /// Sum of the housing's changes within the windows, K; `None` for a way without windows.
+    pub sum_gradient_k: Option<f64>,
     /// Largest predicted error of the efficiency (absolute, standard error and bias in quadrature), fraction; `None`
     /// where none was predicted.
     pub worst_error_eta: Option<f64>,
-    /// Mean of these errors, fraction.
-    pub mean_error_eta: Option<f64>,
+    /// Root of the mean square of these errors, fraction.
+    pub rms_error_eta: Option<f64>,
 }
 
 /// The plan beside what it is held against.
@@ -37,56 +40,53 @@ pub struct Comparison {
     /// The plan.
     pub proposed: WayOfMapping,
     /// Along speed lines, at each point until T2 and the housing drift by less than [`STABLE_DRIFT_K_MIN`], efficiency
-    /// from the temperature rise. Its error is that of heat transfer and of declared offsets.
+    /// from the temperature rise. Its error is that of heat transfer and of the offsets that the plan's method has too.
     pub conventional: WayOfMapping,
-    /// Along speed lines, with the plan's method and dwell.
-    pub along_speed_lines: WayOfMapping,
+    /// The same points by the same method under each order that allows it, the best for the time it takes first.
+    pub orders: Vec<(String, WayOfMapping)>,
+}
+
+impl Comparison {
+    /// The way of an order, by its name in campaigns.
+    pub fn of_order(&self, name: &str) -> Option<&WayOfMapping> {
+        self.orders.iter().find(|(other, _)| other == name).map(|(_, way)| way)
+    }
 }
 
 /// Points along speed lines: by speed, on each line from the widest opening to the narrowest.
 pub fn along_speed_lines(points: &[OperatingPoint]) -> Vec<OperatingPoint> {
     let mut order = points.to_vec();
-    order.sort_by(|a, b| {
-        a.speed_rpm.total_cmp(&b.speed_rpm).then(b.valve_opening_ratio.total_cmp(&a.valve_opening_ratio))
-    });
+    order.sort_by(by_speed_line);
     order
 }
 
-/// Compares `plan` with both.
+/// Compares `plan` with conventional mapping and with the other orders.
 ///
 /// # Errors
-/// [`PlanError`] where a simulation fails.
+/// [`PlanError`] where a simulation fails, or no order is allowed.
 pub fn compare(request: &PlanRequest<'_>, plan: &Plan) -> Result<Comparison, PlanError> {
     let order = along_speed_lines(request.points);
     let targets = reachable(request, &order)?;
-    let listed = PlanRequest { order: VisitOrder::Listed, ..request.clone() };
+    let plans = all(&PlanRequest { appended: None, ..request.clone() })?;
     Ok(Comparison {
-        proposed: way(
-            plan.steps.iter().map(|step| step.to).collect(),
-            plan.steps.iter().map(|step| step.dwell_s).sum(),
-            // A repeat measures no point.
-            plan.steps
-                .iter()
-                .filter(|step| step.kind.measures())
-                .map(|step| error(step.predicted.sigma_eta, step.predicted.bias_eta)),
-        ),
+        proposed: planned(plan),
         conventional: conventional(request, &order, &targets)?,
-        along_speed_lines: dynamic(&listed, &order, &targets)?,
+        orders: plans.iter().map(|plan| (plan.objective.clone(), planned(plan))).collect(),
     })
+}
+
+fn planned(plan: &Plan) -> WayOfMapping {
+    WayOfMapping {
+        order: plan.steps.iter().map(|step| step.to).collect(),
+        minutes: plan.steps.iter().map(|step| step.dwell_s).sum::<f64>() / 60.0,
+        sum_gradient_k: Some(plan.figures.sum_gradient_k),
+        worst_error_eta: plan.figures.worst_error_eta,
+        rms_error_eta: plan.figures.rms_error_eta,
+    }
 }
 
 fn error(sigma: Option<f64>, bias: Option<f64>) -> Option<f64> {
     Some(sigma?.hypot(bias?))
-}
-
-fn way(order: Vec<OperatingPoint>, seconds: f64, errors: impl Iterator<Item = Option<f64>>) -> WayOfMapping {
-    let errors: Vec<f64> = errors.flatten().collect();
-    WayOfMapping {
-        order,
-        minutes: seconds / 60.0,
-        worst_error_eta: errors.iter().copied().max_by(f64::total_cmp),
-        mean_error_eta: mean(&errors),
-    }
 }
 
 fn warmed_up(request: &PlanRequest<'_>, first: &SteadyState) -> Result<State, PlanError> {
@@ -143,26 +143,12 @@ fn conventional(
             error(Some(sigma), Some(eta - outputs.efficiency))
         }));
     }
-    Ok(way(order.to_vec(), seconds, errors.into_iter()))
-}
-
-fn dynamic(
-    request: &PlanRequest<'_>,
-    order: &[OperatingPoint],
-    targets: &[SteadyState],
-) -> Result<WayOfMapping, PlanError> {
-    let first = targets.first().ok_or(PlanError::NoPoints)?;
-    let mut state = warmed_up(request, first)?;
-    let dwell_s = request.timing.dwell_s;
-    // No jump leads to the first point here either.
-    let back = usize::from(request.return_to_first && order.len() > 1);
-    let steps: Vec<_> = order.iter().zip(targets).cycle().take(order.len() + back).collect();
-    let mut errors = Vec::with_capacity(steps.len());
-    for (i, &(&to, target)) in steps.iter().enumerate() {
-        let step = forecast(request, state, &target.boundary, dwell_s, i > 0)
-            .map_err(|source| PlanError::Forecast { to, source })?;
-        errors.push(error(step.predicted.sigma_eta, step.predicted.bias_eta));
-        state = step.end;
-    }
-    Ok(way(steps.iter().map(|(to, _)| **to).collect(), dwell_s * steps.len() as f64, errors.into_iter()))
+    let errors: Vec<f64> = errors.into_iter().flatten().collect();
+    Ok(WayOfMapping {
+        order: order.to_vec(),
+        minutes: seconds / 60.0,
+        sum_gradient_k: None,
+        worst_error_eta: errors.iter().copied().max_by(f64::total_cmp),
+        rms_error_eta: rms(&errors),
+    })
 }

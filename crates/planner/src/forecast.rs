@@ -1,5 +1,6 @@
 //! One step of the plan on the nominal machine, with what the identification is expected to make of it.
 
+use crate::method::MethodResult;
 use crate::request::PlanRequest;
 use mapper_core::Predicted;
 use mapper_physics::forecast::{ForecastRow, StepForecast, forecast_step};
@@ -7,8 +8,11 @@ use mapper_physics::model::State;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::simulate::SimulationError;
 
+/// Most steps whose errors are forecast together: of more, a sample is, which takes them for a campaign of its own.
+pub(crate) const MOST_TOGETHER: usize = 400;
+
 /// A step as it is expected to go.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Forecast {
     pub(crate) predicted: Predicted,
     pub(crate) end: State,
@@ -16,6 +20,8 @@ pub(crate) struct Forecast {
     pub(crate) highest_t2_k: f64,
     /// Longest stretch beyond the surge line, s.
     pub(crate) longest_surge_s: f64,
+    /// The step from its jump to its end.
+    pub(crate) rows: Vec<ForecastRow>,
 }
 
 /// What the step from `state` to `boundary` is expected to give, and the state at its end.
@@ -30,7 +36,7 @@ pub(crate) fn forecast(
 ) -> Result<Forecast, SimulationError> {
     let step = forecast_step(request.model, state, boundary, dwell_s)?;
     let mut predicted = step.predicted(&request.window, &request.settle_bands, has_jump);
-    if has_jump {
+    if has_jump && request.method.is_some_and(|method| !method.is_joint()) {
         with_errors(request, &step, dwell_s, &mut predicted);
     }
     Ok(Forecast {
@@ -39,6 +45,7 @@ pub(crate) fn forecast(
         highest_speed_rpm: step.highest_speed_rpm,
         highest_t2_k: step.highest_t2_k,
         longest_surge_s: step.longest_surge_s,
+        rows: step.rows,
     })
 }
 
@@ -52,9 +59,31 @@ fn with_errors(request: &PlanRequest<'_>, step: &StepForecast, dwell_s: f64, pre
         return;
     };
     let mean = |value: fn(&ForecastRow) -> f64| window.iter().map(value).sum::<f64>() / window.len() as f64;
-    let (own_eta, own_h) = (mean(|row| row.efficiency), mean(|row| row.h_w_m2k));
+    tell(predicted, &found, mean(|row| row.efficiency), mean(|row| row.h_w_m2k));
+}
+
+/// Puts what a method finds beside what the model has.
+fn tell(predicted: &mut Predicted, found: &MethodResult, eta: f64, h_w_m2k: f64) {
     predicted.sigma_eta = Some(found.sigma_eta);
-    predicted.sigma_h_rel = Some(found.sigma_h_w_m2k / own_h);
-    predicted.bias_eta = Some(found.eta - own_eta);
-    predicted.bias_h_rel = Some(found.h_w_m2k / own_h - 1.0);
+    predicted.open_sigma_eta = Some(found.open_sigma_eta);
+    predicted.sigma_h_rel = Some(found.sigma_h_w_m2k / h_w_m2k);
+    predicted.bias_eta = Some(found.eta - eta);
+    predicted.bias_h_rel = Some(found.h_w_m2k / h_w_m2k - 1.0);
+}
+
+/// Adds the errors that a method makes which identifies all steps together. `rows`: those of each step.
+pub(crate) fn with_errors_together<'a>(
+    request: &PlanRequest<'_>,
+    rows: &[Vec<ForecastRow>],
+    predicted: impl Iterator<Item = &'a mut Predicted>,
+) {
+    let Some(method) = request.method.filter(|method| method.is_joint()) else { return };
+    let every = rows.len().div_ceil(MOST_TOGETHER).max(1);
+    let sample: Vec<&[ForecastRow]> = rows.iter().step_by(every).map(Vec::as_slice).collect();
+    let Some(found) = method.together(&sample) else { return };
+    for ((predicted, rows), found) in predicted.step_by(every).zip(&sample).zip(found) {
+        if let (Some(found), Some(end)) = (found, rows.last()) {
+            tell(predicted, &found, end.efficiency, end.h_w_m2k);
+        }
+    }
 }

@@ -8,6 +8,7 @@
 
 use crate::chain::Chain;
 use crate::forecast::forecast;
+use crate::method::WorthOfStep;
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::OperatingPoint;
 use mapper_numerics::parallel;
@@ -18,6 +19,9 @@ use std::collections::HashSet;
 
 /// States that differ by less, K, lead to gradients that differ by less than any sensor sees.
 const ALIKE_K: f64 = 0.01;
+
+/// From fraction^2 to %^2: numbers about 1.
+const PERCENT2: f64 = 1e4;
 
 /// Scaled (c, t, w) of three of the six starts; the other three are their mirror images.
 const DESIGN: [[f64; 3]; 3] = [[-1.0, -1.0, -1.0], [0.2, -0.6, -1.0], [0.6, 0.0, 1.0]];
@@ -92,6 +96,8 @@ pub(crate) struct Response {
     first: [f64; 2],
     /// Mean square error of eta times the gradient squared, over the gradient, rising.
     error: Vec<(f64, f64)>,
+    /// What the step is worth to a campaign that is identified as a whole, %^2, where that is known.
+    worth: Option<Surface>,
 }
 
 /// The reduced machine.
@@ -143,6 +149,7 @@ impl Housing {
         points: &[OperatingPoint],
         targets: &[SteadyState],
         start: Option<State>,
+        worth: Option<&dyn WorthOfStep>,
     ) -> Result<Self, PlanError> {
         let scale = Scale::of(targets, start);
         let by_speed = |a: &&SteadyState, b: &&SteadyState| {
@@ -152,7 +159,7 @@ impl Housing {
         let fastest = targets.iter().max_by(by_speed).ok_or(PlanError::NoPoints)?;
         let aims: Vec<(&SteadyState, OperatingPoint)> = targets.iter().zip(points.iter().copied()).collect();
         let one = |(target, to): &(&SteadyState, OperatingPoint)| {
-            response(request, target, &scale, [slowest, fastest], start.is_none())
+            response(request, target, &scale, [slowest, fastest], start.is_none(), worth)
                 .map_err(|source| PlanError::Forecast { to: *to, source })
         };
         Ok(Housing {
@@ -162,6 +169,27 @@ impl Housing {
             gradient_max_k: request.limits.housing_gradient_max_k.unwrap_or(f64::INFINITY),
             alike: [ALIKE_K / scale.half[0], ALIKE_K / scale.half[1]],
             returns: false,
+        })
+    }
+
+    /// The same machine with what a step is worth in place of its gradient, so that all that looks for large sums of gradients
+    /// looks for a campaign that knows much. `None` where that is not known.
+    pub(crate) fn by_worth(&self) -> Option<Housing> {
+        let worths: Vec<Surface> =
+            self.responses.iter().map(|response| response.worth).collect::<Option<_>>()?;
+        // A constant for each step changes no order, and makes every worth positive.
+        let far = worths.iter().map(|worth| worth.0.iter().map(|k| k.abs()).sum::<f64>()).fold(0.0, f64::max);
+        let raised = |mut worth: Surface| {
+            worth.0[0] += 2.0 * far;
+            worth
+        };
+        let responses = self.responses.iter().zip(worths);
+        Some(Housing {
+            responses: responses
+                .map(|(response, worth)| Response { gradient_k: raised(worth), ..response.clone() })
+                .collect(),
+            gradient_max_k: f64::INFINITY,
+            ..self.clone()
         })
     }
 
@@ -190,11 +218,13 @@ fn response(
     scale: &Scale,
     [slowest, fastest]: [&SteadyState; 2],
     starts_cold: bool,
+    worth: Option<&dyn WorthOfStep>,
 ) -> Result<Response, mapper_physics::simulate::SimulationError> {
     let dwell_s = request.timing.dwell_s;
     let mut gradient_k = [[0.0; 2]; 3];
     let mut end = [[[0.0; 2]; 3]; 2];
     let mut error = Vec::new();
+    let mut worths = worth.map(|_| [[0.0; 2]; 3]);
     for (i, design) in DESIGN.iter().enumerate() {
         for (j, sign) in [1.0, -1.0].into_iter().enumerate() {
             let [c, t, w] = design.map(|x| sign * x);
@@ -211,6 +241,11 @@ fn response(
             let left = scale.scaled(&forecast.end);
             end[0][i][j] = left[0];
             end[1][i][j] = left[1];
+            match (&mut worths, worth.and_then(|worth| worth.of(&forecast.rows))) {
+                (Some(worths), Some(worth)) => worths[i][j] = PERCENT2 * worth,
+                // Of a step that tells nothing there is nothing to choose by.
+                (worths, _) => *worths = None,
+            }
             if let (Some(sigma), Some(bias)) = (predicted.sigma_eta, predicted.bias_eta) {
                 error.push((dtc_k, (sigma * sigma + bias * bias) * dtc_k * dtc_k));
             }
@@ -233,6 +268,7 @@ fn response(
         settled: [settled[0], settled[1]],
         first,
         error,
+        worth: worths.map(Surface::through),
     })
 }
 

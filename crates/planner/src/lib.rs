@@ -8,10 +8,12 @@
 
 pub mod assignment;
 mod auction;
+mod best;
 mod bound;
 mod candidates;
 pub mod chain;
 mod comparison;
+mod dwell;
 pub mod exact;
 mod fingerprint;
 mod forecast;
@@ -25,11 +27,13 @@ mod reach;
 mod repeats;
 mod request;
 mod search;
+mod stage;
+mod walk;
 
 pub use comparison::{Comparison, STABLE_DRIFT_K_MIN, WayOfMapping, along_speed_lines, compare};
 pub use fingerprint::sha256_hex;
 pub use graph::{JumpForecast, Rejection, explain_jump, jump_graph};
-pub use method::{ForecastRow, MethodResult, PredictedMethod};
+pub use method::{ForecastRow, MethodResult, PredictedMethod, WorthOfStep};
 pub use objective::Objective;
 pub use order::order_points;
 pub use plan::make_plan;

@@ -15,6 +15,8 @@ pub struct MethodResult {
     pub h_w_m2k: f64,
     /// Its standard error, W/(m2 K).
     pub sigma_h_w_m2k: f64,
+    /// Standard error of the efficiency where nothing that the method can find by itself is as declared, fraction.
+    pub open_sigma_eta: f64,
 }
 
 /// An identification method, for planning.
@@ -22,6 +24,29 @@ pub trait PredictedMethod: std::fmt::Debug + Sync {
     /// What it makes of the rows of a window, which lie `interval_s` apart; `None` where it finds nothing.
     fn predict(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult>;
 
+    /// What it makes of the steps of a whole campaign, each from its jump to its end, where it looks at all of them together;
+    /// one result for each step. `None` where it looks at each step for itself, or comes to no end.
+    fn together(&self, _steps: &[&[ForecastRow]]) -> Option<Vec<Option<MethodResult>>> {
+        None
+    }
+
+    /// What single steps are worth to a campaign of these steps; `None` for a method that looks at each step for itself.
+    fn worth_to(&self, _steps: &[&[ForecastRow]]) -> Option<Box<dyn WorthOfStep>> {
+        None
+    }
+
+    /// Whether it looks at all steps together.
+    fn is_joint(&self) -> bool {
+        false
+    }
+
     /// What conventional mapping makes of a settled point: apparent efficiency and its standard error, fractions.
     fn predict_settled(&self, row: &ForecastRow) -> Option<(f64, f64)>;
+}
+
+/// What a step is worth to a planned campaign.
+pub trait WorthOfStep: std::fmt::Debug + Sync {
+    /// By how much the step makes all points more certain, less the variance of its own point, fraction^2; the rows lead from
+    /// its jump to its end.
+    fn of(&self, rows: &[ForecastRow]) -> Option<f64>;
 }

@@ -26,23 +26,46 @@ pub(crate) struct Ordered {
     pub(crate) proven: bool,
 }
 
+/// Along speed lines: by speed, on each line from the widest opening to the narrowest.
+pub(crate) fn by_speed_line(a: &OperatingPoint, b: &OperatingPoint) -> std::cmp::Ordering {
+    let by_opening = b.valve_opening_ratio.total_cmp(&a.valve_opening_ratio);
+    a.speed_rpm.total_cmp(&b.speed_rpm).then(by_opening)
+}
+
 /// What the search makes large for this order.
 pub(crate) fn objective(order: VisitOrder) -> Objective {
     match order {
         VisitOrder::WorstGradient => Objective::Worst { target_k: REPEATS_KEEP_K },
-        VisitOrder::Information | VisitOrder::Time => Objective::Information,
-        VisitOrder::Listed | VisitOrder::Greedy | VisitOrder::SumGradient => Objective::Sum,
+        VisitOrder::Information | VisitOrder::Time | VisitOrder::Best => Objective::Information,
+        VisitOrder::Listed | VisitOrder::SpeedLines | VisitOrder::Greedy | VisitOrder::SumGradient => {
+            Objective::Sum
+        }
     }
 }
 
 /// Orders `given` points of the housing.
-pub(crate) fn order_on(housing: &Housing, given: &[usize], request: &PlanRequest<'_>) -> Ordered {
+pub(crate) fn order_on(
+    housing: &Housing,
+    points: &[OperatingPoint],
+    given: &[usize],
+    request: &PlanRequest<'_>,
+) -> Ordered {
+    // A campaign that is to know much is one with a large sum of what its steps are worth.
+    if let (true, Some(by_worth)) = (request.order.needs_method(), housing.by_worth()) {
+        let request = PlanRequest { order: VisitOrder::SumGradient, ..request.clone() };
+        return order_on(&by_worth, points, given, &request);
+    }
     let effort = Effort::usual(given.len(), request.effort);
     let settled = |from: usize| housing.settled(from);
     let within = |effort, given: &[usize], objective| search(housing, given, objective, effort, request.seed);
     let search = |given: &[usize], objective| within(effort, given, objective);
     let (order, figure) = match request.order {
         VisitOrder::Listed => return Ordered { order: given.to_vec(), proven: false },
+        VisitOrder::SpeedLines => {
+            let mut order = given.to_vec();
+            order.sort_by(|a, b| by_speed_line(&points[*a], &points[*b]));
+            return Ordered { order, proven: false };
+        }
         VisitOrder::Greedy => {
             return Ordered { order: greedy(housing, given, Objective::Sum), proven: false };
         }
@@ -60,7 +83,7 @@ pub(crate) fn order_on(housing: &Housing, given: &[usize], request: &PlanRequest
             let order = search_worst(housing, given, effort, request.seed);
             (order, Figure::Worst)
         }
-        VisitOrder::Information | VisitOrder::Time => {
+        VisitOrder::Information | VisitOrder::Time | VisitOrder::Best => {
             return Ordered { order: search(given, Objective::Information), proven: false };
         }
     };
@@ -91,9 +114,9 @@ pub fn order_points(
         return Ok((Vec::new(), Vec::new()));
     }
     let targets = reachable(request, subset)?;
-    let housing = Housing::of(request, subset, &targets, from_state)?;
+    let housing = Housing::of(request, subset, &targets, from_state, None)?;
     let given: Vec<usize> = (0..subset.len()).collect();
-    let order = order_on(&housing, &given, request).order;
+    let order = order_on(&housing, subset, &given, request).order;
     let gradients = gradients_k(&housing, &order);
     Ok((order.into_iter().map(|index| subset[index]).collect(), gradients))
 }

@@ -1,31 +1,29 @@
 //! From a request to a plan.
 
+use crate::best::{best, cost};
 use crate::bound::Optimistic;
+use crate::dwell::NEARLY_RATIO;
 use crate::fingerprint::made_from;
-use crate::forecast::{Forecast, forecast};
-use crate::graph::rejections;
+use crate::forecast::MOST_TOGETHER;
 use crate::housing::Housing;
-use crate::order::{Ordered, PROOF_TOLERANCE_RATIO, objective, order_on};
+use crate::order::{Ordered, PROOF_TOLERANCE_RATIO};
 use crate::reach::reachable;
-use crate::repeats::{RepeatedJump, Visit, append, plain, put_return, usual_jumps, with_repeats};
+use crate::repeats::{RepeatedJump, Visit, usual_jumps};
 use crate::request::{PlanError, PlanRequest};
+use crate::stage::{Made, Stage};
+use crate::walk::error_eta;
 use mapper_core::{
-    Jump, OperatingPoint, Plan, PlanBound, PlanFigures, PlanStep, Repeats, StepKind, VisitOrder, WindowRule,
+    Jump, OperatingPoint, Plan, PlanBound, PlanFigures, PlanStep, Repeats, StepKind, VisitOrder,
 };
-use mapper_numerics::statistics::rms;
-use mapper_physics::forecast::warmed_up;
-use mapper_physics::model::State;
+use mapper_numerics::statistics::{mean, rms};
 use mapper_physics::steady::SteadyState;
 
-/// How often jumps that turn out not to be allowed are taken out and the rest is ordered again.
-const ROUNDS: usize = 25;
+/// Effort of a search that only leads to another, over the usual.
+const ROUGHLY_RATIO: f64 = 0.1;
+/// How often what steps are worth is worked out again, about the order that was found.
+const SLOPES: usize = 2;
 /// Jumps tried for repeats where the request names none.
 const USUAL_JUMPS: usize = 3;
-/// Dwells tried for the shortest campaign lie this far apart, s.
-const DWELL_STEP_S: f64 = 5.0;
-/// Shortest of them, s: the earliest window with the shortest useful length.
-const SHORTEST_DWELL_S: f64 = WindowRule::EARLIEST_S + WindowRule::SHORTEST_S;
-
 /// Orders the points and forecasts every step.
 ///
 /// # Errors
@@ -39,6 +37,9 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
     }
     if request.order == VisitOrder::Time && request.required_sigma_eta.is_none() {
         return Err(PlanError::NeedsRequiredError);
+    }
+    if request.order == VisitOrder::Best {
+        return best(request);
     }
     let targets = reachable(request, request.points)?;
     let made = plan_to(request, &targets);
@@ -74,156 +75,45 @@ fn plan_with(
     reached: &[SteadyState],
     repeats: Option<(Repeats, Jump)>,
 ) -> Result<Plan, PlanError> {
-    let needs_method = request.order.needs_method();
-    let (mut points, mut targets) = (request.points.to_vec(), reached.to_vec());
-    let mut repeated = None;
-    let mut place = |point: OperatingPoint| -> Result<usize, PlanError> {
-        if let Some(known) = points.iter().position(|other| *other == point) {
-            return Ok(known);
-        }
-        targets.extend(reachable(request, &[point])?);
-        points.push(point);
-        Ok(points.len() - 1)
-    };
-    if let Some((repeats, Jump { from, to })) = repeats {
-        let (from, to) = (place(from)?, place(to)?);
-        repeated =
-            Some(RepeatedJump { from, to, every_steps: repeats.every_steps, at_least: repeats.at_least });
-    }
-    let appended =
-        request.appended.map(|jump| Ok::<_, PlanError>((place(jump.from)?, place(jump.to)?))).transpose()?;
-    // Only the search for information needs the method at every start of the reduced housing.
-    let without_method = PlanRequest { method: request.method.filter(|_| needs_method), ..request.clone() };
-    let mut housing = Housing::of(&without_method, &points, &targets, None)?;
-    housing.returns = request.return_to_first;
-    let given: Vec<usize> = (0..request.points.len()).collect();
-    let mut barred: Vec<String> = Vec::new();
-    for _ in 0..ROUNDS {
-        let ordered = order_on(&housing, &given, request);
-        let mut visits = match repeated {
-            Some(jump) => with_repeats(&housing, &ordered.order, jump, objective(request.order)),
-            None => plain(&ordered.order),
-        };
-        let returned = request.return_to_first && put_return(&mut visits);
-        if let Some((from, to)) = appended {
-            append(&mut visits, from, to);
-        }
-        let (steps, forbidden) = walk(request, &points, &targets, &visits, repeated.map(|jump| jump.to))?;
-        if forbidden.is_empty() {
-            // What was searched, proven and bounded is an order with its way back.
-            let proven = ordered.proven && (returned || !request.return_to_first || given.len() < 2);
-            let ordered = Ordered { proven, ..ordered };
-            return Ok(finished(request, &housing, &ordered, &visits, repeated, steps));
-        }
-        let before = barred.len();
-        for Forbidden { from, to, reasons } in forbidden {
-            let text = format!("{} to {}: {reasons}", points[from], points[to]);
-            if !barred.contains(&text) {
-                barred.push(text);
-            }
-            housing.forbid(from, to);
-        }
-        let searched = !matches!(request.order, VisitOrder::Listed);
-        if barred.len() == before || !searched {
-            break;
-        }
-    }
-    Err(PlanError::NoAdmissibleOrder(barred))
-}
-
-/// A jump of a plan that is not allowed.
-struct Forbidden {
-    from: usize,
-    to: usize,
-    reasons: String,
-}
-
-/// The steps in full, and the jumps among them that are not allowed.
-fn walk(
-    request: &PlanRequest<'_>,
-    points: &[OperatingPoint],
-    targets: &[SteadyState],
-    visits: &[Visit],
-    repeated: Option<usize>,
-) -> Result<(Vec<PlanStep>, Vec<Forbidden>), PlanError> {
-    // Repeats compare when they last equally long: the first one's dwell holds for all.
-    let mut repeat_dwell_s = None;
-    let mut steps: Vec<PlanStep> = Vec::with_capacity(visits.len());
-    let mut forbidden = Vec::new();
-    let mut start_s = request.timing.warm_up_s;
-    let mut now: Option<(State, usize)> = None;
-    for visit in visits {
-        let (to, target) = (points[visit.index], &targets[visit.index]);
-        let fail = |source| PlanError::Forecast { to, source };
-        let state = match now {
-            Some((state, _)) => state,
-            None => warmed_up(request.model, target.state, &target.boundary, request.timing.warm_up_s)
-                .map_err(fail)?,
-        };
-        let is_repeat = visit.kind == StepKind::Repeat && Some(visit.index) == repeated;
-        let (dwell_s, forecast) = match repeat_dwell_s.filter(|_| is_repeat) {
-            Some(dwell_s) => {
-                (dwell_s, forecast(request, state, &target.boundary, dwell_s, now.is_some()).map_err(fail)?)
-            }
-            None => step(request, state, target, now.is_some()).map_err(fail)?,
-        };
-        if is_repeat {
-            repeat_dwell_s = Some(dwell_s);
-        }
-        if let Some((_, from)) = now {
-            let p3_change_pa = target.boundary.p3_pa - targets[from].boundary.p3_pa;
-            let reasons = rejections(request, &forecast, p3_change_pa, target.boundary.t3_k);
-            if !reasons.is_empty() {
-                let reasons = reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ");
-                forbidden.push(Forbidden { from, to: visit.index, reasons });
-            }
-        }
-        steps.push(PlanStep {
-            index: steps.len(),
-            kind: visit.kind,
-            from: now.map(|(_, from)| points[from]),
-            to,
-            p3_pa: target.boundary.p3_pa,
-            t3_k: target.boundary.t3_k,
-            oil_temperature_k: target.boundary.oil_temperature_k,
-            dwell_s,
-            start_s,
-            predicted: forecast.predicted,
-        });
-        start_s += dwell_s;
-        now = Some((forecast.end, visit.index));
-    }
-    Ok((steps, forbidden))
-}
-
-/// A step with its dwell: the request's, or the shortest that reaches the required error.
-fn step(
-    request: &PlanRequest<'_>,
-    state: State,
-    target: &SteadyState,
-    has_jump: bool,
-) -> Result<(f64, Forecast), mapper_physics::simulate::SimulationError> {
+    let stage = Stage::of(request, reached, repeats)?;
+    let joint = request.method.is_some_and(|method| method.is_joint());
     let longest_s = request.timing.dwell_s;
-    let at = |dwell_s: f64| forecast(request, state, &target.boundary, dwell_s, has_jump);
-    if let (VisitOrder::Time, Some(required), true) = (request.order, request.required_sigma_eta, has_jump) {
-        let mut dwell_s = SHORTEST_DWELL_S;
-        while dwell_s < longest_s {
-            let forecast = at(dwell_s)?;
-            if error_eta(&forecast.predicted).is_some_and(|error| error <= required) {
-                return Ok((dwell_s, forecast));
-            }
-            dwell_s += DWELL_STEP_S;
-        }
+    let usual = (longest_s, request.effort);
+    if !joint {
+        return Ok(stage.made(request.order, usual, None)?.plan);
     }
-    Ok((longest_s, at(longest_s)?))
+    let informed = request.order.needs_method();
+    let first = if informed { VisitOrder::SumGradient } else { request.order };
+    let chosen = request.required_sigma_eta.is_some() && first != VisitOrder::Listed;
+    if !(informed || chosen) {
+        return Ok(stage.made(first, usual, None)?.plan);
+    }
+    // An order is sought for the dwells that it will have, and what steps are worth is known about a campaign: both come from
+    // a rough first one.
+    let mut made = stage.made(first, (longest_s, ROUGHLY_RATIO * request.effort), None)?;
+    let dwell_s = |made: &Made| {
+        let dwells_s: Vec<f64> = made.plan.steps.iter().map(|step| step.dwell_s).collect();
+        mean(&dwells_s).unwrap_or(longest_s)
+    };
+    if !informed {
+        made = stage.made(first, (dwell_s(&made), request.effort), None)?;
+    }
+    if let (true, Some(method)) = (informed, request.method) {
+        for _ in 0..SLOPES {
+            let rows: Vec<_> = made.rows.iter().take(MOST_TOGETHER).map(Vec::as_slice).collect();
+            let Some(worth) = method.worth_to(&rows) else { break };
+            let other = stage.made(request.order, (dwell_s(&made), request.effort), Some(worth.as_ref()))?;
+            if cost(&other.plan).total_cmp(&cost(&made.plan)).is_ge() {
+                break;
+            }
+            made = other;
+        }
+        made.plan.objective = request.order.name().to_owned();
+    }
+    Ok(made.plan)
 }
 
-/// Standard error and bias of the efficiency in quadrature.
-fn error_eta(predicted: &mapper_core::Predicted) -> Option<f64> {
-    Some(predicted.sigma_eta?.hypot(predicted.bias_eta.unwrap_or(0.0)))
-}
-
-fn finished(
+pub(crate) fn finished(
     request: &PlanRequest<'_>,
     housing: &Housing,
     ordered: &Ordered,
@@ -241,8 +131,8 @@ fn finished(
         + request.timing.cool_down_s;
     let figures = figures(&steps, duration_s / 60.0);
     // A bound holds for the points and their repeats, not for what is put behind them.
-    let searched =
-        !matches!(request.order, VisitOrder::Listed | VisitOrder::Greedy) && request.appended.is_none();
+    let searched = !matches!(request.order, VisitOrder::Listed | VisitOrder::Greedy | VisitOrder::SpeedLines)
+        && request.appended.is_none();
     let bound =
         searched.then(|| bound(request, housing, ordered, visits, repeated, &steps, &figures)).flatten();
     Plan {
@@ -266,11 +156,11 @@ fn bound_remark(request: &PlanRequest<'_>, bound: Option<&PlanBound>) -> Option<
         return Some("none was worked out: a jump was put behind the points".to_owned());
     }
     let text = match request.order {
-        VisitOrder::Listed | VisitOrder::Greedy => "the order was not searched for",
-        VisitOrder::Time => {
-            "none is known for the shortest campaign: each dwell is chosen for itself, and bounds hold for one dwell alone"
+        VisitOrder::Listed | VisitOrder::Greedy | VisitOrder::SpeedLines => "the order was not searched for",
+        _ if request.required_sigma_eta.is_some() => {
+            "none is known: each dwell is chosen for itself, and bounds hold for one dwell alone"
         }
-        VisitOrder::Information => {
+        VisitOrder::Information | VisitOrder::Time | VisitOrder::Best => {
             "none is known for the predicted error of the efficiency; those of the gradients hold for any order"
         }
         VisitOrder::SumGradient | VisitOrder::WorstGradient if bound.is_none() => {
@@ -306,23 +196,35 @@ fn remarks(request: &PlanRequest<'_>, steps: &[PlanStep], repeated: Option<Opera
             ));
         }
     }
-    if let (VisitOrder::Time, Some(required)) = (request.order, request.required_sigma_eta) {
-        let short: Vec<String> = steps
-            .iter()
-            .filter(|step| error_eta(&step.predicted).is_some_and(|error| error > required))
-            .map(|step| step.to.to_string())
-            .collect();
-        if !short.is_empty() {
-            remarks.push(format!(
-                "{} of the steps do not reach an error of {:.2} points of efficiency within {:.0} s: {}",
-                short.len(),
-                100.0 * required,
-                request.timing.dwell_s,
-                short.join(", ")
-            ));
-        }
-    }
+    remarks.extend(not_reached(request, steps));
     remarks
+}
+
+/// What of the required error is not reached within the longest dwell.
+fn not_reached(request: &PlanRequest<'_>, steps: &[PlanStep]) -> Option<String> {
+    let required = request.required_sigma_eta?;
+    let (percent, longest_s) = (100.0 * required, request.timing.dwell_s);
+    if request.method.is_some_and(|method| method.is_joint()) {
+        let found = open_rms_error_eta(steps)?;
+        return (found > NEARLY_RATIO * required).then(|| {
+            format!(
+                "steps of {longest_s:.0} s reach an error of {:.2} points of efficiency (rms), not the {percent:.2} that are required",
+                100.0 * found
+            )
+        });
+    }
+    let short: Vec<String> = steps
+        .iter()
+        .filter(|step| error_eta(&step.predicted).is_some_and(|error| error > required))
+        .map(|step| step.to.to_string())
+        .collect();
+    (!short.is_empty()).then(|| {
+        format!(
+            "{} of the steps do not reach an error of {percent:.2} points of efficiency within {longest_s:.0} s: {}",
+            short.len(),
+            short.join(", ")
+        )
+    })
 }
 
 fn bound(
@@ -335,7 +237,7 @@ fn bound(
     figures: &PlanFigures,
 ) -> Option<PlanBound> {
     // A dwell of its own for each step is another problem than the one the housing was reduced for.
-    if request.order == VisitOrder::Time {
+    if request.required_sigma_eta.is_some() {
         return None;
     }
     let mut nodes: Vec<usize> = ordered.order.clone();
@@ -380,6 +282,15 @@ fn bound(
     })
 }
 
+/// Root of the mean square of the errors where nothing is as declared, of the steps that measure a point.
+pub(crate) fn open_rms_error_eta(steps: &[PlanStep]) -> Option<f64> {
+    let points = steps.iter().filter(|step| step.kind.measures()).map(|step| &step.predicted);
+    let errors: Vec<f64> = points
+        .filter_map(|predicted| Some(predicted.open_sigma_eta?.hypot(predicted.bias_eta.unwrap_or(0.0))))
+        .collect();
+    rms(&errors)
+}
+
 /// The figures, of the steps that measure a point: a repeat is there to compare.
 fn figures(steps: &[PlanStep], minutes: f64) -> PlanFigures {
     let points = || steps.iter().filter(|step| step.kind.measures()).map(|step| &step.predicted);
@@ -391,6 +302,7 @@ fn figures(steps: &[PlanStep], minutes: f64) -> PlanFigures {
         worst_gradient_k: gradients().min_by(f64::total_cmp),
         worst_sigma_eta: largest(&mut points().filter_map(|predicted| predicted.sigma_eta)),
         rms_error_eta: rms(&errors),
+        open_rms_error_eta: open_rms_error_eta(steps),
         worst_error_eta: largest(&mut errors.iter().copied()),
         minutes,
     }

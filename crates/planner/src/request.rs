@@ -38,7 +38,8 @@ pub struct PlanRequest<'a> {
     pub return_to_first: bool,
     /// A jump to be made after all else, e.g. what a gap diagnosis asks for.
     pub appended: Option<Jump>,
-    /// Standard error of the efficiency (fraction) that [`VisitOrder::Time`] has to reach.
+    /// Standard error of the efficiency (fraction) that each point is to reach: no step lasts longer than that takes, nor
+    /// longer than `timing.dwell_s`. Without one all steps last that long.
     pub required_sigma_eta: Option<f64>,
     /// The identification method; without one no errors are predicted.
     pub method: Option<&'a dyn PredictedMethod>,
@@ -68,7 +69,7 @@ pub enum PlanError {
     NoPoints,
     /// An order needs to know what the identification will make of a step.
     #[error(
-        "the order {order} needs the dynamic identification method; set `identification.method: dynamic`"
+        "the order {order} needs an identification method that looks at transients; set `identification.method: joint`"
     )]
     NeedsMethod {
         /// The order.

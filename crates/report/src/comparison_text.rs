@@ -1,48 +1,61 @@
-//! A plan beside conventional mapping and the same points along speed lines.
+//! A plan beside conventional mapping and the same points under other orders.
 
 use crate::number::percent;
 use mapper_planner::{Comparison, STABLE_DRIFT_K_MIN, WayOfMapping};
+use serde_json::{Value, json};
 use std::fmt::Write;
 
-fn ways(comparison: &Comparison) -> [(&'static str, &'static str, &WayOfMapping); 3] {
-    [
-        ("proposed", "this plan", &comparison.proposed),
-        ("conventional", "conventional, with stabilisation", &comparison.conventional),
-        ("along_speed_lines", "along speed lines, same method", &comparison.along_speed_lines),
-    ]
-}
-
 /// For machines: minutes and predicted errors of each way.
-pub fn comparison_json(comparison: &Comparison) -> serde_json::Value {
-    let entry = |(key, _, way): (&str, &str, &WayOfMapping)| {
-        let value = serde_json::json!({
+pub fn comparison_json(comparison: &Comparison) -> Value {
+    let entry = |way: &WayOfMapping| {
+        json!({
             "minutes": way.minutes,
+            "sum_gradient_k": way.sum_gradient_k,
             "worst_error_eta": way.worst_error_eta,
-            "mean_error_eta": way.mean_error_eta,
+            "rms_error_eta": way.rms_error_eta,
             "order": way.order,
-        });
-        (key.to_owned(), value)
+        })
     };
-    serde_json::Value::Object(ways(comparison).map(entry).into_iter().collect())
+    let orders: Vec<Value> = comparison
+        .orders
+        .iter()
+        .map(|(name, way)| {
+            let mut value = entry(way);
+            value["name"] = name.as_str().into();
+            value
+        })
+        .collect();
+    json!({
+        "proposed": entry(&comparison.proposed),
+        "conventional": entry(&comparison.conventional),
+        "orders": orders,
+    })
 }
 
 /// For people.
 pub fn comparison_text(comparison: &Comparison) -> String {
     let mut text =
-        "\nPredicted error of the efficiency, %points (without warm-up and cool-down):\n".to_owned();
-    for (_, name, way) in ways(comparison) {
+        "\nPredicted error of the efficiency, %points (minutes without soak, warm-up and cool-down):\n"
+            .to_owned();
+    let mut line = |name: &str, way: &WayOfMapping| {
+        let gradient = way.sum_gradient_k.map_or_else(|| "-".to_owned(), |sum_k| format!("{sum_k:.0}"));
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,
-            "  {name:<34}{:>7.0} min   worst {:>6}   mean {:>6}",
+            "  {name:<32}{:>6.0} min   rms {:>6}   worst {:>6}   gradients {gradient:>6} K",
             way.minutes,
+            percent(way.rms_error_eta, 2),
             percent(way.worst_error_eta, 2),
-            percent(way.mean_error_eta, 2)
         );
+    };
+    line("this plan", &comparison.proposed);
+    for (name, way) in &comparison.orders {
+        line(&format!("order: {name}"), way);
     }
+    line("conventional, with stabilisation", &comparison.conventional);
     let _ = writeln!(
         text,
-        "Conventional: T2 and housing must drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is that of heat transfer and of declared offsets."
+        "Orders: the best for the time it takes first. Conventional: T2 and housing must drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is that of heat transfer and of the same offsets."
     );
     text
 }

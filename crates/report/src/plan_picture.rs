@@ -2,7 +2,7 @@
 
 use mapper_campaign::Campaign;
 use mapper_chart::{Annotation, Axis, Colour, Figure, Line, Panel, Scatter, TextAnchor};
-use mapper_core::{OperatingPoint, Plan, StepKind};
+use mapper_core::{OperatingPoint, Plan, StepKind, VisitOrder};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::steady::hold_speed;
@@ -47,8 +47,8 @@ pub fn plan_svg(campaign: &Campaign, model: &Model, plan: &Plan, comparison: &Co
     }
     Figure::new(format!("{}: path through the map", plan.campaign))
         .subtitle(format!(
-            "Errors of the efficiency as predicted on the nominal machine: mean, worst. Along speed lines with the plan's method and dwell: {}.",
-            numbers(&comparison.along_speed_lines)
+            "Errors of the efficiency as predicted on the nominal machine: rms, worst. Along speed lines with the plan's method: {}.",
+            comparison.of_order(VisitOrder::SpeedLines.name()).map_or_else(|| "-".to_owned(), numbers)
         ))
         .panel(conventional)
         .panel(planned)
@@ -58,11 +58,11 @@ pub fn plan_svg(campaign: &Campaign, model: &Model, plan: &Plan, comparison: &Co
 
 fn numbers(way: &WayOfMapping) -> String {
     let percent =
-        |error: Option<f64>| error.map_or_else(|| "-".to_owned(), |error| format!("{:.1}", 100.0 * error));
+        |error: Option<f64>| error.map_or_else(|| "-".to_owned(), |error| format!("{:.2}", 100.0 * error));
     format!(
         "{:.0} min, {} / {} %points",
         way.minutes,
-        percent(way.mean_error_eta),
+        percent(way.rms_error_eta),
         percent(way.worst_error_eta)
     )
 }

@@ -43,6 +43,7 @@ fn plan() -> Plan {
             worst_gradient_k: None,
             worst_sigma_eta: None,
             rms_error_eta: None,
+            open_rms_error_eta: None,
             worst_error_eta: None,
             minutes: 1.0,
         },

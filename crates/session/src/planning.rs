@@ -3,9 +3,10 @@
 use crate::SessionError;
 use crate::declared::identification;
 use crate::files::read_text;
-use crate::predicted_method::Dynamic;
+use crate::predicted_method::{Dynamic, Joint};
 use mapper_campaign::Campaign;
-use mapper_core::{Method, Plan};
+use mapper_core::{JointSettings, Method, Plan};
+use mapper_identify::{ZeroSettings, expected_after_zero};
 use mapper_physics::model::Model;
 use mapper_planner::{PlanRequest, PredictedMethod, make_plan};
 use std::path::Path;
@@ -36,8 +37,8 @@ pub fn with_plan_request<T, E: From<SessionError>>(
     then: impl FnOnce(&PlanRequest<'_>) -> Result<T, E>,
 ) -> Result<T, E> {
     let canonical = serde_json::to_string(campaign).map_err(SessionError::from)?;
-    let dynamic = Dynamic::of(identification(campaign));
-    let of_transients = matches!(campaign.identification.method, Method::Dynamic | Method::Joint);
+    let method = predicted_method(campaign);
+    let of_transients = method.is_some();
     then(&PlanRequest {
         campaign_name: &campaign.name,
         campaign_canonical: &canonical,
@@ -54,10 +55,25 @@ pub fn with_plan_request<T, E: From<SessionError>>(
         repeats: campaign.repeats,
         return_to_first: campaign.return_to_first && of_transients,
         required_sigma_eta: campaign.required_sigma_eta,
-        method: of_transients.then_some(&dynamic as &dyn PredictedMethod),
+        method: method.as_deref(),
         effort: 1.0,
         seed: campaign.seed,
     })
+}
+
+/// The campaign's method as the planner sees it, after the zero that the campaign asks for; `None` for a method that waits
+/// until nothing moves.
+fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
+    let config = identification(campaign);
+    let config = match campaign.zero {
+        Some(soak) => expected_after_zero(config, &ZeroSettings::from(soak), soak.duration_s),
+        None => config,
+    };
+    match campaign.identification.method {
+        Method::Joint if config.joint != JointSettings::all_off() => Some(Box::new(Joint::of(config))),
+        Method::Dynamic | Method::Joint => Some(Box::new(Dynamic::of(config))),
+        Method::Steady | Method::Imported => None,
+    }
 }
 
 /// A plan from a file, refused where what it was made from has changed; `made` is the plan made again.

@@ -1,7 +1,10 @@
-//! The dynamic method as the planner sees it.
+//! The identification methods as the planner sees them.
 
-use mapper_identify::{ExpectedRow, IdentifyConfig, PressureTap, expected, expected_steady};
-use mapper_planner::{ForecastRow, MethodResult, PredictedMethod};
+use mapper_identify::{
+    Expected, ExpectedRow, ExpectedStep, IdentifyConfig, PressureTap, StepWorth, expected, expected_steady,
+    expected_together,
+};
+use mapper_planner::{ForecastRow, MethodResult, PredictedMethod, WorthOfStep};
 
 /// The dynamic method with the campaign's settings.
 #[derive(Debug)]
@@ -22,12 +25,7 @@ impl PredictedMethod for Dynamic {
     fn predict(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult> {
         let rows: Vec<ExpectedRow> = window.iter().map(expected_row).collect();
         let found = expected(&rows, interval_s, &self.config)?;
-        Some(MethodResult {
-            eta: found.eta,
-            sigma_eta: found.sigma_eta,
-            h_w_m2k: found.h_w_m2k,
-            sigma_h_w_m2k: found.sigma_h_w_m2k,
-        })
+        Some(result(found))
     }
 
     fn predict_settled(&self, row: &ForecastRow) -> Option<(f64, f64)> {
@@ -35,9 +33,82 @@ impl PredictedMethod for Dynamic {
     }
 }
 
+/// The joint method with the campaign's settings, after its zero. Where a step is looked at by itself it is the dynamic one.
+#[derive(Debug)]
+pub struct Joint {
+    alone: Dynamic,
+}
+
+impl Joint {
+    /// The method under `config`.
+    pub fn of(config: IdentifyConfig) -> Self {
+        Joint { alone: Dynamic::of(config) }
+    }
+}
+
+impl PredictedMethod for Joint {
+    fn predict(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult> {
+        self.alone.predict(window, interval_s)
+    }
+
+    fn together(&self, steps: &[&[ForecastRow]]) -> Option<Vec<Option<MethodResult>>> {
+        let rows = expected_rows(steps);
+        let found = expected_together(&expected_steps(&rows, steps), &self.alone.config)?;
+        Some(found.into_iter().map(|found| found.map(result)).collect())
+    }
+
+    fn worth_to(&self, steps: &[&[ForecastRow]]) -> Option<Box<dyn WorthOfStep>> {
+        let rows = expected_rows(steps);
+        let worth = StepWorth::about(&expected_steps(&rows, steps), &self.alone.config)?;
+        Some(Box::new(Worth(worth)))
+    }
+
+    fn is_joint(&self) -> bool {
+        true
+    }
+
+    fn predict_settled(&self, row: &ForecastRow) -> Option<(f64, f64)> {
+        self.alone.predict_settled(row)
+    }
+}
+
+#[derive(Debug)]
+struct Worth(StepWorth);
+
+impl WorthOfStep for Worth {
+    fn of(&self, rows: &[ForecastRow]) -> Option<f64> {
+        let expected = expected_rows(&[rows]);
+        let step = expected_steps(&expected, &[rows]);
+        self.0.of(step.first()?)
+    }
+}
+
+fn expected_rows(steps: &[&[ForecastRow]]) -> Vec<Vec<ExpectedRow>> {
+    steps.iter().map(|rows| rows.iter().map(expected_row).collect()).collect()
+}
+
+fn expected_steps<'a>(rows: &'a [Vec<ExpectedRow>], steps: &[&[ForecastRow]]) -> Vec<ExpectedStep<'a>> {
+    let one = |(rows, step): (&'a Vec<ExpectedRow>, &&[ForecastRow])| {
+        let (eta, h_w_m2k) = step.last().map_or((0.0, 0.0), |end| (end.efficiency, end.h_w_m2k));
+        ExpectedStep { rows, eta, h_w_m2k }
+    };
+    rows.iter().zip(steps).map(one).collect()
+}
+
+fn result(found: Expected) -> MethodResult {
+    MethodResult {
+        eta: found.eta,
+        sigma_eta: found.sigma_eta,
+        h_w_m2k: found.h_w_m2k,
+        sigma_h_w_m2k: found.sigma_h_w_m2k,
+        open_sigma_eta: found.open_sigma_eta,
+    }
+}
+
 fn expected_row(row: &ForecastRow) -> ExpectedRow {
     ExpectedRow {
         t_s: row.t_s,
+        speed_rpm: row.speed_rpm,
         t1_k: row.t1_k,
         t2_k: row.t2_k,
         tc_k: row.tc_k,

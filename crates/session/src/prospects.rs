@@ -100,9 +100,13 @@ fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     if !(transient && auto && campaign.sequence.is_none()) {
         return None;
     }
-    let needed_s = |step: &PlanStep| {
-        step.predicted.settle_s.unwrap_or(f64::INFINITY).max(WindowRule::EARLIEST_S) + WindowRule::SHORTEST_S
+    let joint = campaign.identification.method == Method::Joint;
+    let rest_s =
+        |dwell_s: f64| if joint { WindowRule::rest_at_end_s(dwell_s) } else { WindowRule::SHORTEST_S };
+    let settles_s = |step: &PlanStep| {
+        step.predicted.settle_s.unwrap_or(f64::INFINITY).max(if joint { 0.0 } else { WindowRule::EARLIEST_S })
     };
+    let needed_s = |step: &PlanStep| settles_s(step) + rest_s(step.dwell_s);
     let measured = || plan.steps.iter().filter(|step| step.kind != StepKind::Repeat && step.from.is_some());
     let late: Vec<_> = measured().filter(|step| needed_s(step) > step.dwell_s).collect();
     let worst = late.iter().max_by(|a, b| needed_s(a).total_cmp(&needed_s(b)))?;
@@ -117,7 +121,7 @@ fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
              (`not_stabilised`); {} {settles}",
             late.len(),
             measured().count(),
-            WindowRule::SHORTEST_S,
+            rest_s(worst.dwell_s),
             worst.to
         ),
         "lengthen `timing.dwell`, or widen `identification.stabilisation`".to_owned(),

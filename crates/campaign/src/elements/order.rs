@@ -1,4 +1,4 @@
-//! `order:` and `required_sigma_eta:`, what the order called `time` has to reach. The orders themselves stand in
+//! `order:` and `required_sigma_eta:`, by which the dwell of each step is chosen. The orders themselves stand in
 //! [`mapper_core::VisitOrder`].
 
 use crate::checking::Check;
@@ -15,13 +15,14 @@ pub(crate) fn check(check: &mut Check<'_>) {
         check.note(FindingKind::MissingKey, &path, message, "add e.g. `required_sigma_eta: 1 %`");
     }
     let steady = check.text(&steps!["identification", "method"]) == Some("steady");
-    let counts_on_method =
-        [VisitOrder::Information, VisitOrder::Time].into_iter().any(|needs| needs.name() == order);
+    let counts_on_method = [VisitOrder::Information, VisitOrder::Time, VisitOrder::Best]
+        .into_iter()
+        .any(|needs| needs.name() == order);
     if steady && counts_on_method {
         let message = format!(
-            "`{order}` orders by the predicted result of the dynamic method, but the method is `steady`"
+            "`{order}` orders by the predicted result of the method, and `steady` has none for a step that still moves"
         );
-        let remedy = "write `identification.method: dynamic`, or another order";
+        let remedy = "write `identification.method: joint`, or another order";
         check.note(FindingKind::Conflict, &path, message, remedy);
     }
 }

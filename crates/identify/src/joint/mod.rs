@@ -7,6 +7,7 @@
 
 pub(crate) mod cleaning;
 pub(crate) mod common_part;
+pub(crate) mod expected;
 pub(crate) mod explained;
 pub(crate) mod inlet;
 pub(crate) mod input_noise;
@@ -24,6 +25,7 @@ pub(crate) mod smoothness;
 pub(crate) mod solve;
 pub(crate) mod start;
 pub(crate) mod surface;
+pub(crate) mod worth;
 
 use crate::dynamic::{self, Estimate};
 use crate::end_state::EndState;
@@ -44,6 +46,10 @@ const ROUNDS: usize = 3;
 
 /// Growth of the points' standard errors above which leaving a region out costs more than it gains.
 const MOST_LOST_RATIO: f64 = 2.0;
+
+/// Error of the efficiencies, fraction, that only the declaration of alpha_A, probe and direction factor may keep away: more, and
+/// a machine that is not as declared passes for one that is.
+const MOST_RESTING: f64 = 0.0125;
 
 /// What the method makes of a recording.
 #[derive(Debug)]
@@ -108,7 +114,7 @@ pub(crate) fn estimate(
         }
         return Joint { estimates, thermal: None, two_parameter };
     };
-    let Attempt { problem, smoothed, thermal, left_out, .. } = attempt;
+    let Attempt { problem, smoothed, thermal, resting, left_out, .. } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
         let own = &mut findings[step.position];
@@ -157,6 +163,14 @@ pub(crate) fn estimate(
             let message = "no sensor uncertainty was declared: the interval holds noise alone".to_owned();
             own.remark(code::NOTHING_DECLARED, message);
         }
+        if resting > MOST_RESTING {
+            let message = format!(
+                "the recording alone knows the efficiencies to {:.1} points only; the rest is trust in the declared alpha_A, probe and \
+                 direction factor: record longer steps or larger gradients, or hold fixed what is known (`identification.joint`)",
+                100.0 * resting
+            );
+            own.doubt(code::RESTS_ON_DECLARATION, message);
+        }
         for doubt in &thermal.doubts {
             own.doubt(code::MODEL_DOUBTED, doubt.clone());
         }
@@ -170,6 +184,8 @@ struct Attempt<'a> {
     covariance: Covariance,
     smoothed: Smoothed,
     thermal: ThermalModel,
+    /// By how much the efficiencies would be off if what was drawn to its declared value were not as declared, fraction.
+    resting: f64,
     /// Why the barred steps are barred, if any are.
     left_out: Option<String>,
 }
@@ -187,7 +203,7 @@ impl<'a> Attempt<'a> {
             let member = problem.members.get_mut(*index)?;
             (member.shares, member.barred) = (false, true);
         }
-        let covariance = fitted(&mut problem, steps, config)?;
+        let (covariance, resting) = fitted(&mut problem, steps, config)?;
         let mut smoothed = smoothness::smoothed(&problem, &covariance, steps, config.reference);
         if smoothed.strain > smoothness::STRAIN_SIGMAS {
             // The declaration does not hold: the offsets then have the spread that they show.
@@ -199,7 +215,7 @@ impl<'a> Attempt<'a> {
             smoothed.strain = strain;
         }
         let thermal = shared::thermal_model(&problem, &covariance, &smoothed, steps, config);
-        Some(Attempt { problem, covariance, smoothed, thermal, left_out: None })
+        Some(Attempt { problem, covariance, smoothed, thermal, resting, left_out: None })
     }
 
     /// The fit without the region of the map that disagrees most, if there is one.
@@ -261,20 +277,23 @@ fn carefully(config: &IdentifyConfig) -> IdentifyConfig {
 }
 
 /// Fits, learns from the fit how noisy steps are and how far points may scatter, leaves out what fits far worse, and
-/// fits again.
+/// fits again. With the covariance comes how far the points rest on what is declared, fraction.
 fn fitted(
     problem: &mut Problem<'_>,
     steps: &[rows::StepRows],
     config: &IdentifyConfig,
-) -> Option<Covariance> {
+) -> Option<(Covariance, f64)> {
     for _ in 0..ROUNDS {
         problem.minimise(ROUGHLY)?;
         start::refine(problem, steps, config);
+        problem.explained = input_noise::explained(problem, steps, config);
         judge::exclude(problem);
         // A probe that came to rest on its bound may leave it under better weights.
         problem.active[PROBE_MM2] = problem.probe_fitted;
     }
     problem.minimise(FULLY)?;
+    let open = problem.clone();
     parsimony::settle(problem)?;
-    inlet::settle(problem)
+    let resting = parsimony::resting_on_declaration(&open, problem)?;
+    Some((inlet::settle(problem)?, resting))
 }

@@ -8,9 +8,9 @@
 //! what that leaves open is carried on as variance: enough that the 95 % interval about the drawn value reaches as far as
 //! the mixture of both answers does. Its plain variance would not, since the mixture has a long tail on one side.
 
-use crate::joint::parameters::{ALPHA, LN_DIRECTION, PROBE_MM2, SHARED};
+use crate::joint::parameters::{ALPHA, ETA, LN_DIRECTION, PROBE_MM2, SHARED};
 use crate::joint::solve::{Covariance, FULLY, Problem};
-use mapper_numerics::statistics::{NORMAL_975, normal_quantile};
+use mapper_numerics::statistics::{NORMAL_975, mean, normal_quantile};
 use nalgebra::{DMatrix, DVector};
 
 /// The refinements, and for each what small faults of the model can pass for: a clearance that grows by a percent as the
@@ -23,6 +23,26 @@ pub(crate) const DECLARED_HOLDS: f64 = 0.67;
 const BEYOND: f64 = 0.025;
 /// Weight of a refinement above which it is left alone.
 const SURE: f64 = 0.999;
+
+/// By how much the efficiencies would be off, fraction (rms of one standard error), if a refinement that is drawn to its
+/// declared value were at work after all: what is known of them without the declaration. 0 where none is drawn.
+pub(crate) fn resting_on_declaration(open: &Problem<'_>, settled: &Problem<'_>) -> Option<f64> {
+    let drawn = |(index, _): &(usize, f64)| {
+        open.active[*index] && settled.priors[*index].sigma < 0.5 * open.priors[*index].sigma
+    };
+    let drawn: Vec<usize> = REFINEMENTS.iter().filter(|one| drawn(one)).map(|(index, _)| *index).collect();
+    if drawn.is_empty() {
+        return Some(0.0);
+    }
+    let mut held = open.clone();
+    drawn.iter().for_each(|index| held.active[*index] = false);
+    let (open, held) = (open.covariance()?, held.covariance()?);
+    let variance = |covariance: &Covariance, i: usize| covariance.own.get(i).map(|(own, _)| own[(ETA, ETA)]);
+    let of_steps: Vec<f64> = (0..open.own.len())
+        .filter_map(|i| Some((variance(&open, i)? - variance(&held, i)?).max(0.0)))
+        .collect();
+    Some(mean(&of_steps)?.sqrt())
+}
 
 /// Weighs the refinements, draws the least needed by its weight, fits again, and weighs those that are left: one that was
 /// only balanced by another shows what it is when the other is gone.

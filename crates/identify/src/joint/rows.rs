@@ -71,9 +71,8 @@ pub(crate) fn condensed(
     let mut start = 0;
     while start < samples.len() {
         let start_s = samples.t_s[start];
+        let block_s = block_s_after(start_s - samples.t_s[0], config);
         // Half a nanosecond: times of samples are rounded.
-        let late = !config.declared.is_empty() && start_s - samples.t_s[0] >= LATE_S;
-        let block_s = if late { LATE_BLOCK_S } else { BLOCK_S };
         let end = samples.t_s.partition_point(|t| *t < start_s + block_s - 5e-10).max(start + 1);
         let of = |column: &[f64]| mean(&column[start..end]).unwrap_or(f64::NAN);
         let t_s = of(&samples.t_s);
@@ -120,6 +119,12 @@ pub(crate) fn condensed(
     usable.then_some(StepRows { position, rows, end })
 }
 
+/// Length of a block that begins so long after the first sample, s.
+pub(crate) fn block_s_after(elapsed_s: f64, config: &IdentifyConfig) -> f64 {
+    let late = !config.declared.is_empty() && elapsed_s >= LATE_S;
+    if late { LATE_BLOCK_S } else { BLOCK_S }
+}
+
 /// Smooths T1, Tc, P1, P2, flow and the place on the map.
 fn smooth(rows: &mut [Row]) {
     let t_s: Vec<f64> = rows.iter().map(|row| row.t_s).collect();
@@ -139,7 +144,14 @@ fn smooth(rows: &mut [Row]) {
     column(|row| row.place.1, |row, value| row.place.1 = value);
 }
 
-fn place(config: &IdentifyConfig, speed_rpm: f64, flow_kg_s: f64, t1_k: f64, p1_pa: f64) -> (f64, f64) {
+/// Corrected speed, rpm, and flow, kg/s.
+pub(crate) fn place(
+    config: &IdentifyConfig,
+    speed_rpm: f64,
+    flow_kg_s: f64,
+    t1_k: f64,
+    p1_pa: f64,
+) -> (f64, f64) {
     let reference = &config.reference;
     (reference.corrected_speed_rpm(speed_rpm, t1_k), reference.corrected_flow_kg_s(flow_kg_s, t1_k, p1_pa))
 }

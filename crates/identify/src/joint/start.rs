@@ -6,7 +6,6 @@ use crate::findings::{Findings, code};
 use crate::joint::cleaning::cleaned;
 use crate::joint::explained::Explained;
 use crate::joint::inlet;
-use crate::joint::input_noise;
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
     ALPHA, ALPHA_SIGMA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, INLET, LN_COEFFICIENT, LN_DEVIATION,
@@ -28,7 +27,7 @@ use mapper_physics::air;
 /// Start of what is used of a step, after the last change of a command, s: h and efficiency are followed while the
 /// operating point settles. Where noise could pass for a slow probe the seconds right after the jump are needed, which
 /// tell the two apart by tens of kelvin; without noise they only show where the surface is none.
-const START_S: f64 = 3.0;
+pub(crate) const START_S: f64 = 3.0;
 const START_WITH_NOISE_S: f64 = 1.5;
 /// Minimum spread of the points' efficiencies about the surface: maps are not polynomials.
 const LEAST_SURFACE_SIGMA: f64 = 3e-3;
@@ -71,12 +70,12 @@ pub(crate) fn steps(
         }
         if !config.declared.is_empty() {
             // What varies is followed; but a point is where a step settles.
-            let mut judged = Findings::new();
-            window::choose(recording, step, WindowRule::Auto, &config.settle_bands, &mut judged);
-            if judged.warnings.iter().any(|warning| warning.code == code::NOT_STABILISED) {
+            let rest = window::rest(recording, step, &config.settle_bands);
+            let needed_s = WindowRule::rest_at_end_s(step.end_s - step.start_s);
+            if let Some(rest) = rest.filter(|rest| !rest.whole && rest.settled_s < needed_s.floor()) {
                 let message = format!(
-                    "speed, flow or pressure ratio still varies beyond its limit in the last {:.0} s of the step",
-                    WindowRule::SHORTEST_S
+                    "the {} still varies beyond its limit {:.0} s before the step's end (needed: {needed_s:.0} s)",
+                    rest.slowest, rest.settled_s
                 );
                 own.doubt(code::NOT_STABILISED, message);
             }
@@ -165,41 +164,9 @@ pub(crate) fn problem<'a>(
     let members = steps
         .iter()
         .map(|step| {
-            let end_terms = scale.terms(step.end.place);
-            let terms = step
-                .rows
-                .iter()
-                .map(|row| {
-                    let here = scale.terms(row.place);
-                    std::array::from_fn::<f64, TERM_COUNT, _>(|k| here[k] - end_terms[k])
-                })
-                .collect();
             let found = alone.get(step.position);
-            let eta = found.and_then(|found| found.eta).map_or(mean_eta, |(eta, _)| eta).clamp(0.3, 0.9);
-            let first_k = step.rows.first().map_or(step.end.t2_k, |row| row.t2_k);
-            let mut local = [0.0; LOCAL];
-            let mut own = [free; LOCAL];
-            local[ETA] = eta;
-            own[LN_DEVIATION] = Prior { mean: 0.0, sigma: 0.01 };
-            if !with_law {
-                local[LN_DEVIATION] =
-                    found.and_then(|found| found.h_w_m2k).map_or(500.0, |(h, _)| h).clamp(20.0, 5e3).ln();
-                own[LN_DEVIATION] = Prior { mean: local[LN_DEVIATION], sigma: 3.0 };
-            }
-            local[FIRST_READING] = first_k;
-            own[FIRST_READING] = Prior { mean: first_k, sigma: 5.0 };
-            local[SLOPE] = 1.0;
-            own[SLOPE] = Prior { mean: 1.0, sigma: 0.05 };
-            Member {
-                course: Course { rows: &step.rows, terms },
-                measured_k: step.rows.iter().map(|row| row.t2_k).collect(),
-                whitening: whitening(step, config, UNDECLARED_NOISE_K, UNDECLARED_NOISE_K, |_| 0.0),
-                coupling: std::array::from_fn(|i| i.checked_sub(SURFACE).map_or(0.0, |k| end_terms[k])),
-                local,
-                priors: own,
-                shares: found.and_then(|found| found.residual_rms_k).is_none_or(|rms_k| rms_k <= suspect_k),
-                barred: false,
-            }
+            let shares = found.and_then(|found| found.residual_rms_k).is_none_or(|rms_k| rms_k <= suspect_k);
+            Member { shares, ..member(step, found, &scale, mean_eta, config) }
         })
         .collect();
     let surface_sigma = if shaped { 0.005 } else { 1e3 };
@@ -219,6 +186,51 @@ pub(crate) fn problem<'a>(
     })
 }
 
+/// A step with its start values. `found`: what it gives by itself; `mean_eta` stands for an efficiency that it does not give.
+pub(crate) fn member<'a>(
+    step: &'a StepRows,
+    found: Option<&Estimate>,
+    scale: &SurfaceScale,
+    mean_eta: f64,
+    config: &IdentifyConfig,
+) -> Member<'a> {
+    let free = Prior { mean: 0.0, sigma: f64::INFINITY };
+    let end_terms = scale.terms(step.end.place);
+    let terms = step
+        .rows
+        .iter()
+        .map(|row| {
+            let here = scale.terms(row.place);
+            std::array::from_fn::<f64, TERM_COUNT, _>(|k| here[k] - end_terms[k])
+        })
+        .collect();
+    let eta = found.and_then(|found| found.eta).map_or(mean_eta, |(eta, _)| eta).clamp(0.3, 0.9);
+    let first_k = step.rows.first().map_or(step.end.t2_k, |row| row.t2_k);
+    let mut local = [0.0; LOCAL];
+    let mut own = [free; LOCAL];
+    local[ETA] = eta;
+    own[LN_DEVIATION] = Prior { mean: 0.0, sigma: 0.01 };
+    if config.joint.h != ConvectionWithinStep::Law {
+        local[LN_DEVIATION] =
+            found.and_then(|found| found.h_w_m2k).map_or(500.0, |(h, _)| h).clamp(20.0, 5e3).ln();
+        own[LN_DEVIATION] = Prior { mean: local[LN_DEVIATION], sigma: 3.0 };
+    }
+    local[FIRST_READING] = first_k;
+    own[FIRST_READING] = Prior { mean: first_k, sigma: 5.0 };
+    local[SLOPE] = 1.0;
+    own[SLOPE] = Prior { mean: 1.0, sigma: 0.05 };
+    Member {
+        course: Course { rows: &step.rows, terms },
+        measured_k: step.rows.iter().map(|row| row.t2_k).collect(),
+        whitening: whitening(step, config, UNDECLARED_NOISE_K, UNDECLARED_NOISE_K, |_| 0.0),
+        coupling: std::array::from_fn(|i| i.checked_sub(SURFACE).map_or(0.0, |k| end_terms[k])),
+        local,
+        priors: own,
+        shares: true,
+        barred: false,
+    }
+}
+
 /// `shape_k`: how far the surface moves the prediction at each row, K; part of that is wrong, and as slow as itself.
 fn whitening(
     step: &StepRows,
@@ -236,6 +248,25 @@ fn whitening(
 
 /// Takes the noise of each step and the spreads of the points about surface and law from what was found.
 pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
+    weigh(problem, steps, config);
+    // Medians: one bad step must not make room for itself.
+    let spread =
+        |off: &dyn Fn(&Member<'_>) -> f64| robust_sigma(problem.members.iter().map(off)).unwrap_or(0.0);
+    let off_surface = spread(&|member| member.off_surface(&problem.shared, &member.local));
+    let off_law = spread(&|member| member.local[LN_DEVIATION]);
+    if problem.setting.shaped {
+        problem.surface_sigma = off_surface.clamp(LEAST_SURFACE_SIGMA, 0.02);
+    }
+    if problem.setting.with_law {
+        let sigma = off_law.clamp(LEAST_LAW_SIGMA, 0.1);
+        for member in &mut problem.members {
+            member.priors[LN_DEVIATION].sigma = sigma;
+        }
+    }
+}
+
+/// The noise of each step, and how its efficiency answers to offsets, where the parameters stand.
+pub(crate) fn weigh(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
     let channels = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
     let declared: Vec<f64> = channels
         .iter()
@@ -272,20 +303,5 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
         let shape_k = |row: usize| terms.get(row).map_or(0.0, |terms| by_eta * dot(terms, surface));
         let new = whitening(step, config, sigma_k, white_sigma_k, shape_k);
         problem.members[i].whitening = new;
-    }
-    problem.explained = input_noise::explained(problem, steps, config);
-    // Medians: one bad step must not make room for itself.
-    let spread =
-        |off: &dyn Fn(&Member<'_>) -> f64| robust_sigma(problem.members.iter().map(off)).unwrap_or(0.0);
-    let off_surface = spread(&|member| member.off_surface(&problem.shared, &member.local));
-    let off_law = spread(&|member| member.local[LN_DEVIATION]);
-    if problem.setting.shaped {
-        problem.surface_sigma = off_surface.clamp(LEAST_SURFACE_SIGMA, 0.02);
-    }
-    if problem.setting.with_law {
-        let sigma = off_law.clamp(LEAST_LAW_SIGMA, 0.1);
-        for member in &mut problem.members {
-            member.priors[LN_DEVIATION].sigma = sigma;
-        }
     }
 }

@@ -1,0 +1,117 @@
+//! What the joint method will make of steps that were only forecast: for planning, before anything is measured.
+//!
+//! The forecast is identified as a recording without noise is, and the covariance where that ends holds the declared noise,
+//! what is left of the offsets and everything that the steps share: the Fisher information of all steps together.
+
+use crate::IdentifyConfig;
+use crate::config::coloured;
+use crate::dynamic::Estimate;
+use crate::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow};
+use crate::joint::rows::{Row, StepRows, block_s_after, place};
+use crate::joint::solve::{Problem, ROUGHLY};
+use crate::joint::start::{self, START_S};
+use crate::joint::{parsimony, smoothness};
+use mapper_numerics::coloured_noise::BlockNoise;
+
+/// Fewest rows of a step that the method takes.
+const FEWEST_ROWS: usize = 4;
+
+/// A step that was only forecast.
+#[derive(Debug, Clone, Copy)]
+pub struct ExpectedStep<'a> {
+    /// Its instants, `t_s` counted from the jump, the last one at the step's end.
+    pub rows: &'a [ExpectedRow],
+    /// Efficiency at its end, fraction.
+    pub eta: f64,
+    /// Heat-transfer coefficient at its end, W/(m2 K).
+    pub h_w_m2k: f64,
+}
+
+/// Identifies noise-free steps together; one result for each step, `None` for a step that is too short. `None` for all where
+/// the fit comes to no end.
+///
+/// After an isothermal zero `config` is that of [`expected_after_zero`](crate::expected_after_zero).
+pub fn expected_together(
+    steps: &[ExpectedStep<'_>],
+    config: &IdentifyConfig,
+) -> Option<Vec<Option<Expected>>> {
+    let condensed: Vec<StepRows> =
+        steps.iter().enumerate().filter_map(|(position, step)| condensed(position, step, config)).collect();
+    let mut problem = expected_problem(steps, &condensed, config)?;
+    let judged = |problem: &Problem<'_>| {
+        Some(smoothness::smoothed(problem, &problem.covariance()?, &condensed, config.reference))
+    };
+    let open = judged(&problem)?;
+    parsimony::settle(&mut problem)?;
+    let smoothed = judged(&problem)?;
+    let mut found = vec![None; steps.len()];
+    for (i, (member, step)) in problem.members.iter().zip(&condensed).enumerate() {
+        let (eta, ln_h) = (smoothed.eta[i], smoothed.ln_h[i]);
+        let h_w_m2k =
+            problem.setting.h_at_end(&step.end, &problem.shared, &member.local).0 * ln_h.value.exp();
+        let expected = Expected {
+            eta: eta.value,
+            sigma_eta: eta.uncertainty.combined_standard_error(),
+            open_sigma_eta: open.eta[i].uncertainty.combined_standard_error(),
+            h_w_m2k,
+            sigma_h_w_m2k: h_w_m2k * ln_h.uncertainty.combined_standard_error(),
+        };
+        let numbers =
+            [expected.eta, expected.sigma_eta, expected.open_sigma_eta, h_w_m2k, expected.sigma_h_w_m2k];
+        found[step.position] = numbers.iter().all(|x| x.is_finite()).then_some(expected);
+    }
+    Some(found)
+}
+
+/// The fit of a forecast, without a judgement on what is at work in it.
+pub(crate) fn expected_problem<'a>(
+    steps: &[ExpectedStep<'_>],
+    condensed: &'a [StepRows],
+    config: &IdentifyConfig,
+) -> Option<Problem<'a>> {
+    let alone: Vec<Estimate> = steps
+        .iter()
+        .map(|step| Estimate {
+            eta: Some((step.eta, None)),
+            h_w_m2k: Some((step.h_w_m2k, None)),
+            ..Estimate::default()
+        })
+        .collect();
+    let mut problem = start::problem(condensed, &alone, config)?;
+    problem.minimise(ROUGHLY)?;
+    start::refine(&mut problem, condensed, config);
+    problem.minimise(ROUGHLY)?;
+    Some(problem)
+}
+
+/// The rows that the method would condense a recording's samples to.
+pub(crate) fn condensed(
+    position: usize,
+    step: &ExpectedStep<'_>,
+    config: &IdentifyConfig,
+) -> Option<StepRows> {
+    let row = |expected: &ExpectedRow, block_s: f64| Row {
+        t_s: expected.t_s,
+        t1_k: expected.t1_k,
+        t2_k: expected.t2_k,
+        tc_k: expected.tc_k,
+        p1_pa: expected.p1_pa,
+        p2_pa: expected.p2_pa,
+        flow_kg_s: expected.flow_kg_s,
+        place: place(config, expected.speed_rpm, expected.flow_kg_s, expected.t1_k, expected.p1_pa),
+        noise: BlockNoise::of_mean(coloured(config.noise_colour), block_s / DECLARED_INTERVAL_S, block_s),
+    };
+    let first = step.rows.partition_point(|expected| expected.t_s < START_S);
+    let first_s = step.rows.get(first)?.t_s;
+    let mut rows: Vec<Row> = Vec::new();
+    for expected in &step.rows[first..] {
+        let block_s = block_s_after(expected.t_s - first_s, config);
+        // Half a nanosecond: times are rounded.
+        if rows.last().is_none_or(|last| expected.t_s - last.t_s >= block_s - 5e-10) {
+            rows.push(row(expected, block_s));
+        }
+    }
+    let end = Row { noise: rows.last()?.noise, ..row(step.rows.last()?, 0.0) };
+    let usable = rows.len() >= FEWEST_ROWS && end.place.0 > 0.0 && end.place.1 > 0.0;
+    usable.then_some(StepRows { position, rows, end })
+}

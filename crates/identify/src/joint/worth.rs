@@ -1,0 +1,122 @@
+//! What a step would tell, to a joint identification of a whole campaign: for choosing among steps before anything is
+//! measured.
+//!
+//! The mean variance of the points' efficiencies is a convex function of the information that the steps bring together
+//! (A-optimality; Fedorov, Theory of Optimal Experiments, 1972, ch. 2). At a campaign that is planned it has a slope, and along
+//! the slope each step counts for itself: that makes orders comparable step by step.
+
+use crate::IdentifyConfig;
+use crate::dynamic::Estimate;
+use crate::joint::expected::{ExpectedStep, condensed, expected_problem};
+use crate::joint::explained::Explained;
+use crate::joint::model::Setting;
+use crate::joint::parameters::{LN_DEVIATION, Prior, SHARED, SharedVector};
+use crate::joint::parsimony::NO_EXTRA;
+use crate::joint::rows::StepRows;
+use crate::joint::solve::Problem;
+use crate::joint::start;
+use crate::joint::surface::SurfaceScale;
+use mapper_numerics::statistics::mean;
+use nalgebra::DMatrix;
+
+/// A planned campaign, and what more information would be worth to it.
+#[derive(Debug)]
+pub struct StepWorth {
+    config: IdentifyConfig,
+    setting: Setting,
+    scale: SurfaceScale,
+    mean_eta: f64,
+    shared: SharedVector,
+    priors: [Prior; SHARED],
+    active: [bool; SHARED],
+    surface_sigma: f64,
+    law_sigma: f64,
+    /// Covariance of what the steps share.
+    covariance: DMatrix<f64>,
+    /// By how much the sum of the points' variances falls with the information.
+    slope: DMatrix<f64>,
+    /// Sum of the points' variances, fraction^2, and sum over its steps of what each is worth.
+    sums: (f64, f64),
+}
+
+impl StepWorth {
+    /// About a campaign; `None` where its forecast cannot be identified.
+    pub fn about(steps: &[ExpectedStep<'_>], config: &IdentifyConfig) -> Option<Self> {
+        let rows: Vec<StepRows> = steps
+            .iter()
+            .enumerate()
+            .filter_map(|(position, step)| condensed(position, step, config))
+            .collect();
+        let problem = expected_problem(steps, &rows, config)?;
+        let fisher = problem.fisher()?;
+        let mut total = fisher.information.clone();
+        for (row, index) in fisher.unknown.iter().enumerate() {
+            total[(row, row)] += problem.priors[*index].weight();
+        }
+        let covariance = total.cholesky()?.inverse();
+        let mut answers = DMatrix::zeros(covariance.nrows(), covariance.nrows());
+        let mut variance = 0.0;
+        for (own, answer) in &fisher.steps {
+            answers += answer * answer.transpose();
+            variance += own + answer.dot(&(&covariance * answer));
+        }
+        let slope = &covariance * answers * &covariance;
+        let worth = slope.dot(&fisher.information) - variance;
+        let places: Vec<(f64, f64)> = rows.iter().map(|step| step.end.place).collect();
+        Some(StepWorth {
+            scale: SurfaceScale::of(&places, config.reference)?,
+            mean_eta: mean(steps.iter().map(|step| step.eta))?,
+            law_sigma: problem.members.first()?.priors[LN_DEVIATION].sigma,
+            config: config.clone(),
+            setting: problem.setting,
+            shared: problem.shared,
+            priors: problem.priors,
+            active: problem.active,
+            surface_sigma: problem.surface_sigma,
+            covariance,
+            slope,
+            sums: (variance, worth),
+        })
+    }
+
+    /// What a step is worth, fraction^2: by how much it makes all points more certain, less the variance of its own point. The
+    /// sum over the steps of a campaign differs from minus the sum of its variances by what the slope does not know.
+    pub fn of(&self, step: &ExpectedStep<'_>) -> Option<f64> {
+        let rows = [condensed(0, step, &self.config)?];
+        let alone = Estimate {
+            eta: Some((step.eta, None)),
+            h_w_m2k: Some((step.h_w_m2k, None)),
+            ..Estimate::default()
+        };
+        let mut member = start::member(&rows[0], Some(&alone), &self.scale, self.mean_eta, &self.config);
+        if self.setting.with_law {
+            member.priors[LN_DEVIATION].sigma = self.law_sigma;
+        }
+        let mut problem = Problem {
+            setting: self.setting,
+            members: vec![member],
+            shared: self.shared,
+            priors: self.priors,
+            active: self.active,
+            lowest: [f64::NEG_INFINITY; SHARED],
+            surface_sigma: self.surface_sigma,
+            explained: Explained::default(),
+            probe_fitted: false,
+            extra_variances: NO_EXTRA,
+            inlet_sought: false,
+            inlet: None,
+        };
+        start::weigh(&mut problem, &rows, &self.config);
+        let fisher = problem.fisher()?;
+        let (own, answer) = fisher.steps.first()?;
+        let variance = own + answer.dot(&(&self.covariance * answer));
+        let worth = self.slope.dot(&fisher.information) - variance;
+        worth.is_finite().then_some(worth)
+    }
+
+    /// Sum of the variances of the campaign's points, fraction^2, and the sum of what its steps are worth: no campaign whose
+    /// steps are worth `w` together has a sum of variances below the first plus the second minus `w`.
+    pub fn sums(&self) -> (f64, f64) {
+        self.sums
+    }
+}

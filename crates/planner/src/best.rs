@@ -1,0 +1,57 @@
+//! The order that is forecast to know most for the time it takes, and all orders beside it.
+
+use crate::plan::make_plan;
+use crate::request::{PlanError, PlanRequest};
+use mapper_core::{Plan, VisitOrder};
+use mapper_numerics::parallel;
+
+/// Orders that are tried.
+pub(crate) const ORDERS: [VisitOrder; 5] = [
+    VisitOrder::SumGradient,
+    VisitOrder::WorstGradient,
+    VisitOrder::Information,
+    VisitOrder::SpeedLines,
+    VisitOrder::Greedy,
+];
+
+/// Mean square error of the efficiency times the minutes of the run: what a campaign costs whose errors fall with the time
+/// that is spent on it. The error is that where nothing is as declared: no order is worth anything that holds only on the
+/// nominal machine. Infinite where no error was forecast.
+pub(crate) fn cost(plan: &Plan) -> f64 {
+    let figures = &plan.figures;
+    figures.open_rms_error_eta.map_or(f64::INFINITY, |rms| rms * rms * figures.minutes)
+}
+
+/// The plan under each order that allows one, the cheapest first.
+pub(crate) fn all(request: &PlanRequest<'_>) -> Result<Vec<Plan>, PlanError> {
+    let made = parallel::map(&ORDERS, |order| make_plan(&PlanRequest { order: *order, ..request.clone() }));
+    let (mut plans, mut failed) = (Vec::new(), None);
+    for made in made {
+        match made {
+            Ok(plan) => plans.push(plan),
+            Err(error) => failed = Some(error),
+        }
+    }
+    plans.sort_by(|a: &Plan, b: &Plan| cost(a).total_cmp(&cost(b)));
+    match failed {
+        Some(error) if plans.is_empty() => Err(error),
+        _ => Ok(plans),
+    }
+}
+
+/// The cheapest of them, with what it was chosen from.
+pub(crate) fn best(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
+    let plans = all(request)?;
+    let told: Vec<String> = plans.iter().map(told).collect();
+    let mut best = plans.into_iter().next().ok_or(PlanError::NoPoints)?;
+    best.remarks
+        .push(format!("of the orders {}, the first is the best for the time it takes", told.join("; ")));
+    best.objective = VisitOrder::Best.name().to_owned();
+    Ok(best)
+}
+
+fn told(plan: &Plan) -> String {
+    let figures = &plan.figures;
+    let error = figures.open_rms_error_eta.map_or("-".to_owned(), |rms| format!("{:.2}", 100.0 * rms));
+    format!("{} ({error} points rms in {:.0} min)", plan.objective, figures.minutes)
+}

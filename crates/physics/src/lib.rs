@@ -22,6 +22,7 @@ pub mod housing;
 pub mod inlet_convection;
 pub mod inputs;
 pub mod instruments;
+pub mod line_points;
 pub mod model;
 pub mod nominal_rig;
 pub mod nusselt;

@@ -12,13 +12,14 @@ use crate::elements::reference::ReferenceFile;
 use crate::elements::repeats::{RepeatsFile, repeats};
 use crate::elements::sensors::SensorsFile;
 use crate::elements::sequence::sequence;
+use crate::elements::speed_control::{SpeedControlFile, speed_control};
 use crate::elements::timing::TimingElement;
 use crate::elements::tolerances::TolerancesElement;
 use crate::elements::zero::ZeroFile;
 use crate::units::{Fraction, Quantity};
 use mapper_core::{
-    Channel, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats, Soak, Timing,
-    VisitOrder,
+    Channel, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats, Soak,
+    SpeedControlSettings, Timing, VisitOrder,
 };
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::line_points::LineRequest;
@@ -90,6 +91,9 @@ pub struct Campaign {
     /// What is done when repeats differ by more than is declared; `None`: they are not watched.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on_drift: Option<OnDrift>,
+    /// How the shaft speed of each step is held; `None`: P3 stays as planned.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed_control: Option<SpeedControlSettings>,
     /// Seed of the search and of simulated rigs.
     pub seed: u64,
     /// What the run must never leave.
@@ -154,6 +158,9 @@ pub(crate) struct CampaignFile {
     return_to_first: Option<bool>,
     /// Watches the repeats while the campaign runs: one that differs from its first visit by more than is declared is made again, and what differs again is drift.
     drift: Option<DriftFile>,
+    /// Holds the shaft speed of each step at its target by P3, on top of what the plan has for the nominal machine; `off` leaves P3 as planned.
+    #[schemars(example = &"off")]
+    speed_control: Option<SpeedControlFile>,
     /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.
     #[schemars(example = 1)]
     seed: Option<u64>,
@@ -213,6 +220,7 @@ impl CampaignFile {
             repeats: repeats(self.repeats),
             return_to_first: self.return_to_first.unwrap_or(true),
             on_drift: self.drift.map(|drift| drift.on_drift),
+            speed_control: speed_control(self.speed_control),
             seed: self.seed.unwrap_or(USUAL_SEED),
             limits,
             reference,

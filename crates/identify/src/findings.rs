@@ -52,6 +52,8 @@ pub mod code {
     pub const OFF_THE_NOMINAL_MAP: &str = "off_the_nominal_map";
     /// The step has no transient of its own: its efficiency rests on what is shared (joint method).
     pub const THROUGH_THE_LAW: &str = "through_the_law";
+    /// The step ended off the speed that it was asked for.
+    pub const SPEED_NOT_REACHED: &str = "speed_not_reached";
     /// Part of the state at the step's end is not from its last seconds.
     pub const END_STATE: &str = "end_state";
 }

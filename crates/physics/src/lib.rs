@@ -35,6 +35,7 @@ pub mod rosenbrock;
 pub mod settled;
 pub mod similarity;
 pub mod simulate;
+pub mod speed_response;
 pub mod standstill;
 pub mod state;
 pub mod steady;

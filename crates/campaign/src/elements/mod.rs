@@ -27,6 +27,7 @@ pub(crate) mod sensors;
 pub(crate) mod sequence;
 pub(crate) mod settle_bands;
 pub(crate) mod several_sensors;
+pub(crate) mod speed_control;
 pub(crate) mod timing;
 pub(crate) mod tolerances;
 pub(crate) mod window;

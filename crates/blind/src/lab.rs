@@ -114,6 +114,8 @@ impl<'a> Schedule<'a> {
             clock: &mut UnpacedClock,
             guards: Vec::new(),
             observer,
+            // What withheld causes do to the speed is part of what is to be found.
+            speed: None,
             stop: &AtomicBool::new(false),
         };
         let of_case = |source| BlindError::Run { name: case.name.clone(), source };

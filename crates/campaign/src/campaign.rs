@@ -12,15 +12,17 @@ use crate::elements::reference::ReferenceFile;
 use crate::elements::repeats::{RepeatsFile, repeats};
 use crate::elements::sensors::SensorsFile;
 use crate::elements::sequence::sequence;
+use crate::elements::speed_control::{SpeedControlFile, speed_control};
 use crate::elements::timing::TimingElement;
 use crate::elements::tolerances::TolerancesElement;
 use crate::elements::zero::ZeroFile;
 use crate::units::{Fraction, Quantity};
 use mapper_core::{
-    Channel, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats, Soak, Timing,
-    VisitOrder,
+    Channel, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats, Soak,
+    SpeedControlSettings, Timing, VisitOrder,
 };
 use mapper_physics::follow_outlet::FollowOutlet;
+use mapper_physics::line_points::LineRequest;
 use mapper_physics::params::BoundaryConditions;
 use mapper_yaml::Step;
 use schemars::JsonSchema;
@@ -62,8 +64,12 @@ pub struct Campaign {
     pub tolerances_declared: bool,
     /// The rig.
     pub backend: BackendChoice,
-    /// The grid in the order of the file, no point twice: `points` as listed, or for each opening all speeds.
+    /// The grid in the order of the file, no point twice: `points` as listed, or for each opening all speeds, or line by
+    /// line from choke to surge.
     pub points: Vec<OperatingPoint>,
+    /// The speed lines that the points were resolved from; none where the file gives openings.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lines: Vec<LineRequest>,
     /// How long things take.
     pub timing: Timing,
     /// The rest before the warm-up, for a zero of the sensors, if there is one.
@@ -85,6 +91,9 @@ pub struct Campaign {
     /// What is done when repeats differ by more than is declared; `None`: they are not watched.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on_drift: Option<OnDrift>,
+    /// How the shaft speed of each step is held; `None`: P3 stays as planned.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed_control: Option<SpeedControlSettings>,
     /// Seed of the search and of simulated rigs.
     pub seed: u64,
     /// What the run must never leave.
@@ -122,7 +131,7 @@ pub(crate) struct CampaignFile {
     /// The rig, by the name of its backend, with the backend's own settings below it, e.g. `virtual_lab: {}`. What stands there is checked by the backend.
     #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"virtual_lab": {}}))]
     backend: BTreeMap<String, serde_json::Value>,
-    /// The operating points: `speeds` and `openings`, or `points`.
+    /// The operating points: `speeds` and `openings`, or `lines`, or `points`.
     pub(crate) grid: GridFile,
     /// How long things take.
     #[serde(deserialize_with = "TimingElement::deserialize")]
@@ -149,6 +158,9 @@ pub(crate) struct CampaignFile {
     return_to_first: Option<bool>,
     /// Watches the repeats while the campaign runs: one that differs from its first visit by more than is declared is made again, and what differs again is drift.
     drift: Option<DriftFile>,
+    /// Holds the shaft speed of each step at its target by P3, on top of what the plan has for the nominal machine; `off` leaves P3 as planned.
+    #[schemars(example = &"off")]
+    speed_control: Option<SpeedControlFile>,
     /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.
     #[schemars(example = 1)]
     seed: Option<u64>,
@@ -169,7 +181,8 @@ pub(crate) struct CampaignFile {
 }
 
 impl CampaignFile {
-    /// The campaign of a file without mistakes, and for each of its points the place in the file it came from.
+    /// The campaign of a file without mistakes, and for each of its points the place in the file it came from. Of each
+    /// line it has one point so far: the others need the nominal model.
     ///
     /// # Errors
     /// Only where the map file or the sequence script can no longer be read.
@@ -178,8 +191,11 @@ impl CampaignFile {
         origin: &Path,
         files: &dyn Fn(&Path) -> io::Result<String>,
     ) -> io::Result<(Campaign, Vec<Vec<Step>>)> {
-        let (points, point_paths) = self.grid.points();
         let (boundary, follow_outlet) = (self.boundary.conditions(), self.boundary.follow_outlet());
+        let limits = self.limits.into();
+        let reference = self.reference.map_or(ReferenceState::SAE, ReferenceState::from);
+        let lines = self.grid.lines(reference, &limits);
+        let (points, point_paths) = self.grid.points(&lines, boundary.t1_k);
         let sensors = self.sensors.declarations();
         let probe_diameter_m = sensors.get(&Channel::T2).map_or(0.0, |sensor| sensor.probe_diameter_m);
         let machine = self.machine.machine(probe_diameter_m, origin, files)?;
@@ -194,6 +210,7 @@ impl CampaignFile {
             tolerances_declared: self.tolerances.is_some(),
             backend: backend(self.backend),
             points,
+            lines,
             timing: self.timing,
             zero: self.zero.map(|zero| zero.soak(boundary.t1_k)),
             identification: self.identification.unwrap_or_default().identification(alpha_area_ratio),
@@ -203,9 +220,10 @@ impl CampaignFile {
             repeats: repeats(self.repeats),
             return_to_first: self.return_to_first.unwrap_or(true),
             on_drift: self.drift.map(|drift| drift.on_drift),
+            speed_control: speed_control(self.speed_control),
             seed: self.seed.unwrap_or(USUAL_SEED),
-            limits: self.limits.into(),
-            reference: self.reference.map_or(ReferenceState::SAE, ReferenceState::from),
+            limits,
+            reference,
             outputs: self.outputs,
             report: self.report,
             display: self.display,

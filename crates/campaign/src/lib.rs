@@ -15,6 +15,7 @@ mod load;
 mod nightly;
 mod prospects;
 mod reach;
+mod resolved;
 mod schema;
 mod si;
 #[cfg(test)]
@@ -29,4 +30,5 @@ pub use load::{
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
 pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
 pub use reach::{Unreachable, nominal_model, unreachable_points};
+pub use resolved::{ResolvedLine, ResolvedPoint, resolved_lines};
 pub use schema::json_schema;

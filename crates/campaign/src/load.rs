@@ -5,6 +5,7 @@ use crate::concern::Concern;
 use crate::consistency;
 use crate::prospects;
 use crate::reach::{self, Unreachable};
+use crate::resolved;
 use crate::schema::SCHEMA;
 use mapper_yaml::{Document, FindingKind, Findings, Node, Notes, ReadError, Source, Step, path_text, steps};
 use std::io;
@@ -139,7 +140,12 @@ pub fn warnings(text: &str, origin: &Path, campaign: &Campaign, more: Vec<Concer
     let source = Source::new(&DOCUMENT, origin, text);
     let mut notes = Notes::default();
     if let Some(root) = mapper_yaml::read(&source, &mut notes) {
-        let paths = root.deserialise().map(|file: CampaignFile| file.grid.points().1).unwrap_or_default();
+        let paths = match campaign.lines.as_slice() {
+            [] => {
+                root.deserialise().map(|file: CampaignFile| file.grid.points(&[], 0.0).1).unwrap_or_default()
+            }
+            _ => resolved::places(campaign),
+        };
         let own = prospects::concerns(campaign, &paths).into_iter().filter(|concern| !concern.grave);
         for concern in own.chain(more) {
             note(&source, &root, &mut notes, FindingKind::Unusual, concern);
@@ -176,7 +182,7 @@ fn finish(
             return None;
         }
     };
-    let (campaign, point_paths) = match file.campaign(&source.origin, files) {
+    let (mut campaign, mut point_paths) = match file.campaign(&source.origin, files) {
         Ok(built) => built,
         Err(error) => {
             // Both were there a moment ago; the map is the usual one.
@@ -192,6 +198,19 @@ fn finish(
     };
     for concern in prospects::concerns(&campaign, &point_paths).into_iter().filter(|concern| concern.grave) {
         note(source, root, notes, FindingKind::Implausible, concern);
+    }
+    if notes.is_empty()
+        && !campaign.lines.is_empty()
+        && let Ok(model) = reach::nominal_model(&campaign)
+    {
+        match resolved::resolve(&mut campaign, &model) {
+            Ok(()) => point_paths = resolved::places(&campaign),
+            Err(concerns) => {
+                for concern in concerns {
+                    note(source, root, notes, FindingKind::Unreachable, concern);
+                }
+            }
+        }
     }
     if !notes.is_empty() {
         return None;

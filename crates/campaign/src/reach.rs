@@ -40,7 +40,7 @@ pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<Unreachable
     let complaint = |(index, point): (usize, &OperatingPoint)| {
         let (boundary, limits) = (&campaign.boundary, &campaign.limits);
         let obstacles = reach(model, *point, boundary, campaign.follow_outlet, limits).err()?;
-        let (krpm, opening) = (point.speed_rpm / 1000.0, point.valve_opening_ratio);
+        let (krpm, opening) = point.shown();
         Some(Unreachable {
             point: index,
             reason: format!("{krpm} krpm at opening {opening} {}", clause(&obstacles)),

@@ -787,3 +787,113 @@ fn a_format_that_nobody_writes_is_shown_where_it_stands() {
     assert_eq!((findings.list.len(), finding.line, finding.path.as_str()), (1, line, "outputs.formats[1]"));
     assert!(finding.message.contains("`cvs`") && finding.remedy.contains("csv"), "{findings}");
 }
+
+/// A grid of lines in place of the short campaign's.
+fn lines(grid: &str) -> String {
+    with("  speeds: [90 krpm, 110 krpm]\n  openings: [0.7, 1.0]\n", grid).0
+}
+
+#[test]
+fn lines_become_points_from_choke_to_surge_at_their_corrected_speed() {
+    let text = lines(
+        "  lines: [{speed_corrected: 90 krpm, points: 3}, {speed_corrected: 110 krpm, spacing: 20 g/s}]\n",
+    );
+    let campaign = run(&text).unwrap_or_else(|findings| panic!("{findings}"));
+    let first = &campaign.points[..3];
+    // SAE's 298 K against a T1 of 298.15 K.
+    assert!(
+        first.iter().all(|point| (point.speed_rpm / (90e3 * (298.15f64 / 298.0).sqrt()) - 1.0).abs() < 1e-12)
+    );
+    assert_eq!(first[0].valve_opening_ratio, 2.5);
+    assert!(first.windows(2).all(|pair| pair[1].valve_opening_ratio < pair[0].valve_opening_ratio));
+    assert!(campaign.points[3..].iter().all(|point| point.speed_rpm > first[0].speed_rpm));
+    assert_eq!(warnings(&text, Path::new("dir/short.yaml"), &campaign, Vec::new()).count(), 0);
+    // Openings beside it: nothing of this is in the campaign, nor in its hash.
+    assert!(!serde_json::to_string(&run(RIGHT).unwrap()).unwrap().contains("\"lines\""));
+}
+
+#[test]
+fn lines_that_have_no_points_are_refused_at_their_place() {
+    let grid = "  speeds: [90 krpm, 110 krpm]\n  openings: [0.7, 1.0]\n";
+    let line = |text: &str| format!("  lines: [{text}]\n");
+    for (text, kind, at, message, remedy) in [
+        (
+            "{speed_corrected: 90 krpm, points: 3, spacing: 8 g/s}",
+            Kind::Conflict,
+            "spacing",
+            "both `points` and `spacing`",
+            "number of its points, or their distance",
+        ),
+        (
+            "{speed_corrected: 90 krpm}",
+            Kind::MissingKey,
+            "{speed_corrected: 90",
+            "neither `points` nor `spacing`",
+            "points: 6",
+        ),
+        (
+            "{speed_corrected: 90 krpm, points: 3}, {speed_corrected: 90000 rpm, points: 4}",
+            Kind::Duplicate,
+            "90000 rpm",
+            "a second time",
+            "remove one",
+        ),
+        (
+            "{speed_corrected: 190 krpm, points: 3}",
+            Kind::Unreachable,
+            "190 krpm",
+            "190.05 krpm at T1 = 298.15 K, above `limits.speed`",
+            "lower it",
+        ),
+        (
+            "{speed_corrected: 110 krpm, spacing: 100 g/s}",
+            Kind::Unreachable,
+            "100 g/s",
+            "leaves one point",
+            "smaller spacing",
+        ),
+        (
+            "{speed_corrected: 110 krpm, spacing: 0.1 g/s}",
+            Kind::Unreachable,
+            "0.1 g/s",
+            "at most 100",
+            "wider spacing",
+        ),
+        (
+            "{speed_corrected: 110 krpm, points: 3, widest_opening: 0.3}",
+            Kind::Unreachable,
+            "3, widest",
+            "has no room",
+            "raise `widest_opening`",
+        ),
+    ] {
+        one(grid, &line(text), kind, at, message, remedy);
+    }
+    one(
+        grid,
+        "  lines: [{speed_corrected: 90 krpm, points: 3}]\n  openings: [0.7]\n",
+        Kind::Conflict,
+        "openings",
+        "`openings` is given together with `lines`",
+        "write",
+    );
+    one(
+        grid,
+        "  speeds: [90 krpm]\n  openings: [0.7, 1.0]\n  surge_margin: 5 %\n",
+        Kind::Conflict,
+        "surge_margin",
+        "belongs to `lines`",
+        "remove it",
+    );
+}
+
+/// The table begins at 80 krpm, corrected: 2.5 % below it openings are believed with a warning, the ends of a line are not.
+#[test]
+fn a_line_outside_the_nominal_map_is_refused() {
+    let text = lines("  lines: [{speed_corrected: 78 krpm, points: 3}]\n")
+        .replace("map: closed_form", "map: {file: maps/there.csv, reference: SAE}");
+    let findings = mistakes(&text);
+    assert_eq!((findings.list.len(), findings.list[0].kind), (1, Kind::Implausible), "{findings}");
+    assert!(findings.list[0].path.ends_with("speed_corrected"), "{findings}");
+    assert!(findings.to_string().contains("begins at 80.0 krpm"), "{findings}");
+}

@@ -18,6 +18,8 @@ pub enum EventKind {
     SoakStarted,
     /// That rest is over.
     SoakEnded,
+    /// A step has ended off the speed that it was asked for.
+    SpeedNotReached,
     /// A guard of the runner tripped.
     GuardTripped,
     /// The rig was put into its safe state.

@@ -36,6 +36,7 @@ mod sample;
 mod schema;
 mod settle_bands;
 mod soak;
+mod speed_response;
 mod step_marker;
 mod thermal_model;
 mod timing;
@@ -74,6 +75,7 @@ pub use reference_state::{NAMED_REFERENCES, NamedReference, ReferenceState, usua
 pub use sample::{ChannelColumn, ElementColumn, SampleBatch, TruthColumn};
 pub use settle_bands::SettleBands;
 pub use soak::Soak;
+pub use speed_response::{SpeedControlSettings, SpeedResponse};
 pub use step_marker::StepMarker;
 pub use thermal_model::{
     ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,

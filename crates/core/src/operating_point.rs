@@ -16,6 +16,11 @@ impl OperatingPoint {
     /// Largest opening that a back-pressure valve may be told, relative to its nominal area.
     pub const OPENING_MAX_RATIO: f64 = 2.5;
 
+    /// Speed in krpm and opening without digits that no rig can set: a hundredth rpm, and 1e-4.
+    pub fn shown(&self) -> (f64, f64) {
+        ((self.speed_rpm * 1e2).round() / 1e5, (self.valve_opening_ratio * 1e4).round() / 1e4)
+    }
+
     /// Whether two points are the same on any rig: speeds within 1e-3 rpm, openings within 1e-6.
     pub fn is_same_place(&self, other: &OperatingPoint) -> bool {
         (self.speed_rpm - other.speed_rpm).abs() < 1e-3
@@ -25,6 +30,7 @@ impl OperatingPoint {
 
 impl std::fmt::Display for OperatingPoint {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}krpm@{}", self.speed_rpm / 1000.0, self.valve_opening_ratio)
+        let (krpm, opening) = self.shown();
+        write!(f, "{krpm}krpm@{opening}")
     }
 }

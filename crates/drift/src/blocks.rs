@@ -53,7 +53,7 @@ impl Block {
 
 /// Steps of all runs, each with its operating point.
 pub(crate) fn steps(runs: &[&Recording]) -> Vec<CampaignStep> {
-    let mut conditions: Vec<(f64, f64)> = Vec::new();
+    let mut conditions: Vec<Condition> = Vec::new();
     let mut steps: Vec<CampaignStep> = Vec::new();
     let mut offset_s = 0.0;
     for (run, recording) in runs.iter().enumerate() {
@@ -79,13 +79,36 @@ pub(crate) fn steps(runs: &[&Recording]) -> Vec<CampaignStep> {
     steps
 }
 
-fn condition_of(marker: &StepMarker, conditions: &mut Vec<(f64, f64)>) -> usize {
-    let key = (marker.p3_pa, marker.valve_opening_ratio);
-    let same = |a: f64, b: f64| (a - b).abs() <= SAME_COMMAND * a.abs().max(b.abs());
-    match conditions.iter().position(|known| same(known.0, key.0) && same(known.1, key.1)) {
+/// What was commanded for an operating point: its speed where that is known, since a loop that holds it moves P3; else P3, Pa.
+/// Beside it the opening of the valve.
+#[derive(Debug, Clone, Copy)]
+struct Condition {
+    speed_rpm: Option<f64>,
+    p3_pa: f64,
+    valve_opening_ratio: f64,
+}
+
+impl Condition {
+    fn is_same(&self, other: &Condition) -> bool {
+        let same = |a: f64, b: f64| (a - b).abs() <= SAME_COMMAND * a.abs().max(b.abs());
+        let drive = match (self.speed_rpm, other.speed_rpm) {
+            (Some(own), Some(other)) => same(own, other),
+            _ => same(self.p3_pa, other.p3_pa),
+        };
+        drive && same(self.valve_opening_ratio, other.valve_opening_ratio)
+    }
+}
+
+fn condition_of(marker: &StepMarker, conditions: &mut Vec<Condition>) -> usize {
+    let condition = Condition {
+        speed_rpm: marker.to.map(|to| to.speed_rpm),
+        p3_pa: marker.p3_pa,
+        valve_opening_ratio: marker.valve_opening_ratio,
+    };
+    match conditions.iter().position(|known| known.is_same(&condition)) {
         Some(position) => position,
         None => {
-            conditions.push(key);
+            conditions.push(condition);
             conditions.len() - 1
         }
     }

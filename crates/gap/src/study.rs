@@ -167,9 +167,9 @@ impl Study {
                 StudyStep { marker: *marker, jumped, blocks: blocks(&table, start_s, end_s, &schedule) }
             })
             .collect();
-        let measured_lag = measured_lag_s(&table, &recording.steps, declared.noise_sigma(Channel::P3));
+        let measured_lag = measured_lag_s(&table, recording, declared.noise_sigma(Channel::P3));
         let lag_s = measured_lag.map_or(nominal.instruments.p3_lag_s, |(lag_s, _)| lag_s);
-        let inputs = SmoothedInputs::read(&table, &recording.steps, &declared, lag_s);
+        let inputs = SmoothedInputs::read(&table, recording, &declared, lag_s);
         let mut groups = Vec::new();
         let mut measured = Vec::new();
         let mut rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>> =

@@ -83,8 +83,16 @@ fn commanded(recording: &Recording, table: &Table) -> Result<(), Problem> {
     for step in &recording.steps {
         // The last fifth: whatever the actuator does, it has arrived.
         let range = table.range(step.end_s - 0.2 * (step.end_s - step.start_s), step.end_s);
-        if let (Some(measured_pa), true) = (middle(&values[range]), step.p3_pa.is_finite()) {
-            away.push(((measured_pa / step.p3_pa - 1.0).abs(), measured_pa, step.p3_pa));
+        // A loop that holds the speed has moved the command since the step began.
+        let held_pa =
+            recording.series.get(&Channel::P3Command).filter(|_| step.to.is_some()).and_then(|command| {
+                let inside =
+                    command.range(step.start_s, step.end_s).rfind(|i| command.t_s[*i] < step.end_s)?;
+                Some(command.values[inside])
+            });
+        let commanded_pa = held_pa.unwrap_or(step.p3_pa);
+        if let (Some(measured_pa), true) = (middle(&values[range]), commanded_pa.is_finite()) {
+            away.push(((measured_pa / commanded_pa - 1.0).abs(), measured_pa, commanded_pa));
         }
     }
     away.sort_by(|a, b| a.0.total_cmp(&b.0));

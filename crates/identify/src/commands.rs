@@ -1,9 +1,13 @@
 //! The commands of a step: whether they begin with a jump, and when they come to rest.
+//!
+//! A closed loop that holds the speed goes on moving P3 a little: that is no jump, and no unrest.
 
 use mapper_core::{Channel, Recording, StepMarker};
 
 /// Change of a command below which it counts as held, ratio.
 const HELD_RATIO: f64 = 1e-6;
+/// P3 within this share of where it ends is held by a loop: the housings' slow warming asks for no more.
+const TRIM_RATIO: f64 = 5e-3;
 
 fn changed(before: f64, after: f64) -> bool {
     (after - before).abs() > HELD_RATIO * before.abs().max(after.abs())
@@ -14,19 +18,17 @@ fn changed(before: f64, after: f64) -> bool {
 /// The first step has none, unless its marker says where it came from.
 pub(crate) fn begins_with_jump(steps: &[StepMarker], position: usize) -> bool {
     let Some(step) = steps.get(position) else { return false };
-    let planned = matches!((step.from, step.to), (Some(from), Some(to)) if from != to);
-    let before = position.checked_sub(1).and_then(|before| steps.get(before));
-    match before {
-        None => planned,
-        Some(before) => {
-            planned
-                || changed(before.p3_pa, step.p3_pa)
-                || changed(before.valve_opening_ratio, step.valve_opening_ratio)
-        }
+    if let (Some(from), Some(to)) = (step.from, step.to) {
+        return from != to;
     }
+    let before = position.checked_sub(1).and_then(|before| steps.get(before));
+    before.is_some_and(|before| {
+        changed(before.p3_pa, step.p3_pa) || changed(before.valve_opening_ratio, step.valve_opening_ratio)
+    })
 }
 
-/// Time of the last change of P3 and valve commands within the step (its start where none is recorded), s.
+/// Time of the last change of P3 and valve commands within the step (its start where none is recorded), s. Of P3 the changes
+/// count up to where it stays within [`TRIM_RATIO`] of its last value.
 pub(crate) fn at_rest_s(recording: &Recording, step: &StepMarker) -> f64 {
     let mut settled_s = step.start_s;
     for channel in [Channel::P3Command, Channel::ValveCommand] {
@@ -34,9 +36,14 @@ pub(crate) fn at_rest_s(recording: &Recording, step: &StepMarker) -> f64 {
         let range = series.range(step.start_s, step.end_s);
         // The change at the step's end belongs to the next one.
         let inside = range.filter(|i| series.t_s[*i] < step.end_s);
+        let last = inside.clone().next_back().map(|i| series.values[i]);
+        let trimmed = |value: f64| {
+            channel == Channel::P3Command
+                && last.is_some_and(|last| (value - last).abs() <= TRIM_RATIO * last.abs())
+        };
         for i in inside {
             let before = i.checked_sub(1).map(|before| series.values[before]);
-            if before.is_some_and(|before| changed(before, series.values[i])) {
+            if before.is_some_and(|before| changed(before, series.values[i]) && !trimmed(before)) {
                 settled_s = settled_s.max(series.t_s[i]);
             }
         }

@@ -54,6 +54,8 @@ pub mod code {
     pub const THROUGH_THE_LAW: &str = "through_the_law";
     /// The recording is too short, or its gradients too small, to find what was declared if it does not hold.
     pub const RESTS_ON_DECLARATION: &str = "rests_on_declaration";
+    /// The step ended off the speed that it was asked for.
+    pub const SPEED_NOT_REACHED: &str = "speed_not_reached";
     /// Part of the state at the step's end is not from its last seconds.
     pub const END_STATE: &str = "end_state";
 }

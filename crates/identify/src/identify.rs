@@ -2,12 +2,12 @@
 
 use crate::dynamic::Estimate;
 use crate::end_state::{EndState, end_state};
-use crate::findings::Findings;
+use crate::findings::{Findings, code};
 use crate::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, dynamic, joint, steady};
 use mapper_core::{
-    Channel, CommonErrors, EstimateUncertainty, IdentifiedPoint, Method, Recording, StepMarker, ThermalModel,
-    WindowRule, confidence_interval_95,
+    Channel, CommonErrors, EstimateUncertainty, Event, EventKind, IdentifiedPoint, Method, Recording,
+    StepMarker, ThermalModel, WindowRule, confidence_interval_95,
 };
 
 /// Identifies every step of a recording, in order. Steps of which not even the place on the map is known are left
@@ -85,7 +85,9 @@ pub fn identify_recording(
             if !(start_s.is_finite() && end_s.is_finite() && start_s < end_s) {
                 return Err(StepError::NoDuration { step: step.index, start_s, end_s });
             }
-            end_state(recording, step, config, findings)
+            let state = end_state(recording, step, config, findings)?;
+            speed_not_reached(recording, step, &state, findings);
+            Ok(state)
         })
         .collect();
     let (mut thermal, mut two_parameter) = (None, Vec::new());
@@ -117,6 +119,21 @@ pub fn identify_recording(
         .map(|(((step, state), estimate), findings)| Ok(point(step, &state?, &estimate, findings, config)))
         .collect();
     Ok(Identified { points, thermal, two_parameter })
+}
+
+/// Remarks that the run has told that a step's speed was not reached: the point is as good as any, but elsewhere on the map.
+fn speed_not_reached(recording: &Recording, step: &StepMarker, state: &EndState, findings: &mut Findings) {
+    let told = |event: &Event| {
+        event.kind == EventKind::SpeedNotReached && event.t_s > step.start_s && event.t_s <= step.end_s
+    };
+    if let (Some(asked), true) = (step.to, recording.events.iter().any(told)) {
+        let message = format!(
+            "{:.2} krpm were asked for and {:.2} krpm reached",
+            asked.speed_rpm / 1e3,
+            state.speed_rpm / 1e3
+        );
+        findings.remark(code::SPEED_NOT_REACHED, message);
+    }
 }
 
 pub(crate) fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {

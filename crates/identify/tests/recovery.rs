@@ -4,7 +4,7 @@
 mod common;
 
 use common::{STEP_S, Transient};
-use mapper_core::{Channel, EstimateUncertainty, Method, Verdict};
+use mapper_core::{Channel, EstimateUncertainty, Event, EventKind, Method, OperatingPoint, Verdict};
 use mapper_identify::{
     DeclaredUncertainty, IdentifyConfig, IdentifyError, PressureTap, WindowRule, code, identify,
 };
@@ -216,4 +216,41 @@ fn a_command_that_ramps_moves_the_window() {
     }
     let point = &identify(&recording, &IdentifyConfig::default()).unwrap()[1];
     assert!((point.window.unwrap().start_s - 50.0).abs() < 1e-9);
+}
+
+/// A loop that holds the speed moves P3 by some permille as the housings warm: the jump was over long before.
+#[test]
+fn a_command_that_is_trimmed_leaves_the_window_alone() {
+    let mut recording = Transient::default().recording();
+    let untrimmed = identify(&recording, &IdentifyConfig::default()).unwrap()[1].window.unwrap();
+    let command = recording.series.entry(Channel::P3Command).or_default();
+    for (t_s, value) in [(0.0, 120e3), (30.0, 170e3)] {
+        command.t_s.push(t_s);
+        command.values.push(value);
+    }
+    for second in 31..150 {
+        command.t_s.push(f64::from(second));
+        command.values.push(170e3 * (1.0 + 2e-3 * (f64::from(second) / 20.0).sin()));
+    }
+    let point = &identify(&recording, &IdentifyConfig::default()).unwrap()[1];
+    assert_eq!(point.window.unwrap(), untrimmed);
+}
+
+/// A speed that was not reached is told with both speeds, and costs the point nothing: it lies elsewhere on the map.
+#[test]
+fn a_speed_that_was_not_reached_is_a_remark() {
+    let mut recording = Transient::default().recording();
+    recording.steps[1].from = Some(OperatingPoint { speed_rpm: 50e3, valve_opening_ratio: 0.7 });
+    recording.steps[1].to = Some(OperatingPoint { speed_rpm: 123e3, valve_opening_ratio: 0.7 });
+    let plain = identify(&recording, &IdentifyConfig::default()).unwrap()[1].clone();
+    let t_s = recording.steps[1].end_s;
+    recording.events.push(Event { t_s, kind: EventKind::SpeedNotReached, message: String::new() });
+    let told = identify(&recording, &IdentifyConfig::default()).unwrap()[1].clone();
+    assert_eq!((told.verdict, told.eta), (plain.verdict, plain.eta));
+    let remark = told.warnings.iter().find(|warning| warning.code == code::SPEED_NOT_REACHED).unwrap();
+    assert!(
+        remark.message.contains("123.00 krpm")
+            && remark.message.contains(&format!("{:.2} krpm", told.speed_rpm / 1e3))
+    );
+    assert!(plain.warnings.iter().all(|warning| warning.code != code::SPEED_NOT_REACHED));
 }

@@ -1,7 +1,7 @@
 //! P3 behind its command: a first-order lag, and its time constant as recorded.
 
 use crate::table::Table;
-use mapper_core::{Channel, StepMarker};
+use mapper_core::{Channel, Recording, StepMarker};
 use mapper_numerics::minimise::minimise;
 
 /// A commanded level from a time on.
@@ -42,14 +42,11 @@ impl LaggedCommand {
         LaggedCommand { levels, at_start_pa, lag_s }
     }
 
-    /// The response to the commands of a recording's steps, at least one.
-    pub fn of_steps(steps: &[StepMarker], lag_s: f64) -> Self {
-        let level = |step: &StepMarker| Level {
-            start_s: step.start_s,
-            p3_pa: step.p3_pa,
-            valve_opening_ratio: step.valve_opening_ratio,
-        };
-        LaggedCommand::new(steps.iter().map(level).collect(), lag_s)
+    /// The response to the commands of a recording, which has at least one step: a level for each step, and within steps
+    /// that a runner has marked one for each further command of P3, as a loop that holds the speed gives them.
+    pub fn of_recording(recording: &Recording, lag_s: f64) -> Self {
+        let levels = recording.steps.iter().flat_map(|step| levels_of_step(recording, step));
+        LaggedCommand::new(levels.collect(), lag_s)
     }
 
     /// The level that holds at `t_s`.
@@ -70,6 +67,25 @@ impl LaggedCommand {
     }
 }
 
+/// The level that a step begins with, and those to which a loop that holds the speed moves it.
+fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Level> {
+    let (mut start_s, mut p3_pa) = (step.start_s, step.p3_pa);
+    let level = |start_s, p3_pa| Level { start_s, p3_pa, valve_opening_ratio: step.valve_opening_ratio };
+    let mut levels = vec![level(start_s, p3_pa)];
+    // In a recording made by others every change of the command is a step of its own.
+    let marked = step.to.is_some();
+    let Some(command) = recording.series.get(&Channel::P3Command).filter(|_| marked) else { return levels };
+    let (t_s, values) = command.slice(step.start_s, step.end_s);
+    // The first sample may have been taken before the change, and a change lies behind the sample before it.
+    for (pair_s, value) in t_s.windows(2).zip(values.iter().skip(1)) {
+        if *value != p3_pa && value.is_finite() && pair_s[0] > start_s {
+            (start_s, p3_pa) = (pair_s[0], *value);
+            levels.push(level(start_s, p3_pa));
+        }
+    }
+    levels
+}
+
 fn approach(from: f64, to: f64, elapsed_s: f64, lag_s: f64) -> f64 {
     if lag_s > 0.0 { to + (from - to) * (-elapsed_s.max(0.0) / lag_s).exp() } else { to }
 }
@@ -81,9 +97,11 @@ const LOOKS: usize = 24;
 ///
 /// The minimum squared residual of the first seconds after each jump; the level after it is free, so that
 /// no offset enters.
-pub fn measured_lag_s(table: &Table, steps: &[StepMarker], noise_sigma: f64) -> Option<(f64, f64)> {
+pub fn measured_lag_s(table: &Table, recording: &Recording, noise_sigma: f64) -> Option<(f64, f64)> {
     let values = table.column(Channel::P3)?;
-    let jumps: Vec<f64> = steps
+    let levels = LaggedCommand::of_recording(recording, 0.0).levels;
+    let jumps: Vec<f64> = recording
+        .steps
         .windows(2)
         .filter(|pair| (pair[1].p3_pa - pair[0].p3_pa).abs() > 10.0 * noise_sigma.max(1.0))
         .map(|pair| pair[1].start_s)
@@ -92,7 +110,7 @@ pub fn measured_lag_s(table: &Table, steps: &[StepMarker], noise_sigma: f64) -> 
         return None;
     }
     let cost = |lag_s: f64| {
-        let command = LaggedCommand::of_steps(steps, lag_s);
+        let command = LaggedCommand::new(levels.clone(), lag_s);
         let mut total = 0.0;
         for jump_s in &jumps {
             let range = table.range(jump_s - 3.0, jump_s + 12.0);
@@ -117,4 +135,43 @@ pub fn measured_lag_s(table: &Table, steps: &[StepMarker], noise_sigma: f64) -> 
     let curvature = (cost(lag_s + away_s) + cost(lag_s - away_s) - 2.0 * cost(lag_s)) / (away_s * away_s);
     let error_s = if curvature > 0.0 { (2.0 / curvature).sqrt() } else { lag_s };
     Some((lag_s, error_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{OperatingPoint, Series, StepKind};
+
+    fn step(start_s: f64, end_s: f64, p3_pa: f64, to: Option<OperatingPoint>) -> StepMarker {
+        let (index, kind) = (0, StepKind::Point);
+        StepMarker { index, kind, start_s, end_s, from: None, to, p3_pa, valve_opening_ratio: 0.7 }
+    }
+
+    /// Samples every half second; the loop speaks at 12 s, seen at 12.5 s.
+    fn recording(to: Option<OperatingPoint>) -> Recording {
+        let t_s: Vec<f64> = (0..=40).map(|i| f64::from(i) * 0.5).collect();
+        let command = |t: &f64| match *t {
+            t if t <= 10.0 => 150e3,
+            t if t <= 12.0 => 200e3,
+            _ => 201e3,
+        };
+        let values = t_s.iter().map(command).collect();
+        Recording {
+            series: [(Channel::P3Command, Series { t_s, values })].into(),
+            steps: vec![step(0.0, 10.0, 150e3, to), step(10.0, 20.0, 200e3, to)],
+            ..Recording::default()
+        }
+    }
+
+    #[test]
+    fn what_a_loop_says_within_a_step_is_a_level_of_its_own() {
+        let held = OperatingPoint { speed_rpm: 110e3, valve_opening_ratio: 0.7 };
+        let levels = |to| -> Vec<(f64, f64)> {
+            let command = LaggedCommand::of_recording(&recording(to), 0.3);
+            command.levels().iter().map(|level| (level.start_s, level.p3_pa)).collect()
+        };
+        assert_eq!(levels(Some(held)), [(0.0, 150e3), (10.0, 200e3), (12.0, 201e3)]);
+        // Steps found from the commands have each change already.
+        assert_eq!(levels(None), [(0.0, 150e3), (10.0, 200e3)]);
+    }
 }

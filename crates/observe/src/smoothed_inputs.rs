@@ -9,7 +9,7 @@ use crate::declared::Declared;
 use crate::lagged_command::LaggedCommand;
 use crate::smoother::{Course, smooth};
 use crate::table::Table;
-use mapper_core::{Channel, StepMarker};
+use mapper_core::{Channel, Recording};
 use mapper_physics::inputs::Inputs;
 use mapper_physics::params::BoundaryConditions;
 
@@ -27,6 +27,8 @@ pub struct Driver {
 pub struct SmoothedInputs {
     /// P3 by its command.
     pub command: LaggedCommand,
+    /// Starts of the steps, s: what a loop does within a step is too small to stop an integration for.
+    jumps_s: Vec<f64>,
     p3_rest: Course,
     /// Every other boundary condition by its channel.
     drivers: Vec<(Channel, Driver)>,
@@ -45,8 +47,8 @@ pub struct InputNoise {
 impl SmoothedInputs {
     /// Reads the inputs off a recording, P3 behind its command by `lag_s`. The campaign's values stand for what is not
     /// recorded.
-    pub fn read(table: &Table, steps: &[StepMarker], declared: &Declared, lag_s: f64) -> SmoothedInputs {
-        let command = LaggedCommand::of_steps(steps, lag_s);
+    pub fn read(table: &Table, recording: &Recording, declared: &Declared, lag_s: f64) -> SmoothedInputs {
+        let command = LaggedCommand::of_recording(recording, lag_s);
         let along: Vec<f64> = table.t_s.iter().map(|t| command.p3_pa(*t)).collect();
         let smoothed = |channel: Channel, values: &[f64]| {
             smooth(&table.t_s, values, declared.noise_sigma(channel), declared.noise_colour)
@@ -57,7 +59,7 @@ impl SmoothedInputs {
         });
         let driver = |channel: Channel| {
             let values = table.column(channel)?;
-            let along_p3 = share_along(table, values, &command, declared.noise_sigma(channel));
+            let along_p3 = share_along(table, values, (&command, &along), declared.noise_sigma(channel));
             let rest: Vec<f64> = values.iter().zip(&along).map(|(v, a)| v - along_p3 * a).collect();
             Some((channel, Driver { course: smoothed(channel, &rest)?, along_p3 }))
         };
@@ -66,6 +68,7 @@ impl SmoothedInputs {
             p3_rest: p3_rest.unwrap_or_else(|| Course::constant(0.0)),
             drivers: others.chain([Channel::TAmb]).filter_map(driver).collect(),
             nominal: declared.nominal,
+            jumps_s: recording.steps.iter().map(|step| step.start_s).collect(),
             command,
         }
     }
@@ -99,8 +102,8 @@ impl Inputs for SmoothedInputs {
     }
 
     fn next_kink_s(&self, t_s: f64) -> f64 {
-        let after = self.command.levels().partition_point(|level| level.start_s <= t_s);
-        self.command.levels().get(after).map_or(f64::INFINITY, |level| level.start_s)
+        let after = self.jumps_s.partition_point(|jump_s| *jump_s <= t_s);
+        self.jumps_s.get(after).copied().unwrap_or(f64::INFINITY)
     }
 
     fn is_constant_after(&self, _t_s: f64) -> bool {
@@ -111,21 +114,29 @@ impl Inputs for SmoothedInputs {
 /// Length of the stretches beside a jump from which its height is taken, s.
 const BESIDE_S: f64 = 8.0;
 
-/// Change of `values` per pascal of P3, from their jumps at P3's jumps; 0 where they do not follow it.
-fn share_along(table: &Table, values: &[f64], command: &LaggedCommand, noise_sigma: f64) -> f64 {
+/// Change of `values` per pascal of P3, from their jumps at P3's jumps; 0 where they do not follow it. `along` is P3 by its
+/// command.
+fn share_along(
+    table: &Table,
+    values: &[f64],
+    (command, along): (&LaggedCommand, &[f64]),
+    noise_sigma: f64,
+) -> f64 {
     let (mut sum_xy, mut sum_xx, mut pairs) = (0.0, 0.0, Vec::new());
     for pair in command.levels().windows(2) {
         let jump_s = pair[1].start_s;
-        let height_pa = pair[1].p3_pa - pair[0].p3_pa;
         let settled_s = jump_s + 6.0 * command.lag_s;
-        let (Some(before), Some(after)) = (
-            line_at(table, values, jump_s - BESIDE_S, jump_s, jump_s),
-            line_at(table, values, settled_s, settled_s + BESIDE_S, jump_s),
-        ) else {
+        // What a loop that holds the speed does right behind a jump is no jump of its own.
+        if pair[0].start_s > jump_s - BESIDE_S {
             continue;
+        }
+        let height = |values: &[f64]| {
+            let before = line_at(table, values, jump_s - BESIDE_S, jump_s, jump_s)?;
+            Some(line_at(table, values, settled_s, settled_s + BESIDE_S, jump_s)? - before)
         };
-        pairs.push((height_pa, after - before));
-        sum_xy += height_pa * (after - before);
+        let (Some(change), Some(height_pa)) = (height(values), height(along)) else { continue };
+        pairs.push((height_pa, change));
+        sum_xy += height_pa * change;
         sum_xx += height_pa * height_pa;
     }
     if sum_xx <= 0.0 || pairs.len() < 3 {

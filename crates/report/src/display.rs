@@ -34,7 +34,7 @@ impl Display {
 
     /// An operating point: speed and opening.
     pub fn place(&self, point: OperatingPoint) -> String {
-        format!("{} @ {}", self.speed(point.speed_rpm), point.valve_opening_ratio)
+        format!("{} @ {}", self.speed(point.speed_rpm), point.shown().1)
     }
 
     /// Column head: what, and the unit of pressures.

@@ -10,6 +10,7 @@ mod observer;
 mod run;
 mod soak;
 mod source;
+mod speed_control;
 
 pub use drift_watch::DriftWatch;
 pub use guard::{Guard, LimitGuard, SilenceGuard, SurgeGuard, Trip};
@@ -17,3 +18,4 @@ pub use observer::{ObserverError, RunObserver};
 pub use run::{RunEnd, RunError, Runner};
 pub use soak::Soaked;
 pub use source::{PlanSteps, StepSource, StepSourceError};
+pub use speed_control::{ResponseAt, SpeedControl, SpeedControlLimits};

@@ -3,6 +3,7 @@
 use crate::guard::{Guard, Trip};
 use crate::observer::{ObserverError, RunObserver};
 use crate::source::{StepSource, StepSourceError};
+use crate::speed_control::SpeedControl;
 use mapper_core::{
     Backend, BackendError, Clock, Event, EventKind, PlanStep, RigMode, Setpoints, Soak, StepMarker,
 };
@@ -53,6 +54,8 @@ pub struct Runner<'a> {
     pub guards: Vec<Box<dyn Guard>>,
     /// Who looks on.
     pub observer: &'a mut dyn RunObserver,
+    /// Holds the speed of each step; `None`: P3 stays as the steps have it.
+    pub speed: Option<SpeedControl<'a>>,
     /// Set from outside to stop at the next poll.
     pub stop: &'a AtomicBool,
 }
@@ -98,11 +101,17 @@ impl Runner<'_> {
             if let Some(soak) = self.steps.soak() {
                 self.rest(first, soak, now_s)?;
             }
-            self.backend.set(&setpoints(first))?;
             let warm_s = *now_s + self.steps.warm_up_s();
-            self.watch(now_s, warm_s, false)?;
+            if warm_s > *now_s {
+                let mut told = self.begin(first, *now_s);
+                self.backend.set(&told)?;
+                self.watch(now_s, warm_s, false, Some(&mut told))?;
+                // The first step itself tells whether its speed was reached.
+                let _ = self.speed.as_mut().map(|speed| speed.end(*now_s));
+            }
         }
         while let Some(step) = next {
+            let mut told = self.begin(&step, *now_s);
             let mut marker = StepMarker {
                 index: step.index,
                 kind: step.kind,
@@ -110,12 +119,15 @@ impl Runner<'_> {
                 end_s: *now_s + step.dwell_s,
                 from: step.from,
                 to: Some(step.to),
-                p3_pa: step.p3_pa,
+                p3_pa: told.p3_pa,
                 valve_opening_ratio: step.to.valve_opening_ratio,
             };
-            self.backend.set(&setpoints(&step))?;
+            self.backend.set(&told)?;
             self.observer.on_step_start(&marker)?;
-            let watched = self.watch(now_s, marker.end_s, true);
+            let watched = self.watch(now_s, marker.end_s, true, Some(&mut told));
+            if watched.is_ok() {
+                self.end(*now_s)?;
+            }
             marker.end_s = *now_s;
             self.observer.on_step_end(&marker)?;
             watched?;
@@ -125,7 +137,19 @@ impl Runner<'_> {
         }
         self.backend.make_safe()?;
         let end_s = *now_s + self.steps.cool_down_s();
-        self.watch(now_s, end_s, false)
+        self.watch(now_s, end_s, false, None)
+    }
+
+    /// What the rig is told at the start of a step.
+    fn begin(&mut self, step: &PlanStep, now_s: f64) -> Setpoints {
+        let p3_pa = self.speed.as_mut().map_or(step.p3_pa, |speed| speed.begin(step, now_s));
+        Setpoints { p3_pa, ..setpoints(step) }
+    }
+
+    /// Tells of a step whose speed was not reached.
+    fn end(&mut self, now_s: f64) -> Result<(), ObserverError> {
+        let event = self.speed.as_mut().and_then(|speed| speed.end(now_s));
+        event.map_or(Ok(()), |event| self.observer.on_event(&event))
     }
 
     /// Keeps the machine at rest for as long as the soak asks; events mark both ends.
@@ -140,7 +164,7 @@ impl Runner<'_> {
             format!("soak for {:.0} s: air off, oil at {:.2} K", soak.duration_s, soak.oil_temperature_k);
         self.observer.on_event(&Event { t_s: *now_s, kind: EventKind::SoakStarted, message })?;
         let end_s = *now_s + soak.duration_s;
-        self.watch(now_s, end_s, false)?;
+        self.watch(now_s, end_s, false, None)?;
         let message = "the soak is over, air on".to_owned();
         self.observer.on_event(&Event { t_s: *now_s, kind: EventKind::SoakEnded, message })?;
         Ok(())
@@ -152,8 +176,15 @@ impl Runner<'_> {
         notes.try_for_each(|message| self.observer.on_event(&Event { t_s, kind: EventKind::Note, message }))
     }
 
-    /// Lets the rig run to `until_s` under the eyes of guards, observer and source, which may end a step early.
-    fn watch(&mut self, now_s: &mut f64, until_s: f64, may_end_early: bool) -> Result<(), Halt> {
+    /// Lets the rig run to `until_s` under the eyes of guards, observer and source, which may end a step early. `told` is what
+    /// the rig was told last, where its speed may be held.
+    fn watch(
+        &mut self,
+        now_s: &mut f64,
+        until_s: f64,
+        may_end_early: bool,
+        mut told: Option<&mut Setpoints>,
+    ) -> Result<(), Halt> {
         while *now_s < until_s {
             if self.stop.load(Ordering::Relaxed) {
                 return Err(Halt::Interrupted);
@@ -170,6 +201,15 @@ impl Runner<'_> {
             let ends = self.steps.on_batch(&batch);
             if ends && may_end_early {
                 break;
+            }
+            if let (Some(speed), Some(told)) = (&mut self.speed, &mut told) {
+                let (p3_pa, event) = speed.on_batch(&batch);
+                event.map_or(Ok(()), |event| self.observer.on_event(&event))?;
+                // At the end of a step the next one has the say.
+                if let Some(p3_pa) = p3_pa.filter(|_| *now_s < until_s) {
+                    told.p3_pa = p3_pa;
+                    self.backend.set(told)?;
+                }
             }
         }
         Ok(())

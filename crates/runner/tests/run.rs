@@ -142,6 +142,7 @@ fn run(notebook: &mut Notebook, guards: Vec<Box<dyn Guard>>, stop: &AtomicBool) 
         clock: &mut UnpacedClock,
         guards,
         observer: notebook,
+        speed: None,
         stop,
     }
     .run();

@@ -2,16 +2,23 @@
 
 use crate::guards::guards;
 use mapper_campaign::Campaign;
-use mapper_core::{Backend, UnpacedClock};
-use mapper_runner::{RunEnd, RunError, RunObserver, Runner, Soaked, StepSource};
+use mapper_core::{Backend, Channel, PlanStep, UnpacedClock};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::speed_response::speed_response;
+use mapper_runner::{
+    RunEnd, RunError, RunObserver, Runner, Soaked, SpeedControl, SpeedControlLimits, StepSource,
+};
 use std::sync::atomic::AtomicBool;
 
-/// Drives the rig through the steps, after the soak where the campaign has one, under the campaign's guards.
+/// Drives the rig through the steps, after the soak where the campaign has one, under the campaign's guards, and holds their
+/// speeds unless the campaign says not to. `model`: the nominal machine, which the loop is tuned by.
 ///
 /// # Errors
 /// [`RunError`] where rig, steps or observer fail; the rig is safe then.
 pub fn drive(
     campaign: &Campaign,
+    model: &Model,
     steps: &mut dyn StepSource,
     backend: &mut dyn Backend,
     observer: &mut dyn RunObserver,
@@ -27,7 +34,42 @@ pub fn drive(
         }
     };
     // Every backend so far has simulated time.
-    Runner { steps, backend, clock: &mut UnpacedClock, guards, observer, stop }.run()
+    Runner {
+        steps,
+        speed: speed_control(campaign, model),
+        backend,
+        clock: &mut UnpacedClock,
+        guards,
+        observer,
+        stop,
+    }
+    .run()
+}
+
+/// So many declared standard deviations P3 may read too high.
+const READS_TOO_HIGH_SIGMAS: f64 = 4.0;
+
+/// The loop over the shaft speed as the campaign has it.
+fn speed_control<'a>(campaign: &'a Campaign, model: &'a Model) -> Option<SpeedControl<'a>> {
+    let sensor = campaign.sensors.get(&Channel::P3).map(|sensor| sensor.declared).unwrap_or_default();
+    let high_pa = campaign.limits.p3_max_pa;
+    let sigma_pa = sensor.noise_sigma.hypot(sensor.offset_sigma).hypot(sensor.gain_sigma_ratio * high_pa);
+    let limits = SpeedControlLimits {
+        p3_min_pa: campaign.limits.p3_min_pa,
+        p3_max_pa: high_pa - READS_TOO_HIGH_SIGMAS * sigma_pa,
+        p3_slew_max_pa_s: campaign.limits.p3_slew_max_pa_s(),
+        speed_max_rpm: campaign.limits.speed_max_rpm,
+    };
+    let response_at = move |step: &PlanStep| {
+        let boundary = BoundaryConditions {
+            t3_k: step.t3_k,
+            oil_temperature_k: step.oil_temperature_k,
+            valve_opening_ratio: step.to.valve_opening_ratio,
+            ..campaign.boundary
+        };
+        speed_response(model, step.to.speed_rpm, &boundary)
+    };
+    Some(SpeedControl::new(campaign.speed_control?, limits, Box::new(response_at)))
 }
 
 /// Time at rest before the plan begins, s.

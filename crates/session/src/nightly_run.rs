@@ -75,8 +75,9 @@ impl NightlyRun {
         };
         let mut recorder = Recorder::new(RecordingWriter::create(recording, &header)?);
         // A night runs many at once: nobody could follow their steps.
+        let mut steps = PlanSteps::new(plan);
         let end =
-            drive(&self.campaign, &mut PlanSteps::new(plan), backend.as_mut(), &mut recorder, session.stop)
+            drive(&self.campaign, &self.model, &mut steps, backend.as_mut(), &mut recorder, session.stop)
                 .map_err(|source| SessionError::Run { source, recording: recording.to_owned() })?;
         recorder.finish()?;
         Ok(end)

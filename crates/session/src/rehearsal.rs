@@ -39,7 +39,7 @@ pub fn rehearse(
     let nominal = Campaign { backend: choice, zero: None, ..campaign.clone() };
     let mut backend = session.registry.make_backend(&nominal, model)?;
     let mut steps = Rehearsing { steps: ScriptedSteps::new(campaign, model, source)?, notes: Vec::new() };
-    let end = drive(&nominal, &mut steps, backend.as_mut(), &mut Nobody, session.stop);
+    let end = drive(&nominal, model, &mut steps, backend.as_mut(), &mut Nobody, session.stop);
     let failed = |error| match error {
         RunError::Source(error) => SessionError::Script(error),
         error => SessionError::Rehearsal(error),

@@ -196,10 +196,11 @@ impl PreparedRun<'_> {
         let (end, drifted) = if campaign.on_drift.is_some()
             && let Some(mut watch) = drift_watch(campaign, steps)
         {
-            let end = drive(campaign, &mut watch, self.backend.as_mut(), &mut observers, session.stop);
+            let end =
+                drive(campaign, &self.model, &mut watch, self.backend.as_mut(), &mut observers, session.stop);
             (end, watch.ended_by_drift().map(str::to_owned))
         } else {
-            (drive(campaign, steps, self.backend.as_mut(), &mut observers, session.stop), None)
+            (drive(campaign, &self.model, steps, self.backend.as_mut(), &mut observers, session.stop), None)
         };
         let end = match (end, drifted) {
             (Ok(RunEnd::Completed), None) => Ended::Completed,

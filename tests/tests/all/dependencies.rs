@@ -14,7 +14,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-physics",   &["core", "numerics"]),
     ("mapper-campaign",  &["core", "physics", "yaml"]),
     ("mapper-planner",   &["core", "numerics", "physics"]),
-    ("mapper-runner",    &["core"]),
+    ("mapper-runner",    &["core", "numerics"]),
     ("mapper-sequence",  &["core", "numerics", "physics", "yaml"]),
     ("mapper-record",    &["core", "numerics", "yaml"]),
     ("mapper-observe",   &["core", "numerics", "physics"]),

@@ -26,4 +26,5 @@ mod sequences;
 mod shipped_campaign;
 mod sizes;
 mod sources;
+mod speed_lines;
 mod zero;

@@ -1,8 +1,11 @@
 //! `grid:`
 
+use super::lines::{self, LineDefaults, LineFile};
+use super::opening::Opening;
 use crate::checking::Check;
-use crate::units::{Kind, Quantity, Speed};
-use mapper_core::OperatingPoint;
+use crate::units::{Fraction, Kind, Quantity, Speed};
+use mapper_core::{Limits, OperatingPoint, ReferenceState};
+use mapper_physics::line_points::LineRequest;
 use mapper_yaml::FindingKind;
 use mapper_yaml::{Content, Step, steps};
 use schemars::JsonSchema;
@@ -12,9 +15,10 @@ use std::collections::HashSet;
 /// Maximum number of points a grid may have: four weeks of two-minute steps.
 const POINT_LIMIT: usize = 20_000;
 /// Ways to write a grid.
-const FORMS: &str = "write `speeds` and `openings`, or `points`, a list of `{speed: 50 krpm, opening: 0.5}`";
+const FORMS: &str = "write `speeds` and `openings`, or `points`, a list of `{speed: 50 krpm, opening: 0.5}`, or `lines`, \
+                     a list of `{speed_corrected: 50 krpm, points: 6}`";
 
-/// The operating points: every speed at every opening, or a list.
+/// The operating points: every speed at every opening, speed lines with points from choke to surge, or a list.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GridFile {
@@ -30,6 +34,14 @@ pub(crate) struct GridFile {
     /// The points one by one.
     #[schemars(length(min = 1, max = 20000))]
     points: Option<Vec<PointFile>>,
+    /// Speed lines by their corrected speeds, each with points from choke to surge; the openings are found on the nominal machine.
+    #[schemars(length(min = 1, max = 200))]
+    lines: Option<Vec<LineFile>>,
+    /// Surge margin of the last point of each of `lines`: corrected flow over the nominal map's surge flow at equal corrected speed, minus one. 10 % if none is given, or `limits.surge_margin` where that is more.
+    #[schemars(extend("x-min" = "-50 %", "x-max" = "200 %"), example = &"10 %")]
+    surge_margin: Option<Quantity<Fraction>>,
+    /// Opening of the first point of each of `lines`; 2.5 if none is given.
+    widest_opening: Option<Opening>,
 }
 
 /// A point.
@@ -48,12 +60,6 @@ pub(crate) struct PointFile {
 #[schemars(inline)]
 pub(crate) struct SpeedFile(#[schemars(extend("x-above" = "0 rpm", "x-max" = "1000 krpm"))] Quantity<Speed>);
 
-/// Opening of the back-pressure valve relative to its nominal area, a plain number above 0, at most 2.5.
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(transparent)]
-#[schemars(inline)]
-pub(crate) struct Opening(#[schemars(range(max = 2.5), extend("exclusiveMinimum" = 0), example = 0.5)] f64);
-
 impl From<PointFile> for OperatingPoint {
     fn from(file: PointFile) -> Self {
         OperatingPoint { speed_rpm: file.speed.0.inside, valve_opening_ratio: file.opening.0 }
@@ -61,8 +67,24 @@ impl From<PointFile> for OperatingPoint {
 }
 
 impl GridFile {
+    /// The lines in SI; none in another form.
+    pub(crate) fn lines(&self, reference: ReferenceState, limits: &Limits) -> Vec<LineRequest> {
+        let defaults = LineDefaults { surge_margin: self.surge_margin, widest_opening: self.widest_opening };
+        self.lines.iter().flatten().map(|line| line.request(defaults, reference, limits)).collect()
+    }
+
     /// The points and where each stands: its entry in `points`, or its speed in `speeds`.
-    pub(crate) fn points(&self) -> (Vec<OperatingPoint>, Vec<Vec<Step>>) {
+    ///
+    /// Of `lines`, whose openings are not known yet, the first point of each.
+    pub(crate) fn points(&self, lines: &[LineRequest], t1_k: f64) -> (Vec<OperatingPoint>, Vec<Vec<Step>>) {
+        if !lines.is_empty() {
+            let first = |(index, line): (usize, &LineRequest)| {
+                let speed_rpm = line.reference.physical_speed_rpm(line.speed_corrected_rpm, t1_k);
+                let point = OperatingPoint { speed_rpm, valve_opening_ratio: line.widest_opening_ratio };
+                (point, steps!["grid", "lines", index, "speed_corrected"].to_vec())
+            };
+            return lines.iter().enumerate().map(first).unzip();
+        }
         if let Some(listed) = &self.points {
             let entry = |(index, point): (usize, &PointFile)| {
                 (OperatingPoint::from(*point), steps!["grid", "points", index].to_vec())
@@ -100,6 +122,26 @@ pub(crate) fn check(check: &mut Check<'_>) {
     let has = |key: &str| grid.get(&steps![key]).is_some();
     let (speeds, openings, points, skip) = (has("speeds"), has("openings"), has("points"), has("skip"));
     let here = steps!["grid"];
+    let other = ["speeds", "openings", "points", "skip"].into_iter().find(|key| has(key));
+    let of_lines = ["surge_margin", "widest_opening"].into_iter().find(|key| has(key));
+    if has("lines") {
+        if let Some(key) = other {
+            let message = format!("`{key}` is given together with `lines`");
+            check.note_key(FindingKind::Conflict, &here, key, message, FORMS);
+        }
+        lines::check(check);
+        return;
+    }
+    if let Some(key) = of_lines {
+        let message = format!("`{key}` belongs to `lines`, and the grid has none");
+        check.note_key(
+            FindingKind::Conflict,
+            &here,
+            key,
+            message,
+            "remove it, or write the points as `lines`",
+        );
+    }
     match (speeds, openings, points) {
         (false, false, false) => {
             check.note(FindingKind::MissingKey, &here, "the grid has no points".into(), FORMS);
@@ -250,7 +292,7 @@ mod tests {
     #[test]
     fn a_grid_is_every_speed_at_every_opening_without_what_is_skipped() {
         let text = "{speeds: [50 krpm, 90 krpm], openings: [0.5, 1], skip: [{speed: 50000 rpm, opening: 1}]}";
-        let (points, places) = crate::testing::any::<GridFile>(text).unwrap().points();
+        let (points, places) = crate::testing::any::<GridFile>(text).unwrap().points(&[], 298.15);
         let found: Vec<(f64, f64)> = points.iter().map(|p| (p.speed_rpm, p.valve_opening_ratio)).collect();
         assert_eq!(found, [(50e3, 0.5), (90e3, 0.5), (90e3, 1.0)]);
         assert_eq!(places.len(), points.len());

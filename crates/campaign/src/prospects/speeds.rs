@@ -71,7 +71,8 @@ fn table(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>); 2]) -> Vec<
     let one = |(rpm, at): (f64, Vec<Step>), edge_rpm: f64, verb: &str, beyond: f64| {
         let corrected_rpm = rpm * correction;
         (beyond > ROUNDING_RATIO).then(|| Concern {
-            grave: beyond > BEYOND_RATIO,
+            // The ends of `lines` are read off the map itself.
+            grave: beyond > BEYOND_RATIO || !campaign.lines.is_empty(),
             at,
             message: format!(
                 "the grid goes to {:.1} krpm ({:.1} krpm corrected), the nominal map `{named}` {verb} at {:.1} krpm: \

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::{interrupt, output, registry};
 use clap::Args;
 use mapper_campaign::CampaignError;
-use mapper_report::{declared_sensors_text, duration};
+use mapper_report::{declared_sensors_text, duration, lines_text};
 use mapper_session::{Session, nominal_model};
 use serde_json::json;
 use std::io::IsTerminal;
@@ -50,10 +50,12 @@ impl Check {
         })?;
         let warnings = mapper_campaign::warnings(&text, &self.campaign, &campaign, prospects.concerns);
         let (steps, duration_s) = (prospects.plan.steps.len(), prospects.duration_s);
+        let lines = mapper_campaign::resolved_lines(&campaign, &model);
         if self.json {
             return output::print_json(&json!({
                 "campaign": campaign.name,
                 "points": campaign.points.len(),
+                "lines": lines,
                 "steps": steps,
                 "minutes": duration_s / 60.0,
                 "backend": campaign.backend.name,
@@ -75,12 +77,13 @@ impl Check {
             count => format!(", {count} warnings"),
         };
         output::print(&format!(
-            "{}: no mistakes{number}. {} points in {steps} steps on `{}` in {} of the rig's time{forecast}.\n{}",
+            "{}: no mistakes{number}. {} points in {steps} steps on `{}` in {} of the rig's time{forecast}.\n{}{}",
             self.campaign.display(),
             campaign.points.len(),
             campaign.backend.name,
             duration(duration_s),
             declared_sensors_text(&campaign),
+            lines_text(&campaign, &lines),
         ))
     }
 }

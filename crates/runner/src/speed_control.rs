@@ -1,0 +1,304 @@
+//! The closed loop over the shaft speed: P3 as planned, and on top of it what the measured speed asks for.
+//!
+//! **Feed-forward.** The plan's P3 holds the nominal machine at the target. What the machine at hand lacks is carried from step
+//! to step as a *deficit* of turbine power, `d = ln(W_nominal(P3) / W_nominal(P3_plan))`: a turbine 10 % worse lacks the same
+//! 10 % on every speed line, while the pressure that makes up for it differs fourfold. A step starts at
+//! `P3 = P3_plan exp(d s)`, `s` = [`SpeedResponse::p3_per_power`].
+//!
+//! **Feedback.** Once the jump's own transient is over, a PI controller in its velocity form adds, once a second,
+//! `dP3 = (tau (e - e_before) + e dt) / (lambda K)`: `e` the error of the median speed of that second, `K` and `tau` gain and
+//! time constant of the nominal machine, `lambda` the time constant of the closed loop (lambda or IMC tuning; Rivera, Morari
+//! and Skogestad, Ind. Eng. Chem. Process Des. Dev. 25 (1986)). The zero cancels the shaft's pole, so that the loop is of first
+//! order and does not overshoot. `lambda` grows with the time since the transient, as the gain of a Kalman filter falls:
+//! what is off is corrected in seconds, and later the loop follows the slow housings and hardly any noise.
+//!
+//! **Limits.** The velocity form has no integral beside the command itself: clamping the command to its limits and to the rig's
+//! rate is all the anti-windup there is.
+
+use mapper_core::{
+    Channel, Event, EventKind, OperatingPoint, PlanStep, SampleBatch, SpeedControlSettings, SpeedResponse,
+};
+use mapper_numerics::statistics::median;
+use std::collections::VecDeque;
+
+/// Time constant of the closed loop, s: at first, and in the long run.
+const LAMBDA_S: (f64, f64) = (2.5, 20.0);
+/// The closed loop's time constant over the time since the transient.
+const LAMBDA_GROWTH: f64 = 0.4;
+/// After a jump the loop waits for so many time constants of the machine, and as long as P3 needs at the rig's rate.
+const TRANSIENT_TIME_CONSTANTS: f64 = 5.0;
+/// Shortest time that it waits, s.
+const TRANSIENT_MIN_S: f64 = 2.0;
+/// Longest time that it waits for the speed to stop moving, s: a machine that never rests is held all the same.
+const TRANSIENT_MAX_S: f64 = 15.0;
+/// The transient is over when the speed moves by less than this share of it in a second.
+const AT_REST_RATIO: f64 = 1e-3;
+/// Commands closer to what was sent than this share of the band, as a speed, are not sent: valves wear.
+const SENT_SHARE: f64 = 0.05;
+/// Largest deficit, plus or minus: beyond it something else is wrong, a sensor of the speed above all.
+const DEFICIT_MAX: f64 = 0.4;
+/// Smallest weight of a step's own deficit in what is carried on: what housings add to single steps averages out.
+const LEARNING_MIN_RATIO: f64 = 0.3;
+/// Seconds at the end of a step over which its speed is judged, s.
+const END_S: f64 = 10.0;
+/// Seconds beyond the band after which what was off counts as new.
+const OFF_SECONDS: usize = 3;
+
+/// What the loop may do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpeedControlLimits {
+    /// Lowest P3, Pa.
+    pub p3_min_pa: f64,
+    /// Highest P3, Pa: as far below the limit as its sensor may read too high, or the guard would end the run. A step whose
+    /// plan has more keeps it.
+    pub p3_max_pa: f64,
+    /// Fastest change of P3, Pa/s; `None`: the rig's own business.
+    pub p3_slew_max_pa_s: Option<f64>,
+    /// Highest shaft speed, rpm.
+    pub speed_max_rpm: f64,
+}
+
+/// The nominal machine's answer at a step; `None` where it has none, and P3 stays as planned.
+pub type ResponseAt<'a> = Box<dyn FnMut(&PlanStep) -> Option<SpeedResponse> + 'a>;
+
+/// Holds the shaft speed of a run. Time comes with the samples; equal samples give equal commands.
+pub struct SpeedControl<'a> {
+    settings: SpeedControlSettings,
+    limits: SpeedControlLimits,
+    response_at: ResponseAt<'a>,
+    /// Deficit that steps begin with.
+    deficit: f64,
+    /// Steps it was learnt from.
+    learnt: usize,
+    hold: Option<Hold>,
+    /// The last command, Pa.
+    sent_pa: Option<f64>,
+}
+
+/// The point that is held.
+#[derive(Debug)]
+struct Hold {
+    target: OperatingPoint,
+    plan_pa: f64,
+    response: SpeedResponse,
+    start_s: f64,
+    /// The transient is not over before, s.
+    not_before_s: f64,
+    /// What the loop asks for, Pa: the command but for changes too small to be sent.
+    wanted_pa: f64,
+    /// Since when the loop is closed, or has begun anew, s.
+    closed_s: Option<f64>,
+    /// Time and error of the second before.
+    before: Option<(f64, f64)>,
+    /// Seconds in a row beyond the band.
+    off: usize,
+    /// Time and speed of the last seconds.
+    recent: VecDeque<(f64, f64)>,
+    /// Since when a limit is in the way, and whether that was told.
+    saturated: Option<(f64, bool)>,
+}
+
+impl Hold {
+    fn deficit(&self, p3_pa: f64) -> f64 {
+        (p3_pa / self.plan_pa).ln() / self.response.p3_per_power
+    }
+
+    fn p3_pa(&self, deficit: f64) -> f64 {
+        self.plan_pa * (deficit * self.response.p3_per_power).exp()
+    }
+
+    /// Mean speed of the last seconds, rpm.
+    fn reached_rpm(&self) -> Option<f64> {
+        let count = self.recent.len();
+        (count > 0).then(|| self.recent.iter().map(|(_, rpm)| rpm).sum::<f64>() / count as f64)
+    }
+}
+
+impl<'a> SpeedControl<'a> {
+    /// A loop that has learnt nothing yet.
+    pub fn new(
+        settings: SpeedControlSettings,
+        limits: SpeedControlLimits,
+        response_at: ResponseAt<'a>,
+    ) -> Self {
+        SpeedControl { settings, limits, response_at, deficit: 0.0, learnt: 0, hold: None, sent_pa: None }
+    }
+
+    /// Deficit of turbine power that the next step begins with, natural logarithm.
+    pub fn deficit(&self) -> f64 {
+        self.deficit
+    }
+
+    /// P3 with which a step begins at `t_s`, Pa. Where the step goes on at the point that is held, what holds it.
+    pub fn begin(&mut self, step: &PlanStep, t_s: f64) -> f64 {
+        if let Some(hold) = &mut self.hold
+            && hold.target.is_same_place(&step.to)
+            && hold.plan_pa == step.p3_pa
+        {
+            hold.recent.clear();
+            hold.saturated = None;
+            return self.sent_pa.unwrap_or(hold.wanted_pa);
+        }
+        let Some(response) = (self.response_at)(step) else {
+            self.hold = None;
+            self.sent_pa = Some(step.p3_pa);
+            return step.p3_pa;
+        };
+        let mut hold = Hold {
+            target: step.to,
+            plan_pa: step.p3_pa,
+            response,
+            start_s: t_s,
+            not_before_s: 0.0,
+            wanted_pa: step.p3_pa,
+            closed_s: None,
+            before: None,
+            off: 0,
+            recent: VecDeque::new(),
+            saturated: None,
+        };
+        // What was learnt elsewhere never drives the nominal machine beyond the speed limit.
+        let room_pa = (self.limits.speed_max_rpm - step.to.speed_rpm).max(0.0) / response.rpm_per_pa;
+        hold.wanted_pa = self.allowed(hold.p3_pa(self.deficit).min(step.p3_pa + room_pa), &hold);
+        let from_pa = self.sent_pa.unwrap_or(hold.wanted_pa);
+        let ramp_s = self
+            .limits
+            .p3_slew_max_pa_s
+            .map_or(0.0, |slew_pa_s| (hold.wanted_pa - from_pa).abs() / slew_pa_s);
+        hold.not_before_s = t_s
+            + ramp_s
+            + (TRANSIENT_TIME_CONSTANTS * response.time_constant_s).clamp(TRANSIENT_MIN_S, TRANSIENT_MAX_S);
+        let p3_pa = hold.wanted_pa;
+        self.hold = Some(hold);
+        self.sent_pa = Some(p3_pa);
+        p3_pa
+    }
+
+    /// Looks at new samples: the next P3 to send, if there is one, Pa, and what is to be told.
+    pub fn on_batch(&mut self, batch: &SampleBatch) -> (Option<f64>, Option<Event>) {
+        let Some(mut hold) = self.hold.take() else { return (None, None) };
+        let told = self.advance(&mut hold, batch);
+        let smallest_pa =
+            SENT_SHARE * self.settings.band_ratio * hold.target.speed_rpm / hold.response.rpm_per_pa;
+        let send = self.sent_pa.is_none_or(|sent_pa| (hold.wanted_pa - sent_pa).abs() > smallest_pa);
+        let next = send.then_some(hold.wanted_pa);
+        if send {
+            self.sent_pa = next;
+        }
+        self.hold = Some(hold);
+        (next, told)
+    }
+
+    fn advance(&mut self, hold: &mut Hold, batch: &SampleBatch) -> Option<Event> {
+        let now_s = *batch.t_s.last()?;
+        let speeds = batch.column(Channel::ShaftSpeed)?;
+        let speed_rpm = median(speeds.iter().filter(|speed| speed.is_finite()))?;
+        hold.recent.push_back((now_s, speed_rpm));
+        while hold.recent.front().is_some_and(|(t_s, _)| *t_s < now_s - END_S) {
+            hold.recent.pop_front();
+        }
+        let error_rpm = hold.target.speed_rpm - speed_rpm;
+        let before = hold.before.replace((now_s, error_rpm));
+        let (before_s, error_before_rpm) = before?;
+        let dt_s = now_s - before_s;
+        // A batch that ends where the one before did has nothing new.
+        if dt_s <= 0.0 {
+            return None;
+        }
+        if hold.closed_s.is_none() {
+            let moves = (error_rpm - error_before_rpm).abs() > AT_REST_RATIO * hold.target.speed_rpm * dt_s;
+            let patience = now_s - hold.start_s < hold.not_before_s - hold.start_s + TRANSIENT_MAX_S;
+            if now_s < hold.not_before_s || (moves && patience) {
+                return None;
+            }
+            hold.closed_s = Some(now_s - dt_s);
+        }
+        let beyond = error_rpm.abs() > self.settings.band_ratio * hold.target.speed_rpm;
+        hold.off = if beyond { hold.off + 1 } else { 0 };
+        if hold.off == OFF_SECONDS {
+            hold.closed_s = Some(now_s - dt_s);
+        }
+        let closed_for_s = now_s - hold.closed_s.unwrap_or(now_s);
+        let lambda_s = (LAMBDA_GROWTH * closed_for_s).clamp(LAMBDA_S.0, LAMBDA_S.1);
+        let response = &hold.response;
+        // After a silence the speed is corrected by what is seen now, not for all that was missed.
+        let counted_s = dt_s.min(0.5 * lambda_s);
+        let change_pa = (response.time_constant_s * (error_rpm - error_before_rpm) + error_rpm * counted_s)
+            / (lambda_s * response.rpm_per_pa);
+        let asked_pa = hold.wanted_pa + change_pa;
+        let slew_pa = self.limits.p3_slew_max_pa_s.map_or(f64::INFINITY, |slew_pa_s| slew_pa_s * dt_s);
+        let rated_pa = asked_pa.clamp(hold.wanted_pa - slew_pa, hold.wanted_pa + slew_pa);
+        let allowed_pa = self.allowed(rated_pa, hold);
+        hold.wanted_pa = allowed_pa;
+        self.saturation(hold, now_s, rated_pa)
+    }
+
+    /// P3 within the rig's limits, and no farther from the plan's than any deficit goes, Pa.
+    fn allowed(&self, p3_pa: f64, hold: &Hold) -> f64 {
+        let (low_pa, high_pa) = (hold.p3_pa(-DEFICIT_MAX), hold.p3_pa(DEFICIT_MAX));
+        p3_pa
+            .clamp(low_pa, high_pa)
+            .max(self.limits.p3_min_pa.min(hold.plan_pa))
+            .min(self.limits.p3_max_pa.max(hold.plan_pa))
+    }
+
+    /// Tells once in a step that a limit is in the way: after seconds, so that a passing touch is none.
+    fn saturation(&self, hold: &mut Hold, now_s: f64, asked_pa: f64) -> Option<Event> {
+        let speed_rpm = hold.reached_rpm()?;
+        if asked_pa == hold.wanted_pa {
+            hold.saturated = hold.saturated.filter(|(_, told)| *told);
+            return None;
+        }
+        let (since_s, told) = hold.saturated.unwrap_or((now_s, false));
+        let tell = !told && now_s - since_s >= OFF_SECONDS as f64;
+        hold.saturated = Some((since_s, told || tell));
+        tell.then(|| Event {
+            t_s: now_s,
+            kind: EventKind::Note,
+            message: format!(
+                "speed control: P3 stays at {:.1} kPa, {}; the speed is {:.2} krpm where {:.2} krpm are asked for",
+                hold.wanted_pa / 1e3,
+                self.limit_in_words(hold.wanted_pa),
+                speed_rpm / 1e3,
+                hold.target.speed_rpm / 1e3
+            ),
+        })
+    }
+
+    fn limit_in_words(&self, p3_pa: f64) -> String {
+        if p3_pa >= self.limits.p3_max_pa {
+            "its highest".to_owned()
+        } else if p3_pa <= self.limits.p3_min_pa {
+            "its lowest".to_owned()
+        } else {
+            format!(
+                "as far from the plan as turbine power may be ({:.0} %); is the speed's sensor right?",
+                100.0 * DEFICIT_MAX.exp_m1()
+            )
+        }
+    }
+
+    /// A step has ended at `t_s`: what it was off, if that is beyond the band. What it took is carried on.
+    pub fn end(&mut self, t_s: f64) -> Option<Event> {
+        let hold = self.hold.as_ref()?;
+        if hold.closed_s.is_some() {
+            let own = hold.deficit(hold.wanted_pa);
+            self.learnt += 1;
+            let weight = (1.0 / self.learnt as f64).max(LEARNING_MIN_RATIO);
+            self.deficit += weight * (own - self.deficit);
+        }
+        let (asked_rpm, reached_rpm) = (hold.target.speed_rpm, hold.reached_rpm()?);
+        let off_ratio = reached_rpm / asked_rpm - 1.0;
+        (off_ratio.abs() > self.settings.band_ratio).then(|| Event {
+            t_s,
+            kind: EventKind::SpeedNotReached,
+            message: format!(
+                "the speed was not reached: {:.2} krpm asked for, {:.2} krpm in the last {END_S:.0} s ({:+.2} %, band {:.2} %)",
+                asked_rpm / 1e3,
+                reached_rpm / 1e3,
+                100.0 * off_ratio,
+                100.0 * self.settings.band_ratio
+            ),
+        })
+    }
+}

@@ -17,7 +17,7 @@ import tempfile
 REPLACED = [
     ("speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]", "speeds: [65 krpm, 125 krpm, 95 krpm, 140 krpm]"),
     ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [1.0]"),
-    ("order: sum_gradient ", "repeats: off\norder: listed "),
+    ("order: information ", "repeats: off\norder: listed "),
 ]
 
 

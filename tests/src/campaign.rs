@@ -13,7 +13,8 @@ pub const SHORT_GRID: &[(&str, &str)] = &[
         "speeds: [80 krpm, 125 krpm]",
     ),
     ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.4]"),
-    ("warm_up: 10 min ", "warm_up: 60 s "),
+    ("warm_up: 2 min ", "warm_up: 60 s "),
+    ("required_sigma_eta: 0.9 %\n", ""),
     ("seed: 1 ", "repeats: off\nreturn_to_first: false\nseed: 1 "),
 ];
 

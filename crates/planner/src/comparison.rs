@@ -32,6 +32,8 @@ pub struct WayOfMapping {
     pub worst_error_eta: Option<f64>,
     /// Root of the mean square of these errors, fraction.
     pub rms_error_eta: Option<f64>,
+    /// The same where nothing is as declared, fraction.
+    pub open_rms_error_eta: Option<f64>,
 }
 
 /// The plan beside what it is held against.
@@ -82,6 +84,7 @@ fn planned(plan: &Plan) -> WayOfMapping {
         sum_gradient_k: Some(plan.figures.sum_gradient_k),
         worst_error_eta: plan.figures.worst_error_eta,
         rms_error_eta: plan.figures.rms_error_eta,
+        open_rms_error_eta: plan.figures.open_rms_error_eta,
     }
 }
 
@@ -150,5 +153,6 @@ fn conventional(
         sum_gradient_k: None,
         worst_error_eta: errors.iter().copied().max_by(f64::total_cmp),
         rms_error_eta: rms(&errors),
+        open_rms_error_eta: None,
     })
 }

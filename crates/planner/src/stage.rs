@@ -14,6 +14,8 @@ use mapper_physics::steady::SteadyState;
 
 /// How often jumps that turn out not to be allowed are taken out and the rest is ordered again.
 const ROUNDS: usize = 25;
+/// Effort of ordering again, over the first.
+const AGAIN_RATIO: f64 = 0.2;
 
 /// Where a plan is made.
 pub(crate) struct Stage<'a> {
@@ -77,10 +79,12 @@ impl<'a> Stage<'a> {
         };
         let mut housing = Housing::of(&searched, &self.points, &self.targets, None, worth)?;
         housing.returns = request.return_to_first;
-        let given: Vec<usize> = (0..request.points.len()).collect();
+        let mut given: Vec<usize> = (0..request.points.len()).collect();
         let mut barred: Vec<String> = Vec::new();
-        for _ in 0..ROUNDS {
-            let ordered = order_on(&housing, &self.points, &given, request);
+        for round in 0..ROUNDS {
+            // Where one jump is taken out, the best order is not far.
+            let effort = if round == 0 { effort } else { AGAIN_RATIO * effort };
+            let ordered = order_on(&housing, &self.points, &given, &PlanRequest { effort, ..request.clone() });
             let mut visits = match self.repeated {
                 Some(jump) => with_repeats(&housing, &ordered.order, jump, objective(order)),
                 None => plain(&ordered.order),
@@ -111,6 +115,7 @@ impl<'a> Stage<'a> {
                 }
                 housing.forbid(from, to);
             }
+            given = ordered.order;
             let searched = !matches!(order, VisitOrder::Listed | VisitOrder::SpeedLines);
             if barred.len() == before || !searched {
                 break;

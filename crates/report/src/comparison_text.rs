@@ -13,6 +13,7 @@ pub fn comparison_json(comparison: &Comparison) -> Value {
             "sum_gradient_k": way.sum_gradient_k,
             "worst_error_eta": way.worst_error_eta,
             "rms_error_eta": way.rms_error_eta,
+            "open_rms_error_eta": way.open_rms_error_eta,
             "order": way.order,
         })
     };
@@ -42,9 +43,10 @@ pub fn comparison_text(comparison: &Comparison) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,
-            "  {name:<32}{:>6.0} min   rms {:>6}   worst {:>6}   gradients {gradient:>6} K",
+            "  {name:<32}{:>6.0} min   rms {:>5}   open {:>5}   worst {:>5}   gradients {gradient:>5} K",
             way.minutes,
             percent(way.rms_error_eta, 2),
+            percent(way.open_rms_error_eta, 2),
             percent(way.worst_error_eta, 2),
         );
     };
@@ -55,7 +57,7 @@ pub fn comparison_text(comparison: &Comparison) -> String {
     line("conventional, with stabilisation", &comparison.conventional);
     let _ = writeln!(
         text,
-        "Orders: the best for the time it takes first. Conventional: T2 and housing must drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is that of heat transfer and of the same offsets."
+        "Orders: the best for the time it takes first. Open: where alpha_A, probe and direction factor have to be found. Conventional: T2 and housing must drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is that of heat transfer and of the same offsets."
     );
     text
 }

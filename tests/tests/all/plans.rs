@@ -19,7 +19,7 @@ fn campaign(order: &str, more: &[(&str, &str)]) -> CampaignFile {
             )
         })
         .chain(BY_ITSELF.iter().copied())
-        .chain([("order: sum_gradient ", order.as_str())])
+        .chain([("order: information ", order.as_str())])
         .chain(more.iter().copied())
         .collect();
     CampaignFile::shipped_with(&wider)

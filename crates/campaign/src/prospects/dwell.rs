@@ -13,6 +13,10 @@ pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
     let dwell_s = campaign.timing.dwell_s;
     let (earliest_s, shortest_s) = (WindowRule::EARLIEST_S, WindowRule::SHORTEST_S);
     let needed_s = earliest_s + shortest_s;
+    // A method that follows a step from its jump on needs no settled window.
+    if identification.method == Method::Joint && dwell_s > earliest_s {
+        return Vec::new();
+    }
     match identification.window {
         WindowRule::Auto if dwell_s < needed_s => {
             // A script may stay elsewhere for as long as it likes.

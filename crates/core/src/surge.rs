@@ -30,8 +30,8 @@ impl Default for SurgeSeek {
         SurgeSeek {
             closest_margin_ratio: 0.03,
             step_ratio: 0.03,
-            dwell_s: 20.0,
-            wanted_standard_error_ratio: 0.007,
+            dwell_s: 25.0,
+            wanted_standard_error_ratio: 0.008,
             most_steps: 40,
         }
     }

@@ -13,58 +13,56 @@ pub(crate) struct GrowthLaw {
 
 impl GrowthLaw {
     /// The growing part at a margin, up to a factor.
-    fn at(self, margin_ratio: f64) -> f64 {
+    pub(crate) fn part(self, margin_ratio: f64) -> f64 {
         let part = |margin: f64| margin.max(1e-6).powf(-self.exponent);
         (part(margin_ratio) - part(self.onset_ratio)).max(0.0)
     }
 }
 
+/// The growing part up to a factor, and the variation that was read there.
+pub(crate) type Read = (f64, Variation);
+
 /// Rounds of the reweighted fit; the variance moves by less than its own error from one to the next.
 const ROUNDS: usize = 5;
 
-/// Logarithm of the likelihood of a channel's variations at these margins, where level and size of the growth are the most
-/// likely ones; a variance of so many degrees of freedom follows a chi-squared law.
-pub(crate) fn log_likelihood(variations: &[(f64, Variation)], law: GrowthLaw) -> f64 {
-    let parts: Vec<f64> = variations.iter().map(|(margin_ratio, _)| law.at(*margin_ratio)).collect();
-    fitted(variations, &parts)
-}
-
-/// The same without any growth.
-pub(crate) fn log_likelihood_without(variations: &[(f64, Variation)]) -> f64 {
-    fitted(variations, &vec![0.0; variations.len()])
-}
-
-fn fitted(variations: &[(f64, Variation)], parts: &[f64]) -> f64 {
-    let all: f64 = variations.iter().map(|(_, variation)| variation.degrees_of_freedom).sum();
-    let least = variations.iter().map(|(_, v)| v.variance_ratio).fold(f64::INFINITY, f64::min);
-    let flat = variations.iter().map(|(_, v)| v.variance_ratio * v.degrees_of_freedom).sum::<f64>() / all;
-    let (mut level, mut size) = (if parts.iter().any(|part| *part > 0.0) { least } else { flat }, 0.0);
-    let floor = 0.05 * least;
+/// Logarithm of the likelihood of a channel's variations for the most likely level and size, neither negative. A variance of
+/// so many degrees of freedom follows a chi-squared law.
+pub(crate) fn log_likelihood(read: &[Read]) -> f64 {
+    let least = 0.2 * read.iter().map(|(_, v)| v.variance).fold(f64::INFINITY, f64::min);
+    let mut expected: Vec<f64> = read.iter().map(|(_, variation)| variation.variance).collect();
     for _ in 0..ROUNDS {
-        // Weighted least squares for level and size; the weights are those of variances.
+        // Weighted least squares; the weights are those of variances.
         let (mut s, mut sg, mut sgg, mut sv, mut sgv) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for ((_, variation), part) in variations.iter().zip(parts) {
-            let expected = level + size * part;
-            // At the first round what was read has to stand for what is expected.
-            let scale = if size > 0.0 { expected } else { variation.variance_ratio.max(expected) };
-            let weight = variation.degrees_of_freedom / (scale * scale);
+        for ((part, variation), expected) in read.iter().zip(&expected) {
+            let weight = variation.degrees_of_freedom / (expected * expected);
             s += weight;
             sg += weight * part;
             sgg += weight * part * part;
-            sv += weight * variation.variance_ratio;
-            sgv += weight * part * variation.variance_ratio;
+            sv += weight * variation.variance;
+            sgv += weight * part * variation.variance;
         }
         let determinant = s * sgg - sg * sg;
         let slope = if determinant > 1e-12 * s * sgg { (s * sgv - sg * sv) / determinant } else { 0.0 };
-        (level, size) = if slope > 0.0 { ((sv - slope * sg) / s, slope) } else { (flat, 0.0) };
-        level = level.max(floor);
+        let mut size = slope.max(0.0);
+        let mut level = (sv - size * sg) / s;
+        if level < least {
+            level = least;
+            size = if sgg > 0.0 { ((sgv - level * sg) / sgg).max(0.0) } else { 0.0 };
+        }
+        for ((part, _), expected) in read.iter().zip(&mut expected) {
+            *expected = level + size * part;
+        }
     }
-    variations
-        .iter()
-        .zip(parts)
-        .map(|((_, variation), part)| {
-            let expected = level + size * part;
-            -0.5 * variation.degrees_of_freedom * (expected.ln() + variation.variance_ratio / expected)
+    read.iter()
+        .zip(&expected)
+        .map(|((_, variation), expected)| {
+            -0.5 * variation.degrees_of_freedom * (expected.ln() + variation.variance / expected)
         })
         .sum()
+}
+
+/// By how much likelier a variance is any than that of a known level, natural logarithm; 0 where it is smaller.
+pub(crate) fn excess(read: Variation, level: f64) -> f64 {
+    let ratio = read.variance / level;
+    if ratio > 1.0 { 0.5 * read.degrees_of_freedom * (ratio - 1.0 - ratio.ln()) } else { 0.0 }
 }

@@ -28,6 +28,11 @@ pub enum Why {
 const FAR_STEP_RATIO: f64 = 0.08;
 /// Surge margin of the nominal map beyond which surge is far, ratio: its surge line is a guess.
 const FAR_MARGIN_RATIO: f64 = 0.35;
+/// Step that may be made whatever the highest possible surge flow, ratio: what grows would have grown more at this opening if
+/// surge were as near as that, and only looks further on can tell.
+const SMALL_STEP_RATIO: f64 = 0.007;
+/// The law is not carried on from farther than so many times the smallest margin: how it begins is any rig's own.
+const TRUSTED_MARGINS: f64 = 1.4;
 /// Distance that is kept from the highest surge flow that is possible, ratio.
 const KEPT_RATIO: f64 = 0.005;
 /// Smallest step that is worth the time, ratio.
@@ -58,16 +63,25 @@ pub fn next_move(looks: &[Look], seek: &SurgeSeek, nominal_margin_ratio: Option<
     let estimate = SurgeEstimate::of(looks);
     let Some(estimate) = estimate.filter(|estimate| estimate.seen) else {
         let far = nominal_margin_ratio.is_some_and(|margin| margin > FAR_MARGIN_RATIO);
-        let step = if far { FAR_STEP_RATIO.max(seek.step_ratio) } else { seek.step_ratio };
+        let step = match estimate {
+            // Something grows, but not at enough openings to tell how fast.
+            Some(estimate) if estimate.grows => 0.5 * seek.step_ratio,
+            _ if far => FAR_STEP_RATIO.max(seek.step_ratio),
+            _ => seek.step_ratio,
+        };
         return Move::To(opening * (1.0 - step));
     };
-    if estimate.standard_error_ratio() <= seek.wanted_standard_error_ratio {
+    let margin_ratio = estimate.closest_flow_kg_s / estimate.flow_corrected_kg_s - 1.0;
+    let near = margin_ratio <= TRUSTED_MARGINS * seek.closest_margin_ratio;
+    if near && estimate.standard_error_ratio() <= seek.wanted_standard_error_ratio {
         return Move::Done(Why::Known);
     }
     // Near surge pressures hardly change with flow: the flow goes with the opening.
     let flow_kg_s = estimate.closest_flow_kg_s;
+    let possible_kg_s = estimate.flow_corrected_kg_s + 2.0 * estimate.standard_error_kg_s;
+    let safe_kg_s = possible_kg_s.max(estimate.highest_flow_kg_s) * (1.0 + KEPT_RATIO);
     let lowest_kg_s = (flow_kg_s * (1.0 - seek.step_ratio))
-        .max(estimate.highest_flow_kg_s * (1.0 + KEPT_RATIO))
+        .max(safe_kg_s.min(flow_kg_s * (1.0 - SMALL_STEP_RATIO)))
         .max(estimate.flow_corrected_kg_s * (1.0 + seek.closest_margin_ratio));
     let step = 1.0 - lowest_kg_s / flow_kg_s;
     if step >= LEAST_STEP_RATIO {

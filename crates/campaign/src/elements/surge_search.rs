@@ -16,11 +16,11 @@ pub(crate) struct SurgeSearchFile {
     /// Largest change of the valve's opening at a step while surge may be near, of the opening; 3 % if none is given.
     #[schemars(extend("x-min" = "0.5 %", "x-max" = "10 %"), example = &"3 %")]
     step: Option<Quantity<Fraction>>,
-    /// Time at each opening; 20 s if none is given. The first 5 s are for the rig to follow.
-    #[schemars(extend("x-min" = "12 s", "x-max" = "10 min"), example = &"20 s")]
+    /// Time at each opening; 25 s if none is given. The first 5 s are for the rig to follow.
+    #[schemars(extend("x-min" = "12 s", "x-max" = "10 min"), example = &"25 s")]
     dwell: Option<Quantity<Duration>>,
-    /// Standard error of the surge flow at which a line is done, without the flow meter's gain; 0.7 % if none is given.
-    #[schemars(extend("x-min" = "0.1 %", "x-max" = "5 %"), example = &"0.7 %")]
+    /// Standard error of the surge flow at which a line is done, without the flow meter's gain; 0.8 % if none is given.
+    #[schemars(extend("x-min" = "0.1 %", "x-max" = "5 %"), example = &"0.8 %")]
     standard_error: Option<Quantity<Fraction>>,
     /// Maximum number of openings of one line; 40 if none is given.
     #[schemars(range(min = 5, max = 200), example = 40)]

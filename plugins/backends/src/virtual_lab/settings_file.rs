@@ -63,9 +63,9 @@ struct SettingsFile {
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct PrecursorFile {
-    /// Surge margin at which it begins; 12 % where left out.
+    /// Surge margin at which it begins; 25 % where left out.
     onset: Option<Quantity<Fraction>>,
-    /// Root mean square of the flow's swing at half that margin; 0.5 % where left out.
+    /// Root mean square of the flow's swing at half that margin; 0.3 % where left out.
     size: Option<Quantity<Fraction>>,
     /// Exponent by which the variance grows with the inverse of the margin; 1 where left out.
     growth: Option<f64>,

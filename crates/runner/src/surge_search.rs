@@ -3,7 +3,7 @@
 
 use crate::source::{StepSource, StepSourceError};
 use mapper_core::{
-    Channel, EventKind, OperatingPoint, PlanStep, Predicted, Recording, ReferenceState, SampleBatch, Series,
+    Channel, EventKind, OperatingPoint, PlanStep, Predicted, Recording, ReferenceState, SampleBatch,
     Soak, StepKind, StepMarker, SurgeSeek,
 };
 use mapper_surge::{Look, Move, SurgeEstimate, Why, next_move};
@@ -115,8 +115,7 @@ impl<'a> SurgeSearch<'a> {
     }
 
     fn remember(&mut self, step: &PlanStep) {
-        let known =
-            self.line_ends.iter_mut().find(|end| (end.to.speed_rpm - step.to.speed_rpm).abs() < 1e-3);
+        let known = self.line_ends.iter_mut().find(|end| (end.to.speed_rpm - step.to.speed_rpm).abs() < 1e-3);
         match known {
             Some(end) if end.to.valve_opening_ratio <= step.to.valve_opening_ratio => {}
             Some(end) => *end = step.clone(),
@@ -135,7 +134,7 @@ impl<'a> SurgeSearch<'a> {
             if self.approach.as_ref().is_none_or(|approach| approach.stage == Stage::Over) {
                 self.approach = Some(Approach::of(lines.pop()?));
             }
-            let Some(approach) = self.approach.as_mut() else { return None };
+            let approach = self.approach.as_mut()?;
             if let Some(step) = approach.step(&self.seek, self.hold) {
                 return Some(step);
             }
@@ -176,13 +175,11 @@ impl Approach {
             Stage::Over => return None,
         };
         let to = OperatingPoint { speed_rpm: self.end.to.speed_rpm, valve_opening_ratio: opening };
-        let mut step =
-            PlanStep { kind: StepKind::Approach, to, dwell_s, ..self.end.clone() };
+        let mut step = PlanStep { kind: StepKind::Approach, to, dwell_s, ..self.end.clone() };
         // The way back needs no leave of the limits: the line's end itself is within them.
         if self.stage != Stage::Return {
             let held = hold(OperatingPoint { speed_rpm: to.speed_rpm * self.trim_ratio, ..to })?;
-            (step.p3_pa, step.t3_k, step.oil_temperature_k) =
-                (held.p3_pa, held.t3_k, held.oil_temperature_k);
+            (step.p3_pa, step.t3_k, step.oil_temperature_k) = (held.p3_pa, held.t3_k, held.oil_temperature_k);
             step.predicted = held.predicted;
             self.nominal_margin_ratio = Some(held.surge_margin_ratio);
         }
@@ -196,7 +193,7 @@ impl Approach {
     fn read(&mut self, batch: &SampleBatch) -> bool {
         for channel in READ {
             if let Some(values) = batch.column(channel) {
-                let series = self.readings.series.entry(channel).or_insert_with(Series::default);
+                let series = self.readings.series.entry(channel).or_default();
                 series.t_s.extend_from_slice(&batch.t_s);
                 series.values.extend_from_slice(values);
             }
@@ -223,14 +220,23 @@ impl Approach {
     }
 
     /// What follows from the step that has ended; a note where the line is done.
-    fn conclude(&mut self, marker: &StepMarker, seek: &SurgeSeek, reference: ReferenceState) -> Option<String> {
+    fn conclude(
+        &mut self,
+        marker: &StepMarker,
+        seek: &SurgeSeek,
+        reference: ReferenceState,
+    ) -> Option<String> {
         let line = || format!("surge search: {:.0} rpm", self.end.to.speed_rpm);
         let safe = self.end.to.valve_opening_ratio;
         let (stage, note) = match self.stage {
             Stage::Return | Stage::Over => (Stage::Over, None),
             _ if self.surged => (
                 Stage::Return,
-                Some(format!("{}: surge at opening {:.3}, the valve opens", line(), marker.valve_opening_ratio)),
+                Some(format!(
+                    "{}: surge at opening {:.3}, the valve opens",
+                    line(),
+                    marker.valve_opening_ratio
+                )),
             ),
             Stage::Arrive => (Stage::Look(safe), None),
             Stage::Look(_) => {
@@ -314,7 +320,8 @@ impl StepSource for SurgeSearch<'_> {
 
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(approach) = &mut self.approach else { return self.inner.after_step(marker) };
-        self.surges += usize::from(approach.surged && matches!(approach.stage, Stage::Arrive | Stage::Look(_)));
+        self.surges +=
+            usize::from(approach.surged && matches!(approach.stage, Stage::Arrive | Stage::Look(_)));
         let note = approach.conclude(marker, &self.seek, self.reference);
         self.notes.extend(note);
         Ok(())

@@ -11,7 +11,7 @@ use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_observe::FusedChannel;
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_report::{RunReport, run_report};
+use mapper_report::{RunReport, SurgeReport, run_report};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -76,8 +76,17 @@ impl Session<'_> {
             Some(map) => export(self.registry, campaign, map, directory, &mut remarks)?,
             None => BTreeMap::new(),
         };
-        let Identified { recording: recorded, config, points, thermal, two_parameter, sensors, zero, score, surge } =
-            identified;
+        let Identified {
+            recording: recorded,
+            config,
+            points,
+            thermal,
+            two_parameter,
+            sensors,
+            zero,
+            score,
+            surge,
+        } = identified;
         let mut points_file = json!({"reference": config.reference, "points": points, "thermal": thermal, "two_parameter": two_parameter, "zero": zero});
         if !sensors.is_empty() {
             points_file["sensors"] = json!(sensors);
@@ -99,6 +108,11 @@ impl Session<'_> {
             two_parameter: &two_parameter,
             sensors: &sensors,
             score: score.as_ref(),
+            surge: surge.as_ref().map(|surge| SurgeReport {
+                marks: &surge.marks,
+                remarks: &surge.remarks,
+                surges: surge.surges,
+            }),
             has_picture: map.contains_key("svg"),
         });
         write_new(&report, text.as_bytes())?;

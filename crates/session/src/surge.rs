@@ -67,7 +67,7 @@ impl SurgeForecast {
     pub fn sentence(&self, seek: &SurgeSeek) -> String {
         format!(
             "Behind these steps surge is sought at the ends of {} speed lines, no nearer than a margin of {:.1} %: about {} steps, \
-             {:.0} min, not counted above.",
+             {:.0} min, not counted above",
             self.lines,
             100.0 * seek.closest_margin_ratio,
             self.steps,

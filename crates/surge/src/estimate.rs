@@ -24,7 +24,7 @@ const WELL_GROWN_RATIO: f64 = 6.0;
 const STANDS_OUT: f64 = 7.0;
 
 /// Standard error of the distance to surge that the law itself may make, ratio: no rig follows it quite.
-const LAW_ERROR_RATIO: f64 = 0.2;
+const LAW_ERROR_RATIO: f64 = 0.25;
 
 /// What is known of the surge flow of a line, at the speed of its last look.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -76,9 +76,8 @@ fn approaches(steps: &[StepMarker]) -> Vec<Vec<StepMarker>> {
     let mut returned = false;
     for step in steps.iter().filter(|step| step.kind == StepKind::Approach) {
         let before = approaches.last().and_then(|approach| approach.last());
-        let goes_on = before.is_some_and(|before| {
-            before.to.map(|to| to.speed_rpm) == step.to.map(|to| to.speed_rpm)
-        });
+        let goes_on =
+            before.is_some_and(|before| before.to.map(|to| to.speed_rpm) == step.to.map(|to| to.speed_rpm));
         let opens = before.is_some_and(|before| step.valve_opening_ratio > before.valve_opening_ratio);
         if !goes_on {
             approaches.push(vec![*step]);

@@ -20,9 +20,8 @@ impl Smoothed {
     /// that of the opening. As measured where there are fewer than five looks.
     pub(crate) fn of(looks: &[Look]) -> Option<Self> {
         let last = looks.last()?;
-        let to_speed = |look: &Look| {
-            look.flow_corrected_kg_s * last.speed_corrected_rpm / look.speed_corrected_rpm
-        };
+        let to_speed =
+            |look: &Look| look.flow_corrected_kg_s * last.speed_corrected_rpm / look.speed_corrected_rpm;
         let measured: Vec<f64> = looks.iter().map(to_speed).collect();
         let place = |look: &Look| (look.valve_opening_ratio / last.valve_opening_ratio).ln();
         let taken = |look: &Look| place(look).abs() < REACH_RATIO.ln();

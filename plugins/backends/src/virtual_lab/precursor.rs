@@ -25,7 +25,8 @@ pub struct SurgePrecursor {
 
 impl SurgePrecursor {
     /// A lab without any.
-    pub const NONE: SurgePrecursor = SurgePrecursor { onset_margin_ratio: 0.25, size_ratio: 0.0, growth: 1.0 };
+    pub const NONE: SurgePrecursor =
+        SurgePrecursor { onset_margin_ratio: 0.25, size_ratio: 0.0, growth: 1.0 };
     /// Where a campaign says nothing.
     pub const USUAL: SurgePrecursor = SurgePrecursor { size_ratio: 3e-3, ..SurgePrecursor::NONE };
 

@@ -112,10 +112,7 @@ impl SampleCollector {
             let sensor = sensors.iter_mut().find(|(channel, _)| *channel == row.channel);
             column.push(drifted(sensor.map_or(truth, |(_, sensor)| sensor.read(truth))));
         }
-        self.truth.push(
-            [instant.speed_rpm, instant.tc_k, instant.tt_k, surge_flow_kg_s],
-            instant.outputs(),
-        );
+        self.truth.push([instant.speed_rpm, instant.tc_k, instant.tt_k, surge_flow_kg_s], instant.outputs());
     }
 
     pub(super) fn finish(self, events: Vec<Event>) -> SampleBatch {

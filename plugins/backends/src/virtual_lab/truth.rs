@@ -30,11 +30,7 @@ pub struct TruthRecorder {
 
 impl TruthRecorder {
     /// Adds one sample: shaft speed, temperatures of both housings, flow at which this speed would surge; `outputs` is `None` at standstill.
-    pub fn push(
-        &mut self,
-        [speed_rpm, tc_k, tt_k, surge_flow_kg_s]: [f64; 4],
-        outputs: Option<&Outputs>,
-    ) {
+    pub fn push(&mut self, [speed_rpm, tc_k, tt_k, surge_flow_kg_s]: [f64; 4], outputs: Option<&Outputs>) {
         for (column, (_, _, read)) in self.from_outputs.iter_mut().zip(FROM_OUTPUTS) {
             column.push(outputs.map_or(f64::NAN, read));
         }

@@ -101,7 +101,8 @@ impl Recording {
         let first = self.steps.iter().position(|step| step.kind == StepKind::Approach)?;
         let from_s = self.steps[first].start_s;
         let split = |series: &mut Series| {
-            let at = series.t_s.partition_point(|t_s| *t_s < from_s);
+            // A sample at the very end of the step before belongs to that.
+            let at = series.t_s.partition_point(|t_s| *t_s <= from_s);
             Series { t_s: series.t_s.split_off(at), values: series.values.split_off(at) }
         };
         let after = self.events.partition_point(|event| event.t_s < from_s);

@@ -43,7 +43,14 @@ pub fn assemble(
     points.iter().try_for_each(|point| check(point, method))?;
     let mut lines: Vec<SpeedLine> = group(points, &grouping).iter().map(line).collect();
     lines.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
-    Ok(CompressorMap { machine: machine.to_owned(), reference, method, lines, fitted: None })
+    Ok(CompressorMap {
+        machine: machine.to_owned(),
+        reference,
+        method,
+        lines,
+        surge: Vec::new(),
+        fitted: None,
+    })
 }
 
 fn check(point: &IdentifiedPoint, method: Method) -> Result<(), AssembleError> {

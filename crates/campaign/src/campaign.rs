@@ -13,13 +13,14 @@ use crate::elements::repeats::{RepeatsFile, repeats};
 use crate::elements::sensors::SensorsFile;
 use crate::elements::sequence::sequence;
 use crate::elements::speed_control::{SpeedControlFile, speed_control};
+use crate::elements::surge_search::SurgeSearchFile;
 use crate::elements::timing::TimingElement;
 use crate::elements::tolerances::TolerancesElement;
 use crate::elements::zero::ZeroFile;
 use crate::units::{Fraction, Quantity};
 use mapper_core::{
     Channel, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats, Soak,
-    SpeedControlSettings, Timing, VisitOrder,
+    SpeedControlSettings, SurgeSeek, Timing, VisitOrder,
 };
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::line_points::LineRequest;
@@ -94,6 +95,9 @@ pub struct Campaign {
     /// How the shaft speed of each step is held; `None`: P3 stays as planned.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_control: Option<SpeedControlSettings>,
+    /// How surge is sought after all other steps, if it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surge_search: Option<SurgeSeek>,
     /// Seed of the search and of simulated rigs.
     pub seed: u64,
     /// What the run must never leave.
@@ -161,6 +165,8 @@ pub(crate) struct CampaignFile {
     /// Holds the shaft speed of each step at its target by P3, on top of what the plan has for the nominal machine; `off` leaves P3 as planned.
     #[schemars(example = &"off")]
     speed_control: Option<SpeedControlFile>,
+    /// Seeks the surge line after all other steps; it is not sought where this is left out.
+    surge_search: Option<SurgeSearchFile>,
     /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.
     #[schemars(example = 1)]
     seed: Option<u64>,
@@ -221,6 +227,7 @@ impl CampaignFile {
             return_to_first: self.return_to_first.unwrap_or(true),
             on_drift: self.drift.map(|drift| drift.on_drift),
             speed_control: speed_control(self.speed_control),
+            surge_search: self.surge_search.map(SurgeSearchFile::seek),
             seed: self.seed.unwrap_or(USUAL_SEED),
             limits,
             reference,

@@ -38,6 +38,7 @@ mod settle_bands;
 mod soak;
 mod speed_response;
 mod step_marker;
+mod surge;
 mod thermal_model;
 mod timing;
 mod visit_order;
@@ -77,6 +78,7 @@ pub use settle_bands::SettleBands;
 pub use soak::Soak;
 pub use speed_response::{SpeedControlSettings, SpeedResponse};
 pub use step_marker::StepMarker;
+pub use surge::{SurgeFoundBy, SurgeMark, SurgeSeek};
 pub use thermal_model::{
     ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
 };

@@ -1,6 +1,6 @@
 //! The product: a compressor map in corrected quantities.
 
-use crate::{FittedMap, IdentifiedPoint, Method, ReferenceState};
+use crate::{FittedMap, IdentifiedPoint, Method, ReferenceState, SurgeMark};
 use serde::{Deserialize, Serialize};
 
 /// One measured point of the map, brought to corrected quantities.
@@ -55,6 +55,9 @@ pub struct CompressorMap {
     pub method: Method,
     /// Speed lines in order of speed.
     pub lines: Vec<SpeedLine>,
+    /// Surge-side ends that were sought, in order of speed; empty where none were.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub surge: Vec<SurgeMark>,
     /// Smooth surface through the points, as a table; `None` where none was fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fitted: Option<FittedMap>,
@@ -78,6 +81,7 @@ impl CompressorMap {
                 }
             }
         }
+        self.surge.iter_mut().for_each(|mark| mark.scale(speed, flow));
         if let Some(fitted) = &mut self.fitted {
             fitted.scale(speed, flow);
         }

@@ -14,6 +14,8 @@ pub enum StepKind {
     Repeat,
     /// The first point once more, at the end: no jump led to it at the start.
     Return,
+    /// A step of an approach to the surge line, after all others.
+    Approach,
 }
 
 impl StepKind {
@@ -21,7 +23,7 @@ impl StepKind {
     pub fn measures(self) -> bool {
         match self {
             StepKind::Point | StepKind::Return => true,
-            StepKind::Repeat => false,
+            StepKind::Repeat | StepKind::Approach => false,
         }
     }
 }
@@ -85,7 +87,7 @@ impl Predicted {
 pub struct PlanStep {
     /// Position in the plan, from 0.
     pub index: usize,
-    /// Point, repeat, or the first point once more.
+    /// Point, repeat, the first point once more, or approach to surge.
     pub kind: StepKind,
     /// Point before the jump; `None` for the first step.
     pub from: Option<OperatingPoint>,

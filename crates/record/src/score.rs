@@ -5,7 +5,7 @@
 pub use crate::truth::{Truth, read_truth};
 
 use crate::RecordError;
-use mapper_core::{IdentifiedPoint, StepMarker};
+use mapper_core::{Channel, IdentifiedPoint, Recording, ReferenceState, StepMarker, SurgeMark};
 use mapper_numerics::statistics::{mean, median};
 use serde::Serialize;
 use std::path::Path;
@@ -75,6 +75,47 @@ fn truth_at(truth: &Truth, t_s: f64) -> Option<PointTruth> {
     let index = truth.t_s.partition_point(|sample_s| *sample_s <= t_s).checked_sub(1)?;
     let value = |name: &str| truth.column(name)?.get(index).copied().filter(|value| value.is_finite());
     Some(PointTruth { eta: value("eta")?, h_w_m2k: value("h_w_m2k")? })
+}
+
+/// A surge mark beside the truth, where there is any.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ScoredMark {
+    /// What was found.
+    #[serde(flatten)]
+    pub mark: SurgeMark,
+    /// Corrected flow at which the machine truly surges at that speed, kg/s; `None` on a real rig.
+    pub truth_flow_corrected_kg_s: Option<f64>,
+}
+
+/// Truth is taken from so much before the end of the measurement nearest surge, s.
+const MARK_TRUTH_S: f64 = 10.0;
+
+/// Puts the truth of a recording beside its surge marks; `approaches` says the inlet's state, which corrects the true flow.
+///
+/// # Errors
+/// [`RecordError`] where the recording cannot be read.
+pub fn score_marks(
+    recording: &Path,
+    approaches: &Recording,
+    reference: ReferenceState,
+    marks: Vec<SurgeMark>,
+) -> Result<Vec<ScoredMark>, RecordError> {
+    let truth = read_truth(recording)?;
+    let scored = |mark: SurgeMark| {
+        let (start_s, end_s) = (mark.closest_end_s - MARK_TRUTH_S, mark.closest_end_s);
+        let true_flow_kg_s = || {
+            let flows_kg_s = truth.column("surge_flow_kg_s")?;
+            let within = truth.t_s.iter().zip(flows_kg_s).filter(|(t_s, _)| (start_s..=end_s).contains(*t_s));
+            mean(within.map(|(_, flow)| *flow)).filter(|flow| flow.is_finite())
+        };
+        let level = |channel: Channel| mean(approaches.series.get(&channel)?.slice(start_s, end_s).1);
+        let corrected = || {
+            let (t1_k, p1_pa) = (level(Channel::T1)?, level(Channel::P1)?);
+            Some(reference.corrected_flow_kg_s(true_flow_kg_s()?, t1_k, p1_pa))
+        };
+        ScoredMark { mark, truth_flow_corrected_kg_s: corrected() }
+    };
+    Ok(marks.into_iter().map(scored).collect())
 }
 
 /// The errors of all points in a few numbers; `None` where no point has both a number and a truth.

@@ -57,6 +57,7 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
                 StepKind::Point => (step.index + 1).to_string(),
                 StepKind::Repeat => format!("{} repeat", step.index + 1),
                 StepKind::Return => format!("{} again", step.index + 1),
+                StepKind::Approach => format!("{} surge", step.index + 1),
             },
             step.from.map_or_else(|| "-".to_owned(), |from| display.place(from)),
             display.place(step.to),

@@ -108,6 +108,7 @@ pub fn step_name(point: &IdentifiedPoint) -> String {
         StepKind::Point => (point.step + 1).to_string(),
         StepKind::Repeat => format!("{} repeat", point.step + 1),
         StepKind::Return => format!("{} again", point.step + 1),
+        StepKind::Approach => format!("{} surge", point.step + 1),
     }
 }
 

@@ -9,12 +9,13 @@ use crate::number::{number, percent};
 use crate::points::{score_text, step_name, verdict_word};
 use crate::repeated_jumps::repeated_jumps_text;
 use crate::shared_errors::shared_errors_text;
+use crate::surge_text::surge_text;
 use mapper_assemble::RepeatedJump;
 use mapper_campaign::Campaign;
 use mapper_core::{Event, Plan};
 use mapper_identify::TwoParameter;
 use mapper_observe::FusedChannel;
-use mapper_record::score::{ScoreSummary, ScoredPoint};
+use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};
 use std::fmt::Write;
 
 /// Everything a test report needs.
@@ -37,8 +38,21 @@ pub struct RunReport<'a> {
     pub sensors: &'a [FusedChannel],
     /// How far the points are from the simulator's truth; `None` on a real rig.
     pub score: Option<&'a ScoreSummary>,
+    /// What came of the search for surge; `None` where there was none.
+    pub surge: Option<SurgeReport<'a>>,
     /// Whether a picture of the map stands beside the report as `map.svg`.
     pub has_picture: bool,
+}
+
+/// What came of the search for surge.
+#[derive(Clone, Copy)]
+pub struct SurgeReport<'a> {
+    /// Marks in order of speed.
+    pub marks: &'a [ScoredMark],
+    /// Lines on which none was found.
+    pub remarks: &'a [String],
+    /// How often the compressor went into surge.
+    pub surges: usize,
 }
 
 /// The report as Markdown.
@@ -53,6 +67,7 @@ pub fn run_report(report: &RunReport<'_>) -> String {
         two_parameter,
         sensors,
         score,
+        surge,
         has_picture,
     } = *report;
     // Writing to a String cannot fail, here and below.
@@ -87,6 +102,9 @@ pub fn run_report(report: &RunReport<'_>) -> String {
         let _ = writeln!(text, "{}", score_text(score));
     }
     points_section(&mut text, campaign, points);
+    if let Some(SurgeReport { marks, remarks, surges }) = surge {
+        let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, surges, &campaign.display));
+    }
     if !repeats.is_empty() {
         let sentences = repeated_jumps_text(repeats, &Display::new(&campaign.display));
         let _ = write!(

@@ -2,7 +2,7 @@
 
 use crate::source::{StepSource, StepSourceError};
 use mapper_core::{
-    Channel, DeclaredUncertainty, OnDrift, OperatingPoint, PlanStep, SampleBatch, Soak, StepMarker,
+    Channel, DeclaredUncertainty, OnDrift, OperatingPoint, PlanStep, SampleBatch, Soak, StepKind, StepMarker,
 };
 use std::collections::{BTreeMap, VecDeque};
 
@@ -171,7 +171,8 @@ impl StepSource for DriftWatch<'_> {
 
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         self.inner.after_step(marker)?;
-        let Some(jump) = marker.from.zip(marker.to).filter(|_| !self.readings.is_empty()) else {
+        let compared = !self.readings.is_empty() && marker.kind != StepKind::Approach;
+        let Some(jump) = marker.from.zip(marker.to).filter(|_| compared) else {
             return Ok(());
         };
         let now = self.end_means();

@@ -11,6 +11,7 @@ mod run;
 mod soak;
 mod source;
 mod speed_control;
+mod surge_search;
 
 pub use drift_watch::DriftWatch;
 pub use guard::{Guard, LimitGuard, SilenceGuard, SurgeGuard, Trip};
@@ -19,3 +20,4 @@ pub use run::{RunEnd, RunError, Runner};
 pub use soak::Soaked;
 pub use source::{PlanSteps, StepSource, StepSourceError};
 pub use speed_control::{ResponseAt, SpeedControl, SpeedControlLimits};
+pub use surge_search::{Held, Hold, SurgeSearch};

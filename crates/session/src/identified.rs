@@ -3,15 +3,20 @@
 use crate::declared::identification_with;
 use crate::fusing::fused;
 use crate::recorded::{Recorded, same_machine};
+use crate::surge::marks_of;
 use crate::{Session, SessionError, SessionEvent};
-use mapper_campaign::nominal_model;
+use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{ALPHA_AREA_SIGMA_RATIO, IdentifiedPoint, Method, Recording, ReferenceState, ThermalModel};
 use mapper_identify::{
     IdentifyConfig, TwoParameter, WindowRule, ZeroOutcome, doubt_off_the_nominal_map, identify_recording,
 };
 use mapper_observe::FusedChannel;
 use mapper_record::ChannelMap;
-use mapper_record::score::{ScoreSummary, ScoredPoint};
+use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};
+use serde::Serialize;
+
+use mapper_surge::SurgeMarks;
+use std::path::Path;
 
 /// What a recording gives.
 #[derive(Debug)]
@@ -32,6 +37,19 @@ pub struct Identified {
     pub zero: ZeroOutcome,
     /// How far the points are from the truth; `None` on a real rig.
     pub score: Option<ScoreSummary>,
+    /// Surge-side ends that were sought; `None` where none were.
+    pub surge: Option<SoughtSurge>,
+}
+
+/// What came of the search for surge.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SoughtSurge {
+    /// The marks in order of speed, with the truth where the recording holds it.
+    pub marks: Vec<ScoredMark>,
+    /// Lines on which surge was not found, in words.
+    pub remarks: Vec<String>,
+    /// How often the compressor went into surge.
+    pub surges: usize,
 }
 
 impl Identified {
@@ -85,6 +103,13 @@ impl Session<'_> {
         let recording = fused.recordings.into_iter().next().unwrap_or_default();
         let sensors = fused.channels.into_iter().next().unwrap_or_default();
         let zero = ZeroOutcome::of(&recording, &fused.config, soak);
+        let surge = match recorded.approaches {
+            Some(approaches) => {
+                let (approaches, config) = zero.take_off(approaches, fused.config.clone());
+                Some(sought(&recorded.path, &approaches, recorded.campaign.as_ref(), &config)?)
+            }
+            None => None,
+        };
         let (recording, config) = zero.take_off(recording, fused.config);
         let found = identify_recording(&recording, &config)?;
         let mut points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
@@ -111,6 +136,19 @@ impl Session<'_> {
             sensors,
             zero,
             score,
+            surge,
         })
     }
+}
+
+/// The marks of the approaches beside their truth.
+fn sought(
+    path: &Path,
+    approaches: &Recording,
+    campaign: Option<&Campaign>,
+    config: &IdentifyConfig,
+) -> Result<SoughtSurge, SessionError> {
+    let SurgeMarks { marks, remarks, surges } = marks_of(approaches, campaign, config);
+    let marks = mapper_record::score::score_marks(path, approaches, config.reference, marks)?;
+    Ok(SoughtSurge { marks, remarks, surges })
 }

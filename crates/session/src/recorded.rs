@@ -3,6 +3,7 @@
 use crate::SessionError;
 use crate::run_directory;
 use mapper_campaign::{Campaign, CampaignError};
+use mapper_core::Recording;
 use mapper_observe::OtherMachine;
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use std::path::{Path, PathBuf};
@@ -16,6 +17,8 @@ pub struct Recorded {
     pub read: ReadReport,
     /// Given by the caller, or attached to the recording.
     pub campaign: Option<Campaign>,
+    /// The approaches to surge, which are no part of what is identified; `None` where there are none.
+    pub approaches: Option<Recording>,
 }
 
 impl Recorded {
@@ -33,7 +36,13 @@ impl Recorded {
             None if map.machine.is_some() => None,
             None => attached_campaign(&read, &file)?,
         };
-        Ok(Recorded { path: file, read, campaign })
+        Ok(Recorded::of(file, read, campaign))
+    }
+
+    /// What was read of a file, with the approaches to surge taken off.
+    pub(crate) fn of(path: PathBuf, mut read: ReadReport, campaign: Option<Campaign>) -> Recorded {
+        let approaches = read.recording.split_off_approaches();
+        Recorded { path, read, campaign, approaches }
     }
 
     /// The campaign, or that nobody says what machine was recorded.

@@ -1,7 +1,7 @@
 //! What a run gives: points, map, report; data for whoever asks, files in its directory.
 
 use crate::files::{json_text, write_new};
-use crate::identified::Identified;
+use crate::identified::{Identified, SoughtSurge};
 use crate::recorded::Recorded;
 use crate::{Registry, Session, SessionError, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble, repeated_jumps};
@@ -11,7 +11,7 @@ use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_observe::FusedChannel;
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_report::{RunReport, run_report};
+use mapper_report::{RunReport, SurgeReport, run_report};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -43,6 +43,9 @@ pub struct Results {
     pub sensors: Vec<FusedChannel>,
     /// What came of the isothermal zero.
     pub zero: ZeroOutcome,
+    /// Surge-side ends that were sought; `None` where none were.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surge: Option<SoughtSurge>,
     /// What else is to be known.
     pub remarks: Vec<String>,
     /// The map itself; `None` where there is none.
@@ -66,18 +69,30 @@ impl Session<'_> {
     ) -> Result<Results, SessionError> {
         let read = read_recording(recording, &ChannelMap::native(), &ReadOptions::default())?;
         let mut remarks: Vec<String> = read.warnings.iter().map(ToString::to_string).collect();
-        let recorded = Recorded { path: recording.to_owned(), read, campaign: Some(campaign.clone()) };
+        let recorded = Recorded::of(recording.to_owned(), read, Some(campaign.clone()));
         let identified = self.identify(recorded, &ChannelMap::native(), None)?;
         let compressor_map = compressor_map(campaign, &identified, &mut remarks);
         let map = match &compressor_map {
             Some(map) => export(self.registry, campaign, map, directory, &mut remarks)?,
             None => BTreeMap::new(),
         };
-        let Identified { recording: recorded, config, points, thermal, two_parameter, sensors, zero, score } =
-            identified;
+        let Identified {
+            recording: recorded,
+            config,
+            points,
+            thermal,
+            two_parameter,
+            sensors,
+            zero,
+            score,
+            surge,
+        } = identified;
         let mut points_file = json!({"reference": config.reference, "points": points, "thermal": thermal, "two_parameter": two_parameter, "zero": zero});
         if !sensors.is_empty() {
             points_file["sensors"] = json!(sensors);
+        }
+        if let Some(surge) = &surge {
+            points_file["surge"] = json!(surge);
         }
         write_new(&directory.join(run_directory::POINTS), json_text(&points_file)?.as_bytes())?;
         let report = directory.join(run_directory::REPORT);
@@ -93,6 +108,11 @@ impl Session<'_> {
             two_parameter: &two_parameter,
             sensors: &sensors,
             score: score.as_ref(),
+            surge: surge.as_ref().map(|surge| SurgeReport {
+                marks: &surge.marks,
+                remarks: &surge.remarks,
+                surges: surge.surges,
+            }),
             has_picture: map.contains_key("svg"),
         });
         write_new(&report, text.as_bytes())?;
@@ -108,6 +128,7 @@ impl Session<'_> {
             two_parameter,
             sensors,
             zero,
+            surge,
             remarks,
             compressor_map,
         })
@@ -130,6 +151,8 @@ fn compressor_map(
     let map = assemble(&placed, &campaign.machine.name, config.reference, config.method, Grouping::default())
         .map_err(|error| remarks.push(format!("there is no map: {error}")))
         .ok()?;
+    let marks = identified.surge.iter().flat_map(|surge| surge.marks.iter().map(|scored| scored.mark));
+    let map = CompressorMap { surge: marks.collect(), ..map };
     match MapFit::new(&map).and_then(|fit| fit.table(&MapFitOptions::default())) {
         Ok(table) => Some(CompressorMap { fitted: Some(table), ..map }),
         Err(error) => {

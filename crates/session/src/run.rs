@@ -8,13 +8,14 @@ use crate::planning::{nominal_model, plan, stored_plan};
 use crate::rehearsal::rehearse;
 use crate::results::Results;
 use crate::scripted_steps::ScriptedSteps;
+use crate::surge::{hold_near_surge, remark_surge_search};
 use crate::{Session, SessionError, run_directory};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
 use mapper_core::{Backend, Plan, RigDescription};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
-use mapper_runner::{PlanSteps, RunEnd, RunError, RunObserver, StepSource};
+use mapper_runner::{PlanSteps, RunEnd, RunError, RunObserver, StepSource, SurgeSearch};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -105,10 +106,11 @@ impl<'s> Session<'s> {
         let campaign = request.campaign;
         self.registry.check_formats(campaign)?;
         let model = nominal_model(campaign)?;
-        let made = match &campaign.sequence {
+        let mut made = match &campaign.sequence {
             None => plan(campaign, &model)?,
             Some(source) => rehearse(self, campaign, &model, source)?.plan,
         };
+        remark_surge_search(campaign, &model, &mut made);
         let plan = match request.plan {
             None => made.clone(),
             Some(path) => stored_plan(path, &made)?,
@@ -186,6 +188,15 @@ impl PreparedRun<'_> {
         let steps: &mut dyn StepSource = match &mut self.scripted {
             Some(scripted) => scripted,
             None => &mut planned,
+        };
+        let hold = |point| hold_near_surge(campaign, &self.model, point);
+        let mut search;
+        let steps: &mut dyn StepSource = match campaign.surge_search {
+            None => steps,
+            Some(seek) => {
+                search = SurgeSearch::new(steps, seek, campaign.reference, &hold);
+                &mut search
+            }
         };
         let mut teller = Teller {
             on_event: session.on_event,

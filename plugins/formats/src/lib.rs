@@ -36,6 +36,7 @@ formats! {
     json,
     sae,
     fitted,
+    surge,
     modelica,
     simscape,
     npss,

@@ -8,7 +8,7 @@ use crate::heading::efficiency_name;
 use crate::labels::{contour_levels, krpm, percent};
 use crate::{fitted_items, surface};
 use mapper_chart::{Axis, Contours, Figure, Line, LineEnd, Marker, Panel, Scatter, ScatterPoint, palette};
-use mapper_core::{CompressorMap, MapPoint, Method, Verdict};
+use mapper_core::{CompressorMap, MapPoint, Method, SurgeMark, Verdict, confidence_interval_95};
 
 /// The map as a figure of two panels; flow in kg/s, efficiency in %.
 pub fn map_figure(map: &CompressorMap) -> Figure {
@@ -45,6 +45,9 @@ pub fn map_panel(map: &CompressorMap) -> Panel {
         Some(fitted) => fitted_items::add_map(&mut panel, fitted),
         None => add_measured_lines(&mut panel, map),
     }
+    if !map.surge.is_empty() {
+        panel.add(surge_marks(map));
+    }
     let all = || map.lines.iter().flat_map(|line| &line.points);
     for class in CLASSES {
         let members: Vec<(f64, f64)> = all()
@@ -56,6 +59,21 @@ pub fn map_panel(map: &CompressorMap) -> Panel {
         }
     }
     panel
+}
+
+/// Surge-side ends that were sought, with their 95 % intervals.
+fn surge_marks(map: &CompressorMap) -> Scatter {
+    let mark = |mark: &SurgeMark| {
+        let (flow, ratio) = (mark.flow_corrected_kg_s, mark.pressure_ratio);
+        ScatterPoint {
+            x: flow,
+            y: ratio,
+            x_interval: Some(confidence_interval_95(flow, mark.flow_total_standard_error_kg_s())),
+            y_interval: Some(confidence_interval_95(ratio, mark.pressure_ratio_standard_error)),
+        }
+    };
+    let marks: Vec<ScatterPoint> = map.surge.iter().map(mark).collect();
+    Scatter::new(marks, palette::VERMILLION).marker(Marker::Square).label("surge, sought")
 }
 
 /// Lines and contours without a fit: through the points.

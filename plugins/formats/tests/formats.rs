@@ -21,6 +21,7 @@ fn empty() -> CompressorMap {
         reference: ReferenceState::SAE,
         method: Method::Steady,
         lines: vec![],
+        surge: Vec::new(),
         fitted: None,
     }
 }

@@ -14,7 +14,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-physics",   &["core", "numerics"]),
     ("mapper-campaign",  &["core", "physics", "yaml"]),
     ("mapper-planner",   &["core", "numerics", "physics"]),
-    ("mapper-runner",    &["core", "numerics"]),
+    ("mapper-surge",     &["core", "numerics", "physics"]),
+    ("mapper-runner",    &["core", "numerics", "surge"]),
     ("mapper-sequence",  &["core", "numerics", "physics", "yaml"]),
     ("mapper-record",    &["core", "numerics", "yaml"]),
     ("mapper-observe",   &["core", "numerics", "physics"]),
@@ -34,7 +35,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Words, pages and pictures made from data.
     ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "assemble", "gap", "drift", "history", "record", "reproduce", "sequence"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "observe", "identify", "gap", "drift", "history", "assemble", "report", "numerics"]),
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "observe", "identify", "surge", "gap", "drift", "history", "assemble", "report", "numerics"]),
     // The program names the plug-ins; nothing sees the program.
     ("mapper-cli",       &["core", "physics", "campaign", "planner", "record", "drift", "history", "assemble", "reproduce", "report", "session", "backends", "blind", "effects", "formats"]),
     // Tests run the program and read its files; chores know nothing of it.

@@ -27,4 +27,5 @@ mod shipped_campaign;
 mod sizes;
 mod sources;
 mod speed_lines;
+mod surge;
 mod zero;

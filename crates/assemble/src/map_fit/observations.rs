@@ -2,12 +2,14 @@
 
 use super::MapFitError;
 use super::common_errors::CommonErrorField;
-use mapper_core::{CompressorMap, MapPoint, Verdict};
+use mapper_core::{CompressorMap, MapPoint, SurgeMark, Verdict};
 use mapper_physics::similarity::head_ratio;
 
 /// Maximum number of points and lines that a fit takes: several times what the largest measured maps have.
 const MOST_POINTS: usize = 2000;
 const MOST_LINES: usize = 60;
+/// A surge mark belongs to a line whose speed is as near as this, ratio.
+const MARK_SPEED_RATIO: f64 = 0.03;
 
 /// One point.
 #[derive(Debug, Clone, Copy)]
@@ -21,6 +23,8 @@ pub(crate) struct Observation {
     pub eta: Option<f64>,
     /// Standard error of the efficiency that no other point shares, fraction; 0 where none is known.
     pub eta_error: f64,
+    /// Whether it is a surge mark: it says where the line ends, nothing of efficiency.
+    pub is_mark: bool,
     /// The line's largest flow, kg/s, and largest pressure ratio less 1: units of the distance.
     pub flow_scale_kg_s: f64,
     pub ratio_scale: f64,
@@ -90,6 +94,22 @@ impl Observations {
                 common.add(own.speed_ratio, own.flow_kg_s / flow_scale_kg_s, point);
                 points.push(own);
             }
+            let on_line = |mark: &&SurgeMark| {
+                (mark.speed_corrected_rpm / speed_corrected_rpm - 1.0).abs() < MARK_SPEED_RATIO
+                    && mark.flow_corrected_kg_s > 0.0
+                    && mark.pressure_ratio > 1.0
+            };
+            points.extend(map.surge.iter().filter(on_line).map(|mark| Observation {
+                line: index,
+                speed_ratio: mark.speed_corrected_rpm / nominal_speed_rpm,
+                flow_kg_s: mark.flow_corrected_kg_s,
+                pressure_ratio: mark.pressure_ratio,
+                eta: None,
+                eta_error: 0.0,
+                is_mark: true,
+                flow_scale_kg_s,
+                ratio_scale,
+            }));
         }
         let lines_rpm = lines.iter().map(|line| line.0).collect();
         let all = Observations { nominal_speed_rpm, lines_rpm, points, common };
@@ -146,6 +166,7 @@ fn observation(
         flow_kg_s: p.flow_corrected_kg_s,
         pressure_ratio: p.pressure_ratio,
         eta,
+        is_mark: false,
         eta_error: if eta_error.is_finite() { eta_error.clamp(0.0, 1.0) } else { 1.0 },
         flow_scale_kg_s,
         ratio_scale,

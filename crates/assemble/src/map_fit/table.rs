@@ -79,8 +79,17 @@ struct Ends {
     /// Smooth surge-side end.
     spline: SpeedSpline,
     surge: DVector<f64>,
-    /// Speed ratio, and smallest and largest angle with a point, for each measured line.
-    measured: Vec<(f64, f64, f64)>,
+    /// For each measured line.
+    measured: Vec<MeasuredEnds>,
+}
+
+/// Where a measured line ends.
+struct MeasuredEnds {
+    speed_ratio: f64,
+    /// Smallest and largest angle with a measured point.
+    points: (f64, f64),
+    /// Largest angle, surge marks included.
+    surge: f64,
 }
 
 /// Smoothing of the surge-side ends: variance of an end over that of its roughness.
@@ -88,20 +97,27 @@ const END_SMOOTHING: f64 = 0.004;
 
 impl Ends {
     fn new(fit: &MapFit) -> Self {
-        let mut measured: Vec<(f64, f64, f64)> = fit
+        let mut measured: Vec<MeasuredEnds> = fit
             .data
             .lines_rpm
             .iter()
-            .map(|speed| (fit.speed_ratio(*speed), f64::INFINITY, f64::NEG_INFINITY))
+            .map(|speed| MeasuredEnds {
+                speed_ratio: fit.speed_ratio(*speed),
+                points: (f64::INFINITY, f64::NEG_INFINITY),
+                surge: f64::NEG_INFINITY,
+            })
             .collect();
         for (point, angle) in fit.data.points.iter().zip(&fit.solution.angles_rad) {
             let line = &mut measured[point.line];
-            (line.1, line.2) = (line.1.min(*angle), line.2.max(*angle));
+            line.surge = line.surge.max(*angle);
+            if !point.is_mark {
+                line.points = (line.points.0.min(*angle), line.points.1.max(*angle));
+            }
         }
         let spline = fit.solution.splines.shape.clone();
-        let rows: Vec<DVector<f64>> = measured.iter().map(|line| spline.row(line.0)).collect();
+        let rows: Vec<DVector<f64>> = measured.iter().map(|line| spline.row(line.speed_ratio)).collect();
         let basis = DMatrix::from_fn(rows.len(), spline.len(), |i, k| rows[i][k]);
-        let ends = DVector::from_iterator(measured.len(), measured.iter().map(|line| line.2));
+        let ends = DVector::from_iterator(measured.len(), measured.iter().map(|line| line.surge));
         let mean = ends.mean();
         let square = basis.tr_mul(&basis)
             + &spline.penalty * END_SMOOTHING
@@ -121,24 +137,29 @@ impl Ends {
             return smooth(speed_ratio).clamp(0.2, ANGLE_RANGE.1);
         };
         // Beyond the measured speeds as far over the smooth end as at the outermost line.
-        let at = speed_ratio.clamp(first.0, last.0);
-        let measured = self.supported(at).map_or(f64::NEG_INFINITY, |(_, surge)| surge);
+        let at = speed_ratio.clamp(first.speed_ratio, last.speed_ratio);
+        let measured = self.between(at, |line| line.surge).unwrap_or(f64::NEG_INFINITY);
         let over = (measured - smooth(at)).max(0.0);
         (smooth(speed_ratio) + over).clamp(0.2, ANGLE_RANGE.1)
     }
 
     /// Smallest and largest angle that points support; `None` outside the measured speeds.
     fn supported(&self, speed_ratio: f64) -> Option<(f64, f64)> {
+        let low = self.between(speed_ratio, |line| line.points.0)?;
+        Some((low, self.between(speed_ratio, |line| line.points.1)?))
+    }
+
+    /// What the measured lines have, straight between neighbours; `None` outside the measured speeds.
+    fn between(&self, speed_ratio: f64, value: impl Fn(&MeasuredEnds) -> f64) -> Option<f64> {
         let slack = 1e-9;
-        let after = self.measured.partition_point(|line| line.0 < speed_ratio - slack);
+        let after = self.measured.partition_point(|line| line.speed_ratio < speed_ratio - slack);
         let upper = self.measured.get(after)?;
-        if upper.0 <= speed_ratio + slack {
-            return Some((upper.1, upper.2));
+        if upper.speed_ratio <= speed_ratio + slack {
+            return Some(value(upper));
         }
         let lower = self.measured.get(after.checked_sub(1)?)?;
-        let share = (speed_ratio - lower.0) / (upper.0 - lower.0);
-        let blend = |a: f64, b: f64| a + share * (b - a);
-        Some((blend(lower.1, upper.1), blend(lower.2, upper.2)))
+        let share = (speed_ratio - lower.speed_ratio) / (upper.speed_ratio - lower.speed_ratio);
+        Some(value(lower) + share * (value(upper) - value(lower)))
     }
 }
 

@@ -28,6 +28,7 @@ pub(crate) mod sequence;
 pub(crate) mod settle_bands;
 pub(crate) mod several_sensors;
 pub(crate) mod speed_control;
+pub(crate) mod surge_search;
 pub(crate) mod timing;
 pub(crate) mod tolerances;
 pub(crate) mod window;

@@ -6,7 +6,7 @@ use crate::{output, registry};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
 use mapper_report::{
-    disagreement_text, points_text, sensors_text, shared_errors_text, thermal_text, zero_text,
+    disagreement_text, points_text, sensors_text, shared_errors_text, surge_text, thermal_text, zero_text,
 };
 use mapper_session::{Recorded, Session};
 use serde_json::json;
@@ -56,6 +56,9 @@ impl Identify {
             if !found.sensors.is_empty() {
                 value["sensors"] = json!(found.sensors);
             }
+            if let Some(surge) = &found.surge {
+                value["surge"] = json!(surge);
+            }
             return output::print_json(&value);
         }
         let disagreement = disagreement_text(&found.points, &found.two_parameter, &display);
@@ -69,6 +72,10 @@ impl Identify {
         }
         text.push_str(&sensors_text(&found.sensors));
         text.push_str(&zero_text(&found.zero));
+        if let Some(surge) = &found.surge {
+            text.push('\n');
+            text.push_str(&surge_text(&surge.marks, &surge.remarks, surge.surges, &display));
+        }
         for warning in &warnings {
             text.push_str(&format!("recording: {warning}\n"));
         }

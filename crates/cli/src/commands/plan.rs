@@ -12,7 +12,8 @@ use mapper_physics::model::Model;
 use mapper_planner::PlanRequest;
 use mapper_report::{comparison_json, comparison_text, jump_text, plan_svg, plan_text};
 use mapper_session::{
-    Rehearsal, Session, SessionError, json_text, nominal_model, rehearse, with_plan_request, write_new,
+    Rehearsal, Session, SessionError, json_text, nominal_model, rehearse, remark_surge_search,
+    with_plan_request, write_new,
 };
 use std::path::PathBuf;
 
@@ -73,7 +74,7 @@ impl Plan {
             })?;
             return output::print(&jump_text(&campaign, &jump));
         }
-        let (plan, comparison) = with_plan_request(&campaign, &model, |request| {
+        let (mut plan, comparison) = with_plan_request(&campaign, &model, |request| {
             let appended = match self.append.as_slice() {
                 [from, to] => Some(mapper_core::Jump { from: *from, to: *to }),
                 _ => None,
@@ -84,6 +85,7 @@ impl Plan {
             let comparison = compared.then(|| mapper_planner::compare(request, &plan)).transpose()?;
             Ok::<_, SessionError>((plan, comparison))
         })?;
+        remark_surge_search(&campaign, &model, &mut plan);
         self.store(&plan)?;
         if let (Some(path), Some(comparison)) = (&self.svg, &comparison) {
             write_new(path, plan_svg(&campaign, &model, &plan, comparison).as_bytes())?;
@@ -113,7 +115,8 @@ impl Plan {
         }
         let (registry, stop) = (registry::registry(), interrupt::stop_flag()?);
         let session = Session { stop: &stop, ..Session::new(&registry) };
-        let Rehearsal { plan, notes } = rehearse(&session, campaign, model, source)?;
+        let Rehearsal { mut plan, notes } = rehearse(&session, campaign, model, source)?;
+        remark_surge_search(campaign, model, &mut plan);
         self.store(&plan)?;
         if self.json {
             let mut value = serde_json::to_value(&plan).map_err(SessionError::from)?;

@@ -4,6 +4,7 @@ use super::actuator::Actuator;
 use super::drift::{self, LabDrift};
 use super::elements::ElementBank;
 use super::inputs::{LOWEST_EXPANSION_RATIO, LabInputs};
+use super::precursor::Resonator;
 use super::samples::{Instant, Readers, SampleCollector};
 use super::sensor::Sensor;
 use super::settings::{LabSettings, Start};
@@ -141,6 +142,7 @@ impl Backend for VirtualLab {
                     .iter()
                     .map(|(channel, of)| ElementBank::new(*channel, of, sample_s, settings.seed))
                     .collect(),
+                resonator: Resonator::new(settings.surge_precursor, settings.seed),
             },
             commands: None,
             now_s: 0.0,

@@ -2,6 +2,7 @@
 
 use super::drift;
 use super::elements::ElementBank;
+use super::precursor::{P2_SHARE, Resonator, Swing};
 use super::sensor::Sensor;
 use super::settings::LabSettings;
 use super::truth::TruthRecorder;
@@ -28,6 +29,17 @@ impl Instant<'_> {
     fn outputs(&self) -> Option<&Outputs> {
         self.running.map(|(_, outputs)| outputs)
     }
+
+    /// Flow at which the machine as it is would go into surge at this speed, kg/s; NaN at standstill.
+    fn surge_flow_kg_s(&self, settings: &LabSettings) -> f64 {
+        let Some(outputs) = self.outputs() else { return f64::NAN };
+        let map = &settings.model.map;
+        let corrected_rpm = map.reference().corrected_speed_rpm(self.speed_rpm, self.boundary.t1_k);
+        // In proportion to the flow here, which the model turned from corrected to physical.
+        let scale_ratio = settings.model.params.compressor.flow_scale_ratio;
+        let surge_ratio = scale_ratio * map.surge_point(corrected_rpm).0 / outputs.flow_corrected_kg_s;
+        surge_ratio * outputs.flow_kg_s
+    }
 }
 
 /// Everything that reads.
@@ -37,6 +49,8 @@ pub(super) struct Readers {
     pub(super) followers: Vec<ChannelFollower>,
     /// Channels with several sensors.
     pub(super) several: Vec<ElementBank>,
+    /// What flow and pressures do before surge.
+    pub(super) resonator: Resonator,
 }
 
 /// Collects samples into columns.
@@ -74,14 +88,10 @@ impl SampleCollector {
         settings: &LabSettings,
     ) {
         self.t_s.push(t_s);
-        let surging = instant.outputs().is_some_and(|outputs| outputs.surge_position_ratio >= 1.0);
-        let swing = if surging {
-            settings.surge_swing_ratio * (2.0 * std::f64::consts::PI * SURGE_FREQUENCY_HZ * t_s).sin()
-        } else {
-            0.0
-        };
+        let surge_flow_kg_s = instant.surge_flow_kg_s(settings);
         let prepared = instant.running.map(|_| settings.model.prepare(&instant.boundary));
-        let Readers { sensors, followers, several } = readers;
+        let Readers { sensors, followers, several, resonator } = readers;
+        let swing = swing(t_s, instant, surge_flow_kg_s, resonator, settings);
         let mut elements = self.elements.iter_mut();
         for ((row, column), follower) in CHANNELS.iter().zip(&mut self.columns).zip(followers) {
             let total = true_value(row.channel, instant, prepared.as_ref(), commands, swing);
@@ -102,7 +112,7 @@ impl SampleCollector {
             let sensor = sensors.iter_mut().find(|(channel, _)| *channel == row.channel);
             column.push(drifted(sensor.map_or(truth, |(_, sensor)| sensor.read(truth))));
         }
-        self.truth.push(instant.speed_rpm, instant.tc_k, instant.tt_k, instant.outputs());
+        self.truth.push([instant.speed_rpm, instant.tc_k, instant.tt_k, surge_flow_kg_s], instant.outputs());
     }
 
     pub(super) fn finish(self, events: Vec<Event>) -> SampleBatch {
@@ -116,6 +126,27 @@ impl SampleCollector {
             events,
         }
     }
+}
+
+/// How flow and pressures swing: in surge by its cycle, before it by the precursor.
+fn swing(
+    t_s: f64,
+    instant: &Instant<'_>,
+    surge_flow_kg_s: f64,
+    resonator: &mut Resonator,
+    settings: &LabSettings,
+) -> Swing {
+    let Some(outputs) = instant.outputs() else { return Swing::default() };
+    if outputs.surge_position_ratio >= 1.0 {
+        let flow_ratio =
+            settings.surge_swing_ratio * (2.0 * std::f64::consts::PI * SURGE_FREQUENCY_HZ * t_s).sin();
+        return Swing { flow_ratio, p2_ratio: P2_SHARE * flow_ratio, p1_ratio: 0.0 };
+    }
+    let margin_ratio = outputs.flow_kg_s / surge_flow_kg_s - 1.0;
+    // Half of what it swings in surge, where the swing of the surge cycle takes over.
+    let most_ratio = 0.5 * settings.surge_swing_ratio;
+    let params = &settings.model.params;
+    resonator.next(margin_ratio, 1.0 / settings.sample_rate_hz, params, outputs.t2_k, most_ratio)
 }
 
 /// Static pressure at the wall of the pipe of one of the four stations; the total one where the pipe would choke.
@@ -136,7 +167,7 @@ fn true_value(
     instant: &Instant<'_>,
     prepared: Option<&PreparedModel<'_>>,
     commands: Option<&Setpoints>,
-    swing: f64,
+    swing: Swing,
 ) -> f64 {
     let boundary = &instant.boundary;
     let command = |value: fn(&Setpoints) -> f64| commands.map_or(f64::NAN, value);
@@ -150,9 +181,9 @@ fn true_value(
     if let (Some((state, outputs)), Some(prepared)) = (instant.running, prepared) {
         let value = instruments::true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
         return match channel {
-            Channel::CompressorFlow => value * (1.0 + swing),
-            // The pressure swings less than the flow: it is the volume's.
-            Channel::P2 => value * (1.0 + 0.2 * swing),
+            Channel::CompressorFlow => value * (1.0 + swing.flow_ratio),
+            Channel::P2 => value * (1.0 + swing.p2_ratio),
+            Channel::P1 => value * (1.0 + swing.p1_ratio),
             _ => value,
         };
     }

@@ -3,6 +3,7 @@
 use super::actuator::ActuatorDynamics;
 use super::drift::LabDrift;
 use super::elements::LabElements;
+use super::precursor::SurgePrecursor;
 use super::sensor::SensorErrors;
 use super::weather::Weather;
 use mapper_core::Channel;
@@ -58,6 +59,8 @@ pub struct LabSettings {
     pub trip_speed_rpm: f64,
     /// Swing of flow and outlet pressure beyond the surge line, ratio of their values.
     pub surge_swing_ratio: f64,
+    /// Swing of flow and pressures before the surge line.
+    pub surge_precursor: SurgePrecursor,
     /// Seed of all noise.
     pub seed: u64,
 }
@@ -92,6 +95,7 @@ impl LabSettings {
             static_tap_pipe_diameters_m: BTreeMap::new(),
             trip_speed_rpm: f64::INFINITY,
             surge_swing_ratio: 0.0,
+            surge_precursor: SurgePrecursor::NONE,
             seed: 0,
         }
     }

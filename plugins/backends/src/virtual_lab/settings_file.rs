@@ -5,6 +5,7 @@ use super::draws::{Draws, draw, offset_kind};
 use super::drift_file::{self, DriftFile};
 use super::effects_file::{EffectValues, put_in};
 use super::elements_file::{self, FaultFile};
+use super::precursor::SurgePrecursor;
 use super::sensor::SensorErrors;
 use super::setting_problem::{SettingProblem, within};
 use super::settings::{LabSettings, Start};
@@ -55,6 +56,19 @@ struct SettingsFile {
     trip_speed: Option<Quantity<Speed>>,
     /// Swing of the flow in surge; 8 % where left out.
     surge_swing: Option<Quantity<Fraction>>,
+    /// How flow and pressures swing before surge.
+    surge_precursor: PrecursorFile,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct PrecursorFile {
+    /// Surge margin at which it begins; 25 % where left out.
+    onset: Option<Quantity<Fraction>>,
+    /// Root mean square of the flow's swing at half that margin; 0.3 % where left out.
+    size: Option<Quantity<Fraction>>,
+    /// Exponent by which the variance grows with the inverse of the margin; 1 where left out.
+    growth: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
@@ -190,6 +204,7 @@ pub fn read_settings(
         static_tap_pipe_diameters_m: nominal.static_tap_pipe_diameters_m.clone(),
         trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.inside),
         surge_swing_ratio,
+        surge_precursor: file.surge_precursor.precursor()?,
         seed: nominal.seed,
     };
     lab.take(rig);
@@ -206,6 +221,23 @@ impl<Rate: Dimension> ActuatorFile<Rate> {
             return Err(problem.at(format!("actuators.{name}.slew")));
         }
         Ok(ActuatorDynamics { lag_s, slew_per_s })
+    }
+}
+
+impl PrecursorFile {
+    fn precursor(&self) -> Result<SurgePrecursor, BackendError> {
+        let usual = SurgePrecursor::USUAL;
+        let onset_margin_ratio = self.onset.map_or(usual.onset_margin_ratio, |onset| onset.inside);
+        let size_ratio = self.size.map_or(usual.size_ratio, |size| size.inside);
+        let growth = self.growth.unwrap_or(usual.growth);
+        for (key, value, unit, range) in [
+            ("onset", 100.0 * onset_margin_ratio, "%", 0.1..=50.0),
+            ("size", 100.0 * size_ratio, "%", 0.0..=10.0),
+            ("growth", growth, "", 0.2..=4.0),
+        ] {
+            within(value, unit, range).map_err(|problem| problem.at(format!("surge_precursor.{key}")))?;
+        }
+        Ok(SurgePrecursor { onset_margin_ratio, size_ratio, growth })
     }
 }
 
@@ -369,6 +401,8 @@ mod tests {
             (json!({"actuators": {"valve": {"lag": "1 K"}}}), "actuators.valve.lag"),
             (json!({"sample_rate": "10"}), "lacks its unit"),
             (json!({"sample_rate": "0 Hz"}), "sample_rate"),
+            (json!({"surge_precursor": {"onset": "80 %"}}), "surge_precursor.onset"),
+            (json!({"surge_precursor": {"growth": "1 K"}}), "surge_precursor.growth"),
             (json!({"machine": {"alpha_area": 2}}), "machine.alpha_area"),
             (json!({"offset_of": {"T2": "1 kPa"}}), "offset_of.T2"),
             (json!({"actuators": {"valve": {"slew": "0 1/s"}}}), "actuators.valve.slew"),

@@ -25,17 +25,19 @@ pub struct TruthRecorder {
     speed_rpm: Vec<f64>,
     tc_k: Vec<f64>,
     tt_k: Vec<f64>,
+    surge_flow_kg_s: Vec<f64>,
 }
 
 impl TruthRecorder {
-    /// Adds one sample; `outputs` is `None` at standstill.
-    pub fn push(&mut self, speed_rpm: f64, tc_k: f64, tt_k: f64, outputs: Option<&Outputs>) {
+    /// Adds one sample: shaft speed, temperatures of both housings, flow at which this speed would surge; `outputs` is `None` at standstill.
+    pub fn push(&mut self, [speed_rpm, tc_k, tt_k, surge_flow_kg_s]: [f64; 4], outputs: Option<&Outputs>) {
         for (column, (_, _, read)) in self.from_outputs.iter_mut().zip(FROM_OUTPUTS) {
             column.push(outputs.map_or(f64::NAN, read));
         }
         self.speed_rpm.push(speed_rpm);
         self.tc_k.push(tc_k);
         self.tt_k.push(tt_k);
+        self.surge_flow_kg_s.push(surge_flow_kg_s);
     }
 
     /// The columns.
@@ -53,6 +55,7 @@ impl TruthRecorder {
         columns.push(column("speed_rpm", "rpm", self.speed_rpm));
         columns.push(column("tc_k", "K", self.tc_k));
         columns.push(column("tt_k", "K", self.tt_k));
+        columns.push(column("surge_flow_kg_s", "kg/s", self.surge_flow_kg_s));
         columns
     }
 }

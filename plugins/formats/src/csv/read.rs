@@ -210,7 +210,14 @@ fn own(
         .map(|members| line(members[0].0, members.iter().map(|(_, point)| point.clone()).collect()))
         .collect();
     let method = head.method.unwrap_or(Method::Imported);
-    Ok(CompressorMap { machine: head.machine.clone(), reference, method, lines, fitted: None })
+    Ok(CompressorMap {
+        machine: head.machine.clone(),
+        reference,
+        method,
+        lines,
+        surge: Vec::new(),
+        fitted: None,
+    })
 }
 
 fn own_point(

@@ -53,6 +53,7 @@ pub fn turbo_a() -> CompressorMap {
         reference: ReferenceState::SAE,
         method: Method::Dynamic,
         lines,
+        surge: Vec::new(),
         fitted: None,
     }
 }

@@ -1,0 +1,116 @@
+//! Surge that is sought: how a line's surge-side end is approached, and the mark that comes of it.
+
+use crate::{Recording, Series, StepKind};
+use serde::{Deserialize, Serialize};
+
+/// How the surge line is approached at the end of a speed line: the valve closes in small steps until the surge flow is
+/// known, or until it is as near as [`SurgeSeek::closest_margin_ratio`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurgeSeek {
+    /// Smallest surge margin that is gone to, by the surge flow as it is known by then, ratio, > 0.
+    pub closest_margin_ratio: f64,
+    /// Largest change of the valve's opening at a step while the line may be near, ratio, > 0.
+    pub step_ratio: f64,
+    /// Time at each opening, s; its first [`SurgeSeek::SETTLE_S`] are for the rig to follow.
+    pub dwell_s: f64,
+    /// Standard error of the surge flow at which a line is done, ratio, > 0; the flow meter's gain is not part of it.
+    pub wanted_standard_error_ratio: f64,
+    /// Steps of one line at most, the return from the line not counted.
+    pub most_steps: usize,
+}
+
+impl SurgeSeek {
+    /// Time after a small step until speed and pressures have followed, s.
+    pub const SETTLE_S: f64 = 5.0;
+}
+
+impl Default for SurgeSeek {
+    fn default() -> Self {
+        SurgeSeek {
+            closest_margin_ratio: 0.03,
+            step_ratio: 0.03,
+            dwell_s: 25.0,
+            wanted_standard_error_ratio: 0.008,
+            most_steps: 40,
+        }
+    }
+}
+
+/// What the surge flow of a mark was found by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SurgeFoundBy {
+    /// The growth of the variation of pressures and flow, carried on to the line. The compressor was not in surge.
+    Precursor,
+    /// The compressor went into surge: the flow lies between the last opening without surge and the one that surged.
+    Surge,
+}
+
+/// The surge-side end of a speed line, with one standard error of each of its values.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SurgeMark {
+    /// Shaft speed that the line aimed at (physical), rpm.
+    pub target_speed_rpm: f64,
+    /// Corrected speed at which the mark stands, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Corrected flow at surge, kg/s.
+    pub flow_corrected_kg_s: f64,
+    /// Its standard error without the flow meter's gain, kg/s.
+    pub flow_standard_error_kg_s: f64,
+    /// Standard error that all corrected flows share by the flow meter's gain, kg/s.
+    pub flow_common_standard_error_kg_s: f64,
+    /// Total pressure ratio P2/P1 at surge.
+    pub pressure_ratio: f64,
+    /// Its standard error.
+    pub pressure_ratio_standard_error: f64,
+    /// Smallest corrected flow that was measured on the way, kg/s.
+    pub closest_flow_corrected_kg_s: f64,
+    /// Run time at the end of that measurement, s.
+    pub closest_end_s: f64,
+    /// What it was found by.
+    pub found_by: SurgeFoundBy,
+    /// Openings on the way.
+    pub steps: usize,
+}
+
+impl SurgeMark {
+    /// Standard error of the flow, the flow meter's gain included, kg/s.
+    pub fn flow_total_standard_error_kg_s(&self) -> f64 {
+        self.flow_standard_error_kg_s.hypot(self.flow_common_standard_error_kg_s)
+    }
+
+    /// Multiplies corrected speed and flows, for a change of the reference state.
+    pub(crate) fn scale(&mut self, speed_factor: f64, flow_factor: f64) {
+        self.speed_corrected_rpm *= speed_factor;
+        for flow in [
+            &mut self.flow_corrected_kg_s,
+            &mut self.flow_standard_error_kg_s,
+            &mut self.flow_common_standard_error_kg_s,
+            &mut self.closest_flow_corrected_kg_s,
+        ] {
+            *flow *= flow_factor;
+        }
+    }
+}
+
+impl Recording {
+    /// Takes off the approaches to surge and all that comes after the first of them: they stand behind the points, hold
+    /// none, and what they did to the machine is no part of any. `None` where the recording has none.
+    pub fn split_off_approaches(&mut self) -> Option<Recording> {
+        let first = self.steps.iter().position(|step| step.kind == StepKind::Approach)?;
+        let from_s = self.steps[first].start_s;
+        let split = |series: &mut Series| {
+            // A sample at the very end of the step before belongs to that.
+            let at = series.t_s.partition_point(|t_s| *t_s <= from_s);
+            Series { t_s: series.t_s.split_off(at), values: series.values.split_off(at) }
+        };
+        let after = self.events.partition_point(|event| event.t_s < from_s);
+        Some(Recording {
+            series: self.series.iter_mut().map(|(channel, series)| (*channel, split(series))).collect(),
+            elements: self.elements.iter_mut().map(|(element, series)| (*element, split(series))).collect(),
+            steps: self.steps.split_off(first),
+            events: self.events.split_off(after),
+        })
+    }
+}

@@ -1,0 +1,92 @@
+//! How far the valve may be closed by what is known.
+
+use crate::estimate::SurgeEstimate;
+use crate::look::Look;
+use mapper_core::SurgeSeek;
+
+/// What to do at the end of a look.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Move {
+    /// Go to this opening, relative to the nominal area; where it is the one of the last look, look again.
+    To(f64),
+    /// The line is done.
+    Done(Why),
+}
+
+/// Why a line is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Why {
+    /// The surge flow is known as well as was asked for.
+    Known,
+    /// Closing further would go nearer than was asked for, or than is safe by what is known.
+    NearEnough,
+    /// So many steps were made.
+    Steps,
+}
+
+/// Step of the opening while the nominal map says that surge is far, ratio.
+const FAR_STEP_RATIO: f64 = 0.08;
+/// Surge margin of the nominal map beyond which surge is far, ratio: its surge line is a guess.
+const FAR_MARGIN_RATIO: f64 = 0.35;
+/// Step that may be made whatever the highest possible surge flow, ratio: what grows would have grown more at this opening if
+/// surge were as near as that, and only looks further on can tell.
+const SMALL_STEP_RATIO: f64 = 0.007;
+/// The law is not carried on from farther than so many times the smallest margin: how it begins is any rig's own.
+const TRUSTED_MARGINS: f64 = 1.4;
+/// Distance that is kept from the highest surge flow that is possible, ratio.
+const KEPT_RATIO: f64 = 0.005;
+/// Smallest step that is worth the time, ratio.
+const LEAST_STEP_RATIO: f64 = 0.004;
+/// Looks at one opening at most.
+const MOST_LOOKS: usize = 3;
+
+/// Looks that a line will take on a machine like the nominal one, from a surge margin on.
+pub fn expected_looks(margin_ratio: f64, seek: &SurgeSeek) -> usize {
+    let (mut flow, mut looks) = (1.0 + margin_ratio, 1);
+    while flow > 1.0 + 1.3 * seek.closest_margin_ratio && looks < seek.most_steps {
+        let far = flow - 1.0 > FAR_MARGIN_RATIO;
+        flow *= 1.0 - if far { FAR_STEP_RATIO.max(seek.step_ratio) } else { seek.step_ratio };
+        looks += 1;
+    }
+    // Some more where the line is nearest: there the steps get smaller.
+    (looks + 3).min(seek.most_steps)
+}
+
+/// The next move after these looks, at least one. `nominal_margin_ratio`: surge margin that the nominal machine has at the
+/// last opening; `None` where it is not known.
+pub fn next_move(looks: &[Look], seek: &SurgeSeek, nominal_margin_ratio: Option<f64>) -> Move {
+    let Some(last) = looks.last() else { return Move::Done(Why::Steps) };
+    if looks.len() >= seek.most_steps {
+        return Move::Done(Why::Steps);
+    }
+    let opening = last.valve_opening_ratio;
+    let estimate = SurgeEstimate::of(looks);
+    let Some(estimate) = estimate.filter(|estimate| estimate.seen) else {
+        let far = nominal_margin_ratio.is_some_and(|margin| margin > FAR_MARGIN_RATIO);
+        let step = match estimate {
+            // Something grows, but not at enough openings to tell how fast.
+            Some(estimate) if estimate.grows => 0.5 * seek.step_ratio,
+            _ if far => FAR_STEP_RATIO.max(seek.step_ratio),
+            _ => seek.step_ratio,
+        };
+        return Move::To(opening * (1.0 - step));
+    };
+    let margin_ratio = estimate.closest_flow_kg_s / estimate.flow_corrected_kg_s - 1.0;
+    let near = margin_ratio <= TRUSTED_MARGINS * seek.closest_margin_ratio;
+    if near && estimate.standard_error_ratio() <= seek.wanted_standard_error_ratio {
+        return Move::Done(Why::Known);
+    }
+    // Near surge pressures hardly change with flow: the flow goes with the opening.
+    let flow_kg_s = estimate.closest_flow_kg_s;
+    let possible_kg_s = estimate.flow_corrected_kg_s + 2.0 * estimate.standard_error_kg_s;
+    let safe_kg_s = possible_kg_s.max(estimate.highest_flow_kg_s) * (1.0 + KEPT_RATIO);
+    let lowest_kg_s = (flow_kg_s * (1.0 - seek.step_ratio))
+        .max(safe_kg_s.min(flow_kg_s * (1.0 - SMALL_STEP_RATIO)))
+        .max(estimate.flow_corrected_kg_s * (1.0 + seek.closest_margin_ratio));
+    let step = 1.0 - lowest_kg_s / flow_kg_s;
+    if step >= LEAST_STEP_RATIO {
+        return Move::To(opening * (1.0 - step));
+    }
+    let here = looks.iter().rev().take_while(|look| look.valve_opening_ratio == opening).count();
+    if here < MOST_LOOKS { Move::To(opening) } else { Move::Done(Why::NearEnough) }
+}

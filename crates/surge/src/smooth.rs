@@ -1,0 +1,56 @@
+//! Flows of the looks, freed of the noise that single means have: flow is a smooth function of the opening.
+
+use crate::look::Look;
+use nalgebra::{Matrix3, Vector3};
+
+/// Flows and pressure ratios at one speed, in the order of the looks.
+#[derive(Debug, Clone)]
+pub(crate) struct Smoothed {
+    /// Corrected flow at the speed of the last look, kg/s.
+    pub(crate) flows_kg_s: Vec<f64>,
+    /// Standard error of such a flow, as the scatter about the curve shows it, ratio.
+    pub(crate) flow_error_ratio: f64,
+}
+
+/// Openings within this of the smallest one take part: beyond, a parabola is no curve of a valve.
+const REACH_RATIO: f64 = 1.7;
+
+impl Smoothed {
+    /// Flows brought to the speed of the last look by similarity, through which the logarithm of flow goes as a parabola of
+    /// that of the opening. As measured where there are fewer than five looks.
+    pub(crate) fn of(looks: &[Look]) -> Option<Self> {
+        let last = looks.last()?;
+        let to_speed =
+            |look: &Look| look.flow_corrected_kg_s * last.speed_corrected_rpm / look.speed_corrected_rpm;
+        let measured: Vec<f64> = looks.iter().map(to_speed).collect();
+        let place = |look: &Look| (look.valve_opening_ratio / last.valve_opening_ratio).ln();
+        let taken = |look: &Look| place(look).abs() < REACH_RATIO.ln();
+        let (mut square, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        let mut count = 0usize;
+        for (look, flow) in looks.iter().zip(&measured).filter(|(look, _)| taken(look)) {
+            let row = row(place(look));
+            square += row * row.transpose();
+            right += row * flow.ln();
+            count += 1;
+        }
+        let unsmoothed = Smoothed { flows_kg_s: measured.clone(), flow_error_ratio: 0.0 };
+        let (true, Some(inverse)) = (count >= 5, square.try_inverse()) else { return Some(unsmoothed) };
+        let parabola = inverse * right;
+        let flow = |look: &Look| row(place(look)).dot(&parabola);
+        let pairs = || looks.iter().zip(&measured).filter(|(look, _)| taken(look));
+        let left: f64 = pairs().map(|(look, measured)| (measured.ln() - flow(look)).powi(2)).sum();
+        let sigma_ratio = (left / (count - 3).max(1) as f64).sqrt();
+        let at_last = row(0.0);
+        let flows_kg_s = looks
+            .iter()
+            .zip(&measured)
+            .map(|(look, measured)| if taken(look) { flow(look).exp() } else { *measured })
+            .collect();
+        let flow_error_ratio = sigma_ratio * at_last.dot(&(inverse * at_last)).max(0.0).sqrt();
+        Some(Smoothed { flows_kg_s, flow_error_ratio })
+    }
+}
+
+fn row(place: f64) -> Vector3<f64> {
+    Vector3::new(1.0, place, place * place)
+}

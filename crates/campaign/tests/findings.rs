@@ -163,7 +163,7 @@ fn rare_values_are_warned_of() {
     for (old, new, at, message) in [
         (
             "timing: {dwell: 120 s}",
-            "timing: {dwell: 30 s}".to_owned(),
+            "timing: {dwell: 30 s}\nidentification: {method: dynamic}".to_owned(),
             "30 s",
             "every point would be doubtful",
         ),

@@ -36,7 +36,7 @@ fn turbo_a_is_the_machine_of_appendix_a() {
     assert_eq!(campaign.reference, ReferenceState::SAE);
     assert_eq!(campaign.order, VisitOrder::Information);
     assert_eq!(campaign.identification.window, WindowRule::Auto);
-    assert_eq!((campaign.timing.warm_up_s, campaign.timing.dwell_s, campaign.seed), (600.0, 120.0, 1));
+    assert_eq!((campaign.timing.warm_up_s, campaign.timing.dwell_s, campaign.seed), (120.0, 120.0, 1));
     assert!(campaign.points.len() >= 30);
     let mut speeds: Vec<f64> = campaign.points.iter().map(|point| point.speed_rpm).collect();
     speeds.sort_by(f64::total_cmp);

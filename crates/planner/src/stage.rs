@@ -84,7 +84,8 @@ impl<'a> Stage<'a> {
         for round in 0..ROUNDS {
             // Where one jump is taken out, the best order is not far.
             let effort = if round == 0 { effort } else { AGAIN_RATIO * effort };
-            let ordered = order_on(&housing, &self.points, &given, &PlanRequest { effort, ..request.clone() });
+            let ordered =
+                order_on(&housing, &self.points, &given, &PlanRequest { effort, ..request.clone() });
             let mut visits = match self.repeated {
                 Some(jump) => with_repeats(&housing, &ordered.order, jump, objective(order)),
                 None => plain(&ordered.order),

@@ -3,8 +3,8 @@
 
 use crate::source::{StepSource, StepSourceError};
 use mapper_core::{
-    Channel, EventKind, OperatingPoint, PlanStep, Predicted, Recording, ReferenceState, SampleBatch,
-    Soak, StepKind, StepMarker, SurgeSeek,
+    Channel, EventKind, OperatingPoint, PlanStep, Predicted, Recording, ReferenceState, SampleBatch, Soak,
+    StepKind, StepMarker, SurgeSeek,
 };
 use mapper_surge::{Look, Move, SurgeEstimate, Why, next_move};
 

@@ -9,7 +9,8 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use common::{Driven, campaign, driven};
+use common::shipped::campaign;
+use common::{Driven, driven};
 
 const SEEDS: u64 = 20;
 

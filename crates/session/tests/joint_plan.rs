@@ -2,14 +2,15 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
+#[path = "common/shipped.rs"]
+mod shipped;
 
-use common::campaign;
 use mapper_backends::virtual_lab;
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, VisitOrder};
-use mapper_session::{Registry, RunRequest, Session, nominal_model, plan, with_plan_request};
 use mapper_planner::compare;
+use mapper_session::{Registry, RunRequest, Session, nominal_model, plan, with_plan_request};
+use shipped::campaign;
 
 const GRID: [(&str, &str); 3] = [
     (
@@ -54,7 +55,10 @@ fn forty_seeds_err_as_forecast() {
     }
     let lines = planned(&Campaign { order: VisitOrder::SpeedLines, ..first }).figures.rms_error_eta.unwrap();
     let ratio = f64::sqrt(square / count) / lines;
-    assert!(count >= 40.0 * 12.0 && (0.67..1.33).contains(&ratio), "{ratio} of {lines}, {forecast} by information");
+    assert!(
+        count >= 40.0 * 12.0 && (0.67..1.33).contains(&ratio),
+        "{ratio} of {lines}, {forecast} by information"
+    );
 }
 
 /// More time tells more, and nothing that the method can find makes a point more certain when it has to be found.
@@ -62,7 +66,11 @@ fn forty_seeds_err_as_forecast() {
 fn an_open_error_is_never_the_smaller_one_and_falls_with_time() {
     let mut before = f64::INFINITY;
     for dwell in ["dwell: 30 s ", "dwell: 60 s ", "dwell: 120 s "] {
-        let plan = planned(&small(&[ANY_ERROR, ("dwell: 120 s ", dwell), ("order: information ", "order: speed_lines ")]));
+        let plan = planned(&small(&[
+            ANY_ERROR,
+            ("dwell: 120 s ", dwell),
+            ("order: information ", "order: speed_lines "),
+        ]));
         for step in &plan.steps {
             let (sigma, open) = (step.predicted.sigma_eta.unwrap(), step.predicted.open_sigma_eta.unwrap());
             // Smoothness is weighed again for each: a hundredth.
@@ -90,17 +98,24 @@ fn steps_last_as_long_as_the_required_error_takes() {
         assert!(rest_s >= 0.25 * step.dwell_s || step.dwell_s >= 120.0, "{}: {rest_s} s", step.to);
     }
     let impossible = planned(&Campaign { required_sigma_eta: Some(0.1 * reachable), ..campaign });
-    assert!(impossible.remarks.iter().any(|remark| remark.contains("that are required")), "{:?}", impossible.remarks);
+    assert!(
+        impossible.remarks.iter().any(|remark| remark.contains("that are required")),
+        "{:?}",
+        impossible.remarks
+    );
 }
 
 /// `best` is the first of the list that `--compare` prints, and jumps tell more than speed lines of equal length.
 #[test]
 fn the_best_order_is_the_best_of_those_compared() {
-    let campaign = small(&[ANY_ERROR, ("dwell: 120 s ", "dwell: 40 s "), ("order: information ", "order: best ")]);
+    let campaign =
+        small(&[ANY_ERROR, ("dwell: 120 s ", "dwell: 40 s "), ("order: information ", "order: best ")]);
     let model = nominal_model(&campaign).unwrap();
     let best = planned(&campaign);
-    let comparison =
-        with_plan_request(&campaign, &model, |request| Ok::<_, mapper_session::SessionError>(compare(request, &best)?)).unwrap();
+    let comparison = with_plan_request(&campaign, &model, |request| {
+        Ok::<_, mapper_session::SessionError>(compare(request, &best)?)
+    })
+    .unwrap();
     let cost = |way: &mapper_planner::WayOfMapping| way.open_rms_error_eta.unwrap().powi(2) * way.minutes;
     let costs: Vec<f64> = comparison.orders.iter().map(|(_, way)| cost(way)).collect();
     assert!(cost(&comparison.proposed) <= costs[0] * (1.0 + 1e-9), "{costs:?}");

@@ -4,7 +4,8 @@
 
 mod common;
 
-use common::{Driven, campaign, driven};
+use common::shipped::campaign;
+use common::{Driven, driven};
 use mapper_core::EventKind;
 
 /// Six points from 50 to 155 krpm, repeats and return included, two minutes each.

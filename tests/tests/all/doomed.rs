@@ -19,7 +19,6 @@ fn what_will_come_to_little_is_a_warning() {
             "15 mm",
             "a probe of 15.00 mm has a time constant of",
         ),
-        ("dwell: 120 s ", "dwell: 30 s ", "30 s", "every point would be doubtful"),
     ] {
         let campaign = short(&[(old, new)]);
         let checked = mapper(["check".as_ref(), campaign.path.as_os_str()]).exits(0);

@@ -11,7 +11,11 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 /// A day of the rig's time: far from over when the recording holds a few steps.
-const LONG: &[(&str, &str)] = &[("warm_up: 2 min ", "warm_up: 60 s "), ("required_sigma_eta: 0.9 %\n", ""), ("dwell: 120 s ", "dwell: 30 min ")];
+const LONG: &[(&str, &str)] = &[
+    ("warm_up: 2 min ", "warm_up: 60 s "),
+    ("required_sigma_eta: 0.9 %\n", ""),
+    ("dwell: 120 s ", "dwell: 30 min "),
+];
 /// About an hour and a quarter of the rig's time, two steps of half an hour.
 const SOME_STEPS_BYTES: u64 = 20_000_000;
 /// Without any news of the recording for so long the test gives up: a run writes each second of its own clock, thousands of

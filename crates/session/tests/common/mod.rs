@@ -1,10 +1,11 @@
 //! Campaigns driven on the virtual lab, and what became of the speed of each step.
 
+pub mod shipped;
+
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, Event, EventKind, SampleBatch, StepMarker};
 use mapper_runner::{ObserverError, PlanSteps, RunEnd, RunObserver};
 use mapper_session::{Registry, drive, nominal_model, plan};
-use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 /// A step as it went.
@@ -105,18 +106,6 @@ impl RunObserver for Driven {
         self.steps.last_mut().unwrap().marker = *marker;
         Ok(())
     }
-}
-
-/// The shipped turbo_a with other lines put in for its own, each found once.
-pub fn campaign(replacements: &[(&str, &str)]) -> Campaign {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns/turbo_a.yaml");
-    let mut text = std::fs::read_to_string(&path).unwrap();
-    for (old, new) in replacements {
-        assert_eq!(text.matches(old).count(), 1, "{old}");
-        text = text.replace(old, new);
-    }
-    let none = |_: &Path| Err(std::io::ErrorKind::NotFound.into());
-    mapper_campaign::check(&text, &path, &none).unwrap_or_else(|findings| panic!("{findings}"))
 }
 
 /// Drives a campaign on its lab from the first step to the last.

@@ -76,11 +76,12 @@ pub(crate) fn with_errors_together<'a>(
     request: &PlanRequest<'_>,
     rows: &[Vec<ForecastRow>],
     predicted: impl Iterator<Item = &'a mut Predicted>,
+    as_declared: bool,
 ) {
     let Some(method) = request.method.filter(|method| method.is_joint()) else { return };
     let every = rows.len().div_ceil(MOST_TOGETHER).max(1);
     let sample: Vec<&[ForecastRow]> = rows.iter().step_by(every).map(Vec::as_slice).collect();
-    let Some(found) = method.together(&sample) else { return };
+    let Some(found) = method.together(&sample, as_declared) else { return };
     for ((predicted, rows), found) in predicted.step_by(every).zip(&sample).zip(found) {
         if let (Some(found), Some(end)) = (found, rows.last()) {
             tell(predicted, &found, end.efficiency, end.h_w_m2k);

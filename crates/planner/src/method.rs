@@ -25,8 +25,9 @@ pub trait PredictedMethod: std::fmt::Debug + Sync {
     fn predict(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult>;
 
     /// What it makes of the steps of a whole campaign, each from its jump to its end, where it looks at all of them together;
-    /// one result for each step. `None` where it looks at each step for itself, or comes to no end.
-    fn together(&self, _steps: &[&[ForecastRow]]) -> Option<Vec<Option<MethodResult>>> {
+    /// one result for each step. `None` where it looks at each step for itself, or comes to no end. `as_declared`: whether the
+    /// errors of a machine that is as declared are asked for too; else `sigma_eta` is `open_sigma_eta`.
+    fn together(&self, _steps: &[&[ForecastRow]], _as_declared: bool) -> Option<Vec<Option<MethodResult>>> {
         None
     }
 

@@ -20,6 +20,8 @@ use mapper_physics::steady::SteadyState;
 
 /// Effort of a search that only leads to another, over the usual.
 const ROUGHLY_RATIO: f64 = 0.1;
+/// The same of one by what steps are worth: that is known to a few percent only.
+const INFORMED_RATIO: f64 = 0.3;
 /// How often what steps are worth is worked out again, about the order that was found.
 const SLOPES: usize = 2;
 /// Jumps tried for repeats where the request names none.
@@ -102,7 +104,8 @@ fn plan_with(
         for _ in 0..SLOPES {
             let rows: Vec<_> = made.rows.iter().take(MOST_TOGETHER).map(Vec::as_slice).collect();
             let Some(worth) = method.worth_to(&rows) else { break };
-            let other = stage.made(request.order, (dwell_s(&made), request.effort), Some(worth.as_ref()))?;
+            let sought = (dwell_s(&made), INFORMED_RATIO * request.effort);
+            let other = stage.made(request.order, sought, Some(worth.as_ref()))?;
             if cost(&other.plan).total_cmp(&cost(&made.plan)).is_ge() {
                 break;
             }

@@ -100,8 +100,9 @@ impl<'a> Stage<'a> {
                 visits: &visits,
                 repeated: self.repeated.map(|jump| jump.to),
             };
-            let Walk { steps, forbidden, rows } = walk_until_certain(request, route, dwell_s)?;
-            if forbidden.is_empty() {
+            let walked = walk_until_certain(request, route, dwell_s)?;
+            if walked.forbidden.is_empty() {
+                let Walk { steps, rows, .. } = walked.thorough(request);
                 // What was searched, proven and bounded is an order with its way back.
                 let proven = ordered.proven && (returned || !request.return_to_first || given.len() < 2);
                 let ordered = Ordered { proven, ..ordered };
@@ -109,7 +110,7 @@ impl<'a> Stage<'a> {
                 return Ok(Made { plan, rows });
             }
             let before = barred.len();
-            for Forbidden { from, to, reasons } in forbidden {
+            for Forbidden { from, to, reasons } in walked.forbidden {
                 let text = format!("{} to {}: {reasons}", self.points[from], self.points[to]);
                 if !barred.contains(&text) {
                     barred.push(text);

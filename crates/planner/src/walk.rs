@@ -42,7 +42,7 @@ pub(crate) struct Walk {
     pub(crate) rows: Vec<Vec<ForecastRow>>,
 }
 
-/// Goes through a route. `dwells_s`: one for each visit; where there are none, a method that looks at each step by itself gets
+/// Goes through a route; where steps are identified together their errors are the open ones. `dwells_s`: one for each visit; where there are none, a method that looks at each step by itself gets
 /// the shortest that reaches the required error, and any other the request's.
 pub(crate) fn walk(
     request: &PlanRequest<'_>,
@@ -101,8 +101,17 @@ pub(crate) fn walk(
         now = Some((forecast.end, visit.index));
         rows.push(forecast.rows);
     }
-    with_errors_together(request, &rows, steps.iter_mut().map(|step| &mut step.predicted));
+    with_errors_together(request, &rows, steps.iter_mut().map(|step| &mut step.predicted), false);
     Ok(Walk { steps, forbidden, rows })
+}
+
+impl Walk {
+    /// With the errors of a machine that is as declared.
+    pub(crate) fn thorough(mut self, request: &PlanRequest<'_>) -> Self {
+        let predicted = self.steps.iter_mut().map(|step| &mut step.predicted);
+        with_errors_together(request, &self.rows, predicted, true);
+        self
+    }
 }
 
 /// A step with its dwell: the request's, or the shortest that reaches the required error.

@@ -51,9 +51,9 @@ impl PredictedMethod for Joint {
         self.alone.predict(window, interval_s)
     }
 
-    fn together(&self, steps: &[&[ForecastRow]]) -> Option<Vec<Option<MethodResult>>> {
+    fn together(&self, steps: &[&[ForecastRow]], as_declared: bool) -> Option<Vec<Option<MethodResult>>> {
         let rows = expected_rows(steps);
-        let found = expected_together(&expected_steps(&rows, steps), &self.alone.config)?;
+        let found = expected_together(&expected_steps(&rows, steps), &self.alone.config, as_declared)?;
         Some(found.into_iter().map(|found| found.map(result)).collect())
     }
 

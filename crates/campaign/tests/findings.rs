@@ -385,7 +385,7 @@ fn types_and_names() {
         "campaign: short\norder: greddy\n",
         Kind::WrongValue,
         "greddy",
-        "not one of sum_gradient, worst_gradient, information, time, greedy, listed",
+        "not one of sum_gradient, worst_gradient, information, time, best, speed_lines",
         "did you mean `greedy`?",
     );
     one(

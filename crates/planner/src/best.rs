@@ -1,6 +1,5 @@
 //! The order that is forecast to know most for the time it takes, and all orders beside it.
 
-use crate::plan::make_plan;
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::{Plan, VisitOrder};
 use mapper_numerics::parallel;
@@ -22,9 +21,12 @@ pub(crate) fn cost(plan: &Plan) -> f64 {
     figures.open_rms_error_eta.map_or(f64::INFINITY, |rms| rms * rms * figures.minutes)
 }
 
+/// How a plan is made under one order.
+type Make = fn(&PlanRequest<'_>) -> Result<Plan, PlanError>;
+
 /// The plan under each order that allows one, the cheapest first.
-pub(crate) fn all(request: &PlanRequest<'_>) -> Result<Vec<Plan>, PlanError> {
-    let made = parallel::map(&ORDERS, |order| make_plan(&PlanRequest { order: *order, ..request.clone() }));
+pub(crate) fn all(request: &PlanRequest<'_>, make: Make) -> Result<Vec<Plan>, PlanError> {
+    let made = parallel::map(&ORDERS, |order| make(&PlanRequest { order: *order, ..request.clone() }));
     let (mut plans, mut failed) = (Vec::new(), None);
     for made in made {
         match made {
@@ -40,8 +42,8 @@ pub(crate) fn all(request: &PlanRequest<'_>) -> Result<Vec<Plan>, PlanError> {
 }
 
 /// The cheapest of them, with what it was chosen from.
-pub(crate) fn best(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
-    let plans = all(request)?;
+pub(crate) fn best(request: &PlanRequest<'_>, make: Make) -> Result<Plan, PlanError> {
+    let plans = all(request, make)?;
     let told: Vec<String> = plans.iter().map(told).collect();
     let mut best = plans.into_iter().next().ok_or(PlanError::NoPoints)?;
     best.remarks

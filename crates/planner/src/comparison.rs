@@ -3,6 +3,7 @@
 use crate::best::all;
 use crate::method::ForecastRow;
 use crate::order::by_speed_line;
+use crate::plan::make_plan;
 use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::{OperatingPoint, Plan};
@@ -69,7 +70,7 @@ pub fn along_speed_lines(points: &[OperatingPoint]) -> Vec<OperatingPoint> {
 pub fn compare(request: &PlanRequest<'_>, plan: &Plan) -> Result<Comparison, PlanError> {
     let order = along_speed_lines(request.points);
     let targets = reachable(request, &order)?;
-    let plans = all(&PlanRequest { appended: None, ..request.clone() })?;
+    let plans = all(&PlanRequest { appended: None, ..request.clone() }, make_plan)?;
     Ok(Comparison {
         proposed: planned(plan),
         conventional: conventional(request, &order, &targets)?,

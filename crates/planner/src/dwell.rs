@@ -4,7 +4,7 @@
 //! together, so all get the same time, unless one settles later. It is found by the forecast itself: on logarithmic scales
 //! the error is nearly a line in the time.
 
-use crate::plan::open_rms_error_eta;
+use crate::figures::open_rms_error_eta;
 use crate::request::{PlanError, PlanRequest};
 use crate::walk::{Route, Walk, walk};
 use mapper_core::{PlanStep, StepKind, WindowRule};

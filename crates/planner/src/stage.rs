@@ -1,10 +1,10 @@
 //! The points that a plan visits, repeats and appended jump included, made into a plan under an order.
 
 use crate::dwell::walk_until_certain;
+use crate::finish::finished;
 use crate::housing::Housing;
 use crate::method::{ForecastRow, WorthOfStep};
 use crate::order::{Ordered, objective, order_on};
-use crate::plan::finished;
 use crate::reach::reachable;
 use crate::repeats::{RepeatedJump, append, plain, put_return, with_repeats};
 use crate::request::{PlanError, PlanRequest};

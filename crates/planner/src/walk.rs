@@ -1,11 +1,12 @@
 //! The steps of an order in full, simulated one after the other.
 
+use crate::figures::error_eta;
 use crate::forecast::{Forecast, forecast, with_errors_together};
 use crate::graph::rejections;
 use crate::method::ForecastRow;
 use crate::repeats::Visit;
 use crate::request::{PlanError, PlanRequest};
-use mapper_core::{OperatingPoint, PlanStep, Predicted, StepKind, WindowRule};
+use mapper_core::{OperatingPoint, PlanStep, StepKind, WindowRule};
 use mapper_physics::forecast::warmed_up;
 use mapper_physics::model::State;
 use mapper_physics::simulate::SimulationError;
@@ -135,9 +136,4 @@ fn step(
         }
     }
     Ok((longest_s, at(longest_s)?))
-}
-
-/// Standard error and bias of the efficiency in quadrature.
-pub(crate) fn error_eta(predicted: &Predicted) -> Option<f64> {
-    Some(predicted.sigma_eta?.hypot(predicted.bias_eta.unwrap_or(0.0)))
 }

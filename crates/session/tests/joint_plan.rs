@@ -8,6 +8,7 @@ mod shipped;
 use mapper_backends::virtual_lab;
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, VisitOrder};
+use mapper_formats::FORMATS;
 use mapper_planner::compare;
 use mapper_session::{Registry, RunRequest, Session, nominal_model, plan, with_plan_request};
 use shipped::campaign;
@@ -38,7 +39,7 @@ fn forty_seeds_err_as_forecast() {
     let steps_of_40_s = ("dwell: 120 s ", "dwell: 40 s ");
     let first = small(&[ANY_ERROR, steps_of_40_s]);
     let forecast = planned(&first).figures.rms_error_eta.unwrap();
-    let registry = Registry { backends: vec![virtual_lab::PLUGIN], ..Registry::default() };
+    let registry = Registry { backends: vec![virtual_lab::PLUGIN], formats: FORMATS, ..Registry::default() };
     let session = Session::new(&registry);
     let (mut square, mut count) = (0.0, 0.0);
     for seed in 1..=40 {

@@ -17,6 +17,8 @@ fn run(zero: &str, seed: u32, out: &Path) -> Value {
         ("m_c:   {noise: 1.5e-4 kg/s, gain: 0.5 %}", "m_c:   {noise: 1.5e-4 kg/s}"),
         ("zero: {soak: 30 min, evenness: 0.03 K, pressure_evenness: 3 Pa}\n", ""),
         ("method: joint ", "joint: {alpha_area: fixed, probe: fixed, direction: fixed}\n  method: joint "),
+        // The same steps with a zero and without.
+        ("required_sigma_eta: 0.9 %\n", ""),
         ("seed: 1 ", &seed),
     ]);
     let arguments =

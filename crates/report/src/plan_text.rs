@@ -103,6 +103,13 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
             percent(figures.worst_error_eta, 2),
             percent(figures.rms_error_eta, 2),
         );
+        if figures.open_rms_error_eta != figures.rms_error_eta {
+            let _ = writeln!(
+                text,
+                "Where alpha_A, the probe and the direction of the heat are not as declared and have to be found: {} rms.",
+                percent(figures.open_rms_error_eta, 2),
+            );
+        }
     }
     if let Some(bound) = &plan.bound {
         text.push_str(&bound_text(bound));

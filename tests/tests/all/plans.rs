@@ -1,6 +1,6 @@
 //! What a plan says comes true on the virtual lab, whatever it was ordered by.
 
-use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper};
+use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, repository};
 use serde_json::Value;
 
 /// Six points of the shipped campaign, ordered by `order`.
@@ -138,4 +138,25 @@ fn an_appended_jump_is_run_behind_the_points() {
     let last = points.last().unwrap();
     assert_eq!(points.len(), 8, "six points, the start of the jump and its target");
     assert_eq!((last["kind"].as_str(), number(&last["valve"])), (Some("repeat"), 1.4));
+}
+
+/// A plan that its own comparison beats says so, and `best` takes what beats it.
+#[test]
+fn a_plan_that_speed_lines_beat_says_so() {
+    let plan = |more: &[(&str, &str)]| {
+        let text = std::fs::read_to_string(repository().join("campaigns/grid18.yaml")).unwrap();
+        let campaign =
+            CampaignFile::of(more.iter().fold(text, |text, (old, new)| text.replacen(old, new, 1)));
+        mapper(["plan".as_ref(), campaign.path.as_os_str(), "--json".as_ref()]).exits(0).json()
+    };
+    // Each step by itself: with 100 s of samples large gradients are no gain.
+    let gradients = plan(&[]);
+    let said =
+        gradients["remarks"].as_array().unwrap().iter().any(|remark| {
+            remark.as_str().unwrap().starts_with("plain speed lines are forecast to do better")
+        });
+    assert!(said, "{}", gradients["remarks"]);
+    let best = plan(&[("order: sum_gradient", "order: best")]);
+    let error = |plan: &Value| plan["figures"]["rms_error_eta"].as_f64().unwrap();
+    assert!(error(&best) < error(&gradients), "{} and {}", error(&best), error(&gradients));
 }

@@ -13,7 +13,11 @@ const CONVENTIONAL: Colour = Colour(0xB4, 0x53, 0x09);
 const PROPOSED: Colour = Colour(0x1D, 0x4E, 0x89);
 
 /// Steps that carry their number: more would cover the map.
-const NUMBERED_STEPS: usize = 30;
+const NUMBERED_STEPS: usize = 80;
+/// Jumps that are drawn strongly.
+const FIRST_JUMPS: usize = 10;
+/// How much of the colour is left for all others.
+const LATER_TINT: f64 = 0.6;
 
 /// Both paths side by side, as SVG.
 pub fn plan_svg(campaign: &Campaign, model: &Model, plan: &Plan, comparison: &Comparison) -> String {
@@ -92,11 +96,18 @@ fn panel(
         panel.add(Line::new(line, MAP).width_px(1.2).label("speed lines"));
     }
     let places: Vec<(f64, f64)> = path.iter().map(|point| place(*point)).collect();
-    panel.add(Line::new(places.clone(), colour).width_px(1.1).arrows().label("path"));
+    let first = places.len().min(FIRST_JUMPS + 1);
+    // What comes later must not hide where the path begins.
+    if places.len() > first {
+        let later = places[first - 1..].to_vec();
+        panel.add(Line::new(later, colour.tint(LATER_TINT)).width_px(0.8).arrows().label("later jumps"));
+    }
+    let label = if places.len() > first { format!("first {FIRST_JUMPS} jumps") } else { "path".to_owned() };
+    panel.add(Line::new(places[..first].to_vec(), colour).width_px(1.6).arrows().label(label));
     panel.add(Scatter::new(places.clone(), colour).size_px(5.0));
+    // Each point carries the number of the step that comes to it first.
     for (step, at) in places.iter().enumerate() {
-        let end = step == 0 || step + 1 == places.len();
-        if places.len() <= NUMBERED_STEPS || end {
+        if places.len() <= NUMBERED_STEPS && !path[..step].contains(&path[step]) {
             let number = Annotation::new((step + 1).to_string(), *at);
             panel.add(Annotation { shift_px: (-4.0, 9.0), anchor: TextAnchor::End, colour, ..number });
         }

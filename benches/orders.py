@@ -37,7 +37,7 @@ MACHINES = {
         "turbo_a", {"virtual_lab: {}": "virtual_lab: {machine: {alpha_area: 0.15}}"}, AFTER_THE_ZERO,
     ),
 }
-ORDERS = ["information", "sum_gradient", "worst_gradient", "speed_lines"]
+ORDERS = ["information", "sum_gradient", "speed_lines"]
 DWELL = "40 s"
 
 

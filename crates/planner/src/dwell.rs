@@ -17,7 +17,7 @@ const SHORTEST_S: f64 = 20.0;
 /// Forecasts that are made.
 const ROUNDS: usize = 5;
 /// An error within this of the required one is that one.
-pub(crate) const NEARLY_RATIO: f64 = 1.02;
+pub const NEARLY_RATIO: f64 = 1.02;
 /// How the error falls with the time, if nothing better is known: a half by averaging, a half by the larger gradients.
 const FALL: f64 = -0.8;
 

@@ -10,6 +10,7 @@ use mapper_identify::ZeroSettings;
 use mapper_physics::model::Model;
 use mapper_physics::standstill::{StandstillState, relax};
 use mapper_physics::thermocouple::time_constant_s;
+use mapper_planner::NEARLY_RATIO;
 
 /// How far from the cell's temperature a cold machine's housings are reckoned with, K, as the zero does when it finds the
 /// limit that Tc relaxes to.
@@ -43,7 +44,12 @@ impl Session<'_> {
             None => plan(campaign, model)?,
             Some(source) => rehearse(self, campaign, model, source)?.plan,
         };
-        let concerns = [soak(campaign, model), settling(campaign, &plan), probe(campaign, &plan)];
+        let concerns = [
+            soak(campaign, model),
+            settling(campaign, &plan),
+            probe(campaign, &plan),
+            required_error(campaign, &plan),
+        ];
         Ok(Prospects {
             duration_s: soak_s(campaign) + plan.duration_s(),
             concerns: concerns.into_iter().flatten().collect(),
@@ -126,6 +132,25 @@ fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
         ),
         "lengthen `timing.dwell`, or widen `identification.stabilisation`".to_owned(),
     ))
+}
+
+/// A required error that the longest dwell does not reach.
+fn required_error(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+    let required = campaign.required_sigma_eta.filter(|_| campaign.identification.method == Method::Joint)?;
+    let found = plan.figures.open_rms_error_eta?;
+    (found > NEARLY_RATIO * required).then(|| {
+        Concern::warning(
+            &["required_sigma_eta"],
+            format!(
+                "steps of {:.0} s reach {:.2} points of efficiency (rms, where alpha_A, the probe and the direction of the heat have to be \
+                 found), not the {:.2} that are required",
+                campaign.timing.dwell_s,
+                100.0 * found,
+                100.0 * required
+            ),
+            "lengthen `timing.dwell`, begin with a `zero`, or require less".to_owned(),
+        )
+    })
 }
 
 /// A window of which the declared T2 probe spends a large part on what came before.

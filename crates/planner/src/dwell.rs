@@ -16,8 +16,8 @@ const LATER_S: f64 = 2.0;
 const SHORTEST_S: f64 = 20.0;
 /// Forecasts that are made.
 const ROUNDS: usize = 5;
-/// An error within this of the required one is that one.
-pub const NEARLY_RATIO: f64 = 1.02;
+/// The required error counts as reached up to this multiple of it.
+pub const REACHED_RATIO: f64 = 1.02;
 /// How the error falls with the time, if nothing better is known: a half by averaging, a half by the larger gradients.
 const FALL: f64 = -0.8;
 
@@ -52,7 +52,7 @@ pub(crate) fn walk_until_certain(
         };
         // Whole seconds: nobody holds a point for 31.4159 s.
         let next_s = (time_s * (required / error).powf(1.0 / fall)).ceil().clamp(SHORTEST_S, longest_s);
-        let reached = error <= NEARLY_RATIO * required;
+        let reached = error <= REACHED_RATIO * required;
         // The first walk knows of no settling times yet.
         if before.is_some() && (next_s == time_s || (reached && next_s > time_s - 2.0)) {
             break;

@@ -1,7 +1,7 @@
 //! From the steps of a plan to the plan: figures, bound, remarks.
 
 use crate::bound::Optimistic;
-use crate::dwell::NEARLY_RATIO;
+use crate::dwell::REACHED_RATIO;
 use crate::figures::{error_eta, figures, open_rms_error_eta};
 use crate::fingerprint::made_from;
 use crate::housing::Housing;
@@ -103,7 +103,7 @@ fn not_reached(request: &PlanRequest<'_>, steps: &[PlanStep]) -> Option<String> 
     let (percent, longest_s) = (100.0 * required, request.timing.dwell_s);
     if request.method.is_some_and(|method| method.is_joint()) {
         let found = open_rms_error_eta(steps)?;
-        return (found > NEARLY_RATIO * required).then(|| {
+        return (found > REACHED_RATIO * required).then(|| {
             format!(
                 "steps of {longest_s:.0} s reach an error of {:.2} points of efficiency (rms), not the {percent:.2} that are required",
                 100.0 * found

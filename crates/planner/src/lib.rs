@@ -33,7 +33,7 @@ mod stage;
 mod walk;
 
 pub use comparison::{Comparison, STABLE_DRIFT_K_MIN, WayOfMapping, along_speed_lines, compare};
-pub use dwell::NEARLY_RATIO;
+pub use dwell::REACHED_RATIO;
 pub use fingerprint::sha256_hex;
 pub use graph::{JumpForecast, Rejection, explain_jump, jump_graph};
 pub use method::{ForecastRow, MethodResult, PredictedMethod, WorthOfStep};

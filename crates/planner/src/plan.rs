@@ -39,9 +39,8 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
     }
     let targets = reachable(request, request.points)?;
     let mut plan = with_or_without_return(request, &targets)?;
-    let unasked =
-        matches!(request.order, VisitOrder::Information | VisitOrder::Time | VisitOrder::SpeedLines);
-    if request.method.is_some() && !unasked {
+    // What is ordered by errors, or goes along speed lines itself, need not be held against them.
+    if request.method.is_some() && !request.order.needs_method() && request.order != VisitOrder::SpeedLines {
         let lines = PlanRequest { order: VisitOrder::SpeedLines, appended: None, ..request.clone() };
         let lines = with_or_without_return(&lines, &targets);
         plan.remarks.extend(lines.ok().and_then(|lines| beaten(&plan, &lines)));

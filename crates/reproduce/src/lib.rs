@@ -15,7 +15,6 @@ mod figure_8;
 mod figure_9;
 mod format;
 mod lab;
-#[cfg(test)]
 mod model_table;
 mod outcome;
 mod picture;

@@ -2,6 +2,8 @@
 //! openings 0.5, 0.7 and 1.0, noise-free, 10 to 110 s, errors against the mean in the window unless said otherwise.
 //! Tolerances are half the last printed digit.
 
+#![cfg(test)]
+
 use crate::figure_5::apparent_eta;
 use crate::lab::{Run, run_all};
 use crate::outcome::{Outcome, RUN_S, WINDOW, assuming, extremes, in_window, outcomes, worst};

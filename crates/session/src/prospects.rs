@@ -10,7 +10,7 @@ use mapper_identify::ZeroSettings;
 use mapper_physics::model::Model;
 use mapper_physics::standstill::{StandstillState, relax};
 use mapper_physics::thermocouple::time_constant_s;
-use mapper_planner::NEARLY_RATIO;
+use mapper_planner::REACHED_RATIO;
 
 /// How far from the cell's temperature a cold machine's housings are reckoned with, K, as the zero does when it finds the
 /// limit that Tc relaxes to.
@@ -138,7 +138,7 @@ fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
 fn required_error(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let required = campaign.required_sigma_eta.filter(|_| campaign.identification.method == Method::Joint)?;
     let found = plan.figures.open_rms_error_eta?;
-    (found > NEARLY_RATIO * required).then(|| {
+    (found > REACHED_RATIO * required).then(|| {
         Concern::warning(
             &["required_sigma_eta"],
             format!(

@@ -3,14 +3,10 @@
 use crate::labels::{contour_levels, krpm, percent};
 use crate::surface::{SUBDIVISIONS, across};
 use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, StructuredGrid, palette};
-use mapper_core::{FittedLine, FittedMap, FittedNode, confidence_interval_95};
+use mapper_core::{CompressorMap, FittedLine, FittedMap, FittedNode, SpeedLine, confidence_interval_95};
 
 const SURGE: palette::Colour = palette::VERMILLION;
 const CHOKE: palette::Colour = palette::PURPLE;
-/// Efficiency below which a curve of efficiency over flow is not drawn, fraction: towards pressure ratio 1 it falls to 0
-/// and would press what was measured into the upper rim.
-const LEAST_ETA_DRAWN: f64 = 0.4;
-
 /// Everything below the points of the panel pressure ratio over flow.
 pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap) {
     add_shade(panel, fitted);
@@ -44,25 +40,53 @@ pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap) {
     panel.add(Line::new(Vec::new(), palette::GREY).width_px(1.0).dash(Dash::Dashed).label("extrapolated"));
 }
 
-/// Fitted efficiency of the measured lines over flow, with its 95 % band.
-pub(crate) fn add_eta(panel: &mut Panel, fitted: &FittedMap) {
+/// Fitted efficiency of the measured lines over flow, with its 95 % band, as far as each line was measured: beyond, towards
+/// pressure ratio 1, it falls to 0 and would press what was measured into the upper rim.
+pub(crate) fn add_eta(panel: &mut Panel, map: &CompressorMap, fitted: &FittedMap) {
     let measured: Vec<&FittedLine> = fitted.lines.iter().filter(|line| line.measured).collect();
     let last = measured.len().saturating_sub(1).max(1) as f64;
-    for (index, line) in measured.iter().enumerate() {
+    for (index, (line, own)) in measured.iter().zip(&map.lines).enumerate() {
         let colour = palette::sequential(index as f64 / last);
-        let drawn: Vec<&FittedNode> = line.nodes.iter().filter(|n| n.eta >= LEAST_ETA_DRAWN).collect();
+        let drawn = between_points(line, own);
         let side = |low: bool| {
-            drawn.iter().filter(|n| !n.extrapolated).map(move |n| {
-                let (below, above) = confidence_interval_95(n.eta, n.eta_standard_error);
-                (n.flow_corrected_kg_s, 100.0 * if low { below } else { above })
+            drawn.iter().map(move |(flow_kg_s, eta, standard_error)| {
+                let (below, above) = confidence_interval_95(*eta, *standard_error);
+                (*flow_kg_s, 100.0 * if low { below } else { above })
             })
         };
         let mut band: Vec<(f64, f64)> = side(true).collect();
         band.extend(side(false).collect::<Vec<_>>().into_iter().rev());
         panel.add(Polygon { opacity: 0.25, ..Polygon::new(band, colour) });
-        let at = |n: &&FittedNode| ((n.flow_corrected_kg_s, 100.0 * n.eta), n.extrapolated);
-        panel.add(Line::new(runs(drawn.iter().map(at), false), colour).width_px(1.2));
+        let curve = drawn.iter().map(|(flow_kg_s, eta, _)| (*flow_kg_s, 100.0 * eta)).collect();
+        panel.add(Line::new(curve, colour).width_px(1.2));
     }
+}
+
+/// Flow, efficiency and its standard error along a line from its lowest measured efficiency towards choke to its smallest
+/// measured flow, where the curve ends between two nodes.
+fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<(f64, f64, f64)> {
+    let points = || own.points.iter().filter(|point| point.eta.is_some());
+    let smallest_kg_s = points().map(|point| point.flow_corrected_kg_s).fold(f64::INFINITY, f64::min);
+    let lowest =
+        points().filter_map(|point| point.identified.eta_low.or(point.eta)).fold(f64::INFINITY, f64::min);
+    let values = |n: &FittedNode| (n.flow_corrected_kg_s, n.eta, n.eta_standard_error);
+    let mut drawn: Vec<(f64, f64, f64)> = Vec::new();
+    // From choke to surge.
+    for (flow_kg_s, eta, standard_error) in line.nodes.iter().map(values) {
+        if flow_kg_s >= smallest_kg_s {
+            if eta >= lowest || !drawn.is_empty() {
+                drawn.push((flow_kg_s, eta, standard_error));
+            }
+            continue;
+        }
+        if let Some(&(before_kg_s, before, error_before)) = drawn.last() {
+            let share = (before_kg_s - smallest_kg_s) / (before_kg_s - flow_kg_s);
+            let at = |a: f64, b: f64| a + share * (b - a);
+            drawn.push((smallest_kg_s, at(before, eta), at(error_before, standard_error)));
+        }
+        break;
+    }
+    drawn
 }
 
 fn place(node: &FittedNode) -> (f64, f64) {

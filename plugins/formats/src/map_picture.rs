@@ -98,7 +98,7 @@ fn efficiency_panel(map: &CompressorMap) -> Panel {
     let mut panel = Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new(name))
         .title("(b) efficiency with its 95 % interval");
     if let Some(fitted) = &map.fitted {
-        fitted_items::add_eta(&mut panel, fitted);
+        fitted_items::add_eta(&mut panel, map, fitted);
     }
     let last = map.lines.len().saturating_sub(1).max(1) as f64;
     for (index, line) in map.lines.iter().enumerate() {

@@ -31,6 +31,13 @@ pub struct ExpectedStep<'a> {
     pub h_w_m2k: f64,
 }
 
+impl ExpectedStep<'_> {
+    /// Where a fit may start.
+    pub(crate) fn estimate(&self) -> Estimate {
+        Estimate { eta: Some((self.eta, None)), h_w_m2k: Some((self.h_w_m2k, None)), ..Estimate::default() }
+    }
+}
+
 /// Identifies noise-free steps together; one result for each step, `None` for a step that is too short. `None` for all where
 /// the fit comes to no end. `as_declared`: whether the errors of a machine that is as declared are worked out too; else they are
 /// those of one that is not.
@@ -78,14 +85,7 @@ pub(crate) fn expected_problem<'a>(
     condensed: &'a [StepRows],
     config: &IdentifyConfig,
 ) -> Option<Problem<'a>> {
-    let alone: Vec<Estimate> = steps
-        .iter()
-        .map(|step| Estimate {
-            eta: Some((step.eta, None)),
-            h_w_m2k: Some((step.h_w_m2k, None)),
-            ..Estimate::default()
-        })
-        .collect();
+    let alone: Vec<Estimate> = steps.iter().map(ExpectedStep::estimate).collect();
     let mut problem = start::problem(condensed, &alone, config)?;
     problem.minimise(ROUGHLY)?;
     start::refine(&mut problem, condensed, config);

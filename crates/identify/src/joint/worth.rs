@@ -6,7 +6,6 @@
 //! the slope each step counts for itself: that makes orders comparable step by step.
 
 use crate::IdentifyConfig;
-use crate::dynamic::Estimate;
 use crate::joint::expected::{ExpectedStep, condensed, expected_problem};
 use crate::joint::explained::Explained;
 use crate::joint::model::Setting;
@@ -35,8 +34,6 @@ pub struct StepWorth {
     covariance: DMatrix<f64>,
     /// By how much the sum of the points' variances falls with the information.
     slope: DMatrix<f64>,
-    /// Sum of the points' variances, fraction^2, and sum over its steps of what each is worth.
-    sums: (f64, f64),
 }
 
 impl StepWorth {
@@ -55,13 +52,10 @@ impl StepWorth {
         }
         let covariance = total.cholesky()?.inverse();
         let mut answers = DMatrix::zeros(covariance.nrows(), covariance.nrows());
-        let mut variance = 0.0;
-        for (own, answer) in &fisher.steps {
+        for (_, answer) in &fisher.steps {
             answers += answer * answer.transpose();
-            variance += own + answer.dot(&(&covariance * answer));
         }
         let slope = &covariance * answers * &covariance;
-        let worth = slope.dot(&fisher.information) - variance;
         let places: Vec<(f64, f64)> = rows.iter().map(|step| step.end.place).collect();
         Some(StepWorth {
             scale: SurfaceScale::of(&places, config.reference)?,
@@ -75,7 +69,6 @@ impl StepWorth {
             surface_sigma: problem.surface_sigma,
             covariance,
             slope,
-            sums: (variance, worth),
         })
     }
 
@@ -83,12 +76,8 @@ impl StepWorth {
     /// sum over the steps of a campaign differs from minus the sum of its variances by what the slope does not know.
     pub fn of(&self, step: &ExpectedStep<'_>) -> Option<f64> {
         let rows = [condensed(0, step, &self.config)?];
-        let alone = Estimate {
-            eta: Some((step.eta, None)),
-            h_w_m2k: Some((step.h_w_m2k, None)),
-            ..Estimate::default()
-        };
-        let mut member = start::member(&rows[0], Some(&alone), &self.scale, self.mean_eta, &self.config);
+        let mut member =
+            start::member(&rows[0], Some(&step.estimate()), &self.scale, self.mean_eta, &self.config);
         if self.setting.with_law {
             member.priors[LN_DEVIATION].sigma = self.law_sigma;
         }
@@ -112,11 +101,5 @@ impl StepWorth {
         let variance = own + answer.dot(&(&self.covariance * answer));
         let worth = self.slope.dot(&fisher.information) - variance;
         worth.is_finite().then_some(worth)
-    }
-
-    /// Sum of the variances of the campaign's points, fraction^2, and the sum of what its steps are worth: no campaign whose
-    /// steps are worth `w` together has a sum of variances below the first plus the second minus `w`.
-    pub fn sums(&self) -> (f64, f64) {
-        self.sums
     }
 }

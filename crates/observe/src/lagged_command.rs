@@ -4,6 +4,9 @@ use crate::table::Table;
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_numerics::minimise::minimise;
 
+/// Change of a command below which it counts as held.
+const HELD_RATIO: f64 = 1e-6;
+
 /// A commanded level from a time on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
@@ -42,8 +45,8 @@ impl LaggedCommand {
         LaggedCommand { levels, at_start_pa, lag_s }
     }
 
-    /// The response to the commands of a recording, which has at least one step: a level for each step, and within steps
-    /// that a runner has marked one for each further command of P3, as a loop that holds the speed gives them.
+    /// The response to the commands of a recording, which has at least one step: a level for each step, and within it
+    /// one for each further command of P3, as a loop that holds the speed gives them.
     pub fn of_recording(recording: &Recording, lag_s: f64) -> Self {
         let levels = recording.steps.iter().flat_map(|step| levels_of_step(recording, step));
         LaggedCommand::new(levels.collect(), lag_s)
@@ -72,13 +75,13 @@ fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Level> {
     let (mut start_s, mut p3_pa) = (step.start_s, step.p3_pa);
     let level = |start_s, p3_pa| Level { start_s, p3_pa, valve_opening_ratio: step.valve_opening_ratio };
     let mut levels = vec![level(start_s, p3_pa)];
-    // In a recording made by others every change of the command is a step of its own.
-    let marked = step.to.is_some();
-    let Some(command) = recording.series.get(&Channel::P3Command).filter(|_| marked) else { return levels };
+    let Some(command) = recording.series.get(&Channel::P3Command) else { return levels };
     let (t_s, values) = command.slice(step.start_s, step.end_s);
     // The first sample may have been taken before the change, and a change lies behind the sample before it.
     for (pair_s, value) in t_s.windows(2).zip(values.iter().skip(1)) {
-        if *value != p3_pa && value.is_finite() && pair_s[0] > start_s {
+        // The read-back of a command that is held moves in its last digits.
+        let moved = p3_pa.is_nan() || (value / p3_pa - 1.0).abs() > HELD_RATIO;
+        if moved && value.is_finite() && pair_s[0] > start_s {
             (start_s, p3_pa) = (pair_s[0], *value);
             levels.push(level(start_s, p3_pa));
         }
@@ -140,15 +143,15 @@ pub fn measured_lag_s(table: &Table, recording: &Recording, noise_sigma: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{OperatingPoint, Series, StepKind};
+    use mapper_core::{Series, StepKind};
 
-    fn step(start_s: f64, end_s: f64, p3_pa: f64, to: Option<OperatingPoint>) -> StepMarker {
+    fn step(start_s: f64, end_s: f64, p3_pa: f64) -> StepMarker {
         let (index, kind) = (0, StepKind::Point);
-        StepMarker { index, kind, start_s, end_s, from: None, to, p3_pa, valve_opening_ratio: 0.7 }
+        StepMarker { index, kind, start_s, end_s, from: None, to: None, p3_pa, valve_opening_ratio: 0.7 }
     }
 
     /// Samples every half second; the loop speaks at 12 s, seen at 12.5 s.
-    fn recording(to: Option<OperatingPoint>) -> Recording {
+    fn recording() -> Recording {
         let t_s: Vec<f64> = (0..=40).map(|i| f64::from(i) * 0.5).collect();
         let command = |t: &f64| match *t {
             t if t <= 10.0 => 150e3,
@@ -158,20 +161,15 @@ mod tests {
         let values = t_s.iter().map(command).collect();
         Recording {
             series: [(Channel::P3Command, Series { t_s, values })].into(),
-            steps: vec![step(0.0, 10.0, 150e3, to), step(10.0, 20.0, 200e3, to)],
+            steps: vec![step(0.0, 10.0, 150e3), step(10.0, 20.0, 200e3)],
             ..Recording::default()
         }
     }
 
     #[test]
     fn what_a_loop_says_within_a_step_is_a_level_of_its_own() {
-        let held = OperatingPoint { speed_rpm: 110e3, valve_opening_ratio: 0.7 };
-        let levels = |to| -> Vec<(f64, f64)> {
-            let command = LaggedCommand::of_recording(&recording(to), 0.3);
-            command.levels().iter().map(|level| (level.start_s, level.p3_pa)).collect()
-        };
-        assert_eq!(levels(Some(held)), [(0.0, 150e3), (10.0, 200e3), (12.0, 201e3)]);
-        // Steps found from the commands have each change already.
-        assert_eq!(levels(None), [(0.0, 150e3), (10.0, 200e3)]);
+        let command = LaggedCommand::of_recording(&recording(), 0.3);
+        let levels: Vec<_> = command.levels().iter().map(|level| (level.start_s, level.p3_pa)).collect();
+        assert_eq!(levels, [(0.0, 150e3), (10.0, 200e3), (12.0, 201e3)]);
     }
 }

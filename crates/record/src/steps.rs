@@ -12,6 +12,13 @@ const JUMP_GAP_S: f64 = 1.0;
 /// Relative change below which a command counts as unchanged: read-back of a held command moves in its last digits.
 const COMMAND_TOLERANCE_RATIO: f64 = 1e-6;
 
+/// P3 that moves by more than this share within [`JUMP_GAP_S`] is a jump: a loop that holds the speed takes longer for less.
+const FAST_RATIO: f64 = 0.01;
+
+/// A chain of slow changes of P3 is a jump by a slow rig where it moves P3 by more than this share, and else the work of a
+/// loop that holds the speed.
+const SLOW_RATIO: f64 = 0.02;
+
 /// A message on `/step`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(crate) struct StepMessage {
@@ -91,19 +98,9 @@ pub(crate) fn steps_from_commands(
     let missing = commands.iter().filter(|(_, command)| command.is_none());
     warnings.extend(missing.map(|(channel, _)| ReadWarning::MissingCommand { channel: *channel }));
 
-    let mut changes_s: Vec<f64> =
-        commands.iter().flat_map(|(_, command)| command.map(change_times_s).unwrap_or_default()).collect();
-    changes_s.sort_by(f64::total_cmp);
     // Start of each step, and the time its commands have taken their values.
     let mut jumps_s: Vec<(f64, f64)> = vec![(first_s, first_s)];
-    let mut last_change_s = f64::NEG_INFINITY;
-    for change_s in changes_s {
-        match jumps_s.last_mut() {
-            Some((_, settled_s)) if change_s - last_change_s <= JUMP_GAP_S => *settled_s = change_s,
-            _ => jumps_s.push((change_s, change_s)),
-        }
-        last_change_s = change_s;
-    }
+    jumps_s.extend(jumps(commands[0].1, commands[1].1));
     let ends_s = jumps_s.iter().skip(1).map(|(start_s, _)| last_before_s(series, *start_s)).chain([last_s]);
     jumps_s
         .iter()
@@ -125,6 +122,40 @@ pub(crate) fn steps_from_commands(
         .collect()
 }
 
+/// Start and end of each jump of the commands, s.
+fn jumps(p3: Option<&Series>, valve: Option<&Series>) -> Vec<(f64, f64)> {
+    let p3_changes = p3.map(changes).unwrap_or_default();
+    let valve_changes = valve.map(changes).unwrap_or_default();
+    let mut times_s: Vec<f64> = p3_changes.iter().chain(&valve_changes).map(|change| change.t_s).collect();
+    times_s.sort_by(f64::total_cmp);
+    let chains = times_s.chunk_by(|before_s, t_s| t_s - before_s <= JUMP_GAP_S);
+    chains.filter_map(|chain| jump_of_chain(chain, &p3_changes, &valve_changes)).collect()
+}
+
+/// The jump in a chain of changes, which what a loop does before it may have joined.
+fn jump_of_chain(chain: &[f64], p3_changes: &[Change], valve_changes: &[Change]) -> Option<(f64, f64)> {
+    let (first_s, last_s) = (*chain.first()?, *chain.last()?);
+    let within = |changes: &[Change], from_s: f64, to_s: f64| -> Vec<Change> {
+        let from = changes.partition_point(|change| change.t_s < from_s);
+        let to = changes.partition_point(|change| change.t_s <= to_s);
+        changes.get(from..to).unwrap_or_default().to_vec()
+    };
+    let moved_ratio = |from_s: f64, to_s: f64| match within(p3_changes, from_s, to_s).as_slice() {
+        [first, .., last] => (last.after / first.before - 1.0).abs(),
+        [only] => (only.after / only.before - 1.0).abs(),
+        [] => 0.0,
+    };
+    // Already in its first moments, or the trim before a jump would count as its start.
+    let fast_over = |from_s: f64, share: f64| {
+        moved_ratio(from_s, from_s + share * JUMP_GAP_S) > share * FAST_RATIO
+    };
+    let fast = chain.iter().copied().find(|t_s| {
+        !within(valve_changes, *t_s, *t_s).is_empty() || fast_over(*t_s, 0.25) && fast_over(*t_s, 1.0)
+    });
+    let slow = (moved_ratio(first_s, last_s) > SLOW_RATIO).then_some(first_s);
+    Some((fast.or(slow)?, last_s))
+}
+
 /// Time of the last measured sample before `change_s`, or `change_s` where nothing was measured before.
 ///
 /// A command is seen at a sample: whether that sample was taken before or after the change, the recording does not say,
@@ -138,21 +169,26 @@ fn last_before_s(series: &BTreeMap<Channel, Series>, change_s: f64) -> f64 {
     measured.filter_map(|(_, series)| before_s(series)).reduce(f64::max).unwrap_or(change_s)
 }
 
-/// Times at which a command takes a new value.
-fn change_times_s(command: &Series) -> Vec<f64> {
+/// A command that takes a new value.
+#[derive(Debug, Clone, Copy)]
+struct Change {
+    t_s: f64,
+    before: f64,
+    after: f64,
+}
+
+fn changes(command: &Series) -> Vec<Change> {
     let mut current: Option<f64> = None;
-    let mut changes_s = Vec::new();
+    let mut changes = Vec::new();
     for (t_s, value) in command.t_s.iter().zip(&command.values).filter(|(_, value)| value.is_finite()) {
-        let changed = current
-            .is_some_and(|held| (value - held).abs() > COMMAND_TOLERANCE_RATIO * value.abs().max(held.abs()));
-        if changed {
-            changes_s.push(*t_s);
-        }
-        if changed || current.is_none() {
+        let before = current
+            .filter(|held| (value - held).abs() > COMMAND_TOLERANCE_RATIO * value.abs().max(held.abs()));
+        changes.extend(before.map(|before| Change { t_s: *t_s, before, after: *value }));
+        if before.is_some() || current.is_none() {
             current = Some(*value);
         }
     }
-    changes_s
+    changes
 }
 
 /// The latest number at or before a time, or the first one there is.
@@ -196,6 +232,30 @@ mod tests {
             steps.iter().map(|s| (s.start_s, s.end_s, s.p3_pa, s.valve_opening_ratio)).collect();
         assert_eq!(found, [(0.0, 20.0, 1.5e5, 0.5), (20.0, 40.0, 2.0e5, 0.7), (40.0, 50.0, 1.5e5, 0.7)]);
         assert!(warnings.is_empty());
+    }
+
+    /// The speed's loop trims P3 each second, up to the next jump, which follows within a second.
+    #[test]
+    fn a_loop_that_trims_the_pressure_makes_no_steps() {
+        let trims = (3..40).map(|second| (f64::from(second), 1.5e5 * (1.0 + 2e-4 * f64::from(second)), 0.5));
+        let mut rows = vec![(0.0, 1.5e5, 0.5)];
+        rows.extend(trims);
+        rows.extend([(39.9, 2.0e5, 0.7), (45.0, 2.001e5, 0.7), (60.0, 2.001e5, 0.7)]);
+        let steps = steps_from_commands(&commands(&rows), Some((0.0, 60.0)), &mut Vec::new());
+        let starts_s: Vec<_> = steps.iter().map(|step| step.start_s).collect();
+        assert_eq!(starts_s, [0.0, 39.9]);
+    }
+
+    #[test]
+    fn a_slow_ramp_is_one_jump() {
+        let ramp = (0..=60).map(|i| (20.0 + 0.5 * f64::from(i), 1.5e5 + 500.0 * f64::from(i), 0.5));
+        let mut rows = vec![(0.0, 1.5e5, 0.5)];
+        rows.extend(ramp);
+        rows.push((90.0, 1.8e5, 0.5));
+        let steps = steps_from_commands(&commands(&rows), Some((0.0, 90.0)), &mut Vec::new());
+        let found: Vec<_> = steps.iter().map(|step| (step.start_s, step.p3_pa)).collect();
+        // The value at 20 s is the one that was held before.
+        assert_eq!(found, [(0.0, 1.5e5), (20.5, 1.8e5)]);
     }
 
     #[test]

@@ -129,8 +129,10 @@ impl Runner<'_> {
                 self.end(*now_s)?;
             }
             marker.end_s = *now_s;
-            self.observer.on_step_end(&marker)?;
+            // What ended the step early outranks a marker that could not be written.
+            let told = self.observer.on_step_end(&marker);
             watched?;
+            told?;
             self.steps.after_step(&marker)?;
             next = self.steps.next_step()?;
             self.pass_notes(*now_s)?;

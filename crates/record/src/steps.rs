@@ -146,9 +146,8 @@ fn jump_of_chain(chain: &[f64], p3_changes: &[Change], valve_changes: &[Change])
         [] => 0.0,
     };
     // Already in its first moments, or the trim before a jump would count as its start.
-    let fast_over = |from_s: f64, share: f64| {
-        moved_ratio(from_s, from_s + share * JUMP_GAP_S) > share * FAST_RATIO
-    };
+    let fast_over =
+        |from_s: f64, share: f64| moved_ratio(from_s, from_s + share * JUMP_GAP_S) > share * FAST_RATIO;
     let fast = chain.iter().copied().find(|t_s| {
         !within(valve_changes, *t_s, *t_s).is_empty() || fast_over(*t_s, 0.25) && fast_over(*t_s, 1.0)
     });

@@ -11,6 +11,7 @@ mod interrupt;
 mod output;
 mod progress;
 mod registry;
+mod results_text;
 mod subcommands;
 
 use clap::Parser;

@@ -18,6 +18,7 @@ mod event;
 mod fitted_map;
 mod identified;
 mod inlet_convection;
+mod joined;
 mod joint_settings;
 mod jump;
 mod limits;
@@ -57,6 +58,7 @@ pub use identified::{
     standard_error_of,
 };
 pub use inlet_convection::InletConvection;
+pub use joined::{StepOrigin, joined};
 pub use joint_settings::{
     ALPHA_AREA_SIGMA_RATIO, Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings,
 };

@@ -9,6 +9,9 @@ const HELD_RATIO: f64 = 1e-6;
 /// P3 within this share of where it ends is held by a loop: the housings' slow warming asks for no more.
 const TRIM_RATIO: f64 = 5e-3;
 
+/// A step that begins later than this after the one before, s, comes from somewhere else.
+const LEADS_ON_S: f64 = 60.0;
+
 fn changed(before: f64, after: f64) -> bool {
     (after - before).abs() > HELD_RATIO * before.abs().max(after.abs())
 }
@@ -23,7 +26,9 @@ pub(crate) fn begins_with_jump(steps: &[StepMarker], position: usize) -> bool {
     }
     let before = position.checked_sub(1).and_then(|before| steps.get(before));
     before.is_some_and(|before| {
-        changed(before.p3_pa, step.p3_pa) || changed(before.valve_opening_ratio, step.valve_opening_ratio)
+        step.start_s - before.end_s <= LEADS_ON_S
+            && (changed(before.p3_pa, step.p3_pa)
+                || changed(before.valve_opening_ratio, step.valve_opening_ratio))
     })
 }
 

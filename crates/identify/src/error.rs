@@ -1,5 +1,6 @@
 //! What stops identification altogether, and what stops a single step.
 
+use crate::needs::names;
 use mapper_core::{Channel, Method};
 
 /// Why a recording cannot be identified.
@@ -7,8 +8,9 @@ use mapper_core::{Channel, Method};
 pub enum IdentifyError {
     /// Channels that the method needs are not there.
     #[error(
-        "the {method} method needs {}; the recording has none of them. Name their fields in the channel map",
-        list(missing)
+        "the {method} method needs {}; the recording has none of them. Name their fields in the channel map{}",
+        names(missing),
+        without_the_housing(missing)
     )]
     MissingChannels {
         /// The method asked for.
@@ -62,7 +64,10 @@ pub enum StepError {
     },
 }
 
-fn list(channels: &[Channel]) -> String {
-    let named: Vec<String> = channels.iter().map(|c| format!("{c} ({})", c.info().description)).collect();
-    named.join(", ")
+/// What is left to do where the housing's temperature alone is missing.
+fn without_the_housing(missing: &[Channel]) -> &'static str {
+    match missing {
+        [Channel::Tc] => "; without it the method `steady` gives conventional efficiencies",
+        _ => "",
+    }
 }

@@ -3,6 +3,7 @@
 use crate::dynamic::Estimate;
 use crate::end_state::{EndState, end_state};
 use crate::findings::{Findings, code};
+use crate::needs::missing;
 use crate::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, dynamic, joint, steady};
 use mapper_core::{
@@ -57,20 +58,9 @@ pub fn identify_recording(
     config: &IdentifyConfig,
 ) -> Result<Identified, IdentifyError> {
     check(config)?;
-    let mut needed = vec![
-        Channel::ShaftSpeed,
-        Channel::CompressorFlow,
-        Channel::P1,
-        Channel::T1,
-        Channel::P2,
-        Channel::T2,
-    ];
-    if config.method != Method::Steady {
-        needed.push(Channel::Tc);
-    }
-    needed.retain(|channel| recording.require(*channel).is_err());
-    if !needed.is_empty() {
-        return Err(IdentifyError::MissingChannels { method: config.method, missing: needed });
+    let missing = missing(recording, config.method);
+    if !missing.is_empty() {
+        return Err(IdentifyError::MissingChannels { method: config.method, missing });
     }
     if recording.steps.is_empty() {
         return Err(IdentifyError::NoSteps);

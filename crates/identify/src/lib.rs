@@ -20,6 +20,7 @@ mod flow_drift;
 mod followed;
 mod identify;
 mod joint;
+mod needs;
 mod nominal_map;
 mod one_fit;
 mod probe;
@@ -44,6 +45,7 @@ pub use joint::worth::StepWorth;
 pub use mapper_core::{
     Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings, SettleBands, WindowRule,
 };
+pub use needs::{method_for, needs};
 pub use nominal_map::doubt_off_the_nominal_map;
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};

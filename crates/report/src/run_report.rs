@@ -12,7 +12,8 @@ use crate::shared_errors::shared_errors_text;
 use crate::surge_text::surge_text;
 use mapper_assemble::RepeatedJump;
 use mapper_campaign::Campaign;
-use mapper_core::{Event, Plan};
+use mapper_campaign::campaign::DisplayUnits;
+use mapper_core::{Event, Method, Plan, ReferenceState};
 use mapper_identify::TwoParameter;
 use mapper_observe::FusedChannel;
 use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};
@@ -20,12 +21,24 @@ use std::fmt::Write;
 
 /// Everything a test report needs.
 pub struct RunReport<'a> {
-    /// Machine, rig, conditions, calibration, display units.
-    pub campaign: &'a Campaign,
-    /// What was run.
-    pub plan: &'a Plan,
+    /// Name of the machine.
+    pub machine: &'a str,
+    /// Rig, conditions, calibration, display units; `None` for a log of which no campaign is known.
+    pub campaign: Option<&'a Campaign>,
+    /// What was run; `None` where nobody planned it here.
+    pub plan: Option<&'a Plan>,
+    /// What the points were identified from; of a run, whose directory has its recording, nothing.
+    pub sources: &'a [ReportSource],
     /// How the run ended, in a sentence.
     pub outcome: &'a str,
+    /// What else is to be known: of the recording, of the method, of the map.
+    pub remarks: &'a [String],
+    /// Reference state of corrected quantities.
+    pub reference: ReferenceState,
+    /// How the points were identified.
+    pub method: Method,
+    /// Declared share of the internal area before compression.
+    pub alpha_area_ratio: f64,
     /// What happened on the way.
     pub events: &'a [Event],
     /// Identified points, repeats included.
@@ -44,6 +57,19 @@ pub struct RunReport<'a> {
     pub has_picture: bool,
 }
 
+/// A recording that points were identified from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReportSource {
+    /// Its file.
+    pub file: String,
+    /// Time of its start in nanoseconds since 1970-01-01 UTC; 0 where it does not say.
+    pub start_time_ns: u64,
+    /// From the first sample to the last, s.
+    pub duration_s: f64,
+    /// Steps that were marked or found in it.
+    pub steps: usize,
+}
+
 /// What came of the search for surge.
 #[derive(Clone, Copy)]
 pub struct SurgeReport<'a> {
@@ -58,9 +84,11 @@ pub struct SurgeReport<'a> {
 /// The report as Markdown.
 pub fn run_report(report: &RunReport<'_>) -> String {
     let RunReport {
+        machine,
         campaign,
-        plan,
+        sources,
         outcome,
+        remarks,
         events,
         points,
         repeats,
@@ -69,22 +97,40 @@ pub fn run_report(report: &RunReport<'_>) -> String {
         score,
         surge,
         has_picture,
+        ..
     } = *report;
+    let units = campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
     // Writing to a String cannot fail, here and below.
-    let mut text = format!("# Compressor map of {}\n\n", campaign.machine.name);
-    if let Some(disagreement) = disagreement_text(points, two_parameter, &campaign.display) {
+    let mut text = format!("# Compressor map of {machine}\n\n");
+    if let Some(disagreement) = disagreement_text(points, two_parameter, &units) {
         let _ = writeln!(text, "**{}**\n", disagreement.trim_end());
     }
     let _ = writeln!(text, "{outcome}\n");
+    for remark in remarks {
+        let _ = writeln!(text, "- {remark}");
+    }
+    if !remarks.is_empty() {
+        text.push('\n');
+    }
     if has_picture {
         text.push_str("![map](map.svg)\n\n");
     }
     let rows: Vec<[String; 2]> =
-        head_rows(campaign, plan).into_iter().map(|(what, value)| [what.to_owned(), value]).collect();
+        head_rows(report).into_iter().map(|(what, value)| [what.to_owned(), value]).collect();
     text.push_str(&markdown::table(&["", ""], Align::Left, &rows));
     text.push('\n');
-    if !campaign.report.calibration.is_empty() {
-        let calibrated = campaign.report.calibration.iter();
+    if !sources.is_empty() {
+        // Steps are counted through all recordings.
+        let before = sources.iter().scan(0, |sum, source| Some(std::mem::replace(sum, *sum + source.steps)));
+        let rows: Vec<[String; 4]> =
+            sources.iter().zip(before).map(|(source, before)| source_row(source, before)).collect();
+        text.push_str(&markdown::table(&["recording", "begins", "lasts", "steps"], Align::Left, &rows));
+        text.push('\n');
+    }
+    if let Some(calibration) =
+        campaign.map(|campaign| &campaign.report.calibration).filter(|days| !days.is_empty())
+    {
+        let calibrated = calibration.iter();
         let rows: Vec<[String; 2]> = calibrated
             .map(|(channel, day)| [format!("{channel} ({})", channel.info().description), day.to_string()])
             .collect();
@@ -101,12 +147,12 @@ pub fn run_report(report: &RunReport<'_>) -> String {
     if let Some(score) = score {
         let _ = writeln!(text, "{}", score_text(score));
     }
-    points_section(&mut text, campaign, points);
+    points_section(&mut text, &units, points);
     if let Some(SurgeReport { marks, remarks, surges }) = surge {
-        let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, surges, &campaign.display));
+        let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, surges, &units));
     }
     if !repeats.is_empty() {
-        let sentences = repeated_jumps_text(repeats, &Display::new(&campaign.display));
+        let sentences = repeated_jumps_text(repeats, &Display::new(&units));
         let _ = write!(
             text,
             "\n## Drift\n\nRepeats are kept out of the map. Fixed offsets cancel in what changes between them.\n\n{}",
@@ -123,13 +169,41 @@ pub fn run_report(report: &RunReport<'_>) -> String {
     text
 }
 
-fn head_rows(campaign: &Campaign, plan: &Plan) -> Vec<(&'static str, String)> {
+fn source_row(source: &ReportSource, before: usize) -> [String; 4] {
+    // Simulated time starts at 0, and so does a log that knows only seconds: that is no date.
+    let begins = i64::try_from(source.start_time_ns / 1_000_000_000).ok().filter(|seconds| *seconds > 0);
+    let begins = begins.and_then(|seconds| jiff::Timestamp::from_second(seconds).ok());
+    [
+        source.file.clone(),
+        begins.map_or_else(|| "not stated".to_owned(), |time| time.to_string()),
+        duration(source.duration_s),
+        match source.steps {
+            0 => "none".to_owned(),
+            steps => format!("{} to {}", before + 1, before + steps),
+        },
+    ]
+}
+
+fn head_rows(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
+    let mut rows = report.campaign.map(campaign_rows).unwrap_or_default();
+    rows.push(("reference state of corrected quantities", report.reference.to_string()));
+    rows.push(("identification", format!("{}, alpha_A = {}", report.method, report.alpha_area_ratio)));
+    if let Some((campaign, plan)) = report.campaign.zip(report.plan) {
+        rows.push(("duration", whole_duration(campaign, plan)));
+        rows.push(("order", plan.objective.clone()));
+        rows.push(("seed", plan.seed.to_string()));
+        rows.push(("campaign SHA-256", plan.made_from.campaign_sha256.clone()));
+        rows.push(("model SHA-256", plan.made_from.model_sha256.clone()));
+    }
+    rows
+}
+
+fn campaign_rows(campaign: &Campaign) -> Vec<(&'static str, String)> {
     let (display, report, boundary) = (Display::new(&campaign.display), &campaign.report, &campaign.boundary);
     let temperature = |k: f64| format!("{} {}", display.temperature(k), campaign.display.temperature);
     let pressure = |pa: f64| format!("{} {}", display.pressure(pa), campaign.display.pressure);
     let follows = || "held at the compressor's outlet temperature".to_owned();
     let missing = || "not stated".to_owned();
-    let reference = &campaign.reference;
     vec![
         ("campaign", campaign.name.clone()),
         ("serial number", campaign.machine.serial_number.clone().unwrap_or_else(missing)),
@@ -151,19 +225,6 @@ fn head_rows(campaign: &Campaign, plan: &Plan) -> Vec<(&'static str, String)> {
             "oil temperature",
             if campaign.follow_outlet.oil { follows() } else { temperature(boundary.oil_temperature_k) },
         ),
-        ("reference state of corrected quantities", reference.to_string()),
-        (
-            "identification",
-            format!(
-                "{}, alpha_A = {}",
-                campaign.identification.method, campaign.identification.alpha_area_ratio
-            ),
-        ),
-        ("duration", whole_duration(campaign, plan)),
-        ("order", plan.objective.clone()),
-        ("seed", plan.seed.to_string()),
-        ("campaign SHA-256", plan.made_from.campaign_sha256.clone()),
-        ("model SHA-256", plan.made_from.model_sha256.clone()),
     ]
 }
 
@@ -179,12 +240,12 @@ fn whole_duration(campaign: &Campaign, plan: &Plan) -> String {
     }
 }
 
-fn points_section(text: &mut String, campaign: &Campaign, points: &[ScoredPoint]) {
-    let display = Display::new(&campaign.display);
+fn points_section(text: &mut String, units: &DisplayUnits, points: &[ScoredPoint]) {
+    let display = Display::new(units);
     text.push_str(
         "## Points\n\nIntervals are 95 %: noise, declared sensor offsets, and what moving flow is estimated to cost the method.\n\n",
     );
-    if let Some(shared) = shared_errors_text(points.iter().map(|scored| &scored.point), &campaign.display) {
+    if let Some(shared) = shared_errors_text(points.iter().map(|scored| &scored.point), units) {
         let _ = writeln!(text, "{shared}\n");
     }
     let heads = [

@@ -1,10 +1,10 @@
 //! What a campaign declares, as identification and diagnosis need it.
 
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, DeclaredUncertainty, WindowRule};
+use mapper_core::{ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Method, ReferenceState, WindowRule};
 use mapper_identify::{IdentifyConfig, PressureTap};
 use mapper_observe::declared_uncertainties;
-use mapper_record::ChannelMap;
+use mapper_record::{ChannelMap, MachineConstants};
 use std::collections::BTreeMap;
 
 /// How the recordings of this campaign are identified.
@@ -55,5 +55,34 @@ pub fn identification_with(campaign: &Campaign, map: &ChannelMap) -> IdentifyCon
             end_s: window.end_s,
         }),
         ..identification
+    }
+}
+
+/// How a recording is identified of which nothing is known but what its channel map says. A pipe diameter stands there for
+/// a static tap alone.
+pub(crate) fn identification_of(machine: &MachineConstants, map: &ChannelMap) -> IdentifyConfig {
+    let usual = IdentifyConfig::default();
+    let tap = |diameter_m: Option<f64>| {
+        diameter_m.map_or(PressureTap::Total, |pipe_diameter_m| PressureTap::Static { pipe_diameter_m })
+    };
+    let (inlet_m, outlet_m) = (machine.compressor_inlet_diameter_m, machine.compressor_outlet_diameter_m);
+    IdentifyConfig {
+        method: Method::Joint,
+        alpha_area_ratio: machine.alpha_area_ratio,
+        alpha_area_sigma_ratio: ALPHA_AREA_SIGMA_RATIO,
+        internal_area_m2: machine.compressor_internal_area_m2,
+        probe_diameter_m: machine.t2_probe_diameter_m,
+        inlet_tap: tap(inlet_m),
+        outlet_tap: tap(outlet_m),
+        inlet_diameter_m: inlet_m.unwrap_or(usual.inlet_diameter_m),
+        outlet_diameter_m: outlet_m.unwrap_or(usual.outlet_diameter_m),
+        reference: map.reference.unwrap_or(ReferenceState::SAE),
+        window: map.window.map_or_else(WindowRule::default, |window| WindowRule::Fixed {
+            start_s: window.start_s,
+            end_s: window.end_s,
+        }),
+        declared: map.sensors.clone(),
+        noise_colour: map.noise_colour.unwrap_or_default(),
+        ..usual
     }
 }

@@ -55,6 +55,22 @@ pub enum SessionError {
         /// The run.
         key: String,
     },
+    /// Nothing to identify was given.
+    #[error("no recording was given; name a run directory or a recording")]
+    NoRecording,
+    /// Recordings that cannot be identified together.
+    #[error(
+        "{} and {} cannot be identified together: their campaigns have another {differs}; identify each by itself, or give the campaign \
+         that holds for all with `--campaign`", .first.display(), .other.display()
+    )]
+    NotTogether {
+        /// The first recording.
+        first: PathBuf,
+        /// The one that differs from it.
+        other: PathBuf,
+        /// What differs.
+        differs: &'static str,
+    },
     /// A method that does not exist.
     #[error("`{name}` is not a method: {source}")]
     Method {
@@ -256,6 +272,8 @@ impl SessionError {
             | E::Nightly(NightlyError::Mistakes(_))
             | E::NightlySequence { .. }
             | E::NightlyTwice { .. }
+            | E::NoRecording
+            | E::NotTogether { .. }
             | E::Method { .. }
             | E::Model(_)
             | E::Backend(_)

@@ -1,14 +1,14 @@
 //! From a recording to identified points beside their truth, where there is any: one way for all who need it.
 
-use crate::declared::identification_with;
+use crate::declared::{identification_of, identification_with};
 use crate::fusing::fused;
 use crate::recorded::{Recorded, same_machine};
 use crate::surge::marks_of;
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::{Campaign, nominal_model};
-use mapper_core::{ALPHA_AREA_SIGMA_RATIO, IdentifiedPoint, Method, Recording, ReferenceState, ThermalModel};
+use mapper_core::{IdentifiedPoint, Method, Recording, StepMarker, StepOrigin, ThermalModel, joined};
 use mapper_identify::{
-    IdentifyConfig, TwoParameter, WindowRule, ZeroOutcome, doubt_off_the_nominal_map, identify_recording,
+    IdentifyConfig, TwoParameter, ZeroOutcome, doubt_off_the_nominal_map, identify_recording, method_for,
 };
 use mapper_observe::FusedChannel;
 use mapper_record::ChannelMap;
@@ -16,13 +16,15 @@ use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};
 use serde::Serialize;
 
 use mapper_surge::SurgeMarks;
-use std::path::Path;
+use std::path::PathBuf;
 
 /// What a recording gives.
 #[derive(Debug)]
 pub struct Identified {
-    /// The recording as it was identified: several sensors are fused, the isothermal zero is subtracted.
+    /// The recording as it was identified: several are joined, several sensors are fused, the isothermal zero is subtracted.
     pub recording: Recording,
+    /// Where each step of it comes from.
+    pub origins: Vec<StepOrigin>,
     /// How it was identified.
     pub config: IdentifyConfig,
     /// The points, with the truth where the recording holds it.
@@ -39,6 +41,8 @@ pub struct Identified {
     pub score: Option<ScoreSummary>,
     /// Surge-side ends that were sought; `None` where none were.
     pub surge: Option<SoughtSurge>,
+    /// What else is to be known of it.
+    pub remarks: Vec<String>,
 }
 
 /// What came of the search for surge.
@@ -60,60 +64,56 @@ impl Identified {
 }
 
 impl Session<'_> {
-    /// Identifies all steps of a recording. Machine, sensors and window come from its campaign, or else from the channel map.
+    /// Identifies all steps of one recording, or of several of the same machine together. Machine, sensors and window come from
+    /// the campaign of the first, or else from the channel map; the zero is that of the first, subtracted from all.
     ///
     /// # Errors
-    /// [`SessionError::MachineUnknown`] where neither is known, [`SessionError::OtherMachine`] where the recording is not of the
-    /// campaign's machine, [`SessionError::Identify`] where the recording lacks what
-    /// the method needs.
+    /// [`SessionError::NoRecording`] where there is none, [`SessionError::MachineUnknown`] where neither campaign nor channel map
+    /// says what machine it is, [`SessionError::OtherMachine`] where a recording is not of the campaign's machine,
+    /// [`SessionError::NotTogether`] where the recordings' own campaigns differ, [`SessionError::Identify`] where the recording
+    /// lacks what the method needs.
     pub fn identify(
         &self,
-        recorded: Recorded,
+        recorded: Vec<Recorded>,
         map: &ChannelMap,
         method: Option<Method>,
     ) -> Result<Identified, SessionError> {
-        if let Some(campaign) = &recorded.campaign {
-            same_machine(&recorded, campaign)?;
-        }
-        let mut config = match (&recorded.campaign, &map.machine) {
+        let campaign = same_campaign(&recorded)?.cloned();
+        let campaign = campaign.as_ref();
+        let mut config = match (campaign, &map.machine) {
             (Some(campaign), _) => identification_with(campaign, map),
-            (None, Some(machine)) => IdentifyConfig {
-                method: Method::Joint,
-                alpha_area_ratio: machine.alpha_area_ratio,
-                alpha_area_sigma_ratio: ALPHA_AREA_SIGMA_RATIO,
-                internal_area_m2: machine.compressor_internal_area_m2,
-                reference: map.reference.unwrap_or(ReferenceState::SAE),
-                window: map.window.map_or_else(WindowRule::default, |window| WindowRule::Fixed {
-                    start_s: window.start_s,
-                    end_s: window.end_s,
-                }),
-                declared: map.sensors.clone(),
-                noise_colour: map.noise_colour.unwrap_or_default(),
-                ..IdentifyConfig::default()
-            },
+            (None, Some(machine)) => identification_of(machine, map),
             (None, None) => {
                 return Err(SessionError::MachineUnknown {
                     remedy: "Give `--campaign FILE`, or `machine:` with `compressor_internal_area` in the channel map",
                 });
             }
         };
-        config.method = method.unwrap_or(config.method);
-        let soak = recorded.campaign.as_ref().and_then(|campaign| campaign.zero);
-        let fused = fused(vec![recorded.read.recording], config, recorded.campaign.as_ref(), map);
-        let recording = fused.recordings.into_iter().next().unwrap_or_default();
+        let mut remarks = Vec::new();
+        config.method = method.unwrap_or_else(|| {
+            let usual = config.method;
+            let found = recorded.iter().map(|one| method_for(&one.read.recording, usual));
+            let (method, why) =
+                found.reduce(|a, b| if a.1.is_some() { a } else { b }).unwrap_or((usual, None));
+            remarks.extend(why);
+            method
+        });
+        let soak = campaign.and_then(|campaign| campaign.zero);
+        let (mut recordings, mut sources) = (Vec::new(), Vec::new());
+        for Recorded { path, read, approaches, .. } in recorded {
+            sources.push(Source { path, steps: read.recording.steps.clone(), approaches });
+            recordings.push(read.recording);
+        }
+        let fused = fused(recordings, config, campaign, map);
         let sensors = fused.channels.into_iter().next().unwrap_or_default();
-        let zero = ZeroOutcome::of(&recording, &fused.config, soak);
-        let surge = match recorded.approaches {
-            Some(approaches) => {
-                let (approaches, config) = zero.take_off(approaches, fused.config.clone());
-                Some(sought(&recorded.path, &approaches, recorded.campaign.as_ref(), &config)?)
-            }
-            None => None,
-        };
-        let (recording, config) = zero.take_off(recording, fused.config);
+        let first = fused.recordings.first().ok_or(SessionError::NoRecording)?;
+        let zero = ZeroOutcome::of(first, &fused.config, soak);
+        let (_, config) = zero.take_off(Recording::default(), fused.config.clone());
+        let off = |recording: Recording| zero.take_off(recording, fused.config.clone()).0;
+        let (recording, origins) = joined(fused.recordings.into_iter().map(off).collect());
         let found = identify_recording(&recording, &config)?;
         let mut points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
-        if let Some(campaign) = recorded.campaign.as_ref().filter(|campaign| campaign.tolerances_declared) {
+        if let Some(campaign) = campaign.filter(|campaign| campaign.tolerances_declared) {
             let model = nominal_model(campaign)?;
             doubt_off_the_nominal_map(
                 &mut points,
@@ -125,10 +125,12 @@ impl Session<'_> {
         for point in &points {
             self.tell(SessionEvent::PointIdentified(Box::new(point.clone())));
         }
-        let points = mapper_record::score::score(&recorded.path, &recording.steps, points)?;
+        let surge = sought(&sources, off, campaign, &config)?;
+        let points = scored(&sources, &recording, &origins, points)?;
         let score = mapper_record::score::summarise(&points);
         Ok(Identified {
             recording,
+            origins,
             config,
             points,
             thermal: found.thermal,
@@ -137,18 +139,89 @@ impl Session<'_> {
             zero,
             score,
             surge,
+            remarks,
         })
     }
 }
 
-/// The marks of the approaches beside their truth.
+/// What is kept of each recording beside what is identified.
+struct Source {
+    path: PathBuf,
+    steps: Vec<StepMarker>,
+    approaches: Option<Recording>,
+}
+
+/// The campaign that all recordings belong to; `None` where none names one.
+fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionError> {
+    let first = recorded.first().ok_or(SessionError::NoRecording)?;
+    let Some(campaign) = &first.campaign else { return Ok(None) };
+    for other in recorded {
+        same_machine(other, campaign)?;
+        let Some(theirs) = &other.campaign else { continue };
+        let differs = if theirs.machine != campaign.machine {
+            "machine"
+        } else if theirs.sensors != campaign.sensors {
+            "sensors"
+        } else if theirs.reference != campaign.reference {
+            "reference state"
+        } else {
+            continue;
+        };
+        let (first, other) = (first.path.clone(), other.path.clone());
+        return Err(SessionError::NotTogether { first, other, differs });
+    }
+    Ok(Some(campaign))
+}
+
+/// The points beside their truth, each from the recording that it comes from.
+fn scored(
+    sources: &[Source],
+    recording: &Recording,
+    origins: &[StepOrigin],
+    points: Vec<IdentifiedPoint>,
+) -> Result<Vec<ScoredPoint>, SessionError> {
+    let origin_of = |index: usize| {
+        let position = recording.steps.iter().position(|step| step.index == index)?;
+        origins.get(position)
+    };
+    let mut scored: Vec<(usize, ScoredPoint)> = Vec::new();
+    for (number, source) in sources.iter().enumerate() {
+        let theirs = points.iter().enumerate().filter_map(|(place, point)| {
+            let origin = origin_of(point.step).filter(|origin| origin.recording == number)?;
+            Some((place, point.step, IdentifiedPoint { step: origin.step, ..point.clone() }))
+        });
+        let (places, alone): (Vec<(usize, usize)>, Vec<IdentifiedPoint>) =
+            theirs.map(|(place, step, point)| ((place, step), point)).unzip();
+        let found = mapper_record::score::score(&source.path, &source.steps, alone)?;
+        scored.extend(places.into_iter().zip(found).map(|((place, step), mut found)| {
+            found.point.step = step;
+            (place, found)
+        }));
+    }
+    scored.sort_by_key(|(place, _)| *place);
+    Ok(scored.into_iter().map(|(_, found)| found).collect())
+}
+
+/// The marks of all approaches beside their truth; `None` where surge was not sought.
 fn sought(
-    path: &Path,
-    approaches: &Recording,
+    sources: &[Source],
+    off: impl Fn(Recording) -> Recording,
     campaign: Option<&Campaign>,
     config: &IdentifyConfig,
-) -> Result<SoughtSurge, SessionError> {
-    let SurgeMarks { marks, remarks, surges } = marks_of(approaches, campaign, config);
-    let marks = mapper_record::score::score_marks(path, approaches, config.reference, marks)?;
-    Ok(SoughtSurge { marks, remarks, surges })
+) -> Result<Option<SoughtSurge>, SessionError> {
+    let mut all: Option<SoughtSurge> = None;
+    for Source { path, approaches, .. } in sources {
+        let Some(approaches) = approaches.clone().map(&off) else { continue };
+        let SurgeMarks { marks, remarks, surges } = marks_of(&approaches, campaign, config);
+        let marks = mapper_record::score::score_marks(path, &approaches, config.reference, marks)?;
+        let together =
+            all.get_or_insert_with(|| SoughtSurge { marks: Vec::new(), remarks: Vec::new(), surges: 0 });
+        together.marks.extend(marks);
+        together.remarks.extend(remarks);
+        together.surges += surges;
+    }
+    if let Some(all) = &mut all {
+        all.marks.sort_by(|a, b| a.mark.speed_corrected_rpm.total_cmp(&b.mark.speed_corrected_rpm));
+    }
+    Ok(all)
 }

@@ -60,7 +60,7 @@ impl NightlyRun {
         }
         let read = read_recording(&recording, &ChannelMap::native(), &ReadOptions::default())?;
         let recorded = Recorded::of(recording, read, Some(self.campaign.clone()));
-        let identified = session.identify(recorded, &ChannelMap::native(), None)?;
+        let identified = session.identify(vec![recorded], &ChannelMap::native(), None)?;
         row.figures = figures(&identified.points, &plan);
         row.points = point_rows(&identified.points);
         Ok(())

@@ -1,4 +1,4 @@
-//! What a run gives: points, map, report; data for whoever asks, files in its directory.
+//! What a run or a recording gives: points, map, report; data for whoever asks, files in its directory.
 
 use crate::files::{json_text, write_new};
 use crate::identified::{Identified, SoughtSurge};
@@ -6,12 +6,13 @@ use crate::recorded::Recorded;
 use crate::{Registry, Session, SessionError, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble, repeated_jumps};
 use mapper_campaign::Campaign;
-use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Plan, ThermalModel};
+use mapper_campaign::campaign::Outputs;
+use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Method, Plan, ThermalModel};
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_observe::FusedChannel;
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_report::{RunReport, SurgeReport, run_report};
+use mapper_report::{ReportSource, RunReport, SurgeReport, run_report};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -22,8 +23,11 @@ use std::path::{Path, PathBuf};
 pub struct Results {
     /// The run's directory.
     pub run: PathBuf,
-    /// Its recording.
+    /// Its recording, or the first of those that were identified together.
     pub recording: PathBuf,
+    /// The others.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub further_recordings: Vec<PathBuf>,
     /// Identified points, repeats included.
     pub points: Vec<ScoredPoint>,
     /// Files of the map by format.
@@ -53,8 +57,19 @@ pub struct Results {
     pub compressor_map: Option<CompressorMap>,
 }
 
+/// What is known of where recordings come from.
+struct Told<'a> {
+    campaign: Option<&'a Campaign>,
+    plan: Option<&'a Plan>,
+    /// How it ended, or how the points were made.
+    outcome: &'a str,
+    machine: &'a str,
+    formats: Vec<&'a str>,
+    sources: &'a [ReportSource],
+}
+
 impl Session<'_> {
-    /// Reads the recording back, identifies, assembles, exports and reports, all into `directory`.
+    /// Reads the recording of a run back, identifies, assembles, exports and reports, all into `directory`.
     ///
     /// # Errors
     /// [`SessionError`] where the recording cannot be identified or a file cannot be written. A map that cannot be
@@ -68,24 +83,77 @@ impl Session<'_> {
         recording: &Path,
     ) -> Result<Results, SessionError> {
         let read = read_recording(recording, &ChannelMap::native(), &ReadOptions::default())?;
-        let mut remarks: Vec<String> = read.warnings.iter().map(ToString::to_string).collect();
+        let remarks: Vec<String> = read.warnings.iter().map(ToString::to_string).collect();
         let recorded = Recorded::of(recording.to_owned(), read, Some(campaign.clone()));
-        let identified = self.identify(recorded, &ChannelMap::native(), None)?;
-        let compressor_map = compressor_map(campaign, &identified, &mut remarks);
+        let identified = self.identify(vec![recorded], &ChannelMap::native(), None)?;
+        let formats = campaign.outputs.formats.iter().map(|format| format.name()).collect();
+        let machine = &campaign.machine.name;
+        let told =
+            Told { campaign: Some(campaign), plan: Some(plan), outcome, machine, formats, sources: &[] };
+        self.written(&told, identified, (recording.to_owned(), Vec::new()), remarks, directory)
+    }
+
+    /// Identifies recordings and leaves what a run leaves, points, map and report, in `directory`, which is made where it is
+    /// missing. Nothing that is there is replaced: where it has results already, nothing is identified.
+    ///
+    /// # Errors
+    /// As [`Session::identify`]; [`SessionError::File`] where a file is there or cannot be written.
+    pub fn identify_into(
+        &self,
+        recorded: Vec<Recorded>,
+        map: &ChannelMap,
+        method: Option<Method>,
+        directory: &Path,
+    ) -> Result<Results, SessionError> {
+        for name in [run_directory::POINTS, run_directory::REPORT] {
+            let path = directory.join(name);
+            if path.exists() {
+                return Err(SessionError::file("write", &path)(std::io::ErrorKind::AlreadyExists.into()));
+            }
+        }
+        let campaign = recorded.first().and_then(|first| first.campaign.clone());
+        let plan: Option<Plan> = match recorded.as_slice() {
+            [only] => only.read.plan_json.as_deref().and_then(|json| serde_json::from_slice(json).ok()),
+            _ => None,
+        };
+        let sources: Vec<ReportSource> = recorded.iter().map(source).collect();
+        let remarks = recorded.iter().flat_map(|one| remarks_of(one, recorded.len() > 1)).collect();
+        let mut files = recorded.iter().map(|one| one.path.clone());
+        let first = files.next().ok_or(SessionError::NoRecording)?;
+        let further: Vec<PathBuf> = files.collect();
+        let named = first.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let identified = self.identify(recorded, map, method)?;
+        let usual = Outputs::default();
+        let outputs = campaign.as_ref().map_or(&usual, |campaign| &campaign.outputs);
+        let told = Told {
+            campaign: campaign.as_ref(),
+            plan: plan.as_ref(),
+            outcome: &format!("Identified by the method `{}`.", identified.config.method),
+            machine: campaign.as_ref().map_or(&named, |campaign| &campaign.machine.name),
+            formats: outputs.formats.iter().map(|format| format.name()).collect(),
+            sources: &sources,
+        };
+        std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
+        self.written(&told, identified, (first, further), remarks, directory)
+    }
+
+    /// The files of what was identified.
+    fn written(
+        &self,
+        told: &Told<'_>,
+        identified: Identified,
+        (recording_file, further_recordings): (PathBuf, Vec<PathBuf>),
+        mut remarks: Vec<String>,
+        directory: &Path,
+    ) -> Result<Results, SessionError> {
+        remarks.extend(identified.remarks.iter().cloned());
+        let compressor_map = compressor_map(told.machine, &identified, &mut remarks);
         let map = match &compressor_map {
-            Some(map) => export(self.registry, campaign, map, directory, &mut remarks)?,
+            Some(map) => export(self.registry, &told.formats, map, directory, &mut remarks)?,
             None => BTreeMap::new(),
         };
         let Identified {
-            recording: recorded,
-            config,
-            points,
-            thermal,
-            two_parameter,
-            sensors,
-            zero,
-            score,
-            surge,
+            recording, config, points, thermal, two_parameter, sensors, zero, score, surge, ..
         } = identified;
         let mut points_file = json!({"reference": config.reference, "points": points, "thermal": thermal, "two_parameter": two_parameter, "zero": zero});
         if !sensors.is_empty() {
@@ -97,12 +165,18 @@ impl Session<'_> {
         write_new(&directory.join(run_directory::POINTS), json_text(&points_file)?.as_bytes())?;
         let report = directory.join(run_directory::REPORT);
         let alone: Vec<IdentifiedPoint> = points.iter().map(|scored| scored.point.clone()).collect();
-        let repeats = repeated_jumps(&recorded.steps, &alone);
+        let repeats = repeated_jumps(&recording.steps, &alone);
         let text = run_report(&RunReport {
-            campaign,
-            plan,
-            outcome,
-            events: &recorded.events,
+            machine: told.machine,
+            campaign: told.campaign,
+            plan: told.plan,
+            sources: told.sources,
+            outcome: told.outcome,
+            remarks: &remarks,
+            reference: config.reference,
+            method: config.method,
+            alpha_area_ratio: config.alpha_area_ratio,
+            events: &recording.events,
             points: &points,
             repeats: &repeats,
             two_parameter: &two_parameter,
@@ -118,7 +192,8 @@ impl Session<'_> {
         write_new(&report, text.as_bytes())?;
         Ok(Results {
             run: directory.to_owned(),
-            recording: recording.to_owned(),
+            recording: recording_file,
+            further_recordings,
             points,
             map,
             report,
@@ -135,9 +210,32 @@ impl Session<'_> {
     }
 }
 
+/// A recording as a report names it.
+fn source(recorded: &Recorded) -> ReportSource {
+    let recording = &recorded.read.recording;
+    let spans = recording.series.values().filter_map(|series| series.t_s.first().zip(series.t_s.last()));
+    let (first_s, last_s) =
+        spans.fold((f64::INFINITY, 0.0f64), |(first, last), (a, b)| (first.min(*a), last.max(*b)));
+    ReportSource {
+        file: recorded.path.display().to_string(),
+        start_time_ns: recorded.read.start_time_ns,
+        duration_s: (last_s - first_s).max(0.0),
+        steps: recording.steps.len(),
+    }
+}
+
+/// What was wrong with a file; its name in front where there are several.
+fn remarks_of(recorded: &Recorded, several: bool) -> Vec<String> {
+    let named = |warning: &mapper_record::ReadWarning| match several {
+        true => format!("{}: {warning}", recorded.path.display()),
+        false => warning.to_string(),
+    };
+    recorded.read.warnings.iter().map(named).collect()
+}
+
 /// The map of all points that have a place on it, with a surface through it where it has enough of them.
 fn compressor_map(
-    campaign: &Campaign,
+    machine: &str,
     identified: &Identified,
     remarks: &mut Vec<String>,
 ) -> Option<CompressorMap> {
@@ -148,7 +246,7 @@ fn compressor_map(
     };
     let placed: Vec<IdentifiedPoint> = identified.points_alone().filter(has_place).cloned().collect();
     let config = &identified.config;
-    let map = assemble(&placed, &campaign.machine.name, config.reference, config.method, Grouping::default())
+    let map = assemble(&placed, machine, config.reference, config.method, Grouping::default())
         .map_err(|error| remarks.push(format!("there is no map: {error}")))
         .ok()?;
     let marks = identified.surge.iter().flat_map(|surge| surge.marks.iter().map(|scored| scored.mark));
@@ -162,16 +260,16 @@ fn compressor_map(
     }
 }
 
-/// Writes the map in every format that the campaign names.
+/// Writes the map in these formats.
 fn export(
     registry: &Registry,
-    campaign: &Campaign,
+    formats: &[&str],
     map: &CompressorMap,
     directory: &Path,
     remarks: &mut Vec<String>,
 ) -> Result<BTreeMap<String, PathBuf>, SessionError> {
     let mut files = BTreeMap::new();
-    for name in campaign.outputs.formats.iter().map(|format| format.name()) {
+    for name in formats.iter().copied() {
         let format = registry.written_format(name)?;
         let bytes = match format.write(map) {
             Ok(bytes) => bytes,

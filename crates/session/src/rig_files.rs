@@ -30,9 +30,14 @@ impl Session<'_> {
     ///
     /// # Errors
     /// [`SessionError`] where the machine is not known, the recording cannot be identified or a file cannot be written.
-    pub fn rig_files(&self, recorded: Recorded, out: &Path) -> Result<RigFiles, SessionError> {
+    pub fn rig_files(
+        &self,
+        recorded: Recorded,
+        map: &ChannelMap,
+        out: &Path,
+    ) -> Result<RigFiles, SessionError> {
         let campaign = recorded.known("Give `--campaign FILE`")?.clone();
-        let identified = self.identify(recorded, &ChannelMap::native(), None)?;
+        let identified = self.identify(vec![recorded], map, None)?;
         let points: Vec<IdentifiedPoint> = identified.points_alone().cloned().collect();
         let (machine, params) = (&campaign.machine.name, &campaign.machine.params);
         let thermal = ThermalExport { machine, params, found: identified.thermal.as_ref() };

@@ -7,15 +7,18 @@ use mapper_core::{
 };
 use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::nominal_rig::NominalRig;
-use mapper_record::{ChannelMap, ReadOptions, RecordError, read_recording};
+use mapper_record::{ChannelMap, ChannelMapError, ReadOptions, RecordError, read_recording};
 use std::path::Path;
 
 /// Name of the backend, in campaigns and descriptions.
 pub const NAME: &str = "replay";
 
 /// Replay as campaigns ask for it.
-pub const PLUGIN: BackendPlugin =
-    BackendPlugin { name: NAME, summary: "plays a recording back: {recording: FILE}", make };
+pub const PLUGIN: BackendPlugin = BackendPlugin {
+    name: NAME,
+    summary: "plays a recording back: {recording: FILE, channels: MAP.yaml}, the latter for a log of another program",
+    make,
+};
 
 /// Why a recording cannot be played, or why the play is over.
 #[derive(Debug, thiserror::Error)]
@@ -26,21 +29,26 @@ pub enum ReplayError {
     /// The file cannot be read.
     #[error(transparent)]
     Unreadable(#[from] RecordError),
+    /// The channel map cannot be read, or has mistakes.
+    #[error(transparent)]
+    ChannelMap(#[from] ChannelMapError),
     /// More was asked for than was recorded.
     #[error("the recording being replayed has ended")]
     Over,
 }
 
 fn make(_: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {
-    let wrong = |problem: ReplayError| BackendError::Settings {
+    let wrong = |key: &str, problem: ReplayError| BackendError::Settings {
         backend: NAME.to_owned(),
-        path: "recording".to_owned(),
+        path: key.to_owned(),
         source: Box::new(problem),
     };
-    let path = settings.get("recording").and_then(|value| value.as_str());
-    let path = Path::new(path.ok_or_else(|| wrong(ReplayError::NoRecording))?);
-    let report = read_recording(path, &ChannelMap::native(), &ReadOptions::default())
-        .map_err(|error| wrong(error.into()))?;
+    let path = |key: &str| settings.get(key).and_then(|value| value.as_str()).map(Path::new);
+    let recording = path("recording").ok_or_else(|| wrong("recording", ReplayError::NoRecording))?;
+    let map = path("channels").map(ChannelMap::load).transpose();
+    let map = map.map_err(|error| wrong("channels", error.into()))?.unwrap_or_else(ChannelMap::native);
+    let report = read_recording(recording, &map, &ReadOptions::default())
+        .map_err(|error| wrong("recording", error.into()))?;
     Ok(Box::new(ReplayBackend::new(&report.recording)))
 }
 

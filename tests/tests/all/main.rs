@@ -28,4 +28,5 @@ mod sizes;
 mod sources;
 mod speed_lines;
 mod surge;
+mod together;
 mod zero;

@@ -1,7 +1,8 @@
-//! `mapper identify`: from a recording to points, without a rig.
+//! `mapper identify`: from recordings to points and a map, without a rig.
 
 use crate::failure::Failure;
 use crate::given::{channel_map, given_campaign};
+use crate::results_text::results_text;
 use crate::{output, registry};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
@@ -12,11 +13,15 @@ use mapper_session::{Recorded, Session};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Identify efficiency and heat transfer from a run directory or any MCAP recording
+/// Identify efficiency and heat transfer from run directories or any MCAP recordings
 #[derive(Debug, Args)]
 pub struct Identify {
-    /// Run directory, or MCAP file
-    pub recording: PathBuf,
+    /// Run directory, or MCAP file; several of the same machine are identified together, each point once
+    #[arg(required = true)]
+    pub recordings: Vec<PathBuf>,
+    /// Leave what a run leaves (points, map, pictures, report) in this directory; existing files are not replaced
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
     #[arg(long, value_name = "FILE")]
     pub channels: Option<PathBuf>,
@@ -32,16 +37,28 @@ pub struct Identify {
 }
 
 impl Identify {
-    /// Identifies all steps of a recording.
+    /// Identifies all steps of the recordings.
     pub fn run(&self) -> Result<(), Failure> {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
-        let recorded = Recorded::read(&self.recording, &map, given.as_ref())?;
-        let path = recorded.path.clone();
-        let warnings: Vec<String> = recorded.read.warnings.iter().map(ToString::to_string).collect();
-        let display = recorded.campaign.as_ref().map(|campaign| campaign.display.clone()).unwrap_or_default();
+        let read = |path: &PathBuf| Recorded::read(path, &map, given.as_ref());
+        let recorded = self.recordings.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let path = recorded.first().map(|first| first.path.clone());
+        let warnings: Vec<String> =
+            recorded.iter().flat_map(|one| &one.read.warnings).map(ToString::to_string).collect();
+        let campaign = recorded.first().and_then(|first| first.campaign.as_ref());
+        let display = campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
+        let method = self.method.map(Method::from);
         let registry = registry::registry();
-        let found = Session::new(&registry).identify(recorded, &map, self.method.map(Method::from))?;
+        let session = Session::new(&registry);
+        if let Some(directory) = &self.out {
+            let results = session.identify_into(recorded, &map, method, directory)?;
+            return match self.json {
+                true => output::print_json(&results),
+                false => output::print(&results_text(&display, &results)),
+            };
+        }
+        let found = session.identify(recorded, &map, method)?;
         if self.json {
             let mut value = json!({
                 "recording": path,
@@ -52,6 +69,7 @@ impl Identify {
                 "zero": found.zero,
                 "score": found.score,
                 "recording_warnings": warnings,
+                "remarks": found.remarks,
             });
             if !found.sensors.is_empty() {
                 value["sensors"] = json!(found.sensors);
@@ -62,7 +80,8 @@ impl Identify {
             return output::print_json(&value);
         }
         let disagreement = disagreement_text(&found.points, &found.two_parameter, &display);
-        let mut text = disagreement.unwrap_or_default();
+        let mut text: String = found.remarks.iter().map(|remark| format!("{remark}\n")).collect();
+        text.push_str(&disagreement.unwrap_or_default());
         text.push_str(&points_text(&found.points, &display));
         if let Some(shared) = shared_errors_text(found.points.iter().map(|scored| &scored.point), &display) {
             text.push_str(&format!("{shared}\n"));

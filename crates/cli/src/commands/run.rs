@@ -3,17 +3,14 @@
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::progress::Progress;
+use crate::results_text::results_text;
 use crate::{interrupt, output, registry};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::Verdict;
-use mapper_report::{
-    Display, disagreement_text, plan_text, points_text, repeated_jumps_text, sensors_text,
-    shared_errors_text, thermal_text, zero_text,
-};
-use mapper_session::{Ended, PreparedRun, Results, RunOutcome, RunRequest, Session, SessionError, soak_s};
+use mapper_report::plan_text;
+use mapper_session::{Ended, PreparedRun, RunOutcome, RunRequest, Session, SessionError, soak_s};
 use serde_json::json;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Run a campaign: plan, drive the rig, record, identify, assemble the map, report
@@ -72,7 +69,7 @@ impl Run {
         });
         match results {
             Ok(results) if self.json => output::print_json(&results)?,
-            Ok(results) => output::print(&results_text(campaign, &results))?,
+            Ok(results) => output::print(&results_text(&campaign.display, &results))?,
             Err(error) if matches!(end, Ended::Completed | Ended::Drifted { .. }) => return Err(error.into()),
             // Stopped before there was anything to identify: why it was stopped is what counts.
             Err(_) if self.json => {
@@ -125,31 +122,4 @@ impl Run {
             would_write.display(),
         ))
     }
-}
-
-/// A table with what to know below it.
-fn results_text(campaign: &Campaign, results: &Results) -> String {
-    let disagreement = disagreement_text(&results.points, &results.two_parameter, &campaign.display);
-    let mut text = disagreement.unwrap_or_default();
-    text.push_str(&points_text(&results.points, &campaign.display));
-    let points = results.points.iter().map(|scored| &scored.point);
-    if let Some(shared) = shared_errors_text(points, &campaign.display) {
-        let _ = writeln!(text, "{shared}");
-    }
-    text.push_str(&repeated_jumps_text(&results.repeats, &Display::new(&campaign.display)));
-    if let Some(thermal) = &results.thermal {
-        text.push_str(&thermal_text(thermal));
-    }
-    text.push_str(&sensors_text(&results.sensors));
-    text.push_str(&zero_text(&results.zero));
-    // Writing to a String cannot fail.
-    for remark in &results.remarks {
-        let _ = writeln!(text, "{remark}");
-    }
-    for path in results.map.values() {
-        let _ = writeln!(text, "map        {}", path.display());
-    }
-    let _ = writeln!(text, "report     {}", results.report.display());
-    let _ = writeln!(text, "recording  {}", results.recording.display());
-    text
 }

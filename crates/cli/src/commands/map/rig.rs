@@ -1,21 +1,23 @@
 //! `mapper map rig`: what a run gave beside the compressor's map.
 
 use crate::failure::Failure;
-use crate::given::given_campaign;
+use crate::given::{channel_map, given_campaign};
 use crate::{output, registry};
 use clap::Args;
-use mapper_record::ChannelMap;
 use mapper_session::{Recorded, Session};
 use std::path::PathBuf;
 
 /// Write the other results of a run: thermal model, turbine, pictures of h and of errors
 #[derive(Debug, Args)]
 pub struct Rig {
-    /// Run directory, or MCAP file of a run
+    /// Run directory, or MCAP file
     pub recording: PathBuf,
     /// Directory for the files; existing files are not replaced
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Channel map: where a recording made by another program holds the rig's channels (YAML)
+    #[arg(long, value_name = "FILE")]
+    pub channels: Option<PathBuf>,
     /// Campaign with machine, sensors and window, instead of the one attached to the recording
     #[arg(long, value_name = "FILE")]
     pub campaign: Option<PathBuf>,
@@ -28,9 +30,10 @@ impl Rig {
     /// Identifies a recording by its campaign's method and writes thermal model, turbine and pictures.
     pub fn run(&self) -> Result<(), Failure> {
         let given = given_campaign(self.campaign.as_deref())?;
-        let recorded = Recorded::read(&self.recording, &ChannelMap::native(), given.as_ref())?;
+        let map = channel_map(self.channels.as_deref())?;
+        let recorded = Recorded::read(&self.recording, &map, given.as_ref())?;
         let registry = registry::registry();
-        let written = Session::new(&registry).rig_files(recorded, &self.out)?;
+        let written = Session::new(&registry).rig_files(recorded, &map, &self.out)?;
         if self.json {
             return output::print_json(&written);
         }

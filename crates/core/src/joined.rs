@@ -1,0 +1,141 @@
+//! Several recordings of one machine, one behind the other, as one recording.
+
+use crate::{Element, Recording, Series, StepKind, StepMarker};
+use std::collections::BTreeMap;
+
+/// Time between two recordings that are joined, s: far more than any housing remembers, so that nobody takes the last step of
+/// one for the start of the first jump of the next.
+const BETWEEN_S: f64 = 3600.0;
+/// Steps of logs without targets are at the same point where their commands agree to this.
+const SAME_COMMAND_RATIO: f64 = 5e-3;
+
+/// Where a step of a joined recording comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StepOrigin {
+    /// Number of the recording, from 0.
+    pub recording: usize,
+    /// Index of the step there.
+    pub step: usize,
+}
+
+/// Joins recordings in the order in which they are given; one alone stays as it is. Times and indices of steps go on from
+/// recording to recording. A point that an earlier recording has visited is a repeat where the same jump leads to it, and a
+/// return where another does, so that each point stands on the map once. The origins are those of the steps, in order.
+pub fn joined(recordings: Vec<Recording>) -> (Recording, Vec<StepOrigin>) {
+    let alone = recordings.len() < 2;
+    let mut whole = Recording::default();
+    let mut origins = Vec::new();
+    for (number, mut recording) in recordings.into_iter().enumerate() {
+        origins.extend(recording.steps.iter().map(|step| StepOrigin { recording: number, step: step.index }));
+        if alone {
+            return (recording, origins);
+        }
+        let shift_s = end_s(&whole).map_or(0.0, |end_s| end_s + BETWEEN_S) - start_s(&recording);
+        let before = whole.steps.len();
+        for step in &mut recording.steps {
+            step.kind = kind(step, &whole.steps[..before]);
+            step.index = whole.steps.len();
+            step.start_s += shift_s;
+            step.end_s += shift_s;
+            whole.steps.push(*step);
+        }
+        recording.events.iter_mut().for_each(|event| event.t_s += shift_s);
+        whole.events.append(&mut recording.events);
+        append(&mut whole.series, recording.series, shift_s);
+        append::<Element>(&mut whole.elements, recording.elements, shift_s);
+    }
+    (whole, origins)
+}
+
+fn append<K: Ord>(whole: &mut BTreeMap<K, Series>, more: BTreeMap<K, Series>, shift_s: f64) {
+    for (key, mut series) in more {
+        let together = whole.entry(key).or_default();
+        together.t_s.extend(series.t_s.iter().map(|t_s| t_s + shift_s));
+        together.values.append(&mut series.values);
+    }
+}
+
+fn kind(step: &StepMarker, earlier: &[StepMarker]) -> StepKind {
+    let at_the_point = |other: &&StepMarker| match (step.to, other.to) {
+        (Some(to), Some(other)) => to == other,
+        (None, None) => {
+            alike(step.p3_pa, other.p3_pa) && alike(step.valve_opening_ratio, other.valve_opening_ratio)
+        }
+        _ => false,
+    };
+    if step.kind != StepKind::Point || !earlier.iter().any(|other| at_the_point(&other)) {
+        return step.kind;
+    }
+    let same_jump = |other: &StepMarker| other.from == step.from;
+    if earlier.iter().filter(at_the_point).any(same_jump) { StepKind::Repeat } else { StepKind::Return }
+}
+
+fn alike(a: f64, b: f64) -> bool {
+    (a - b).abs() <= SAME_COMMAND_RATIO * a.abs().max(b.abs())
+}
+
+fn all(recording: &Recording) -> impl Iterator<Item = &Series> {
+    recording.series.values().chain(recording.elements.values())
+}
+
+fn start_s(recording: &Recording) -> f64 {
+    all(recording).filter_map(|series| series.t_s.first().copied()).reduce(f64::min).unwrap_or(0.0)
+}
+
+fn end_s(recording: &Recording) -> Option<f64> {
+    all(recording).filter_map(|series| series.t_s.last().copied()).reduce(f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Channel, OperatingPoint};
+
+    fn at(speed_rpm: f64) -> Option<OperatingPoint> {
+        Some(OperatingPoint { speed_rpm, valve_opening_ratio: 0.7 })
+    }
+
+    fn recording(start_s: f64, jumps: &[(Option<OperatingPoint>, Option<OperatingPoint>)]) -> Recording {
+        let steps = jumps.iter().enumerate().map(|(index, (from, to))| StepMarker {
+            index,
+            kind: StepKind::Point,
+            start_s: start_s + 10.0 * index as f64,
+            end_s: start_s + 10.0 * (index + 1) as f64,
+            from: *from,
+            to: *to,
+            p3_pa: 2e5,
+            valve_opening_ratio: 0.7,
+        });
+        let t_s: Vec<f64> = (0..=10 * jumps.len()).map(|t| start_s + t as f64).collect();
+        let values = vec![1.0; t_s.len()];
+        Recording {
+            series: [(Channel::T2, Series { t_s, values })].into(),
+            steps: steps.collect(),
+            ..Recording::default()
+        }
+    }
+
+    #[test]
+    fn what_was_visited_before_is_no_new_point() {
+        let first = recording(0.0, &[(None, at(5e4)), (at(5e4), at(9e4))]);
+        let second = recording(700.0, &[(None, at(7e4)), (at(5e4), at(9e4)), (at(9e4), at(5e4))]);
+        let (whole, origins) = joined(vec![first, second]);
+        let kinds: Vec<_> = whole.steps.iter().map(|step| step.kind).collect();
+        use StepKind::{Point, Repeat, Return};
+        assert_eq!(kinds, [Point, Point, Point, Repeat, Return]);
+        assert_eq!(origins[3], StepOrigin { recording: 1, step: 1 });
+        let t2 = &whole.series[&Channel::T2];
+        assert!(t2.t_s.is_sorted_by(|a, b| a < b), "times rise");
+        // Each step keeps its samples.
+        for step in &whole.steps {
+            assert_eq!(t2.slice(step.start_s, step.end_s).0.len(), 11);
+        }
+        assert!(whole.steps[2].start_s - whole.steps[1].end_s >= BETWEEN_S);
+    }
+
+    #[test]
+    fn one_recording_stays_as_it_is() {
+        let only = recording(3.0, &[(None, None), (None, None)]);
+        assert_eq!(joined(vec![only.clone()]).0, only);
+    }
+}

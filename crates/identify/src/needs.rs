@@ -1,0 +1,40 @@
+//! What each method needs of a recording.
+
+use mapper_core::{Channel, Method, Recording};
+
+/// What every point needs: its place on the map, and the temperature rise.
+const EVERY: [Channel; 6] =
+    [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::T1, Channel::P2, Channel::T2];
+
+/// Channels that a method needs.
+pub fn needs(method: Method) -> Vec<Channel> {
+    let housing = (method != Method::Steady).then_some(Channel::Tc);
+    EVERY.into_iter().chain(housing).collect()
+}
+
+/// Channels that a method needs and the recording has not.
+pub fn missing(recording: &Recording, method: Method) -> Vec<Channel> {
+    needs(method).into_iter().filter(|channel| recording.require(*channel).is_err()).collect()
+}
+
+/// The method for a recording where nobody asked for one by name, and why it is another than `usual`. Without a housing
+/// temperature there is no heat transfer to be had, and the apparent efficiency is what is left.
+pub fn method_for(recording: &Recording, usual: Method) -> (Method, Option<String>) {
+    let lost = missing(recording, usual);
+    if lost.is_empty() || usual == Method::Steady || !missing(recording, Method::Steady).is_empty() {
+        return (usual, None);
+    }
+    let why = format!(
+        "the recording has no {}, which `{usual}` needs: the efficiencies are those of conventional mapping (`{}`), in which \
+         heat that the housing takes or gives counts as work; there is no heat-transfer coefficient",
+        names(&lost),
+        Method::Steady
+    );
+    (Method::Steady, Some(why))
+}
+
+/// Symbols with descriptions.
+pub(crate) fn names(channels: &[Channel]) -> String {
+    let named = |channel: &Channel| format!("{channel} ({})", channel.info().description);
+    channels.iter().map(named).collect::<Vec<_>>().join(", ")
+}

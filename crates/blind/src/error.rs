@@ -1,8 +1,8 @@
 //! What can go wrong with blind cases.
 
+use mapper_campaign::NominalTableError;
 use mapper_physics::effect::EffectError;
 use mapper_physics::steady::SteadyError;
-use mapper_physics::tabulated_map::MapError;
 use mapper_record::RecordError;
 use mapper_runner::RunError;
 use std::path::PathBuf;
@@ -70,7 +70,7 @@ pub enum BlindError {
     Record(#[from] RecordError),
     /// The campaign's map makes no nominal model.
     #[error(transparent)]
-    NominalModel(#[from] MapError),
+    NominalModel(#[from] NominalTableError),
     /// No channel of the campaign's recording can be compared with the model.
     #[error("the campaign records nothing to measure signatures by; declare sensors of speed, P2, T2 or Tc")]
     NothingRecorded,

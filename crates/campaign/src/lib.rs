@@ -13,6 +13,7 @@ mod consistency;
 mod elements;
 mod load;
 mod nightly;
+mod nominal_table;
 mod prospects;
 mod reach;
 mod resolved;
@@ -29,6 +30,7 @@ pub use load::{
 };
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
 pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
+pub use nominal_table::{NominalTableError, nominal_table};
 pub use reach::{Unreachable, nominal_model, unreachable_points};
 pub use resolved::{ResolvedLine, ResolvedPoint, resolved_lines};
 pub use schema::json_schema;

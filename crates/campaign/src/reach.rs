@@ -1,12 +1,12 @@
 //! Whether the nominal model can reach each point within the limits.
 
 use crate::campaign::{Campaign, MapSource};
+use crate::nominal_table::{NominalTableError, nominal_table};
 use mapper_core::OperatingPoint;
 use mapper_physics::characteristic::CompressorCharacteristic;
 use mapper_physics::closed_form_map::ClosedFormMap;
 use mapper_physics::model::Model;
 use mapper_physics::reach::{clause, reach};
-use mapper_physics::tabulated_map::{MapError, TabulatedMap};
 use std::sync::Arc;
 
 /// A point that cannot be measured.
@@ -23,14 +23,14 @@ pub struct Unreachable {
 /// The nominal model of a campaign, on its map.
 ///
 /// # Errors
-/// [`MapError`] where the map file's text is not a map; a checked campaign has none.
-pub fn nominal_model(campaign: &Campaign) -> Result<Model, MapError> {
+/// [`NominalTableError`] where the map file's text is not a map; a checked campaign has none.
+pub fn nominal_model(campaign: &Campaign) -> Result<Model, NominalTableError> {
     let params = campaign.machine.params;
     let map: Arc<dyn CompressorCharacteristic> = match &campaign.machine.map {
         MapSource::ClosedForm => {
             Arc::new(ClosedFormMap { wheel_diameter_m: params.compressor.wheel_diameter_m })
         }
-        MapSource::Table { text, reference, .. } => Arc::new(TabulatedMap::from_csv(text, *reference)?),
+        MapSource::Table { text, reference, .. } => Arc::new(nominal_table(text, *reference)?),
     };
     Ok(Model::new(params, map))
 }

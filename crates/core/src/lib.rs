@@ -23,6 +23,7 @@ mod joint_settings;
 mod jump;
 mod limits;
 mod map;
+mod map_columns;
 mod map_format;
 mod map_format_error;
 mod model_tolerances;
@@ -65,6 +66,7 @@ pub use joint_settings::{
 pub use jump::{Jump, Repeats};
 pub use limits::{Limits, SURGE_ALLOWED_S};
 pub use map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
+pub use map_columns::MAP_COLUMNS;
 pub use map_format::{MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, ReadMap, WriteMap};
 pub use map_format_error::{ExportError, ImportError};
 pub use model_tolerances::ModelTolerances;

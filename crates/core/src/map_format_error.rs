@@ -84,17 +84,29 @@ pub enum ImportError {
         /// What a row is.
         form: &'static str,
     },
-    /// The head line has none of the names of a column that every map needs.
-    #[error("line {line}: no column holds the {quantity} (one of {names}); found: {found}")]
-    MissingColumn {
+    /// All lines slower than any turbocharger's.
+    #[error(
+        "the fastest speed line turns at {speed_corrected_rpm} rpm only: no turbocharger is that slow; if the file has krpm, say so in its \
+         heading (`speed [krpm]`)"
+    )]
+    Slow {
+        /// The fastest corrected speed, rpm.
+        speed_corrected_rpm: f64,
+    },
+    /// More flow than an inlet passes.
+    #[error(
+        "line {line}: no compressor passes {flow_corrected_kg_s} kg/s at {speed_corrected_rpm} rpm ({most_kg_s:.2} kg/s at most); if the \
+         file has g/s, kg/h or lb/min, say so in its heading (`flow [g/s]`)"
+    )]
+    Flow {
         /// Line, from 1.
         line: usize,
-        /// Which quantity.
-        quantity: &'static str,
-        /// Names that it may have.
-        names: String,
-        /// Names that are there, shortened.
-        found: String,
+        /// Corrected flow, kg/s.
+        flow_corrected_kg_s: f64,
+        /// Corrected speed, rpm.
+        speed_corrected_rpm: f64,
+        /// What an inlet passes at most, kg/s.
+        most_kg_s: f64,
     },
     /// A field that holds something other than a number.
     #[error("line {line}: the {quantity} is `{text}`, not a number")]

@@ -20,6 +20,7 @@ pub mod forecast;
 pub mod hooks;
 pub mod housing;
 pub mod inlet_convection;
+pub mod inlet_limit;
 pub mod inputs;
 pub mod instruments;
 pub mod line_points;

@@ -6,6 +6,7 @@
 //! extrapolation, good enough to run a machine up, not to be read as a measurement.
 
 use crate::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+use crate::inlet_limit::{SLOWEST_TOP_SPEED_RPM, largest_flow_kg_s};
 use crate::similarity::{head_ratio as head, pressure_ratio_of_head};
 use mapper_core::{ReferenceState, with_unit};
 
@@ -70,15 +71,31 @@ pub enum MapError {
         /// That of the next slower line.
         slower_pressure_ratio: f64,
     },
-    /// The text is not a table.
+    /// All lines slower than any turbocharger's.
     #[error(
-        "line {line} of the map: `{text}` is not four numbers (corrected rpm, corrected kg/s, pressure ratio, efficiency)"
+        "the fastest speed line turns at {} only: no turbocharger is that slow; if the table has krpm, say so in its heading (`speed [krpm]`)",
+        with_unit(speed_corrected_rpm, "rpm")
     )]
-    Syntax {
-        /// Line of the file, from 1.
-        line: usize,
-        /// What stands there.
-        text: String,
+    Slow {
+        /// The fastest corrected speed, rpm.
+        speed_corrected_rpm: f64,
+    },
+    /// More flow than an inlet passes.
+    #[error(
+        "row {row} of the map: no compressor passes {} at {} ({} at most); if the table has g/s, kg/h or lb/min, say so in its heading (`flow [g/s]`)",
+        with_unit(flow_corrected_kg_s, "kg/s"),
+        with_unit(speed_corrected_rpm, "rpm"),
+        with_unit(most_kg_s, "kg/s")
+    )]
+    Flow {
+        /// Row, from 1, header not counted.
+        row: usize,
+        /// Corrected flow, kg/s.
+        flow_corrected_kg_s: f64,
+        /// Corrected speed, rpm.
+        speed_corrected_rpm: f64,
+        /// What an inlet passes at most, kg/s.
+        most_kg_s: f64,
     },
 }
 
@@ -139,6 +156,22 @@ impl TabulatedMap {
                 }
             }
         }
+        let fastest_rpm = rows.iter().map(|row| row.speed_corrected_rpm).fold(0.0, f64::max);
+        if !rows.is_empty() && fastest_rpm < SLOWEST_TOP_SPEED_RPM {
+            return Err(MapError::Slow { speed_corrected_rpm: fastest_rpm });
+        }
+        for (index, row) in rows.iter().enumerate() {
+            let MapRow { flow_corrected_kg_s, speed_corrected_rpm, .. } = *row;
+            let most_kg_s = largest_flow_kg_s(speed_corrected_rpm);
+            if flow_corrected_kg_s > most_kg_s {
+                return Err(MapError::Flow {
+                    row: index + 1,
+                    flow_corrected_kg_s,
+                    speed_corrected_rpm,
+                    most_kg_s,
+                });
+            }
+        }
         let mut sorted = rows.to_vec();
         sorted.sort_by(|a, b| {
             a.speed_corrected_rpm
@@ -163,43 +196,6 @@ impl TabulatedMap {
         }
         let fingerprint = format!("table {reference} {sorted:?}");
         Ok(TabulatedMap { reference, lines, fingerprint })
-    }
-
-    /// Reads comma-separated text: corrected rpm, corrected kg/s, pressure ratio, efficiency. A first line without
-    /// numbers is a header; `#` starts a comment.
-    ///
-    /// # Errors
-    /// [`MapError`] with the line of the file.
-    pub fn from_csv(text: &str, reference: ReferenceState) -> Result<Self, MapError> {
-        let mut rows = Vec::new();
-        let mut header_allowed = true;
-        for (index, line) in text.lines().enumerate() {
-            let content = line.split('#').next().unwrap_or_default().trim();
-            if content.is_empty() {
-                continue;
-            }
-            let numbers: Option<Vec<f64>> =
-                content.split([',', ';', '\t']).map(|field| field.trim().parse().ok()).collect();
-            match numbers.as_deref() {
-                Some(&[speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, efficiency]) => {
-                    rows.push(MapRow {
-                        speed_corrected_rpm,
-                        flow_corrected_kg_s,
-                        pressure_ratio,
-                        efficiency,
-                    });
-                }
-                _ if header_allowed => {}
-                _ => {
-                    return Err(MapError::Syntax {
-                        line: index + 1,
-                        text: content.chars().take(60).collect(),
-                    });
-                }
-            }
-            header_allowed = false;
-        }
-        TabulatedMap::new(&rows, reference)
     }
 
     /// Corrected speeds of the lines, rpm, rising.
@@ -380,17 +376,22 @@ mod tests {
     }
 
     #[test]
-    fn the_real_looking_sample_reads_and_a_broken_one_says_where() {
-        let csv = "RPM,WC,PRC,ETAC\n50000,0.04,1.31,0.58\n50000,0.06,1.30,0.63\n50000,0.08,1.2,0.6\n\
-                   70000,0.06,1.7,0.6\n70000,0.09,1.65,0.7\n70000,0.12,1.5,0.65\n";
-        let map = TabulatedMap::from_csv(csv, ReferenceState::SAE).unwrap();
-        assert_eq!(map.speeds_corrected_rpm(), [50e3, 70e3]);
-        assert!((map.evaluate(50e3, 1.30).flow_corrected_kg_s - 0.06).abs() < 1e-12);
-        let broken = TabulatedMap::from_csv(&csv.replace("0.09", "oops"), ReferenceState::SAE);
-        assert!(matches!(broken, Err(MapError::Syntax { line: 6, .. })));
-        let negative = TabulatedMap::from_csv(&csv.replace("0.09", "-1"), ReferenceState::SAE);
-        assert!(matches!(negative, Err(MapError::Value { row: 5, quantity: "flow", .. })));
-        assert!(matches!(TabulatedMap::from_csv("", ReferenceState::SAE), Err(MapError::TooFewLines { .. })));
+    fn krpm_and_g_s_that_nobody_named_are_no_map() {
+        let row = |speed_corrected_rpm, flow_corrected_kg_s| MapRow {
+            speed_corrected_rpm,
+            flow_corrected_kg_s,
+            pressure_ratio: 1.5,
+            efficiency: 0.7,
+        };
+        let refused = |row: MapRow| TabulatedMap::new(&[row], ReferenceState::SAE).unwrap_err();
+        assert!(matches!(refused(row(170.0, 0.1)), MapError::Slow { .. }));
+        assert!(matches!(refused(row(150e3, 100.0)), MapError::Flow { row: 1, .. }));
+        // A locomotive's: 20 kg/s at 20 krpm.
+        assert!(matches!(
+            refused(row(20e3, 20.0)),
+            MapError::TooFewLines { .. } | MapError::TooFewPoints { .. }
+        ));
+        assert!(matches!(TabulatedMap::new(&[], ReferenceState::SAE), Err(MapError::TooFewLines { .. })));
     }
 
     proptest! {
@@ -400,11 +401,6 @@ mod tests {
             let map = sampled(&[50e3, 80e3, 110e3, 140e3]);
             let here = map.evaluate(speed, pr).flow_corrected_kg_s;
             prop_assert!(map.evaluate(speed, pr + step).flow_corrected_kg_s <= here + 1e-15);
-        }
-
-        #[test]
-        fn any_text_is_a_map_or_an_error(text in "[0-9.,;#\\n a-z-]{0,200}") {
-            let _ = TabulatedMap::from_csv(&text, ReferenceState::SAE);
         }
     }
 }

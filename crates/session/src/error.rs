@@ -81,7 +81,7 @@ pub enum SessionError {
     },
     /// The campaign's map is not usable.
     #[error("the nominal model has no map: {0}")]
-    Model(#[from] mapper_physics::tabulated_map::MapError),
+    Model(#[from] mapper_campaign::NominalTableError),
     /// There is no plan.
     #[error(transparent)]
     Plan(#[from] PlanError),

@@ -5,6 +5,7 @@ use mapper_core::{
     CommonErrors, CompressorMap, IdentifiedPoint, ImportError, MapPoint, Method, ReferenceState, SpeedLine,
     SpeedShift, StepKind, Verdict,
 };
+use mapper_physics::inlet_limit::{SLOWEST_TOP_SPEED_RPM, largest_flow_kg_s};
 use mapper_physics::similarity::at_speed;
 
 /// Largest number of points that are read.
@@ -57,6 +58,15 @@ impl Row {
                 return Err(ImportError::Value { line: self.at, quantity, value, needed });
             }
         }
+        let most_kg_s = largest_flow_kg_s(self.speed_corrected_rpm);
+        if self.flow_corrected_kg_s > most_kg_s {
+            return Err(ImportError::Flow {
+                line: self.at,
+                flow_corrected_kg_s: self.flow_corrected_kg_s,
+                speed_corrected_rpm: self.speed_corrected_rpm,
+                most_kg_s,
+            });
+        }
         Ok(())
     }
 
@@ -104,6 +114,10 @@ pub(crate) fn map_of_rows(
     let reference = reference::settle(found, given)?;
     if rows.is_empty() {
         return Err(ImportError::Empty);
+    }
+    let fastest_rpm = rows.iter().map(|row| row.speed_corrected_rpm).fold(0.0, f64::max);
+    if fastest_rpm < SLOWEST_TOP_SPEED_RPM {
+        return Err(ImportError::Slow { speed_corrected_rpm: fastest_rpm });
     }
     let mut points: Vec<IdentifiedPoint> =
         rows.iter().enumerate().map(|(step, row)| row.point(reference, step)).collect();

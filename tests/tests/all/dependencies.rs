@@ -29,7 +29,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // A backend may read recordings: replay does.
     ("mapper-backends",  &["core", "numerics", "physics", "record", "yaml"]),
     ("mapper-effects",   &["core", "physics"]),
-    ("mapper-formats",   &["core", "numerics", "physics", "chart"]),
+    ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart"]),
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
     ("mapper-blind",     &["core", "numerics", "physics", "campaign", "runner", "record", "observe", "gap", "backends", "effects"]),
     // Words, pages and pictures made from data.

@@ -77,11 +77,7 @@ fn two_recordings_make_one_map() {
         targets(points(&together).iter().filter(new)).len(),
         points(&together).iter().filter(new).count()
     );
-    assert_eq!(
-        targets(points(&together).iter()),
-        targets(alone.iter().flat_map(points)),
-        "no point is lost"
-    );
+    assert_eq!(targets(points(&together).iter()), targets(alone.iter().flat_map(points)), "no point is lost");
     let places = |points: &[Value]| -> Vec<[f64; 3]> {
         let place = |point: &Value| {
             ["flow_corrected_kg_s", "pressure_ratio", "speed_corrected_rpm"]

@@ -3,9 +3,9 @@
 use super::geometry::GeometryFile;
 use super::reference::ReferenceFile;
 use crate::checking::{Check, beside};
+use crate::nominal_table::nominal_table;
 use mapper_core::ReferenceState;
 use mapper_physics::params::Params;
-use mapper_physics::tabulated_map::TabulatedMap;
 use mapper_yaml::FindingKind;
 use mapper_yaml::steps;
 use schemars::JsonSchema;
@@ -129,9 +129,9 @@ pub(crate) fn check(check: &mut Check<'_>) {
         }
         // Whether a table is a map does not depend on its reference state, which may be missing yet.
         Ok(text) => {
-            if let Err(error) = TabulatedMap::from_csv(&text, ReferenceState::SAE) {
+            if let Err(error) = nominal_table(&text, ReferenceState::SAE) {
                 let message = format!("the map file `{}` is not a map: {error}", path.display());
-                let remedy = "each row needs corrected rpm, corrected kg/s, pressure ratio and efficiency";
+                let remedy = "each row needs corrected speed, corrected flow, pressure ratio and efficiency; in rpm, kg/s and as a fraction where the heading names no unit";
                 check.note(FindingKind::WrongValue, &steps, message, remedy);
             }
         }

@@ -5,10 +5,12 @@
 //! factor, has no name for `krpm`, and parses only its own spellings; this table is short enough to be read against
 //! the definitions of its units.
 
+mod heading;
 mod kind;
 mod parse;
 mod quantity;
 
+pub use heading::{FoundColumn, HeadingError, WantedColumn, find_columns};
 pub use kind::{Kind, Unit};
 pub use parse::{UnitError, parse, parse_with};
 pub use quantity::{

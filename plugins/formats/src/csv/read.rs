@@ -5,26 +5,13 @@ use crate::lines::{Row, line, map_of_rows, room_for_one_more};
 use crate::reference;
 use ::csv::{ReaderBuilder, StringRecord, Trim};
 use mapper_core::{
-    CommonErrors, CompressorMap, ImportError, MapPoint, Method, ReferenceState, SpeedShift, Verdict, Warning,
+    CommonErrors, CompressorMap, ImportError, MAP_COLUMNS, MapPoint, Method, ReferenceState, SpeedShift,
+    Verdict, Warning,
 };
+use mapper_yaml::units::{FoundColumn, Kind, WantedColumn, find_columns};
 
-/// Names under which the four columns are found, lower case without blanks and underscores.
-const SPEED: &[&str] =
-    &["speedcorrectedrpm", "rpm", "nccorr", "n", "n(rpm)", "nc", "speed", "speed(rpm)", "correctedspeed"];
-const FLOW: &[&str] = &[
-    "flowcorrectedkgs",
-    "wc",
-    "wccorr",
-    "mdot",
-    "mdot(kg/s)",
-    "flow",
-    "flow(kg/s)",
-    "massflow",
-    "correctedflow",
-    "m",
-];
-const RATIO: &[&str] = &["pressureratio", "prc", "pic", "pr", "pi", "ratio"];
-const ETA: &[&str] = &["eta", "etac", "eff", "efficiency", "eta(ts)", "eta(tt)"];
+/// What the four columns measure.
+const KINDS: [Kind; 4] = [Kind::Speed, Kind::MassFlow, Kind::Fraction, Kind::Fraction];
 
 /// Most common errors that are read of a point; `mapper` writes up to 13.
 const MOST_COMMON: usize = 64;
@@ -40,7 +27,7 @@ struct Head {
 /// Names of the columns as found, and which of them are the four.
 struct Columns {
     names: Vec<String>,
-    four: [usize; 4],
+    four: [FoundColumn; 4],
 }
 
 pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
@@ -67,7 +54,7 @@ pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
     };
     let first = record(first)?;
     let (columns, mut pending) = match numeric(&first) {
-        true => (Columns { names: Vec::new(), four: [0, 1, 2, 3] }, Some(first)),
+        true => (Columns { names: Vec::new(), four: [0, 1, 2, 3].map(bare) }, Some(first)),
         false => (named(&first)?, None),
     };
     let head = Head { reference, machine, method, columns };
@@ -113,27 +100,20 @@ fn numeric(record: &StringRecord) -> bool {
     record.len() >= 4 && record.iter().take(4).all(|field| field.parse::<f64>().is_ok())
 }
 
+/// A column without a heading: in the unit used inside.
+fn bare(index: usize) -> FoundColumn {
+    FoundColumn { index, unit: None }
+}
+
 fn named(record: &StringRecord) -> Result<Columns, ImportError> {
-    let names: Vec<String> = record.iter().map(str::to_owned).collect();
-    let plain: Vec<String> = names.iter().map(|n| n.to_ascii_lowercase().replace([' ', '_'], "")).collect();
-    let find = |what: &'static str, wanted: &[&str]| {
-        wanted.iter().find_map(|name| plain.iter().position(|n| n == name)).ok_or_else(|| {
-            let shown: String = names.join(", ").chars().take(120).collect();
-            ImportError::MissingColumn {
-                line: at(record),
-                quantity: what,
-                names: wanted.join(", "),
-                found: shown,
-            }
-        })
-    };
-    let four = [
-        find("corrected speed", SPEED)?,
-        find("corrected flow", FLOW)?,
-        find("pressure ratio", RATIO)?,
-        find("efficiency", ETA)?,
-    ];
-    Ok(Columns { names, four })
+    let headings: Vec<&str> = record.iter().collect();
+    let wanted: [WantedColumn<'_>; 4] = std::array::from_fn(|i| {
+        let (quantity, names) = MAP_COLUMNS[i];
+        WantedColumn { quantity, names, kind: KINDS[i] }
+    });
+    let four = find_columns(&headings, wanted)
+        .map_err(|source| ImportError::Row { line: at(record), source: source.into() })?;
+    Ok(Columns { names: headings.iter().map(|heading| (*heading).to_owned()).collect(), four })
 }
 
 impl Columns {
@@ -168,15 +148,16 @@ fn finite(text: &str, record: &StringRecord, name: &str) -> Result<f64, ImportEr
 
 fn row(record: &StringRecord, columns: &Columns) -> Result<Row, ImportError> {
     let field = |index: usize, what: &str| {
-        let text = record.get(columns.four[index]).unwrap_or_default();
+        let column = columns.four[index];
+        let text = record.get(column.index).unwrap_or_default();
         let shown: String = text.chars().take(40).collect();
-        text.parse::<f64>().map_err(|_| ImportError::NotANumber {
+        text.parse::<f64>().map(|value| column.inside(value)).map_err(|_| ImportError::NotANumber {
             line: at(record),
             quantity: what.to_owned(),
             text: shown,
         })
     };
-    let eta_text = record.get(columns.four[3]).unwrap_or_default();
+    let eta_text = record.get(columns.four[3].index).unwrap_or_default();
     let row = Row {
         at: at(record),
         speed_corrected_rpm: field(0, "corrected speed")?,

@@ -38,6 +38,8 @@ mod surge_text;
 mod table;
 mod thermal_file;
 mod thermal_model;
+mod transient_picture;
+mod transient_text;
 mod turbine_file;
 mod zero_text;
 
@@ -72,5 +74,7 @@ pub use surge_text::surge_text;
 pub use table::with_heads;
 pub use thermal_file::ThermalExport;
 pub use thermal_model::thermal_text;
+pub use transient_picture::transient_figure;
+pub use transient_text::transient_text;
 pub use turbine_file::{TurbinePoint, turbine_points, turbine_text};
 pub use zero_text::zero_text;

@@ -55,6 +55,9 @@ pub enum SessionError {
         /// The run.
         key: String,
     },
+    /// A log without steps has too little.
+    #[error(transparent)]
+    Driven(#[from] mapper_driven::DrivenError),
     /// Nothing to identify was given.
     #[error("no recording was given; name a run directory or a recording")]
     NoRecording,
@@ -303,7 +306,7 @@ impl SessionError {
             // Only reading fails for reasons that are not the recording's.
             E::Record(RecordError::Read { .. } | RecordError::Exists { .. } | RecordError::Create { .. })
             | E::Record(RecordError::Write { .. } | RecordError::BadInput { .. }) => ErrorKind::Failure,
-            E::Record(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
+            E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
                 ErrorKind::BadRecording
             }
             E::Sequence(_)

@@ -61,6 +61,7 @@ pub mod run_directory;
 mod scripted_steps;
 mod session;
 mod surge;
+mod transient;
 
 pub use declared::identification;
 pub use drift::Drift;
@@ -82,3 +83,4 @@ pub use rig_files::RigFiles;
 pub use run::{Ended, PROGRAM, PreparedRun, RunOutcome, RunRequest};
 pub use session::Session;
 pub use surge::{SurgeForecast, remark_surge_search, surge_forecast};
+pub use transient::write_transient;

@@ -19,6 +19,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-sequence",  &["core", "numerics", "physics", "yaml"]),
     ("mapper-record",    &["core", "numerics", "yaml"]),
     ("mapper-observe",   &["core", "numerics", "physics"]),
+    ("mapper-driven",    &["core", "numerics", "physics", "observe"]),
     ("mapper-identify",  &["core", "numerics", "physics", "observe"]),
     ("mapper-assemble",  &["core", "numerics", "physics", "identify"]),
     ("mapper-drift",     &["core", "numerics", "physics", "observe", "identify"]),
@@ -33,9 +34,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
     ("mapper-blind",     &["core", "numerics", "physics", "campaign", "runner", "record", "observe", "gap", "backends", "effects"]),
     // Words, pages and pictures made from data.
-    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "assemble", "gap", "drift", "history", "record", "reproduce", "sequence"]),
+    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "assemble", "gap", "drift", "driven", "history", "record", "reproduce", "sequence"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "observe", "identify", "surge", "gap", "drift", "history", "assemble", "report", "numerics"]),
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "observe", "identify", "surge", "gap", "drift", "driven", "history", "assemble", "report", "numerics"]),
     // The program names the plug-ins; nothing sees the program.
     ("mapper-cli",       &["core", "physics", "campaign", "planner", "record", "drift", "history", "assemble", "reproduce", "report", "session", "backends", "blind", "effects", "formats"]),
     // Tests run the program and read its files; chores know nothing of it.

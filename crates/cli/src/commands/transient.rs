@@ -1,0 +1,64 @@
+//! `mapper transient`: a log in which nothing rests.
+
+use crate::failure::Failure;
+use crate::given::{channel_map, given_campaign};
+use crate::{output, registry};
+use clap::Args;
+use mapper_report::transient_text;
+use mapper_session::{Recorded, Session, write_transient};
+use std::path::PathBuf;
+
+/// Identify the compressor side of a log without steps, driven by its measured speed, flow, pressures and inlet temperature
+#[derive(Debug, Args)]
+pub struct Transient {
+    /// Run directory, or MCAP file
+    pub recording: PathBuf,
+    /// Channel map: where a recording made by another program holds the channels (YAML)
+    #[arg(long, value_name = "FILE")]
+    pub channels: Option<PathBuf>,
+    /// Campaign with the machine and its geometry, instead of the one attached to the recording
+    #[arg(long, value_name = "FILE")]
+    pub campaign: Option<PathBuf>,
+    /// Fit what lies before this time of the log and predict the rest, e.g. "13.2 s" [default: fit everything]
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    pub fit_until: Option<f64>,
+    /// Leave text, JSON and pictures in this directory; existing files are not replaced
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A time with its unit, s.
+fn seconds(text: &str) -> Result<f64, String> {
+    let duration = mapper_campaign::units::parse(mapper_campaign::units::Kind::Duration, text);
+    duration.map_err(|error| error.to_string())
+}
+
+impl Transient {
+    /// Fits, predicts, and says what is left.
+    pub fn run(&self) -> Result<(), Failure> {
+        let map = channel_map(self.channels.as_deref())?;
+        let given = given_campaign(self.campaign.as_deref())?;
+        let recorded = Recorded::read(&self.recording, &map, given.as_ref())?;
+        let registry = registry::registry();
+        let outcome = Session::new(&registry).transient(&recorded, self.fit_until)?;
+        let machine = recorded.campaign.as_ref().map_or("", |campaign| &campaign.machine.name);
+        let files = match &self.out {
+            Some(directory) => write_transient(&outcome, machine, directory)?,
+            None => Vec::new(),
+        };
+        if self.json {
+            return output::print_json(&outcome);
+        }
+        let mut text = transient_text(&outcome);
+        for warning in &recorded.read.warnings {
+            text.push_str(&format!("recording: {warning}\n"));
+        }
+        for file in files {
+            text.push_str(&format!("{}\n", file.display()));
+        }
+        output::print(&text)
+    }
+}

@@ -1,0 +1,250 @@
+//! What a log without steps gives, and how far it is from a part that nobody fitted.
+
+use crate::density::log_density;
+use crate::ensemble::draws;
+use crate::parameters::{COUNT, PARAMETERS, Parameter};
+use crate::{Declared, DrivenError, Predicted, Readings, Values, predict};
+use mapper_numerics::statistics::{mean, quantile, rms};
+use mapper_physics::params::Params;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64Mcg;
+use serde::Serialize;
+
+/// Rows that are needed: twice the parameters.
+const FEWEST_ROWS: usize = 2 * COUNT;
+/// A log has told something of a parameter whose interval is narrower than this share of the prior's.
+const TOLD_RATIO: f64 = 0.7;
+
+/// A parameter as the log leaves it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FoundParameter {
+    /// Which one, and what was known beforehand.
+    #[serde(flatten)]
+    pub parameter: Parameter,
+    /// Median.
+    pub value: f64,
+    /// Lower end of the 95 % interval.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Whether the log tells it: else it is the prior's.
+    pub told: bool,
+}
+
+/// A part of the log beside what is predicted for it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Judged {
+    /// Time of its first row, s.
+    pub from_s: f64,
+    /// Time of its last row, s.
+    pub until_s: f64,
+    /// Rows.
+    pub rows: usize,
+    /// Root mean square of T2 less its mean prediction, K.
+    pub rms_k: f64,
+    /// What that was expected to be, K: median and 95 % interval over everything that the fitted part leaves open.
+    pub expected_rms_k: f64,
+    /// Its lower end, K.
+    pub expected_low_k: f64,
+    /// Its upper end, K.
+    pub expected_high_k: f64,
+    /// Share of the rows whose 95 % interval holds the reading, ratio.
+    pub inside_ratio: f64,
+}
+
+/// How much something moves the reading of T2 over the fitted part, K rms: median and 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Moves {
+    /// Median, K.
+    pub rms_k: f64,
+    /// Lower end, K.
+    pub low_k: f64,
+    /// Upper end, K.
+    pub high_k: f64,
+}
+
+/// T2 over time, as read and as predicted, K.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trace {
+    /// Times, s.
+    pub t_s: Vec<f64>,
+    /// As read.
+    pub read_k: Vec<f64>,
+    /// Mean prediction.
+    pub predicted_k: Vec<f64>,
+    /// Lower end of the 95 % interval.
+    pub low_k: Vec<f64>,
+    /// Upper end.
+    pub high_k: Vec<f64>,
+    /// Isentropic efficiency, mean, fraction.
+    pub efficiency: Vec<f64>,
+    /// Apparent efficiency `T1 (PR^kappa - 1)/(T2 - T1)` of the readings, fraction: what nobody should believe.
+    pub apparent_efficiency: Vec<f64>,
+}
+
+/// What a log gives.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DrivenOutcome {
+    /// Time up to which it was fitted, s.
+    pub fitted_until_s: f64,
+    /// The parameters.
+    pub parameters: Vec<FoundParameter>,
+    /// What the probe's lag does to T2.
+    pub probe_moves: Moves,
+    /// What heat to and from the housing does to T2.
+    pub heat_moves: Moves,
+    /// The part that was fitted.
+    pub fitted: Judged,
+    /// The rest; `None` where everything was fitted.
+    pub held_out: Option<Judged>,
+    /// T2 over all rows.
+    pub trace: Trace,
+    /// Rows of T2 that could not be used.
+    pub lost_rows: usize,
+}
+
+/// Identifies the compressor side from all rows before `fit_until_s`, and predicts the others, of which nothing but what drives
+/// is looked at. Same seed, same answer.
+///
+/// # Errors
+/// [`DrivenError::TooFewRows`] where there is too little to fit.
+pub fn identify(
+    rows: &Readings,
+    params: Params,
+    fit_until_s: f64,
+    seed: u64,
+) -> Result<DrivenOutcome, DrivenError> {
+    let fitted = rows.t_s.partition_point(|t_s| *t_s < fit_until_s);
+    if fitted < FEWEST_ROWS {
+        return Err(DrivenError::TooFewRows { rows: fitted, until_s: fit_until_s, needed: FEWEST_ROWS });
+    }
+    let declared = Declared::new(params, rows);
+    let sample: Vec<Values> = draws(|standard| log_density(standard, rows, &declared, fitted), seed)
+        .iter()
+        .map(Values::of_standard)
+        .collect();
+    let predicted: Vec<Predicted> =
+        sample.iter().map(|values| predict(rows, &declared, values, rows.len())).collect();
+    let noisy = with_noise(&sample, &predicted, rows, seed);
+    let trace = trace(rows, &predicted, &noisy);
+    let judged = |from: usize, until: usize| judged(rows, &trace, &noisy, from, until);
+    let without = |change: &dyn Fn(&mut Values)| moves(&sample, &predicted, rows, &declared, fitted, change);
+    Ok(DrivenOutcome {
+        fitted_until_s: fit_until_s,
+        parameters: PARAMETERS
+            .iter()
+            .enumerate()
+            .map(|(i, parameter)| found(*parameter, i, &sample))
+            .collect(),
+        probe_moves: without(&|values| values.0[PROBE] = 0.0),
+        heat_moves: without(&|values| values.0[HEAT] = 0.0),
+        fitted: judged(0, fitted),
+        held_out: (fitted < rows.len()).then(|| judged(fitted, rows.len())),
+        trace,
+        lost_rows: rows.lost,
+    })
+}
+
+/// Places of what can be taken away.
+const HEAT: usize = 5;
+const PROBE: usize = 11;
+
+fn found(parameter: Parameter, place: usize, sample: &[Values]) -> FoundParameter {
+    let at = |share: f64| quantile(sample.iter().map(|values| values.0[place]), share).unwrap_or(f64::NAN);
+    let (low, high) = (at(0.025), at(0.975));
+    let prior = |z: f64| {
+        let mut standard = [0.0; COUNT];
+        standard[place] = z;
+        Values::of_standard(&standard).0[place]
+    };
+    let told = high - low < TOLD_RATIO * (prior(1.96) - prior(-1.96));
+    FoundParameter { parameter, value: at(0.5), low, high, told }
+}
+
+/// Each draw with noise of its own, as if it were the truth.
+fn with_noise(sample: &[Values], predicted: &[Predicted], rows: &Readings, seed: u64) -> Vec<Vec<f64>> {
+    let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_add(1));
+    sample
+        .iter()
+        .zip(predicted)
+        .map(|(values, predicted)| {
+            let [.., sigma_k] = values.0;
+            let mut noise_k: Option<(f64, f64)> = None;
+            let noisy = predicted.t2_k.iter().zip(&rows.t_s).map(|(t2_k, t_s)| {
+                let z: f64 = StandardNormal.sample(&mut random);
+                let keep = noise_k.map_or(0.0, |(at_s, _)| (-(t_s - at_s) / crate::density::ALIKE_S).exp());
+                let before_k = noise_k.map_or(0.0, |(_, noise_k)| noise_k);
+                let now_k = keep * before_k + sigma_k * (1.0 - keep * keep).sqrt() * z;
+                noise_k = Some((*t_s, now_k));
+                t2_k + now_k
+            });
+            noisy.collect()
+        })
+        .collect()
+}
+
+fn trace(rows: &Readings, predicted: &[Predicted], noisy: &[Vec<f64>]) -> Trace {
+    let over = |i: usize, pick: &dyn Fn(&Predicted) -> &[f64]| {
+        mean(predicted.iter().map(|one| pick(one)[i])).unwrap_or(f64::NAN)
+    };
+    let end = |i: usize, share: f64| quantile(noisy.iter().map(|one| one[i]), share).unwrap_or(f64::NAN);
+    let every = || 0..rows.len();
+    let apparent = |i: usize| {
+        let (t1_k, ratio) = (rows.t1_k[i], rows.p2_pa[i] / rows.p1_pa[i]);
+        t1_k * mapper_physics::compression::isentropic_rise_ratio(ratio, t1_k) / (rows.t2_k[i] - t1_k)
+    };
+    Trace {
+        t_s: rows.t_s.clone(),
+        read_k: rows.t2_k.clone(),
+        predicted_k: every().map(|i| over(i, &|one| &one.t2_k)).collect(),
+        low_k: every().map(|i| end(i, 0.025)).collect(),
+        high_k: every().map(|i| end(i, 0.975)).collect(),
+        efficiency: every().map(|i| over(i, &|one| &one.efficiency)).collect(),
+        apparent_efficiency: every().map(apparent).collect(),
+    }
+}
+
+fn judged(rows: &Readings, trace: &Trace, noisy: &[Vec<f64>], from: usize, until: usize) -> Judged {
+    let distance = |truth_k: &[f64]| {
+        let off = (from..until).map(|i| truth_k[i] - trace.predicted_k[i]);
+        rms(off).unwrap_or(f64::NAN)
+    };
+    let expected: Vec<f64> = noisy.iter().map(|one| distance(one)).collect();
+    let at = |share: f64| quantile(&expected, share).unwrap_or(f64::NAN);
+    let inside =
+        (from..until).filter(|i| (trace.low_k[*i]..=trace.high_k[*i]).contains(&rows.t2_k[*i])).count();
+    Judged {
+        from_s: rows.t_s[from],
+        until_s: rows.t_s[until - 1],
+        rows: until - from,
+        rms_k: distance(&rows.t2_k),
+        expected_rms_k: at(0.5),
+        expected_low_k: at(0.025),
+        expected_high_k: at(0.975),
+        inside_ratio: inside as f64 / (until - from) as f64,
+    }
+}
+
+/// How far T2 moves when something is taken away.
+fn moves(
+    sample: &[Values],
+    predicted: &[Predicted],
+    rows: &Readings,
+    declared: &Declared,
+    fitted: usize,
+    change: &dyn Fn(&mut Values),
+) -> Moves {
+    let distances: Vec<f64> = sample
+        .iter()
+        .zip(predicted)
+        .filter_map(|(values, with)| {
+            let mut values = *values;
+            change(&mut values);
+            let without = predict(rows, declared, &values, fitted);
+            rms(without.t2_k.iter().zip(&with.t2_k).map(|(without, with)| without - with))
+        })
+        .collect();
+    let at = |share: f64| quantile(&distances, share).unwrap_or(f64::NAN);
+    Moves { rms_k: at(0.5), low_k: at(0.025), high_k: at(0.975) }
+}

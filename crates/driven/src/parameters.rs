@@ -1,0 +1,108 @@
+//! What is not known of the compressor side, and what is known of it beforehand.
+//!
+//! Priors are those of passenger-car and lorry turbochargers: published maps for the efficiency, Burke et al., Appendix A,
+//! scaled to the declared machine, for the heat. They are wide, and whatever a log does not tell stays as wide.
+
+use serde::Serialize;
+
+/// How a parameter is spread beforehand.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Spread {
+    /// Normal about the middle.
+    Normal,
+    /// Normal in the logarithm: the middle is the median, the width one standard deviation of the logarithm.
+    LogNormal,
+}
+
+/// A parameter with its prior.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Short name.
+    pub name: &'static str,
+    /// What it is.
+    pub description: &'static str,
+    /// Its unit; empty for a ratio.
+    pub unit: &'static str,
+    /// Middle of the prior.
+    pub middle: f64,
+    /// Its width.
+    pub width: f64,
+    /// Its form.
+    pub spread: Spread,
+}
+
+const fn normal(
+    name: &'static str,
+    unit: &'static str,
+    middle: f64,
+    width: f64,
+    description: &'static str,
+) -> Parameter {
+    Parameter { name, description, unit, middle, width, spread: Spread::Normal }
+}
+
+const fn log_normal(
+    name: &'static str,
+    unit: &'static str,
+    middle: f64,
+    width: f64,
+    description: &'static str,
+) -> Parameter {
+    Parameter { name, description, unit, middle, width, spread: Spread::LogNormal }
+}
+
+/// Number of parameters.
+pub const COUNT: usize = 14;
+
+/// All parameters, in the order of [`Values`].
+pub const PARAMETERS: [Parameter; COUNT] = [
+    normal("eta", "", 0.70, 0.06, "isentropic efficiency, total to total, at middle speed and flow"),
+    normal("eta_speed", "", 0.0, 0.08, "its change per unit of relative speed"),
+    normal("eta_speed_2", "", -0.10, 0.12, "its curvature over relative speed"),
+    normal("eta_flow", "", 0.0, 0.12, "its change per unit of the logarithm of the flow coefficient"),
+    normal("eta_flow_2", "", -0.5, 0.3, "its curvature over the logarithm of the flow coefficient"),
+    log_normal(
+        "h",
+        "",
+        1.0,
+        0.5,
+        "heat transfer inside the housing, over Appendix A's law on the declared area",
+    ),
+    normal("alpha_A", "", 0.1, 0.1, "share of the internal area before compression"),
+    log_normal("capacity", "", 1.0, 0.5, "heat capacity of the housing, over the declared one"),
+    log_normal(
+        "loss",
+        "W/K",
+        2.0,
+        1.0,
+        "conductance from the housing to what surrounds it: oil, turbine, engine bay",
+    ),
+    normal("surroundings", "K", 345.0, 25.0, "temperature of what surrounds the housing"),
+    normal("housing_start", "K", 0.0, 20.0, "housing at the start, over the mean of T1 and T2 there"),
+    log_normal("probe", "mm", 2.5, 0.6, "diameter of the T2 probe's tip (eqs. 11-12)"),
+    normal("t2_offset", "K", 0.0, 1.0, "fixed offset of T2 less that of T1"),
+    log_normal("noise", "K", 0.4, 0.8, "what neither noise nor model explains, one standard deviation"),
+];
+
+/// Values of all parameters, in the order of [`PARAMETERS`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Values(pub [f64; COUNT]);
+
+impl Values {
+    /// From standard normal numbers: what the search walks in.
+    pub fn of_standard(standard: &[f64; COUNT]) -> Self {
+        Values(std::array::from_fn(|i| {
+            let Parameter { middle, width, spread, .. } = PARAMETERS[i];
+            match spread {
+                Spread::Normal => middle + width * standard[i],
+                Spread::LogNormal => middle * (width * standard[i]).exp(),
+            }
+        }))
+    }
+
+    /// The value of a parameter by its name; `None` for another name.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        PARAMETERS.iter().position(|parameter| parameter.name == name).map(|i| self.0[i])
+    }
+}

@@ -1,0 +1,78 @@
+//! What a log without steps has given, for a terminal and a report.
+
+use crate::table;
+use mapper_driven::{DrivenOutcome, Judged, Moves};
+use std::fmt::Write;
+
+/// What is left of T2, what moves it, and the parameters.
+pub fn transient_text(outcome: &DrivenOutcome) -> String {
+    // Writing to a String cannot fail.
+    let mut text = String::from(
+        "Compressor side driven by measured speed, flow, P1, P2 and T1; T2 is judged. Intervals are 95 %.\n\n",
+    );
+    let _ = writeln!(text, "fitted    {}", judged_text(&outcome.fitted));
+    if let Some(held_out) = &outcome.held_out {
+        let _ = writeln!(text, "held out  {}", judged_text(held_out));
+        let _ = writeln!(text, "          {}", verdict(held_out));
+    }
+    if outcome.lost_rows > 0 {
+        let _ = writeln!(
+            text,
+            "{} readings of T2 were left out: a channel is missing there or impossible",
+            outcome.lost_rows
+        );
+    }
+    let _ = writeln!(text, "\nWhat moves T2 while it is fitted (rms):");
+    let _ = writeln!(text, "  lag of the probe                 {}", moves_text(&outcome.probe_moves));
+    let _ = writeln!(text, "  heat to and from the housing     {}", moves_text(&outcome.heat_moves));
+    text.push('\n');
+    let heads =
+        ["parameter", "value", "95 % interval", "unit", "known from", "what it is"].map(str::to_owned);
+    let mut rows = table::with_heads(&heads);
+    for column in rows.column_iter_mut().skip(3) {
+        column.set_cell_alignment(comfy_table::CellAlignment::Left);
+    }
+    for found in &outcome.parameters {
+        let parameter = &found.parameter;
+        rows.add_row([
+            parameter.name.to_owned(),
+            format!("{:.3}", found.value),
+            format!("{:.3} .. {:.3}", found.low, found.high),
+            parameter.unit.to_owned(),
+            if found.told { "the log" } else { "beforehand" }.to_owned(),
+            parameter.description.to_owned(),
+        ]);
+    }
+    let _ = writeln!(text, "{rows}");
+    text.push_str(
+        "\nNot asked here: the turbine side, a map (no point rests), and causes that act on what drives (a wrong flow or pressure shows as \
+         another efficiency).\n",
+    );
+    text
+}
+
+fn judged_text(judged: &Judged) -> String {
+    format!(
+        "{:.1} to {:.1} s, {} readings: {:.2} K rms; expected {:.2} K ({:.2} .. {:.2}); intervals hold {:.0} % of the readings",
+        judged.from_s,
+        judged.until_s,
+        judged.rows,
+        judged.rms_k,
+        judged.expected_rms_k,
+        judged.expected_low_k,
+        judged.expected_high_k,
+        100.0 * judged.inside_ratio
+    )
+}
+
+fn verdict(held_out: &Judged) -> &'static str {
+    if held_out.rms_k > held_out.expected_high_k {
+        "more is left than the fitted part allows: something acts there that this side has not, or that its readings do not show"
+    } else {
+        "what is left is what the fitted part lets expect"
+    }
+}
+
+fn moves_text(moves: &Moves) -> String {
+    format!("{:5.1} K  ({:.1} .. {:.1})", moves.rms_k, moves.low_k, moves.high_k)
+}

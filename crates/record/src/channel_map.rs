@@ -5,7 +5,9 @@ use mapper_core::{
     CHANNELS, Channel, DeclaredUncertainty, Element, Group, MAX_ELEMENTS, NoiseColour, RedundantSensors,
     ReferenceState,
 };
+use mapper_logs::LogOptions;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// Maps a recording's topics and fields onto channels. SI inside; written with units in YAML.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -29,18 +31,35 @@ pub struct ChannelMap {
     pub redundant: BTreeMap<Channel, RedundantSensors>,
     /// How the sensors' noise is correlated in time.
     pub noise_colour: Option<NoiseColour>,
+    /// What gauge pressures are added to.
+    pub ambient_pressure: Option<AmbientPressure>,
+    /// How a log of another program is to be read, where looking at it is not enough.
+    pub log: LogOptions,
+    /// File and text it was read from, so that what is wrong with it for a recording can be shown in it.
+    pub(crate) text: Option<(PathBuf, String)>,
     pub(crate) native: bool,
+}
+
+/// The pressure that gauge pressures are read over.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AmbientPressure {
+    /// A known value, Pa.
+    Constant(f64),
+    /// A column of the log.
+    Source(ChannelSource),
 }
 
 /// One field of one topic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChannelSource {
-    /// Topic, e.g. `/rig/compressor`.
+    /// Topic, e.g. `/rig/compressor`, or group of a log; empty for any group of a log.
     pub topic: String,
     /// Field of the topic's messages.
     pub field: String,
     /// Unit of the field; `None` to take it from the recording.
     pub unit: Option<String>,
+    /// Whether it is a pressure over the ambient pressure.
+    pub gauge: bool,
 }
 
 /// What identification needs of the machine.
@@ -74,13 +93,14 @@ impl ChannelMap {
             topic: row.group.topic().to_owned(),
             field: row.field.to_owned(),
             unit: Some(row.dimension.unit().to_owned()),
+            gauge: false,
         };
         let channels = CHANNELS.iter().map(|row| (row.channel, source(row))).collect();
         let several = |row: &'static mapper_core::ChannelInfo| {
             (1..=MAX_ELEMENTS).map(|number| {
                 let element = Element { channel: row.channel, number };
                 let unit = Some(row.dimension.unit().to_owned());
-                (element, ChannelSource { topic: ELEMENTS_TOPIC.to_owned(), field: element.field(), unit })
+                (element, ChannelSource { topic: ELEMENTS_TOPIC.to_owned(), field: element.field(), unit, gauge: false })
             })
         };
         let measured = CHANNELS.iter().filter(|row| row.group != Group::Command);

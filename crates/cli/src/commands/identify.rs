@@ -12,10 +12,10 @@ use mapper_session::{Recorded, Session};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Identify efficiency and heat transfer from a run directory or any MCAP recording
+/// Identify efficiency and heat transfer from a run directory, an MCAP recording or the log of another program
 #[derive(Debug, Args)]
 pub struct Identify {
-    /// Run directory, or MCAP file
+    /// Run directory, MCAP file, or log of another program (see `mapper log inspect`)
     pub recording: PathBuf,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
     #[arg(long, value_name = "FILE")]
@@ -36,11 +36,11 @@ impl Identify {
     pub fn run(&self) -> Result<(), Failure> {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
-        let recorded = Recorded::read(&self.recording, &map, given.as_ref())?;
+        let registry = registry::registry();
+        let recorded = Recorded::read(&registry, &self.recording, &map, given.as_ref())?;
         let path = recorded.path.clone();
         let warnings: Vec<String> = recorded.read.warnings.iter().map(ToString::to_string).collect();
         let display = recorded.campaign.as_ref().map(|campaign| campaign.display.clone()).unwrap_or_default();
-        let registry = registry::registry();
         let found = Session::new(&registry).identify(recorded, &map, self.method.map(Method::from))?;
         if self.json {
             let mut value = json!({

@@ -9,6 +9,7 @@ subcommands! { Command:
     plan::Plan,
     run::Run,
     identify::Identify,
+    log::Log,
     gap::Gap,
     drift::Drift,
     nightly::Nightly,

@@ -28,8 +28,8 @@ impl Rig {
     /// Identifies a recording by its campaign's method and writes thermal model, turbine and pictures.
     pub fn run(&self) -> Result<(), Failure> {
         let given = given_campaign(self.campaign.as_deref())?;
-        let recorded = Recorded::read(&self.recording, &ChannelMap::native(), given.as_ref())?;
         let registry = registry::registry();
+        let recorded = Recorded::read(&registry, &self.recording, &ChannelMap::native(), given.as_ref())?;
         let written = Session::new(&registry).rig_files(recorded, &self.out)?;
         if self.json {
             return output::print_json(&written);

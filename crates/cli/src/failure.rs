@@ -107,9 +107,7 @@ impl From<SessionError> for Failure {
             SessionError::Campaign(error) => Failure::of_campaign(error),
             SessionError::Nightly(NightlyError::Mistakes(findings))
             | SessionError::ChannelMap(ChannelMapError::Mistakes(findings))
-            | SessionError::Record(RecordError::ChannelMap(findings)) => {
-                Failure::of_findings(&findings)
-            }
+            | SessionError::Record(RecordError::ChannelMap(findings)) => Failure::of_findings(&findings),
             error => Failure::new(code, error),
         }
     }

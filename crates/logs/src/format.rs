@@ -57,7 +57,11 @@ impl LogFormats {
     ///
     /// # Errors
     /// [`LogError`] where the file cannot be read, is of no known format, or holds nothing that can be used.
-    pub fn open(self, file: &LogFile, options: &LogOptions) -> Result<(&'static LogFormat, Box<dyn Log>), LogError> {
+    pub fn open(
+        self,
+        file: &LogFile,
+        options: &LogOptions,
+    ) -> Result<(&'static LogFormat, Box<dyn Log>), LogError> {
         let head = file.head(Self::HEAD_BYTES)?;
         let format = self.of_head(&head).ok_or_else(|| LogError::Unknown {
             path: file.path().to_owned(),

@@ -32,11 +32,32 @@ const SPELLINGS: &[(Kind, &str, &[&str])] = &[
     (
         Kind::Temperature,
         "degC",
-        &["degc", "°c", "c", "gradc", "grdc", "grad", "celsius", "gradcelsius", "degreesc", "degreec", "ºc", "deg.c", "*c"],
+        &[
+            "degc",
+            "°c",
+            "c",
+            "gradc",
+            "grdc",
+            "grad",
+            "celsius",
+            "gradcelsius",
+            "degreesc",
+            "degreec",
+            "ºc",
+            "deg.c",
+            "*c",
+        ],
     ),
     (Kind::Temperature, "K", &["k", "kelvin", "degk", "°k"]),
     (Kind::Temperature, "degF", &["degf", "°f", "f", "fahrenheit"]),
-    (Kind::Speed, "rpm", &["rpm", "1/min", "min-1", "min^-1", "min⁻¹", "u/min", "upm", "rev/min", "r/min", "umin", "/min", "1/m"]),
+    (
+        Kind::Speed,
+        "rpm",
+        &[
+            "rpm", "1/min", "min-1", "min^-1", "min⁻¹", "u/min", "upm", "rev/min", "r/min", "umin", "/min",
+            "1/m",
+        ],
+    ),
     (Kind::Speed, "krpm", &["krpm", "1000rpm", "1000/min", "k1/min", "ku/min"]),
     (Kind::Speed, "Hz", &["hz", "1/s", "rev/s", "u/s", "rps"]),
     (Kind::Speed, "rad/s", &["rad/s"]),
@@ -66,7 +87,8 @@ const PRESSURES: &[(&str, &str)] = &[
     ("pa", "Pa"),
 ];
 
-const GAUGE: &[&str] = &["g", "(g)", "_g", "rel", "_rel", "(rel)", "r", "ü", "(ü)", "gauge", "ue", "-g", "relativ"];
+const GAUGE: &[&str] =
+    &["g", "(g)", "_g", "rel", "_rel", "(rel)", "r", "ü", "(ü)", "gauge", "ue", "-g", "relativ"];
 const ABSOLUTE: &[&str] = &["a", "(a)", "_a", "abs", "_abs", "(abs)", "absolute", "absolut", "-a", "abs."];
 
 /// The unit that a header means; `None` for what is none.
@@ -76,7 +98,8 @@ pub fn header_unit(text: &str) -> Option<HeaderUnit> {
     if lower.is_empty() || lower.len() > 24 {
         return None;
     }
-    let known = |kind, symbol, reference| Some(HeaderUnit { kind, unit: unit(kind, symbol).ok()?, reference });
+    let known =
+        |kind, symbol, reference| Some(HeaderUnit { kind, unit: unit(kind, symbol).ok()?, reference });
     for (kind, symbol, spellings) in SPELLINGS {
         if spellings.contains(&lower.as_str()) {
             return known(*kind, symbol, Reference::Unsaid);
@@ -141,7 +164,11 @@ mod tests {
             ("U/min", Kind::Speed, "rpm", Reference::Unsaid),
         ] {
             let found = header_unit(text).unwrap();
-            assert_eq!((found.kind, found.unit.symbol(), found.reference), (kind, symbol_of(kind, symbol), reference), "{text}");
+            assert_eq!(
+                (found.kind, found.unit.symbol(), found.reference),
+                (kind, symbol_of(kind, symbol), reference),
+                "{text}"
+            );
         }
         assert_eq!(header_unit("Nm"), None);
     }

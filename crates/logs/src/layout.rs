@@ -47,7 +47,9 @@ impl Layout {
         };
         let by = |text: fn(&Column) -> &str| -> Vec<usize> {
             let rows = self.columns.iter().enumerate();
-            rows.filter(|(_, column)| in_group(column) && text(column) == field).map(|(index, _)| index).collect()
+            rows.filter(|(_, column)| in_group(column) && text(column) == field)
+                .map(|(index, _)| index)
+                .collect()
         };
         let named = by(|column| &column.name);
         if named.is_empty() { by(|column| &column.header) } else { named }

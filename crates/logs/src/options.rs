@@ -105,7 +105,9 @@ pub const OPTION_KEYS: [OptionKey; 12] = [
         name: "decimal",
         description: "Decimal sign: `.` or `,`.",
         example: ",",
-        set: |options, text| set(&mut options.decimal, one_char(text).filter(|sign| [',', '.'].contains(sign))),
+        set: |options, text| {
+            set(&mut options.decimal, one_char(text).filter(|sign| [',', '.'].contains(sign)))
+        },
     },
     OptionKey {
         name: "encoding",
@@ -241,7 +243,9 @@ mod tests {
         for key in OPTION_KEYS {
             LogOptions::default().set(key.name, key.example).unwrap();
         }
-        for (key, value) in [("separator", "ab"), ("decimal", ";"), ("rate", "0 Hz"), ("names_row", "0"), ("x", "1")] {
+        for (key, value) in
+            [("separator", "ab"), ("decimal", ";"), ("rate", "0 Hz"), ("names_row", "0"), ("x", "1")]
+        {
             assert!(LogOptions::default().set(key, value).is_err(), "{key}: {value}");
         }
     }

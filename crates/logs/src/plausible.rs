@@ -66,7 +66,8 @@ mod tests {
         // A car's compressor at 40 kg/h to 1100 kg/h taken for g/s and for kg/s.
         assert!(fits(Channel::CompressorFlow, 0.011, 0.31));
         assert!(!fits(Channel::CompressorFlow, 40.0, 1100.0));
-        let symbols: Vec<_> = fitting_units(Channel::CompressorFlow, 40.0, 1100.0).iter().map(|unit| unit.symbol()).collect();
+        let symbols: Vec<_> =
+            fitting_units(Channel::CompressorFlow, 40.0, 1100.0).iter().map(|unit| unit.symbol()).collect();
         assert!(symbols.contains(&"kg/h") && !symbols.contains(&"kg/s"), "{symbols:?}");
         // degC taken for K, K for degC, rpm in thousands.
         assert!(!fits(Channel::T1, 19.0, 25.0) && !fits(Channel::T1, 565.0, 573.0));

@@ -11,7 +11,8 @@ pub fn sparkline(values: &[f64], width: usize) -> String {
     let high = finite().fold(f64::NEG_INFINITY, f64::max);
     let width = width.min(values.len());
     let share = |index: usize| {
-        let part = values.get(index * values.len() / width..(index + 1) * values.len() / width).unwrap_or_default();
+        let part =
+            values.get(index * values.len() / width..(index + 1) * values.len() / width).unwrap_or_default();
         let (mut sum, mut count) = (0.0, 0.0);
         for value in part.iter().filter(|value| value.is_finite()) {
             sum += value;

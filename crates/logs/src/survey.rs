@@ -72,7 +72,13 @@ pub struct ColumnSurvey {
 
 impl Default for ColumnSurvey {
     fn default() -> Self {
-        ColumnSurvey { count: 0, missing: 0, min: f64::INFINITY, max: f64::NEG_INFINITY, trace: Trace::default() }
+        ColumnSurvey {
+            count: 0,
+            missing: 0,
+            min: f64::INFINITY,
+            max: f64::NEG_INFINITY,
+            trace: Trace::default(),
+        }
     }
 }
 
@@ -116,7 +122,9 @@ impl GroupSurvey {
 
     /// The typical interval so far: settled once enough rows have come.
     fn typical_s(&mut self) -> f64 {
-        if self.interval_s.is_finite() && self.intervals.len() % 64 != 0 || self.intervals.len() >= INTERVALS && self.interval_s > 0.0 {
+        if self.interval_s.is_finite() && self.intervals.len() % 64 != 0
+            || self.intervals.len() >= INTERVALS && self.interval_s > 0.0
+        {
             return self.interval_s;
         }
         let mut intervals = self.intervals.clone();
@@ -140,7 +148,12 @@ pub fn survey(log: &mut dyn Log) -> Result<Survey, LogError> {
     let layout = log.layout().clone();
     let mut survey = Survey {
         groups: vec![
-            GroupSurvey { first_s: f64::NAN, last_s: f64::NAN, interval_s: f64::NAN, ..GroupSurvey::default() };
+            GroupSurvey {
+                first_s: f64::NAN,
+                last_s: f64::NAN,
+                interval_s: f64::NAN,
+                ..GroupSurvey::default()
+            };
             layout.groups.len()
         ],
         columns: vec![ColumnSurvey::default(); layout.columns.len()],

@@ -22,7 +22,11 @@ impl Trace {
     pub fn push(&mut self, value: f64) {
         let bin = usize::try_from(self.rows / self.rows_per_bin).unwrap_or(BIN_LIMIT);
         if bin >= BIN_LIMIT {
-            self.bins = self.bins.chunks(2).map(|pair| pair.iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1))).collect();
+            self.bins = self
+                .bins
+                .chunks(2)
+                .map(|pair| pair.iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1)))
+                .collect();
             self.rows_per_bin *= 2;
             return self.push(value);
         }

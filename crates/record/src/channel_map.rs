@@ -1,5 +1,6 @@
 //! Where a recording holds the rig's channels, and what it does not say itself.
 
+use crate::definitions::Reads;
 use crate::format::ELEMENTS_TOPIC;
 use mapper_core::{
     CHANNELS, Channel, DeclaredUncertainty, Element, Group, MAX_ELEMENTS, NoiseColour, RedundantSensors,
@@ -100,12 +101,28 @@ impl ChannelMap {
             (1..=MAX_ELEMENTS).map(|number| {
                 let element = Element { channel: row.channel, number };
                 let unit = Some(row.dimension.unit().to_owned());
-                (element, ChannelSource { topic: ELEMENTS_TOPIC.to_owned(), field: element.field(), unit, gauge: false })
+                (
+                    element,
+                    ChannelSource {
+                        topic: ELEMENTS_TOPIC.to_owned(),
+                        field: element.field(),
+                        unit,
+                        gauge: false,
+                    },
+                )
             })
         };
         let measured = CHANNELS.iter().filter(|row| row.group != Group::Command);
         let elements = measured.flat_map(several).collect();
         ChannelMap { channels, elements, native: true, ..ChannelMap::default() }
+    }
+
+    /// Where a field of a recording is described.
+    pub(crate) fn source(&self, reads: Reads) -> Option<&ChannelSource> {
+        match reads {
+            Reads::Channel(channel) => self.channels.get(&channel),
+            Reads::Element(element) => self.elements.get(&element),
+        }
     }
 
     /// Whether this is [`ChannelMap::native`]: channels missing from the recording are then no surprise.

@@ -2,9 +2,9 @@
 
 use crate::channel_map_schema::SCHEMA;
 use crate::format::TRUTH_PREFIX;
-use mapper_logs::units::{difference, kind_of, parse_quantity, remedy, unit};
 use crate::{AmbientPressure, ChannelMap, ChannelSource, MachineConstants, WindowLimits};
 use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, RedundantSensors, ReferenceState};
+use mapper_logs::units::{difference, kind_of, parse_quantity, remedy, unit};
 use mapper_logs::{LogOptions, OPTION_KEYS, OptionError};
 use mapper_yaml::units::{Kind, UnitError};
 use mapper_yaml::{Content, Document, FindingKind, Findings, Node, Notes, Source, Step, path_text, steps};
@@ -17,7 +17,8 @@ use std::path::{Path, PathBuf};
 const SIZE_LIMIT: usize = 1 << 20;
 
 /// What messages call the file.
-pub(crate) static DOCUMENT: Document = Document { name: "channel map", example: "examples/channels/gap_rig.yaml" };
+pub(crate) static DOCUMENT: Document =
+    Document { name: "channel map", example: "examples/channels/gap_rig.yaml" };
 
 /// Why there is no channel map.
 #[derive(Debug, thiserror::Error)]
@@ -147,7 +148,9 @@ impl<'a> Reader<'a> {
         if node.entries().is_empty() {
             return self.positive(&here, Kind::Pressure).map(AmbientPressure::Constant);
         }
-        let text = |key: &str| self.root.get(&steps!["ambient_pressure", key]).and_then(Node::text).map(str::to_owned);
+        let text = |key: &str| {
+            self.root.get(&steps!["ambient_pressure", key]).and_then(Node::text).map(str::to_owned)
+        };
         let (topic, field, written) = (text("topic").unwrap_or_default(), text("field")?, text("unit"));
         if let Some(Err(error)) = written.as_deref().map(|name| unit(Kind::Pressure, name)) {
             self.note_unit(&steps!["ambient_pressure", "unit"], Kind::Pressure, &error);
@@ -160,12 +163,15 @@ impl<'a> Reader<'a> {
         for entry in self.root.get(&steps!["log"]).map(Node::entries).unwrap_or_default() {
             let here = steps!["log", entry.key.as_str()];
             let Some(node) = self.root.get(&here) else { continue };
-            let Some(text) = node.text().map(str::to_owned).or_else(|| node.number().map(|number| number.to_string())) else {
+            let Some(text) =
+                node.text().map(str::to_owned).or_else(|| node.number().map(|number| number.to_string()))
+            else {
                 continue;
             };
             // A key that does not exist was noted by the check against the schema.
             if let Err(error @ OptionError::Value { .. }) = options.set(&entry.key, &text) {
-                let remedy = OPTION_KEYS.iter().find(|key| key.name == entry.key).map_or("", |key| key.description);
+                let remedy =
+                    OPTION_KEYS.iter().find(|key| key.name == entry.key).map_or("", |key| key.description);
                 self.note(FindingKind::WrongValue, &here, error.to_string(), remedy);
             }
         }
@@ -185,9 +191,13 @@ impl<'a> Reader<'a> {
         if let Some(Err(error)) = written.as_deref().map(|name| unit(kind, name)) {
             self.note_unit(&of("unit"), kind, &error);
         }
-        let gauge = matches!(self.root.get(&of("gauge")).map(|node| &node.content), Some(Content::Scalar(Value::Bool(true))));
+        let gauge = matches!(
+            self.root.get(&of("gauge")).map(|node| &node.content),
+            Some(Content::Scalar(Value::Bool(true)))
+        );
         if gauge && kind != Kind::Pressure {
-            let message = format!("{channel} is no pressure, and only pressures are read over the ambient pressure");
+            let message =
+                format!("{channel} is no pressure, and only pressures are read over the ambient pressure");
             self.note(FindingKind::Conflict, &of("gauge"), message, "remove `gauge`");
         }
         (topic, written, gauge)

@@ -1,9 +1,9 @@
 //! Why a recording could not be written or read.
 
-use mapper_logs::units::{kind_of, remedy};
 use crate::{FormatVersion, UnitError};
 use mapper_core::Channel;
 use mapper_logs::LogError;
+use mapper_logs::units::{kind_of, remedy};
 use mapper_yaml::Findings;
 use std::{io, path::PathBuf};
 

@@ -135,7 +135,11 @@ mod tests {
     fn a_slow_log_stays_as_it_is() {
         let out = through(10.0, 300);
         assert_eq!(out.len(), 300);
-        assert!(out.iter().enumerate().all(|(row, (t_s, values))| *t_s == row as f64 / 10.0 && values[0] == 5.0 * t_s));
+        assert!(
+            out.iter()
+                .enumerate()
+                .all(|(row, (t_s, values))| *t_s == row as f64 / 10.0 && values[0] == 5.0 * t_s)
+        );
         assert_eq!(through(10.0, 3).len(), 3);
     }
 }

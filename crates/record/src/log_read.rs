@@ -4,7 +4,7 @@ use crate::complaints::Complaints;
 use crate::definitions::Reads;
 use crate::log_blocks::Blocks;
 use crate::series_builder::SeriesBuilder;
-use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, RecordError};
+use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, ReadWarning, RecordError};
 use mapper_core::Channel;
 use mapper_logs::units::{kind_of, remedy, unit};
 use mapper_logs::{Kind, Layout, LogFile, Reference, Row, Unit, header_unit};
@@ -28,6 +28,7 @@ pub(crate) struct ReadLog {
     pub(crate) zero_ns: u64,
     /// Time 0 in nanoseconds since 1970, where the log says it.
     pub(crate) start_time_ns: Option<u64>,
+    pub(crate) warnings: Vec<ReadWarning>,
     pub(crate) averaged: bool,
     pub(crate) full: bool,
 }
@@ -46,7 +47,11 @@ struct Wanted {
 }
 
 /// Reads the mapped columns.
-pub(crate) fn read_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Result<ReadLog, RecordError> {
+pub(crate) fn read_log(
+    file: &LogFile,
+    map: &ChannelMap,
+    options: &ReadOptions,
+) -> Result<ReadLog, RecordError> {
     let (_, mut log) = options.logs.open(file, &map.log)?;
     let layout = log.layout().clone();
     let wanted = wanted(map, &layout)?;
@@ -55,7 +60,11 @@ pub(crate) fn read_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) 
     columns.sort_unstable();
     columns.dedup();
     let of_group = |group: usize| -> Vec<usize> {
-        columns.iter().copied().filter(|column| layout.columns.get(*column).is_some_and(|c| c.group == group)).collect()
+        columns
+            .iter()
+            .copied()
+            .filter(|column| layout.columns.get(*column).is_some_and(|c| c.group == group))
+            .collect()
     };
     let members: Vec<Vec<usize>> = (0..layout.groups.len()).map(of_group).collect();
     // Place of each wanted column among the values of its group.
@@ -72,10 +81,14 @@ pub(crate) fn read_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) 
     let mut read = ReadLog {
         zero_ns: ZERO_NS,
         start_time_ns: layout.start_time_ns,
-        units: wanted.iter().filter_map(|wanted| match wanted.target {
-            Target::Reads(reads) => Some((reads, wanted.unit)),
-            Target::Ambient => None,
-        }).collect(),
+        warnings: contradictions(map, &layout, &wanted),
+        units: wanted
+            .iter()
+            .filter_map(|wanted| match wanted.target {
+                Target::Reads(reads) => Some((reads, wanted.unit)),
+                Target::Ambient => None,
+            })
+            .collect(),
         ..ReadLog::default()
     };
     let mut blocks: Vec<Blocks> = members.iter().map(|_| Blocks::default()).collect();
@@ -83,7 +96,8 @@ pub(crate) fn read_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) 
     let mut take_row = |row: Row<'_>| {
         rows += 1;
         let usable = row.t_s.is_finite() && row.t_s.abs() < LONGEST_S && rows <= options.max_messages;
-        if let (Some(blocks), Some(places), true) = (blocks.get_mut(row.group), places.get(row.group), usable) {
+        if let (Some(blocks), Some(places), true) = (blocks.get_mut(row.group), places.get(row.group), usable)
+        {
             blocks.push(row.t_s, row.values, &mut |t_s, values| read.take(places, t_s, values));
         }
         Ok(())
@@ -121,8 +135,9 @@ fn wanted(map: &ChannelMap, layout: &Layout) -> Result<Vec<Wanted>, RecordError>
     for (reads, source) in channels.chain(elements) {
         let channel = reads.channel();
         let at = |key: &str| steps!["channels", channel.symbol(), key].to_vec();
-        let found = column_of(layout, source, &at, &mut complaints)
-            .and_then(|column| Some((column, unit_of(layout, column, source, Some(channel), &at, &mut complaints)?)));
+        let found = column_of(layout, source, &at, &mut complaints).and_then(|column| {
+            Some((column, unit_of(layout, column, source, Some(channel), &at, &mut complaints)?))
+        });
         list.extend(found.map(|(column, unit)| Wanted { target: Target::Reads(reads), column, unit }));
     }
     if let Some(AmbientPressure::Source(source)) = &map.ambient_pressure {
@@ -133,6 +148,19 @@ fn wanted(map: &ChannelMap, layout: &Layout) -> Result<Vec<Wanted>, RecordError>
     }
     complaints.result(map)?;
     Ok(list)
+}
+
+/// Where the map and the log disagree about a unit.
+fn contradictions(map: &ChannelMap, layout: &Layout, wanted: &[Wanted]) -> Vec<ReadWarning> {
+    let contradiction = |wanted: &Wanted| {
+        let Target::Reads(reads) = wanted.target else { return None };
+        let recorded = layout.columns.get(wanted.column)?.unit.clone()?;
+        let known = header_unit(&recorded);
+        let agrees = known.is_some_and(|known| known.unit.converts_like(wanted.unit));
+        let mapped = map.source(reads)?.unit.clone()?;
+        (!agrees).then(|| ReadWarning::UnitContradiction { channel: reads.channel(), mapped, recorded })
+    };
+    wanted.iter().filter_map(contradiction).collect()
 }
 
 fn column_of(
@@ -146,13 +174,19 @@ fn column_of(
         return Some(*column);
     }
     if !source.topic.is_empty() && !layout.groups.iter().any(|group| group.name == source.topic) {
-        let names: Vec<&str> = layout.groups.iter().map(|group| group.name.as_str()).filter(|name| !name.is_empty()).collect();
+        let names: Vec<&str> =
+            layout.groups.iter().map(|group| group.name.as_str()).filter(|name| !name.is_empty()).collect();
         let remedy = if names.is_empty() {
             "the log has one group without a name: leave `topic` out".to_owned()
         } else {
             format!("its groups are {}", names.join(", "))
         };
-        complaints.add(FindingKind::WrongValue, &at("topic"), format!("the log has no group `{}`", source.topic), remedy);
+        complaints.add(
+            FindingKind::WrongValue,
+            &at("topic"),
+            format!("the log has no group `{}`", source.topic),
+            remedy,
+        );
         return None;
     }
     let message;
@@ -162,7 +196,11 @@ fn column_of(
         message = format!("the log has no column `{}`", source.field);
         let guess = closest(&source.field, &names).map(|name| format!("did you mean `{name}`? "));
         let shown: Vec<&str> = names.iter().copied().take(30).collect();
-        let more = if names.len() > shown.len() { format!(" and {} more", names.len() - shown.len()) } else { String::new() };
+        let more = if names.len() > shown.len() {
+            format!(" and {} more", names.len() - shown.len())
+        } else {
+            String::new()
+        };
         remedy = format!("{}its columns are {}{more}", guess.unwrap_or_default(), shown.join(", "));
     } else {
         let groups: Vec<&str> = columns
@@ -210,20 +248,26 @@ fn unit_of(
         None => match unit(kind, recorded) {
             Ok(unit) => Some(unit),
             Err(error) => {
-                let message = format!("the log gives {name} in `{recorded}`, which is not a unit of {}", kind.name());
-                complaints.add(FindingKind::Unit, &at("field"), message, format!("{}; write `unit`", remedy(kind, &error)));
+                let message =
+                    format!("the log gives {name} in `{recorded}`, which is not a unit of {}", kind.name());
+                complaints.add(
+                    FindingKind::Unit,
+                    &at("field"),
+                    message,
+                    format!("{}; write `unit`", remedy(kind, &error)),
+                );
                 None
             }
         },
     }
 }
 
-/// The file as a log, where it is no MCAP and any format is known.
+/// Whether a file that starts with these bytes is MCAP, or too short to be anything else.
 pub(crate) fn is_mcap(head: &[u8]) -> bool {
     head.starts_with(b"\x89MCAP") || head.len() < 5 && b"\x89MCAP".starts_with(head)
 }
 
-/// Whether there are log formats to ask.
+/// The file as a log, where it is no MCAP and there are formats to ask.
 pub(crate) fn log_of_path(path: &Path, options: &ReadOptions) -> Result<Option<LogFile>, RecordError> {
     if options.logs.0.is_empty() {
         return Ok(None);

@@ -1,7 +1,7 @@
 //! Whether what was read can be what the channel map says, before anything is computed from it.
 
-use crate::complaints::Complaints;
 use crate::ChannelSource;
+use crate::complaints::Complaints;
 use mapper_core::{Channel, Series};
 use mapper_logs::plausible::{fits, fitting_units, looks_like_gauge};
 use mapper_logs::units::{kind_of, unit};
@@ -22,7 +22,8 @@ pub(crate) fn check(
 ) {
     let mut values: Vec<f64> = series.values.iter().copied().filter(|value| value.is_finite()).collect();
     values.sort_unstable_by(f64::total_cmp);
-    let quantile = |share: f64| values.get((share * values.len().saturating_sub(1) as f64).round() as usize).copied();
+    let quantile =
+        |share: f64| values.get((share * values.len().saturating_sub(1) as f64).round() as usize).copied();
     let (Some(low), Some(high)) = (quantile(OUTER), quantile(1.0 - OUTER)) else { return };
     if fits(channel, low, high) {
         return;
@@ -37,11 +38,16 @@ pub(crate) fn check(
     let absolute = !source.gauge;
     for other in fitting_units(channel, written_low, written_high).into_iter().filter(|_| absolute) {
         let shown = shown_unit(kind_of(channel));
-        let at = |value: f64| short(shown.map_or(other.to_inside(value), |shown| shown.from_inside(other.to_inside(value))));
+        let at = |value: f64| {
+            short(shown.map_or(other.to_inside(value), |shown| shown.from_inside(other.to_inside(value))))
+        };
         let symbol = shown.map_or(channel.unit(), Unit::symbol);
         right.push(format!(
             "as {} they would be {} to {} {symbol}: write `unit: {}`",
-            other.symbol(), at(written_low), at(written_high), other.symbol()
+            other.symbol(),
+            at(written_low),
+            at(written_high),
+            other.symbol()
         ));
     }
     if right.is_empty() {
@@ -52,7 +58,11 @@ pub(crate) fn check(
     let over = if source.gauge { " with the ambient pressure" } else { "" };
     let message = format!(
         "the readings of `{}` lie between {} and {} {}{over}, which is impossible for {channel}, {}",
-        source.field, short(written_low), short(written_high), unit_used.symbol(), channel.info().description
+        source.field,
+        short(written_low),
+        short(written_high),
+        unit_used.symbol(),
+        channel.info().description
     );
     let remedy = format!("{}; or leave {channel} out", right.join("; "));
     complaints.add(FindingKind::Implausible, &place, message, remedy);

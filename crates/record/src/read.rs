@@ -9,7 +9,9 @@ use crate::scan::{Scanned, scan};
 use crate::series_builder::{SeriesBuilder, run_time_s};
 use crate::steps::{steps_from_commands, steps_from_markers};
 use crate::steps_found::{can_be_searched, steps_from_jumps, without_rest};
-use crate::{AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError, plausibility};
+use crate::{
+    AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError, plausibility,
+};
 use mapper_core::{Channel, Element, Group, Recording, RedundantSensors, Series, StepMarker};
 use mapper_logs::{LogFile, Unit};
 use mapper_yaml::{FindingKind, steps};
@@ -86,7 +88,7 @@ fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Resul
         return Err(RecordError::LogWithoutMap { path: file.path().to_owned() });
     }
     let log = read_log(file, map, options)?;
-    let mut warnings = Vec::new();
+    let mut warnings = log.warnings;
     if log.averaged {
         warnings.push(ReadWarning::Averaged);
     }
@@ -132,9 +134,15 @@ fn read(
 fn fits_mcap(map: &ChannelMap) -> Result<(), RecordError> {
     let mut complaints = Complaints::default();
     for (reads, source) in sources(map).filter(|(_, source)| source.topic.is_empty()) {
-        let message = format!("`{}` has no `topic`, and the fields of an MCAP recording stand in topics", source.field);
+        let message =
+            format!("`{}` has no `topic`, and the fields of an MCAP recording stand in topics", source.field);
         let remedy = "write `topic: /name`, as in the recording".to_owned();
-        complaints.add(FindingKind::MissingKey, &steps!["channels", reads.channel().symbol()], message, remedy);
+        complaints.add(
+            FindingKind::MissingKey,
+            &steps!["channels", reads.channel().symbol()],
+            message,
+            remedy,
+        );
     }
     if let Some(AmbientPressure::Source(_)) = &map.ambient_pressure {
         let message = "columns of the ambient pressure are read from logs alone".to_owned();
@@ -232,11 +240,7 @@ fn gather(
         if built.t_s.is_empty() {
             continue;
         }
-        let source = match reads {
-            Reads::Channel(channel) => map.channels.get(&channel),
-            Reads::Element(element) => map.elements.get(&element),
-        };
-        if source.is_some_and(|source| source.gauge) {
+        if map.source(reads).is_some_and(|source| source.gauge) {
             if built.t_s.first().is_none_or(|t_s| ambient_pa(*t_s).is_none()) {
                 warnings.push(ReadWarning::NoAmbient { channel: reads.channel() });
                 continue;
@@ -285,7 +289,8 @@ fn complete(
 fn steps_without_marks(gathered: &Gathered, warnings: &mut Vec<ReadWarning>) -> Vec<StepMarker> {
     let series = &gathered.series;
     let span_s = span_s(series);
-    let commanded = [Channel::P3Command, Channel::ValveCommand].iter().any(|channel| series.contains_key(channel));
+    let commanded =
+        [Channel::P3Command, Channel::ValveCommand].iter().any(|channel| series.contains_key(channel));
     if commanded || !can_be_searched(series) {
         return without_rest(steps_from_commands(series, span_s, warnings), series);
     }

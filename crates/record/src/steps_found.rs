@@ -39,9 +39,14 @@ pub(crate) fn can_be_searched(series: &BTreeMap<Channel, Series>) -> bool {
 }
 
 /// Steps from jump to jump. What was held before the first jump is the first step.
-pub(crate) fn steps_from_jumps(series: &BTreeMap<Channel, Series>, warnings: &mut Vec<ReadWarning>) -> Vec<StepMarker> {
+pub(crate) fn steps_from_jumps(
+    series: &BTreeMap<Channel, Series>,
+    warnings: &mut Vec<ReadWarning>,
+) -> Vec<StepMarker> {
     let grid = Grid::of(series);
-    let (Some(first_s), Some(last_s)) = (grid.t_s.first().copied(), grid.t_s.last().copied()) else { return Vec::new() };
+    let (Some(first_s), Some(last_s)) = (grid.t_s.first().copied(), grid.t_s.last().copied()) else {
+        return Vec::new();
+    };
     let starts_s: Vec<f64> = std::iter::once(first_s).chain(grid.jumps_s()).collect();
     let ends_s = starts_s.iter().skip(1).map(|next_s| next_s - grid.interval_s).chain([last_s]);
     let p3 = series.get(&Channel::P3);
@@ -80,7 +85,8 @@ pub(crate) fn without_rest(steps: Vec<StepMarker>, series: &BTreeMap<Channel, Se
 
 /// NaN where there are no readings.
 fn median(series: &Series, start_s: f64, end_s: f64) -> f64 {
-    let mut values: Vec<f64> = series.slice(start_s, end_s).1.iter().copied().filter(|value| value.is_finite()).collect();
+    let mut values: Vec<f64> =
+        series.slice(start_s, end_s).1.iter().copied().filter(|value| value.is_finite()).collect();
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
@@ -108,21 +114,27 @@ impl Grid {
     fn of(series: &BTreeMap<Channel, Series>) -> Grid {
         let found: Vec<(Channel, f64, &Series)> = SIGNALS
             .iter()
-            .filter_map(|(channel, ratio)| Some((*channel, *ratio, series.get(channel).filter(|s| s.t_s.len() > 30)?)))
+            .filter_map(|(channel, ratio)| {
+                Some((*channel, *ratio, series.get(channel).filter(|s| s.t_s.len() > 30)?))
+            })
             .collect();
         let typical_s = |series: &Series| {
-            let mut steps: Vec<f64> = series.t_s.windows(2).take(4096).map(|pair| pair[1] - pair[0]).collect();
+            let mut steps: Vec<f64> =
+                series.t_s.windows(2).take(4096).map(|pair| pair[1] - pair[0]).collect();
             steps.sort_unstable_by(f64::total_cmp);
             steps.get(steps.len() / 2).copied().unwrap_or(GRID_S)
         };
         let first_s = found.iter().filter_map(|(.., s)| s.t_s.first().copied()).fold(f64::INFINITY, f64::min);
-        let last_s = found.iter().filter_map(|(.., s)| s.t_s.last().copied()).fold(f64::NEG_INFINITY, f64::max);
+        let last_s =
+            found.iter().filter_map(|(.., s)| s.t_s.last().copied()).fold(f64::NEG_INFINITY, f64::max);
         let slowest_s = found.iter().map(|(.., s)| typical_s(s)).fold(GRID_S, f64::max);
         let interval_s = slowest_s.max((last_s - first_s) / GRID_LIMIT);
         let mut bins: BTreeMap<i64, Vec<(f64, f64)>> = BTreeMap::new();
         for (index, (.., series)) in found.iter().enumerate() {
             for (t_s, value) in series.t_s.iter().zip(&series.values).filter(|(_, value)| value.is_finite()) {
-                let bin = bins.entry(((t_s - first_s) / interval_s) as i64).or_insert_with(|| vec![(0.0, 0.0); found.len()]);
+                let bin = bins
+                    .entry(((t_s - first_s) / interval_s) as i64)
+                    .or_insert_with(|| vec![(0.0, 0.0); found.len()]);
                 if let Some(bin) = bin.get_mut(index) {
                     bin.0 += value;
                     bin.1 += 1.0;
@@ -159,7 +171,8 @@ impl Grid {
         let mut at = window;
         while at + apart + window <= self.t_s.len() {
             let jumped = |signal: &&Signal| {
-                let (before, after) = (signal.mean(at - window, at), signal.mean(at + apart, at + apart + window));
+                let (before, after) =
+                    (signal.mean(at - window, at), signal.mean(at + apart, at + apart + window));
                 (after - before).abs() > signal.least(before, after)
             };
             let moved: Vec<&Signal> = self.signals.iter().filter(jumped).collect();
@@ -168,12 +181,16 @@ impl Grid {
                 continue;
             }
             let end = (at + apart + window).min(self.t_s.len() - 1);
-            let begun = |place: &usize| moved.iter().any(|signal| signal.has_begun(*place, at - window, at, at + apart, window));
+            let begun = |place: &usize| {
+                moved.iter().any(|signal| signal.has_begun(*place, at - window, at, at + apart, window))
+            };
             let start = (at..end).find(begun).unwrap_or(at);
             jumps_s.extend(self.t_s.get(start));
             at = start + window;
             // The rest of a slow jump is no other one.
-            while at + window <= self.t_s.len() && !self.signals.iter().all(|signal| signal.is_calm(at - window, at, window)) {
+            while at + window <= self.t_s.len()
+                && !self.signals.iter().all(|signal| signal.is_calm(at - window, at, window))
+            {
                 at += 1;
             }
         }
@@ -189,7 +206,8 @@ impl Signal {
                 Some(*sum)
             }))
             .collect();
-        let mut steps: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).collect();
+        let mut steps: Vec<f64> =
+            values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).collect();
         steps.sort_unstable_by(f64::total_cmp);
         // Of a normal distribution the median of the absolute values is 0.6745 standard deviations; a difference has twice the
         // variance.
@@ -213,7 +231,9 @@ impl Signal {
         let (before, after) = (self.mean(from, to), self.mean(after_from, after_from + window));
         let jump = after - before;
         let enough = (BEGUN_SHARE * jump.abs()).max(4.0 * self.sigma).min(0.5 * jump.abs());
-        let off = |place: usize| self.values.get(place).is_some_and(|value| (value - before) * jump.signum() > enough);
+        let off = |place: usize| {
+            self.values.get(place).is_some_and(|value| (value - before) * jump.signum() > enough)
+        };
         off(place) && (off(place + 1) || place + 1 >= self.values.len())
     }
 
@@ -243,7 +263,9 @@ mod tests {
 
     fn starts(series: &BTreeMap<Channel, Series>) -> Vec<f64> {
         let steps = without_rest(steps_from_jumps(series, &mut Vec::new()), series);
-        assert!(steps.iter().enumerate().all(|(index, step)| step.index == index && step.end_s > step.start_s));
+        assert!(
+            steps.iter().enumerate().all(|(index, step)| step.index == index && step.end_s > step.start_s)
+        );
         steps.iter().map(|step| step.start_s).collect()
     }
 
@@ -268,8 +290,13 @@ mod tests {
     fn a_jump_in_a_gap_is_found_behind_it() {
         let mut series = run(&[(0.0, 90e3), (60.0, 120e3)], 120.0);
         let speed = series.get_mut(&Channel::ShaftSpeed).unwrap();
-        let kept: Vec<(f64, f64)> =
-            speed.t_s.iter().copied().zip(speed.values.iter().copied()).filter(|(t, _)| !(50.0..75.0).contains(t)).collect();
+        let kept: Vec<(f64, f64)> = speed
+            .t_s
+            .iter()
+            .copied()
+            .zip(speed.values.iter().copied())
+            .filter(|(t, _)| !(50.0..75.0).contains(t))
+            .collect();
         (speed.t_s, speed.values) = kept.into_iter().unzip();
         let found = starts(&series);
         assert_eq!(found.len(), 2, "{found:?}");

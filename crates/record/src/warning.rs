@@ -102,7 +102,9 @@ pub enum ReadWarning {
     #[error("the log is faster than identification needs: it was averaged to 10 samples a second")]
     Averaged,
     /// Steps were found in what was measured.
-    #[error("the recording has neither step marks nor commands: {count} steps were found where {channels} jump")]
+    #[error(
+        "the recording has neither step marks nor commands: {count} steps were found where {channels} jump"
+    )]
     StepsFound {
         /// How many.
         count: usize,
@@ -110,7 +112,9 @@ pub enum ReadWarning {
         channels: String,
     },
     /// What a gauge pressure is added to is not there.
-    #[error("{channel} is a gauge pressure, and the ambient pressure is not in the recording: it was left out")]
+    #[error(
+        "{channel} is a gauge pressure, and the ambient pressure is not in the recording: it was left out"
+    )]
     NoAmbient {
         /// The channel.
         channel: Channel,

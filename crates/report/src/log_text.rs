@@ -14,15 +14,23 @@ const GAPS: usize = 5;
 
 /// Findings, columns, gaps, and the proposal with what is sure of it and what is not.
 pub fn log_text(format: &str, layout: &Layout, survey: &Survey, proposal: &Proposal) -> String {
-    let mut text = format!("{format}, {} columns. Found by looking (in brackets what overrides it, `--with KEY=VALUE`):\n", layout.columns.len());
+    let mut text = format!(
+        "{format}, {} columns. Found by looking (in brackets what overrides it, `--with KEY=VALUE`):\n",
+        layout.columns.len()
+    );
     for finding in &layout.findings {
         let _ = writeln!(text, "  {finding}");
     }
     for (index, (group, data)) in layout.groups.iter().zip(&survey.groups).enumerate() {
         let several = layout.groups.len() > 1;
         let name = if several { format!("Group {} `{}`", index + 1, group.name) } else { "Rows".to_owned() };
-        let rate = if data.interval_s > 0.0 { format!(", {} Hz", significant(1.0 / data.interval_s, 3)) } else { String::new() };
-        let _ = write!(text, "\n{name}: {} from {:.3} s to {:.3} s{rate}", data.rows, data.first_s, data.last_s);
+        let rate = if data.interval_s > 0.0 {
+            format!(", {} Hz", significant(1.0 / data.interval_s, 3))
+        } else {
+            String::new()
+        };
+        let _ =
+            write!(text, "\n{name}: {} from {:.3} s to {:.3} s{rate}", data.rows, data.first_s, data.last_s);
         if data.backward > 0 {
             let _ = write!(text, "; {} rows are not after the row before", data.backward);
         }
@@ -32,7 +40,8 @@ pub fn log_text(format: &str, layout: &Layout, survey: &Survey, proposal: &Propo
             count => writeln!(text, ", {count} gaps:"),
         };
         for gap in data.gaps.iter().take(GAPS) {
-            let _ = writeln!(text, "  {:.3} s to {:.3} s ({:.1} s)", gap.from_s, gap.to_s, gap.to_s - gap.from_s);
+            let _ =
+                writeln!(text, "  {:.3} s to {:.3} s ({:.1} s)", gap.from_s, gap.to_s, gap.to_s - gap.from_s);
         }
     }
     let _ = writeln!(text, "\n{}", columns(layout, survey, proposal));
@@ -53,7 +62,8 @@ fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> comfy_table
         }
     }
     for (index, (column, data)) in layout.columns.iter().zip(&survey.columns).enumerate() {
-        let is_ambient = matches!(&proposal.ambient, Some(Ambient::Column { column, .. }) if *column == index);
+        let is_ambient =
+            matches!(&proposal.ambient, Some(Ambient::Column { column, .. }) if *column == index);
         let none = if is_ambient { "ambient pressure".to_owned() } else { String::new() };
         let channel = proposal.of_column(index).map_or(none, |proposed| {
             let mark = match proposed.certainty {
@@ -90,7 +100,12 @@ fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> comfy_table
 fn proposal_text(layout: &Layout, proposal: &Proposal) -> String {
     let mut text = String::new();
     let by = |certainty: Certainty| -> Vec<&str> {
-        proposal.channels.iter().filter(|proposed| proposed.certainty == certainty).map(|proposed| proposed.channel.symbol()).collect()
+        proposal
+            .channels
+            .iter()
+            .filter(|proposed| proposed.certainty == certainty)
+            .map(|proposed| proposed.channel.symbol())
+            .collect()
     };
     let list = |names: Vec<&str>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
     let _ = writeln!(text, "\nProposed channel map\n  sure: {}", list(by(Certainty::Sure)));
@@ -100,8 +115,12 @@ fn proposal_text(layout: &Layout, proposal: &Proposal) -> String {
         let name = layout.columns.get(proposed.column).map_or("", |column| column.name.as_str());
         let _ = writeln!(text, "  {} (`{name}`): {}", proposed.channel, proposed.remarks.join("; "));
     }
-    let gauge: Vec<&str> =
-        proposal.channels.iter().filter(|proposed| proposed.gauge).map(|proposed| proposed.channel.symbol()).collect();
+    let gauge: Vec<&str> = proposal
+        .channels
+        .iter()
+        .filter(|proposed| proposed.gauge)
+        .map(|proposed| proposed.channel.symbol())
+        .collect();
     match &proposal.ambient {
         None => {}
         Some(Ambient::Column { column, .. }) => {

@@ -293,7 +293,9 @@ impl SessionError {
             E::Record(RecordError::Read { .. } | RecordError::Exists { .. } | RecordError::Create { .. })
             | E::Record(RecordError::Write { .. } | RecordError::BadInput { .. }) => ErrorKind::Failure,
             E::Record(RecordError::ChannelMap(_) | RecordError::LogWithoutMap { .. }) => ErrorKind::BadInput,
-            E::Record(RecordError::Log(LogError::Read { .. })) | E::Log(LogError::Read { .. }) => ErrorKind::Failure,
+            E::Record(RecordError::Log(LogError::Read { .. })) | E::Log(LogError::Read { .. }) => {
+                ErrorKind::Failure
+            }
             E::LogOption(_) => ErrorKind::BadInput,
             E::Log(_) => ErrorKind::BadRecording,
             E::Record(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {

@@ -26,7 +26,11 @@ pub struct Inspected {
 ///
 /// # Errors
 /// [`SessionError::LogOption`] for a wrong key or value, [`SessionError::Log`] where the file cannot be read as a log.
-pub fn inspect_log(registry: &Registry, path: &Path, options: Vec<(String, String)>) -> Result<Inspected, SessionError> {
+pub fn inspect_log(
+    registry: &Registry,
+    path: &Path,
+    options: Vec<(String, String)>,
+) -> Result<Inspected, SessionError> {
     let mut read_by = LogOptions::default();
     for (key, value) in &options {
         read_by.set(key, value)?;

@@ -31,9 +31,9 @@ impl Clock {
     /// Seconds of a count.
     pub(crate) fn count_s(&self, cells: &dyn Cells) -> Option<f64> {
         match self {
-            Clock::Count { column, unit_s } => {
-                Some(cells.number(*column)).filter(|value| value.is_finite()).map(|value| scaled(value, *unit_s))
-            }
+            Clock::Count { column, unit_s } => Some(cells.number(*column))
+                .filter(|value| value.is_finite())
+                .map(|value| scaled(value, *unit_s)),
             _ => None,
         }
     }

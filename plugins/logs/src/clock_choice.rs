@@ -74,7 +74,11 @@ impl Candidate {
     /// Least step between two readings, s.
     fn resolution_s(&self) -> f64 {
         let readings: Vec<f64> = self.present().collect();
-        readings.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min)
+        readings
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .filter(|step| *step > 0.0)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Whether the other shows the same rows at the same pace.
@@ -95,7 +99,9 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
         ([], Some(rate_hz)) => {
             clocks.findings.push(format!("clock: none, {rate_hz} samples a second as given (rate)"));
             let clock = Clock::Rate { interval_s: 1.0 / rate_hz };
-            clocks.groups.push((Group::default(), GroupClock { clock, zero_s: 0.0, zero_ns: 0, spread: None }));
+            clocks
+                .groups
+                .push((Group::default(), GroupClock { clock, zero_s: 0.0, zero_ns: 0, spread: None }));
             return Ok(clocks);
         }
         ([], None) => found(sample, options, &mut clocks.findings),
@@ -128,10 +134,19 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
     let is_epoch = |candidate: &Candidate| candidate.first_s().abs() > LONGEST_COUNT_S || candidate.dated;
     let mixed = chosen.iter().any(|candidate| is_epoch(candidate) != is_epoch(chosen[0]));
     let common_s = chosen.iter().map(|candidate| candidate.first_s()).fold(f64::INFINITY, f64::min);
-    let dated = groups.iter().flatten().find(|candidate| candidate.dated && matches!(candidate.clock, Clock::Instant { .. }));
+    let dated = groups
+        .iter()
+        .flatten()
+        .find(|candidate| candidate.dated && matches!(candidate.clock, Clock::Instant { .. }));
     for (index, (group, candidate)) in groups.iter().zip(&chosen).enumerate() {
         let epoch = is_epoch(candidate) || matches!(candidate.clock, Clock::Instant { .. });
-        let zero_s = if mixed { candidate.first_s() } else if epoch { common_s } else { 0.0 };
+        let zero_s = if mixed {
+            candidate.first_s()
+        } else if epoch {
+            common_s
+        } else {
+            0.0
+        };
         let name = if groups.len() == 1 { String::new() } else { name_of(candidate) };
         let mut words = format!("`{}`", name_of(candidate));
         if let Clock::Count { unit_s, .. } = candidate.clock {
@@ -139,14 +154,29 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
         }
         let spread = spread(candidate);
         if let Some((interval_s, rows)) = spread {
-            words.push_str(&format!(", {rows} rows share each reading and are spread {interval_s:.3} s apart"));
+            words.push_str(&format!(
+                ", {rows} rows share each reading and are spread {interval_s:.3} s apart"
+            ));
         }
-        let others: Vec<String> = group.iter().filter(|other| other.at != candidate.at).map(|other| format!("`{}`", name_of(other))).collect();
-        let beside = if others.is_empty() { String::new() } else { format!("; {} runs with it and is coarser or no finer", others.join(" and ")) };
+        let others: Vec<String> = group
+            .iter()
+            .filter(|other| other.at != candidate.at)
+            .map(|other| format!("`{}`", name_of(other)))
+            .collect();
+        let beside = if others.is_empty() {
+            String::new()
+        } else {
+            format!("; beside it: {}", others.join(" and "))
+        };
         let of = if groups.len() == 1 { "clock".to_owned() } else { format!("clock of group `{name}`") };
         clocks.findings.push(format!("{of}: {words}{beside} (time, time_unit)"));
         let zero_ns = (zero_s * 1e9).round();
-        let clock = GroupClock { clock: candidate.clock.clone(), zero_s, zero_ns: exact_zero_ns(candidate, sample, zero_ns), spread };
+        let clock = GroupClock {
+            clock: candidate.clock.clone(),
+            zero_s,
+            zero_ns: exact_zero_ns(candidate, sample, zero_ns),
+            spread,
+        };
         clocks.groups.push((Group { name, clock: words }, clock));
         if index > 0 {
             let from = group.iter().map(|clock| clock.at).min().unwrap_or(candidate.at);
@@ -159,7 +189,12 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
         clocks.findings.push("the clocks count from different epochs: each group begins at 0 s".to_owned());
     }
     if let (Some(dated), Some((_, first))) = (dated, clocks.groups.first()) {
-        let start_s = dated.first_s() - if matches!(first.clock, Clock::Count { .. }) { chosen[0].first_s() - first.zero_s } else { 0.0 };
+        let start_s = dated.first_s()
+            - if matches!(first.clock, Clock::Count { .. }) {
+                chosen[0].first_s() - first.zero_s
+            } else {
+                0.0
+            };
         clocks.start_time_ns = (start_s > 0.0).then_some((start_s * 1e9) as u64);
     }
     Ok(clocks)
@@ -222,7 +257,11 @@ fn candidate(clock: Clock, at: usize, sample: &Sample<'_>, dated: bool) -> Candi
 fn named(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<Candidate, String> {
     let find = |name: &String| {
         let is = |column: &HeadColumn| column.name == *name || column.header == *name;
-        sample.columns.iter().position(is).ok_or_else(|| format!("there is no column `{name}`, which `time` names"))
+        sample
+            .columns
+            .iter()
+            .position(is)
+            .ok_or_else(|| format!("there is no column `{name}`, which `time` names"))
     };
     let columns: Vec<usize> = names.iter().map(find).collect::<Result<_, _>>()?;
     let order = options.date_order.unwrap_or_else(|| order_of(columns[0], sample).0);
@@ -231,9 +270,12 @@ fn named(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<
             let (date, time) = if shows(*time, sample, order).0 { (*time, *date) } else { (*date, *time) };
             candidate(Clock::Instant { date: Some(date), time, order }, date.min(time), sample, true)
         }
-        [column] if share(*column, sample, order) > 0.5 => {
-            candidate(Clock::Instant { date: None, time: *column, order }, *column, sample, shows(*column, sample, order).0)
-        }
+        [column] if share(*column, sample, order) > 0.5 => candidate(
+            Clock::Instant { date: None, time: *column, order },
+            *column,
+            sample,
+            shows(*column, sample, order).0,
+        ),
         [column] => {
             let unit_s = options.time_unit_s.unwrap_or_else(|| count_unit_s(*column, sample));
             candidate(Clock::Count { column: *column, unit_s }, *column, sample, false)
@@ -255,14 +297,21 @@ fn found(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) 
         if share(at, sample, order) > 0.8 {
             let (has_date, has_time) = shows(at, sample, order);
             if has_date && !sure && options.date_order.is_none() {
-                findings.push(format!("date: `{}` may be read in two ways; the month is taken to stand first (date_order)", column.name));
+                findings.push(format!(
+                    "date: `{}` may be read in two ways; the month is taken to stand first (date_order)",
+                    column.name
+                ));
             }
             if !has_time {
                 dates.push(at);
                 continue;
             }
             let beside = dates.pop().filter(|_| !has_date);
-            let clock = Clock::Instant { date: beside, time: at, order: beside.map_or(order, |date| options.date_order.unwrap_or(order_of(date, sample).0)) };
+            let clock = Clock::Instant {
+                date: beside,
+                time: at,
+                order: beside.map_or(order, |date| options.date_order.unwrap_or(order_of(date, sample).0)),
+            };
             candidates.push(candidate(clock, beside.unwrap_or(at), sample, has_date || beside.is_some()));
         } else if is_clock_name(column) {
             let unit_s = options.time_unit_s.unwrap_or_else(|| count_unit_s(at, sample));
@@ -277,7 +326,12 @@ fn found(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) 
 }
 
 fn cells<'a>(column: usize, sample: &'a Sample<'_>) -> impl Iterator<Item = &'a str> {
-    sample.rows.iter().filter_map(move |row| row.get(column)).map(String::as_str).filter(|cell| !cell.is_empty())
+    sample
+        .rows
+        .iter()
+        .filter_map(move |row| row.get(column))
+        .map(String::as_str)
+        .filter(|cell| !cell.is_empty())
 }
 
 fn order_of(column: usize, sample: &Sample<'_>) -> (DateOrder, bool) {
@@ -305,13 +359,36 @@ fn shows(column: usize, sample: &Sample<'_>, order: DateOrder) -> (bool, bool) {
 /// Whether a column of numbers says that it is a clock: by its name, unless its unit says otherwise, or by its unit.
 fn is_clock_name(column: &HeadColumn) -> bool {
     const NAMES: [&str; 22] = [
-        "t", "ts", "time", "zeit", "timestamp", "timestamps", "zeitstempel", "uhrzeit", "datetime", "sec", "seconds", "sek", "sekunden",
-        "elapsed", "clock", "ms", "msec", "t_s", "t_ms", "time_s", "time_ms", "elapsed_time",
+        "t",
+        "ts",
+        "time",
+        "zeit",
+        "timestamp",
+        "timestamps",
+        "zeitstempel",
+        "uhrzeit",
+        "datetime",
+        "sec",
+        "seconds",
+        "sek",
+        "sekunden",
+        "elapsed",
+        "clock",
+        "ms",
+        "msec",
+        "t_s",
+        "t_ms",
+        "time_s",
+        "time_ms",
+        "elapsed_time",
     ];
     let unit = column.unit.as_deref().and_then(header_unit);
     let duration = unit.is_some_and(|unit| unit.kind == Kind::Duration);
     let name = column.name.to_lowercase().replace([' ', '-', '.', ':'], "_");
-    let named = NAMES.contains(&name.as_str()) || name.contains("time") || name.contains("zeit") || name.starts_with("elapsed");
+    let named = NAMES.contains(&name.as_str())
+        || name.contains("time")
+        || name.contains("zeit")
+        || name.starts_with("elapsed");
     duration || named && column.unit.is_none()
 }
 
@@ -323,10 +400,13 @@ fn count_unit_s(column: usize, sample: &Sample<'_>) -> f64 {
         return unit.unit.to_inside(1.0);
     }
     let name = head.name.to_lowercase();
-    let first: Option<f64> = cells(column, sample).find_map(|cell| parse_number(cell.as_bytes(), sample.decimal));
+    let first: Option<f64> =
+        cells(column, sample).find_map(|cell| parse_number(cell.as_bytes(), sample.decimal));
     let first = first.unwrap_or(0.0).abs();
     match first {
-        _ if name == "ms" || name.ends_with("_ms") || name.contains("milli") || name.ends_with("msec") => 1e-3,
+        _ if name == "ms" || name.ends_with("_ms") || name.contains("milli") || name.ends_with("msec") => {
+            1e-3
+        }
         first if first > 1e17 => 1e-9,
         first if first > 1e14 => 1e-6,
         first if first > 1e11 => 1e-3,

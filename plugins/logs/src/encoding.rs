@@ -45,10 +45,15 @@ impl<R: Read> Utf16Reader<R> {
         let count = self.inner.read(&mut block)?;
         self.half.extend_from_slice(block.get(..count).unwrap_or_default());
         let whole = self.half.len() / 2 * 2;
-        let units: Vec<u16> = self.surrogate.take().into_iter().chain(self.half[..whole].chunks_exact(2).map(|pair| {
-            let pair = [pair[0], pair[1]];
-            if self.big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) }
-        })).collect();
+        let units: Vec<u16> = self
+            .surrogate
+            .take()
+            .into_iter()
+            .chain(self.half[..whole].chunks_exact(2).map(|pair| {
+                let pair = [pair[0], pair[1]];
+                if self.big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) }
+            }))
+            .collect();
         self.half.drain(..whole);
         // The first half of a pair waits for the second, unless there is no more.
         let waits = count > 0 && units.last().is_some_and(|unit| (0xD800..0xDC00).contains(unit));

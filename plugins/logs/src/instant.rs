@@ -47,7 +47,8 @@ pub(crate) fn parse_instant(text: &str, order: DateOrder) -> Option<Instant> {
 pub(crate) fn guess_order<'a>(dates: impl Iterator<Item = &'a str>) -> (DateOrder, bool) {
     let mut doubtful = None;
     for text in dates {
-        let Some((parts, sign)) = date_parts(text.trim().split([' ', 'T', '_']).next().unwrap_or_default()) else {
+        let Some((parts, sign)) = date_parts(text.trim().split([' ', 'T', '_']).next().unwrap_or_default())
+        else {
             continue;
         };
         match (parts[0], parts[1], sign) {
@@ -83,7 +84,8 @@ fn date(text: &str, order: DateOrder) -> Option<i64> {
         DateOrder::MonthFirst => (c, a, b),
     };
     let year = if year < 100 { year + 2000 } else { year };
-    let date = Date::new(i16::try_from(year).ok()?, i8::try_from(month).ok()?, i8::try_from(day).ok()?).ok()?;
+    let date =
+        Date::new(i16::try_from(year).ok()?, i8::try_from(month).ok()?, i8::try_from(day).ok()?).ok()?;
     let epoch = Date::new(1970, 1, 1).ok()?;
     Some(i64::from(date.since(epoch).ok()?.get_days()))
 }

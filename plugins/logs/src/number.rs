@@ -10,7 +10,8 @@ pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
     if !(starts.is_ascii_digit() || *starts == decimal) || cell.len() > LIMIT {
         return None;
     }
-    let plain = |bytes: &[u8]| std::str::from_utf8(bytes).ok()?.parse::<f64>().ok().filter(|value| value.is_finite());
+    let plain =
+        |bytes: &[u8]| std::str::from_utf8(bytes).ok()?.parse::<f64>().ok().filter(|value| value.is_finite());
     if decimal == b'.' && !cell.contains(&b',') {
         return plain(cell);
     }
@@ -46,7 +47,8 @@ pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
 pub(crate) fn is_missing(cell: &[u8]) -> bool {
     let cell = cell.trim_ascii();
     let words: [&[u8]; 14] = [
-        b"", b"-", b"--", b"---", b"nan", b"na", b"n/a", b"#n/a", b"#nv", b"null", b"none", b"inf", b"-inf", b"1.#qnan",
+        b"", b"-", b"--", b"---", b"nan", b"na", b"n/a", b"#n/a", b"#nv", b"null", b"none", b"inf", b"-inf",
+        b"1.#qnan",
     ];
     words.iter().any(|word| cell.eq_ignore_ascii_case(word))
 }

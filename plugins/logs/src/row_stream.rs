@@ -32,9 +32,9 @@ impl<R: Read> Read for Limited<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.inner.read(buffer)?;
         let left = self.left.get().checked_sub(count);
-        self.left.set(left.ok_or_else(|| {
-            io::Error::other("a line is longer than 1 MiB; is a quote never closed?")
-        })?);
+        self.left.set(
+            left.ok_or_else(|| io::Error::other("a line is longer than 1 MiB; is a quote never closed?"))?,
+        );
         Ok(count)
     }
 }
@@ -73,7 +73,14 @@ impl RowStream {
             .flexible(true)
             .buffer_capacity(1 << 16)
             .from_reader(limited);
-        RowStream { file: file.clone(), reader, left, dialect, record: csv::ByteRecord::new(), filled: Vec::new() }
+        RowStream {
+            file: file.clone(),
+            reader,
+            left,
+            dialect,
+            record: csv::ByteRecord::new(),
+            filled: Vec::new(),
+        }
     }
 
     fn cell(&self, column: usize) -> &[u8] {
@@ -84,7 +91,9 @@ impl RowStream {
     /// The cells of the row as text.
     pub(crate) fn texts(&self) -> Vec<String> {
         let count = if self.dialect.separator == b' ' { self.filled.len() } else { self.record.len() };
-        (0..count).map(|column| encoding::text(self.cell(column), self.dialect.encoding).trim().to_owned()).collect()
+        (0..count)
+            .map(|column| encoding::text(self.cell(column), self.dialect.encoding).trim().to_owned())
+            .collect()
     }
 }
 
@@ -115,7 +124,9 @@ impl Rows for RowStream {
             if self.dialect.separator == b' ' {
                 self.filled.clear();
                 let record = &self.record;
-                self.filled.extend((0..record.len()).filter(|at| record.get(*at).is_some_and(|cell| !cell.is_empty())));
+                self.filled.extend(
+                    (0..record.len()).filter(|at| record.get(*at).is_some_and(|cell| !cell.is_empty())),
+                );
             }
             if self.record.iter().any(|cell| !cell.trim_ascii().is_empty()) {
                 return Ok(true);

@@ -45,7 +45,9 @@ pub(crate) fn decimal(rows: &[Vec<String>]) -> (u8, bool) {
         let bytes = cell.as_bytes();
         let (point, comma) = (cell.rfind('.'), cell.rfind(','));
         match (point, comma) {
-            (Some(point), Some(comma)) if comma > point => commas += 100 * usize::from(parse_number(bytes, b',').is_some()),
+            (Some(point), Some(comma)) if comma > point => {
+                commas += 100 * usize::from(parse_number(bytes, b',').is_some())
+            }
             (Some(_), Some(_)) => points += 100 * usize::from(parse_number(bytes, b'.').is_some()),
             (Some(_), None) => points += usize::from(parse_number(bytes, b'.').is_some()),
             (None, Some(_)) => commas += usize::from(parse_number(bytes, b',').is_some()),

@@ -34,7 +34,11 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
     let header: Vec<usize> = header_rows(rows, data_row, length);
     let units_row = match options.units_row {
         Some(row) => row.checked_sub(1),
-        None => header.iter().copied().filter(|row| Some(*row + 1) != options.names_row).find(|row| is_units_row(&rows[*row])),
+        None => header
+            .iter()
+            .copied()
+            .filter(|row| Some(*row + 1) != options.names_row)
+            .find(|row| is_units_row(&rows[*row])),
     };
     let others = || header.iter().copied().filter(|row| Some(*row) != units_row);
     let filled = |row: &usize| distinct(rows.get(*row));
@@ -58,7 +62,8 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
         let (mut name, mut unit) = split_unit(&header);
         if units_row.is_some() {
             // `T2 (upper)` is a name where the units have a row of their own.
-            (name, unit) = if own_unit.is_empty() && unit.is_some() { (name, unit) } else { (header.clone(), None) };
+            (name, unit) =
+                if own_unit.is_empty() && unit.is_some() { (name, unit) } else { (header.clone(), None) };
             unit = unit.or(Some(own_unit.to_owned()).filter(|unit| !unit.is_empty()));
         }
         if name.is_empty() {
@@ -75,7 +80,12 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
         columns.push(HeadColumn { header, name, unit, description: description.join(", ") });
     }
     // Columns without a name and without a cell come from separators at the ends of lines.
-    let empty = |column: usize| rows.get(data_row..).unwrap_or_default().iter().all(|row| row.get(column).is_none_or(String::is_empty));
+    let empty = |column: usize| {
+        rows.get(data_row..)
+            .unwrap_or_default()
+            .iter()
+            .all(|row| row.get(column).is_none_or(String::is_empty))
+    };
     while columns.last().is_some_and(|column| column.header.is_empty()) && empty(columns.len() - 1) {
         columns.pop();
     }
@@ -120,7 +130,9 @@ fn distinct(row: Option<&Vec<String>>) -> usize {
 
 fn is_units_row(row: &[String]) -> bool {
     let filled: Vec<&String> = row.iter().filter(|cell| !cell.is_empty()).collect();
-    let units = filled.iter().filter(|cell| header_unit(cell).is_some() || header_unit(cell.trim_matches(['(', ')'])).is_some());
+    let units = filled
+        .iter()
+        .filter(|cell| header_unit(cell).is_some() || header_unit(cell.trim_matches(['(', ')'])).is_some());
     let units = units.count();
     units > 0 && 2 * units >= filled.len()
 }
@@ -132,7 +144,8 @@ fn header_rows(rows: &[Vec<String>], data_row: usize, length: usize) -> Vec<usiz
         // A row of the preamble has a name and a value.
         cells.len() + 2 >= length && (filled > 2 || filled + 1 >= length)
     };
-    let mut header: Vec<usize> = (0..data_row.min(rows.len())).rev().take_while(like_a_header).take(6).collect();
+    let mut header: Vec<usize> =
+        (0..data_row.min(rows.len())).rev().take_while(like_a_header).take(6).collect();
     header.reverse();
     header
 }

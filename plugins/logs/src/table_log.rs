@@ -52,7 +52,12 @@ impl Table {
     }
 
     /// Gives the rows of the wanted columns; `rows` stands before the first row of the table.
-    pub(crate) fn rows(&self, rows: &mut dyn Rows, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
+    pub(crate) fn rows(
+        &self,
+        rows: &mut dyn Rows,
+        wanted: &[usize],
+        sink: &mut RowSink<'_>,
+    ) -> Result<(), LogError> {
         for _ in 0..self.data_row {
             if !rows.advance()? {
                 return Ok(());
@@ -60,9 +65,14 @@ impl Table {
         }
         let mut groups: Vec<(usize, ClockHand, Vec<usize>, Vec<f64>)> = Vec::new();
         for (index, (_, clock)) in self.clocks.groups.iter().enumerate() {
-            let of_group = |column: &&usize| self.layout.columns.get(**column).is_some_and(|column| column.group == index);
-            let sources: Vec<usize> =
-                wanted.iter().filter(of_group).filter_map(|column| self.sources.get(*column).copied()).collect();
+            let of_group = |column: &&usize| {
+                self.layout.columns.get(**column).is_some_and(|column| column.group == index)
+            };
+            let sources: Vec<usize> = wanted
+                .iter()
+                .filter(of_group)
+                .filter_map(|column| self.sources.get(*column).copied())
+                .collect();
             if !sources.is_empty() {
                 groups.push((index, ClockHand::new(clock.clone()), sources, Vec::new()));
             }

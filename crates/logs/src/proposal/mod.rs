@@ -124,7 +124,12 @@ pub fn propose(layout: &Layout, survey: &Survey) -> Proposal {
     proposal
 }
 
-fn candidates(channel: Channel, layout: &Layout, survey: &Survey, units: &[Option<HeaderUnit>]) -> Vec<Candidate> {
+fn candidates(
+    channel: Channel,
+    layout: &Layout,
+    survey: &Survey,
+    units: &[Option<HeaderUnit>],
+) -> Vec<Candidate> {
     let mut list: Vec<Candidate> = Vec::new();
     for (index, column) in layout.columns.iter().enumerate() {
         let data = &survey.columns[index];
@@ -153,7 +158,13 @@ fn candidates(channel: Channel, layout: &Layout, survey: &Survey, units: &[Optio
     list
 }
 
-fn entry(channel: Channel, best: &Candidate, layout: &Layout, survey: &Survey, units: &[Option<HeaderUnit>]) -> ProposedChannel {
+fn entry(
+    channel: Channel,
+    best: &Candidate,
+    layout: &Layout,
+    survey: &Survey,
+    units: &[Option<HeaderUnit>],
+) -> ProposedChannel {
     let mut proposed = ProposedChannel {
         channel,
         column: best.column,
@@ -165,17 +176,24 @@ fn entry(channel: Channel, best: &Candidate, layout: &Layout, survey: &Survey, u
     let data = &survey.columns[best.column];
     let (low, high) = (data.quantile(OUTER), data.quantile(1.0 - OUTER));
     let fitting = fitting_units(channel, low, high);
-    let symbols = |units: &[&'static Unit]| units.iter().map(|unit| unit.symbol()).collect::<Vec<_>>().join(" or ");
+    let symbols =
+        |units: &[&'static Unit]| units.iter().map(|unit| unit.symbol()).collect::<Vec<_>>().join(" or ");
     match (units[best.column], fitting.as_slice()) {
         (Some(unit), _) => {
             proposed.unit = Some(unit.unit.symbol());
             proposed.gauge = unit.reference == Reference::Gauge;
             if !best.fits {
                 proposed.certainty = Certainty::Unsure;
-                let instead = if fitting.is_empty() { String::new() } else { format!("; {} would be plausible", symbols(&fitting)) };
+                let instead = if fitting.is_empty() {
+                    String::new()
+                } else {
+                    format!("; {} would be plausible", symbols(&fitting))
+                };
                 proposed.remarks.push(format!(
                     "{} to {} {} is not plausible{instead}",
-                    short(data.min), short(data.max), unit.unit.symbol()
+                    short(data.min),
+                    short(data.max),
+                    unit.unit.symbol()
                 ));
             }
         }
@@ -186,7 +204,11 @@ fn entry(channel: Channel, best: &Candidate, layout: &Layout, survey: &Survey, u
         }
         (None, []) => {
             proposed.certainty = Certainty::Unsure;
-            proposed.remarks.push(format!("the log gives no unit, and {} to {} fits none", short(data.min), short(data.max)));
+            proposed.remarks.push(format!(
+                "the log gives no unit, and {} to {} fits none",
+                short(data.min),
+                short(data.max)
+            ));
         }
         (None, several) => {
             proposed.unit = several.first().map(|unit| unit.symbol());
@@ -224,22 +246,29 @@ fn settle_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units
         if looks_like_gauge(proposed.channel, low, high) {
             proposed.gauge = true;
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
-            proposed.remarks.push(format!("down to {:.1} kPa: too low for an absolute pressure, taken as gauge", low / 1e3));
+            proposed.remarks.push(format!(
+                "down to {:.1} kPa: too low for an absolute pressure, taken as gauge",
+                low / 1e3
+            ));
         } else if inlet_is_gauge && low < 1.6e5 {
             proposed.gauge = true;
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
-            proposed.remarks.push("the log does not say whether it is absolute; taken as gauge, as P1 is".to_owned());
+            proposed
+                .remarks
+                .push("the log does not say whether it is absolute; taken as gauge, as P1 is".to_owned());
         }
     }
     if !proposal.channels.iter().any(|proposed| proposed.gauge) {
         return;
     }
     let ambient = layout.columns.iter().enumerate().find_map(|(index, column)| {
-        let unit = units[index].filter(|unit| unit.kind == Kind::Pressure && unit.reference != Reference::Gauge)?;
+        let unit =
+            units[index].filter(|unit| unit.kind == Kind::Pressure && unit.reference != Reference::Gauge)?;
         let named = is_ambient(&plain(&column.name)) || is_ambient(&plain(&column.description));
         let median_pa = unit.unit.to_inside(survey.columns[index].quantile(0.5));
         let (least, most) = AMBIENT_PA;
-        (named && (least..=most).contains(&median_pa)).then_some(Ambient::Column { column: index, unit: unit.unit.symbol() })
+        (named && (least..=most).contains(&median_pa))
+            .then_some(Ambient::Column { column: index, unit: unit.unit.symbol() })
     });
     proposal.ambient = Some(ambient.unwrap_or(Ambient::Assumed));
 }

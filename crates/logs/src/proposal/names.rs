@@ -109,27 +109,46 @@ fn rows() -> Vec<Row> {
     let flow = "(m|dm|mdot|m_dot|mp|w|flow|massflow|mass_flow|massenstrom|massenfluss|durchsatz)";
     for (channel, weight, pattern) in [
         (Channel::ShaftSpeed, 6, "(^|_)n_?(tc|atl|turbo|tl|lader|l|shaft)(_|$)".to_owned()),
-        (Channel::ShaftSpeed, 6, "(turbo|tc|atl|lader|shaft|rotor|welle).*(speed|drehzahl|rpm)".to_owned()),
-        (Channel::ShaftSpeed, 6, "(speed|drehzahl|rpm).*(turbo|tc|atl|lader|shaft|rotor|welle|verdichter|compressor)".to_owned()),
+        (Channel::ShaftSpeed, 6, "(turbo|tc|atl|lader|shaft|rotor|welle|compressor|verdichter).*(speed|drehzahl|rpm)".to_owned()),
+        (
+            Channel::ShaftSpeed,
+            6,
+            "(speed|drehzahl|rpm).*(turbo|tc|atl|lader|shaft|rotor|welle|verdichter|compressor)".to_owned(),
+        ),
         (Channel::ShaftSpeed, 4, "^(n|shaft_speed|speed|drehzahl|speed_rpm|rpm)$".to_owned()),
-        (Channel::CompressorFlow, 6, format!("(^|_){flow}_?(c|comp|compressor|verd|verdichter|v|air|luft|l)(_|$)")),
+        (
+            Channel::CompressorFlow,
+            6,
+            format!("(^|_){flow}_?(c|comp|compressor|verd|verdichter|v|air|luft|l)(_|$)"),
+        ),
         (Channel::CompressorFlow, 6, format!("(comp|compressor|verd|verdichter|luft|air)_?{flow}(_|$)")),
         (Channel::CompressorFlow, 6, "luftmasse|^maf|^caf(_|$)|airflow|air_flow".to_owned()),
         (Channel::CompressorFlow, 3, format!("^{flow}(_kg_s)?$")),
         (Channel::TurbineFlow, 7, format!("(^|_){flow}_?(t|turb|turbine|abgas|exh|exhaust|gas)(_|$)")),
         (Channel::TurbineFlow, 7, format!("(turb|turbine|abgas|exh|exhaust|hotgas|hot_gas)_?{flow}(_|$)")),
-        (Channel::ValveCommand, 6, "(valve|ventil|klappe|drossel|throttle|bpv|opening|backpressure|back_pressure)".to_owned()),
+        (
+            Channel::ValveCommand,
+            6,
+            "(valve|ventil|klappe|drossel|throttle|bpv|opening|backpressure|back_pressure)".to_owned(),
+        ),
     ] {
         add(channel, weight, &pattern);
     }
     rows
 }
 
-static SET: LazyLock<Option<Regex>> = LazyLock::new(|| Regex::new("(^|_)(soll\\w*|set|setpoint|sp|cmd|command|demand|dem|target|w)(_|$)|sollwert").ok());
-static DERIVED: LazyLock<Option<Regex>> =
-    LazyLock::new(|| Regex::new("(^|_)(cor|corr|korr|calc|ber|berechnet|model|sim|est|std|stdev|sigma|dev|min|max|raw|roh)(_|$)").ok());
-static OTHER: LazyLock<Option<Regex>> =
-    LazyLock::new(|| Regex::new("fuel|kraftstoff|egr|agr|(^|_)(engine|motor|crank|erpm|torque|drehmoment|cool\\w*|kuehl\\w*|water|wasser|vgt|vtg)(_|$)|(^|_)p_?b").ok());
+static SET: LazyLock<Option<Regex>> = LazyLock::new(|| {
+    Regex::new("(^|_)(soll\\w*|set|setpoint|sp|cmd|command|demand|dem|target|w)(_|$)|sollwert").ok()
+});
+static DERIVED: LazyLock<Option<Regex>> = LazyLock::new(|| {
+    Regex::new(
+        "(^|_)(cor|corr|korr|calc|ber|berechnet|model|sim|est|std|stdev|sigma|dev|min|max|raw|roh)(_|$)",
+    )
+    .ok()
+});
+static OTHER: LazyLock<Option<Regex>> = LazyLock::new(|| {
+    Regex::new("fuel|kraftstoff|egr|agr|(^|_)(engine|motor|crank|erpm|torque|drehmoment|cool\\w*|kuehl\\w*|water|wasser|vgt|vtg)(_|$)|(^|_)p_?b").ok()
+});
 
 fn says(pattern: &LazyLock<Option<Regex>>, text: &str) -> bool {
     pattern.as_ref().is_some_and(|pattern| pattern.is_match(text))
@@ -165,7 +184,9 @@ pub(crate) fn channels_of(name: &str, about: &str, kind: Option<Kind>) -> Vec<(C
     let mut found: Vec<(Channel, Weight)> = Vec::new();
     for row in ROWS.iter() {
         let fits_kind = kind.is_none_or(|kind| kind == kind_of(row.channel));
-        let speaks = kind.is_some() || !matches!(kind_of(row.channel), Kind::Fraction) || row.channel == Channel::ValveCommand;
+        let speaks = kind.is_some()
+            || !matches!(kind_of(row.channel), Kind::Fraction)
+            || row.channel == Channel::ValveCommand;
         let named = row.pattern.is_match(&name);
         let described = !about.is_empty() && row.pattern.is_match(&about);
         if !fits_kind || !speaks || !(named || described) {
@@ -198,7 +219,10 @@ mod tests {
     fn every_pattern_compiles() {
         let places: usize = PLACES
             .iter()
-            .map(|place| place.patterns.len() * (usize::from(place.temperature.is_some()) + usize::from(place.pressure.is_some())))
+            .map(|place| {
+                place.patterns.len()
+                    * (usize::from(place.temperature.is_some()) + usize::from(place.pressure.is_some()))
+            })
             .sum();
         assert_eq!(ROWS.len(), places + 11);
         assert!(SET.is_some() && DERIVED.is_some() && OTHER.is_some());
@@ -206,7 +230,8 @@ mod tests {
 
     #[test]
     fn names_of_test_stands_in_english_and_german() {
-        let (t, p, n, m) = (Some(Kind::Temperature), Some(Kind::Pressure), Some(Kind::Speed), Some(Kind::MassFlow));
+        let (t, p, n, m) =
+            (Some(Kind::Temperature), Some(Kind::Pressure), Some(Kind::Speed), Some(Kind::MassFlow));
         for (name, about, kind, symbol) in [
             ("T2", "", t, "T2"),
             ("T_C_out", "", t, "T2"),
@@ -239,7 +264,14 @@ mod tests {
             let found = channels_of(name, about, kind);
             assert_eq!(found.first().map(|(channel, _)| channel.symbol()), Some(symbol), "{name}: {found:?}");
         }
-        for (name, kind) in [("FEF", m), ("Fuel flow", m), ("Pbc in", p), ("engine speed", n), ("Status", None), ("Kühlwasser ein", t)] {
+        for (name, kind) in [
+            ("FEF", m),
+            ("Fuel flow", m),
+            ("Pbc in", p),
+            ("engine speed", n),
+            ("Status", None),
+            ("Kühlwasser ein", t),
+        ] {
             assert_eq!(channels_of(name, "", kind), [], "{name}");
         }
     }

@@ -25,27 +25,41 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
     ];
     for (higher, lower, words) in raised {
         let (Some(high), Some(low)) = (course(proposal, higher), course(proposal, lower)) else { continue };
-        let turning = |t_s: f64| running.as_ref().is_none_or(|speed| speed.at(t_s).is_none_or(|rpm| rpm > 2000.0));
-        let pairs: Vec<(f64, f64)> =
-            high.samples().filter(|(t_s, _)| turning(*t_s)).filter_map(|(t_s, value)| Some((value, low.at(t_s)?))).collect();
+        let turning =
+            |t_s: f64| running.as_ref().is_none_or(|speed| speed.at(t_s).is_none_or(|rpm| rpm > 2000.0));
+        let pairs: Vec<(f64, f64)> = high
+            .samples()
+            .filter(|(t_s, _)| turning(*t_s))
+            .filter_map(|(t_s, value)| Some((value, low.at(t_s)?)))
+            .collect();
         if pairs.is_empty() {
             continue;
         }
         let share = pairs.iter().filter(|(high, low)| high >= low).count() as f64 / pairs.len() as f64;
         if share >= AGREEMENT {
-            proposal.remarks.push(format!("{words} in {:.0} % of the time that the shaft turns, as it must be", 100.0 * share));
+            proposal.remarks.push(format!(
+                "{words} in {:.0} % of the time that the shaft turns, as it must be",
+                100.0 * share
+            ));
         } else {
             let message = format!("{words} in only {:.0} % of the time that the shaft turns", 100.0 * share);
             doubt(proposal, &[higher, lower], &message);
         }
     }
     if let (Some(speed), Some(flow)) = (running, course(proposal, Channel::CompressorFlow)) {
-        let pairs: Vec<(f64, f64)> = speed.samples().filter_map(|(t_s, rpm)| Some((rpm, flow.at(t_s)?))).collect();
+        let pairs: Vec<(f64, f64)> =
+            speed.samples().filter_map(|(t_s, rpm)| Some((rpm, flow.at(t_s)?))).collect();
         match correlation(&pairs) {
-            Some(r) if r >= FOLLOWS => proposal.remarks.push(format!("flow follows speed (correlation {r:.2})")),
+            Some(r) if r >= FOLLOWS => {
+                proposal.remarks.push(format!("flow follows speed (correlation {r:.2})"))
+            }
             Some(r) => {
                 let message = format!("flow does not follow speed (correlation {r:.2})");
-                for proposed in proposal.channels.iter_mut().filter(|p| [Channel::ShaftSpeed, Channel::CompressorFlow].contains(&p.channel)) {
+                for proposed in proposal
+                    .channels
+                    .iter_mut()
+                    .filter(|p| [Channel::ShaftSpeed, Channel::CompressorFlow].contains(&p.channel))
+                {
                     proposed.certainty = proposed.certainty.min(Certainty::Likely);
                     proposed.remarks.push(message.clone());
                 }
@@ -78,7 +92,9 @@ impl Course {
             (_, false) | (None, _) => 0.0,
             (Some(Ambient::Assumed), _) => STANDARD_ATMOSPHERE_PA,
             (Some(Ambient::Column { column, unit }), _) => {
-                crate::units::unit(mapper_yaml::units::Kind::Pressure, unit).ok()?.to_inside(survey.columns.get(*column)?.quantile(0.5))
+                crate::units::unit(mapper_yaml::units::Kind::Pressure, unit)
+                    .ok()?
+                    .to_inside(survey.columns.get(*column)?.quantile(0.5))
             }
         };
         let values = data.trace.means().into_iter().map(|value| unit.to_inside(value) + ambient_pa).collect();
@@ -86,7 +102,11 @@ impl Course {
     }
 
     fn samples(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        self.t_s.iter().copied().zip(self.values.iter().copied()).filter(|(t_s, value)| t_s.is_finite() && value.is_finite())
+        self.t_s
+            .iter()
+            .copied()
+            .zip(self.values.iter().copied())
+            .filter(|(t_s, value)| t_s.is_finite() && value.is_finite())
     }
 
     /// The mean around a time.

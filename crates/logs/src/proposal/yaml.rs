@@ -6,7 +6,12 @@ use std::fmt::Write;
 
 /// The text of a channel map: what is sure and what is likely as entries, what is not as comments. `options` are the keys and
 /// values with which the log was read.
-pub fn channel_map_text(name: &str, layout: &Layout, proposal: &Proposal, options: &[(String, String)]) -> String {
+pub fn channel_map_text(
+    name: &str,
+    layout: &Layout,
+    proposal: &Proposal,
+    options: &[(String, String)],
+) -> String {
     let mut text = format!(
         "# Channel map of {}, proposed by `mapper log inspect`. Lines that end in a remark had to be guessed:\n\
          # look at them. Lines that are comments are doubtful and count only without the `#`.\nchannels:\n",
@@ -14,7 +19,9 @@ pub fn channel_map_text(name: &str, layout: &Layout, proposal: &Proposal, option
     );
     let kept = |proposed: &&ProposedChannel| proposed.certainty > Certainty::Unsure;
     if !proposal.channels.iter().any(|proposed| kept(&proposed)) {
-        text.push_str("  # nothing was recognised; write e.g.\n  # T2: {field: \"name of the column\", unit: degC}\n");
+        text.push_str(
+            "  # nothing was recognised; write e.g.\n  # T2: {field: \"name of the column\", unit: degC}\n",
+        );
     }
     for proposed in &proposal.channels {
         let mut line = format!("{}: {}", proposed.channel.symbol(), source(layout, proposed));
@@ -27,7 +34,11 @@ pub fn channel_map_text(name: &str, layout: &Layout, proposal: &Proposal, option
     match &proposal.ambient {
         None => {}
         Some(Ambient::Column { column, unit }) => {
-            let _ = writeln!(text, "\n# What gauge pressures are added to.\nambient_pressure: {{{}, unit: {unit}}}", place(layout, *column));
+            let _ = writeln!(
+                text,
+                "\n# What gauge pressures are added to.\nambient_pressure: {{{}, unit: {unit}}}",
+                place(layout, *column)
+            );
         }
         Some(Ambient::Assumed) => {
             text.push_str(

@@ -9,9 +9,7 @@ FORMAT is one of
             first step, and a gap of 8 s
   xlsx      openpyxl: names, units, numbers
   mdf4      asammdf: one group a device, compressed blocks
-  tdms      nptdms: one group a device, units as properties
-  parquet   pyarrow: names with units in brackets
-  arrow     pyarrow: the same as an Arrow file (Feather, version 2)
+  mcap      mcap: one topic a device, units in the metadata
 
 No step marks, no campaign, no truth. SI units where nothing else is said. Prints the steps of the recording, and how far the log's
 clock is ahead of the recording's, as one JSON object.
@@ -90,35 +88,21 @@ def write_mdf4(target, times, groups):
         mdf.save(target, overwrite=True, compression=2)
 
 
-def write_tdms(target, times, groups):
-    from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+def write_mcap(target, times, groups):
+    from mcap.writer import Writer
 
-    start = np.datetime64("2026-11-22T08:00:00")
-    with TdmsWriter(target) as writer:
-        writer.write_segment([RootObject({"stand": "virtual"})])
+    with open(target, "xb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="", library="another program")
         for topic, fields in groups.items():
-            group = topic.split("/")[-1]
-            writer.write_segment([GroupObject(group)])
-            # In pieces, as a program does that writes while it measures.
-            for part in np.array_split(np.arange(len(times)), 7):
-                objects = [ChannelObject(group, "time", times[part], {"unit_string": "s"})]
-                for field, values in fields.items():
-                    properties = {"unit_string": unit_of(field), "wf_start_time": start}
-                    objects.append(ChannelObject(group, field, values[part], properties))
-                writer.write_segment(objects)
-
-
-def write_arrow(target, times, groups, parquet):
-    import pyarrow
-    import pyarrow.feather
-    import pyarrow.parquet
-
-    columns = {"time [s]": times} | {f"{name} [{unit}]": values for name, (values, unit) in flat(groups).items()}
-    table = pyarrow.table(columns)
-    if parquet:
-        pyarrow.parquet.write_table(table, target, compression="zstd")
-    else:
-        pyarrow.feather.write_feather(table, target, compression="zstd")
+            schema = writer.register_schema(topic, "jsonschema", b"{}")
+            units = {field: unit_of(field) for field in fields}
+            channel = writer.register_channel(topic.split("/")[-1], "json", schema, units)
+            for row, time_s in enumerate(times):
+                at_ns = round(time_s * 1e9)
+                data = json.dumps({field: float(values[row]) for field, values in fields.items()}).encode()
+                writer.add_message(channel, at_ns, data, at_ns)
+        writer.finish()
 
 
 REST_S = 1200.0
@@ -209,12 +193,10 @@ def main():
             ahead_s = write_stand(target, times, groups)
         case "xlsx":
             write_xlsx(target, times, groups)
+        case "mcap":
+            write_mcap(target, times, groups)
         case "mdf4":
             write_mdf4(target, times, groups)
-        case "tdms":
-            write_tdms(target, times, groups)
-        case "parquet" | "arrow":
-            write_arrow(target, times, groups, kind == "parquet")
         case _:
             sys.exit(__doc__)
     assert not any(math.isnan(step) for step in steps)

@@ -34,6 +34,11 @@ impl LogFile {
         &self.path
     }
 
+    /// The bytes, where they are in memory.
+    pub fn bytes(&self) -> Option<&[u8]> {
+        self.bytes.as_deref()
+    }
+
     /// The bytes from the start.
     ///
     /// # Errors

@@ -29,5 +29,7 @@ macro_rules! logs {
 }
 
 logs! {
+    mdf4,
+    xlsx,
     delimited,
 }

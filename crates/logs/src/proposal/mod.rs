@@ -137,9 +137,8 @@ fn candidates(
             continue;
         }
         let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
-        let about = format!("{group} {} {}", column.description, column.name);
         let kind = units[index].map(|unit| unit.kind).filter(|kind| *kind != Kind::Frequency);
-        let named = channels_of(&column.name, &about, kind);
+        let named = channels_of(&column.name, group, &column.description, kind);
         let Some((_, weight)) = named.iter().find(|(named, _)| *named == channel) else { continue };
         let (low, high) = (data.quantile(OUTER), data.quantile(1.0 - OUTER));
         let fits = match units[index] {

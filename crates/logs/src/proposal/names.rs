@@ -174,13 +174,14 @@ pub(crate) fn is_ambient(name: &str) -> bool {
     ["amb", "baro", "umg", "atm", "luftdruck"].iter().any(|word| name.contains(word))
 }
 
-/// The channels that a column may be, by its name and by what else is said about it, with their weights.
-pub(crate) fn channels_of(name: &str, about: &str, kind: Option<Kind>) -> Vec<(Channel, Weight)> {
-    let (name, about) = (plain(name), plain(about));
+/// The channels that a column may be, by its name, its group and what else is said about it, with their weights.
+pub(crate) fn channels_of(name: &str, group: &str, about: &str, kind: Option<Kind>) -> Vec<(Channel, Weight)> {
+    let (name, group) = (plain(name), plain(group));
+    let about = plain(&format!("{group} {about} {name}"));
     if is_other(&name) {
         return Vec::new();
     }
-    let set = is_set_value(&name);
+    let set = is_set_value(&name) || is_set_value(&group);
     let mut found: Vec<(Channel, Weight)> = Vec::new();
     for row in ROWS.iter() {
         let fits_kind = kind.is_none_or(|kind| kind == kind_of(row.channel));
@@ -261,7 +262,7 @@ mod tests {
             ("p3_soll", "", p, "P3_command"),
             ("Stellung Drosselklappe", "", None, "valve_command"),
         ] {
-            let found = channels_of(name, about, kind);
+            let found = channels_of(name, "", about, kind);
             assert_eq!(found.first().map(|(channel, _)| channel.symbol()), Some(symbol), "{name}: {found:?}");
         }
         for (name, kind) in [
@@ -272,7 +273,7 @@ mod tests {
             ("Status", None),
             ("Kühlwasser ein", t),
         ] {
-            assert_eq!(channels_of(name, "", kind), [], "{name}");
+            assert_eq!(channels_of(name, "", "", kind), [], "{name}");
         }
     }
 }

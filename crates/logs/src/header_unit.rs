@@ -130,7 +130,7 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
             return (name.trim().trim_end_matches(['/', ',']).trim().to_owned(), Some(unit.to_owned()));
         }
     }
-    for between in [" / ", "/", " in ", ", ", "_", " "] {
+    for between in [" / ", " in ", "/", ", ", "_", " "] {
         // From the left for `/`, which units hold themselves: `m / kg/s`.
         let cuts: Vec<(usize, &str)> = header.match_indices(between).collect();
         for (at, _) in cuts {

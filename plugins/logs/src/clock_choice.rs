@@ -68,7 +68,9 @@ impl Candidate {
     fn runs(&self) -> bool {
         let readings: Vec<f64> = self.present().collect();
         let back = readings.windows(2).filter(|pair| pair[1] < pair[0]).count();
-        20 * back <= readings.len() && (readings.len() < 2 || readings.first() < readings.last())
+        // A clock that shows seconds may stand still over the rows that were looked at; a number that does is none.
+        let moves = readings.len() < 2 || readings.first() < readings.last();
+        20 * back <= readings.len() && (moves || matches!(self.clock, Clock::Instant { .. }))
     }
 
     /// Least step between two readings, s.
@@ -249,8 +251,23 @@ fn candidate(clock: Clock, at: usize, sample: &Sample<'_>, dated: bool) -> Candi
         Clock::Instant { .. } => clock.instant_ns(&row).map(|ns| ns as f64 / 1e9),
         _ => clock.count_s(&row),
     };
-    let readings_s = rows.map(reading).collect();
+    let mut readings_s: Vec<Option<f64>> = rows.map(reading).collect();
+    if !dated && matches!(clock, Clock::Instant { .. }) {
+        past_midnight(&mut readings_s);
+    }
     Candidate { clock, at, readings_s, dated }
+}
+
+/// Times of day go on behind midnight.
+fn past_midnight(readings_s: &mut [Option<f64>]) {
+    let (mut days_s, mut last_s) = (0.0, f64::NEG_INFINITY);
+    for reading in readings_s.iter_mut().flatten() {
+        if *reading + days_s < last_s - 43_200.0 {
+            days_s += 86_400.0;
+        }
+        *reading += days_s;
+        last_s = *reading;
+    }
 }
 
 /// The clock that a user names.

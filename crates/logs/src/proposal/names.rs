@@ -64,7 +64,7 @@ const PLACES: &[Place] = &[
         (6, "^{q}_?c$"), (7, "{C}_?{H}"), (7, "{H}_?{C}(_|$)"), (3, "(^|_){H}"),
     ]},
     Place { temperature: Some(Channel::Tt), pressure: None, patterns: &[
-        (6, "^{q}_?t$"), (8, "(^|_){T}_?{H}"), (8, "{H}_?{T}(_|$)"),
+        (6, "^{q}_?t$"), (8, "turb\\w*_?{H}"), (8, "(^|_){q}_t_?{H}"), (8, "{H}_?{T}(_|$)"),
     ]},
     Place { temperature: Some(Channel::TOil), pressure: None, patterns: &[
         (7, "(oil|oel).*(^|_)?{I}(_|$)"), (6, "(^|_)(oil|oel)"), (6, "(oil|oel)(_|$)"),

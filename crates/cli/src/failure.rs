@@ -4,7 +4,7 @@ use crate::exit_code::Code;
 use mapper_blind::BlindError;
 use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
-use mapper_record::ChannelMapError;
+use mapper_record::{ChannelMapError, RecordError};
 use mapper_session::{ErrorKind, SessionError};
 use std::io::IsTerminal;
 use std::path::Path;
@@ -106,9 +106,8 @@ impl From<SessionError> for Failure {
         match error {
             SessionError::Campaign(error) => Failure::of_campaign(error),
             SessionError::Nightly(NightlyError::Mistakes(findings))
-            | SessionError::ChannelMap(ChannelMapError::Mistakes(findings)) => {
-                Failure::of_findings(&findings)
-            }
+            | SessionError::ChannelMap(ChannelMapError::Mistakes(findings))
+            | SessionError::Record(RecordError::ChannelMap(findings)) => Failure::of_findings(&findings),
             error => Failure::new(code, error),
         }
     }

@@ -3,6 +3,7 @@
 use mapper_backends::BACKENDS;
 use mapper_effects::ScriptEffect;
 use mapper_formats::FORMATS;
+use mapper_log_formats::LOG_FORMATS;
 use mapper_physics::effect::Effect;
 use mapper_session::{Registry, SessionError};
 use std::path::Path;
@@ -15,6 +16,7 @@ pub fn registry() -> Registry {
         effects: mapper_effects::catalogue(),
         read_effect,
         formats: FORMATS,
+        logs: LOG_FORMATS,
     }
 }
 

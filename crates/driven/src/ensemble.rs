@@ -62,7 +62,7 @@ pub(crate) fn draws<const N: usize>(
                 }
             }
         }
-        if step >= MOVES.0 && (step - MOVES.0) % KEEP_EVERY == 0 {
+        if step >= MOVES.0 && (step - MOVES.0).is_multiple_of(KEEP_EVERY) {
             kept.extend(walkers.iter().map(|(place, _)| *place));
         }
     }

@@ -1,11 +1,14 @@
 //! Where a recording holds the rig's channels, and what it does not say itself.
 
+use crate::definitions::Reads;
 use crate::format::ELEMENTS_TOPIC;
 use mapper_core::{
     CHANNELS, Channel, DeclaredUncertainty, Element, Group, MAX_ELEMENTS, NoiseColour, RedundantSensors,
     ReferenceState,
 };
+use mapper_logs::LogOptions;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// Maps a recording's topics and fields onto channels. SI inside; written with units in YAML.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -29,18 +32,35 @@ pub struct ChannelMap {
     pub redundant: BTreeMap<Channel, RedundantSensors>,
     /// How the sensors' noise is correlated in time.
     pub noise_colour: Option<NoiseColour>,
+    /// What gauge pressures are added to.
+    pub ambient_pressure: Option<AmbientPressure>,
+    /// How a log of another program is to be read, where looking at it is not enough.
+    pub log: LogOptions,
+    /// File and text it was read from, so that what is wrong with it for a recording can be shown in it.
+    pub(crate) text: Option<(PathBuf, String)>,
     pub(crate) native: bool,
+}
+
+/// The pressure that gauge pressures are read over.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AmbientPressure {
+    /// A known value, Pa.
+    Constant(f64),
+    /// A column of the log.
+    Source(ChannelSource),
 }
 
 /// One field of one topic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChannelSource {
-    /// Topic, e.g. `/rig/compressor`.
+    /// Topic, e.g. `/rig/compressor`, or group of a log; empty for any group of a log.
     pub topic: String,
     /// Field of the topic's messages.
     pub field: String,
     /// Unit of the field; `None` to take it from the recording.
     pub unit: Option<String>,
+    /// Whether it is a pressure over the ambient pressure.
+    pub gauge: bool,
 }
 
 /// What identification needs of the machine.
@@ -74,18 +94,35 @@ impl ChannelMap {
             topic: row.group.topic().to_owned(),
             field: row.field.to_owned(),
             unit: Some(row.dimension.unit().to_owned()),
+            gauge: false,
         };
         let channels = CHANNELS.iter().map(|row| (row.channel, source(row))).collect();
         let several = |row: &'static mapper_core::ChannelInfo| {
             (1..=MAX_ELEMENTS).map(|number| {
                 let element = Element { channel: row.channel, number };
                 let unit = Some(row.dimension.unit().to_owned());
-                (element, ChannelSource { topic: ELEMENTS_TOPIC.to_owned(), field: element.field(), unit })
+                (
+                    element,
+                    ChannelSource {
+                        topic: ELEMENTS_TOPIC.to_owned(),
+                        field: element.field(),
+                        unit,
+                        gauge: false,
+                    },
+                )
             })
         };
         let measured = CHANNELS.iter().filter(|row| row.group != Group::Command);
         let elements = measured.flat_map(several).collect();
         ChannelMap { channels, elements, native: true, ..ChannelMap::default() }
+    }
+
+    /// Where a field of a recording is described.
+    pub(crate) fn source(&self, reads: Reads) -> Option<&ChannelSource> {
+        match reads {
+            Reads::Channel(channel) => self.channels.get(&channel),
+            Reads::Element(element) => self.elements.get(&element),
+        }
     }
 
     /// Whether this is [`ChannelMap::native`]: channels missing from the recording are then no surprise.

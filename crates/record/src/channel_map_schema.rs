@@ -4,6 +4,7 @@
 //! may, and a ratio may stand bare. [`crate::channel_map_yaml`] reads them.
 
 use mapper_core::{CHANNELS, MAX_ELEMENTS, NAMED_REFERENCES};
+use mapper_logs::OPTION_KEYS;
 use mapper_yaml::Schema;
 use serde_json::{Map, Value, json};
 use std::sync::LazyLock;
@@ -12,9 +13,9 @@ pub(crate) static SCHEMA: LazyLock<Schema> = LazyLock::new(|| Schema::new(schema
 
 fn schema() -> Value {
     let source = closed(
-        &["topic", "field"],
+        &["field"],
         json!({
-            "topic": text("Topic of the recording.", "/rig/compressor"),
+            "topic": text("Topic of the recording, or group of a log; a log with one group needs none.", "/rig/compressor"),
             "field": {
                 "description": "Field of the topic's messages; a list of fields where several sensors measure the channel.",
                 "examples": ["outlet_temperature"],
@@ -24,6 +25,7 @@ fn schema() -> Value {
                 ],
             },
             "unit": text("Unit of the field; as the recording says if none is given.", "degC"),
+            "gauge": {"type": "boolean", "description": "Whether a pressure is read over `ambient_pressure`; absolute if not given.", "examples": [true]},
         }),
     );
     let sensor = closed(
@@ -48,8 +50,34 @@ fn schema() -> Value {
             "window": window(),
             "sensors": by_channel("Declared uncertainty of the sensors, one standard deviation, by symbol; of several sensors of a channel that of each.", &sensor),
             "noise_colour": noise_colour(),
+            "ambient_pressure": ambient_pressure(),
+            "log": log(),
         }),
     )
+}
+
+fn ambient_pressure() -> Value {
+    let source = closed(
+        &["field"],
+        json!({
+            "topic": text("Group of the log; a log with one group needs none.", "/rig/ambient"),
+            "field": text("Column of the log.", "P_amb"),
+            "unit": text("Unit of the column; as the log says if none is given.", "kPa"),
+        }),
+    );
+    let value = quantity("What the barometer read.", "101.3 kPa");
+    json!({
+        "description": "What gauge pressures are added to: a value, or the column of a log.",
+        "examples": ["101.3 kPa"],
+        "anyOf": [value, source],
+    })
+}
+
+/// How a log is to be read: the keys that its formats know.
+fn log() -> Value {
+    let key = |key: &mapper_logs::OptionKey| (key.name.to_owned(), quantity(key.description, key.example));
+    let keys: Map<String, Value> = OPTION_KEYS.iter().map(key).collect();
+    closed(&[], keys.into())
 }
 
 fn machine() -> Value {

@@ -2,11 +2,13 @@
 
 use crate::channel_map_schema::SCHEMA;
 use crate::format::TRUTH_PREFIX;
-use crate::units::{difference, kind_of, parse_quantity, remedy, unit};
-use crate::{ChannelMap, ChannelSource, MachineConstants, WindowLimits};
+use crate::{AmbientPressure, ChannelMap, ChannelSource, MachineConstants, WindowLimits};
 use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, RedundantSensors, ReferenceState};
+use mapper_logs::units::{difference, kind_of, parse_quantity, remedy, unit};
+use mapper_logs::{LogOptions, OPTION_KEYS, OptionError};
 use mapper_yaml::units::{Kind, UnitError};
-use mapper_yaml::{Document, FindingKind, Findings, Node, Notes, Source, Step, path_text, steps};
+use mapper_yaml::{Content, Document, FindingKind, Findings, Node, Notes, Source, Step, path_text, steps};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,7 +17,8 @@ use std::path::{Path, PathBuf};
 const SIZE_LIMIT: usize = 1 << 20;
 
 /// What messages call the file.
-static DOCUMENT: Document = Document { name: "channel map", example: "examples/channels/gap_rig.yaml" };
+pub(crate) static DOCUMENT: Document =
+    Document { name: "channel map", example: "examples/channels/gap_rig.yaml" };
 
 /// Why there is no channel map.
 #[derive(Debug, thiserror::Error)]
@@ -76,11 +79,12 @@ impl<'a> Reader<'a> {
     fn map(&mut self) -> ChannelMap {
         let (mut channels, mut elements) = (BTreeMap::new(), BTreeMap::new());
         for channel in self.channels_below("channels") {
-            let (topic, unit) = self.topic_and_unit(channel);
+            let (topic, unit, gauge) = self.topic_unit_and_gauge(channel);
             let source = |field: &String| ChannelSource {
                 topic: topic.clone(),
                 field: field.clone(),
                 unit: unit.clone(),
+                gauge,
             };
             let fields = self.fields(channel);
             if let [field] = fields.as_slice() {
@@ -114,7 +118,17 @@ impl<'a> Reader<'a> {
                 redundant.insert(channel, several);
             }
         }
+        let ambient_pressure = self.ambient_pressure();
+        let gauge = channels.values().chain(elements.values()).any(|source| source.gauge);
+        if gauge && !self.has("ambient_pressure") {
+            let message = "a gauge pressure is mapped, and nothing says what it is added to".to_owned();
+            let remedy = "write `ambient_pressure: 101.3 kPa`, or the column that holds it: `ambient_pressure: {field: P_amb, unit: kPa}`";
+            self.note(FindingKind::MissingKey, &steps!["channels"], message, remedy);
+        }
         ChannelMap {
+            ambient_pressure,
+            log: self.log(),
+            text: Some((self.source.origin.clone(), self.source.text().to_owned())),
             channels,
             elements,
             redundant,
@@ -128,7 +142,43 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn topic_and_unit(&mut self, channel: Channel) -> (String, Option<String>) {
+    fn ambient_pressure(&mut self) -> Option<AmbientPressure> {
+        let here = steps!["ambient_pressure"];
+        let node = self.root.get(&here)?;
+        if node.entries().is_empty() {
+            return self.positive(&here, Kind::Pressure).map(AmbientPressure::Constant);
+        }
+        let text = |key: &str| {
+            self.root.get(&steps!["ambient_pressure", key]).and_then(Node::text).map(str::to_owned)
+        };
+        let (topic, field, written) = (text("topic").unwrap_or_default(), text("field")?, text("unit"));
+        if let Some(Err(error)) = written.as_deref().map(|name| unit(Kind::Pressure, name)) {
+            self.note_unit(&steps!["ambient_pressure", "unit"], Kind::Pressure, &error);
+        }
+        Some(AmbientPressure::Source(ChannelSource { topic, field, unit: written, gauge: false }))
+    }
+
+    fn log(&mut self) -> LogOptions {
+        let mut options = LogOptions::default();
+        for entry in self.root.get(&steps!["log"]).map(Node::entries).unwrap_or_default() {
+            let here = steps!["log", entry.key.as_str()];
+            let Some(node) = self.root.get(&here) else { continue };
+            let Some(text) =
+                node.text().map(str::to_owned).or_else(|| node.number().map(|number| number.to_string()))
+            else {
+                continue;
+            };
+            // A key that does not exist was noted by the check against the schema.
+            if let Err(error @ OptionError::Value { .. }) = options.set(&entry.key, &text) {
+                let remedy =
+                    OPTION_KEYS.iter().find(|key| key.name == entry.key).map_or("", |key| key.description);
+                self.note(FindingKind::WrongValue, &here, error.to_string(), remedy);
+            }
+        }
+        options
+    }
+
+    fn topic_unit_and_gauge(&mut self, channel: Channel) -> (String, Option<String>, bool) {
         let of = |key: &str| steps!["channels", channel.symbol(), key];
         let topic = self.root.get(&of("topic")).and_then(Node::text).unwrap_or_default().to_owned();
         let written = self.root.get(&of("unit")).and_then(Node::text).map(str::to_owned);
@@ -141,7 +191,16 @@ impl<'a> Reader<'a> {
         if let Some(Err(error)) = written.as_deref().map(|name| unit(kind, name)) {
             self.note_unit(&of("unit"), kind, &error);
         }
-        (topic, written)
+        let gauge = matches!(
+            self.root.get(&of("gauge")).map(|node| &node.content),
+            Some(Content::Scalar(Value::Bool(true)))
+        );
+        if gauge && kind != Kind::Pressure {
+            let message =
+                format!("{channel} is no pressure, and only pressures are read over the ambient pressure");
+            self.note(FindingKind::Conflict, &of("gauge"), message, "remove `gauge`");
+        }
+        (topic, written, gauge)
     }
 
     /// The field of a channel, or those of its several sensors.

@@ -1,9 +1,9 @@
 //! Which fields of a topic are which channels, and in which unit.
 
 use crate::records::ChannelDefinition;
-use crate::units::{kind_of, unit};
 use crate::{ChannelMap, ChannelSource, ReadWarning, RecordError};
 use mapper_core::{Channel, Element};
+use mapper_logs::units::{kind_of, unit};
 use mapper_yaml::units::{Kind, Unit};
 use serde_json::Value;
 use std::path::Path;

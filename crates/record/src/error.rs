@@ -1,8 +1,10 @@
 //! Why a recording could not be written or read.
 
-use crate::units::{kind_of, remedy};
 use crate::{FormatVersion, UnitError};
 use mapper_core::Channel;
+use mapper_logs::LogError;
+use mapper_logs::units::{kind_of, remedy};
+use mapper_yaml::Findings;
 use std::{io, path::PathBuf};
 
 /// Why a recording could not be written or read.
@@ -56,6 +58,18 @@ pub enum RecordError {
         /// Its first bytes, as text.
         found: String,
     },
+    /// A log of another program cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A log of another program without a channel map.
+    #[error("`{}` is the log of another program: say which column is which channel with `--channels`; `mapper log inspect {} --write-channels channels.yaml` proposes it", path.display(), path.display())]
+    LogWithoutMap {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The channel map does not fit the recording: all that is wrong with it, with its places.
+    #[error("{0}")]
+    ChannelMap(Box<Findings>),
     /// Written by a later version of this program.
     #[error("failed to read `{}`: it has recording format {found}, this program knows up to {}; use a newer program", path.display(), FormatVersion::CURRENT)]
     NewerFormat {

@@ -1,13 +1,20 @@
 //! Reading a recording, one's own or another program's.
 
+use crate::complaints::Complaints;
 use crate::definitions::Reads;
+use crate::log_read::{is_mcap, log_of_path, read_log};
 use crate::read_options::ReadOptions;
 use crate::rig_sink::RigSink;
 use crate::scan::{Scanned, scan};
 use crate::series_builder::{SeriesBuilder, run_time_s};
 use crate::steps::{steps_from_commands, steps_from_markers};
-use crate::{ChannelMap, FormatVersion, ReadWarning, RecordError};
-use mapper_core::{Channel, Element, Group, Recording, RedundantSensors, Series};
+use crate::steps_found::{can_be_searched, steps_from_jumps, without_rest};
+use crate::{
+    AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError, plausibility,
+};
+use mapper_core::{Channel, Element, Group, Recording, RedundantSensors, Series, StepMarker};
+use mapper_logs::{LogFile, Unit};
+use mapper_yaml::{FindingKind, steps};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -46,7 +53,10 @@ pub fn read_recording(
     map: &ChannelMap,
     options: &ReadOptions,
 ) -> Result<ReadReport, RecordError> {
-    read(path, map, options, &|| open(path))
+    match log_of_path(path, options)? {
+        Some(file) => read_as_log(&file, map, options),
+        None => read(path, map, options, &|| open(path)),
+    }
 }
 
 /// Reads a recording from memory; `name` stands for the file in messages. Otherwise as [`read_recording`].
@@ -59,6 +69,9 @@ pub fn read_recording_from(
     map: &ChannelMap,
     options: &ReadOptions,
 ) -> Result<ReadReport, RecordError> {
+    if !options.logs.0.is_empty() && !is_mcap(bytes) {
+        return read_as_log(&LogFile::of_bytes(name, bytes), map, options);
+    }
     // The pass needs a source it may own; a shared copy costs once what the file has.
     let shared: std::sync::Arc<[u8]> = bytes.into();
     read(name, map, options, &|| Ok(Box::new(io::Cursor::new(shared.clone()))))
@@ -68,12 +81,41 @@ pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
     Ok(Box::new(BufReader::with_capacity(1 << 16, File::open(path)?)))
 }
 
+fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Result<ReadReport, RecordError> {
+    if map.is_native() {
+        // A file of no known format is said to be none, whatever the map.
+        options.logs.open(file, &map.log)?;
+        return Err(RecordError::LogWithoutMap { path: file.path().to_owned() });
+    }
+    let log = read_log(file, map, options)?;
+    let mut warnings = log.warnings;
+    if log.averaged {
+        warnings.push(ReadWarning::Averaged);
+    }
+    if log.full {
+        warnings.push(ReadWarning::TooManyMessages { limit: options.max_messages });
+    }
+    warnings.extend(missing(map, &log.builders));
+    let ambient = log.ambient.map(|builder| builder.build(Channel::P1, log.zero_ns, &mut warnings));
+    let mut gathered = gather(map, log.builders, log.zero_ns, ambient, &mut warnings);
+    complete(map, &mut gathered, &log.units)?;
+    let steps = steps_without_marks(&gathered, &mut warnings);
+    let Gathered { series, elements, .. } = gathered;
+    Ok(ReadReport {
+        recording: Recording { events: Vec::new(), series, elements, steps },
+        warnings,
+        start_time_ns: log.start_time_ns.unwrap_or(0),
+        ..ReadReport::default()
+    })
+}
+
 fn read(
     path: &Path,
     map: &ChannelMap,
     options: &ReadOptions,
     open: &dyn Fn() -> io::Result<Box<dyn Read>>,
 ) -> Result<ReadReport, RecordError> {
+    fits_mcap(map)?;
     let (mut sink, scanned) = scan(path, open, options, || RigSink::new(path, map))?;
     if let Some(error) = sink.failure.take() {
         return Err(error);
@@ -85,7 +127,29 @@ fn read(
         let topics = sink.topic_names.into_iter().collect();
         return Err(RecordError::NothingMapped { path: path.to_owned(), topics });
     }
-    Ok(report(map, sink, scanned))
+    report(map, sink, scanned)
+}
+
+/// What only logs allow.
+fn fits_mcap(map: &ChannelMap) -> Result<(), RecordError> {
+    let mut complaints = Complaints::default();
+    for (reads, source) in sources(map).filter(|(_, source)| source.topic.is_empty()) {
+        let message =
+            format!("`{}` has no `topic`, and the fields of an MCAP recording stand in topics", source.field);
+        let remedy = "write `topic: /name`, as in the recording".to_owned();
+        complaints.add(
+            FindingKind::MissingKey,
+            &steps!["channels", reads.channel().symbol()],
+            message,
+            remedy,
+        );
+    }
+    if let Some(AmbientPressure::Source(_)) = &map.ambient_pressure {
+        let message = "columns of the ambient pressure are read from logs alone".to_owned();
+        let remedy = "write the value of the barometer, e.g. `101.3 kPa`".to_owned();
+        complaints.add(FindingKind::Unsupported, &steps!["ambient_pressure"], message, remedy);
+    }
+    complaints.result(map)
 }
 
 fn is_own(topic: &str) -> bool {
@@ -93,38 +157,17 @@ fn is_own(topic: &str) -> bool {
     topic == STEP_TOPIC || topic == EVENT_TOPIC || topic.starts_with(TRUTH_PREFIX)
 }
 
-fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> ReadReport {
+fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> Result<ReadReport, RecordError> {
     let mut warnings = scanned.warnings;
     warnings.append(&mut sink.warnings);
     warnings.extend(sink.damaged_messages());
-    let channels = map.channels.iter().map(|(channel, source)| (Reads::Channel(*channel), source));
-    let elements = map.elements.iter().map(|(element, source)| (Reads::Element(*element), source));
-    let missing = channels.chain(elements).filter(|(reads, _)| !sink.builders.contains_key(reads));
     if !map.is_native() {
-        warnings.extend(missing.map(|(reads, source)| ReadWarning::MissingChannel {
-            channel: reads.channel(),
-            topic: source.topic.clone(),
-            field: source.field.clone(),
-        }));
+        warnings.extend(missing(map, &sink.builders));
     }
     let first_sample_ns = sink.builders.values().filter_map(SeriesBuilder::first_time_ns).min();
     let zero_ns = sink.start_time_ns.or(first_sample_ns).unwrap_or(0);
-    let (mut series, mut elements) = (BTreeMap::new(), BTreeMap::new());
-    for (reads, builder) in sink.builders {
-        let built = builder.build(reads.channel(), zero_ns, &mut warnings);
-        match reads {
-            _ if built.t_s.is_empty() => {}
-            Reads::Channel(channel) => drop(series.insert(channel, built)),
-            Reads::Element(element) => drop(elements.insert(element, built)),
-        }
-    }
-    read_together(map, &mut series, &elements);
-    let span_s = span_s(&series);
-    if let Some((first_s, last_s)) = span_s {
-        for (channel, value) in &map.constants {
-            series.entry(*channel).or_insert_with(|| constant(first_s, last_s, *value));
-        }
-    }
+    let mut gathered = gather(map, sink.builders, zero_ns, None, &mut warnings);
+    complete(map, &mut gathered, &sink.units)?;
     let steps = if sink.format.is_some() || !sink.steps.is_empty() {
         let markers = sink.steps.into_iter().map(|(log_time_ns, mut message)| {
             if sink.start_time_ns.is_none() {
@@ -132,9 +175,10 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> ReadRepo
             }
             message
         });
-        steps_from_markers(markers, span_s.map_or(0.0, |(_, last_s)| last_s), &mut warnings)
+        let last_s = span_s(&gathered.series).map_or(0.0, |(_, last_s)| last_s);
+        steps_from_markers(markers, last_s, &mut warnings)
     } else {
-        steps_from_commands(&series, span_s, &mut warnings)
+        steps_without_marks(&gathered, &mut warnings)
     };
     let events = sink.events.into_iter().map(|(log_time_ns, mut event)| {
         if sink.start_time_ns.is_none() {
@@ -142,7 +186,8 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> ReadRepo
         }
         event
     });
-    ReadReport {
+    let Gathered { series, elements, .. } = gathered;
+    Ok(ReadReport {
         recording: Recording { events: events.collect(), series, elements, steps },
         warnings,
         campaign_text: sink.campaign_text,
@@ -150,7 +195,106 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> ReadRepo
         metadata: sink.metadata,
         format: sink.format,
         start_time_ns: zero_ns,
+    })
+}
+
+/// What the map names and the recording does not hold.
+fn missing(map: &ChannelMap, builders: &BTreeMap<Reads, SeriesBuilder>) -> Vec<ReadWarning> {
+    let absent = sources(map).filter(|(reads, _)| !builders.contains_key(reads));
+    let warning = |(reads, source): (Reads, &ChannelSource)| ReadWarning::MissingChannel {
+        channel: reads.channel(),
+        topic: source.topic.clone(),
+        field: source.field.clone(),
+    };
+    absent.map(warning).collect()
+}
+
+/// Every source that the map names.
+fn sources(map: &ChannelMap) -> impl Iterator<Item = (Reads, &ChannelSource)> {
+    let channels = map.channels.iter().map(|(channel, source)| (Reads::Channel(*channel), source));
+    channels.chain(map.elements.iter().map(|(element, source)| (Reads::Element(*element), source)))
+}
+
+/// The series of a recording.
+struct Gathered {
+    series: BTreeMap<Channel, Series>,
+    elements: BTreeMap<Element, Series>,
+}
+
+/// Series over run time, gauge pressures made absolute.
+fn gather(
+    map: &ChannelMap,
+    builders: BTreeMap<Reads, SeriesBuilder>,
+    zero_ns: u64,
+    ambient: Option<Series>,
+    warnings: &mut Vec<ReadWarning>,
+) -> Gathered {
+    let mut gathered = Gathered { series: BTreeMap::new(), elements: BTreeMap::new() };
+    let ambient_pa = |t_s: f64| match (&map.ambient_pressure, &ambient) {
+        (Some(AmbientPressure::Constant(value_pa)), _) => Some(*value_pa),
+        (_, Some(series)) => series.interpolate(t_s),
+        _ => None,
+    };
+    for (reads, builder) in builders {
+        let mut built = builder.build(reads.channel(), zero_ns, warnings);
+        if built.t_s.is_empty() {
+            continue;
+        }
+        if map.source(reads).is_some_and(|source| source.gauge) {
+            if built.t_s.first().is_none_or(|t_s| ambient_pa(*t_s).is_none()) {
+                warnings.push(ReadWarning::NoAmbient { channel: reads.channel() });
+                continue;
+            }
+            for (t_s, value) in built.t_s.iter().zip(&mut built.values) {
+                *value += ambient_pa(*t_s).unwrap_or(f64::NAN);
+            }
+        }
+        match reads {
+            Reads::Channel(channel) => drop(gathered.series.insert(channel, built)),
+            Reads::Element(element) => drop(gathered.elements.insert(element, built)),
+        }
     }
+    gathered
+}
+
+/// Checks what was read against what is possible, and adds what follows from it: channels with several sensors, constants.
+fn complete(
+    map: &ChannelMap,
+    gathered: &mut Gathered,
+    units: &BTreeMap<Reads, &'static Unit>,
+) -> Result<(), RecordError> {
+    if !map.is_native() {
+        let mut complaints = Complaints::default();
+        for (reads, source) in sources(map) {
+            let series = match reads {
+                Reads::Channel(channel) => gathered.series.get(&channel),
+                Reads::Element(element) => gathered.elements.get(&element),
+            };
+            if let (Some(series), Some(unit)) = (series, units.get(&reads)) {
+                plausibility::check(reads.channel(), source, unit, series, &mut complaints);
+            }
+        }
+        complaints.result(map)?;
+    }
+    read_together(map, &mut gathered.series, &gathered.elements);
+    if let Some((first_s, last_s)) = span_s(&gathered.series) {
+        for (channel, value) in &map.constants {
+            gathered.series.entry(*channel).or_insert_with(|| constant(first_s, last_s, *value));
+        }
+    }
+    Ok(())
+}
+
+/// Steps from commands, or else from jumps of what was measured.
+fn steps_without_marks(gathered: &Gathered, warnings: &mut Vec<ReadWarning>) -> Vec<StepMarker> {
+    let series = &gathered.series;
+    let span_s = span_s(series);
+    let commanded =
+        [Channel::P3Command, Channel::ValveCommand].iter().any(|channel| series.contains_key(channel));
+    if commanded || !can_be_searched(series) {
+        return without_rest(steps_from_commands(series, span_s, warnings), series);
+    }
+    without_rest(steps_from_jumps(series, warnings), series)
 }
 
 /// The readings of channels of which the recording holds single sensors alone, on the times of the first of them: what the

@@ -1,17 +1,21 @@
 //! Bounds of the reader.
 
+use mapper_logs::LogFormats;
+
 /// Bounds on what a file may make the reader do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub struct ReadOptions {
     /// Chunks that claim to be larger unpacked are left out, bytes.
     pub max_chunk_bytes: u64,
     /// Messages beyond these are left out.
     pub max_messages: u64,
+    /// Formats of logs that are read beside MCAP.
+    pub logs: LogFormats,
 }
 
 impl Default for ReadOptions {
-    /// 256 MiB; 100 million, which is a month of four groups at 10 Hz.
+    /// 256 MiB; 100 million, which is a month of four groups at 10 Hz; MCAP alone.
     fn default() -> Self {
-        ReadOptions { max_chunk_bytes: 256 << 20, max_messages: 100_000_000 }
+        ReadOptions { max_chunk_bytes: 256 << 20, max_messages: 100_000_000, logs: LogFormats::default() }
     }
 }

@@ -11,6 +11,7 @@ use crate::series_builder::SeriesBuilder;
 use crate::steps::StepMessage;
 use crate::{ChannelMap, FormatVersion, ReadWarning, RecordError};
 use mapper_core::Event;
+use mapper_logs::Unit;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -28,6 +29,8 @@ pub(crate) struct RigSink<'a> {
     topics: BTreeMap<u16, Topic>,
     pub(crate) topic_names: BTreeSet<String>,
     pub(crate) builders: BTreeMap<Reads, SeriesBuilder>,
+    /// Unit of each field that was mapped.
+    pub(crate) units: BTreeMap<Reads, &'static Unit>,
     pub(crate) steps: Vec<(u64, StepMessage)>,
     pub(crate) events: Vec<(u64, Event)>,
     pub(crate) metadata: BTreeMap<String, String>,
@@ -49,6 +52,7 @@ impl<'a> RigSink<'a> {
             topics: BTreeMap::new(),
             topic_names: BTreeSet::new(),
             builders: BTreeMap::new(),
+            units: BTreeMap::new(),
             steps: Vec::new(),
             events: Vec::new(),
             metadata: BTreeMap::new(),
@@ -72,7 +76,11 @@ impl<'a> RigSink<'a> {
 
     fn mapped(&mut self, definition: &ChannelDefinition) -> Option<Topic> {
         match map_topic(self.path, self.map, definition, &mut self.warnings) {
-            Ok(mapped) => mapped.map(Topic::Mapped),
+            Ok(mapped) => {
+                let outputs = mapped.iter().flat_map(|topic| &topic.outputs);
+                self.units.extend(outputs.map(|(_, reads, unit)| (*reads, *unit)));
+                mapped.map(Topic::Mapped)
+            }
             Err(error) => {
                 self.failure.get_or_insert(error);
                 None

@@ -1,6 +1,7 @@
 //! What only a simulator knows, for scoring alone.
 
 use crate::format::{METADATA_NAME, START_KEY, TRUTH_TOPIC};
+use crate::log_read::is_mcap;
 use crate::message::{FieldValue, read_fields};
 use crate::read::open;
 use crate::records::ChannelDefinition;
@@ -8,6 +9,7 @@ use crate::scan::{Sink, scan};
 use crate::series_builder::run_time_s;
 use crate::{ReadOptions, ReadWarning, RecordError};
 use mapper_core::TruthColumn;
+use mapper_logs::LogFile;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -29,11 +31,14 @@ impl Truth {
     }
 }
 
-/// Reads the truth of a recording; empty where it has none.
+/// Reads the truth of a recording; empty where it has none, as the log of another program.
 ///
 /// # Errors
 /// As [`read_recording`](crate::read_recording).
 pub fn read_truth(path: &Path) -> Result<Truth, RecordError> {
+    if !is_mcap(&LogFile::of_path(path).head(8)?) {
+        return Ok(Truth::default());
+    }
     let options = ReadOptions::default();
     let (sink, scanned) = scan(path, &|| open(path), &options, TruthSink::default)?;
     let rows = sink.times_ns.len();

@@ -98,6 +98,27 @@ pub enum ReadWarning {
         /// The limit.
         limit: u64,
     },
+    /// A fast log was averaged while it was read.
+    #[error("the log is faster than identification needs: it was averaged to 10 samples a second")]
+    Averaged,
+    /// Steps were found in what was measured.
+    #[error(
+        "the recording has neither step marks nor commands: {count} steps were found where {channels} jump"
+    )]
+    StepsFound {
+        /// How many.
+        count: usize,
+        /// Channels that were looked at.
+        channels: String,
+    },
+    /// What a gauge pressure is added to is not there.
+    #[error(
+        "{channel} is a gauge pressure, and the ambient pressure is not in the recording: it was left out"
+    )]
+    NoAmbient {
+        /// The channel.
+        channel: Channel,
+    },
     /// Steps could not be found because no command is mapped.
     #[error(
         "no steps were found: the recording has neither step markers nor a mapped P3_command or valve_command"

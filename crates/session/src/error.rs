@@ -6,6 +6,7 @@ use mapper_drift::DriftError;
 use mapper_gap::diagnose::GapError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
+use mapper_logs::{LogError, OptionError};
 use mapper_observe::OtherMachine;
 use mapper_planner::PlanError;
 use mapper_record::{ChannelMapError, RecordError};
@@ -161,6 +162,12 @@ pub enum SessionError {
     /// A recording cannot be read or written.
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// A log of another program cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// What was said about how to read a log is wrong.
+    #[error(transparent)]
+    LogOption(#[from] OptionError),
     /// The channel map cannot be read, or has mistakes.
     #[error(transparent)]
     ChannelMap(#[from] ChannelMapError),
@@ -306,6 +313,12 @@ impl SessionError {
             // Only reading fails for reasons that are not the recording's.
             E::Record(RecordError::Read { .. } | RecordError::Exists { .. } | RecordError::Create { .. })
             | E::Record(RecordError::Write { .. } | RecordError::BadInput { .. }) => ErrorKind::Failure,
+            E::Record(RecordError::ChannelMap(_) | RecordError::LogWithoutMap { .. }) => ErrorKind::BadInput,
+            E::Record(RecordError::Log(LogError::Read { .. })) | E::Log(LogError::Read { .. }) => {
+                ErrorKind::Failure
+            }
+            E::LogOption(_) => ErrorKind::BadInput,
+            E::Log(_) => ErrorKind::BadRecording,
             E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
                 ErrorKind::BadRecording
             }

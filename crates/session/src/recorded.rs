@@ -1,7 +1,7 @@
 //! A recording read from a file, with the campaign that says what was recorded.
 
-use crate::SessionError;
 use crate::run_directory;
+use crate::{Registry, SessionError};
 use mapper_campaign::{Campaign, CampaignError};
 use mapper_core::Recording;
 use mapper_observe::OtherMachine;
@@ -22,15 +22,21 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// Reads a run directory or a file. What says the machine is, in this order: the campaign given, the `machine` of the
+    /// Reads a run directory, an MCAP file or a log of any format of the registry. What says the machine is, in this order: the campaign given, the `machine` of the
     /// channel map, the campaign attached to the recording.
     ///
     /// # Errors
     /// [`SessionError::Record`] where the recording cannot be read, [`SessionError::Campaign`] where the attached campaign
     /// has mistakes.
-    pub fn read(path: &Path, map: &ChannelMap, given: Option<&Campaign>) -> Result<Recorded, SessionError> {
+    pub fn read(
+        registry: &Registry,
+        path: &Path,
+        map: &ChannelMap,
+        given: Option<&Campaign>,
+    ) -> Result<Recorded, SessionError> {
         let file = run_directory::recording_of(path);
-        let read = read_recording(&file, map, &ReadOptions::default())?;
+        let options = ReadOptions { logs: registry.logs, ..ReadOptions::default() };
+        let read = read_recording(&file, map, &options)?;
         let campaign = match given {
             Some(campaign) => Some(campaign.clone()),
             None if map.machine.is_some() => None,

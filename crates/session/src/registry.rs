@@ -3,6 +3,7 @@
 use crate::SessionError;
 use mapper_campaign::Campaign;
 use mapper_core::{Backend, MapFormats};
+use mapper_logs::LogFormats;
 use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
@@ -24,6 +25,8 @@ pub struct Registry {
     pub read_effect: ReadEffect,
     /// Map formats, read and written.
     pub formats: MapFormats,
+    /// Formats of logs that other programs wrote.
+    pub logs: LogFormats,
 }
 
 impl Default for Registry {
@@ -34,6 +37,7 @@ impl Default for Registry {
             effects: Vec::new(),
             read_effect: no_effect,
             formats: MapFormats(&[]),
+            logs: LogFormats::default(),
         }
     }
 }

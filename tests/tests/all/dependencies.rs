@@ -17,7 +17,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-surge",     &["core", "numerics", "physics"]),
     ("mapper-runner",    &["core", "numerics", "surge"]),
     ("mapper-sequence",  &["core", "numerics", "physics", "yaml"]),
-    ("mapper-record",    &["core", "numerics", "yaml"]),
+    ("mapper-logs",      &["core", "yaml"]),
+    ("mapper-record",    &["core", "logs", "numerics", "yaml"]),
     ("mapper-observe",   &["core", "numerics", "physics"]),
     ("mapper-driven",    &["core", "numerics", "physics", "observe"]),
     ("mapper-identify",  &["core", "numerics", "physics", "observe"]),
@@ -31,14 +32,15 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-backends",  &["core", "numerics", "physics", "record", "yaml"]),
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart"]),
+    ("mapper-log-formats", &["logs"]),
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
     ("mapper-blind",     &["core", "numerics", "physics", "campaign", "runner", "record", "observe", "gap", "backends", "effects"]),
     // Words, pages and pictures made from data.
-    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "assemble", "gap", "drift", "driven", "history", "record", "reproduce", "sequence"]),
+    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "assemble", "gap", "drift", "driven", "history", "logs", "record", "reproduce", "sequence"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "record", "observe", "identify", "surge", "gap", "drift", "driven", "history", "assemble", "report", "numerics"]),
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "drift", "driven", "history", "assemble", "report", "numerics"]),
     // The program names the plug-ins; nothing sees the program.
-    ("mapper-cli",       &["core", "physics", "campaign", "planner", "record", "drift", "history", "assemble", "reproduce", "report", "session", "backends", "blind", "effects", "formats"]),
+    ("mapper-cli",       &["core", "physics", "campaign", "planner", "record", "drift", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "backends", "blind", "effects", "formats"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

@@ -13,6 +13,7 @@ mod drift_watched;
 mod full_disk;
 mod help;
 mod interrupted;
+mod logs;
 mod maps;
 mod mistakes;
 mod nightly;

@@ -36,15 +36,15 @@ impl Drift {
     pub fn run(&self) -> Result<(), Failure> {
         let (files, given) = self.sources()?;
         let map = channel_map(self.channels.as_deref())?;
+        let registry = registry::registry();
         let recorded: Vec<Recorded> = files
             .iter()
-            .map(|file| Recorded::read(file, &map, given.as_ref()))
+            .map(|file| Recorded::read(&registry, file, &map, given.as_ref()))
             .collect::<Result<_, SessionError>>()?;
         let Some(first) = recorded.first() else {
             return Err(Failure::new(Code::BadInput, "no recording was given"));
         };
         let campaign = first.known("Give it with `mapper drift --recording FILE CAMPAIGN`")?;
-        let registry = registry::registry();
         let drift = Session::new(&registry).drift(&recorded, campaign, &map)?;
         if let Some(path) = &self.corrected {
             let corrected =

@@ -13,10 +13,10 @@ use mapper_session::{Recorded, Session};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Identify efficiency and heat transfer from run directories or any MCAP recordings
+/// Identify efficiency and heat transfer from run directories, MCAP recordings or logs of other programs
 #[derive(Debug, Args)]
 pub struct Identify {
-    /// Run directory, or MCAP file; several of the same machine are identified together, each point once
+    /// Run directory, MCAP file, or log of another program (see `mapper log inspect`); several of the same machine are identified together, each point once
     #[arg(required = true)]
     pub recordings: Vec<PathBuf>,
     /// Leave what a run leaves (points, map, pictures, report) in this directory; existing files are not replaced
@@ -41,7 +41,8 @@ impl Identify {
     pub fn run(&self) -> Result<(), Failure> {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
-        let read = |path: &PathBuf| Recorded::read(path, &map, given.as_ref());
+        let registry = registry::registry();
+        let read = |path: &PathBuf| Recorded::read(&registry, path, &map, given.as_ref());
         let recorded = self.recordings.iter().map(read).collect::<Result<Vec<_>, _>>()?;
         let path = recorded.first().map(|first| first.path.clone());
         let warnings: Vec<String> =
@@ -49,7 +50,6 @@ impl Identify {
         let campaign = recorded.first().and_then(|first| first.campaign.as_ref());
         let display = campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
         let method = self.method.map(Method::from);
-        let registry = registry::registry();
         let session = Session::new(&registry);
         if let Some(directory) = &self.out {
             let results = session.identify_into(recorded, &map, method, directory)?;

@@ -10,6 +10,7 @@ subcommands! { Command:
     run::Run,
     identify::Identify,
     transient::Transient,
+    log::Log,
     gap::Gap,
     drift::Drift,
     nightly::Nightly,

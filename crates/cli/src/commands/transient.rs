@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// Identify the compressor side of a log without steps, driven by its measured speed, flow, pressures and inlet temperature
 #[derive(Debug, Args)]
 pub struct Transient {
-    /// Run directory, or MCAP file
+    /// Run directory, MCAP file, or log of another program (see `mapper log inspect`)
     pub recording: PathBuf,
     /// Channel map: where a recording made by another program holds the channels (YAML)
     #[arg(long, value_name = "FILE")]
@@ -41,8 +41,8 @@ impl Transient {
     pub fn run(&self) -> Result<(), Failure> {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
-        let recorded = Recorded::read(&self.recording, &map, given.as_ref())?;
         let registry = registry::registry();
+        let recorded = Recorded::read(&registry, &self.recording, &map, given.as_ref())?;
         let outcome = Session::new(&registry).transient(&recorded, self.fit_until)?;
         let machine = recorded.campaign.as_ref().map_or("", |campaign| &campaign.machine.name);
         let files = match &self.out {

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 pub struct Diagnose {
     /// Campaign with machine, declared uncertainties and tolerances (YAML)
     pub campaign: PathBuf,
-    /// Run directory, or MCAP file
+    /// Run directory, MCAP file, or log of another program
     #[arg(long, value_name = "FILE")]
     pub recording: PathBuf,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
@@ -38,8 +38,8 @@ impl Diagnose {
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;
-        let recorded = Recorded::read(&self.recording, &map, Some(&campaign))?;
         let (registry, progress) = (registry::registry(), Progress::new());
+        let recorded = Recorded::read(&registry, &self.recording, &map, Some(&campaign))?;
         let on_event = |event: &_| progress.show(event);
         let session = Session { on_event: &on_event, ..Session::new(&registry) };
         let effects = registry.effects_with(&self.effects)?;

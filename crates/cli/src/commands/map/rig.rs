@@ -31,8 +31,8 @@ impl Rig {
     pub fn run(&self) -> Result<(), Failure> {
         let given = given_campaign(self.campaign.as_deref())?;
         let map = channel_map(self.channels.as_deref())?;
-        let recorded = Recorded::read(&self.recording, &map, given.as_ref())?;
         let registry = registry::registry();
+        let recorded = Recorded::read(&registry, &self.recording, &map, given.as_ref())?;
         let written = Session::new(&registry).rig_files(recorded, &map, &self.out)?;
         if self.json {
             return output::print_json(&written);

@@ -7,7 +7,7 @@ use mapper_yaml::units::{Kind, Unit, UnitError, parse_with};
 const ONE: Unit = Unit { spellings: &["1", "-"], zero: 0.0, numerator: 1.0, denominator: 1.0, decade: 0 };
 
 /// What a channel measures.
-pub(crate) fn kind_of(channel: Channel) -> Kind {
+pub fn kind_of(channel: Channel) -> Kind {
     match channel.info().dimension {
         Dimension::RotationalSpeed => Kind::Speed,
         Dimension::MassFlow => Kind::MassFlow,
@@ -18,7 +18,7 @@ pub(crate) fn kind_of(channel: Channel) -> Kind {
 }
 
 /// The kind of noise and offsets of a reading.
-pub(crate) fn difference(kind: Kind) -> Kind {
+pub fn difference(kind: Kind) -> Kind {
     match kind {
         Kind::Temperature => Kind::TemperatureDifference,
         Kind::Pressure => Kind::PressureDifference,
@@ -30,7 +30,7 @@ pub(crate) fn difference(kind: Kind) -> Kind {
 ///
 /// # Errors
 /// [`UnitError::WrongUnit`] for what is not a unit of the kind.
-pub(crate) fn unit(kind: Kind, spelling: &str) -> Result<&'static Unit, UnitError> {
+pub fn unit(kind: Kind, spelling: &str) -> Result<&'static Unit, UnitError> {
     let spelling = spelling.trim();
     find(kind, spelling).ok_or_else(|| UnitError::WrongUnit { unit: spelling.to_owned(), kind })
 }
@@ -39,7 +39,7 @@ pub(crate) fn unit(kind: Kind, spelling: &str) -> Result<&'static Unit, UnitErro
 ///
 /// # Errors
 /// [`UnitError`] for what is not a finite number, for an unknown unit, and for a missing one.
-pub(crate) fn parse_quantity(kind: Kind, text: &str) -> Result<f64, UnitError> {
+pub fn parse_quantity(kind: Kind, text: &str) -> Result<f64, UnitError> {
     parse_with(kind, text, |spelling| match spelling {
         "" => (kind == Kind::Fraction).then_some(&ONE),
         spelling => find(kind, spelling),
@@ -47,7 +47,7 @@ pub(crate) fn parse_quantity(kind: Kind, text: &str) -> Result<f64, UnitError> {
 }
 
 /// What would be right instead.
-pub(crate) fn remedy(kind: Kind, error: &UnitError) -> String {
+pub fn remedy(kind: Kind, error: &UnitError) -> String {
     let bare = if kind == Kind::Fraction { "; a ratio may be written with `1`" } else { "" };
     format!("{}{bare}", error.remedy(kind))
 }

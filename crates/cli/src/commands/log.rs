@@ -1,0 +1,24 @@
+//! `mapper log`.
+
+use crate::failure::Failure;
+use crate::subcommands::subcommands;
+use clap::Args;
+
+/// Look into the log of a test stand
+#[derive(Debug, Args)]
+pub struct Log {
+    /// What to do with the log
+    #[command(subcommand)]
+    command: LogCommand,
+}
+
+subcommands! { LogCommand:
+    inspect::Inspect,
+}
+
+impl Log {
+    /// Runs the sub-command that was asked for.
+    pub fn run(&self) -> Result<(), Failure> {
+        self.command.run()
+    }
+}

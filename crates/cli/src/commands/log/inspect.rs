@@ -1,0 +1,82 @@
+//! `mapper log inspect`: what a log holds, and the channel map that it suggests.
+
+use crate::failure::Failure;
+use crate::{output, registry};
+use clap::Args;
+use mapper_report::log_text;
+use mapper_session::{Inspected, inspect_log, write_new};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Show every column of a log with unit, rate, range and gaps, and propose a channel map
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// Log of a test stand
+    pub log: PathBuf,
+    /// How to read it where looking at it gave the wrong answer, e.g. `separator=;`, `time=TS`; may be repeated
+    #[arg(long = "with", value_name = "KEY=VALUE", value_parser = key_and_value)]
+    pub with: Vec<(String, String)>,
+    /// Write the proposed channel map to this new file
+    #[arg(long, value_name = "FILE")]
+    pub write_channels: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn key_and_value(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("write KEY=VALUE, e.g. `separator=;`")?;
+    Ok((key.trim().to_owned(), value.to_owned()))
+}
+
+impl Inspect {
+    /// Looks at one log.
+    pub fn run(&self) -> Result<(), Failure> {
+        let registry = registry::registry();
+        let found = inspect_log(&registry, &self.log, self.with.clone())?;
+        if let Some(file) = &self.write_channels {
+            write_new(file, found.channel_map().as_bytes())?;
+        }
+        if self.json {
+            return output::print_json(&json_of(&found));
+        }
+        let mut text = log_text(found.format, &found.layout, &found.survey, &found.proposal);
+        match &self.write_channels {
+            Some(file) => text.push_str(&format!("\nThe channel map is in {}.\n", file.display())),
+            None => text.push_str("\nKeep it with `--write-channels FILE`.\n"),
+        }
+        output::print(&text)
+    }
+}
+
+/// Absent numbers are null.
+fn json_of(found: &Inspected) -> Value {
+    let columns = found.layout.columns.iter().zip(&found.survey.columns).map(|(column, data)| {
+        json!({
+            "name": column.name,
+            "header": column.header,
+            "unit": column.unit,
+            "description": column.description,
+            "group": column.group,
+            "count": data.count,
+            "missing": data.missing,
+            "min": data.min,
+            "max": data.max,
+        })
+    });
+    json!({
+        "log": found.path,
+        "format": found.format,
+        "findings": found.layout.findings,
+        "start_time_ns": found.layout.start_time_ns,
+        "groups": found.layout.groups.iter().zip(&found.survey.groups).map(|(group, data)| {
+            let mut value = json!(data);
+            value["name"] = json!(group.name);
+            value["clock"] = json!(group.clock);
+            value
+        }).collect::<Vec<_>>(),
+        "columns": columns.collect::<Vec<_>>(),
+        "proposal": found.proposal,
+        "channel_map": found.channel_map(),
+    })
+}

@@ -1,0 +1,37 @@
+//! Why a log cannot be read.
+
+use std::io;
+use std::path::PathBuf;
+
+/// Why a log cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// The file could not be opened or read.
+    #[error("failed to read the log `{}`: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// No format knows the file.
+    #[error("failed to read `{}`: it is neither MCAP nor {known} (it starts with {found})", path.display())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+        /// Its first bytes, as text.
+        found: String,
+        /// The formats that are read.
+        known: String,
+    },
+    /// The file is of the format, but cannot be used.
+    #[error("failed to read `{}` as {format}: {message}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// Name of the format.
+        format: &'static str,
+        /// What is wrong, and what to do.
+        message: String,
+    },
+}

@@ -1,0 +1,79 @@
+//! The seam of log formats: a format recognises a file, and opens it as groups, columns and rows.
+
+use crate::{Layout, LogError, LogFile, LogOptions};
+
+/// Rows of one group as they come.
+#[derive(Debug, Clone, Copy)]
+pub struct Row<'a> {
+    /// Index of the group.
+    pub group: usize,
+    /// Time, s, on the clock that all groups share; any finite number.
+    pub t_s: f64,
+    /// Values of those wanted columns that belong to the group, in the order in which they were wanted; NaN where the
+    /// log has none.
+    pub values: &'a [f64],
+}
+
+/// Takes rows; an error ends the reading.
+pub type RowSink<'a> = dyn FnMut(Row<'_>) -> Result<(), LogError> + 'a;
+
+/// An open log.
+pub trait Log {
+    /// What is in it.
+    fn layout(&self) -> &Layout;
+
+    /// Gives the rows of the wanted columns (indices of [`Layout::columns`]), each group in the order of the file.
+    ///
+    /// # Errors
+    /// [`LogError`] where the file cannot be read on; what came before was given.
+    fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError>;
+}
+
+/// One format of logs.
+#[derive(Debug, Clone, Copy)]
+pub struct LogFormat {
+    /// Name for people, e.g. `CSV`.
+    pub name: &'static str,
+    /// Whether the first bytes of a file (up to [`LogFormats::HEAD_BYTES`]) are of this format.
+    pub recognises: fn(&[u8]) -> bool,
+    /// Opens a file of this format.
+    pub open: fn(&LogFile, &LogOptions) -> Result<Box<dyn Log>, LogError>,
+}
+
+/// The formats that a program knows, in the order in which they are asked.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct LogFormats(pub &'static [LogFormat]);
+
+impl LogFormats {
+    /// How much of a file formats see to recognise it, bytes.
+    pub const HEAD_BYTES: usize = 4096;
+
+    /// The format of a file that starts with these bytes.
+    pub fn of_head(self, head: &[u8]) -> Option<&'static LogFormat> {
+        self.0.iter().find(|format| (format.recognises)(head))
+    }
+
+    /// Opens a log.
+    ///
+    /// # Errors
+    /// [`LogError`] where the file cannot be read, is of no known format, or holds nothing that can be used.
+    pub fn open(
+        self,
+        file: &LogFile,
+        options: &LogOptions,
+    ) -> Result<(&'static LogFormat, Box<dyn Log>), LogError> {
+        let head = file.head(Self::HEAD_BYTES)?;
+        let format = self.of_head(&head).ok_or_else(|| LogError::Unknown {
+            path: file.path().to_owned(),
+            found: format!("{:?}", String::from_utf8_lossy(head.get(..8).unwrap_or(&head))),
+            known: self.names(),
+        })?;
+        Ok((format, (format.open)(file, options)?))
+    }
+
+    /// Names of the formats, for messages.
+    pub fn names(self) -> String {
+        let names: Vec<&str> = self.0.iter().map(|format| format.name).collect();
+        names.join(", ")
+    }
+}

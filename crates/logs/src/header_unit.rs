@@ -1,0 +1,198 @@
+//! Units as the headers of logs write them.
+
+use crate::units::unit;
+use mapper_yaml::units::{Kind, Unit};
+use serde::Serialize;
+
+/// What a pressure is measured from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reference {
+    /// The header does not say.
+    Unsaid,
+    /// Vacuum.
+    Absolute,
+    /// The ambient pressure.
+    Gauge,
+}
+
+/// A unit of a header that is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeaderUnit {
+    /// What it measures.
+    pub kind: Kind,
+    /// The unit.
+    pub unit: &'static Unit,
+    /// What a pressure is measured from.
+    pub reference: Reference,
+}
+
+/// Spellings that logs use beside those of the table of units, in small letters without blanks.
+const SPELLINGS: &[(Kind, &str, &[&str])] = &[
+    (
+        Kind::Temperature,
+        "degC",
+        &[
+            "degc",
+            "°c",
+            "c",
+            "gradc",
+            "grdc",
+            "grad",
+            "celsius",
+            "gradcelsius",
+            "degreesc",
+            "degreec",
+            "ºc",
+            "deg.c",
+            "*c",
+        ],
+    ),
+    (Kind::Temperature, "K", &["k", "kelvin", "degk", "°k"]),
+    (Kind::Temperature, "degF", &["degf", "°f", "f", "fahrenheit"]),
+    (
+        Kind::Speed,
+        "rpm",
+        &[
+            "rpm", "1/min", "min-1", "min^-1", "min⁻¹", "u/min", "upm", "rev/min", "r/min", "umin", "/min",
+            "1/m",
+        ],
+    ),
+    (Kind::Speed, "krpm", &["krpm", "1000rpm", "1000/min", "k1/min", "ku/min"]),
+    (Kind::Speed, "Hz", &["hz", "1/s", "rev/s", "u/s", "rps"]),
+    (Kind::Speed, "rad/s", &["rad/s"]),
+    (Kind::MassFlow, "kg/s", &["kg/s", "kgs", "kgs-1", "kg/sec"]),
+    (Kind::MassFlow, "g/s", &["g/s", "gs-1", "g/sec"]),
+    (Kind::MassFlow, "kg/h", &["kg/h", "kg/hr", "kghr", "kgh", "kgh-1", "kg/std"]),
+    (Kind::MassFlow, "kg/min", &["kg/min", "kgmin"]),
+    (Kind::MassFlow, "lb/min", &["lb/min", "lbmin", "lbm/min", "lbs/min", "ppm_lb"]),
+    (Kind::MassFlow, "lb/s", &["lb/s", "lbm/s"]),
+    (Kind::Fraction, "%", &["%", "percent", "prozent", "pct"]),
+    (Kind::Fraction, "1", &["1", "-", "--", "ratio"]),
+    (Kind::Duration, "s", &["s", "sec", "secs", "second", "seconds", "sek", "sekunden"]),
+    (Kind::Duration, "ms", &["ms", "msec", "millisec", "milliseconds"]),
+    (Kind::Duration, "min", &["min", "minutes", "minuten"]),
+    (Kind::Duration, "h", &["h", "hr", "hours", "std", "stunden"]),
+];
+
+/// Pressures without what they are measured from.
+const PRESSURES: &[(&str, &str)] = &[
+    ("mbar", "mbar"),
+    ("kpa", "kPa"),
+    ("hpa", "hPa"),
+    ("mpa", "MPa"),
+    ("bar", "bar"),
+    ("atm", "atm"),
+    ("psi", "psi"),
+    ("pa", "Pa"),
+];
+
+const GAUGE: &[&str] =
+    &["g", "(g)", "_g", "rel", "_rel", "(rel)", "r", "ü", "(ü)", "gauge", "ue", "-g", "relativ"];
+const ABSOLUTE: &[&str] = &["a", "(a)", "_a", "abs", "_abs", "(abs)", "absolute", "absolut", "-a", "abs."];
+
+/// The unit that a header means; `None` for what is none.
+pub fn header_unit(text: &str) -> Option<HeaderUnit> {
+    let plain: String = text.chars().filter(|c| !c.is_whitespace() && !['[', ']'].contains(c)).collect();
+    let lower = plain.to_lowercase();
+    if lower.is_empty() || lower.len() > 24 {
+        return None;
+    }
+    let known =
+        |kind, symbol, reference| Some(HeaderUnit { kind, unit: unit(kind, symbol).ok()?, reference });
+    for (kind, symbol, spellings) in SPELLINGS {
+        if spellings.contains(&lower.as_str()) {
+            return known(*kind, symbol, Reference::Unsaid);
+        }
+    }
+    for (spelling, symbol) in PRESSURES {
+        let reference = match lower.strip_prefix(spelling) {
+            Some("") => Reference::Unsaid,
+            Some(rest) if GAUGE.contains(&rest) => Reference::Gauge,
+            Some(rest) if ABSOLUTE.contains(&rest) => Reference::Absolute,
+            _ => continue,
+        };
+        return known(Kind::Pressure, symbol, reference);
+    }
+    None
+}
+
+/// A name and its unit, where a header holds both: `T2 [degC]`, `T2 (degC)`, `p2 / kPa`, `p2 in kPa`, `T2_degC`.
+pub fn split_unit(header: &str) -> (String, Option<String>) {
+    let header = header.trim();
+    let whole = || (header.to_owned(), None);
+    for (open, close, any) in [('[', ']', true), ('(', ')', false), ('{', '}', false), ('<', '>', false)] {
+        let Some(inside) = header.strip_suffix(close) else { continue };
+        let Some((name, unit)) = inside.rsplit_once(open) else { continue };
+        let unit = unit.trim();
+        // `bar (g)` and `[bar(g)]` hold brackets of their own.
+        if !name.trim().is_empty() && !unit.is_empty() && (any || header_unit(unit).is_some()) {
+            return (name.trim().trim_end_matches(['/', ',']).trim().to_owned(), Some(unit.to_owned()));
+        }
+    }
+    for between in [" / ", " in ", "/", ", ", "_", " "] {
+        // From the left for `/`, which units hold themselves: `m / kg/s`.
+        let cuts: Vec<(usize, &str)> = header.match_indices(between).collect();
+        for (at, _) in cuts {
+            let (name, unit) = (header[..at].trim(), header[at + between.len()..].trim());
+            let known = header_unit(unit);
+            // A single letter behind a blank or a line is a place more often than a unit: `T_C`, `p_a`.
+            let doubtful = [" ", "_"].contains(&between) && unit.chars().count() < 2;
+            if !name.is_empty() && known.is_some() && !doubtful && unit != "-" && !unit.ends_with("--") {
+                return (name.to_owned(), Some(unit.to_owned()));
+            }
+        }
+    }
+    whole()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_as_test_stands_write_them() {
+        for (text, kind, symbol, reference) in [
+            ("°C", Kind::Temperature, "degC", Reference::Unsaid),
+            ("[Grad C]", Kind::Temperature, "degC", Reference::Unsaid),
+            ("kPaG", Kind::Pressure, "kPa", Reference::Gauge),
+            ("kPaA", Kind::Pressure, "kPa", Reference::Absolute),
+            ("bar(g)", Kind::Pressure, "bar", Reference::Gauge),
+            ("mbar rel", Kind::Pressure, "mbar", Reference::Gauge),
+            ("bar abs", Kind::Pressure, "bar", Reference::Absolute),
+            ("kghr", Kind::MassFlow, "kg/h", Reference::Unsaid),
+            ("U/min", Kind::Speed, "rpm", Reference::Unsaid),
+        ] {
+            let found = header_unit(text).unwrap();
+            assert_eq!(
+                (found.kind, found.unit.symbol(), found.reference),
+                (kind, symbol_of(kind, symbol), reference),
+                "{text}"
+            );
+        }
+        assert_eq!(header_unit("Nm"), None);
+    }
+
+    fn symbol_of(kind: Kind, symbol: &str) -> &'static str {
+        unit(kind, symbol).unwrap().symbol()
+    }
+
+    #[test]
+    fn a_header_is_cut_where_its_unit_begins() {
+        for (header, name, unit) in [
+            ("T2 [degC]", "T2", Some("degC")),
+            ("p2 / kPa", "p2", Some("kPa")),
+            ("m_L / kg/h", "m_L", Some("kg/h")),
+            ("Druck (bar)", "Druck", Some("bar")),
+            ("p2 [bar(g)]", "p2", Some("bar(g)")),
+            ("Drehzahl ATL in 1/min", "Drehzahl ATL", Some("1/min")),
+            ("outlet_temp_degC", "outlet_temp", Some("degC")),
+            ("T_C", "T_C", None),
+            ("T2", "T2", None),
+            ("Valve (upper)", "Valve (upper)", None),
+            ("q [Nm]", "q", Some("Nm")),
+        ] {
+            assert_eq!(split_unit(header), (name.to_owned(), unit.map(str::to_owned)), "{header}");
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! What a log holds, as found by looking.
+
+use serde::Serialize;
+
+/// Groups, columns and what was found out about them.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Layout {
+    /// Columns that share a clock, in the order of the file.
+    pub groups: Vec<Group>,
+    /// Columns, clocks left out, in the order of the file.
+    pub columns: Vec<Column>,
+    /// What was found by looking, one sentence each, with the key that overrides it.
+    pub findings: Vec<String>,
+    /// Time 0 of all groups in nanoseconds since 1970-01-01, where the log gives dates; in the zone of the log.
+    pub start_time_ns: Option<u64>,
+}
+
+/// Columns that share a clock.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Group {
+    /// Name: a sheet, a group of the format, the clock's column; empty where the log has one group without a name.
+    pub name: String,
+    /// The clock in words.
+    pub clock: String,
+}
+
+/// One column.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Column {
+    /// Name without its unit; distinct within a group.
+    pub name: String,
+    /// The cell of the header as written, unit included.
+    pub header: String,
+    /// Unit as written; `None` where the log gives none.
+    pub unit: Option<String>,
+    /// Long name or comment; empty where there is none.
+    pub description: String,
+    /// Index of its group.
+    pub group: usize,
+}
+
+impl Layout {
+    /// Columns of that name, or with that header as a whole, in a group of that name (any where `topic` is empty).
+    pub fn find(&self, topic: &str, field: &str) -> Vec<usize> {
+        let in_group = |column: &Column| {
+            topic.is_empty() || self.groups.get(column.group).is_some_and(|group| group.name == topic)
+        };
+        let by = |text: fn(&Column) -> &str| -> Vec<usize> {
+            let rows = self.columns.iter().enumerate();
+            rows.filter(|(_, column)| in_group(column) && text(column) == field)
+                .map(|(index, _)| index)
+                .collect()
+        };
+        let named = by(|column| &column.name);
+        if named.is_empty() { by(|column| &column.header) } else { named }
+    }
+}

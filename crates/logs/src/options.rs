@@ -1,0 +1,252 @@
+//! What a user may say about a log, where looking at it gave the wrong answer.
+
+use mapper_yaml::units::{Kind, parse};
+
+/// How the letters of a text file are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// UTF-8, with or without a byte order mark.
+    Utf8,
+    /// Windows-1252, of which Latin-1 is a part.
+    Latin1,
+    /// UTF-16, low byte first.
+    Utf16Le,
+    /// UTF-16, high byte first.
+    Utf16Be,
+}
+
+/// The order of the parts of a date.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DateOrder {
+    /// 22.11.2026.
+    DayFirst,
+    /// 11/22/2026.
+    MonthFirst,
+    /// 2026-11-22.
+    YearFirst,
+}
+
+/// What is known about a log beforehand; what is not given is found by looking.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LogOptions {
+    /// Character between the cells of a line; a blank stands for any number of blanks.
+    pub separator: Option<char>,
+    /// Decimal sign: `.` or `,`.
+    pub decimal: Option<char>,
+    /// How the letters are stored.
+    pub encoding: Option<Encoding>,
+    /// Row of the names, from 1; rows without any cell do not count, nor does a byte order mark.
+    pub names_row: Option<usize>,
+    /// Row of the units, from 1; 0 where there is none.
+    pub units_row: Option<usize>,
+    /// First row of data, from 1.
+    pub data_row: Option<usize>,
+    /// Columns of the clock: one, or one with the date and one with the time of day.
+    pub time: Vec<String>,
+    /// Unit of a clock that counts, as seconds.
+    pub time_unit_s: Option<f64>,
+    /// Order of the parts of a date.
+    pub date_order: Option<DateOrder>,
+    /// Samples per second of a log without a clock, Hz, > 0.
+    pub rate_hz: Option<f64>,
+    /// Sheet of a workbook.
+    pub sheet: Option<String>,
+    /// Values that stand for none, in the unit of the log.
+    pub missing: Vec<f64>,
+}
+
+/// One key of the options.
+#[derive(Debug, Clone, Copy)]
+pub struct OptionKey {
+    /// As written in a channel map and behind `--with`.
+    pub name: &'static str,
+    /// One line for people.
+    pub description: &'static str,
+    /// A value as one would write it.
+    pub example: &'static str,
+    set: fn(&mut LogOptions, &str) -> Option<()>,
+}
+
+/// A key or a value that does not exist.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum OptionError {
+    /// No such key.
+    #[error("there is no key `{key}`; the keys are {}", known())]
+    Key {
+        /// What was written.
+        key: String,
+    },
+    /// Not a value of the key.
+    #[error("`{value}` is no value of `{key}`; write e.g. `{example}`")]
+    Value {
+        /// The key.
+        key: &'static str,
+        /// What was written.
+        value: String,
+        /// A right one.
+        example: &'static str,
+    },
+}
+
+fn known() -> String {
+    let names: Vec<&str> = OPTION_KEYS.iter().map(|key| key.name).collect();
+    names.join(", ")
+}
+
+/// Every key.
+pub const OPTION_KEYS: [OptionKey; 12] = [
+    OptionKey {
+        name: "separator",
+        description: "Character between the cells of a line: a character, `tab` or `blank`.",
+        example: ";",
+        set: |options, text| set(&mut options.separator, separator(text)),
+    },
+    OptionKey {
+        name: "decimal",
+        description: "Decimal sign: `.` or `,`.",
+        example: ",",
+        set: |options, text| {
+            set(&mut options.decimal, one_char(text).filter(|sign| [',', '.'].contains(sign)))
+        },
+    },
+    OptionKey {
+        name: "encoding",
+        description: "How letters are stored: utf-8, latin-1, utf-16le or utf-16be.",
+        example: "latin-1",
+        set: |options, text| set(&mut options.encoding, encoding(text)),
+    },
+    OptionKey {
+        name: "names_row",
+        description: "Row of the names, from 1; empty rows do not count.",
+        example: "1",
+        set: |options, text| set(&mut options.names_row, text.parse().ok().filter(|row| *row > 0)),
+    },
+    OptionKey {
+        name: "units_row",
+        description: "Row of the units, from 1; 0 where there is none.",
+        example: "2",
+        set: |options, text| set(&mut options.units_row, text.parse().ok()),
+    },
+    OptionKey {
+        name: "data_row",
+        description: "First row of data, from 1; empty rows do not count.",
+        example: "3",
+        set: |options, text| set(&mut options.data_row, text.parse().ok().filter(|row| *row > 0)),
+    },
+    OptionKey {
+        name: "time",
+        description: "Column of the clock; two with ` + ` between them where date and time of day stand apart.",
+        example: "Date + Time",
+        set: |options, text| {
+            options.time = text.split(" + ").map(|name| name.trim().to_owned()).collect();
+            options.time.iter().all(|name| !name.is_empty()).then_some(())
+        },
+    },
+    OptionKey {
+        name: "time_unit",
+        description: "Unit of a clock that counts: s, ms, min or h.",
+        example: "ms",
+        set: |options, text| set(&mut options.time_unit_s, parse(Kind::Duration, &format!("1 {text}")).ok()),
+    },
+    OptionKey {
+        name: "date_order",
+        description: "Order of the parts of a date: day_first, month_first or year_first.",
+        example: "day_first",
+        set: |options, text| set(&mut options.date_order, date_order(text)),
+    },
+    OptionKey {
+        name: "rate",
+        description: "Samples per second of a log without a clock.",
+        example: "10 Hz",
+        set: |options, text| {
+            let rate_hz = parse(Kind::Frequency, text).ok().filter(|rate| *rate > 0.0);
+            set(&mut options.rate_hz, rate_hz)
+        },
+    },
+    OptionKey {
+        name: "sheet",
+        description: "Sheet of a workbook; all of them where none is given.",
+        example: "Data",
+        set: |options, text| set(&mut options.sheet, Some(text.to_owned())),
+    },
+    OptionKey {
+        name: "missing",
+        description: "Values that stand for none, with blanks between them.",
+        example: "-9999",
+        set: |options, text| {
+            let values: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
+            options.missing = values?;
+            Some(())
+        },
+    },
+];
+
+fn set<T>(place: &mut Option<T>, value: Option<T>) -> Option<()> {
+    *place = Some(value?);
+    Some(())
+}
+
+fn one_char(text: &str) -> Option<char> {
+    let mut chars = text.chars();
+    chars.next().filter(|_| chars.next().is_none())
+}
+
+fn separator(text: &str) -> Option<char> {
+    match text {
+        "tab" | "\\t" => Some('\t'),
+        "blank" => Some(' '),
+        text => one_char(text).filter(char::is_ascii),
+    }
+}
+
+fn encoding(text: &str) -> Option<Encoding> {
+    match text.to_ascii_lowercase().as_str() {
+        "utf-8" | "utf8" => Some(Encoding::Utf8),
+        "latin-1" | "latin1" | "iso-8859-1" | "windows-1252" | "cp1252" => Some(Encoding::Latin1),
+        "utf-16le" | "utf-16" => Some(Encoding::Utf16Le),
+        "utf-16be" => Some(Encoding::Utf16Be),
+        _ => None,
+    }
+}
+
+fn date_order(text: &str) -> Option<DateOrder> {
+    match text {
+        "day_first" => Some(DateOrder::DayFirst),
+        "month_first" => Some(DateOrder::MonthFirst),
+        "year_first" => Some(DateOrder::YearFirst),
+        _ => None,
+    }
+}
+
+impl LogOptions {
+    /// Sets one key.
+    ///
+    /// # Errors
+    /// [`OptionError`] for a key that does not exist and for a value that is none of its.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<(), OptionError> {
+        let row = OPTION_KEYS.iter().find(|row| row.name == key);
+        let row = row.ok_or_else(|| OptionError::Key { key: key.to_owned() })?;
+        (row.set)(self, value).ok_or_else(|| OptionError::Value {
+            key: row.name,
+            value: value.to_owned(),
+            example: row.example,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_example_is_a_value_of_its_key_and_nonsense_is_none() {
+        for key in OPTION_KEYS {
+            LogOptions::default().set(key.name, key.example).unwrap();
+        }
+        for (key, value) in
+            [("separator", "ab"), ("decimal", ";"), ("rate", "0 Hz"), ("names_row", "0"), ("x", "1")]
+        {
+            assert!(LogOptions::default().set(key, value).is_err(), "{key}: {value}");
+        }
+    }
+}

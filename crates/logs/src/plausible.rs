@@ -1,0 +1,85 @@
+//! What the channels of a turbocharger read, wide enough for any of them: a wrong unit shows before anything is computed.
+
+use crate::units::{kind_of, unit};
+use mapper_core::Channel;
+use mapper_yaml::units::{Kind, Unit};
+
+/// The range in which readings of a channel lie while the machine runs, in the unit used inside.
+///
+/// From a car's turbocharger (wheels of 30 mm) to a ship's (of 300 mm). The lower end is what a machine reaches that
+/// runs at all: at rest speed and flow are 0.
+pub fn running_range(channel: Channel) -> (f64, f64) {
+    match channel {
+        Channel::ShaftSpeed => (2e3, 4e5),
+        Channel::CompressorFlow | Channel::TurbineFlow => (5e-4, 20.0),
+        // From a throttled inlet at altitude to the outlet of a stage before it.
+        Channel::P1 => (3e4, 6e5),
+        Channel::P2 => (5e4, 2e6),
+        Channel::P3 | Channel::P4 | Channel::P3Command => (5e4, 2e6),
+        Channel::T1 | Channel::TAmb => (220.0, 390.0),
+        Channel::T2 => (220.0, 700.0),
+        Channel::Tc => (220.0, 800.0),
+        Channel::T3 | Channel::T4 | Channel::Tt | Channel::T3Command => (220.0, 1500.0),
+        Channel::TOil | Channel::TOilCommand => (220.0, 480.0),
+        Channel::ValveCommand => (0.0, 10.0),
+    }
+}
+
+/// Range of an ambient pressure, Pa.
+pub const AMBIENT_PA: (f64, f64) = (5e4, 1.1e5);
+
+/// Whether readings whose course lies between `low` and `high` (without its outermost twentieths) can be those of a channel.
+pub fn fits(channel: Channel, low: f64, high: f64) -> bool {
+    let (least, most) = running_range(channel);
+    match kind_of(channel) {
+        // 0 at rest, but not all the time; a channel that is 0 throughout is dead, which is not a matter of units.
+        Kind::Speed | Kind::MassFlow => high <= most && (high >= least || high == 0.0 && low == 0.0),
+        _ => low >= least && high <= most,
+    }
+}
+
+/// Units in which values of this course would be plausible.
+pub fn fitting_units(channel: Channel, low: f64, high: f64) -> Vec<&'static Unit> {
+    let kind = kind_of(channel);
+    let rare = |unit: &&Unit| !["degF", "degR", "lb/s", "atm", "rad/s", "ppm"].contains(&unit.symbol());
+    let fitting = |unit: &&'static Unit| fits(channel, unit.to_inside(low), unit.to_inside(high));
+    let bare = unit(kind, "1").ok();
+    kind.units().iter().chain(bare).filter(rare).filter(fitting).collect()
+}
+
+/// Whether absolute pressures of this course (Pa) look like readings over the ambient pressure: too low for absolute ones,
+/// and plausible once it is added.
+pub fn looks_like_gauge(channel: Channel, low_pa: f64, high_pa: f64) -> bool {
+    const AMBIENT: f64 = 1e5;
+    kind_of(channel) == Kind::Pressure
+        && !fits(channel, low_pa, high_pa)
+        && fits(channel, low_pa + AMBIENT, high_pa + AMBIENT)
+        && low_pa > -0.7 * AMBIENT
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_usual_mistakes_of_units_show() {
+        // A car's compressor at 40 kg/h to 1100 kg/h taken for g/s and for kg/s.
+        assert!(fits(Channel::CompressorFlow, 0.011, 0.31));
+        assert!(!fits(Channel::CompressorFlow, 40.0, 1100.0));
+        let symbols: Vec<_> =
+            fitting_units(Channel::CompressorFlow, 40.0, 1100.0).iter().map(|unit| unit.symbol()).collect();
+        assert!(symbols.contains(&"kg/h") && !symbols.contains(&"kg/s"), "{symbols:?}");
+        // degC taken for K, K for degC, rpm in thousands.
+        assert!(!fits(Channel::T1, 19.0, 25.0) && !fits(Channel::T1, 565.0, 573.0));
+        assert!(!fits(Channel::ShaftSpeed, 50.0, 150.0) && fits(Channel::ShaftSpeed, 0.0, 1.5e5));
+        // A dead channel is not a matter of units.
+        assert!(fits(Channel::ShaftSpeed, 0.0, 0.0));
+    }
+
+    #[test]
+    fn gauge_pressures_show_at_the_inlet() {
+        assert!(looks_like_gauge(Channel::P1, -4e3, 400.0));
+        assert!(!looks_like_gauge(Channel::P1, 9.7e4, 1.01e5));
+        assert!(looks_like_gauge(Channel::P2, 9e3, 1.4e5));
+    }
+}

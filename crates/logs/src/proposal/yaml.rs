@@ -1,0 +1,103 @@
+//! A proposal as the text of a channel map.
+
+use super::{Ambient, Certainty, Proposal, ProposedChannel};
+use crate::Layout;
+use std::fmt::Write;
+
+/// The text of a channel map: what is sure and what is likely as entries, what is not as comments. `options` are the keys and
+/// values with which the log was read.
+pub fn channel_map_text(
+    name: &str,
+    layout: &Layout,
+    proposal: &Proposal,
+    options: &[(String, String)],
+) -> String {
+    let mut text = format!(
+        "# Channel map of {}, proposed by `mapper log inspect`. Lines that end in a remark had to be guessed:\n\
+         # look at them. Lines that are comments are doubtful and count only without the `#`.\nchannels:\n",
+        name.replace(['\n', '\r'], " ")
+    );
+    let kept = |proposed: &&ProposedChannel| proposed.certainty > Certainty::Unsure;
+    if !proposal.channels.iter().any(|proposed| kept(&proposed)) {
+        text.push_str(
+            "  # nothing was recognised; write e.g.\n  # T2: {field: \"name of the column\", unit: degC}\n",
+        );
+    }
+    for proposed in &proposal.channels {
+        let mut line = format!("{}: {}", proposed.channel.symbol(), source(layout, proposed));
+        if !proposed.remarks.is_empty() {
+            let remarks = proposed.remarks.join("; ").replace(['\n', '\r'], " ");
+            let _ = write!(line, "  # {remarks}");
+        }
+        let _ = writeln!(text, "  {}{line}", if kept(&proposed) { "" } else { "# " });
+    }
+    match &proposal.ambient {
+        None => {}
+        Some(Ambient::Column { column, unit }) => {
+            let _ = writeln!(
+                text,
+                "\n# What gauge pressures are added to.\nambient_pressure: {{{}, unit: {unit}}}",
+                place(layout, *column)
+            );
+        }
+        Some(Ambient::Assumed) => {
+            text.push_str(
+                "\n# What gauge pressures are added to. The log does not hold it: write what the barometer read.\n\
+                 ambient_pressure: 101.3 kPa\n",
+            );
+        }
+    }
+    if !options.is_empty() {
+        text.push_str("\n# How the log is to be read.\nlog:\n");
+        for (key, value) in options {
+            let _ = writeln!(text, "  {key}: {}", quoted(value));
+        }
+    }
+    text
+}
+
+fn source(layout: &Layout, proposed: &ProposedChannel) -> String {
+    let mut text = format!("{{{}", place(layout, proposed.column));
+    if let Some(unit) = proposed.unit {
+        let _ = write!(text, ", unit: {}", scalar(unit));
+    }
+    if proposed.gauge {
+        text.push_str(", gauge: true");
+    }
+    text.push('}');
+    text
+}
+
+/// Topic, where there are several groups, and field.
+fn place(layout: &Layout, column: usize) -> String {
+    let Some(column) = layout.columns.get(column) else { return String::new() };
+    let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
+    let topic = if group.is_empty() { String::new() } else { format!("topic: {}, ", scalar(group)) };
+    format!("{topic}field: {}", scalar(&column.name))
+}
+
+/// A text that needs no quotes where it is a plain word, and one with them else.
+fn scalar(text: &str) -> String {
+    const WORDS: [&str; 9] = ["y", "n", "yes", "no", "on", "off", "true", "false", "null"];
+    let mut letters = text.chars();
+    let plain = letters.next().is_some_and(|first| first.is_ascii_alphabetic())
+        && letters.all(|letter| letter.is_ascii_alphanumeric() || ['_', '/', '.', '^'].contains(&letter))
+        && !WORDS.contains(&text.to_lowercase().as_str());
+    if plain { text.to_owned() } else { quoted(text) }
+}
+
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for letter in text.chars() {
+        match letter {
+            '"' | '\\' => quoted.extend(['\\', letter]),
+            '\t' => quoted.push_str("\\t"),
+            letter if letter.is_control() => {
+                let _ = write!(quoted, "\\x{:02x}", u32::from(letter).min(255));
+            }
+            letter => quoted.push(letter),
+        }
+    }
+    quoted.push('"');
+    quoted
+}

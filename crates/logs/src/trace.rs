@@ -1,0 +1,63 @@
+//! A long series in a bounded number of means.
+
+/// Most means that are kept; a power of two.
+const BIN_LIMIT: usize = 512;
+
+/// Means over equal numbers of rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    bins: Vec<(f64, u32)>,
+    rows_per_bin: u64,
+    rows: u64,
+}
+
+impl Default for Trace {
+    fn default() -> Self {
+        Trace { bins: Vec::new(), rows_per_bin: 1, rows: 0 }
+    }
+}
+
+impl Trace {
+    /// Adds the next row; NaN counts as a row without a value.
+    pub fn push(&mut self, value: f64) {
+        let bin = usize::try_from(self.rows / self.rows_per_bin).unwrap_or(BIN_LIMIT);
+        if bin >= BIN_LIMIT {
+            self.bins = self
+                .bins
+                .chunks(2)
+                .map(|pair| pair.iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1)))
+                .collect();
+            self.rows_per_bin *= 2;
+            return self.push(value);
+        }
+        if bin == self.bins.len() {
+            self.bins.push((0.0, 0));
+        }
+        if let Some(bin) = self.bins.get_mut(bin).filter(|_| value.is_finite()) {
+            bin.0 += value;
+            bin.1 += 1;
+        }
+        self.rows += 1;
+    }
+
+    /// The means, in order; NaN where there was no value.
+    pub fn means(&self) -> Vec<f64> {
+        self.bins.iter().map(|(sum, count)| sum / f64::from(*count)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_ramp_keeps_its_shape_in_few_means() {
+        let mut trace = Trace::default();
+        (0..100_000).for_each(|row| trace.push(f64::from(row)));
+        let means = trace.means();
+        assert!((BIN_LIMIT / 4..=BIN_LIMIT).contains(&means.len()), "{}", means.len());
+        assert!(means.is_sorted());
+        let whole: f64 = means.iter().take(means.len() - 1).sum::<f64>() / (means.len() - 1) as f64;
+        assert!((whole / 50_000.0 - 1.0).abs() < 0.02, "{whole}");
+    }
+}

@@ -1,0 +1,145 @@
+//! Means of a fast log at the rate that identification uses.
+
+/// Rate of the means, Hz: that of this program's own recordings. Identification works with transients of seconds.
+const RATE_HZ: f64 = 10.0;
+
+/// A group is left as it is up to this rate, Hz: blocks would hold one sample, or now one and now two.
+const LEFT_ALONE_HZ: f64 = 15.0;
+
+/// Rows from which the rate is taken.
+const LOOKED_AT: usize = 256;
+
+/// The rows of one group, averaged where they come fast.
+#[derive(Debug, Default)]
+pub(crate) struct Blocks {
+    /// Rows from which the rate is found.
+    first: Vec<(f64, Vec<f64>)>,
+    state: State,
+}
+
+#[derive(Debug, Default)]
+enum State {
+    #[default]
+    Looking,
+    AsItIs,
+    Averaging(Block),
+}
+
+#[derive(Debug, Default)]
+struct Block {
+    number: i64,
+    rows: f64,
+    time_sum_s: f64,
+    sums: Vec<(f64, f64)>,
+}
+
+/// Takes time and values; NaN where there is none.
+pub(crate) type TakeRow<'a> = dyn FnMut(f64, &[f64]) + 'a;
+
+impl Blocks {
+    pub(crate) fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
+        match &mut self.state {
+            State::AsItIs => take(t_s, values),
+            State::Averaging(block) => block.push(t_s, values, take),
+            State::Looking => {
+                self.first.push((t_s, values.to_owned()));
+                if self.first.len() >= LOOKED_AT {
+                    self.decide(take);
+                }
+            }
+        }
+    }
+
+    /// Gives what is left.
+    pub(crate) fn finish(&mut self, take: &mut TakeRow<'_>) {
+        if matches!(self.state, State::Looking) {
+            self.decide(take);
+        }
+        if let State::Averaging(block) = &mut self.state {
+            block.flush(take);
+        }
+    }
+
+    /// Whether means are taken.
+    pub(crate) fn averages(&self) -> bool {
+        matches!(self.state, State::Averaging(_))
+    }
+
+    fn decide(&mut self, take: &mut TakeRow<'_>) {
+        let mut intervals_s: Vec<f64> =
+            self.first.windows(2).map(|pair| pair[1].0 - pair[0].0).filter(|step| *step > 0.0).collect();
+        intervals_s.sort_by(f64::total_cmp);
+        let typical_s = intervals_s.get(intervals_s.len() / 2).copied().unwrap_or(f64::INFINITY);
+        let fast = typical_s * LEFT_ALONE_HZ < 1.0;
+        self.state = if fast { State::Averaging(Block::default()) } else { State::AsItIs };
+        for (t_s, values) in std::mem::take(&mut self.first) {
+            self.push(t_s, &values, take);
+        }
+    }
+}
+
+impl Block {
+    fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
+        // A sample on a border belongs behind it, whatever the last digit of its time.
+        let number = (t_s * RATE_HZ + 1e-6).floor() as i64;
+        if number != self.number {
+            self.flush(take);
+            self.number = number;
+        }
+        self.rows += 1.0;
+        self.time_sum_s += t_s;
+        self.sums.resize(values.len(), (0.0, 0.0));
+        for (sum, value) in self.sums.iter_mut().zip(values).filter(|(_, value)| value.is_finite()) {
+            sum.0 += value;
+            sum.1 += 1.0;
+        }
+    }
+
+    fn flush(&mut self, take: &mut TakeRow<'_>) {
+        if self.rows > 0.0 {
+            let means: Vec<f64> = self.sums.iter().map(|(sum, count)| sum / count).collect();
+            take(self.time_sum_s / self.rows, &means);
+        }
+        *self = Block { number: self.number, ..Block::default() };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn through(rate_hz: f64, rows: usize) -> Vec<(f64, Vec<f64>)> {
+        let (mut blocks, mut out) = (Blocks::default(), Vec::new());
+        let mut take = |t_s: f64, values: &[f64]| out.push((t_s, values.to_owned()));
+        for row in 0..rows {
+            let t_s = row as f64 / rate_hz;
+            let slow = if row % 2 == 0 { 1.0 } else { f64::NAN };
+            blocks.push(t_s, &[5.0 * t_s, slow], &mut take);
+        }
+        blocks.finish(&mut take);
+        out
+    }
+
+    #[test]
+    fn a_fast_log_comes_at_ten_hertz_with_the_means_of_times_and_values() {
+        let out = through(100.0, 1000);
+        assert_eq!(out.len(), 100);
+        for (index, (t_s, values)) in out.iter().enumerate() {
+            // Ten samples from 0.1 i to 0.1 i + 0.09 s have their mean in the middle; a ramp stays one.
+            assert!((t_s - (0.1 * index as f64 + 0.045)).abs() < 1e-9, "{t_s}");
+            assert!((values[0] - 5.0 * t_s).abs() < 1e-9 && values[1] == 1.0);
+        }
+    }
+
+    #[test]
+    fn a_slow_log_stays_as_it_is() {
+        let out = through(10.0, 300);
+        assert_eq!(out.len(), 300);
+        assert!(
+            out.iter()
+                .enumerate()
+                .all(|(row, (t_s, values))| *t_s == row as f64 / 10.0 && values[0] == 5.0 * t_s)
+        );
+        assert_eq!(through(10.0, 3).len(), 3);
+    }
+}

@@ -1,0 +1,277 @@
+//! Reading a log of another program by a channel map.
+
+use crate::complaints::Complaints;
+use crate::definitions::Reads;
+use crate::log_blocks::Blocks;
+use crate::series_builder::SeriesBuilder;
+use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, ReadWarning, RecordError};
+use mapper_core::Channel;
+use mapper_logs::units::{kind_of, remedy, unit};
+use mapper_logs::{Kind, Layout, LogFile, Reference, Row, Unit, header_unit};
+use mapper_yaml::{FindingKind, Step, closest, steps};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Time 0 of a log on the clock of [`SeriesBuilder`]: logs may begin before it.
+const ZERO_NS: u64 = 1 << 62;
+
+/// Times beyond this are no times, s: a century, within what the clock holds.
+const LONGEST_S: f64 = 3.2e9;
+
+/// What was read of a log.
+#[derive(Debug, Default)]
+pub(crate) struct ReadLog {
+    pub(crate) builders: BTreeMap<Reads, SeriesBuilder>,
+    /// Ambient pressure, Pa.
+    pub(crate) ambient: Option<SeriesBuilder>,
+    pub(crate) units: BTreeMap<Reads, &'static Unit>,
+    pub(crate) zero_ns: u64,
+    /// Time 0 in nanoseconds since 1970, where the log says it.
+    pub(crate) start_time_ns: Option<u64>,
+    pub(crate) warnings: Vec<ReadWarning>,
+    pub(crate) averaged: bool,
+    pub(crate) full: bool,
+}
+
+/// What a wanted column is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Target {
+    Reads(Reads),
+    Ambient,
+}
+
+struct Wanted {
+    target: Target,
+    column: usize,
+    unit: &'static Unit,
+}
+
+/// Reads the mapped columns.
+pub(crate) fn read_log(
+    file: &LogFile,
+    map: &ChannelMap,
+    options: &ReadOptions,
+) -> Result<ReadLog, RecordError> {
+    let (_, mut log) = options.logs.open(file, &map.log)?;
+    let layout = log.layout().clone();
+    let wanted = wanted(map, &layout)?;
+    // Each column once, in the order of the layout: several channels may read one.
+    let mut columns: Vec<usize> = wanted.iter().map(|wanted| wanted.column).collect();
+    columns.sort_unstable();
+    columns.dedup();
+    let of_group = |group: usize| -> Vec<usize> {
+        columns
+            .iter()
+            .copied()
+            .filter(|column| layout.columns.get(*column).is_some_and(|c| c.group == group))
+            .collect()
+    };
+    let members: Vec<Vec<usize>> = (0..layout.groups.len()).map(of_group).collect();
+    // Place of each wanted column among the values of its group.
+    let places: Vec<Vec<(usize, Target, &'static Unit)>> = members
+        .iter()
+        .map(|members| {
+            let place = |wanted: &Wanted| {
+                let at = members.iter().position(|column| *column == wanted.column)?;
+                Some((at, wanted.target, wanted.unit))
+            };
+            wanted.iter().filter_map(place).collect()
+        })
+        .collect();
+    let mut read = ReadLog {
+        zero_ns: ZERO_NS,
+        start_time_ns: layout.start_time_ns,
+        warnings: contradictions(map, &layout, &wanted),
+        units: wanted
+            .iter()
+            .filter_map(|wanted| match wanted.target {
+                Target::Reads(reads) => Some((reads, wanted.unit)),
+                Target::Ambient => None,
+            })
+            .collect(),
+        ..ReadLog::default()
+    };
+    let mut blocks: Vec<Blocks> = members.iter().map(|_| Blocks::default()).collect();
+    let mut rows = 0u64;
+    let mut take_row = |row: Row<'_>| {
+        rows += 1;
+        let usable = row.t_s.is_finite() && row.t_s.abs() < LONGEST_S && rows <= options.max_messages;
+        if let (Some(blocks), Some(places), true) = (blocks.get_mut(row.group), places.get(row.group), usable)
+        {
+            blocks.push(row.t_s, row.values, &mut |t_s, values| read.take(places, t_s, values));
+        }
+        Ok(())
+    };
+    log.rows(&columns, &mut take_row)?;
+    for (blocks, places) in blocks.iter_mut().zip(&places) {
+        blocks.finish(&mut |t_s, values| read.take(places, t_s, values));
+        read.averaged |= blocks.averages();
+    }
+    read.full = rows > options.max_messages;
+    Ok(read)
+}
+
+impl ReadLog {
+    fn take(&mut self, places: &[(usize, Target, &'static Unit)], t_s: f64, values: &[f64]) {
+        let time_ns = ZERO_NS.saturating_add_signed((t_s * 1e9).round() as i64);
+        for (at, target, unit) in places {
+            // An empty cell is no sample: slow columns share rows with fast ones.
+            let Some(value) = values.get(*at).copied().filter(|value| value.is_finite()) else { continue };
+            let builder = match target {
+                Target::Reads(reads) => self.builders.entry(*reads).or_default(),
+                Target::Ambient => self.ambient.get_or_insert_default(),
+            };
+            builder.push(time_ns, unit.to_inside(value));
+        }
+    }
+}
+
+/// The columns that the map names, with their units; or all mistakes of the map for this log.
+fn wanted(map: &ChannelMap, layout: &Layout) -> Result<Vec<Wanted>, RecordError> {
+    let mut complaints = Complaints::default();
+    let mut list = Vec::new();
+    let channels = map.channels.iter().map(|(channel, source)| (Reads::Channel(*channel), source));
+    let elements = map.elements.iter().map(|(element, source)| (Reads::Element(*element), source));
+    for (reads, source) in channels.chain(elements) {
+        let channel = reads.channel();
+        let at = |key: &str| steps!["channels", channel.symbol(), key].to_vec();
+        let found = column_of(layout, source, &at, &mut complaints).and_then(|column| {
+            Some((column, unit_of(layout, column, source, Some(channel), &at, &mut complaints)?))
+        });
+        list.extend(found.map(|(column, unit)| Wanted { target: Target::Reads(reads), column, unit }));
+    }
+    if let Some(AmbientPressure::Source(source)) = &map.ambient_pressure {
+        let at = |key: &str| steps!["ambient_pressure", key].to_vec();
+        let found = column_of(layout, source, &at, &mut complaints)
+            .and_then(|column| Some((column, unit_of(layout, column, source, None, &at, &mut complaints)?)));
+        list.extend(found.map(|(column, unit)| Wanted { target: Target::Ambient, column, unit }));
+    }
+    complaints.result(map)?;
+    Ok(list)
+}
+
+/// Where the map and the log disagree about a unit.
+fn contradictions(map: &ChannelMap, layout: &Layout, wanted: &[Wanted]) -> Vec<ReadWarning> {
+    let contradiction = |wanted: &Wanted| {
+        let Target::Reads(reads) = wanted.target else { return None };
+        let recorded = layout.columns.get(wanted.column)?.unit.clone()?;
+        let known = header_unit(&recorded);
+        let agrees = known.is_some_and(|known| known.unit.converts_like(wanted.unit));
+        let mapped = map.source(reads)?.unit.clone()?;
+        (!agrees).then(|| ReadWarning::UnitContradiction { channel: reads.channel(), mapped, recorded })
+    };
+    wanted.iter().filter_map(contradiction).collect()
+}
+
+fn column_of(
+    layout: &Layout,
+    source: &ChannelSource,
+    at: &dyn Fn(&str) -> Vec<Step>,
+    complaints: &mut Complaints,
+) -> Option<usize> {
+    let columns = layout.find(&source.topic, &source.field);
+    if let [column] = columns.as_slice() {
+        return Some(*column);
+    }
+    if !source.topic.is_empty() && !layout.groups.iter().any(|group| group.name == source.topic) {
+        let names: Vec<&str> =
+            layout.groups.iter().map(|group| group.name.as_str()).filter(|name| !name.is_empty()).collect();
+        let remedy = if names.is_empty() {
+            "the log has one group without a name: leave `topic` out".to_owned()
+        } else {
+            format!("its groups are {}", names.join(", "))
+        };
+        complaints.add(
+            FindingKind::WrongValue,
+            &at("topic"),
+            format!("the log has no group `{}`", source.topic),
+            remedy,
+        );
+        return None;
+    }
+    let message;
+    let remedy;
+    if columns.is_empty() {
+        let names: Vec<&str> = layout.columns.iter().map(|column| column.name.as_str()).collect();
+        message = format!("the log has no column `{}`", source.field);
+        let guess = closest(&source.field, &names).map(|name| format!("did you mean `{name}`? "));
+        let shown: Vec<&str> = names.iter().copied().take(30).collect();
+        let more = if names.len() > shown.len() {
+            format!(" and {} more", names.len() - shown.len())
+        } else {
+            String::new()
+        };
+        remedy = format!("{}its columns are {}{more}", guess.unwrap_or_default(), shown.join(", "));
+    } else {
+        let groups: Vec<&str> = columns
+            .iter()
+            .filter_map(|column| layout.groups.get(layout.columns.get(*column)?.group))
+            .map(|group| group.name.as_str())
+            .collect();
+        message = format!("the log has `{}` in several groups", source.field);
+        remedy = format!("name one with `topic`: {}", groups.join(", "));
+    }
+    complaints.add(FindingKind::WrongValue, &at("field"), message, remedy);
+    None
+}
+
+/// The unit of the map, or else that of the log. `channel` is `None` for the ambient pressure.
+fn unit_of(
+    layout: &Layout,
+    column: usize,
+    source: &ChannelSource,
+    channel: Option<Channel>,
+    at: &dyn Fn(&str) -> Vec<Step>,
+    complaints: &mut Complaints,
+) -> Option<&'static Unit> {
+    let kind = channel.map_or(Kind::Pressure, kind_of);
+    // What the map has was checked when it was read.
+    if let Some(written) = &source.unit {
+        return unit(kind, written).ok();
+    }
+    let name = channel.map_or("the ambient pressure", Channel::symbol);
+    let Some(recorded) = layout.columns.get(column).and_then(|column| column.unit.as_deref()) else {
+        let message = format!("neither the channel map nor the log gives the unit of {name}");
+        let example = channel.map_or("kPa", |channel| channel.unit());
+        complaints.add(FindingKind::Unit, &at("field"), message, format!("add e.g. `unit: {example}`"));
+        return None;
+    };
+    let known = header_unit(recorded);
+    match known.filter(|known| known.kind == kind) {
+        Some(known) if known.reference == Reference::Gauge && !source.gauge => {
+            let message = format!("the log gives {name} in {recorded}, a pressure over the ambient pressure");
+            let remedy = "write `gauge: true`, and `ambient_pressure`".to_owned();
+            complaints.add(FindingKind::Unit, &at("field"), message, remedy);
+            None
+        }
+        Some(known) => Some(known.unit),
+        None => match unit(kind, recorded) {
+            Ok(unit) => Some(unit),
+            Err(error) => {
+                let message =
+                    format!("the log gives {name} in `{recorded}`, which is not a unit of {}", kind.name());
+                complaints.add(
+                    FindingKind::Unit,
+                    &at("field"),
+                    message,
+                    format!("{}; write `unit`", remedy(kind, &error)),
+                );
+                None
+            }
+        },
+    }
+}
+
+/// Whether a file that starts with these bytes is MCAP, or too short to be anything else.
+pub(crate) fn is_mcap(head: &[u8]) -> bool {
+    head.starts_with(b"\x89MCAP") || head.len() < 5 && b"\x89MCAP".starts_with(head)
+}
+
+/// The file as a log, where it is no MCAP and there are formats to ask.
+pub(crate) fn log_of_path(path: &Path, options: &ReadOptions) -> Result<Option<LogFile>, RecordError> {
+    if options.logs.0.is_empty() {
+        return Ok(None);
+    }
+    let file = LogFile::of_path(path);
+    Ok((!is_mcap(&file.head(8)?)).then_some(file))
+}

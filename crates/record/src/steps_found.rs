@@ -1,0 +1,309 @@
+//! The steps of a recording that has neither marks nor commands: where speed, flow and pressures jump.
+
+use crate::ReadWarning;
+use mapper_core::{Channel, Series, StepKind, StepMarker};
+use std::collections::BTreeMap;
+
+/// Channels that jump with the points of a map, each with the share of itself by which it moves at least. Temperatures follow
+/// for minutes, and say nothing about the beginning.
+const SIGNALS: [(Channel, f64); 4] = [
+    (Channel::ShaftSpeed, 0.01),
+    (Channel::CompressorFlow, 0.02),
+    (Channel::P3, 0.015),
+    (Channel::P2, 0.015),
+];
+
+/// Time over which means are compared before and after, s.
+const WINDOW_S: f64 = 3.0;
+
+/// The later mean begins this long after the earlier one ends, s: a jump is over by then, a drift has hardly begun.
+const APART_S: f64 = 2.0;
+
+/// Shortest interval of the grid on which jumps are sought, s.
+const GRID_S: f64 = 0.2;
+
+/// Most places of that grid: a day at its shortest interval.
+const GRID_LIMIT: f64 = 5e5;
+
+/// Multiple of the noise of a mean over the grid's interval that a jump must exceed.
+const NOISE_MULTIPLE: f64 = 6.0;
+
+/// Share of a jump that has happened where it counts as begun.
+const BEGUN_SHARE: f64 = 0.1;
+
+/// Share of the least jump per window below which a signal counts as calm again.
+const CALM_SHARE: f64 = 0.3;
+
+/// Shaft speed below which the machine is at rest, rpm: far below any idle, far above any sensor's noise.
+const AT_REST_RPM: f64 = 1000.0;
+
+/// Whether there is anything that jumps.
+pub(crate) fn can_be_searched(series: &BTreeMap<Channel, Series>) -> bool {
+    SIGNALS.iter().any(|(channel, _)| series.get(channel).is_some_and(|series| series.t_s.len() > 30))
+}
+
+/// Steps from jump to jump. What was held before the first jump is the first step.
+pub(crate) fn steps_from_jumps(
+    series: &BTreeMap<Channel, Series>,
+    warnings: &mut Vec<ReadWarning>,
+) -> Vec<StepMarker> {
+    let grid = Grid::of(series);
+    let (Some(first_s), Some(last_s)) = (grid.t_s.first().copied(), grid.t_s.last().copied()) else {
+        return Vec::new();
+    };
+    let starts_s: Vec<f64> = std::iter::once(first_s).chain(grid.jumps_s()).collect();
+    let ends_s = starts_s.iter().skip(1).map(|next_s| next_s - grid.interval_s).chain([last_s]);
+    let p3 = series.get(&Channel::P3);
+    let steps: Vec<StepMarker> = starts_s
+        .iter()
+        .zip(ends_s)
+        .enumerate()
+        .map(|(index, (start_s, end_s))| StepMarker {
+            index,
+            kind: StepKind::Point,
+            start_s: *start_s,
+            end_s: end_s.max(*start_s),
+            from: None,
+            to: None,
+            p3_pa: p3.map_or(f64::NAN, |p3| median(p3, 0.5 * (start_s + end_s), end_s)),
+            valve_opening_ratio: f64::NAN,
+        })
+        .collect();
+    let channels: Vec<&str> = grid.signals.iter().map(|signal| signal.channel.symbol()).collect();
+    let turning = without_rest(steps.clone(), series).len();
+    warnings.push(ReadWarning::StepsFound { count: turning, channels: channels.join(", ") });
+    steps
+}
+
+/// Leaves out the steps in which the shaft rests: a soak before the first point, the end of a run. They are counted anew.
+pub(crate) fn without_rest(steps: Vec<StepMarker>, series: &BTreeMap<Channel, Series>) -> Vec<StepMarker> {
+    let Some(speed) = series.get(&Channel::ShaftSpeed) else { return steps };
+    let rests = |step: &StepMarker| median(speed, step.start_s, step.end_s) < AT_REST_RPM;
+    if steps.iter().all(rests) {
+        // A dead sensor, or a file without a run: nothing to judge by.
+        return steps;
+    }
+    let turning = steps.into_iter().filter(|step| !rests(step));
+    turning.enumerate().map(|(index, step)| StepMarker { index, ..step }).collect()
+}
+
+/// NaN where there are no readings.
+fn median(series: &Series, start_s: f64, end_s: f64) -> f64 {
+    let mut values: Vec<f64> =
+        series.slice(start_s, end_s).1.iter().copied().filter(|value| value.is_finite()).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Means of the signals over equal intervals; intervals without any are left out, so that a jump in a gap shows behind it.
+struct Grid {
+    interval_s: f64,
+    t_s: Vec<f64>,
+    signals: Vec<Signal>,
+}
+
+struct Signal {
+    channel: Channel,
+    values: Vec<f64>,
+    /// Sums of the values before each place.
+    sums: Vec<f64>,
+    /// Noise of a value.
+    sigma: f64,
+    least_ratio: f64,
+    /// Level below which a share of it means nothing.
+    floor: f64,
+}
+
+impl Grid {
+    fn of(series: &BTreeMap<Channel, Series>) -> Grid {
+        let found: Vec<(Channel, f64, &Series)> = SIGNALS
+            .iter()
+            .filter_map(|(channel, ratio)| {
+                Some((*channel, *ratio, series.get(channel).filter(|s| s.t_s.len() > 30)?))
+            })
+            .collect();
+        let typical_s = |series: &Series| {
+            let mut steps: Vec<f64> =
+                series.t_s.windows(2).take(4096).map(|pair| pair[1] - pair[0]).collect();
+            steps.sort_unstable_by(f64::total_cmp);
+            steps.get(steps.len() / 2).copied().unwrap_or(GRID_S)
+        };
+        let first_s = found.iter().filter_map(|(.., s)| s.t_s.first().copied()).fold(f64::INFINITY, f64::min);
+        let last_s =
+            found.iter().filter_map(|(.., s)| s.t_s.last().copied()).fold(f64::NEG_INFINITY, f64::max);
+        let slowest_s = found.iter().map(|(.., s)| typical_s(s)).fold(GRID_S, f64::max);
+        let interval_s = slowest_s.max((last_s - first_s) / GRID_LIMIT);
+        let mut bins: BTreeMap<i64, Vec<(f64, f64)>> = BTreeMap::new();
+        for (index, (.., series)) in found.iter().enumerate() {
+            for (t_s, value) in series.t_s.iter().zip(&series.values).filter(|(_, value)| value.is_finite()) {
+                let bin = bins
+                    .entry(((t_s - first_s) / interval_s) as i64)
+                    .or_insert_with(|| vec![(0.0, 0.0); found.len()]);
+                if let Some(bin) = bin.get_mut(index) {
+                    bin.0 += value;
+                    bin.1 += 1.0;
+                }
+            }
+        }
+        let t_s: Vec<f64> = bins.keys().map(|bin| first_s + *bin as f64 * interval_s).collect();
+        let signals = found.iter().enumerate().map(|(index, (channel, ratio, _))| {
+            let mut held = f64::NAN;
+            let mut values: Vec<f64> = Vec::with_capacity(bins.len());
+            for bin in bins.values() {
+                let (sum, count) = bin.get(index).copied().unwrap_or_default();
+                held = if count > 0.0 { sum / count } else { held };
+                values.push(held);
+            }
+            // Before its first reading a signal stands where it begins.
+            let first = values.iter().copied().find(|value| value.is_finite()).unwrap_or(0.0);
+            values.iter_mut().take_while(|value| !value.is_finite()).for_each(|value| *value = first);
+            Signal::of(*channel, *ratio, values)
+        });
+        let signals = signals.collect();
+        Grid { interval_s, t_s, signals }
+    }
+
+    /// Places of a time, at least two.
+    fn places(&self, time_s: f64) -> usize {
+        ((time_s / self.interval_s).round() as usize).max(2)
+    }
+
+    /// Beginning of each jump, s.
+    fn jumps_s(&self) -> Vec<f64> {
+        let (window, apart) = (self.places(WINDOW_S), self.places(APART_S));
+        let mut jumps_s = Vec::new();
+        let mut at = window;
+        while at + apart + window <= self.t_s.len() {
+            let jumped = |signal: &&Signal| {
+                let (before, after) =
+                    (signal.mean(at - window, at), signal.mean(at + apart, at + apart + window));
+                (after - before).abs() > signal.least(before, after)
+            };
+            let moved: Vec<&Signal> = self.signals.iter().filter(jumped).collect();
+            if moved.is_empty() {
+                at += 1;
+                continue;
+            }
+            let end = (at + apart + window).min(self.t_s.len() - 1);
+            let begun = |place: &usize| {
+                moved.iter().any(|signal| signal.has_begun(*place, at - window, at, at + apart, window))
+            };
+            let start = (at..end).find(begun).unwrap_or(at);
+            jumps_s.extend(self.t_s.get(start));
+            at = start + window;
+            // The rest of a slow jump is no other one.
+            while at + window <= self.t_s.len()
+                && !self.signals.iter().all(|signal| signal.is_calm(at - window, at, window))
+            {
+                at += 1;
+            }
+        }
+        jumps_s
+    }
+}
+
+impl Signal {
+    fn of(channel: Channel, least_ratio: f64, values: Vec<f64>) -> Signal {
+        let sums = std::iter::once(0.0)
+            .chain(values.iter().scan(0.0, |sum, value| {
+                *sum += value;
+                Some(*sum)
+            }))
+            .collect();
+        let mut steps: Vec<f64> =
+            values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).collect();
+        steps.sort_unstable_by(f64::total_cmp);
+        // Of a normal distribution the median of the absolute values is 0.6745 standard deviations; a difference has twice the
+        // variance.
+        let sigma = steps.get(steps.len() / 2).copied().unwrap_or(0.0) / 0.6745 / std::f64::consts::SQRT_2;
+        let top = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
+        Signal { channel, values, sums, sigma, least_ratio, floor: 0.1 * top }
+    }
+
+    fn mean(&self, from: usize, to: usize) -> f64 {
+        let sum = |at: usize| self.sums.get(at.min(self.values.len())).copied().unwrap_or(0.0);
+        (sum(to) - sum(from)) / to.saturating_sub(from).max(1) as f64
+    }
+
+    /// The least difference of two means that is a jump.
+    fn least(&self, before: f64, after: f64) -> f64 {
+        (self.least_ratio * before.abs().max(after.abs()).max(self.floor)).max(NOISE_MULTIPLE * self.sigma)
+    }
+
+    /// Whether the jump between two means has begun at a place, and goes on at the next one.
+    fn has_begun(&self, place: usize, from: usize, to: usize, after_from: usize, window: usize) -> bool {
+        let (before, after) = (self.mean(from, to), self.mean(after_from, after_from + window));
+        let jump = after - before;
+        let enough = (BEGUN_SHARE * jump.abs()).max(4.0 * self.sigma).min(0.5 * jump.abs());
+        let off = |place: usize| {
+            self.values.get(place).is_some_and(|value| (value - before) * jump.signum() > enough)
+        };
+        off(place) && (off(place + 1) || place + 1 >= self.values.len())
+    }
+
+    fn is_calm(&self, from: usize, at: usize, window: usize) -> bool {
+        let (before, after) = (self.mean(from, at), self.mean(at, at + window));
+        let calm = CALM_SHARE * self.least_ratio * before.abs().max(after.abs()).max(self.floor);
+        (after - before).abs() <= calm.max(NOISE_MULTIPLE * self.sigma)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A shaft that follows jumps of its drive with a lag of two seconds, at 10 Hz, with noise of a fixed pattern.
+    fn run(jumps: &[(f64, f64)], end_s: f64) -> BTreeMap<Channel, Series> {
+        let (mut speed, mut t_s, mut values) = (jumps[0].1, Vec::new(), Vec::new());
+        for row in 0..(10.0 * end_s) as usize {
+            let t = row as f64 / 10.0;
+            let wanted = jumps.iter().rfind(|(at, _)| *at <= t).map_or(0.0, |(_, rpm)| *rpm);
+            speed += (wanted - speed) * 0.1 / 2.0;
+            t_s.push(t);
+            values.push(speed + 30.0 * (row as f64 * 12.9898).sin());
+        }
+        BTreeMap::from([(Channel::ShaftSpeed, Series { t_s, values })])
+    }
+
+    fn starts(series: &BTreeMap<Channel, Series>) -> Vec<f64> {
+        let steps = without_rest(steps_from_jumps(series, &mut Vec::new()), series);
+        assert!(
+            steps.iter().enumerate().all(|(index, step)| step.index == index && step.end_s > step.start_s)
+        );
+        steps.iter().map(|step| step.start_s).collect()
+    }
+
+    #[test]
+    fn jumps_are_found_within_a_second_and_drifts_are_none() {
+        let jumps = [(0.0, 90e3), (60.0, 120e3), (90.0, 118e3), (150.0, 60e3), (180.0, 150e3)];
+        let found = starts(&run(&jumps, 240.0));
+        assert_eq!(found.len(), jumps.len(), "{found:?}");
+        assert!(found.iter().zip(&jumps).all(|(found, (jump, _))| (found - jump).abs() <= 1.0), "{found:?}");
+        let drift: Vec<(f64, f64)> = (0..240).map(|s| (f64::from(s), 90e3 + 20.0 * f64::from(s))).collect();
+        assert_eq!(starts(&run(&drift, 240.0)), [0.0]);
+    }
+
+    #[test]
+    fn rest_before_and_after_is_no_step() {
+        let found = starts(&run(&[(0.0, 0.0), (1200.0, 80e3), (1320.0, 120e3), (1440.0, 0.0)], 1600.0));
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!((found[0] - 1200.0).abs() <= 1.0 && (found[1] - 1320.0).abs() <= 1.0, "{found:?}");
+    }
+
+    #[test]
+    fn a_jump_in_a_gap_is_found_behind_it() {
+        let mut series = run(&[(0.0, 90e3), (60.0, 120e3)], 120.0);
+        let speed = series.get_mut(&Channel::ShaftSpeed).unwrap();
+        let kept: Vec<(f64, f64)> = speed
+            .t_s
+            .iter()
+            .copied()
+            .zip(speed.values.iter().copied())
+            .filter(|(t, _)| !(50.0..75.0).contains(t))
+            .collect();
+        (speed.t_s, speed.values) = kept.into_iter().unzip();
+        let found = starts(&series);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!((found[1] - 75.0).abs() <= 1.0, "{found:?}");
+    }
+}

@@ -1,0 +1,51 @@
+//! A look into the log of another program.
+
+use crate::{Registry, SessionError};
+use mapper_logs::proposal::{Proposal, channel_map_text, propose};
+use mapper_logs::{Layout, LogFile, LogOptions, Survey, survey};
+use std::path::{Path, PathBuf};
+
+/// What a log holds, and the channel map that it suggests.
+#[derive(Debug)]
+pub struct Inspected {
+    /// The file.
+    pub path: PathBuf,
+    /// Name of its format.
+    pub format: &'static str,
+    /// Groups, columns, and what was found by looking.
+    pub layout: Layout,
+    /// Rates, ranges, gaps.
+    pub survey: Survey,
+    /// The suggestion.
+    pub proposal: Proposal,
+    /// Keys and values with which it was read.
+    pub options: Vec<(String, String)>,
+}
+
+/// Reads a log once and suggests a channel map; `options` are keys and values of how it is to be read.
+///
+/// # Errors
+/// [`SessionError::LogOption`] for a wrong key or value, [`SessionError::Log`] where the file cannot be read as a log.
+pub fn inspect_log(
+    registry: &Registry,
+    path: &Path,
+    options: Vec<(String, String)>,
+) -> Result<Inspected, SessionError> {
+    let mut read_by = LogOptions::default();
+    for (key, value) in &options {
+        read_by.set(key, value)?;
+    }
+    let (format, mut log) = registry.logs.open(&LogFile::of_path(path), &read_by)?;
+    let survey = survey(log.as_mut())?;
+    let layout = log.layout().clone();
+    let proposal = propose(&layout, &survey);
+    Ok(Inspected { path: path.to_owned(), format: format.name, layout, survey, proposal, options })
+}
+
+impl Inspected {
+    /// The suggestion as the text of a channel map.
+    pub fn channel_map(&self) -> String {
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        channel_map_text(&name, &self.layout, &self.proposal, &self.options)
+    }
+}

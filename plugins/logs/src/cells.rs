@@ -1,0 +1,22 @@
+//! One row of a table, whatever it is stored in.
+
+use crate::instant::Instant;
+use mapper_logs::{DateOrder, LogError};
+
+/// The cells of a row.
+pub(crate) trait Cells {
+    /// The number in a cell; NaN where there is none.
+    fn number(&self, column: usize) -> f64;
+
+    /// The date or time of day in a cell.
+    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant>;
+}
+
+/// Rows one after the other.
+pub(crate) trait Rows: Cells {
+    /// Goes to the next row; `false` after the last one.
+    ///
+    /// # Errors
+    /// [`LogError`] where the file cannot be read on.
+    fn advance(&mut self) -> Result<bool, LogError>;
+}

@@ -1,0 +1,429 @@
+//! Which columns of a table are clocks, which of them is read, and which columns belong to each.
+
+use crate::cells::Cells;
+use crate::clock::{Clock, GroupClock};
+use crate::instant::{guess_order, parse_instant};
+use crate::number::parse_number;
+use crate::table_head::HeadColumn;
+use mapper_logs::{DateOrder, Group, Kind, LogOptions, header_unit};
+
+/// The clocks of a table.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Clocks {
+    pub(crate) groups: Vec<(Group, GroupClock)>,
+    /// Group of each column; `None` for clocks.
+    pub(crate) group_of: Vec<Option<usize>>,
+    pub(crate) findings: Vec<String>,
+    /// Time 0 in nanoseconds since 1970, where there is a date.
+    pub(crate) start_time_ns: Option<u64>,
+}
+
+/// Counts above this since some epoch are dates in disguise, s: eleven days.
+const LONGEST_COUNT_S: f64 = 1e6;
+
+/// The first rows of data.
+pub(crate) struct Sample<'a> {
+    pub(crate) columns: &'a [HeadColumn],
+    pub(crate) rows: &'a [Vec<String>],
+    pub(crate) decimal: u8,
+}
+
+struct SampleRow<'a>(&'a [String], u8);
+
+impl Cells for SampleRow<'_> {
+    fn number(&self, column: usize) -> f64 {
+        self.0.get(column).and_then(|cell| parse_number(cell.as_bytes(), self.1)).unwrap_or(f64::NAN)
+    }
+
+    fn instant(&self, column: usize, order: DateOrder) -> Option<crate::instant::Instant> {
+        parse_instant(self.0.get(column)?, order)
+    }
+}
+
+/// A clock that a table may have, and what it reads in the first rows, s.
+#[derive(Debug, Clone)]
+struct Candidate {
+    clock: Clock,
+    at: usize,
+    readings_s: Vec<Option<f64>>,
+    dated: bool,
+}
+
+impl Candidate {
+    fn present(&self) -> impl Iterator<Item = f64> + '_ {
+        self.readings_s.iter().flatten().copied()
+    }
+
+    fn first_s(&self) -> f64 {
+        self.present().next().unwrap_or(0.0)
+    }
+
+    fn distinct(&self) -> usize {
+        let mut readings: Vec<f64> = self.present().collect();
+        readings.dedup();
+        readings.len()
+    }
+
+    /// Whether it never goes back and moves on at all.
+    fn runs(&self) -> bool {
+        let readings: Vec<f64> = self.present().collect();
+        let back = readings.windows(2).filter(|pair| pair[1] < pair[0]).count();
+        // A clock that shows seconds may stand still over the rows that were looked at; a number that does is none.
+        let moves = readings.len() < 2 || readings.first() < readings.last();
+        20 * back <= readings.len() && (moves || matches!(self.clock, Clock::Instant { .. }))
+    }
+
+    /// Least step between two readings, s.
+    fn resolution_s(&self) -> f64 {
+        let readings: Vec<f64> = self.present().collect();
+        readings
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .filter(|step| *step > 0.0)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether the other shows the same rows at the same pace.
+    fn runs_with(&self, other: &Candidate) -> bool {
+        let tolerance_s = 1.01 * self.resolution_s().max(other.resolution_s()).min(60.0);
+        self.readings_s.iter().zip(&other.readings_s).all(|pair| match pair {
+            (Some(a), Some(b)) => ((a - self.first_s()) - (b - other.first_s())).abs() <= tolerance_s,
+            (None, None) => true,
+            _ => false,
+        })
+    }
+}
+
+/// Finds the clocks.
+pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks, String> {
+    let mut clocks = Clocks { group_of: vec![Some(0); sample.columns.len()], ..Clocks::default() };
+    let candidates = match (options.time.as_slice(), options.rate_hz) {
+        ([], Some(rate_hz)) => {
+            clocks.findings.push(format!("clock: none, {rate_hz} samples a second as given (rate)"));
+            let clock = Clock::Rate { interval_s: 1.0 / rate_hz };
+            clocks
+                .groups
+                .push((Group::default(), GroupClock { clock, zero_s: 0.0, zero_ns: 0, spread: None }));
+            return Ok(clocks);
+        }
+        ([], None) => found(sample, options, &mut clocks.findings),
+        (names, _) => vec![named(names, sample, options)?],
+    };
+    let Some(first) = candidates.first() else {
+        let names: Vec<&str> = sample.columns.iter().map(|column| column.name.as_str()).take(40).collect();
+        return Err(format!(
+            "no column is a clock; name it (`time`) or give the rate (`rate: 10 Hz`); the columns are {}",
+            names.join(", ")
+        ));
+    };
+    // Clocks of the same pace belong together; another pace begins another group.
+    let mut groups: Vec<Vec<&Candidate>> = vec![vec![first]];
+    for candidate in &candidates[1..] {
+        match groups.iter_mut().find(|group| group[0].runs_with(candidate)) {
+            Some(group) => group.push(candidate),
+            None => groups.push(vec![candidate]),
+        }
+    }
+    let name_of = |candidate: &Candidate| {
+        let names = candidate.clock.columns().into_iter().filter_map(|column| sample.columns.get(column));
+        names.map(|column| column.name.as_str()).collect::<Vec<_>>().join(" + ")
+    };
+    for clock in candidates.iter().flat_map(|candidate| candidate.clock.columns()) {
+        clocks.group_of[clock] = None;
+    }
+    let chosen: Vec<&Candidate> = groups.iter().map(|group| finest(group)).collect();
+    // Groups whose clocks count from different epochs have nothing in common but their first rows.
+    let is_epoch = |candidate: &Candidate| candidate.first_s().abs() > LONGEST_COUNT_S || candidate.dated;
+    let mixed = chosen.iter().any(|candidate| is_epoch(candidate) != is_epoch(chosen[0]));
+    let common_s = chosen.iter().map(|candidate| candidate.first_s()).fold(f64::INFINITY, f64::min);
+    let dated = groups
+        .iter()
+        .flatten()
+        .find(|candidate| candidate.dated && matches!(candidate.clock, Clock::Instant { .. }));
+    for (index, (group, candidate)) in groups.iter().zip(&chosen).enumerate() {
+        let epoch = is_epoch(candidate) || matches!(candidate.clock, Clock::Instant { .. });
+        let zero_s = if mixed {
+            candidate.first_s()
+        } else if epoch {
+            common_s
+        } else {
+            0.0
+        };
+        let name = if groups.len() == 1 { String::new() } else { name_of(candidate) };
+        let mut words = format!("`{}`", name_of(candidate));
+        if let Clock::Count { unit_s, .. } = candidate.clock {
+            words.push_str(&format!(", counts {}", unit_words(unit_s)));
+        }
+        let spread = spread(candidate);
+        if let Some((interval_s, rows)) = spread {
+            words.push_str(&format!(
+                ", {rows} rows share each reading and are spread {interval_s:.3} s apart"
+            ));
+        }
+        let others: Vec<String> = group
+            .iter()
+            .filter(|other| other.at != candidate.at)
+            .map(|other| format!("`{}`", name_of(other)))
+            .collect();
+        let beside =
+            if others.is_empty() { String::new() } else { format!("; beside it: {}", others.join(" and ")) };
+        let of = if groups.len() == 1 { "clock".to_owned() } else { format!("clock of group `{name}`") };
+        clocks.findings.push(format!("{of}: {words}{beside} (time, time_unit)"));
+        let zero_ns = (zero_s * 1e9).round();
+        let clock = GroupClock {
+            clock: candidate.clock.clone(),
+            zero_s,
+            zero_ns: exact_zero_ns(candidate, sample, zero_ns),
+            spread,
+        };
+        clocks.groups.push((Group { name, clock: words }, clock));
+        if index > 0 {
+            let from = group.iter().map(|clock| clock.at).min().unwrap_or(candidate.at);
+            for of in clocks.group_of.iter_mut().skip(from).flatten() {
+                *of = index;
+            }
+        }
+    }
+    if mixed {
+        clocks.findings.push("the clocks count from different epochs: each group begins at 0 s".to_owned());
+    }
+    if let (Some(dated), Some((_, first))) = (dated, clocks.groups.first()) {
+        let start_s = dated.first_s()
+            - if matches!(first.clock, Clock::Count { .. }) {
+                chosen[0].first_s() - first.zero_s
+            } else {
+                0.0
+            };
+        clocks.start_time_ns = (start_s > 0.0).then_some((start_s * 1e9) as u64);
+    }
+    Ok(clocks)
+}
+
+/// Time 0 of dates to the nanosecond: that of the first row.
+fn exact_zero_ns(candidate: &Candidate, sample: &Sample<'_>, near_ns: f64) -> i64 {
+    let rows = sample.rows.iter().map(|row| SampleRow(row, sample.decimal));
+    let first = rows.filter_map(|row| candidate.clock.instant_ns(&row)).next();
+    first.filter(|ns| (*ns as f64 - near_ns).abs() < 1e6).unwrap_or(near_ns as i64)
+}
+
+/// The clock with the most readings; of equals one that counts, then the first.
+fn finest<'a>(group: &[&'a Candidate]) -> &'a Candidate {
+    let rank = |candidate: &Candidate| (candidate.distinct(), matches!(candidate.clock, Clock::Count { .. }));
+    let mut best = group[0];
+    for candidate in &group[1..] {
+        if rank(candidate) > rank(best) {
+            best = candidate;
+        }
+    }
+    best
+}
+
+/// Where rows share a reading: the time between them, and how many share one.
+fn spread(candidate: &Candidate) -> Option<(f64, usize)> {
+    let readings: Vec<f64> = candidate.present().collect();
+    let runs: Vec<&[f64]> = readings.chunk_by(|a, b| a == b).collect();
+    // The first and the last may be cut.
+    let whole = runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default();
+    let mut lengths: Vec<usize> = whole.iter().map(|run| run.len()).collect();
+    lengths.sort_unstable();
+    let rows = *lengths.get(lengths.len() / 2)?;
+    let ticks: Vec<f64> = runs.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
+    let tick_s = ticks.iter().copied().filter(|tick| *tick > 0.0).fold(f64::INFINITY, f64::min);
+    (rows >= 2 && tick_s.is_finite()).then(|| (tick_s / rows as f64, rows))
+}
+
+fn unit_words(unit_s: f64) -> String {
+    match unit_s {
+        1.0 => "seconds".to_owned(),
+        0.001 => "milliseconds".to_owned(),
+        60.0 => "minutes".to_owned(),
+        3600.0 => "hours".to_owned(),
+        other => format!("in {other} s"),
+    }
+}
+
+fn candidate(clock: Clock, at: usize, sample: &Sample<'_>, dated: bool) -> Candidate {
+    let rows = sample.rows.iter().map(|row| SampleRow(row, sample.decimal));
+    let reading = |row: SampleRow<'_>| match &clock {
+        Clock::Instant { .. } => clock.instant_ns(&row).map(|ns| ns as f64 / 1e9),
+        _ => clock.count_s(&row),
+    };
+    let mut readings_s: Vec<Option<f64>> = rows.map(reading).collect();
+    if !dated && matches!(clock, Clock::Instant { .. }) {
+        past_midnight(&mut readings_s);
+    }
+    Candidate { clock, at, readings_s, dated }
+}
+
+/// Times of day go on behind midnight.
+fn past_midnight(readings_s: &mut [Option<f64>]) {
+    let (mut days_s, mut last_s) = (0.0, f64::NEG_INFINITY);
+    for reading in readings_s.iter_mut().flatten() {
+        if *reading + days_s < last_s - 43_200.0 {
+            days_s += 86_400.0;
+        }
+        *reading += days_s;
+        last_s = *reading;
+    }
+}
+
+/// The clock that a user names.
+fn named(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<Candidate, String> {
+    let find = |name: &String| {
+        let is = |column: &HeadColumn| column.name == *name || column.header == *name;
+        sample
+            .columns
+            .iter()
+            .position(is)
+            .ok_or_else(|| format!("there is no column `{name}`, which `time` names"))
+    };
+    let columns: Vec<usize> = names.iter().map(find).collect::<Result<_, _>>()?;
+    let order = options.date_order.unwrap_or_else(|| order_of(columns[0], sample).0);
+    let made = match columns.as_slice() {
+        [date, time] => {
+            let (date, time) = if shows(*time, sample, order).0 { (*time, *date) } else { (*date, *time) };
+            candidate(Clock::Instant { date: Some(date), time, order }, date.min(time), sample, true)
+        }
+        [column] if share(*column, sample, order) > 0.5 => candidate(
+            Clock::Instant { date: None, time: *column, order },
+            *column,
+            sample,
+            shows(*column, sample, order).0,
+        ),
+        [column] => {
+            let unit_s = options.time_unit_s.unwrap_or_else(|| count_unit_s(*column, sample));
+            candidate(Clock::Count { column: *column, unit_s }, *column, sample, false)
+        }
+        _ => return Err("`time` names one column, or a date and a time of day".to_owned()),
+    };
+    if made.present().next().is_none() {
+        return Err(format!("`{}`, which `time` names, holds neither numbers nor times", names.join(" + ")));
+    }
+    Ok(made)
+}
+
+fn found(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) -> Vec<Candidate> {
+    let mut candidates: Vec<Candidate> = Vec::new();
+    let mut dates: Vec<usize> = Vec::new();
+    for (at, column) in sample.columns.iter().enumerate() {
+        let (guessed, sure) = order_of(at, sample);
+        let order = options.date_order.unwrap_or(guessed);
+        if share(at, sample, order) > 0.8 {
+            let (has_date, has_time) = shows(at, sample, order);
+            if has_date && !sure && options.date_order.is_none() {
+                findings.push(format!(
+                    "date: `{}` may be read in two ways; the month is taken to stand first (date_order)",
+                    column.name
+                ));
+            }
+            if !has_time {
+                dates.push(at);
+                continue;
+            }
+            let beside = dates.pop().filter(|_| !has_date);
+            let clock = Clock::Instant {
+                date: beside,
+                time: at,
+                order: beside.map_or(order, |date| options.date_order.unwrap_or(order_of(date, sample).0)),
+            };
+            candidates.push(candidate(clock, beside.unwrap_or(at), sample, has_date || beside.is_some()));
+        } else if is_clock_name(column) {
+            let unit_s = options.time_unit_s.unwrap_or_else(|| count_unit_s(at, sample));
+            let count = candidate(Clock::Count { column: at, unit_s }, at, sample, false);
+            if 2 * count.present().count() > sample.rows.len().min(4) {
+                candidates.push(count);
+            }
+        }
+    }
+    candidates.retain(Candidate::runs);
+    candidates
+}
+
+fn cells<'a>(column: usize, sample: &'a Sample<'_>) -> impl Iterator<Item = &'a str> {
+    sample
+        .rows
+        .iter()
+        .filter_map(move |row| row.get(column))
+        .map(String::as_str)
+        .filter(|cell| !cell.is_empty())
+}
+
+fn order_of(column: usize, sample: &Sample<'_>) -> (DateOrder, bool) {
+    guess_order(cells(column, sample))
+}
+
+/// Share of the cells that are dates or times.
+fn share(column: usize, sample: &Sample<'_>, order: DateOrder) -> f64 {
+    let (mut instants, mut all) = (0.0, 0.0);
+    for cell in cells(column, sample) {
+        all += 1.0;
+        if parse_instant(cell, order).is_some() && parse_number(cell.as_bytes(), sample.decimal).is_none() {
+            instants += 1.0;
+        }
+    }
+    if all > 0.0 { instants / all } else { 0.0 }
+}
+
+/// Whether its cells have a date, and a time of day.
+fn shows(column: usize, sample: &Sample<'_>, order: DateOrder) -> (bool, bool) {
+    let first = cells(column, sample).find_map(|cell| parse_instant(cell, order)).unwrap_or_default();
+    (first.day.is_some(), first.ns_of_day.is_some())
+}
+
+/// Whether a column of numbers says that it is a clock: by its name, unless its unit says otherwise, or by its unit.
+fn is_clock_name(column: &HeadColumn) -> bool {
+    const NAMES: [&str; 22] = [
+        "t",
+        "ts",
+        "time",
+        "zeit",
+        "timestamp",
+        "timestamps",
+        "zeitstempel",
+        "uhrzeit",
+        "datetime",
+        "sec",
+        "seconds",
+        "sek",
+        "sekunden",
+        "elapsed",
+        "clock",
+        "ms",
+        "msec",
+        "t_s",
+        "t_ms",
+        "time_s",
+        "time_ms",
+        "elapsed_time",
+    ];
+    let unit = column.unit.as_deref().and_then(header_unit);
+    let duration = unit.is_some_and(|unit| unit.kind == Kind::Duration);
+    let name = column.name.to_lowercase().replace([' ', '-', '.', ':'], "_");
+    let named = NAMES.contains(&name.as_str())
+        || name.contains("time")
+        || name.contains("zeit")
+        || name.starts_with("elapsed");
+    duration || named && column.unit.is_none()
+}
+
+/// Seconds of one count: by its unit, its name, or, of epochs, its size.
+fn count_unit_s(column: usize, sample: &Sample<'_>) -> f64 {
+    let Some(head) = sample.columns.get(column) else { return 1.0 };
+    let unit = head.unit.as_deref().and_then(header_unit).filter(|unit| unit.kind == Kind::Duration);
+    if let Some(unit) = unit {
+        return unit.unit.to_inside(1.0);
+    }
+    let name = head.name.to_lowercase();
+    let first: Option<f64> =
+        cells(column, sample).find_map(|cell| parse_number(cell.as_bytes(), sample.decimal));
+    let first = first.unwrap_or(0.0).abs();
+    match first {
+        _ if name == "ms" || name.ends_with("_ms") || name.contains("milli") || name.ends_with("msec") => {
+            1e-3
+        }
+        first if first > 1e17 => 1e-9,
+        first if first > 1e14 => 1e-6,
+        first if first > 1e11 => 1e-3,
+        _ => 1.0,
+    }
+}

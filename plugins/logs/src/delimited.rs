@@ -1,0 +1,98 @@
+//! CSV and its relatives: cells with a separator between them.
+
+use crate::cells::Rows;
+use crate::encoding;
+use crate::row_stream::{Dialect, RowStream};
+use crate::separator::{SEPARATORS, decimal, score};
+use crate::table_log::Table;
+use mapper_logs::{Encoding, Layout, Log, LogError, LogFile, LogFormat, LogOptions, RowSink};
+use std::io::Cursor;
+
+/// The format.
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+
+const NAME: &str = "CSV";
+
+/// How much of a file is looked at, bytes.
+const HEAD_BYTES: usize = 1 << 18;
+
+/// How many rows of it are looked at.
+const HEAD_ROWS: usize = 400;
+
+/// Text, and more than one word of it.
+fn recognises(head: &[u8]) -> bool {
+    let (encoding, _) = encoding::guess(head);
+    let utf16 = matches!(encoding, Encoding::Utf16Le | Encoding::Utf16Be);
+    let control = head.iter().filter(|byte| **byte < 0x20 && !matches!(byte, b'\t' | b'\n' | b'\r' | 0x0C)).count();
+    utf16 || !head.is_empty() && control == 0 && head.iter().any(|byte| SEPARATORS.contains(byte) || *byte == b'\n')
+}
+
+struct Delimited {
+    file: LogFile,
+    dialect: Dialect,
+    table: Table,
+}
+
+fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
+    let head = file.head(HEAD_BYTES)?;
+    let (found, mark) = encoding::guess(&head);
+    let encoding = options.encoding.unwrap_or(found);
+    let whole = head.len() < HEAD_BYTES;
+    let rows_by = |separator: u8| -> Result<Vec<Vec<String>>, LogError> {
+        let dialect = Dialect { encoding, mark, separator, decimal: b'.' };
+        let mut stream = RowStream::over(file, Box::new(Cursor::new(head.clone())), dialect);
+        let mut rows = Vec::new();
+        while rows.len() < HEAD_ROWS && stream.advance()? {
+            rows.push(stream.texts());
+        }
+        // The last line of what was looked at may be cut.
+        if !whole && rows.len() < HEAD_ROWS && rows.len() > 1 {
+            rows.pop();
+        }
+        Ok(rows)
+    };
+    let given = options.separator.and_then(|separator| u8::try_from(separator).ok());
+    let mut best: Option<(f64, u8, Vec<Vec<String>>)> = None;
+    for separator in given.map_or(SEPARATORS.to_vec(), |separator| vec![separator]) {
+        let rows = rows_by(separator)?;
+        let score = score(&rows, separator);
+        if best.as_ref().is_none_or(|(other, ..)| score > *other) {
+            best = Some((score, separator, rows));
+        }
+    }
+    let Some((_, separator, rows)) = best.filter(|(score, ..)| *score > 0.0) else {
+        return Err(file.content(NAME, "it is text, but no table of numbers"));
+    };
+    let (found_decimal, seen) = decimal(&rows);
+    let decimal = options.decimal.and_then(|sign| u8::try_from(sign).ok()).unwrap_or(found_decimal);
+    let mut table = Table::look(&rows, decimal, options).map_err(|message| file.content(NAME, message))?;
+    let dialect = Dialect { encoding, mark, separator, decimal };
+    table.layout.findings.insert(0, dialect_words(dialect, seen || options.decimal.is_some()));
+    Ok(Box::new(Delimited { file: file.clone(), dialect, table }))
+}
+
+fn dialect_words(dialect: Dialect, decimal_seen: bool) -> String {
+    let separator = match dialect.separator {
+        b'\t' => "tab".to_owned(),
+        b' ' => "blanks".to_owned(),
+        other => format!("`{}`", char::from(other)),
+    };
+    let encoding = match dialect.encoding {
+        Encoding::Utf8 => "UTF-8",
+        Encoding::Latin1 => "Latin-1",
+        Encoding::Utf16Le | Encoding::Utf16Be => "UTF-16",
+    };
+    let decimal = if decimal_seen { "" } else { ", no cell shows it" };
+    let sign = char::from(dialect.decimal);
+    format!("text: separator {separator}, decimal sign `{sign}`{decimal}, letters in {encoding} (separator, decimal, encoding)")
+}
+
+impl Log for Delimited {
+    fn layout(&self) -> &Layout {
+        &self.table.layout
+    }
+
+    fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
+        self.table.rows(&mut RowStream::open(&self.file, self.dialect)?, wanted, sink)
+    }
+}

@@ -1,0 +1,110 @@
+//! The letters of a text file.
+
+use mapper_logs::Encoding;
+use std::io::{self, Read};
+
+/// The encoding of a file that starts with these bytes, and how many of them are its byte order mark.
+pub(crate) fn guess(head: &[u8]) -> (Encoding, usize) {
+    match head {
+        [0xEF, 0xBB, 0xBF, ..] => (Encoding::Utf8, 3),
+        [0xFF, 0xFE, ..] => (Encoding::Utf16Le, 2),
+        [0xFE, 0xFF, ..] => (Encoding::Utf16Be, 2),
+        _ => match std::str::from_utf8(head) {
+            Ok(_) => (Encoding::Utf8, 0),
+            // Cut in the middle of a letter.
+            Err(error) if error.error_len().is_none() => (Encoding::Utf8, 0),
+            Err(_) => (Encoding::Latin1, 0),
+        },
+    }
+}
+
+/// A cell as text.
+pub(crate) fn text(cell: &[u8], encoding: Encoding) -> String {
+    match encoding {
+        Encoding::Latin1 => cell.iter().map(|byte| char::from(*byte)).collect(),
+        _ => String::from_utf8_lossy(cell).into_owned(),
+    }
+}
+
+/// UTF-16 read as UTF-8; a half pair becomes the replacement character.
+pub(crate) struct Utf16Reader<R> {
+    inner: R,
+    big_endian: bool,
+    pending: Vec<u8>,
+    half: Vec<u8>,
+    surrogate: Option<u16>,
+}
+
+impl<R: Read> Utf16Reader<R> {
+    pub(crate) fn new(inner: R, big_endian: bool) -> Self {
+        Utf16Reader { inner, big_endian, pending: Vec::new(), half: Vec::new(), surrogate: None }
+    }
+
+    fn fill(&mut self) -> io::Result<()> {
+        let mut block = [0u8; 8192];
+        let count = self.inner.read(&mut block)?;
+        self.half.extend_from_slice(block.get(..count).unwrap_or_default());
+        let whole = self.half.len() / 2 * 2;
+        let units: Vec<u16> = self
+            .surrogate
+            .take()
+            .into_iter()
+            .chain(self.half[..whole].chunks_exact(2).map(|pair| {
+                let pair = [pair[0], pair[1]];
+                if self.big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) }
+            }))
+            .collect();
+        self.half.drain(..whole);
+        // The first half of a pair waits for the second, unless there is no more.
+        let waits = count > 0 && units.last().is_some_and(|unit| (0xD800..0xDC00).contains(unit));
+        self.surrogate = units.last().copied().filter(|_| waits);
+        let ready = units.len() - usize::from(waits);
+        let letters = char::decode_utf16(units[..ready].iter().copied());
+        let text: String = letters.map(|letter| letter.unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
+        self.pending = text.into_bytes();
+        if count > 0 && self.pending.is_empty() {
+            return self.fill();
+        }
+        Ok(())
+    }
+}
+
+impl<R: Read> Read for Utf16Reader<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.pending.is_empty() {
+            self.fill()?;
+        }
+        let count = self.pending.len().min(buffer.len());
+        for (place, byte) in buffer.iter_mut().zip(self.pending.drain(..count)) {
+            *place = byte;
+        }
+        Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn utf_16_becomes_the_same_text() {
+        let text = "T2 [°C];Drehzahl ATL 𝄞\n".repeat(1500);
+        for big_endian in [false, true] {
+            let bytes: Vec<u8> = text
+                .encode_utf16()
+                .flat_map(|unit| if big_endian { unit.to_be_bytes() } else { unit.to_le_bytes() })
+                .collect();
+            let mut read = String::new();
+            Utf16Reader::new(bytes.as_slice(), big_endian).read_to_string(&mut read).unwrap();
+            assert!(read == text);
+        }
+    }
+
+    #[test]
+    fn the_degree_sign_of_latin_1_is_no_utf_8() {
+        assert_eq!(guess(b"T2 [\xB0C]").0, Encoding::Latin1);
+        assert_eq!(text(b"T2 [\xB0C]", Encoding::Latin1), "T2 [°C]");
+        assert_eq!(guess("T2 [°C]".as_bytes()).0, Encoding::Utf8);
+        assert_eq!(guess(b"\xEF\xBB\xBFT2"), (Encoding::Utf8, 3));
+    }
+}

@@ -1,0 +1,146 @@
+//! ASAM MDF, version 4: the format of measuring systems on engine test beds.
+
+use falcon_mdf::{Channel, ChannelGroup, Mf4File, Signal};
+use mapper_logs::{Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink};
+
+/// The format.
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+
+const NAME: &str = "MDF4";
+
+/// Rows that are decoded at once.
+const CHUNK: usize = 4096;
+
+/// Most channels of a file.
+const CHANNEL_LIMIT: usize = 10_000;
+
+fn recognises(head: &[u8]) -> bool {
+    head.starts_with(b"MDF     ") || head.starts_with(b"UnFinMF ")
+}
+
+struct Mdf4 {
+    path: LogFile,
+    file: Mf4File,
+    layout: Layout,
+    /// The clock of each group.
+    masters: Vec<Channel>,
+    /// The channel of each column.
+    channels: Vec<Channel>,
+}
+
+fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
+    let failed = |error: falcon_mdf::error::Mf4Error| path.content(NAME, error.to_string());
+    let file = match path.bytes() {
+        Some(bytes) => Mf4File::from_bytes(bytes.to_vec()),
+        None => Mf4File::open_buffered(path.path()),
+    };
+    let file = file.map_err(failed)?;
+    if file.channel_count() > CHANNEL_LIMIT {
+        return Err(path.content(NAME, format!("it has {} channels; at most {CHANNEL_LIMIT} are read", file.channel_count())));
+    }
+    let mut log = Mdf4 { path: path.clone(), layout: Layout::default(), masters: Vec::new(), channels: Vec::new(), file };
+    let (mut left_out, mut without_clock) = (0usize, 0usize);
+    for (index, group) in log.file.data_groups().iter().flat_map(|data| &data.channel_groups).enumerate() {
+        let named = |channel: &&Channel| options.time.contains(&channel.name);
+        let clock = group.channels.iter().find(named).or_else(|| {
+            group.master_channel().filter(|master| master.is_time_channel())
+        });
+        let readable = |channel: &&Channel| {
+            channel.unreadable().is_none() && channel.is_numeric() && !channel.is_array() && !channel.is_master()
+        };
+        let Some(clock) = clock else {
+            without_clock += group.channels.len();
+            continue;
+        };
+        let columns: Vec<Channel> = group.channels.iter().filter(readable).filter(|c| c.name != clock.name).cloned().collect();
+        left_out += group.channels.len().saturating_sub(columns.len() + 1);
+        if columns.is_empty() || group.sample_count == 0 {
+            continue;
+        }
+        let number = log.layout.groups.len();
+        log.layout.groups.push(Group { name: name_of(group, index), clock: format!("`{}`", clock.name) });
+        for channel in &columns {
+            log.layout.columns.push(Column {
+                name: channel.name.clone(),
+                header: channel.name.clone(),
+                unit: Some(channel.unit.trim().to_owned()).filter(|unit| !unit.is_empty()),
+                description: channel.comment.chars().take(200).collect(),
+                group: number,
+            });
+        }
+        log.masters.push(clock.clone());
+        log.channels.extend(columns);
+    }
+    distinct_names(&mut log.layout);
+    let findings = &mut log.layout.findings;
+    findings.push(format!("clocks: {} groups, each with its own in seconds (time)", log.masters.len()));
+    if left_out > 0 {
+        findings.push(format!("{left_out} channels are left out: texts, arrays, or not readable"));
+    }
+    if without_clock > 0 {
+        findings.push(format!("{without_clock} channels are left out: their groups have no clock; name one with `time`"));
+    }
+    log.layout.start_time_ns = u64::try_from(log.file.start_time().timestamp_ns).ok().filter(|ns| *ns > 0);
+    if log.layout.groups.is_empty() {
+        return Err(path.content(NAME, "it holds no group of numbers with a clock; name the clock's channel with `time`"));
+    }
+    Ok(Box::new(log))
+}
+
+fn name_of(group: &ChannelGroup, index: usize) -> String {
+    let source = group.source.as_ref().map(|source| source.name.clone());
+    [Some(group.acquisition_name.clone()), source].into_iter().flatten().find(|name| !name.trim().is_empty()).unwrap_or_else(|| format!("group {}", index + 1))
+}
+
+/// Groups have distinct names, and one alone needs none.
+fn distinct_names(layout: &mut Layout) {
+    if let [only] = layout.groups.as_mut_slice() {
+        only.name = String::new();
+    }
+    for index in 1..layout.groups.len() {
+        let (before, rest) = layout.groups.split_at_mut(index);
+        if let Some(group) = rest.first_mut().filter(|group| before.iter().any(|other| other.name == group.name)) {
+            group.name = format!("{} ({})", group.name, index + 1);
+        }
+    }
+}
+
+impl Log for Mdf4 {
+    fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
+        let failed = |error: falcon_mdf::error::Mf4Error| self.path.content(NAME, error.to_string());
+        for (group, master) in self.masters.iter().enumerate() {
+            let mut channels: Vec<&Channel> = vec![master];
+            let of_group = |column: &&usize| self.layout.columns.get(**column).is_some_and(|column| column.group == group);
+            channels.extend(wanted.iter().filter(of_group).filter_map(|column| self.channels.get(*column)));
+            if channels.len() == 1 {
+                continue;
+            }
+            let mut values: Vec<f64> = Vec::new();
+            for chunk in self.file.signals_chunks(&channels, CHUNK).map_err(failed)? {
+                let columns: Vec<Vec<f64>> = chunk.map_err(failed)?.iter().map(valid_values).collect::<Result<_, _>>().map_err(failed)?;
+                let Some((times_s, columns)) = columns.split_first() else { continue };
+                for (row, t_s) in times_s.iter().enumerate() {
+                    values.clear();
+                    values.extend(columns.iter().map(|column| column.get(row).copied().unwrap_or(f64::NAN)));
+                    sink(Row { group, t_s: *t_s, values: &values })?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Values with NaN for those that the file declares invalid.
+fn valid_values(signal: &Signal) -> Result<Vec<f64>, falcon_mdf::error::Mf4Error> {
+    let mut values = signal.values_f64()?;
+    if let Some(validity) = signal.validity() {
+        for (value, _) in values.iter_mut().zip(validity).filter(|(_, valid)| !valid) {
+            *value = f64::NAN;
+        }
+    }
+    Ok(values)
+}

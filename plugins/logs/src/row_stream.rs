@@ -1,0 +1,136 @@
+//! The lines of a delimited file, one after the other.
+
+use crate::cells::{Cells, Rows};
+use crate::encoding::{self, Utf16Reader};
+use crate::instant::{Instant, parse_instant};
+use crate::number::parse_number;
+use mapper_logs::{DateOrder, Encoding, LogError, LogFile};
+use std::cell::Cell;
+use std::io::{self, Read};
+use std::rc::Rc;
+
+/// Longest line, bytes: a quote that is never closed would swallow the file.
+const LINE_LIMIT: usize = 1 << 20;
+
+/// How a delimited file is written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Dialect {
+    pub(crate) encoding: Encoding,
+    /// Bytes of the byte order mark.
+    pub(crate) mark: usize,
+    pub(crate) separator: u8,
+    pub(crate) decimal: u8,
+}
+
+/// Counts what is read since the last whole line.
+struct Limited<R> {
+    inner: R,
+    left: Rc<Cell<usize>>,
+}
+
+impl<R: Read> Read for Limited<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.inner.read(buffer)?;
+        let left = self.left.get().checked_sub(count);
+        self.left.set(
+            left.ok_or_else(|| io::Error::other("a line is longer than 1 MiB; is a quote never closed?"))?,
+        );
+        Ok(count)
+    }
+}
+
+/// See the module.
+pub(crate) struct RowStream {
+    file: LogFile,
+    reader: csv::Reader<Box<dyn Read>>,
+    left: Rc<Cell<usize>>,
+    dialect: Dialect,
+    record: csv::ByteRecord,
+    /// Where blanks separate, the cells that are not empty.
+    filled: Vec<usize>,
+}
+
+impl RowStream {
+    pub(crate) fn open(file: &LogFile, dialect: Dialect) -> Result<Self, LogError> {
+        Ok(Self::over(file, Box::new(file.open()?), dialect))
+    }
+
+    /// The rows of some bytes of the file.
+    pub(crate) fn over(file: &LogFile, mut bytes: Box<dyn Read>, dialect: Dialect) -> Self {
+        let left = Rc::new(Cell::new(LINE_LIMIT));
+        let mark = u64::try_from(dialect.mark).unwrap_or(0);
+        // What is wrong with the mark shows at the first line.
+        drop(io::copy(&mut bytes.by_ref().take(mark), &mut io::sink()));
+        let text: Box<dyn Read> = match dialect.encoding {
+            Encoding::Utf16Le => Box::new(Utf16Reader::new(bytes, false)),
+            Encoding::Utf16Be => Box::new(Utf16Reader::new(bytes, true)),
+            Encoding::Utf8 | Encoding::Latin1 => bytes,
+        };
+        let limited: Box<dyn Read> = Box::new(Limited { inner: text, left: left.clone() });
+        let reader = csv::ReaderBuilder::new()
+            .delimiter(dialect.separator)
+            .has_headers(false)
+            .flexible(true)
+            .buffer_capacity(1 << 16)
+            .from_reader(limited);
+        RowStream {
+            file: file.clone(),
+            reader,
+            left,
+            dialect,
+            record: csv::ByteRecord::new(),
+            filled: Vec::new(),
+        }
+    }
+
+    fn cell(&self, column: usize) -> &[u8] {
+        let at = if self.dialect.separator == b' ' { self.filled.get(column).copied() } else { Some(column) };
+        at.and_then(|at| self.record.get(at)).unwrap_or_default()
+    }
+
+    /// The cells of the row as text.
+    pub(crate) fn texts(&self) -> Vec<String> {
+        let count = if self.dialect.separator == b' ' { self.filled.len() } else { self.record.len() };
+        (0..count)
+            .map(|column| encoding::text(self.cell(column), self.dialect.encoding).trim().to_owned())
+            .collect()
+    }
+}
+
+impl Cells for RowStream {
+    fn number(&self, column: usize) -> f64 {
+        parse_number(self.cell(column), self.dialect.decimal).unwrap_or(f64::NAN)
+    }
+
+    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
+        parse_instant(std::str::from_utf8(self.cell(column)).ok()?, order)
+    }
+}
+
+impl Rows for RowStream {
+    /// Rows without any cell do not count.
+    fn advance(&mut self) -> Result<bool, LogError> {
+        loop {
+            self.left.set(LINE_LIMIT);
+            let more = self.reader.read_byte_record(&mut self.record).map_err(|error| {
+                self.file.error(match error.into_kind() {
+                    csv::ErrorKind::Io(error) => error,
+                    other => io::Error::other(format!("{other:?}")),
+                })
+            })?;
+            if !more {
+                return Ok(false);
+            }
+            if self.dialect.separator == b' ' {
+                self.filled.clear();
+                let record = &self.record;
+                self.filled.extend(
+                    (0..record.len()).filter(|at| record.get(*at).is_some_and(|cell| !cell.is_empty())),
+                );
+            }
+            if self.record.iter().any(|cell| !cell.trim_ascii().is_empty()) {
+                return Ok(true);
+            }
+        }
+    }
+}

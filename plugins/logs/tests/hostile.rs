@@ -1,0 +1,162 @@
+//! Damaged, foreign and hostile logs: no panic, no hang, no allocation beyond what the file itself has.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+use mapper_log_formats::LOG_FORMATS;
+use mapper_logs::proposal::{channel_map_text, propose};
+use mapper_logs::{LogFile, LogOptions, survey};
+use proptest::prelude::*;
+use std::io::Write;
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// Everything that `mapper log inspect` does with a file.
+fn look(bytes: &[u8]) {
+    let file = LogFile::of_bytes(Path::new("log"), bytes);
+    let Ok((_, mut log)) = LOG_FORMATS.open(&file, &LogOptions::default()) else { return };
+    let Ok(found) = survey(log.as_mut()) else { return };
+    let layout = log.layout().clone();
+    drop(channel_map_text("log", &layout, &propose(&layout, &found), &[]));
+}
+
+fn csv() -> Vec<u8> {
+    let mut text =
+        String::from("Pr\u{fc}fstand 7\nDatum;Uhrzeit;t [s];n_TC [U/min];p1 [mbar rel];\"T2 [°C]\"\n");
+    for row in 0..60 {
+        text.push_str(&format!(
+            "22.11.2026;14:03:{:02};{row},5;{};-1,2;\"2{row},25\"\n",
+            row % 60,
+            60_000 + row
+        ));
+    }
+    text.into_bytes()
+}
+
+fn mdf4() -> Vec<u8> {
+    let mut writer = falcon_mdf::Mf4Writer::new();
+    let times: Vec<f64> = (0..50).map(|row| f64::from(row) / 10.0).collect();
+    let group = writer.add_group(&times).unwrap();
+    group.add_channel("n_TC", "rpm", &times).unwrap();
+    group.add_channel("T2", "degC", &times).unwrap();
+    let folder = std::env::temp_dir().join(format!("mapper-hostile-{}.mf4", std::process::id()));
+    writer.write_to_file(&folder).unwrap();
+    let bytes = std::fs::read(&folder).unwrap();
+    std::fs::remove_file(folder).unwrap();
+    bytes
+}
+
+/// The least workbook, stored without compression so that a flipped byte reaches the XML.
+fn xlsx() -> Vec<u8> {
+    let mut rows = String::from(
+        "<row r=\"1\"><c r=\"A1\" t=\"inlineStr\"><is><t>time [s]</t></is></c><c r=\"B1\" t=\"inlineStr\"><is><t>T2 [degC]</t></is></c></row>",
+    );
+    for row in 2..40 {
+        rows.push_str(&format!(
+            "<row r=\"{row}\"><c r=\"A{row}\"><v>{row}</v></c><c r=\"B{row}\"><v>{row}.5</v></c></row>"
+        ));
+    }
+    let head = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>";
+    let main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main";
+    let relations = "http://schemas.openxmlformats.org/officeDocument/2006/relationships";
+    let package = "http://schemas.openxmlformats.org/package/2006";
+    let parts = [
+        ("[Content_Types].xml", format!("{head}<Types xmlns=\"{package}/content-types\"/>")),
+        (
+            "_rels/.rels",
+            format!(
+                "{head}<Relationships xmlns=\"{package}/relationships\"><Relationship Id=\"r1\" Type=\"{relations}/officeDocument\" Target=\"xl/workbook.xml\"/></Relationships>"
+            ),
+        ),
+        (
+            "xl/workbook.xml",
+            format!(
+                "{head}<workbook xmlns=\"{main}\" xmlns:r=\"{relations}\"><sheets><sheet name=\"Log\" sheetId=\"1\" r:id=\"r1\"/></sheets></workbook>"
+            ),
+        ),
+        (
+            "xl/_rels/workbook.xml.rels",
+            format!(
+                "{head}<Relationships xmlns=\"{package}/relationships\"><Relationship Id=\"r1\" Type=\"{relations}/worksheet\" Target=\"worksheets/sheet1.xml\"/></Relationships>"
+            ),
+        ),
+        (
+            "xl/worksheets/sheet1.xml",
+            format!(
+                "{head}<worksheet xmlns=\"{main}\"><dimension ref=\"A1:B39\"/><sheetData>{rows}</sheetData></worksheet>"
+            ),
+        ),
+    ];
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut archive = zip::ZipWriter::new(&mut bytes);
+    for (name, text) in parts {
+        let stored =
+            zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+        archive.start_file(name, stored).unwrap();
+        archive.write_all(text.as_bytes()).unwrap();
+    }
+    archive.finish().unwrap();
+    bytes.into_inner()
+}
+
+fn files() -> &'static [Vec<u8>; 3] {
+    static FILES: OnceLock<[Vec<u8>; 3]> = OnceLock::new();
+    FILES.get_or_init(|| [csv(), mdf4(), xlsx()])
+}
+
+#[test]
+fn the_files_themselves_are_read() {
+    for (bytes, name) in files().iter().zip(["CSV", "MDF4", "Excel"]) {
+        let file = LogFile::of_bytes(Path::new("log"), bytes);
+        let (format, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
+        assert_eq!(format.name, name);
+        let found = survey(log.as_mut()).unwrap();
+        assert!(
+            found.groups[0].rows >= 38 && found.columns.iter().any(|column| column.count >= 38),
+            "{name}: {found:?}"
+        );
+    }
+}
+
+#[test]
+fn every_truncation_ends() {
+    for bytes in files() {
+        (0..bytes.len()).step_by(bytes.len() / 60 + 1).for_each(|length| look(&bytes[..length]));
+    }
+}
+
+#[test]
+fn a_quote_that_is_never_closed_does_not_swallow_the_file() {
+    let mut text = String::from("t [s];T2 [degC]\n0;20\n1;21\n2;\"");
+    (3..400_000).for_each(|row| text.push_str(&format!("{row};22\n")));
+    let file = LogFile::of_bytes(Path::new("log"), text.as_bytes());
+    let error = match LOG_FORMATS.open(&file, &LogOptions::default()) {
+        Err(error) => error.to_string(),
+        Ok((_, mut log)) => survey(log.as_mut()).unwrap_err().to_string(),
+    };
+    assert!(error.contains("quote"), "{error}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn no_bytes_panic(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
+        look(&bytes);
+    }
+
+    #[test]
+    fn no_text_panics(text in "[-+0-9.,;:/\t \n\"a-zA-Z\\[\\]%°ü]{0,400}") {
+        look(text.as_bytes());
+    }
+
+    #[test]
+    fn no_flipped_bytes_panic(flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8)) {
+        for bytes in files() {
+            let mut bytes = bytes.clone();
+            for (index, value) in &flips {
+                let at = index.index(bytes.len());
+                bytes[at] = *value;
+            }
+            look(&bytes);
+        }
+    }
+}

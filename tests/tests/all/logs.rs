@@ -1,0 +1,217 @@
+//! Logs of other programs, written by those programs' own libraries: looked into, mapped, identified.
+
+use mapper_tests::{CampaignFile, Finished, mapper, python, repository, scratch};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// A run of four points, and the campaign that describes its machine.
+struct Run {
+    campaign: CampaignFile,
+    recording: PathBuf,
+    directory: tempfile::TempDir,
+}
+
+impl Run {
+    fn new() -> Run {
+        let mut text = std::fs::read_to_string(repository().join("campaigns/gap_rig.yaml")).unwrap();
+        for (old, new) in [
+            ("[90 krpm, 150 krpm, 50 krpm, 130 krpm, 70 krpm, 110 krpm]", "[90 krpm, 130 krpm]"),
+            ("openings: [0.5, 0.7, 1.0]", "openings: [0.7, 1.0]"),
+        ] {
+            assert_eq!(text.matches(old).count(), 1, "`{old}` in the campaign of the gap rig");
+            text = text.replace(old, new);
+        }
+        let (campaign, directory) = (CampaignFile::of(text), scratch());
+        let out = directory.path().join("runs");
+        let arguments =
+            ["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref(), "--out".as_ref(), out.as_os_str()];
+        let recording = PathBuf::from(mapper(arguments).exits(0).json()["recording"].as_str().unwrap());
+        Run { campaign, recording, directory }
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+
+    /// The recording as a log of this kind, and what its writer says of it.
+    fn log(&self, kind: &str, name: &str) -> (PathBuf, Value) {
+        let target = self.file(name);
+        let written = python("write_log.py", [self.recording.as_os_str(), target.as_os_str(), kind.as_ref()]);
+        (target, written)
+    }
+
+    fn identify(&self, log: &Path, channels: &Path) -> Finished {
+        mapper([
+            "identify".as_ref(),
+            log.as_os_str(),
+            "--channels".as_ref(),
+            channels.as_os_str(),
+            "--campaign".as_ref(),
+            self.campaign.path.as_os_str(),
+            "--json".as_ref(),
+        ])
+    }
+}
+
+/// The channel map that a log suggests, in a new file.
+fn proposed(log: &Path, name: &str) -> PathBuf {
+    let channels = log.with_file_name(name);
+    mapper([
+        "log".as_ref(),
+        "inspect".as_ref(),
+        log.as_os_str(),
+        "--write-channels".as_ref(),
+        channels.as_os_str(),
+    ])
+    .exits(0);
+    channels
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn every_format_leads_to_the_same_points_to_the_last_digit() {
+    let run = Run::new();
+    // The same groups as in the MDF file, hence the same channel map.
+    let (mdf, _) = run.log("mdf4", "log.mf4");
+    let channels = proposed(&mdf, "groups.yaml");
+    let (mcap, _) = run.log("mcap", "log.mcap");
+    let expected = run.identify(&mcap, &channels).exits(0).json()["points"].clone();
+    assert_eq!(expected.as_array().unwrap().len(), 4);
+    assert_eq!(run.identify(&mdf, &channels).exits(0).json()["points"], expected);
+    for (kind, name) in [("csv", "log.csv"), ("xlsx", "log.xlsx")] {
+        let (log, _) = run.log(kind, name);
+        let channels = proposed(&log, &format!("{kind}.yaml"));
+        let points = run.identify(&log, &channels).exits(0).json()["points"].clone();
+        assert_eq!(points, expected, "{kind}");
+    }
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_log_in_the_manner_of_a_test_stand_becomes_points_with_two_commands() {
+    let run = Run::new();
+    let (log, written) = run.log("stand", "stand.txt");
+    let channels = proposed(&log, "channels.yaml");
+    let found = run.identify(&log, &channels).exits(0).json();
+    let expected =
+        mapper(["identify".as_ref(), run.recording.as_os_str(), "--json".as_ref()]).exits(0).json();
+    let points = |value: &Value| value["points"].as_array().unwrap().clone();
+    let (found, expected) = (points(&found), points(&expected));
+    assert_eq!(found.len(), expected.len());
+    let ahead_s = written["ahead_s"].as_f64().unwrap();
+    let starts = written["steps_s"].as_array().unwrap();
+    for (index, (found, expected)) in found.iter().zip(&expected).enumerate() {
+        // The first step begins at rest, with the warm-up; the others where the lab jumped.
+        if index > 0 {
+            let start_s = found["window"]["start_s"].as_f64().unwrap() - 10.0;
+            let truth_s = starts[index].as_f64().unwrap() + ahead_s;
+            assert!(
+                (start_s - truth_s).abs() <= 1.0,
+                "step {index} found at {start_s} s, made at {truth_s} s"
+            );
+        }
+        // What is held shows the same speed and flow: steps that begin up to a second apart move the means by less.
+        for (key, tolerance_ratio) in [("speed_rpm", 1e-3), ("flow_kg_s", 2e-3), ("pressure_ratio", 1e-3)] {
+            let (a, b) = (found[key].as_f64().unwrap(), expected[key].as_f64().unwrap());
+            assert!((a / b - 1.0).abs() < tolerance_ratio, "step {index}: {key} {a} against {b}");
+        }
+        // Efficiencies agree within the noise of each.
+        if let (Some(a), Some(b)) = (found["eta"].as_f64(), expected["eta"].as_f64()) {
+            let noise = expected["eta_uncertainty"]["noise_standard_error"].as_f64().unwrap();
+            assert!((a - b).abs() < 3.0 * noise + 1e-3, "step {index}: {a} against {b}");
+        }
+    }
+    assert!(found.iter().filter(|point| point["eta"].is_number()).count() >= 3);
+}
+
+/// A file in a directory of its own.
+fn written(text: &str, name: &str) -> (tempfile::TempDir, PathBuf) {
+    let directory = scratch();
+    let path = directory.path().join(name);
+    std::fs::write(&path, text).unwrap();
+    (directory, path)
+}
+
+/// A compressor that is run up once, in kg/h, mbar over ambient and degC.
+fn small_log() -> String {
+    let mut text =
+        String::from("t [s];n_TC [U/min];m_L [kg/h];p1 [mbar rel];p2 [mbar rel];T1 [°C];T2 [°C]\n");
+    for row in 0..600 {
+        let up = f64::from((row - 300).clamp(0, 50)) / 50.0;
+        let line = format!(
+            "{:.1};{:.0};{:.2};{:.1};{:.1};{:.2};{:.2}\n",
+            f64::from(row) / 10.0,
+            60e3 + 60e3 * up,
+            120.0 + 150.0 * up,
+            -5.0 - 10.0 * up,
+            250.0 + 600.0 * up,
+            22.0,
+            50.0 + 55.0 * up
+        );
+        text.push_str(&line.replace('.', ","));
+    }
+    text
+}
+
+#[test]
+fn the_proposed_channel_map_loads_as_it_stands_and_replaces_no_file() {
+    let (_directory, log) = written(&small_log(), "log.csv");
+    let channels = proposed(&log, "channels.yaml");
+    let text = std::fs::read_to_string(&channels).unwrap();
+    for line in [
+        "P1: {field: p1, unit: mbar, gauge: true}",
+        "m_c: {field: m_L, unit: kg/h}",
+        "ambient_pressure: 101.3 kPa",
+    ] {
+        assert!(text.contains(line), "`{line}` in\n{text}");
+    }
+    mapper_record::ChannelMap::load(&channels).unwrap();
+    let again = mapper([
+        "log".as_ref(),
+        "inspect".as_ref(),
+        log.as_os_str(),
+        "--write-channels".as_ref(),
+        channels.as_os_str(),
+    ]);
+    assert_ne!(again.code, Some(0));
+    assert_eq!(std::fs::read_to_string(&channels).unwrap(), text);
+}
+
+#[test]
+fn all_mistakes_of_a_channel_map_for_a_log_come_at_once_with_their_places() {
+    let (_directory, log) = written(&small_log(), "log.csv");
+    let channels = log.with_file_name("channels.yaml");
+    let identify = |text: &str| {
+        std::fs::write(&channels, text).unwrap();
+        mapper(["identify".as_ref(), log.as_os_str(), "--channels".as_ref(), channels.as_os_str()])
+            .exits(2)
+            .stderr
+    };
+    let names =
+        identify("channels:\n  N: {field: n_TK}\n  T2: {field: T9}\n  m_c: {field: m_L, topic: Daten}\n");
+    for expected in [
+        "no column `n_TK`",
+        "did you mean `n_TC`?",
+        "no column `T9`",
+        "no group `Daten`",
+        ":2:",
+        ":3:",
+        ":4:",
+        "^^^^",
+    ] {
+        assert!(names.contains(expected), "`{expected}` in\n{names}");
+    }
+    // Refused before anything is computed, with what would be right.
+    let units = identify(
+        "channels:\n  N: {field: n_TC, unit: krpm}\n  m_c: {field: m_L, unit: kg/s}\n  T1: {field: T1, unit: K}\n  P1: {field: p1, unit: mbar}\n",
+    );
+    for expected in [
+        "lie between 60000 and 120000 krpm",
+        "write `unit: rpm`",
+        "write `unit: kg/h`",
+        "write `unit: degC`",
+        "write `gauge: true`",
+    ] {
+        assert!(units.contains(expected), "`{expected}` in\n{units}");
+    }
+}

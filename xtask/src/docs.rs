@@ -17,10 +17,13 @@ pub enum Mode {
 }
 
 /// What is generated below docs: files, and folders with all that is in them.
-const GENERATED: &[&str] = &["reproduction.md", "reproduction", "sequences.md", "turbo_a.svg"];
+const GENERATED: &[&str] = &["reproduction.md", "reproduction", "sequences.md", "turbo_a.svg", "real-data"];
 
 /// The README's picture is the map of this campaign.
 const SHIPPED: &str = "campaigns/turbo_a.yaml";
+
+/// Folder of the measured data that docs/real-data.md speaks of, and what `mapper transient` is told of it.
+const MEASURED: &str = "examples/real/turbotools";
 
 /// Writes or checks everything that is generated.
 pub fn docs(mode: Mode) -> Result<(), Error> {
@@ -44,6 +47,8 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
         let map = run.map_err(at(&runs))?.path().join("map.svg");
         write(&made.join("turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
     }
+
+    measured(&programs, &made)?;
 
     let (new, old) = (contents(&made)?, contents(&docs)?);
     let names: BTreeSet<&PathBuf> = new.keys().chain(old.keys()).collect();
@@ -71,6 +76,25 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
         return Err(Error::Stale { differences });
     }
     say(&format!("{}\n", differences.join("\n")));
+    Ok(())
+}
+
+/// What the program makes of measured data: text and picture.
+fn measured(programs: &Programs, made: &Path) -> Result<(), Error> {
+    let file = |name: &str| format!("{MEASURED}/{name}");
+    let out = workspace::target_dir().join("xtask-docs-measured");
+    if out.exists() {
+        fs::remove_dir_all(&out).map_err(at(&out))?;
+    }
+    let (log, channels, campaign) = (file("measured.csv"), file("channels.yaml"), file("campaign.yaml"));
+    let given =
+        ["transient", &log, "--channels", &channels, "--campaign", &campaign, "--fit-until", "13.2 s"];
+    let shown = out.to_string_lossy().into_owned();
+    run(command(&programs.mapper, &[&given[..], &["--out", &shown]].concat()))?;
+    for name in ["transient.svg", "transient.txt"] {
+        let path = out.join(name);
+        write(&made.join("real-data").join(name), &fs::read(&path).map_err(at(&path))?)?;
+    }
     Ok(())
 }
 

@@ -4,6 +4,9 @@ use crate::table;
 use mapper_driven::{DrivenOutcome, Judged, Moves};
 use std::fmt::Write;
 
+/// Bare thermocouples and resistance thermometers of test stands are thinner than this, mm.
+const THICKEST_PROBE_MM: f64 = 6.0;
+
 /// What is left of T2, what moves it, and the parameters.
 pub fn transient_text(outcome: &DrivenOutcome) -> String {
     // Writing to a String cannot fail.
@@ -25,6 +28,12 @@ pub fn transient_text(outcome: &DrivenOutcome) -> String {
     let _ = writeln!(text, "\nWhat moves T2 while it is fitted (rms):");
     let _ = writeln!(text, "  lag of the probe                 {}", moves_text(&outcome.probe_moves));
     let _ = writeln!(text, "  heat to and from the housing     {}", moves_text(&outcome.heat_moves));
+    let probe = outcome.parameters.iter().find(|found| found.parameter.name == "probe");
+    if probe.is_some_and(|probe| probe.value > THICKEST_PROBE_MM) {
+        text.push_str(
+            "  No bare probe is that thick: rather a sheath around the sensor, or a sensor that the gas hardly reaches.\n",
+        );
+    }
     text.push('\n');
     let heads =
         ["parameter", "value", "95 % interval", "unit", "known from", "what it is"].map(str::to_owned);

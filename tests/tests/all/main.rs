@@ -30,4 +30,5 @@ mod sources;
 mod speed_lines;
 mod surge;
 mod together;
+mod transient;
 mod zero;

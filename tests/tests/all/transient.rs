@@ -1,0 +1,40 @@
+//! A log in which nothing rests, measured on an engine.
+
+use mapper_tests::{Finished, mapper, repository, scratch};
+
+fn transient(more: &[&str]) -> Finished {
+    let folder = repository().join("examples/real/turbotools");
+    let file = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+    let (log, channels, campaign) = (file("measured.csv"), file("channels.yaml"), file("campaign.yaml"));
+    let given = ["transient", &log, "--channels", &channels, "--campaign", &campaign];
+    mapper(given.iter().chain(more))
+}
+
+/// An independent fit of the same rows leaves 0.1 K, and with an ideal adiabatic probe 15.5 K on the brake. What is left here is
+/// beyond what was expected, and the program says so.
+#[test]
+fn an_engine_is_fitted_and_what_it_does_not_explain_is_said() {
+    let scratch = scratch();
+    let out = scratch.path().join("out");
+    let given = ["--fit-until", "13.2 s", "--json", "--out", out.to_str().unwrap()];
+    let found = transient(&given).exits(0).json();
+    let rms_k = |part: &str| found[part]["rms_k"].as_f64().unwrap();
+    assert!(rms_k("fitted") < 0.5 && rms_k("held_out") < 4.0, "{} {}", rms_k("fitted"), rms_k("held_out"));
+    let told = std::fs::read_to_string(out.join("transient.txt")).unwrap();
+    let beyond = rms_k("held_out") > found["held_out"]["expected_high_k"].as_f64().unwrap();
+    assert_eq!(told.contains("more is left than the fitted part allows"), beyond, "{told}");
+    // As the log's own description has it: no compressor does that.
+    let apparent = found["trace"]["apparent_efficiency"].as_array().unwrap();
+    assert!(apparent.iter().any(|eta| eta.as_f64().unwrap() > 1.4));
+    for file in ["transient.json", "transient.svg", "transient.png"] {
+        assert!(out.join(file).metadata().unwrap().len() > 1000, "{file}");
+    }
+}
+
+#[test]
+fn a_time_without_its_unit_and_too_little_to_fit_are_refused() {
+    let bare = transient(&["--fit-until", "13.2"]).exits(2);
+    assert!(bare.stderr.contains("13.2"), "{}", bare.stderr);
+    let short = transient(&["--fit-until", "1.5 s"]).exits(6);
+    assert!(short.stderr.contains("at least 28 are needed"), "{}", short.stderr);
+}

@@ -1,0 +1,164 @@
+//! Nonsense is refused, whoever recorded it: doctored recordings by every method, beside the truth.
+//!
+//! What a point must not be: good, with an interval that misses the truth by more than chance makes it miss in a sound
+//! recording. The truth of `steady` is what it says of the readings without noise and fault: it claims no more than an
+//! apparent efficiency.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+#[path = "nonsense/doctor.rs"]
+mod doctor;
+#[path = "common/lab.rs"]
+mod lab;
+#[path = "nonsense/table.rs"]
+mod table;
+
+use lab::{Campaign, Machine, campaign, measured};
+use mapper_core::{Channel, IdentifiedPoint, Method, Recording, Verdict};
+use mapper_identify::{IdentifyConfig, identify_each};
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+
+const METHODS: [Method; 3] = [Method::Steady, Method::Dynamic, Method::Joint];
+
+/// Five speeds at three openings, and the first two points again at the end.
+fn grid() -> Vec<(f64, f64)> {
+    let speeds = [90e3, 150e3, 50e3, 130e3, 70e3];
+    let mut points: Vec<(f64, f64)> =
+        [0.5, 0.8, 1.3].into_iter().flat_map(|valve| speeds.map(|speed| (valve, speed))).collect();
+    points.extend([(0.5, 90e3), (0.5, 150e3)]);
+    points
+}
+
+fn config(method: Method, sound: &Sound) -> IdentifyConfig {
+    IdentifyConfig { method, declared: sound.declared.clone(), ..IdentifyConfig::default() }
+}
+
+/// A sound recording beside what it was made of.
+struct Sound {
+    clean: Campaign,
+    recording: Recording,
+    declared: std::collections::BTreeMap<Channel, mapper_identify::DeclaredUncertainty>,
+}
+
+fn sound(seed: u64) -> Sound {
+    let clean = campaign(&grid(), 100.0, Machine::default());
+    let (recording, declared) = measured(&clean.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(seed));
+    Sound { clean, recording, declared }
+}
+
+/// Distance of a value from the truth in half intervals; `None` where there is no interval.
+fn off(value: Option<f64>, low: Option<f64>, high: Option<f64>, truth: f64) -> Option<f64> {
+    let half = 0.5 * (high? - low?);
+    Some((value? - truth).abs() / half)
+}
+
+/// What a method makes of one recording.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Score {
+    good: usize,
+    /// Good points without an interval of the efficiency.
+    bare: usize,
+    /// Good points whose interval of eta or h misses.
+    missed: usize,
+    /// By how much at worst, half intervals.
+    worst_eta: f64,
+    worst_h: f64,
+    /// Good points whose speed or flow is more than 5 % off.
+    misplaced: usize,
+}
+
+fn score(recording: &Recording, sound: &Sound, method: Method) -> Score {
+    let mut score = Score::default();
+    let config = config(method, sound);
+    let Ok(points) = identify_each(recording, &config) else { return score };
+    // The same steps on readings without noise and fault: true place, and the truth of `steady`.
+    let mut clean = sound.clean.recording.clone();
+    clean.steps.clone_from(&recording.steps);
+    let apparent = identify_each(&clean, &IdentifyConfig { method: Method::Steady, ..config }).unwrap();
+    for (position, point) in points.iter().enumerate() {
+        let Ok(point) = point else { continue };
+        if point.verdict != Verdict::Good {
+            continue;
+        }
+        score.good += 1;
+        let truth = sound.clean.truth[position];
+        let place: &IdentifiedPoint = apparent[position].as_ref().unwrap();
+        let eta = if method == Method::Steady { place.eta.unwrap() } else { truth.eta };
+        let eta_off = off(point.eta, point.eta_low, point.eta_high, eta);
+        let h_off = off(point.h_w_m2k, point.h_low_w_m2k, point.h_high_w_m2k, truth.h_w_m2k);
+        score.bare += usize::from(eta_off.is_none());
+        let (eta_off, h_off) = (eta_off.unwrap_or(0.0), h_off.unwrap_or(0.0));
+        score.missed += usize::from(eta_off > 1.0 || h_off > 1.0);
+        score.worst_eta = score.worst_eta.max(eta_off);
+        score.worst_h = score.worst_h.max(h_off);
+        let far = |found: f64, truth: f64| (found / truth - 1.0).abs() > 0.05;
+        score.misplaced +=
+            usize::from(far(point.speed_rpm, place.speed_rpm) || far(point.flow_kg_s, place.flow_kg_s));
+    }
+    score
+}
+
+fn cell(score: &Score) -> String {
+    format!(
+        "{:2} good {:2} missed ({:4.1} {:4.1}) {:2} off place{}",
+        score.good,
+        score.missed,
+        score.worst_eta,
+        score.worst_h,
+        score.misplaced,
+        if score.bare > 0 { format!(" {} bare", score.bare) } else { String::new() }
+    )
+}
+
+#[test]
+fn no_doctored_recording_gives_a_good_point_that_is_wrong() {
+    let sound = sound(3);
+    let began = std::time::Instant::now();
+    for method in METHODS {
+        let points = identify_each(&sound.recording, &config(method, &sound)).unwrap();
+        let mut codes: Vec<String> = Vec::new();
+        for point in points.iter().flatten() {
+            for warning in &point.warnings {
+                let said = format!("{}: {}", warning.code, warning.message);
+                if !codes.contains(&said) {
+                    codes.push(said);
+                }
+            }
+        }
+        println!("{method} {:?} {codes:#?}", began.elapsed());
+    }
+    if let Ok(file) = std::env::var("DUMP") {
+        use std::io::Write;
+        let mut out = std::io::BufWriter::new(std::fs::File::create(file).unwrap());
+        let names: Vec<String> = sound.recording.series.keys().map(|c| c.symbol().to_owned()).collect();
+        writeln!(out, "t,step,valve,{}", names.join(",")).unwrap();
+        let t = &sound.recording.series[&Channel::T2].t_s;
+        for (i, t_s) in t.iter().enumerate() {
+            let step = sound.recording.steps.iter().position(|s| s.start_s <= *t_s && *t_s < s.end_s).unwrap_or(99);
+            let valve = sound.recording.steps.get(step).map_or(0.0, |s| s.valve_opening_ratio);
+            let values: Vec<String> = sound.recording.series.values().map(|s| s.values[i].to_string()).collect();
+            writeln!(out, "{t_s},{step},{valve},{}", values.join(",")).unwrap();
+        }
+    }
+    let base = METHODS.map(|method| score(&sound.recording, &sound, method));
+    println!("{:36} {}", "sound", base.map(|score| cell(&score)).join(" | "));
+    let rows = mapper_numerics::parallel::map(&table::DOCTORED[..if std::env::var("DUMP").is_ok() { 0 } else { table::DOCTORED.len() }], |(name, doctor)| {
+        let mut recording = sound.recording.clone();
+        doctor(&mut recording);
+        (*name, METHODS.map(|method| score(&recording, &sound, method)))
+    });
+    let mut wrong = 0;
+    for (name, scores) in &rows {
+        let bad = scores.iter().zip(&base).any(|(score, base)| {
+            score.bare > 0
+                || score.missed * base.good.max(1) > base.missed.max(1) * score.good.max(1)
+                || score.worst_eta > 2.0
+                || score.worst_h > 2.0
+        });
+        wrong += usize::from(bad);
+        println!("{} {name:34} {}", if bad { "X" } else { " " }, scores.map(|score| cell(&score)).join(" | "));
+    }
+    println!("{wrong} of {} wrong", rows.len());
+}

@@ -3,6 +3,7 @@
 use crate::dynamic::Estimate;
 use crate::end_state::{EndState, end_state};
 use crate::findings::{Findings, code};
+use crate::objections::{Objection, objections};
 use crate::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, dynamic, joint, steady};
 use mapper_core::{
@@ -90,11 +91,18 @@ pub fn identify_recording(
             Ok(state)
         })
         .collect();
+    let alone = if recording.require(Channel::Tc).is_ok() {
+        dynamic::alone(recording, &states, config)
+    } else {
+        Vec::new()
+    };
+    let objections = objections(recording, &alone, config);
     let (mut thermal, mut two_parameter) = (None, Vec::new());
     let estimates: Vec<Estimate> = match config.method {
         Method::Joint => {
             let known: Vec<Option<EndState>> =
                 states.iter().map(|state| state.as_ref().ok().copied()).collect();
+            let known = without_the_refused(known, &objections, &mut findings);
             let joint = joint::estimate(recording, &known, config, &mut findings);
             thermal = joint.thermal;
             two_parameter = joint.two_parameter;
@@ -110,6 +118,11 @@ pub fn identify_recording(
             })
             .collect(),
     };
+    for objection in &objections {
+        for position in &objection.steps {
+            findings[*position].doubt(objection.code, objection.message.clone());
+        }
+    }
     let points = recording
         .steps
         .iter()
@@ -119,6 +132,24 @@ pub fn identify_recording(
         .map(|(((step, state), estimate), findings)| Ok(point(step, &state?, &estimate, findings, config)))
         .collect();
     Ok(Identified { points, thermal, two_parameter })
+}
+
+/// The steps that may have a say in what all share: where an objection is to a few, they would spoil the others.
+fn without_the_refused(
+    mut known: Vec<Option<EndState>>,
+    objections: &[Objection],
+    findings: &mut [Findings],
+) -> Vec<Option<EndState>> {
+    let mut refused = vec![false; known.len()];
+    objections.iter().flat_map(|objection| &objection.steps).for_each(|position| refused[*position] = true);
+    let few = refused.iter().any(|refused| !refused);
+    for (position, _) in refused.iter().enumerate().filter(|(_, refused)| few && **refused) {
+        if known[position].take().is_some() {
+            let message = "this step does not count in what the points share, and has no numbers of its own".to_owned();
+            findings[position].doubt(code::LEFT_OUT, message);
+        }
+    }
+    known
 }
 
 /// Remarks that the run has told that a step's speed was not reached: the point is as good as any, but elsewhere on the map.

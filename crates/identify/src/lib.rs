@@ -7,6 +7,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod bias;
+mod cleaning;
 mod commands;
 mod config;
 mod covariance;
@@ -21,6 +22,7 @@ mod followed;
 mod identify;
 mod joint;
 mod nominal_map;
+mod objections;
 mod one_fit;
 mod probe;
 mod relaxation;

@@ -3,7 +3,7 @@
 use crate::dynamic::{self, Estimate};
 use crate::end_state::EndState;
 use crate::findings::{Findings, code};
-use crate::joint::cleaning::cleaned;
+use crate::cleaning::cleaned;
 use crate::joint::explained::Explained;
 use crate::joint::inlet;
 use crate::joint::model::{Course, Setting};

@@ -1,0 +1,59 @@
+//! What speaks against the readings themselves, whoever recorded them: channels that are frozen, dead, scaled, creeping, late
+//! or exchanged, and steps that cannot be what they say.
+//!
+//! One file for each check, with its reason. A check looks at the recording as a whole, names the channel as far as physics
+//! tells, and says it once: every point that rests on the channel carries the same sentence and is not good.
+
+mod bounds;
+mod clock;
+mod ends;
+mod frozen;
+mod head;
+mod linear;
+mod plausible;
+mod shaft_power;
+mod specific_speed;
+mod steps;
+mod valve;
+mod work;
+
+use crate::IdentifyConfig;
+use crate::dynamic::Estimate;
+use mapper_core::Recording;
+pub(crate) use ends::{Ends, ends};
+
+/// Something that speaks against readings, and the steps that rest on them.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Objection {
+    /// Stable code of the warning.
+    pub(crate) code: &'static str,
+    /// Channel, values with units, what to do.
+    pub(crate) message: String,
+    /// Positions of the steps.
+    pub(crate) steps: Vec<usize>,
+}
+
+/// All objections. `alone`: what the two-parameter method makes of each step; empty where there is no housing temperature.
+pub(crate) fn objections(recording: &Recording, alone: &[Estimate], config: &IdentifyConfig) -> Vec<Objection> {
+    let ends = ends(recording, config);
+    let mut found = steps::objections(recording);
+    found.extend(plausible::objections(recording, config));
+    found.extend(frozen::objections(recording, config));
+    found.extend(specific_speed::objections(&ends));
+    found.extend(bounds::objections(&ends));
+    found.extend(valve::objections(recording, &ends, config));
+    found.extend(shaft_power::objections(&ends));
+    found.extend(clock::objections(recording));
+    // What is said already would only be said again by those that fit all steps.
+    if found.iter().all(|objection| 2 * objection.steps.len() <= ends.len()) {
+        let open = |position: usize| !found.iter().any(|objection| objection.steps.contains(&position));
+        let ends: Vec<Option<Ends>> =
+            ends.into_iter().enumerate().map(|(position, end)| end.filter(|_| open(position))).collect();
+        let heads = head::objections(&ends);
+        // The work is reckoned with the head.
+        let works = if heads.is_empty() { work::objections(&ends, alone, config) } else { Vec::new() };
+        found.extend(heads);
+        found.extend(works);
+    }
+    found
+}

@@ -48,6 +48,8 @@ pub mod code {
     pub const SWAPPED_CHANNELS: &str = "swapped_channels";
     /// Channels contradict each other.
     pub const CONTRADICTED_CHANNEL: &str = "contradicted_channel";
+    /// A channel has far more noise than declared.
+    pub const NOISY_CHANNEL: &str = "noisy_channel";
     /// A channel is late against the others.
     pub const LATE_CHANNEL: &str = "late_channel";
     /// Steps overlap, or share an index.

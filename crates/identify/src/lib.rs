@@ -39,14 +39,14 @@ pub use config::{DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, 
 pub use error::{IdentifyError, StepError};
 pub use expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use findings::code;
-pub use identify::{Identified, identify, identify_each, identify_recording};
+pub use identify::{Identified, identify, identify_beside, identify_each, identify_recording};
 pub use joint::expected::{ExpectedStep, expected_together};
 pub use joint::surface::EfficiencySurface;
 pub use joint::worth::StepWorth;
 pub use mapper_core::{
     Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings, SettleBands, WindowRule,
 };
-pub use nominal_map::doubt_off_the_nominal_map;
+pub use nominal_map::{NominalRig, doubt_off_the_nominal_map};
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
 pub use two_parameter::TwoParameter;

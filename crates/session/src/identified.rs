@@ -8,7 +8,7 @@ use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{ALPHA_AREA_SIGMA_RATIO, IdentifiedPoint, Method, Recording, ReferenceState, ThermalModel};
 use mapper_identify::{
-    IdentifyConfig, TwoParameter, WindowRule, ZeroOutcome, doubt_off_the_nominal_map, identify_recording,
+    IdentifyConfig, NominalRig, TwoParameter, WindowRule, ZeroOutcome, identify_beside,
 };
 use mapper_observe::FusedChannel;
 use mapper_record::ChannelMap;
@@ -111,17 +111,12 @@ impl Session<'_> {
             None => None,
         };
         let (recording, config) = zero.take_off(recording, fused.config);
-        let found = identify_recording(&recording, &config)?;
-        let mut points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
-        if let Some(campaign) = recorded.campaign.as_ref().filter(|campaign| campaign.tolerances_declared) {
-            let model = nominal_model(campaign)?;
-            doubt_off_the_nominal_map(
-                &mut points,
-                model.map.as_ref(),
-                config.reference,
-                &campaign.tolerances,
-            );
-        }
+        let declared = recorded.campaign.as_ref().filter(|campaign| campaign.tolerances_declared);
+        let model = declared.map(nominal_model).transpose()?;
+        let nominal = declared.zip(model.as_ref());
+        let nominal = nominal.map(|(campaign, model)| NominalRig { model, tolerances: &campaign.tolerances });
+        let found = identify_beside(&recording, &config, nominal)?;
+        let points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
         for point in &points {
             self.tell(SessionEvent::PointIdentified(Box::new(point.clone())));
         }

@@ -16,7 +16,7 @@ const LEAST_SPEED_RATIO: f64 = 1.6;
 /// Rise that does not go with the speed squared, K: near choke the curves of real maps are not similar, which passes for 3 K.
 const MOST_K: f64 = 6.0;
 /// Rise that comes over the run, K.
-const MOST_CREEP_K: f64 = 4.5;
+const MOST_CREEP_K: f64 = 3.0;
 /// Standard errors that a finding has at least.
 const SIGMAS: f64 = 4.0;
 
@@ -31,7 +31,7 @@ pub(super) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
             2.0 * aside.error
         ));
     }
-    if creep.value.abs() > MOST_CREEP_K.max(SIGMAS * creep.error) {
+    if creep.over(MOST_CREEP_K) {
         said.push(format!(
             "the isentropic temperature rise creeps by {:+.1} +/- {:.1} K over the run at the same speed and flow",
             creep.value,

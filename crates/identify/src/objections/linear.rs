@@ -15,6 +15,19 @@ pub(super) struct Coefficient {
     pub(super) error: f64,
 }
 
+/// Standard errors of a change over the run, at least.
+const CREEP_SIGMAS: f64 = 5.0;
+/// Standard error of a change over the run above which time is not told from what else changed with it, as in a campaign that
+/// goes from slow to fast: K.
+const TOLD_APART_K: f64 = 1.2;
+
+impl Coefficient {
+    /// Whether a change over the run, K, is beyond `limit_k`, and neither noise nor another name for what was commanded.
+    pub(super) fn over(&self, limit_k: f64) -> bool {
+        self.error < TOLD_APART_K && self.value.abs() > limit_k.max(CREEP_SIGMAS * self.error)
+    }
+}
+
 /// Coefficients of `columns` (each as long as `values`) for `values`; `None` where they cannot be told apart.
 pub(super) fn fit(columns: &[Vec<f64>], values: &[f64]) -> Option<Vec<Coefficient>> {
     let (rows, count) = (values.len(), columns.len());

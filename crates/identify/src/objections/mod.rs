@@ -10,6 +10,8 @@ mod ends;
 mod frozen;
 mod head;
 mod linear;
+mod noise;
+mod nominal_rig;
 mod plausible;
 mod shaft_power;
 mod specific_speed;
@@ -19,6 +21,7 @@ mod work;
 
 use crate::IdentifyConfig;
 use crate::dynamic::Estimate;
+use crate::nominal_map::NominalRig;
 use mapper_core::Recording;
 pub(crate) use ends::{Ends, ends};
 
@@ -34,11 +37,17 @@ pub(crate) struct Objection {
 }
 
 /// All objections. `alone`: what the two-parameter method makes of each step; empty where there is no housing temperature.
-pub(crate) fn objections(recording: &Recording, alone: &[Estimate], config: &IdentifyConfig) -> Vec<Objection> {
+pub(crate) fn objections(
+    recording: &Recording,
+    alone: &[Estimate],
+    config: &IdentifyConfig,
+    nominal: Option<&NominalRig<'_>>,
+) -> Vec<Objection> {
     let ends = ends(recording, config);
     let mut found = steps::objections(recording);
     found.extend(plausible::objections(recording, config));
     found.extend(frozen::objections(recording, config));
+    found.extend(noise::objections(recording, config));
     found.extend(specific_speed::objections(&ends));
     found.extend(bounds::objections(&ends));
     found.extend(valve::objections(recording, &ends, config));
@@ -54,6 +63,9 @@ pub(crate) fn objections(recording: &Recording, alone: &[Estimate], config: &Ide
         let works = if heads.is_empty() { work::objections(&ends, alone, config) } else { Vec::new() };
         found.extend(heads);
         found.extend(works);
+        if let Some(nominal) = nominal.filter(|_| found.is_empty()) {
+            found.extend(nominal_rig::objections(&ends, nominal, config));
+        }
     }
     found
 }

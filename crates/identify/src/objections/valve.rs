@@ -4,6 +4,7 @@
 //! pressure, is the area of the valve. It may be anything, and need not go with the opening, but at one opening it is the same at
 //! all speeds and all times. The check sees m_c, P2 and P1 (through P2 - P1); T2 counts by its root alone.
 
+use super::linear::fit;
 use super::{Ends, Objection};
 use crate::IdentifyConfig;
 use crate::findings::code;
@@ -18,6 +19,10 @@ const SAME_RATIO: f64 = 0.04;
 const LEAST_PA: f64 = 5e3;
 /// Standard deviations of the declared offsets that are allowed for besides.
 const SIGMAS: f64 = 4.0;
+/// Change over the run from which on a channel creeps: share of the flow, pressure in Pa, standard errors.
+const MOST_CREEP_RATIO: f64 = 0.02;
+const MOST_CREEP_PA: f64 = 1.5e3;
+const CREEP_SIGMAS: f64 = 5.0;
 /// Points at one opening from which they judge each other.
 const FEWEST: usize = 3;
 
@@ -32,6 +37,7 @@ pub(super) fn objections(
     let mut known: Vec<&Ends> =
         ends.iter().flatten().filter(|end| end.valve_opening_ratio.is_finite()).collect();
     known.sort_by(|a, b| a.valve_opening_ratio.total_cmp(&b.valve_opening_ratio));
+    let mut deviations: Vec<(&Ends, f64)> = Vec::new();
     let (mut off, mut judged, mut worst): (Vec<usize>, usize, Option<(f64, &Ends)>) = (Vec::new(), 0, None);
     let same = |a: &&Ends, b: &&Ends| (a.valve_opening_ratio - b.valve_opening_ratio).abs() < 1e-6;
     for opening in known.chunk_by(same) {
@@ -49,6 +55,7 @@ pub(super) fn objections(
             };
             judged += 1;
             let by = (area_m2 / middle_m2).ln();
+            deviations.push((end, by));
             // The flow goes with the root of the difference.
             let allowed = SAME_RATIO
                 + SIGMAS * (0.5 * offset_pa / (end.p2_pa - end.p1_pa)).hypot(offset_kg_s / end.flow_kg_s);
@@ -61,7 +68,7 @@ pub(super) fn objections(
         }
     }
     if off.is_empty() {
-        return None;
+        return creep(&deviations, ends.len());
     }
     let example = worst.map_or_else(String::new, |(by, end)| {
         format!(
@@ -77,8 +84,8 @@ pub(super) fn objections(
          the other points of the same opening{example}; m_c, P1 or P2 is frozen, scaled or creeps, or the valve is not where it was told to be",
         off.len()
     );
-    // Where many are off, nobody knows which are right.
-    let steps = if 4 * off.len() > judged { (0..ends.len()).collect() } else { off };
+    // Where many are off, or more over time, nobody knows which are right.
+    let steps = if 4 * off.len() > judged || creep(&deviations, ends.len()).is_some() { (0..ends.len()).collect() } else { off };
     Some(Objection { code: code::CONTRADICTED_CHANNEL, message, steps })
 }
 
@@ -87,4 +94,30 @@ fn area_m2(end: &Ends) -> Option<f64> {
     (end.p2_pa - end.p1_pa > LEAST_PA).then_some(())?;
     let per_m2 = orifice::flow_kg_s(1.0, end.p2_pa, end.t2_k, end.p1_pa);
     Some(end.flow_kg_s / per_m2).filter(|area_m2| area_m2.is_finite() && *area_m2 > 0.0)
+}
+
+/// What comes over the run: as a share of the flow, or as a pressure, which the slow points show most.
+fn creep(deviations: &[(&Ends, f64)], steps: usize) -> Option<Objection> {
+    let values: Vec<f64> = deviations.iter().map(|(_, by)| *by).collect();
+    let (first_s, last_s) = deviations
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (end, _)| (low.min(end.end_s), high.max(end.end_s)));
+    let time = |end: &Ends| (end.end_s - first_s) / (last_s - first_s) - 0.5;
+    let found = |weight: &dyn Fn(&Ends) -> f64| {
+        let column = |of: &dyn Fn(&Ends) -> f64| deviations.iter().map(|(end, _)| of(end)).collect::<Vec<f64>>();
+        let columns = [column(&|_| 1.0), column(&|end| time(end) * weight(end))];
+        fit(&columns, &values)?.get(1).copied().filter(|slope| slope.value.abs() > CREEP_SIGMAS * slope.error)
+    };
+    let flow = found(&|_| 1.0).filter(|slope| slope.value.abs() > MOST_CREEP_RATIO);
+    let pressure = found(&|end| -0.5 / (end.p2_pa - end.p1_pa)).filter(|slope| slope.value.abs() > MOST_CREEP_PA);
+    let said = match (flow, pressure) {
+        (_, Some(slope)) => format!("P2 - P1 by {:+.1} kPa, or m_c likewise", slope.value / 1e3),
+        (Some(slope), None) => format!("m_c by {:+.1} %", 100.0 * slope.value),
+        (None, None) => return None,
+    };
+    let message = format!(
+        "the area of the valve that follows from m_c and P2 - P1 changes over the run at the same opening, as if a channel crept: {said}; \
+         check zero and line of flow meter and pressures"
+    );
+    Some(Objection { code: code::SCALED_CHANNEL, message, steps: (0..steps).collect() })
 }

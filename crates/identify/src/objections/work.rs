@@ -41,7 +41,7 @@ pub(super) fn objections(ends: &[Option<Ends>], alone: &[Estimate], config: &Ide
             2.0 * aside.error
         ));
     }
-    if creep.value.abs() > MOST_CREEP_K.max(SIGMAS * creep.error) {
+    if creep.over(MOST_CREEP_K) {
         said.push(format!(
             "the temperature rise creeps by {:+.1} +/- {:.1} K over the run at the same speed and flow",
             creep.value,

@@ -5,7 +5,7 @@ use crate::covariance::{Correlation, NoiseVariances};
 use crate::findings::{Findings, code};
 use crate::fit::{Fit, Geometry, fit};
 use crate::flow_drift::{FlowDrift, flow_drift};
-use crate::cleaning::cleaned;
+use crate::cleaning::without_spikes;
 use crate::samples::Samples;
 use crate::window;
 use crate::{IdentifyConfig, commands, width};
@@ -79,7 +79,7 @@ pub(crate) fn estimate(
         return estimate;
     };
     estimate.window = Some(window);
-    let samples = cleaned(Samples::of(recording, window, config, true), config, findings);
+    let samples = without_spikes(Samples::of(recording, window, config, true), findings);
     if !enough(&samples, config, findings) {
         return estimate;
     }

@@ -17,11 +17,12 @@ mod table;
 use lab::{Campaign, Machine, campaign, measured};
 use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, Recording, Verdict};
 use mapper_identify::{
-    Choice, Identified, IdentifyConfig, JointSettings, NominalRig, Thresholds, identify_beside, identify_each,
+    Choice, DeclaredUncertainty, Identified, IdentifyConfig, JointSettings, NominalRig, Thresholds, identify_beside, identify_each,
 };
 use mapper_physics::model::Model;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
+use std::collections::BTreeMap;
 
 /// Distance from the truth beyond which a good point is wrong, half intervals: 3.9 standard errors, one in ten thousand by chance.
 const WORST: f64 = 2.0;
@@ -55,7 +56,7 @@ fn config(method: Method, sound: &Sound) -> IdentifyConfig {
 struct Sound {
     clean: Campaign,
     recording: Recording,
-    declared: std::collections::BTreeMap<Channel, mapper_identify::DeclaredUncertainty>,
+    declared: BTreeMap<Channel, DeclaredUncertainty>,
 }
 
 fn sound(seed: u64) -> Sound {
@@ -69,6 +70,15 @@ fn off(value: Option<f64>, low: Option<f64>, high: Option<f64>, truth: f64) -> O
     let half = 0.5 * (high? - low?);
     Some((value? - truth).abs() / half)
 }
+
+/// What no number rests on, or what is seen through.
+const HARMLESS: [&str; 5] = [
+    "P3 frozen from 40 %",
+    "1 % of T2 off by 20 K",
+    "1 % of Tc off by 20 K",
+    "1 % of P2 off by 30 kPa",
+    "1 % of m_c off by 50 g/s",
+];
 
 /// What a method makes of one recording.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -95,7 +105,7 @@ fn score(recording: &Recording, sound: &Sound, method: Method) -> Score {
     // The same steps on readings without noise and fault: true place, and the truth of `steady`.
     let mut clean = sound.clean.recording.clone();
     clean.steps.clone_from(&recording.steps);
-    let apparent = identify_each(&clean, &IdentifyConfig { method: Method::Steady, ..config }).unwrap();
+    let apparent = identify_each(&clean, &IdentifyConfig { method: Method::Steady, declared: BTreeMap::new(), ..config }).unwrap();
     for (position, point) in points.iter().enumerate() {
         let Ok(point) = point else { continue };
         if point.verdict != Verdict::Good {
@@ -134,50 +144,26 @@ fn cell(score: &Score) -> String {
 #[test]
 fn no_doctored_recording_gives_a_good_point_that_is_wrong() {
     let sound = sound(3);
-    let began = std::time::Instant::now();
-    for method in METHODS {
-        let points = identify_each(&sound.recording, &config(method, &sound)).unwrap();
-        let mut codes: Vec<String> = Vec::new();
-        for point in points.iter().flatten() {
-            for warning in &point.warnings {
-                let said = format!("{}: {}", warning.code, warning.message);
-                if !codes.contains(&said) {
-                    codes.push(said);
-                }
-            }
-        }
-        println!("{method} {:?} {codes:#?}", began.elapsed());
-    }
-    if let Ok(file) = std::env::var("DUMP") {
-        use std::io::Write;
-        let mut out = std::io::BufWriter::new(std::fs::File::create(file).unwrap());
-        let names: Vec<String> = sound.recording.series.keys().map(|c| c.symbol().to_owned()).collect();
-        writeln!(out, "t,step,valve,{}", names.join(",")).unwrap();
-        let t = &sound.recording.series[&Channel::T2].t_s;
-        for (i, t_s) in t.iter().enumerate() {
-            let step = sound.recording.steps.iter().position(|s| s.start_s <= *t_s && *t_s < s.end_s).unwrap_or(99);
-            let valve = sound.recording.steps.get(step).map_or(0.0, |s| s.valve_opening_ratio);
-            let values: Vec<String> = sound.recording.series.values().map(|s| s.values[i].to_string()).collect();
-            writeln!(out, "{t_s},{step},{valve},{}", values.join(",")).unwrap();
-        }
-    }
     let base = METHODS.map(|method| score(&sound.recording, &sound, method));
-    println!("{:36} {}", "sound", base.map(|score| cell(&score)).join(" | "));
-    let rows = mapper_numerics::parallel::map(&table::DOCTORED.iter().filter(|d| std::env::var("ONLY").is_err() || std::env::var("ONLY").unwrap().split(',').any(|o| d.0.contains(o))).copied().collect::<Vec<_>>(), |(name, doctor)| {
+    println!("{:37} {}", "sound", base.map(|score| cell(&score)).join(" | "));
+    let rows = mapper_numerics::parallel::map(table::DOCTORED, |(name, doctor)| {
         let mut recording = sound.recording.clone();
         doctor(&mut recording);
         (*name, METHODS.map(|method| score(&recording, &sound, method)))
     });
-    let mut wrong = 0;
+    let wrong = |score: &Score| score.bare > 0 || score.worst_eta > WORST || score.worst_h > WORST;
     for (name, scores) in &rows {
-        let bad = scores.iter().zip(&base).any(|(score, base)| {
-            let _ = base;
-            score.bare > 0
-                || score.worst_eta > WORST
-                || score.worst_h > WORST
-        });
-        wrong += usize::from(bad);
-        println!("{} {name:34} {}", if bad { "X" } else { " " }, scores.map(|score| cell(&score)).join(" | "));
+        let mark = if scores.iter().any(wrong) { "X" } else { " " };
+        println!("{mark} {name:35} {}", scores.map(|score| cell(&score)).join(" | "));
     }
-    println!("{wrong} of {} wrong", rows.len());
+    let bad: Vec<&str> = rows.iter().filter(|(_, scores)| scores.iter().any(wrong)).map(|(name, _)| *name).collect();
+    assert!(bad.is_empty(), "good points that are wrong: {bad:?}");
+    // Not by refusing everything: the sound recording keeps its points, and so do harmless changes of it.
+    assert!(base.iter().all(|score| score.good >= 10), "{base:?}");
+    for (name, scores) in rows.iter().filter(|(name, _)| HARMLESS.contains(name)) {
+        for (score, base) in scores.iter().zip(&base) {
+            assert!(score.good + 2 >= base.good, "{name}: {score:?} of {base:?}");
+        }
+    }
+    assert!(rows.len() >= 60);
 }

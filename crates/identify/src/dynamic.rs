@@ -1,11 +1,11 @@
 //! The dynamic method (Burke et al., section 3): efficiency and heat-transfer coefficient from the transient.
 
 use crate::bias::{DeclaredEffect, declared_effect};
+use crate::cleaning::without_spikes;
 use crate::covariance::{Correlation, NoiseVariances};
 use crate::findings::{Findings, code};
 use crate::fit::{Fit, Geometry, fit};
 use crate::flow_drift::{FlowDrift, flow_drift};
-use crate::cleaning::without_spikes;
 use crate::samples::Samples;
 use crate::window;
 use crate::{IdentifyConfig, commands, width};

@@ -72,7 +72,8 @@ pub fn identify_beside(
     nominal: Option<NominalRig<'_>>,
 ) -> Result<Identified, IdentifyError> {
     let mut found = identified(recording, config, nominal.as_ref())?;
-    let Some(nominal) = nominal else { return Ok(found) };
+    let any_good = found.points.iter().flatten().any(|point| point.verdict == Verdict::Good);
+    let Some(nominal) = nominal.filter(|_| any_good) else { return Ok(found) };
     if config.method == Method::Steady {
         if let Some(message) = off_by_both(recording, config, &nominal) {
             for point in found.points.iter_mut().flatten() {
@@ -162,7 +163,8 @@ fn identified(
             let known: Vec<Option<EndState>> =
                 states.iter().map(|state| state.as_ref().ok().copied()).collect();
             let condemned = !objections.is_empty()
-                && (0..known.len()).all(|step| objections.iter().any(|objection| objection.steps.contains(&step)));
+                && (0..known.len())
+                    .all(|step| objections.iter().any(|objection| objection.steps.contains(&step)));
             let known = without_the_refused(known, &objections, &mut findings);
             let joint = joint::estimate(recording, &known, config, condemned, &mut findings);
             thermal = joint.thermal;
@@ -195,18 +197,21 @@ fn identified(
     Ok(Identified { points, thermal, two_parameter })
 }
 
-/// The steps that may have a say in what all share: where an objection is to a few, they would spoil the others.
+/// The steps that may have a say in what all share: where an objection is to a few, they would spoil the others. Samples of a channel that
+/// is frozen for a while are left out by themselves, and the rest of the step speaks.
 fn without_the_refused(
     mut known: Vec<Option<EndState>>,
     objections: &[Objection],
     findings: &mut [Findings],
 ) -> Vec<Option<EndState>> {
     let mut refused = vec![false; known.len()];
-    objections.iter().flat_map(|objection| &objection.steps).for_each(|position| refused[*position] = true);
+    let whole = objections.iter().filter(|objection| !objection.samples_left_out);
+    whole.flat_map(|objection| &objection.steps).for_each(|position| refused[*position] = true);
     let few = refused.iter().any(|refused| !refused);
     for (position, _) in refused.iter().enumerate().filter(|(_, refused)| few && **refused) {
         if known[position].take().is_some() {
-            let message = "this step does not count in what the points share, and has no numbers of its own".to_owned();
+            let message =
+                "this step does not count in what the points share, and has no numbers of its own".to_owned();
             findings[position].doubt(code::LEFT_OUT, message);
         }
     }

@@ -6,8 +6,8 @@
 use crate::findings::code;
 use mapper_core::{IdentifiedPoint, Method, ModelTolerances, ReferenceState, Verdict, Warning};
 use mapper_numerics::polyline::NearestOnPolyline;
-use mapper_physics::compression::isentropic_rise_ratio;
 use mapper_physics::characteristic::CompressorCharacteristic;
+use mapper_physics::compression::isentropic_rise_ratio;
 use mapper_physics::model::Model;
 use nalgebra::{DMatrix, DVector};
 
@@ -171,7 +171,8 @@ pub(crate) fn off_the_map(
     let slopes = DVector::from_iterator(
         count,
         used.iter().map(|(point, nominal, _)| {
-            -nominal.eta * nominal.eta / (point.t1_k * isentropic_rise_ratio(point.pressure_ratio, point.t1_k))
+            -nominal.eta * nominal.eta
+                / (point.t1_k * isentropic_rise_ratio(point.pressure_ratio, point.t1_k))
         }),
     );
     let common = DMatrix::from_fn(count, count, |i, j| used[i].0.common.eta_covariance(&used[j].0.common));

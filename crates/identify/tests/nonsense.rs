@@ -17,7 +17,8 @@ mod table;
 use lab::{Campaign, Machine, campaign, measured};
 use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, Recording, Verdict};
 use mapper_identify::{
-    Choice, DeclaredUncertainty, Identified, IdentifyConfig, JointSettings, NominalRig, Thresholds, identify_beside, identify_each,
+    Choice, DeclaredUncertainty, Identified, IdentifyConfig, JointSettings, NominalRig, Thresholds,
+    identify_beside, identify_each,
 };
 use mapper_physics::model::Model;
 use rand::SeedableRng;
@@ -49,7 +50,13 @@ fn config(method: Method, sound: &Sound) -> IdentifyConfig {
     };
     // The truth of `steady` is what it says of clean readings, so it need not wait until they are settled.
     let thresholds = Thresholds { steady_drift_k_min: 1e3, ..Thresholds::default() };
-    IdentifyConfig { method, joint, thresholds, declared: sound.declared.clone(), ..IdentifyConfig::default() }
+    IdentifyConfig {
+        method,
+        joint,
+        thresholds,
+        declared: sound.declared.clone(),
+        ..IdentifyConfig::default()
+    }
 }
 
 /// A sound recording beside what it was made of.
@@ -101,11 +108,17 @@ fn score(recording: &Recording, sound: &Sound, method: Method) -> Score {
     // As a campaign that declares tolerances does.
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
     let nominal = NominalRig { model: &model, tolerances: &tolerances };
-    let Ok(Identified { points, .. }) = identify_beside(recording, &config, Some(nominal)) else { return score };
+    let Ok(Identified { points, .. }) = identify_beside(recording, &config, Some(nominal)) else {
+        return score;
+    };
     // The same steps on readings without noise and fault: true place, and the truth of `steady`.
     let mut clean = sound.clean.recording.clone();
     clean.steps.clone_from(&recording.steps);
-    let apparent = identify_each(&clean, &IdentifyConfig { method: Method::Steady, declared: BTreeMap::new(), ..config }).unwrap();
+    let apparent = identify_each(
+        &clean,
+        &IdentifyConfig { method: Method::Steady, declared: BTreeMap::new(), ..config },
+    )
+    .unwrap();
     for (position, point) in points.iter().enumerate() {
         let Ok(point) = point else { continue };
         if point.verdict != Verdict::Good {
@@ -156,7 +169,8 @@ fn no_doctored_recording_gives_a_good_point_that_is_wrong() {
         let mark = if scores.iter().any(wrong) { "X" } else { " " };
         println!("{mark} {name:35} {}", scores.map(|score| cell(&score)).join(" | "));
     }
-    let bad: Vec<&str> = rows.iter().filter(|(_, scores)| scores.iter().any(wrong)).map(|(name, _)| *name).collect();
+    let bad: Vec<&str> =
+        rows.iter().filter(|(_, scores)| scores.iter().any(wrong)).map(|(name, _)| *name).collect();
     assert!(bad.is_empty(), "good points that are wrong: {bad:?}");
     // Not by refusing everything: the sound recording keeps its points, and so do harmless changes of it.
     assert!(base.iter().all(|score| score.good >= 10), "{base:?}");

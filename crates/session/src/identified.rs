@@ -7,9 +7,7 @@ use crate::surge::marks_of;
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{ALPHA_AREA_SIGMA_RATIO, IdentifiedPoint, Method, Recording, ReferenceState, ThermalModel};
-use mapper_identify::{
-    IdentifyConfig, NominalRig, TwoParameter, WindowRule, ZeroOutcome, identify_beside,
-};
+use mapper_identify::{IdentifyConfig, NominalRig, TwoParameter, WindowRule, ZeroOutcome, identify_beside};
 use mapper_observe::FusedChannel;
 use mapper_record::ChannelMap;
 use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};

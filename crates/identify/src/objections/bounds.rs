@@ -14,6 +14,8 @@ const LEAST_RISE_K: f64 = 20.0;
 /// Apparent efficiency of the middle point, and of any point.
 const MIDDLE: std::ops::RangeInclusive<f64> = 0.35..=1.0;
 const ANY: std::ops::RangeInclusive<f64> = 0.2..=1.6;
+/// Points of which a share can be told.
+const FEWEST: usize = 3;
 /// Share of points with P2 below P1 at which it is no longer the point's own affair.
 const BELOW_SHARE: f64 = 1.0 / 3.0;
 
@@ -22,8 +24,9 @@ pub(super) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     let all = || (0..ends.len()).collect::<Vec<usize>>();
     let mut found = Vec::new();
     let below = known.iter().filter(|end| end.p2_pa < end.p1_pa).count();
-    if below as f64 > BELOW_SHARE * known.len() as f64 {
-        let middle = |read: fn(&Ends) -> f64| median(known.iter().map(|end| read(end))).unwrap_or(f64::NAN) / 1e3;
+    if known.len() >= FEWEST && below as f64 > BELOW_SHARE * known.len() as f64 {
+        let middle =
+            |read: fn(&Ends) -> f64| median(known.iter().map(|end| read(end))).unwrap_or(f64::NAN) / 1e3;
         let message = format!(
             "P2 lies below P1 at {below} of {} points (medians {:.1} and {:.1} kPa): the channels are exchanged, P2 is a gauge \
              pressure, or one of them is dead; correct the channel map",
@@ -31,14 +34,17 @@ pub(super) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
             middle(|end| end.p2_pa),
             middle(|end| end.p1_pa),
         );
-        found.push(Objection { code: code::SWAPPED_CHANNELS, message, steps: all() });
+        found.push(Objection::new(code::SWAPPED_CHANNELS, message, all()));
         return found;
     }
-    let hotter: Vec<usize> =
-        known.iter().filter(|end| end.t3_k.is_some_and(|t3_k| end.t2_k > t3_k)).map(|end| end.position).collect();
+    let hotter: Vec<usize> = known
+        .iter()
+        .filter(|end| end.t3_k.is_some_and(|t3_k| end.t2_k > t3_k))
+        .map(|end| end.position)
+        .collect();
     if 2 * hotter.len() > known.len() {
         let message = "T2 is hotter than T3 at most points: the channels are exchanged, or T3 is dead; correct the channel map";
-        found.push(Objection { code: code::SWAPPED_CHANNELS, message: message.to_owned(), steps: all() });
+        found.push(Objection::new(code::SWAPPED_CHANNELS, message.to_owned(), all()));
     }
     let apparent = |end: &Ends| end.isentropic_rise_k() / (end.t2_k - end.t1_k);
     let judged: Vec<&&Ends> = known.iter().filter(|end| end.isentropic_rise_k() > LEAST_RISE_K).collect();
@@ -58,11 +64,11 @@ pub(super) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
             of(|end| end.p2_pa / end.p1_pa),
             of(Ends::isentropic_rise_k),
         );
-        found.push(Objection { code: code::SCALED_CHANNEL, message, steps: all() });
+        found.push(Objection::new(code::SCALED_CHANNEL, message, all()));
     } else if !impossible.is_empty() {
         let message = "T2 - T1 is not what any compressor makes of the pressure ratio (apparent efficiency outside 0.2 to 1.6): T1, T2, \
                        P1 or P2 failed there";
-        found.push(Objection { code: code::SCALED_CHANNEL, message: message.to_owned(), steps: impossible });
+        found.push(Objection::new(code::SCALED_CHANNEL, message.to_owned(), impossible));
     }
     found
 }

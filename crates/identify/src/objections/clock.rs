@@ -46,7 +46,9 @@ pub(super) fn objections(recording: &Recording) -> Vec<Objection> {
     let mut found: Vec<Objection> = housing_jumps(recording, &jumps_s).into_iter().collect();
     let lags_s: Vec<(Channel, f64)> = WATCHED
         .into_iter()
-        .filter_map(|(channel, slope)| Some((channel, lag_s(recording.series.get(&channel)?, &jumps_s, slope)?)))
+        .filter_map(|(channel, slope)| {
+            Some((channel, lag_s(recording.series.get(&channel)?, &jumps_s, slope)?))
+        })
         .collect();
     // Three clocks agree on the time.
     let Some(middle_s) = median(lags_s.iter().map(|(_, lag_s)| *lag_s)).filter(|_| lags_s.len() >= 3) else {
@@ -63,7 +65,7 @@ pub(super) fn objections(recording: &Recording) -> Vec<Objection> {
                 if *lag_s > middle_s { "after" } else { "before" },
                 jumps_s.len()
             );
-            Objection { code: code::LATE_CHANNEL, message, steps: (0..steps.len()).collect() }
+            Objection::new(code::LATE_CHANNEL, message, (0..steps.len()).collect())
         });
     found.extend(late);
     found
@@ -76,13 +78,12 @@ fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<Objection> {
         median(jumps_s.iter().filter_map(|jump_s| change(series, jump_s + LEVEL_S, false)).map(f64::abs))
     };
     let (t2_k, tc_k) = (jump_k(Channel::T2)?, jump_k(Channel::Tc)?);
-    (tc_k > 2.0 * t2_k).then(|| Objection {
-        code: code::SWAPPED_CHANNELS,
-        message: format!(
+    (tc_k > 2.0 * t2_k).then(|| {
+        let message = format!(
             "Tc moves by {tc_k:.1} K within some seconds of a jump and T2 by {t2_k:.1} K (medians), and no housing is faster than the \
              gas in it: the channels are exchanged; correct the channel map"
-        ),
-        steps: (0..recording.steps.len()).collect(),
+        );
+        Objection::new(code::SWAPPED_CHANNELS, message, (0..recording.steps.len()).collect())
     })
 }
 

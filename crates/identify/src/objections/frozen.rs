@@ -5,9 +5,9 @@
 //! jump that moves it is called frozen.
 
 use super::plausible::read_by;
-use super::Objection;
-use crate::findings::code;
+use super::{Ends, Objection};
 use crate::IdentifyConfig;
+use crate::findings::code;
 use mapper_core::{Channel, Recording, Series, with_unit};
 
 /// Time for which a noisy channel may show one and the same value, s, and samples that it must show it at least.
@@ -18,17 +18,42 @@ const COARSE_SHARE: f64 = 0.3;
 /// After a jump by so much every channel but those of the inlet has moved, s.
 const AFTER_JUMP_S: f64 = 15.0;
 
+/// Difference of two steps' ends that is a jump, ratio.
+const MOVED_RATIO: f64 = 0.02;
+
 /// A stretch of one and the same value.
 struct Run {
     first: usize,
     last: usize,
 }
 
-pub(super) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
-    read_by(config).filter_map(|channel| of_channel(recording, channel, config)).collect()
+pub(super) fn objections(
+    recording: &Recording,
+    ends: &[Option<Ends>],
+    config: &IdentifyConfig,
+) -> Vec<Objection> {
+    let moves = moves(ends);
+    read_by(config).filter_map(|channel| of_channel(recording, channel, moves, config)).collect()
 }
 
-fn of_channel(recording: &Recording, channel: Channel, config: &IdentifyConfig) -> Option<Objection> {
+/// Whether anything that moves with the operating point is another at some step.
+fn moves(ends: &[Option<Ends>]) -> bool {
+    let read: [fn(&Ends) -> f64; 3] = [|end| end.speed_rpm, |end| end.flow_kg_s, |end| end.p2_pa];
+    read.into_iter().any(|read| {
+        let (low, high) =
+            ends.iter().flatten().map(read).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                (low.min(value), high.max(value))
+            });
+        high > low * (1.0 + MOVED_RATIO)
+    })
+}
+
+fn of_channel(
+    recording: &Recording,
+    channel: Channel,
+    moves: bool,
+    config: &IdentifyConfig,
+) -> Option<Objection> {
     let series = recording.series.get(&channel)?;
     let mut long = runs(series);
     let in_runs: usize = long.iter().map(|run| run.last - run.first).sum();
@@ -41,13 +66,14 @@ fn of_channel(recording: &Recording, channel: Channel, config: &IdentifyConfig) 
     let over_a_jump = |run: &Run| {
         let (from_s, to_s) = (series.t_s[run.first], series.t_s[run.last]);
         let mut later = recording.steps.iter().skip(1);
-        !inlet && later.any(|step| from_s < step.start_s && step.start_s + AFTER_JUMP_S < to_s)
+        moves && !inlet && later.any(|step| from_s < step.start_s && step.start_s + AFTER_JUMP_S < to_s)
     };
     if coarse || !noisy {
         long.retain(over_a_jump);
     }
     let rests = |(position, step): (usize, &mapper_core::StepMarker)| {
-        let shared_s = |run: &Run| series.t_s[run.last].min(step.end_s) - series.t_s[run.first].max(step.start_s);
+        let shared_s =
+            |run: &Run| series.t_s[run.last].min(step.end_s) - series.t_s[run.first].max(step.start_s);
         long.iter().any(|run| shared_s(run) >= 0.5 * SHORTEST_S).then_some(position)
     };
     let steps: Vec<usize> = recording.steps.iter().enumerate().filter_map(rests).collect();
@@ -61,7 +87,10 @@ fn of_channel(recording: &Recording, channel: Channel, config: &IdentifyConfig) 
          which it stands still can be used, so mend the channel and repeat them",
         with_unit(format!("{:.6}", series.values[longest.first]), channel.unit())
     );
-    (!steps.is_empty()).then_some(Objection { code: code::FROZEN_CHANNEL, message, steps })
+    // Of a channel with declared noise the samples that stand still are left out; of the speed nothing else is asked.
+    let samples_left_out = noisy && channel != Channel::ShaftSpeed;
+    let objection = Objection { samples_left_out, ..Objection::new(code::FROZEN_CHANNEL, message, steps) };
+    (!objection.steps.is_empty()).then_some(objection)
 }
 
 /// The long stretches of one and the same value.

@@ -45,7 +45,7 @@ pub(super) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
         "{}, which no compressor does: P1 or P2 is scaled, off or creeps (or N or m_c is); check unit, zero and line of the pressures",
         said.join(", and ")
     );
-    vec![Objection { code: code::SCALED_CHANNEL, message, steps: (0..ends.len()).collect() }]
+    vec![Objection::new(code::SCALED_CHANNEL, message, (0..ends.len()).collect())]
 }
 
 /// What a temperature rise has beside what goes with the speed squared, K.

@@ -47,7 +47,9 @@ pub(super) fn fit(columns: &[Vec<f64>], values: &[f64]) -> Option<Vec<Coefficien
         let sigma = robust_sigma(residual.as_slice())?.max(1e-9 * level);
         let inverse = normal.inverse();
         let errors = (0..count).map(|j| sigma * inverse[(j, j)].max(0.0).sqrt());
-        found = Some(solved.iter().zip(errors).map(|(value, error)| Coefficient { value: *value, error }).collect());
+        found = Some(
+            solved.iter().zip(errors).map(|(value, error)| Coefficient { value: *value, error }).collect(),
+        );
         weights = residual.map(|residual| (1.0 + (residual / (HALF_SIGMAS * sigma)).powi(2)).sqrt().recip());
     }
     found

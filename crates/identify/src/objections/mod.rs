@@ -22,8 +22,8 @@ mod work;
 use crate::IdentifyConfig;
 use crate::dynamic::Estimate;
 use crate::nominal_map::NominalRig;
-use mapper_core::Recording;
 pub(crate) use ends::{Ends, ends};
+use mapper_core::Recording;
 
 /// Something that speaks against readings, and the steps that rest on them.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +34,14 @@ pub(crate) struct Objection {
     pub(crate) message: String,
     /// Positions of the steps.
     pub(crate) steps: Vec<usize>,
+    /// Whether identification leaves out the samples that it is about, so that the rest of a step may speak.
+    pub(crate) samples_left_out: bool,
+}
+
+impl Objection {
+    fn new(code: &'static str, message: String, steps: Vec<usize>) -> Self {
+        Objection { code, message, steps, samples_left_out: false }
+    }
 }
 
 /// All objections. `alone`: what the two-parameter method makes of each step; empty where there is no housing temperature.
@@ -43,21 +51,21 @@ pub(crate) fn objections(
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
 ) -> Vec<Objection> {
-    let ends = ends(recording, config);
+    let mut ends = ends(recording, config);
     let mut found = steps::objections(recording);
     found.extend(plausible::objections(recording, config));
-    found.extend(frozen::objections(recording, config));
+    found.extend(frozen::objections(recording, &ends, config));
     found.extend(noise::objections(recording, config));
+    found.extend(clock::objections(recording));
+    // A channel that is named is not named again by what it contradicts.
+    leave_out(&mut ends, &found);
     found.extend(specific_speed::objections(&ends));
     found.extend(bounds::objections(&ends));
     found.extend(valve::objections(recording, &ends, config));
     found.extend(shaft_power::objections(&ends));
-    found.extend(clock::objections(recording));
     // What is said already would only be said again by those that fit all steps.
     if found.iter().all(|objection| 2 * objection.steps.len() <= ends.len()) {
-        let open = |position: usize| !found.iter().any(|objection| objection.steps.contains(&position));
-        let ends: Vec<Option<Ends>> =
-            ends.into_iter().enumerate().map(|(position, end)| end.filter(|_| open(position))).collect();
+        leave_out(&mut ends, &found);
         let heads = head::objections(&ends);
         // The work is reckoned with the head.
         let works = if heads.is_empty() { work::objections(&ends, alone, config) } else { Vec::new() };
@@ -68,4 +76,13 @@ pub(crate) fn objections(
         }
     }
     found
+}
+
+/// Takes away the ends of steps to which there are objections.
+fn leave_out(ends: &mut [Option<Ends>], found: &[Objection]) {
+    for position in found.iter().flat_map(|objection| &objection.steps) {
+        if let Some(end) = ends.get_mut(*position) {
+            *end = None;
+        }
+    }
 }

@@ -39,7 +39,7 @@ pub(super) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<
                 with_unit(format!("{found:.3e}"), channel.unit()),
                 with_unit(format!("{declared:.3e}"), channel.unit()),
             );
-            Some(Objection { code: code::NOISY_CHANNEL, message, steps: (0..recording.steps.len()).collect() })
+            Some(Objection::new(code::NOISY_CHANNEL, message, (0..recording.steps.len()).collect()))
         })
         .collect()
 }

@@ -43,7 +43,8 @@ pub(super) fn objections(
         Some(end.flow_kg_s / nominal_kg_s).filter(|ratio| ratio.is_finite() && *ratio > 0.0)
     });
     let mut found = Vec::new();
-    let allowed = SIGMAS * tolerances.valve_area_ratio.hypot(tolerances.flow_meter_gain_ratio) + BESIDES_RATIO;
+    let allowed =
+        SIGMAS * tolerances.valve_area_ratio.hypot(tolerances.flow_meter_gain_ratio) + BESIDES_RATIO;
     if let Some(flow) = median(flows).filter(|flow| flow.ln().abs() > allowed) {
         let message = format!(
             "m_c is {:.3} of what the nominal valve passes at P2, T2 and its opening (median; {:.3} to {:.3} are declared to be \
@@ -52,7 +53,7 @@ pub(super) fn objections(
             (-allowed).exp(),
             allowed.exp()
         );
-        found.push(Objection { code: code::SCALED_CHANNEL, message, steps: all() });
+        found.push(Objection::new(code::SCALED_CHANNEL, message, all()));
     }
     found.extend(pressure_offset(&known, ends.len(), nominal, config));
     // Speed goes with flow, and less than so.
@@ -65,7 +66,7 @@ pub(super) fn objections(
             (-allowed).exp(),
             allowed.exp()
         );
-        found.push(Objection { code: code::SCALED_CHANNEL, message, steps: all() });
+        found.push(Objection::new(code::SCALED_CHANNEL, message, all()));
     }
     found
 }
@@ -92,19 +93,19 @@ fn pressure_offset(
     let t1_k = median(known.iter().map(|end| end.t1_k))?;
     // dT_is = T1 kappa dPR at a pressure ratio near 1.
     let k_per_pa = t1_k * KAPPA / p1_pa;
-    let offset_pa = |channel: Channel| config.declared.get(&channel).map_or(0.0, |declared| declared.offset_sigma);
+    let offset_pa =
+        |channel: Channel| config.declared.get(&channel).map_or(0.0, |declared| declared.offset_sigma);
     let declared_k = k_per_pa * offset_pa(Channel::P1).hypot(offset_pa(Channel::P2));
     let map_k = nominal.tolerances.flow_map_ratio.hypot(nominal.tolerances.flow_meter_gain_ratio) * MAP_K;
     let limit_k = OFFSET_SIGMAS * declared_k.hypot(map_k).hypot(rise.error);
-    (rise.value.abs() > limit_k).then(|| Objection {
-        code: code::SCALED_CHANNEL,
-        message: format!(
+    (rise.value.abs() > limit_k).then(|| {
+        let message = format!(
             "P2 - P1 is {:+.2} kPa off what the nominal map has at the measured speeds and flows, the same at all speeds ({:.2} kPa are \
              declared to be possible): P1 or P2 is off; compare them at standstill (`zero`)",
             rise.value / k_per_pa / 1e3,
             limit_k / k_per_pa / 1e3,
-        ),
-        steps: (0..steps).collect(),
+        );
+        Objection::new(code::SCALED_CHANNEL, message, (0..steps).collect())
     })
 }
 
@@ -115,7 +116,8 @@ fn speed_of_map_rpm(end: &Ends, nominal: &NominalRig<'_>) -> Option<f64> {
     let flow_kg_s = reference.corrected_flow_kg_s(end.flow_kg_s, end.t1_k, end.p1_pa);
     let ratio = end.p2_pa / end.p1_pa;
     let missing_kg_s = |speed_rpm: f64| {
-        map.evaluate(reference.corrected_speed_rpm(speed_rpm, end.t1_k), ratio).flow_corrected_kg_s - flow_kg_s
+        map.evaluate(reference.corrected_speed_rpm(speed_rpm, end.t1_k), ratio).flow_corrected_kg_s
+            - flow_kg_s
     };
     let (low, high) = (SPEEDS.0 * end.speed_rpm, SPEEDS.1 * end.speed_rpm);
     (low > 0.0 && missing_kg_s(low) < 0.0 && missing_kg_s(high) > 0.0).then_some(())?;

@@ -10,14 +10,8 @@ use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
 
 /// What every method reads.
-pub(super) const READ: [Channel; 6] = [
-    Channel::ShaftSpeed,
-    Channel::CompressorFlow,
-    Channel::P1,
-    Channel::T1,
-    Channel::P2,
-    Channel::T2,
-];
+pub(super) const READ: [Channel; 6] =
+    [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::T1, Channel::P2, Channel::T2];
 
 /// The channels that a method reads.
 pub(super) fn read_by(config: &IdentifyConfig) -> impl Iterator<Item = Channel> {
@@ -38,7 +32,7 @@ pub(super) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<
                 }
             }
             let why = check_running(channel, median(&middles)?).err()?;
-            Some(Objection { code: code::DEAD_CHANNEL, message: why.to_string(), steps })
+            Some(Objection::new(code::DEAD_CHANNEL, why.to_string(), steps))
         })
         .collect()
 }

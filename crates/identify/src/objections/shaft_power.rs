@@ -41,5 +41,5 @@ pub(super) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
         of(|powers| powers.0),
         of(|powers| powers.1),
     );
-    Some(Objection { code: code::SCALED_CHANNEL, message, steps: (0..ends.len()).collect() })
+    Some(Objection::new(code::SCALED_CHANNEL, message, (0..ends.len()).collect()))
 }

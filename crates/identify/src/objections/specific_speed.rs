@@ -31,5 +31,5 @@ pub(super) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
         of_middle(|end| end.flow_kg_s) * 1e3,
         of_middle(|end| end.p2_pa / end.p1_pa),
     );
-    Some(Objection { code: code::SCALED_CHANNEL, message, steps: (0..ends.len()).collect() })
+    Some(Objection::new(code::SCALED_CHANNEL, message, (0..ends.len()).collect()))
 }

@@ -23,9 +23,14 @@ pub(super) fn objections(recording: &Recording) -> Vec<Objection> {
             let message = format!(
                 "step {} ({:.1} s to {:.1} s) and step {} ({:.1} s to {:.1} s) overlap, and a rig is at one point at a time: correct \
                  the step marks",
-                steps[before].index, steps[before].start_s, steps[before].end_s, step.index, step.start_s, step.end_s
+                steps[before].index,
+                steps[before].start_s,
+                steps[before].end_s,
+                step.index,
+                step.start_s,
+                step.end_s
             );
-            found.push(Objection { code: code::STEPS_CONTRADICT, message, steps: vec![before, position] });
+            found.push(Objection::new(code::STEPS_CONTRADICT, message, vec![before, position]));
         }
         if furthest.is_none_or(|before| steps[before].end_s < step.end_s) {
             furthest = Some(position);
@@ -39,14 +44,14 @@ pub(super) fn objections(recording: &Recording) -> Vec<Objection> {
             "{} steps have the index {index}, so what is told of one cannot be told from the others: give each its own",
             same.len()
         );
-        found.push(Objection { code: code::STEPS_CONTRADICT, message, steps: same.to_vec() });
+        found.push(Objection::new(code::STEPS_CONTRADICT, message, same.to_vec()));
     }
     for (position, step) in steps.iter().enumerate().filter(|(_, step)| step.index > LARGEST_INDEX) {
         let message = format!(
             "step {} at {:.1} s has an index beyond {LARGEST_INDEX}, which no plan has: correct the step marks",
             step.index, step.start_s
         );
-        found.push(Objection { code: code::STEPS_CONTRADICT, message, steps: vec![position] });
+        found.push(Objection::new(code::STEPS_CONTRADICT, message, vec![position]));
     }
     found
 }

@@ -43,7 +43,9 @@ pub(super) fn objections(
     for opening in known.chunk_by(same) {
         let areas_m2: Vec<Option<f64>> = opening.iter().map(|end| area_m2(end)).collect();
         let usable = areas_m2.iter().flatten().count();
-        let Some(middle_m2) = median(areas_m2.iter().flatten()).filter(|_| usable >= FEWEST) else { continue };
+        let Some(middle_m2) = median(areas_m2.iter().flatten()).filter(|_| usable >= FEWEST) else {
+            continue;
+        };
         for (end, area_m2) in opening.iter().zip(&areas_m2) {
             let Some(area_m2) = area_m2 else {
                 // Flow through a closed pressure difference.
@@ -85,8 +87,12 @@ pub(super) fn objections(
         off.len()
     );
     // Where many are off, or more over time, nobody knows which are right.
-    let steps = if 4 * off.len() > judged || creep(&deviations, ends.len()).is_some() { (0..ends.len()).collect() } else { off };
-    Some(Objection { code: code::CONTRADICTED_CHANNEL, message, steps })
+    let steps = if 4 * off.len() > judged || creep(&deviations, ends.len()).is_some() {
+        (0..ends.len()).collect()
+    } else {
+        off
+    };
+    Some(Objection::new(code::CONTRADICTED_CHANNEL, message, steps))
 }
 
 /// Area of the valve, discharge coefficient included, m2; `None` where the pressures say nothing of it.
@@ -99,17 +105,20 @@ fn area_m2(end: &Ends) -> Option<f64> {
 /// What comes over the run: as a share of the flow, or as a pressure, which the slow points show most.
 fn creep(deviations: &[(&Ends, f64)], steps: usize) -> Option<Objection> {
     let values: Vec<f64> = deviations.iter().map(|(_, by)| *by).collect();
-    let (first_s, last_s) = deviations
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (end, _)| (low.min(end.end_s), high.max(end.end_s)));
+    let (first_s, last_s) =
+        deviations.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (end, _)| {
+            (low.min(end.end_s), high.max(end.end_s))
+        });
     let time = |end: &Ends| (end.end_s - first_s) / (last_s - first_s) - 0.5;
     let found = |weight: &dyn Fn(&Ends) -> f64| {
-        let column = |of: &dyn Fn(&Ends) -> f64| deviations.iter().map(|(end, _)| of(end)).collect::<Vec<f64>>();
+        let column =
+            |of: &dyn Fn(&Ends) -> f64| deviations.iter().map(|(end, _)| of(end)).collect::<Vec<f64>>();
         let columns = [column(&|_| 1.0), column(&|end| time(end) * weight(end))];
         fit(&columns, &values)?.get(1).copied().filter(|slope| slope.value.abs() > CREEP_SIGMAS * slope.error)
     };
     let flow = found(&|_| 1.0).filter(|slope| slope.value.abs() > MOST_CREEP_RATIO);
-    let pressure = found(&|end| -0.5 / (end.p2_pa - end.p1_pa)).filter(|slope| slope.value.abs() > MOST_CREEP_PA);
+    let pressure =
+        found(&|end| -0.5 / (end.p2_pa - end.p1_pa)).filter(|slope| slope.value.abs() > MOST_CREEP_PA);
     let said = match (flow, pressure) {
         (_, Some(slope)) => format!("P2 - P1 by {:+.1} kPa, or m_c likewise", slope.value / 1e3),
         (Some(slope), None) => format!("m_c by {:+.1} %", 100.0 * slope.value),
@@ -119,5 +128,5 @@ fn creep(deviations: &[(&Ends, f64)], steps: usize) -> Option<Objection> {
         "the area of the valve that follows from m_c and P2 - P1 changes over the run at the same opening, as if a channel crept: {said}; \
          check zero and line of flow meter and pressures"
     );
-    Some(Objection { code: code::SCALED_CHANNEL, message, steps: (0..steps).collect() })
+    Some(Objection::new(code::SCALED_CHANNEL, message, (0..steps).collect()))
 }

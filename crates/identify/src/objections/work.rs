@@ -22,14 +22,19 @@ const OFFSETS: f64 = 3.0;
 /// Efficiencies that are used: beyond, a point says nothing of the work.
 const USED: std::ops::RangeInclusive<f64> = 0.05..=3.0;
 
-pub(super) fn objections(ends: &[Option<Ends>], alone: &[Estimate], config: &IdentifyConfig) -> Vec<Objection> {
+pub(super) fn objections(
+    ends: &[Option<Ends>],
+    alone: &[Estimate],
+    config: &IdentifyConfig,
+) -> Vec<Objection> {
     let work = |end: &'_ Ends| {
         let (eta, _) = alone.get(end.position)?.eta.filter(|(eta, _)| USED.contains(eta))?;
         Some(end.isentropic_rise_k() / eta)
     };
     let rises: Vec<(&Ends, f64)> = ends.iter().flatten().filter_map(|end| Some((end, work(end)?))).collect();
     let Some(Trend { aside, creep }) = trend(&rises) else { return Vec::new() };
-    let offset = |channel: Channel| config.declared.get(&channel).map_or(0.0, |declared| declared.offset_sigma);
+    let offset =
+        |channel: Channel| config.declared.get(&channel).map_or(0.0, |declared| declared.offset_sigma);
     // A housing that reads 1 K too much takes about half a kelvin off the gas.
     let offset_k = offset(Channel::T1).hypot(offset(Channel::T2)).hypot(0.5 * offset(Channel::Tc));
     let mut said = Vec::new();
@@ -55,5 +60,5 @@ pub(super) fn objections(ends: &[Option<Ends>], alone: &[Estimate], config: &Ide
         "{}: T1, T2 or Tc is scaled, off or creeps; compare them at standstill (`zero`), and mend the channel",
         said.join(", and ")
     );
-    vec![Objection { code: code::SCALED_CHANNEL, message, steps: (0..ends.len()).collect() }]
+    vec![Objection::new(code::SCALED_CHANNEL, message, (0..ends.len()).collect())]
 }

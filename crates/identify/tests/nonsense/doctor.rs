@@ -62,7 +62,8 @@ pub fn frozen_step(recording: &mut Recording, channel: Channel, position: usize)
 /// No reading above the given share of the span of its values.
 pub fn clipped(recording: &mut Recording, channel: Channel, share: f64) {
     let values = &series(recording, channel).values;
-    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let (low, high) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     let limit = low + share * (high - low);
     each(recording, channel, |_, value| value.min(limit));
 }

@@ -69,7 +69,7 @@ fn last_mean(channel: Channel, series: &Series, step: &StepMarker, seconds: f64)
     let first = t_s.partition_point(|t| *t < last_s - seconds);
     let finite: Vec<f64> =
         values[first..=last].iter().copied().filter(|value| is_reading(channel, *value)).collect();
-    Some((mean(&without_spikes(&finite))?, last_s))
+    Some((mean(without_spikes(&finite))?, last_s))
 }
 
 /// The values without those far from the middle one: a single spike would move the point.

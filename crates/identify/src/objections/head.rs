@@ -18,7 +18,7 @@ const MOST_K: f64 = 6.0;
 /// Rise that comes over the run, K.
 const MOST_CREEP_K: f64 = 3.0;
 /// Standard errors that a finding has at least.
-const SIGMAS: f64 = 4.0;
+const SIGMAS: f64 = 8.0;
 
 pub(super) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     let rises: Vec<(&Ends, f64)> = ends.iter().flatten().map(|end| (end, end.isentropic_rise_k())).collect();

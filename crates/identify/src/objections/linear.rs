@@ -15,8 +15,9 @@ pub(super) struct Coefficient {
     pub(super) error: f64,
 }
 
-/// Standard errors of a change over the run, at least.
-const CREEP_SIGMAS: f64 = 5.0;
+/// Standard errors of a change over the run, at least: what the trend lacks (heat that the two-parameter method does not know) is no
+/// noise, and makes six.
+const CREEP_SIGMAS: f64 = 8.0;
 /// Standard error of a change over the run above which time is not told from what else changed with it, as in a campaign that
 /// goes from slow to fast: K.
 const TOLD_APART_K: f64 = 1.2;

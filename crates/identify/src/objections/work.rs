@@ -17,7 +17,7 @@ const LEAST_K: f64 = -0.5;
 /// Rise that comes over the run, K.
 const MOST_CREEP_K: f64 = 1.5;
 /// Standard errors that a finding has at least, and declared offsets that are allowed for.
-const SIGMAS: f64 = 4.0;
+const SIGMAS: f64 = 8.0;
 const OFFSETS: f64 = 3.0;
 /// Efficiencies that are used: beyond, a point says nothing of the work.
 const USED: std::ops::RangeInclusive<f64> = 0.05..=3.0;

@@ -88,8 +88,8 @@ pub fn spikes(recording: &mut Recording, channel: Channel, by: f64) {
     for (i, value) in series(recording, channel).values.iter_mut().enumerate() {
         // Knuth's multiplicative hash: irregular, and the same each time.
         let hash = (i as u32).wrapping_mul(2_654_435_761) >> 16;
-        if hash % 100 == 0 {
-            *value += if hash % 200 == 0 { by } else { -by };
+        if hash.is_multiple_of(100) {
+            *value += if hash.is_multiple_of(200) { by } else { -by };
         }
     }
 }

@@ -4,7 +4,8 @@ use crate::dynamic::Estimate;
 use crate::end_state::{EndState, end_state};
 use crate::findings::{Findings, code};
 use crate::nominal_map::{NominalRig, doubt_off_the_nominal_map, off_the_map};
-use crate::objections::{Objection, objections};
+use crate::objections::objection::Objection;
+use crate::objections::objections;
 use crate::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, dynamic, joint, steady};
 use mapper_core::{

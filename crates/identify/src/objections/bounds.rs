@@ -5,8 +5,9 @@
 //! to 1.3 (docs/physics.md: the housing exchanges at most half of the capacity flow times its distance). And turbine inlet gas is the
 //! hottest of all.
 
-use super::{Ends, Objection};
 use crate::findings::code;
+use crate::objections::ends::Ends;
+use crate::objections::objection::Objection;
 use mapper_numerics::statistics::median;
 
 /// Isentropic rise from which heat no longer hides the work, K.
@@ -19,7 +20,7 @@ const FEWEST: usize = 3;
 /// Share of points with P2 below P1 at which it is no longer the point's own affair.
 const BELOW_SHARE: f64 = 1.0 / 3.0;
 
-pub(super) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
+pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     let known: Vec<&Ends> = ends.iter().flatten().collect();
     let all = || (0..ends.len()).collect::<Vec<usize>>();
     let mut found = Vec::new();

@@ -4,9 +4,9 @@
 //! jump. Over all jumps of a recording the moment of the largest change is known to a second or two, whatever the jumps are. Two
 //! loggers with clocks of their own, a filter, and a reader of field buses that waits make a channel late.
 
-use super::Objection;
 use crate::commands::begins_with_jump;
 use crate::findings::code;
+use crate::objections::objection::Objection;
 use mapper_core::{Channel, Recording, Series};
 use mapper_numerics::statistics::{mean, median};
 
@@ -32,7 +32,7 @@ const WATCHED: [(Channel, bool); 5] = [
     (Channel::Tc, true),
 ];
 
-pub(super) fn objections(recording: &Recording) -> Vec<Objection> {
+pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let steps = &recording.steps;
     let jumps_s: Vec<f64> = (0..steps.len())
         .filter(|position| begins_with_jump(steps, *position))

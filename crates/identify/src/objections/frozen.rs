@@ -4,10 +4,11 @@
 //! over. A coarse logger repeats values too, but then it does so all the time; of such a channel only what stands still over a
 //! jump that moves it is called frozen.
 
-use super::plausible::read_by;
-use super::{Ends, Objection};
 use crate::IdentifyConfig;
 use crate::findings::code;
+use crate::objections::ends::Ends;
+use crate::objections::objection::Objection;
+use crate::objections::plausible::read_by;
 use mapper_core::{Channel, Recording, Series, with_unit};
 
 /// Time for which a noisy channel may show one and the same value, s, and samples that it must show it at least.
@@ -27,7 +28,7 @@ struct Run {
     last: usize,
 }
 
-pub(super) fn objections(
+pub(crate) fn objections(
     recording: &Recording,
     ends: &[Option<Ends>],
     config: &IdentifyConfig,

@@ -5,9 +5,10 @@
 //! does not go with the speed squared: 10 % of P2 are 8 K at every speed, where 50 krpm have 12 K. And what comes with the time of the
 //! run alone creeps.
 
-use super::linear::{Coefficient, fit};
-use super::{Ends, Objection};
 use crate::findings::code;
+use crate::objections::ends::Ends;
+use crate::objections::linear::{Coefficient, fit};
+use crate::objections::objection::Objection;
 use mapper_numerics::statistics::median;
 
 /// Points and ratio of the largest to the smallest speed from which on the speeds can be compared.
@@ -20,7 +21,7 @@ const MOST_CREEP_K: f64 = 3.0;
 /// Standard errors that a finding has at least.
 const SIGMAS: f64 = 8.0;
 
-pub(super) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
+pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     let rises: Vec<(&Ends, f64)> = ends.iter().flatten().map(|end| (end, end.isentropic_rise_k())).collect();
     let Some(Trend { aside, creep }) = trend(&rises) else { return Vec::new() };
     let mut said = Vec::new();
@@ -49,16 +50,16 @@ pub(super) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
 }
 
 /// What a temperature rise has beside what goes with the speed squared, K.
-pub(super) struct Trend {
+pub(crate) struct Trend {
     /// The same at all speeds.
-    pub(super) aside: Coefficient,
+    pub(crate) aside: Coefficient,
     /// What comes over the run.
-    pub(super) creep: Coefficient,
+    pub(crate) creep: Coefficient,
 }
 
 /// Fits `rise/N^2` by flow coefficient and speed, with what is the same at all speeds, and what comes over the run; `None` where points
 /// or speeds are too few.
-pub(super) fn trend(rises: &[(&Ends, f64)]) -> Option<Trend> {
+pub(crate) fn trend(rises: &[(&Ends, f64)]) -> Option<Trend> {
     let used: Vec<&(&Ends, f64)> =
         rises.iter().filter(|(end, rise_k)| end.speed_rpm > 0.0 && rise_k.is_finite()).collect();
     let (slowest, fastest) = used.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), (end, _)| {

@@ -10,9 +10,9 @@ const HALF_SIGMAS: f64 = 2.5;
 
 /// A coefficient and its standard error.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Coefficient {
-    pub(super) value: f64,
-    pub(super) error: f64,
+pub(crate) struct Coefficient {
+    pub(crate) value: f64,
+    pub(crate) error: f64,
 }
 
 /// Standard errors of a change over the run, at least: what the trend lacks (heat that the two-parameter method does not know) is no
@@ -24,13 +24,13 @@ const TOLD_APART_K: f64 = 1.2;
 
 impl Coefficient {
     /// Whether a change over the run, K, is beyond `limit_k`, and neither noise nor another name for what was commanded.
-    pub(super) fn over(&self, limit_k: f64) -> bool {
+    pub(crate) fn over(&self, limit_k: f64) -> bool {
         self.error < TOLD_APART_K && self.value.abs() > limit_k.max(CREEP_SIGMAS * self.error)
     }
 }
 
 /// Coefficients of `columns` (each as long as `values`) for `values`; `None` where they cannot be told apart.
-pub(super) fn fit(columns: &[Vec<f64>], values: &[f64]) -> Option<Vec<Coefficient>> {
+pub(crate) fn fit(columns: &[Vec<f64>], values: &[f64]) -> Option<Vec<Coefficient>> {
     let (rows, count) = (values.len(), columns.len());
     if rows < count + 3 || columns.iter().flatten().chain(values).any(|value| !value.is_finite()) {
         return None;

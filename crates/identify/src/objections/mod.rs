@@ -6,12 +6,13 @@
 
 mod bounds;
 mod clock;
-mod ends;
+pub(crate) mod ends;
 mod frozen;
 mod head;
 mod linear;
 mod noise;
 mod nominal_rig;
+pub(crate) mod objection;
 mod plausible;
 mod shaft_power;
 mod specific_speed;
@@ -22,27 +23,9 @@ mod work;
 use crate::IdentifyConfig;
 use crate::dynamic::Estimate;
 use crate::nominal_map::NominalRig;
-pub(crate) use ends::{Ends, ends};
+use crate::objections::ends::{Ends, ends};
+use crate::objections::objection::Objection;
 use mapper_core::Recording;
-
-/// Something that speaks against readings, and the steps that rest on them.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Objection {
-    /// Stable code of the warning.
-    pub(crate) code: &'static str,
-    /// Channel, values with units, what to do.
-    pub(crate) message: String,
-    /// Positions of the steps.
-    pub(crate) steps: Vec<usize>,
-    /// Whether identification leaves out the samples that it is about, so that the rest of a step may speak.
-    pub(crate) samples_left_out: bool,
-}
-
-impl Objection {
-    fn new(code: &'static str, message: String, steps: Vec<usize>) -> Self {
-        Objection { code, message, steps, samples_left_out: false }
-    }
-}
 
 /// All objections. `alone`: what the two-parameter method makes of each step; empty where there is no housing temperature.
 pub(crate) fn objections(

@@ -3,10 +3,10 @@
 //! Successive samples of a slow quantity differ by noise alone. What is declared decides how every reading is weighed and how wide
 //! intervals are, so that a channel with several times as much makes them too narrow.
 
-use super::Objection;
-use super::plausible::read_by;
 use crate::IdentifyConfig;
 use crate::findings::code;
+use crate::objections::objection::Objection;
+use crate::objections::plausible::read_by;
 use mapper_core::{Recording, with_unit};
 use mapper_numerics::statistics::robust_sigma;
 
@@ -16,7 +16,7 @@ const MOST_RATIO: f64 = 3.0;
 /// Samples that are further apart than this differ by more than noise, s.
 const NEIGHBOUR_S: f64 = 1.5;
 
-pub(super) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
+pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
     read_by(config)
         .filter_map(|channel| {
             let declared = config.declared.get(&channel)?.noise_sigma;

@@ -4,11 +4,12 @@
 //! it. The valve's declared area tells it. N with a wrong gain puts all points on the wrong speed lines: the map, at the measured flow
 //! and pressure ratio, has a speed of its own.
 
-use super::linear::fit;
-use super::{Ends, Objection};
 use crate::IdentifyConfig;
 use crate::findings::code;
 use crate::nominal_map::NominalRig;
+use crate::objections::ends::Ends;
+use crate::objections::linear::fit;
+use crate::objections::objection::Objection;
 use mapper_core::Channel;
 use mapper_numerics::root::bisect;
 use mapper_numerics::statistics::median;
@@ -28,7 +29,7 @@ const KAPPA: f64 = 0.286;
 /// Range about the measured speed in which the map's own is sought.
 const SPEEDS: (f64, f64) = (0.4, 2.5);
 
-pub(super) fn objections(
+pub(crate) fn objections(
     ends: &[Option<Ends>],
     nominal: &NominalRig<'_>,
     config: &IdentifyConfig,

@@ -2,23 +2,23 @@
 //!
 //! The ranges are those of [`mapper_observe::plausible`], wide enough for every turbocharger on a gas stand.
 
-use super::Objection;
 use crate::IdentifyConfig;
 use crate::findings::code;
+use crate::objections::objection::Objection;
 use mapper_core::{Channel, Method, Recording};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
 
 /// What every method reads.
-pub(super) const READ: [Channel; 6] =
+pub(crate) const READ: [Channel; 6] =
     [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::T1, Channel::P2, Channel::T2];
 
 /// The channels that a method reads.
-pub(super) fn read_by(config: &IdentifyConfig) -> impl Iterator<Item = Channel> {
+pub(crate) fn read_by(config: &IdentifyConfig) -> impl Iterator<Item = Channel> {
     READ.into_iter().chain((config.method != Method::Steady).then_some(Channel::Tc))
 }
 
-pub(super) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
+pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
     read_by(config)
         .filter_map(|channel| {
             let series = recording.series.get(&channel)?;

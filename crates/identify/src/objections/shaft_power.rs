@@ -4,8 +4,9 @@
 //! housings take 10 to 40 % of it. A point by itself may have more for a while, where a hot compressor housing heats the air or
 //! the shaft slows down; the middle of a campaign may not.
 
-use super::{Ends, Objection};
 use crate::findings::code;
+use crate::objections::ends::Ends;
+use crate::objections::objection::Objection;
 use mapper_core::Channel;
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
@@ -15,7 +16,7 @@ use mapper_physics::air;
 /// on is far below every gas stand.
 const POSSIBLE: std::ops::RangeInclusive<f64> = 0.2..=1.15;
 
-pub(super) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
+pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
     let powers_w: Vec<(f64, f64)> = ends
         .iter()
         .flatten()

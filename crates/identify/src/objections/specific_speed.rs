@@ -3,15 +3,16 @@
 //!
 //! A unit taken for another moves it by far more than machines differ: 1/s for rpm by 60, kg/h for kg/s by 60.
 
-use super::{Ends, Objection};
 use crate::findings::code;
+use crate::objections::ends::Ends;
+use crate::objections::objection::Objection;
 use mapper_numerics::statistics::median;
 use mapper_physics::air;
 
 /// Middle of a campaign's points; a wide margin about what machines have.
 const POSSIBLE: std::ops::RangeInclusive<f64> = 0.15..=4.0;
 
-pub(super) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
+pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
     let used: Vec<&Ends> = ends.iter().flatten().filter(|end| end.isentropic_rise_k() > 0.0).collect();
     let of = |end: &&Ends| {
         let omega_rad_s = end.speed_rpm * std::f64::consts::PI / 30.0;

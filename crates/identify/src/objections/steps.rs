@@ -1,7 +1,7 @@
 //! Steps that cannot be what they say: a rig is at one operating point at a time, and an index names one step.
 
-use super::Objection;
 use crate::findings::code;
+use crate::objections::objection::Objection;
 use mapper_core::Recording;
 
 /// Overlap that rounded times of other loggers explain, s.
@@ -10,7 +10,7 @@ const ROUNDED_S: f64 = 0.5;
 const LARGEST_INDEX: usize = 10_000_000;
 
 /// Steps that overlap in time, share an index, or have one that no plan has.
-pub(super) fn objections(recording: &Recording) -> Vec<Objection> {
+pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let steps = &recording.steps;
     let mut found = Vec::new();
     let mut by_time: Vec<usize> = (0..steps.len()).filter(|i| steps[*i].start_s < steps[*i].end_s).collect();

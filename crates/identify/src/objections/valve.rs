@@ -4,10 +4,11 @@
 //! pressure, is the area of the valve. It may be anything, and need not go with the opening, but at one opening it is the same at
 //! all speeds and all times. The check sees m_c, P2 and P1 (through P2 - P1); T2 counts by its root alone.
 
-use super::linear::fit;
-use super::{Ends, Objection};
 use crate::IdentifyConfig;
 use crate::findings::code;
+use crate::objections::ends::Ends;
+use crate::objections::linear::fit;
+use crate::objections::objection::Objection;
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::median;
 use mapper_physics::orifice;
@@ -26,7 +27,7 @@ const CREEP_SIGMAS: f64 = 5.0;
 /// Points at one opening from which they judge each other.
 const FEWEST: usize = 3;
 
-pub(super) fn objections(
+pub(crate) fn objections(
     recording: &Recording,
     ends: &[Option<Ends>],
     config: &IdentifyConfig,

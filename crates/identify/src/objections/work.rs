@@ -4,11 +4,12 @@
 //! and Tc all count. What does not go with the speed squared is friction of small Reynolds numbers, which is positive and at most
 //! some kelvin, or an offset; what comes with the time of the run is a creeping sensor, or fouling far beyond what one run can bring.
 
-use super::head::{Trend, trend};
-use super::{Ends, Objection};
 use crate::IdentifyConfig;
 use crate::dynamic::Estimate;
 use crate::findings::code;
+use crate::objections::ends::Ends;
+use crate::objections::head::{Trend, trend};
+use crate::objections::objection::Objection;
 use mapper_core::Channel;
 
 /// Rise that does not go with the speed squared, K: published maps lose 2 to 10 points towards low speed, as 0.5 to 5 K would.
@@ -22,7 +23,7 @@ const OFFSETS: f64 = 3.0;
 /// Efficiencies that are used: beyond, a point says nothing of the work.
 const USED: std::ops::RangeInclusive<f64> = 0.05..=3.0;
 
-pub(super) fn objections(
+pub(crate) fn objections(
     ends: &[Option<Ends>],
     alone: &[Estimate],
     config: &IdentifyConfig,

@@ -205,7 +205,7 @@ fn nothing_is_said_of_sound_recordings() {
     let other = Machine { alpha: 0.1, probe_m: 2e-3, ..Machine::default() };
     for (machine, nominal) in [(Machine::default(), Some(nominal)), (other, None)] {
         let clean = campaign(&grid(), 100.0, machine);
-        let seeds: Vec<u64> = (40..46).collect();
+        let seeds: Vec<u64> = (40..44).collect();
         let said = mapper_numerics::parallel::map(&seeds, |seed| {
             let (recording, declared) =
                 measured(&clean.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(*seed));

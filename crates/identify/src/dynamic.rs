@@ -1,6 +1,7 @@
 //! The dynamic method (Burke et al., section 3): efficiency and heat-transfer coefficient from the transient.
 
 use crate::bias::{DeclaredEffect, declared_effect};
+use crate::cleaning::without_spikes;
 use crate::covariance::{Correlation, NoiseVariances};
 use crate::findings::{Findings, code};
 use crate::fit::{Fit, Geometry, fit};
@@ -41,6 +42,19 @@ pub(crate) struct Estimate {
     pub(crate) dtc_k: Option<f64>,
 }
 
+/// Identifies each step that has a state; the others get nothing.
+pub(crate) fn alone<S, E>(
+    recording: &Recording,
+    states: &[Result<S, E>],
+    config: &IdentifyConfig,
+) -> Vec<Estimate> {
+    let of = |(position, state): (usize, &Result<S, E>)| match state {
+        Ok(_) => estimate(recording, position, config, &mut Findings::new()),
+        Err(_) => Estimate::default(),
+    };
+    states.iter().enumerate().map(of).collect()
+}
+
 /// Identifies the step at `position`.
 pub(crate) fn estimate(
     recording: &Recording,
@@ -65,7 +79,7 @@ pub(crate) fn estimate(
         return estimate;
     };
     estimate.window = Some(window);
-    let samples = Samples::of(recording, window, config, true);
+    let samples = without_spikes(Samples::of(recording, window, config, true), findings);
     if !enough(&samples, config, findings) {
         return estimate;
     }

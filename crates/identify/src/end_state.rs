@@ -3,8 +3,11 @@
 use crate::findings::{Findings, code};
 use crate::{IdentifyConfig, StepError, taps};
 use mapper_core::{Channel, Recording, Series, StepMarker};
-use mapper_numerics::statistics::mean;
+use mapper_numerics::statistics::{mean, median, robust_sigma};
 use mapper_observe::plausible::is_reading;
+
+/// Robust standard deviations beyond which a single value is a spike.
+const SPIKE_SIGMAS: f64 = 8.0;
 
 /// The operating point at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,5 +69,14 @@ fn last_mean(channel: Channel, series: &Series, step: &StepMarker, seconds: f64)
     let first = t_s.partition_point(|t| *t < last_s - seconds);
     let finite: Vec<f64> =
         values[first..=last].iter().copied().filter(|value| is_reading(channel, *value)).collect();
-    Some((mean(&finite)?, last_s))
+    Some((mean(without_spikes(&finite))?, last_s))
+}
+
+/// The values without those far from the middle one: a single spike would move the point.
+fn without_spikes(values: &[f64]) -> Vec<f64> {
+    let Some(middle) = median(values) else { return Vec::new() };
+    let sigma = robust_sigma(values.iter().map(|value| value - middle)).unwrap_or(0.0);
+    // What hardly varies has no scale to judge by.
+    let limit = if sigma > 0.0 { SPIKE_SIGMAS * sigma } else { f64::INFINITY };
+    values.iter().copied().filter(|value| (value - middle).abs() <= limit).collect()
 }

@@ -38,6 +38,22 @@ pub mod code {
     pub const NO_COMPRESSION: &str = "no_compression";
     /// No sensor uncertainty was declared.
     pub const NOTHING_DECLARED: &str = "nothing_declared";
+    /// A channel is frozen or saturated.
+    pub const FROZEN_CHANNEL: &str = "frozen_channel";
+    /// A channel reads what no running machine has.
+    pub const DEAD_CHANNEL: &str = "dead_channel";
+    /// A channel is scaled, off or creeps.
+    pub const SCALED_CHANNEL: &str = "scaled_channel";
+    /// Two channels are exchanged.
+    pub const SWAPPED_CHANNELS: &str = "swapped_channels";
+    /// Channels contradict each other.
+    pub const CONTRADICTED_CHANNEL: &str = "contradicted_channel";
+    /// A channel has far more noise than declared.
+    pub const NOISY_CHANNEL: &str = "noisy_channel";
+    /// A channel is late against the others.
+    pub const LATE_CHANNEL: &str = "late_channel";
+    /// Steps overlap, or share an index.
+    pub const STEPS_CONTRADICT: &str = "steps_contradict";
     /// A noisy channel stood still.
     pub const STUCK: &str = "stuck";
     /// The efficiency rests on an alpha_A that is not known well enough (dynamic method).

@@ -4,11 +4,14 @@ use crate::dynamic::Estimate;
 use crate::end_state::{EndState, end_state};
 use crate::findings::{Findings, code};
 use crate::needs::missing;
+use crate::nominal_map::{NominalRig, doubt_off_the_nominal_map, off_the_map};
+use crate::objections::objection::Objection;
+use crate::objections::objections;
 use crate::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, dynamic, joint, steady};
 use mapper_core::{
     Channel, CommonErrors, EstimateUncertainty, Event, EventKind, IdentifiedPoint, Method, Recording,
-    StepMarker, ThermalModel, WindowRule, confidence_interval_95,
+    StepMarker, ThermalModel, Verdict, Warning, WindowRule, confidence_interval_95,
 };
 
 /// Identifies every step of a recording, in order. Steps of which not even the place on the map is known are left
@@ -57,6 +60,65 @@ pub fn identify_recording(
     recording: &Recording,
     config: &IdentifyConfig,
 ) -> Result<Identified, IdentifyError> {
+    identify_beside(recording, config, None)
+}
+
+/// As [`identify_recording`], beside a rig that is declared to be known: flow, speed and efficiencies that lie off it by more than
+/// its tolerances make the points doubtful.
+///
+/// # Errors
+/// As [`identify`].
+pub fn identify_beside(
+    recording: &Recording,
+    config: &IdentifyConfig,
+    nominal: Option<NominalRig<'_>>,
+) -> Result<Identified, IdentifyError> {
+    let mut found = identified(recording, config, nominal.as_ref())?;
+    let any_good = found.points.iter().flatten().any(|point| point.verdict == Verdict::Good);
+    let Some(nominal) = nominal.filter(|_| any_good) else { return Ok(found) };
+    if config.method == Method::Steady {
+        if let Some(message) = off_by_both(recording, config, &nominal) {
+            for point in found.points.iter_mut().flatten() {
+                point.verdict = point.verdict.doubted();
+                let code = code::OFF_THE_NOMINAL_MAP.to_owned();
+                point.warnings.push(Warning { code, message: message.clone() });
+            }
+        }
+        return Ok(found);
+    }
+    let mut points: Vec<IdentifiedPoint> = found.points.iter().flatten().cloned().collect();
+    doubt_off_the_nominal_map(&mut points, nominal.model.map.as_ref(), config.reference, nominal.tolerances);
+    let mut judged = points.into_iter();
+    for point in found.points.iter_mut().flatten() {
+        if let Some(judged) = judged.next() {
+            *point = judged;
+        }
+    }
+    Ok(found)
+}
+
+/// What speaks against the readings where both methods that see the heat find efficiencies off the nominal map, or the second none
+/// that are good: an apparent efficiency cannot be held against it. One of them alone may lack what the machine has.
+fn off_by_both(recording: &Recording, config: &IdentifyConfig, nominal: &NominalRig<'_>) -> Option<String> {
+    recording.require(Channel::Tc).ok()?;
+    let points = |method: Method| -> Option<Vec<IdentifiedPoint>> {
+        let found = identified(recording, &IdentifyConfig { method, ..config.clone() }, None).ok()?;
+        Some(found.points.into_iter().flatten().collect())
+    };
+    let off = |points: &[IdentifiedPoint]| {
+        off_the_map(points, nominal.model.map.as_ref(), config.reference, nominal.tolerances)
+    };
+    let message = off(&points(Method::Dynamic)?)?;
+    let joint = points(Method::Joint)?;
+    let agrees = joint.iter().all(|point| point.verdict != Verdict::Good) || off(&joint).is_some();
+    agrees.then_some(message)
+}
+
+fn identified(
+    recording: &Recording,
+    config: &IdentifyConfig,
+    nominal: Option<&NominalRig<'_>>,
+) -> Result<Identified, IdentifyError> {
     check(config)?;
     let missing = missing(recording, config.method);
     if !missing.is_empty() {
@@ -80,12 +142,22 @@ pub fn identify_recording(
             Ok(state)
         })
         .collect();
+    let alone = if recording.require(Channel::Tc).is_ok() {
+        dynamic::alone(recording, &states, config)
+    } else {
+        Vec::new()
+    };
+    let objections = objections(recording, &alone, config, nominal);
     let (mut thermal, mut two_parameter) = (None, Vec::new());
     let estimates: Vec<Estimate> = match config.method {
         Method::Joint => {
             let known: Vec<Option<EndState>> =
                 states.iter().map(|state| state.as_ref().ok().copied()).collect();
-            let joint = joint::estimate(recording, &known, config, &mut findings);
+            let condemned = !objections.is_empty()
+                && (0..known.len())
+                    .all(|step| objections.iter().any(|objection| objection.steps.contains(&step)));
+            let known = without_the_refused(known, &objections, &mut findings);
+            let joint = joint::estimate(recording, &known, config, condemned, &mut findings);
             thermal = joint.thermal;
             two_parameter = joint.two_parameter;
             joint.estimates
@@ -100,6 +172,11 @@ pub fn identify_recording(
             })
             .collect(),
     };
+    for objection in &objections {
+        for position in &objection.steps {
+            findings[*position].doubt(objection.code, objection.message.clone());
+        }
+    }
     let points = recording
         .steps
         .iter()
@@ -109,6 +186,27 @@ pub fn identify_recording(
         .map(|(((step, state), estimate), findings)| Ok(point(step, &state?, &estimate, findings, config)))
         .collect();
     Ok(Identified { points, thermal, two_parameter })
+}
+
+/// The steps that may have a say in what all share: where an objection is to a few, they would spoil the others. Samples of a channel that
+/// is frozen for a while are left out by themselves, and the rest of the step speaks.
+fn without_the_refused(
+    mut known: Vec<Option<EndState>>,
+    objections: &[Objection],
+    findings: &mut [Findings],
+) -> Vec<Option<EndState>> {
+    let mut refused = vec![false; known.len()];
+    let whole = objections.iter().filter(|objection| !objection.samples_left_out);
+    whole.flat_map(|objection| &objection.steps).for_each(|position| refused[*position] = true);
+    let few = refused.iter().any(|refused| !refused);
+    for (position, _) in refused.iter().enumerate().filter(|(_, refused)| few && **refused) {
+        if known[position].take().is_some() {
+            let message =
+                "this step does not count in what the points share, and has no numbers of its own".to_owned();
+            findings[position].doubt(code::LEFT_OUT, message);
+        }
+    }
+    known
 }
 
 /// Remarks that the run has told that a step's speed was not reached: the point is as good as any, but elsewhere on the map.

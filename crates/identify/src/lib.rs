@@ -7,6 +7,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod bias;
+mod cleaning;
 mod commands;
 mod config;
 mod covariance;
@@ -22,6 +23,7 @@ mod identify;
 mod joint;
 mod needs;
 mod nominal_map;
+mod objections;
 mod one_fit;
 mod probe;
 mod relaxation;
@@ -38,7 +40,7 @@ pub use config::{DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, 
 pub use error::{IdentifyError, StepError};
 pub use expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use findings::code;
-pub use identify::{Identified, identify, identify_each, identify_recording};
+pub use identify::{Identified, identify, identify_beside, identify_each, identify_recording};
 pub use joint::expected::{ExpectedStep, expected_together};
 pub use joint::surface::EfficiencySurface;
 pub use joint::worth::StepWorth;
@@ -46,7 +48,7 @@ pub use mapper_core::{
     Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings, SettleBands, WindowRule,
 };
 pub use needs::{method_for, needs};
-pub use nominal_map::doubt_off_the_nominal_map;
+pub use nominal_map::{NominalRig, doubt_off_the_nominal_map};
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
 pub use two_parameter::TwoParameter;

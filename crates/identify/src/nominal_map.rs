@@ -7,6 +7,8 @@ use crate::findings::code;
 use mapper_core::{IdentifiedPoint, Method, ModelTolerances, ReferenceState, Verdict, Warning};
 use mapper_numerics::polyline::NearestOnPolyline;
 use mapper_physics::characteristic::CompressorCharacteristic;
+use mapper_physics::compression::isentropic_rise_ratio;
+use mapper_physics::model::Model;
 use nalgebra::{DMatrix, DVector};
 
 /// Declared standard deviations of the efficiency's scale that are allowed for: a machine may be better or worse than its
@@ -19,6 +21,10 @@ const LEAST_SHAPE: f64 = 3e-3;
 const LENGTH: f64 = 0.7;
 /// Standard deviations of chi-square above its mean beyond which the points are doubted: one in a thousand of 20 points.
 const DOUBT_SIGMAS: f64 = 4.0;
+/// Standard deviations of a temperature's offset.
+const OFFSET_SIGMAS: f64 = 3.0;
+/// Standard errors of the level beyond its tolerance.
+const LEVEL_SIGMAS: f64 = 4.0;
 /// How far along its speed line a point may be misplaced by the tolerances of flow map and valve, in units of the line's
 /// largest flow and largest PR - 1, one standard deviation.
 const PLACE_RATIO: f64 = 0.01;
@@ -27,6 +33,19 @@ const PLACES: usize = 200;
 /// Fewest points that say anything of a map, and most that are looked at: the effort grows with the cube.
 const FEWEST: usize = 5;
 const MOST: usize = 500;
+
+/// Standard error of what `dynamic` has of its own, fraction: h is held constant while the flow still moves, and half a point of
+/// error by that passes without a doubt.
+const DYNAMIC_OWN: f64 = 5e-3;
+
+/// What a campaign declares of its rig, and how far it may be off it.
+#[derive(Debug, Clone, Copy)]
+pub struct NominalRig<'a> {
+    /// Map, valve and geometry.
+    pub model: &'a Model,
+    /// One-sigma tolerances.
+    pub tolerances: &'a ModelTolerances,
+}
 
 /// Doubts all points of a recording whose efficiencies lie off the nominal map by more than its declared tolerances, the
 /// points' own intervals and a common scale together explain. `reference`: of the points' corrected speeds.
@@ -37,16 +56,21 @@ pub fn doubt_off_the_nominal_map(
     tolerances: &ModelTolerances,
 ) {
     let Some(message) = off_the_map(points, map, reference, tolerances) else { return };
-    for point in points.iter_mut().filter(|point| point.method == Method::Joint && point.eta.is_some()) {
+    for point in points.iter_mut().filter(|point| adiabatic(point) && point.eta.is_some()) {
         point.verdict = point.verdict.doubted();
         let warning = Warning { code: code::OFF_THE_NOMINAL_MAP.to_owned(), message: message.clone() };
         point.warnings.push(warning);
     }
 }
 
+/// Whether a point's efficiency is that of a map, without heat.
+fn adiabatic(point: &IdentifiedPoint) -> bool {
+    matches!(point.method, Method::Joint | Method::Dynamic)
+}
+
 /// The nominal map at the place of a speed line that is nearest to a point.
 #[derive(Debug, Clone, Copy)]
-struct Nominal {
+struct OnMap {
     /// Efficiency, fraction.
     eta: f64,
     /// Its slope along the line, per unit of the line's largest flow and largest PR - 1.
@@ -59,7 +83,7 @@ fn nearest(
     map: &dyn CompressorCharacteristic,
     speed_corrected_rpm: f64,
     flow_factor: f64,
-) -> Option<Nominal> {
+) -> Option<OnMap> {
     let (_, top) = map.surge_point(speed_corrected_rpm);
     let largest_kg_s = map.choke_flow_corrected_kg_s(speed_corrected_rpm);
     if !(top > 1.0 && largest_kg_s > 0.0) {
@@ -79,11 +103,11 @@ fn nearest(
         (point.flow_corrected_kg_s * flow_factor / largest_kg_s, (point.pressure_ratio - 1.0) / (top - 1.0));
     let NearestOnPolyline { segment, share_ratio, .. } = NearestOnPolyline::of(&line, here)?;
     let (((ax, ay), a), ((bx, by), b)) = (places[segment], places[segment + 1]);
-    Some(Nominal { eta: a + share_ratio * (b - a), slope: (b - a) / (bx - ax).hypot(by - ay).max(1e-9) })
+    Some(OnMap { eta: a + share_ratio * (b - a), slope: (b - a) / (bx - ax).hypot(by - ay).max(1e-9) })
 }
 
 /// What speaks against the points, in a sentence; `None` where all is explained.
-fn off_the_map(
+pub(crate) fn off_the_map(
     points: &[IdentifiedPoint],
     map: &dyn CompressorCharacteristic,
     reference: ReferenceState,
@@ -91,9 +115,9 @@ fn off_the_map(
 ) -> Option<String> {
     let speed_factor = reference.speed_factor_to(map.reference());
     let flow_factor = reference.flow_factor_to(map.reference());
-    let used: Vec<(&IdentifiedPoint, Nominal, f64)> = points
+    let used: Vec<(&IdentifiedPoint, OnMap, f64)> = points
         .iter()
-        .filter(|point| point.method == Method::Joint && point.verdict == Verdict::Good)
+        .filter(|point| adiabatic(point) && point.verdict == Verdict::Good)
         .filter_map(|point| {
             let nominal = nearest(point, map, point.speed_corrected_rpm * speed_factor, flow_factor)?;
             let off = point.eta? - nominal.eta;
@@ -118,17 +142,49 @@ fn off_the_map(
         let ((one, nominal, _), (other, other_nominal, _)) = (used[i], used[j]);
         let own = if i == j {
             let own = one.eta_own_standard_error().unwrap_or(0.0);
-            own * own + (PLACE_RATIO * nominal.slope).powi(2) + 1e-6
+            let constant_h = if one.method == Method::Dynamic { DYNAMIC_OWN } else { 0.0 };
+            own * own + constant_h * constant_h + (PLACE_RATIO * nominal.slope).powi(2) + 1e-6
         } else {
             0.0
         };
         let square = ((u[i] - u[j]).powi(2) + (v[i] - v[j]).powi(2)) / (LENGTH * LENGTH);
         one.common.eta_covariance(&other.common)
             + own
-            + scale * scale * nominal.eta * other_nominal.eta
             + shape * shape * nominal.eta * other_nominal.eta * (-0.5 * square).exp()
     });
     let off = DVector::from_iterator(count, used.iter().map(|(.., off)| *off));
+    let etas = DVector::from_iterator(count, used.iter().map(|(_, nominal, _)| nominal.eta));
+    // The level by itself: a machine may be better or worse all over, but not by any amount.
+    let factor = covariance.clone().cholesky()?;
+    let (information, pull) = (etas.dot(&factor.solve(&etas)), etas.dot(&factor.solve(&off)));
+    let level = pull / information;
+    if level.abs() > scale + LEVEL_SIGMAS * information.sqrt().recip() {
+        return Some(format!(
+            "the efficiencies lie {:+.1} % off the nominal map all over, and {:.1} % are its declared tolerance: T1, T2, P1 or P2 is \
+             scaled or off, or the machine is another; `mapper gap diagnose` tells which",
+            100.0 * level,
+            100.0 * tolerances.compressor_efficiency_ratio,
+        ));
+    }
+    let covariance = covariance + scale * scale * &etas * etas.transpose();
+    // One offset of a temperature by itself: among all that chi-square allows for it would hide.
+    let slopes = DVector::from_iterator(
+        count,
+        used.iter().map(|(point, nominal, _)| {
+            -nominal.eta * nominal.eta
+                / (point.t1_k * isentropic_rise_ratio(point.pressure_ratio, point.t1_k))
+        }),
+    );
+    let common = DMatrix::from_fn(count, count, |i, j| used[i].0.common.eta_covariance(&used[j].0.common));
+    let beside = (&covariance - common).cholesky()?;
+    let weights = beside.solve(&slopes) / slopes.dot(&beside.solve(&slopes));
+    let (offset_k, sigma_k) = (weights.dot(&off), weights.dot(&(&covariance * &weights)).max(0.0).sqrt());
+    if offset_k.abs() > OFFSET_SIGMAS * sigma_k {
+        return Some(format!(
+            "the efficiencies lie off the nominal map as if T2 - T1 read {offset_k:+.1} K too much, and {sigma_k:.1} K are what sensors and \
+             map are declared to explain (one standard deviation): T1, T2, Tc or the pressures are off; compare them at standstill (`zero`)"
+        ));
+    }
     let chi_square = off.dot(&covariance.cholesky()?.solve(&off));
     let freedom = count as f64;
     if chi_square <= freedom + DOUBT_SIGMAS * (2.0 * freedom).sqrt() {

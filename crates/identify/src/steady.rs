@@ -3,6 +3,7 @@
 //! Whatever heat flows between gas and housing counts as work here; the error against the adiabatic efficiency is what
 //! the dynamic method is for (fig. 5 of the paper).
 
+use crate::cleaning::without_spikes;
 use crate::config::coloured;
 use crate::dynamic::{Estimate, enough};
 use crate::findings::{Findings, code};
@@ -66,7 +67,7 @@ pub(crate) fn estimate(
     let start_s = (step.end_s - limits.steady_mean_s).max(step.start_s);
     let window = Window { start_s, end_s: step.end_s };
     estimate.window = Some(window);
-    let samples = Samples::of(recording, window, config, false);
+    let samples = without_spikes(Samples::of(recording, window, config, false), findings);
     if !enough(&samples, config, findings) {
         return estimate;
     }

@@ -7,9 +7,7 @@ use crate::surge::marks_of;
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{IdentifiedPoint, Method, Recording, StepMarker, StepOrigin, ThermalModel, joined};
-use mapper_identify::{
-    IdentifyConfig, TwoParameter, ZeroOutcome, doubt_off_the_nominal_map, identify_recording, method_for,
-};
+use mapper_identify::{IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, identify_beside, method_for};
 use mapper_observe::FusedChannel;
 use mapper_record::ChannelMap;
 use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};
@@ -111,17 +109,12 @@ impl Session<'_> {
         let (_, config) = zero.take_off(Recording::default(), fused.config.clone());
         let off = |recording: Recording| zero.take_off(recording, fused.config.clone()).0;
         let (recording, origins) = joined(fused.recordings.into_iter().map(off).collect());
-        let found = identify_recording(&recording, &config)?;
-        let mut points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
-        if let Some(campaign) = campaign.filter(|campaign| campaign.tolerances_declared) {
-            let model = nominal_model(campaign)?;
-            doubt_off_the_nominal_map(
-                &mut points,
-                model.map.as_ref(),
-                config.reference,
-                &campaign.tolerances,
-            );
-        }
+        let declared = campaign.filter(|campaign| campaign.tolerances_declared);
+        let model = declared.map(nominal_model).transpose()?;
+        let nominal = declared.zip(model.as_ref());
+        let nominal = nominal.map(|(campaign, model)| NominalRig { model, tolerances: &campaign.tolerances });
+        let found = identify_beside(&recording, &config, nominal)?;
+        let points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
         for point in &points {
             self.tell(SessionEvent::PointIdentified(Box::new(point.clone())));
         }

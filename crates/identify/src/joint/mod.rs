@@ -5,7 +5,6 @@
 //! the map) is found once, from all of them. Why that is needed, what it assumes and what it can not do stands in
 //! `docs/identification.md`.
 
-pub(crate) mod cleaning;
 pub(crate) mod common_part;
 pub(crate) mod expected;
 pub(crate) mod explained;
@@ -61,11 +60,13 @@ pub(crate) struct Joint {
     pub(crate) two_parameter: Vec<TwoParameter>,
 }
 
-/// Identifies all steps. `end_states` and `findings`: one for each step; no end state, no estimate.
+/// Identifies all steps. `end_states` and `findings`: one for each step; no end state, no estimate. `condemned`: the readings are
+/// refused already, so it is of no use to look for what else they may be.
 pub(crate) fn estimate(
     recording: &Recording,
     end_states: &[Option<EndState>],
     config: &IdentifyConfig,
+    condemned: bool,
     findings: &mut [Findings],
 ) -> Joint {
     let mut two_parameter = Vec::new();
@@ -93,7 +94,7 @@ pub(crate) fn estimate(
     let careful = carefully(config);
     let late: Vec<rows::StepRows> = steps.iter().map(rows::StepRows::settled).collect();
     let attempt = match Attempt::new(&steps, &alone, config, &[]) {
-        Some(attempt) if attempt.thermal.doubts.is_empty() => Some(attempt),
+        Some(attempt) if condemned || attempt.thermal.doubts.is_empty() => Some(attempt),
         first => match first.as_ref().and_then(|first| first.without_a_region(&steps, &alone, config)) {
             Some(other) => Some(other),
             None if careful.joint == config.joint => first,

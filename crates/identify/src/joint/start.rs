@@ -1,9 +1,9 @@
 //! From a recording to a fit that can be started, and what the fit learns of its own spreads.
 
+use crate::cleaning::cleaned;
 use crate::dynamic::{self, Estimate};
 use crate::end_state::EndState;
 use crate::findings::{Findings, code};
-use crate::joint::cleaning::cleaned;
 use crate::joint::explained::Explained;
 use crate::joint::inlet;
 use crate::joint::model::{Course, Setting};

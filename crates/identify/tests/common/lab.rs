@@ -96,6 +96,10 @@ pub fn campaign(points: &[(f64, f64)], dwell_s: f64, machine: Machine) -> Campai
                         (Channel::P2, state.p2_pa),
                         (Channel::T2, t2_k),
                         (Channel::Tc, state.tc_k),
+                        (Channel::TurbineFlow, outputs.turbine_flow_kg_s),
+                        (Channel::P3, boundary.p3_pa),
+                        (Channel::T3, boundary.t3_k),
+                        (Channel::T4, outputs.turbine.t4_k),
                     ] {
                         let series = recording.series.entry(channel).or_default();
                         series.t_s.push(t_s);

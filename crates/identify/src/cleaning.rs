@@ -13,7 +13,13 @@ const SIGMAS: f64 = 8.0;
 /// Time for which a noisy channel may show one and the same value, s.
 const STUCK_S: f64 = 5.0;
 
-/// The samples without them; says so in `findings`.
+/// The samples without spikes; says so in `findings`.
+pub(crate) fn without_spikes(samples: Samples, findings: &mut Findings) -> Samples {
+    // Where nothing is declared nothing is taken for stuck.
+    cleaned(samples, &IdentifyConfig::default(), findings)
+}
+
+/// The samples without spikes and without those of a stuck channel; says so in `findings`.
 pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut Findings) -> Samples {
     // Smallest distances that count, K, and shares of the reading for flow and pressures.
     let columns: [(Channel, &[f64], f64); 6] = [

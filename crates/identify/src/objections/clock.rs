@@ -1,0 +1,127 @@
+//! Channels that are late: at a jump of the operating point all of the compressor's readings move at once.
+//!
+//! Speed, flow, P2 and T2 show the jump as a change of level, the housing as a change of slope, since its temperature cannot
+//! jump. Over all jumps of a recording the moment of the largest change is known to a second or two, whatever the jumps are. Two
+//! loggers with clocks of their own, a filter, and a reader of field buses that waits make a channel late.
+
+use crate::commands::begins_with_jump;
+use crate::findings::code;
+use crate::objections::objection::Objection;
+use mapper_core::{Channel, Recording, Series};
+use mapper_numerics::statistics::{mean, median};
+
+/// What is compared: means of so many seconds before and after a moment.
+const LEVEL_S: f64 = 2.0;
+const SLOPE_S: f64 = 4.0;
+/// Moments looked at, after the jump and before, s.
+const BEFORE_S: f64 = 10.0;
+const AFTER_S: f64 = 45.0;
+const EVERY_S: f64 = 0.5;
+/// Lag behind the others from which on a channel is late, s: a probe of 4 mm and a shaft that runs up make 2 s.
+const LATE_S: f64 = 3.5;
+/// Jumps from which on they can be averaged, and the most that are.
+const FEWEST: usize = 4;
+const MOST: usize = 60;
+
+/// Whether a channel changes its level or its slope at a jump.
+const WATCHED: [(Channel, bool); 5] = [
+    (Channel::ShaftSpeed, false),
+    (Channel::CompressorFlow, false),
+    (Channel::P2, false),
+    (Channel::T2, false),
+    (Channel::Tc, true),
+];
+
+pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
+    let steps = &recording.steps;
+    let jumps_s: Vec<f64> = (0..steps.len())
+        .filter(|position| begins_with_jump(steps, *position))
+        .filter(|position| steps[*position].end_s - steps[*position].start_s > AFTER_S)
+        .map(|position| steps[position].start_s)
+        .take(MOST)
+        .collect();
+    if jumps_s.len() < FEWEST {
+        return Vec::new();
+    }
+    let mut found: Vec<Objection> = housing_jumps(recording, &jumps_s).into_iter().collect();
+    let lags_s: Vec<(Channel, f64)> = WATCHED
+        .into_iter()
+        .filter_map(|(channel, slope)| {
+            Some((channel, lag_s(recording.series.get(&channel)?, &jumps_s, slope)?))
+        })
+        .collect();
+    // Three clocks agree on the time.
+    let Some(middle_s) = median(lags_s.iter().map(|(_, lag_s)| *lag_s)).filter(|_| lags_s.len() >= 3) else {
+        return found;
+    };
+    let late = lags_s
+        .iter()
+        .filter(|(_, lag_s)| (lag_s - middle_s).abs() > LATE_S)
+        .map(|(channel, lag_s)| {
+            let message = format!(
+                "{channel} moves {:.1} s {} the other channels at the jumps (all {} together): its clock or filter is another; \
+                 correct its times",
+                (lag_s - middle_s).abs(),
+                if *lag_s > middle_s { "after" } else { "before" },
+                jumps_s.len()
+            );
+            Objection::new(code::LATE_CHANNEL, message, (0..steps.len()).collect())
+        });
+    found.extend(late);
+    found
+}
+
+/// A housing of a kilogram cannot jump with the gas: where Tc does so more than T2, the two are exchanged.
+fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<Objection> {
+    let jump_k = |channel: Channel| {
+        let series = recording.series.get(&channel)?;
+        median(jumps_s.iter().filter_map(|jump_s| change(series, jump_s + LEVEL_S, false)).map(f64::abs))
+    };
+    let (t2_k, tc_k) = (jump_k(Channel::T2)?, jump_k(Channel::Tc)?);
+    (tc_k > 2.0 * t2_k).then(|| {
+        let message = format!(
+            "Tc moves by {tc_k:.1} K within some seconds of a jump and T2 by {t2_k:.1} K (medians), and no housing is faster than the \
+             gas in it: the channels are exchanged; correct the channel map"
+        );
+        Objection::new(code::SWAPPED_CHANNELS, message, (0..recording.steps.len()).collect())
+    })
+}
+
+/// When after the jumps a channel changes most, s; `None` where it does not change.
+fn lag_s(series: &Series, jumps_s: &[f64], slope: bool) -> Option<f64> {
+    let moments = ((BEFORE_S + AFTER_S) / EVERY_S) as usize;
+    let mut squares = vec![0.0; moments + 1];
+    for jump_s in jumps_s {
+        let changes: Vec<f64> = (0..=moments)
+            .map(|k| {
+                let moment_s = jump_s - BEFORE_S + k as f64 * EVERY_S;
+                change(series, moment_s, slope).unwrap_or(0.0).powi(2)
+            })
+            .collect();
+        let whole = mean(&changes).filter(|mean| *mean > 0.0)?;
+        // Each jump counts alike.
+        squares.iter_mut().zip(changes).for_each(|(sum, square)| *sum += square / whole);
+    }
+    let (at, largest) = squares.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    // What noise makes has no peak.
+    let clear = *largest > 4.0 * mean(&squares)?;
+    clear.then_some(at as f64 * EVERY_S - BEFORE_S)
+}
+
+/// Change of level or slope at a moment.
+fn change(series: &Series, moment_s: f64, slope: bool) -> Option<f64> {
+    if !slope {
+        let before = mean(series.slice(moment_s - LEVEL_S, moment_s).1)?;
+        return Some(mean(series.slice(moment_s, moment_s + LEVEL_S).1)? - before).filter(|d| d.is_finite());
+    }
+    let rate = |from_s: f64, to_s: f64| {
+        let (t_s, values) = series.slice(from_s, to_s);
+        let (middle_s, middle) = (mean(t_s)?, mean(values)?);
+        let (top, bottom) = t_s.iter().zip(values).fold((0.0, 0.0), |(top, bottom), (t_s, value)| {
+            (top + (t_s - middle_s) * (value - middle), bottom + (t_s - middle_s).powi(2))
+        });
+        (bottom > 0.0).then_some(top / bottom)
+    };
+    let change = rate(moment_s, moment_s + SLOPE_S)? - rate(moment_s - SLOPE_S, moment_s)?;
+    Some(change).filter(|change| change.is_finite())
+}

@@ -1,0 +1,67 @@
+//! The readings at the end of each step, where everything but the housing has settled.
+
+use crate::{IdentifyConfig, taps};
+use mapper_core::{Channel, Recording};
+use mapper_numerics::statistics::median;
+use mapper_observe::plausible::is_reading;
+use mapper_physics::compression::isentropic_rise_ratio;
+
+/// Last part of a step, s.
+const LAST_S: f64 = 10.0;
+
+/// Medians over the last seconds of a step, total pressures, SI (speed in rpm).
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ends {
+    pub(crate) position: usize,
+    pub(crate) end_s: f64,
+    pub(crate) valve_opening_ratio: f64,
+    pub(crate) speed_rpm: f64,
+    pub(crate) flow_kg_s: f64,
+    pub(crate) p1_pa: f64,
+    pub(crate) p2_pa: f64,
+    pub(crate) t1_k: f64,
+    pub(crate) t2_k: f64,
+    /// Turbine side; `None` where it was not recorded.
+    pub(crate) turbine_flow_kg_s: Option<f64>,
+    pub(crate) t3_k: Option<f64>,
+    pub(crate) t4_k: Option<f64>,
+}
+
+impl Ends {
+    /// Temperature rise of isentropic compression, K.
+    pub(crate) fn isentropic_rise_k(&self) -> f64 {
+        self.t1_k * isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k)
+    }
+}
+
+/// One for each step; `None` where one of its compressor readings is missing.
+pub(crate) fn ends(recording: &Recording, config: &IdentifyConfig) -> Vec<Option<Ends>> {
+    recording
+        .steps
+        .iter()
+        .enumerate()
+        .map(|(position, step)| {
+            let at = |channel: Channel| {
+                let series = recording.series.get(&channel)?;
+                let values = series.slice((step.end_s - LAST_S).max(step.start_s), step.end_s).1;
+                median(values.iter().filter(|value| is_reading(channel, **value)))
+            };
+            let (flow_kg_s, t1_k, t2_k) = (at(Channel::CompressorFlow)?, at(Channel::T1)?, at(Channel::T2)?);
+            let end = Ends {
+                position,
+                end_s: step.end_s,
+                valve_opening_ratio: step.valve_opening_ratio,
+                speed_rpm: at(Channel::ShaftSpeed)?,
+                flow_kg_s,
+                p1_pa: taps::total_pa(config.inlet_tap, at(Channel::P1)?, flow_kg_s, t1_k),
+                p2_pa: taps::total_pa(config.outlet_tap, at(Channel::P2)?, flow_kg_s, t2_k),
+                t1_k,
+                t2_k,
+                turbine_flow_kg_s: at(Channel::TurbineFlow),
+                t3_k: at(Channel::T3),
+                t4_k: at(Channel::T4),
+            };
+            (end.p1_pa > 0.0 && end.p2_pa > 0.0 && end.isentropic_rise_k().is_finite()).then_some(end)
+        })
+        .collect()
+}

@@ -1,0 +1,109 @@
+//! Frozen and saturated channels: a reading with noise does not repeat to the last digit.
+//!
+//! A sensor that hangs, a logger that lost its module and an amplifier at its limit all show one and the same value over and
+//! over. A coarse logger repeats values too, but then it does so all the time; of such a channel only what stands still over a
+//! jump that moves it is called frozen.
+
+use crate::IdentifyConfig;
+use crate::findings::code;
+use crate::objections::ends::Ends;
+use crate::objections::objection::Objection;
+use crate::objections::plausible::read_by;
+use mapper_core::{Channel, Recording, Series, with_unit};
+
+/// Time for which a noisy channel may show one and the same value, s, and samples that it must show it at least.
+const SHORTEST_S: f64 = 5.0;
+const FEWEST: usize = 8;
+/// Share of equal neighbours outside the long runs above which a logger counts as coarse.
+const COARSE_SHARE: f64 = 0.3;
+/// After a jump by so much every channel but those of the inlet has moved, s.
+const AFTER_JUMP_S: f64 = 15.0;
+
+/// Difference of two steps' ends that is a jump, ratio.
+const MOVED_RATIO: f64 = 0.02;
+
+/// A stretch of one and the same value.
+struct Run {
+    first: usize,
+    last: usize,
+}
+
+pub(crate) fn objections(
+    recording: &Recording,
+    ends: &[Option<Ends>],
+    config: &IdentifyConfig,
+) -> Vec<Objection> {
+    let moves = moves(ends);
+    read_by(config).filter_map(|channel| of_channel(recording, channel, moves, config)).collect()
+}
+
+/// Whether anything that moves with the operating point is another at some step.
+fn moves(ends: &[Option<Ends>]) -> bool {
+    let read: [fn(&Ends) -> f64; 3] = [|end| end.speed_rpm, |end| end.flow_kg_s, |end| end.p2_pa];
+    read.into_iter().any(|read| {
+        let (low, high) =
+            ends.iter().flatten().map(read).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                (low.min(value), high.max(value))
+            });
+        high > low * (1.0 + MOVED_RATIO)
+    })
+}
+
+fn of_channel(
+    recording: &Recording,
+    channel: Channel,
+    moves: bool,
+    config: &IdentifyConfig,
+) -> Option<Objection> {
+    let series = recording.series.get(&channel)?;
+    let mut long = runs(series);
+    let in_runs: usize = long.iter().map(|run| run.last - run.first).sum();
+    let pairs = series.values.len().saturating_sub(1);
+    let equal = series.values.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    let coarse = (equal - in_runs) as f64 > COARSE_SHARE * (pairs - in_runs).max(1) as f64;
+    let noisy = config.declared.get(&channel).is_some_and(|declared| declared.noise_sigma > 0.0);
+    // Inlet conditions may be as still as they are commanded.
+    let inlet = matches!(channel, Channel::P1 | Channel::T1);
+    let over_a_jump = |run: &Run| {
+        let (from_s, to_s) = (series.t_s[run.first], series.t_s[run.last]);
+        let mut later = recording.steps.iter().skip(1);
+        moves && !inlet && later.any(|step| from_s < step.start_s && step.start_s + AFTER_JUMP_S < to_s)
+    };
+    if coarse || !noisy {
+        long.retain(over_a_jump);
+    }
+    let rests = |(position, step): (usize, &mapper_core::StepMarker)| {
+        let shared_s =
+            |run: &Run| series.t_s[run.last].min(step.end_s) - series.t_s[run.first].max(step.start_s);
+        long.iter().any(|run| shared_s(run) >= 0.5 * SHORTEST_S).then_some(position)
+    };
+    let steps: Vec<usize> = recording.steps.iter().enumerate().filter_map(rests).collect();
+    let longest = long.iter().max_by(|a, b| {
+        let of = |run: &Run| series.t_s[run.last] - series.t_s[run.first];
+        of(a).total_cmp(&of(b))
+    })?;
+    let (from_s, to_s) = (series.t_s[longest.first], series.t_s[longest.last]);
+    let message = format!(
+        "{channel} shows {} and nothing else from {from_s:.0} s to {to_s:.0} s: it is frozen or saturated; nothing of the steps in \
+         which it stands still can be used, so mend the channel and repeat them",
+        with_unit(format!("{:.6}", series.values[longest.first]), channel.unit())
+    );
+    // Of a channel with declared noise the samples that stand still are left out; of the speed nothing else is asked.
+    let samples_left_out = noisy && channel != Channel::ShaftSpeed;
+    let objection = Objection { samples_left_out, ..Objection::new(code::FROZEN_CHANNEL, message, steps) };
+    (!objection.steps.is_empty()).then_some(objection)
+}
+
+/// The long stretches of one and the same value.
+fn runs(series: &Series) -> Vec<Run> {
+    let mut runs = Vec::new();
+    let mut first = 0;
+    for stretch in series.values.chunk_by(|a, b| a == b) {
+        let last = first + stretch.len() - 1;
+        if stretch.len() >= FEWEST && series.t_s[last] - series.t_s[first] >= SHORTEST_S {
+            runs.push(Run { first, last });
+        }
+        first = last + 1;
+    }
+    runs
+}

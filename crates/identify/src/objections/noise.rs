@@ -1,0 +1,45 @@
+//! Noise far beyond its declaration: a broken shield, a loose contact, a flow that pulsates.
+//!
+//! Successive samples of a slow quantity differ by noise alone. What is declared decides how every reading is weighed and how wide
+//! intervals are, so that a channel with several times as much makes them too narrow.
+
+use crate::IdentifyConfig;
+use crate::findings::code;
+use crate::objections::objection::Objection;
+use crate::objections::plausible::read_by;
+use mapper_core::{Recording, with_unit};
+use mapper_numerics::statistics::robust_sigma;
+
+/// Standard deviation of a sample over the declared one. Noise with a time constant differs less from sample to sample, never
+/// more.
+const MOST_RATIO: f64 = 3.0;
+/// Samples that are further apart than this differ by more than noise, s.
+const NEIGHBOUR_S: f64 = 1.5;
+
+pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
+    read_by(config)
+        .filter_map(|channel| {
+            let declared = config.declared.get(&channel)?.noise_sigma;
+            let series = recording.series.get(&channel)?;
+            let close = |pair: &[f64]| pair[1] - pair[0] <= NEIGHBOUR_S;
+            let differences: Vec<f64> = series
+                .t_s
+                .windows(2)
+                .zip(series.values.windows(2))
+                .filter(|(times, values)| close(times) && values.iter().all(|value| value.is_finite()))
+                .map(|(_, values)| (values[1] - values[0]) / std::f64::consts::SQRT_2)
+                .collect();
+            let found = robust_sigma(&differences)?;
+            if !(declared > 0.0 && found > MOST_RATIO * declared) {
+                return None;
+            }
+            let message = format!(
+                "{channel} scatters by {} from sample to sample (one standard deviation), and {} is declared: mend the channel, or \
+                 declare the noise that it has",
+                with_unit(format!("{found:.3e}"), channel.unit()),
+                with_unit(format!("{declared:.3e}"), channel.unit()),
+            );
+            Some(Objection::new(code::NOISY_CHANNEL, message, (0..recording.steps.len()).collect()))
+        })
+        .collect()
+}

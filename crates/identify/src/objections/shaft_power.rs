@@ -1,0 +1,46 @@
+//! The compressor's power beside the turbine's: no shaft gives more than it gets.
+//!
+//! `m_c cp (T2 - T1)` against `m_t cp (T3 - T4)`, the whole enthalpy that the exhaust gas loses, heat included. Bearings and
+//! housings take 10 to 40 % of it. A point by itself may have more for a while, where a hot compressor housing heats the air or
+//! the shaft slows down; the middle of a campaign may not.
+
+use crate::findings::code;
+use crate::objections::ends::Ends;
+use crate::objections::objection::Objection;
+use mapper_core::Channel;
+use mapper_numerics::statistics::median;
+use mapper_observe::plausible::check_running;
+use mapper_physics::air;
+
+/// Compressor over turbine power of the middle point: above, and below. A turbine housing that loses as much as it passes
+/// on is far below every gas stand.
+const POSSIBLE: std::ops::RangeInclusive<f64> = 0.2..=1.15;
+
+pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
+    let powers_w: Vec<(f64, f64)> = ends
+        .iter()
+        .flatten()
+        .filter_map(|end| {
+            let (flow_kg_s, t3_k, t4_k) = (end.turbine_flow_kg_s?, end.t3_k?, end.t4_k?);
+            let running = [(Channel::TurbineFlow, flow_kg_s), (Channel::T3, t3_k), (Channel::T4, t4_k)];
+            if running.into_iter().any(|(channel, value)| check_running(channel, value).is_err()) {
+                return None;
+            }
+            let taken = end.flow_kg_s * air::heat_capacity_j_kgk(end.t1_k) * (end.t2_k - end.t1_k);
+            let given = flow_kg_s * air::heat_capacity_j_kgk(0.5 * (t3_k + t4_k)) * (t3_k - t4_k);
+            (given > 0.0).then_some((taken, given))
+        })
+        .collect();
+    let middle = median(powers_w.iter().map(|(taken, given)| taken / given))?;
+    if POSSIBLE.contains(&middle) || 2 * powers_w.len() < ends.len() {
+        return None;
+    }
+    let of = |read: fn(&(f64, f64)) -> f64| median(powers_w.iter().map(read)).unwrap_or(f64::NAN) / 1e3;
+    let message = format!(
+        "the compressor takes {:.2} kW and the exhaust gas gives {:.2} kW (medians; {middle:.2} of it, and 0.5 to 1 is usual): m_c, T1 \
+         or T2, or else m_t, T3 or T4, is scaled or in another unit",
+        of(|powers| powers.0),
+        of(|powers| powers.1),
+    );
+    Some(Objection::new(code::SCALED_CHANNEL, message, (0..ends.len()).collect()))
+}

@@ -1,0 +1,36 @@
+//! Speed, flow and head beside each other: the specific speed `omega sqrt(Q)/dh^0.75` knows no diameter, and radial compressors
+//! have 0.3 to 2 of it from surge to near choke, whatever their size (Cordier's diagram, e.g. Balje, Turbomachines, 1981).
+//!
+//! A unit taken for another moves it by far more than machines differ: 1/s for rpm by 60, kg/h for kg/s by 60.
+
+use crate::findings::code;
+use crate::objections::ends::Ends;
+use crate::objections::objection::Objection;
+use mapper_numerics::statistics::median;
+use mapper_physics::air;
+
+/// Middle of a campaign's points; a wide margin about what machines have.
+const POSSIBLE: std::ops::RangeInclusive<f64> = 0.15..=4.0;
+
+pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
+    let used: Vec<&Ends> = ends.iter().flatten().filter(|end| end.isentropic_rise_k() > 0.0).collect();
+    let of = |end: &&Ends| {
+        let omega_rad_s = end.speed_rpm * std::f64::consts::PI / 30.0;
+        let flow_m3_s = end.flow_kg_s * air::GAS_CONSTANT_J_KGK * end.t1_k / end.p1_pa;
+        let head_j_kg = air::heat_capacity_j_kgk(end.t1_k) * end.isentropic_rise_k();
+        omega_rad_s * flow_m3_s.max(0.0).sqrt() / head_j_kg.powf(0.75)
+    };
+    let middle = median(used.iter().map(of).filter(|speed| speed.is_finite()))?;
+    if POSSIBLE.contains(&middle) {
+        return None;
+    }
+    let of_middle = |read: fn(&Ends) -> f64| median(used.iter().map(|end| read(end))).unwrap_or(f64::NAN);
+    let message = format!(
+        "N, m_c and P2/P1 do not go together: {:.4} krpm, {:.4} g/s and a pressure ratio of {:.3} (medians) make a specific speed of \
+         {middle:.3}, and radial compressors have 0.3 to 2: check the units of N (rpm, not 1/s) and m_c, and that P1 and P2 are absolute",
+        of_middle(|end| end.speed_rpm) / 1e3,
+        of_middle(|end| end.flow_kg_s) * 1e3,
+        of_middle(|end| end.p2_pa / end.p1_pa),
+    );
+    Some(Objection::new(code::SCALED_CHANNEL, message, (0..ends.len()).collect()))
+}

@@ -29,6 +29,9 @@ pub trait Log {
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError>;
 }
 
+/// Opens a file as a log.
+pub type OpenLog = fn(&LogFile, &LogOptions) -> Result<Box<dyn Log>, LogError>;
+
 /// One format of logs.
 #[derive(Debug, Clone, Copy)]
 pub struct LogFormat {
@@ -37,7 +40,7 @@ pub struct LogFormat {
     /// Whether the first bytes of a file (up to [`LogFormats::HEAD_BYTES`]) are of this format.
     pub recognises: fn(&[u8]) -> bool,
     /// Opens a file of this format.
-    pub open: fn(&LogFile, &LogOptions) -> Result<Box<dyn Log>, LogError>,
+    pub open: OpenLog,
 }
 
 /// The formats that a program knows, in the order in which they are asked.

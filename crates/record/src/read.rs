@@ -1,7 +1,7 @@
 //! Reading a recording, one's own or another program's.
 
 use crate::complaints::Complaints;
-use crate::definitions::Reads;
+use crate::definitions::{Reads, source_of};
 use crate::log_read::{is_mcap, log_of_path, read_log};
 use crate::read_options::ReadOptions;
 use crate::rig_sink::RigSink;
@@ -240,7 +240,7 @@ fn gather(
         if built.t_s.is_empty() {
             continue;
         }
-        if map.source(reads).is_some_and(|source| source.gauge) {
+        if source_of(map, reads).is_some_and(|source| source.gauge) {
             if built.t_s.first().is_none_or(|t_s| ambient_pa(*t_s).is_none()) {
                 warnings.push(ReadWarning::NoAmbient { channel: reads.channel() });
                 continue;

@@ -6,8 +6,12 @@ use std::collections::BTreeMap;
 
 /// Channels that jump with the points of a map, each with the share of itself by which it moves at least. Temperatures follow
 /// for minutes, and say nothing about the beginning.
-const SIGNALS: [(Channel, f64); 4] =
-    [(Channel::ShaftSpeed, 0.01), (Channel::CompressorFlow, 0.02), (Channel::P3, 0.015), (Channel::P2, 0.015)];
+const SIGNALS: [(Channel, f64); 4] = [
+    (Channel::ShaftSpeed, 0.01),
+    (Channel::CompressorFlow, 0.02),
+    (Channel::P3, 0.015),
+    (Channel::P2, 0.015),
+];
 
 /// Time over which means are compared before and after, s.
 const WINDOW_S: f64 = 3.0;

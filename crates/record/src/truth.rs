@@ -1,12 +1,12 @@
 //! What only a simulator knows, for scoring alone.
 
 use crate::format::{METADATA_NAME, START_KEY, TRUTH_TOPIC};
+use crate::log_read::is_mcap;
 use crate::message::{FieldValue, read_fields};
 use crate::read::open;
 use crate::records::ChannelDefinition;
 use crate::scan::{Sink, scan};
 use crate::series_builder::run_time_s;
-use crate::log_read::is_mcap;
 use crate::{ReadOptions, ReadWarning, RecordError};
 use mapper_core::TruthColumn;
 use mapper_logs::LogFile;

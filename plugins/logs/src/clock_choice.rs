@@ -165,11 +165,8 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
             .filter(|other| other.at != candidate.at)
             .map(|other| format!("`{}`", name_of(other)))
             .collect();
-        let beside = if others.is_empty() {
-            String::new()
-        } else {
-            format!("; beside it: {}", others.join(" and "))
-        };
+        let beside =
+            if others.is_empty() { String::new() } else { format!("; beside it: {}", others.join(" and ")) };
         let of = if groups.len() == 1 { "clock".to_owned() } else { format!("clock of group `{name}`") };
         clocks.findings.push(format!("{of}: {words}{beside} (time, time_unit)"));
         let zero_ns = (zero_s * 1e9).round();

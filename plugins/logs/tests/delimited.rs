@@ -63,7 +63,8 @@ fn separators_decimal_signs_headers_and_preambles_are_found() {
 fn letters_in_latin_1_and_utf_16_are_read() {
     let text = "Zeit [s];Öl [°C];p2 [kPa]\n0,0;1,5;20,25\n0,1;2,5;20,5\n0,2;3,5;20,75\n";
     let latin: Vec<u8> = text.chars().map(|letter| u8::try_from(u32::from(letter)).unwrap()).collect();
-    let wide: Vec<u8> = [0xFF, 0xFE].into_iter().chain(text.encode_utf16().flat_map(u16::to_le_bytes)).collect();
+    let wide: Vec<u8> =
+        [0xFF, 0xFE].into_iter().chain(text.encode_utf16().flat_map(u16::to_le_bytes)).collect();
     for bytes in [latin, wide, text.as_bytes().to_vec()] {
         let (layout, rows) = read_with(&bytes, &[]).unwrap();
         assert_eq!(names(&layout)[0], ("Öl", Some("°C")));
@@ -81,7 +82,8 @@ fn the_finest_of_several_clocks_is_read_and_the_date_is_kept() {
     assert_eq!(layout.start_time_ns, Some(1_795_356_185_000_000_000));
     let dated = "when,p2 [kPa],T2 [degC]\n2026-11-22 23:59:59.900,1.5,20.25\n2026-11-23 00:00:00.000,2.5,20.5\n2026-11-23T00:00:00.100,3.5,20.75\n";
     assert_rows(&read(dated).1[0], dated);
-    let midnight = "Uhrzeit;p2 [kPa];T2 [degC]\n23:59:59,9;1,5;20,25\n00:00:00,0;2,5;20,5\n00:00:00,1;3,5;20,75\n";
+    let midnight =
+        "Uhrzeit;p2 [kPa];T2 [degC]\n23:59:59,9;1,5;20,25\n00:00:00,0;2,5;20,5\n00:00:00,1;3,5;20,75\n";
     assert_rows(&read(midnight).1[0], midnight);
 }
 
@@ -89,7 +91,10 @@ fn the_finest_of_several_clocks_is_read_and_the_date_is_kept() {
 fn columns_behind_a_clock_of_another_pace_belong_to_it() {
     let text = "t_fast [s],N [rpm],t_slow [s],T2 [degC]\n0.0,1,0.0,20\n0.1,2,1.0,21\n0.2,3,2.0,22\n0.3,4,,\n";
     let (layout, rows) = read(text);
-    assert_eq!(layout.groups.iter().map(|group| group.name.as_str()).collect::<Vec<_>>(), ["t_fast", "t_slow"]);
+    assert_eq!(
+        layout.groups.iter().map(|group| group.name.as_str()).collect::<Vec<_>>(),
+        ["t_fast", "t_slow"]
+    );
     assert_eq!(rows[0], [(0.0, vec![1.0]), (0.1, vec![2.0]), (0.2, vec![3.0]), (0.3, vec![4.0])]);
     assert_eq!(rows[1], [(0.0, vec![20.0]), (1.0, vec![21.0]), (2.0, vec![22.0])]);
 }
@@ -99,7 +104,11 @@ fn rows_that_share_a_second_are_spread_over_it() {
     let mut text = String::from("time,N [rpm]\n");
     (0..50).for_each(|row| text.push_str(&format!("14:03:{:02},{row}\n", row / 10)));
     let (layout, rows) = read(&text);
-    assert!(rows[0].windows(2).all(|pair| (pair[1].0 - pair[0].0 - 0.1).abs() < 1e-9), "{:?}", &rows[0][..12]);
+    assert!(
+        rows[0].windows(2).all(|pair| (pair[1].0 - pair[0].0 - 0.1).abs() < 1e-9),
+        "{:?}",
+        &rows[0][..12]
+    );
     assert!(layout.findings.iter().any(|finding| finding.contains("10 rows share")), "{:?}", layout.findings);
 }
 

@@ -19,9 +19,14 @@ fn look(bytes: &[u8]) {
 }
 
 fn csv() -> Vec<u8> {
-    let mut text = String::from("Pr\u{fc}fstand 7\nDatum;Uhrzeit;t [s];n_TC [U/min];p1 [mbar rel];\"T2 [°C]\"\n");
+    let mut text =
+        String::from("Pr\u{fc}fstand 7\nDatum;Uhrzeit;t [s];n_TC [U/min];p1 [mbar rel];\"T2 [°C]\"\n");
     for row in 0..60 {
-        text.push_str(&format!("22.11.2026;14:03:{:02};{row},5;{};-1,2;\"2{row},25\"\n", row % 60, 60_000 + row));
+        text.push_str(&format!(
+            "22.11.2026;14:03:{:02};{row},5;{};-1,2;\"2{row},25\"\n",
+            row % 60,
+            60_000 + row
+        ));
     }
     text.into_bytes()
 }
@@ -41,9 +46,13 @@ fn mdf4() -> Vec<u8> {
 
 /// The least workbook, stored without compression so that a flipped byte reaches the XML.
 fn xlsx() -> Vec<u8> {
-    let mut rows = String::from("<row r=\"1\"><c r=\"A1\" t=\"inlineStr\"><is><t>time [s]</t></is></c><c r=\"B1\" t=\"inlineStr\"><is><t>T2 [degC]</t></is></c></row>");
+    let mut rows = String::from(
+        "<row r=\"1\"><c r=\"A1\" t=\"inlineStr\"><is><t>time [s]</t></is></c><c r=\"B1\" t=\"inlineStr\"><is><t>T2 [degC]</t></is></c></row>",
+    );
     for row in 2..40 {
-        rows.push_str(&format!("<row r=\"{row}\"><c r=\"A{row}\"><v>{row}</v></c><c r=\"B{row}\"><v>{row}.5</v></c></row>"));
+        rows.push_str(&format!(
+            "<row r=\"{row}\"><c r=\"A{row}\"><v>{row}</v></c><c r=\"B{row}\"><v>{row}.5</v></c></row>"
+        ));
     }
     let head = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>";
     let main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main";
@@ -51,15 +60,36 @@ fn xlsx() -> Vec<u8> {
     let package = "http://schemas.openxmlformats.org/package/2006";
     let parts = [
         ("[Content_Types].xml", format!("{head}<Types xmlns=\"{package}/content-types\"/>")),
-        ("_rels/.rels", format!("{head}<Relationships xmlns=\"{package}/relationships\"><Relationship Id=\"r1\" Type=\"{relations}/officeDocument\" Target=\"xl/workbook.xml\"/></Relationships>")),
-        ("xl/workbook.xml", format!("{head}<workbook xmlns=\"{main}\" xmlns:r=\"{relations}\"><sheets><sheet name=\"Log\" sheetId=\"1\" r:id=\"r1\"/></sheets></workbook>")),
-        ("xl/_rels/workbook.xml.rels", format!("{head}<Relationships xmlns=\"{package}/relationships\"><Relationship Id=\"r1\" Type=\"{relations}/worksheet\" Target=\"worksheets/sheet1.xml\"/></Relationships>")),
-        ("xl/worksheets/sheet1.xml", format!("{head}<worksheet xmlns=\"{main}\"><dimension ref=\"A1:B39\"/><sheetData>{rows}</sheetData></worksheet>")),
+        (
+            "_rels/.rels",
+            format!(
+                "{head}<Relationships xmlns=\"{package}/relationships\"><Relationship Id=\"r1\" Type=\"{relations}/officeDocument\" Target=\"xl/workbook.xml\"/></Relationships>"
+            ),
+        ),
+        (
+            "xl/workbook.xml",
+            format!(
+                "{head}<workbook xmlns=\"{main}\" xmlns:r=\"{relations}\"><sheets><sheet name=\"Log\" sheetId=\"1\" r:id=\"r1\"/></sheets></workbook>"
+            ),
+        ),
+        (
+            "xl/_rels/workbook.xml.rels",
+            format!(
+                "{head}<Relationships xmlns=\"{package}/relationships\"><Relationship Id=\"r1\" Type=\"{relations}/worksheet\" Target=\"worksheets/sheet1.xml\"/></Relationships>"
+            ),
+        ),
+        (
+            "xl/worksheets/sheet1.xml",
+            format!(
+                "{head}<worksheet xmlns=\"{main}\"><dimension ref=\"A1:B39\"/><sheetData>{rows}</sheetData></worksheet>"
+            ),
+        ),
     ];
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut archive = zip::ZipWriter::new(&mut bytes);
     for (name, text) in parts {
-        let stored = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+        let stored =
+            zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
         archive.start_file(name, stored).unwrap();
         archive.write_all(text.as_bytes()).unwrap();
     }
@@ -79,7 +109,10 @@ fn the_files_themselves_are_read() {
         let (format, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
         assert_eq!(format.name, name);
         let found = survey(log.as_mut()).unwrap();
-        assert!(found.groups[0].rows >= 38 && found.columns.iter().any(|column| column.count >= 38), "{name}: {found:?}");
+        assert!(
+            found.groups[0].rows >= 38 && found.columns.iter().any(|column| column.count >= 38),
+            "{name}: {found:?}"
+        );
     }
 }
 

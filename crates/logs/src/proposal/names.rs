@@ -109,7 +109,11 @@ fn rows() -> Vec<Row> {
     let flow = "(m|dm|mdot|m_dot|mp|w|flow|massflow|mass_flow|massenstrom|massenfluss|durchsatz)";
     for (channel, weight, pattern) in [
         (Channel::ShaftSpeed, 6, "(^|_)n_?(tc|atl|turbo|tl|lader|l|shaft)(_|$)".to_owned()),
-        (Channel::ShaftSpeed, 6, "(turbo|tc|atl|lader|shaft|rotor|welle|compressor|verdichter).*(speed|drehzahl|rpm)".to_owned()),
+        (
+            Channel::ShaftSpeed,
+            6,
+            "(turbo|tc|atl|lader|shaft|rotor|welle|compressor|verdichter).*(speed|drehzahl|rpm)".to_owned(),
+        ),
         (
             Channel::ShaftSpeed,
             6,
@@ -175,7 +179,12 @@ pub(crate) fn is_ambient(name: &str) -> bool {
 }
 
 /// The channels that a column may be, by its name, its group and what else is said about it, with their weights.
-pub(crate) fn channels_of(name: &str, group: &str, about: &str, kind: Option<Kind>) -> Vec<(Channel, Weight)> {
+pub(crate) fn channels_of(
+    name: &str,
+    group: &str,
+    about: &str,
+    kind: Option<Kind>,
+) -> Vec<(Channel, Weight)> {
     let (name, group) = (plain(name), plain(group));
     let about = plain(&format!("{group} {about} {name}"));
     if is_other(&name) {

@@ -13,7 +13,7 @@ use crate::{
     AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError, plausibility,
 };
 use mapper_core::{Channel, Element, Group, Recording, RedundantSensors, Series, StepMarker};
-use mapper_logs::{LogFile, Unit};
+use mapper_logs::{LogError, LogFile, Unit};
 use mapper_yaml::{FindingKind, steps};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -83,9 +83,12 @@ pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
 
 fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Result<ReadReport, RecordError> {
     if map.is_native() {
-        // A file of no known format is said to be none, whatever the map.
-        options.logs.open(file, &map.log)?;
-        return Err(RecordError::LogWithoutMap { path: file.path().to_owned() });
+        // Any file may have been named: what cannot be read as a log is not said to need a channel map.
+        return Err(match options.logs.open(file, &map.log) {
+            Ok(_) => RecordError::LogWithoutMap { path: file.path().to_owned() },
+            Err(LogError::Content { path, message, .. }) => RecordError::Neither { path, message },
+            Err(error) => error.into(),
+        });
     }
     let log = read_log(file, map, options)?;
     let mut warnings = log.warnings;

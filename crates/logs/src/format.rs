@@ -83,7 +83,10 @@ impl LogFormats {
 
 /// Formats that people have and that are not read, by their first bytes, with what to do.
 const OTHERS: [(&[u8], &str); 8] = [
-    (b"\x89MCAP", "it is an MCAP recording, which `mapper identify` reads; topics and fields are named in a channel map"),
+    (
+        b"\x89MCAP",
+        "it is an MCAP recording, which `mapper identify` reads; topics and fields are named in a channel map",
+    ),
     (b"TDSm", "it is TDMS; export it as CSV or MDF 4"),
     (b"PAR1", "it is Parquet; export it as CSV, e.g. with `polars.read_parquet(FILE).write_csv(NEW)`"),
     (b"ARROW1", "it is Arrow; export it as CSV, e.g. with `polars.read_ipc(FILE).write_csv(NEW)`"),

@@ -196,10 +196,13 @@ impl Grid {
                 moved.iter().any(|signal| signal.has_begun(*place, at - window, at, at + apart, window))
             };
             let start = (at..end).find(begun).unwrap_or(at);
-            let size = |signal: &Signal| signal.mean(start + apart, start + apart + window) - signal.mean(at - window, at);
+            let size = |signal: &Signal| {
+                signal.mean(start + apart, start + apart + window) - signal.mean(at - window, at)
+            };
             let sizes: Vec<f64> = self.signals.iter().map(size).collect();
             let settles = last.as_ref().is_some_and(|(last, whole): &(usize, Vec<f64>)| {
-                let sizes = self.signals.iter().zip(&sizes).zip(whole).filter(|((signal, _), _)| jumped(signal));
+                let sizes =
+                    self.signals.iter().zip(&sizes).zip(whole).filter(|((signal, _), _)| jumped(signal));
                 start - last < self.places(SETTLING_S)
                     && sizes.into_iter().all(|((_, size), whole)| size.abs() < SETTLING_SHARE * whole.abs())
             });

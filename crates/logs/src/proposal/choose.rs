@@ -27,8 +27,12 @@ pub fn propose(layout: &Layout, survey: &Survey) -> Proposal {
     let mut proposal = Proposal::default();
     let mut taken = vec![false; layout.columns.len()];
     // The surest first, so that a column that fits two channels goes to the one that it fits best.
-    let mut wishes: Vec<(Channel, Vec<Candidate>)> =
-        CHANNELS.iter().map(|row| (row.channel, candidates(row.channel, layout, survey, &units))).collect();
+    let named: Vec<Vec<(Channel, Weight)>> =
+        (0..layout.columns.len()).map(|column| names_of(column, layout, &units)).collect();
+    let mut wishes: Vec<(Channel, Vec<Candidate>)> = CHANNELS
+        .iter()
+        .map(|row| (row.channel, candidates(row.channel, &named, layout, survey, &units)))
+        .collect();
     wishes.sort_by_key(|(_, list)| std::cmp::Reverse(list.first().map_or(0, |best| best.weight)));
     for (channel, list) in wishes {
         let free: Vec<&Candidate> = list.iter().filter(|candidate| !taken[candidate.column]).collect();
@@ -53,22 +57,33 @@ pub fn propose(layout: &Layout, survey: &Survey) -> Proposal {
     proposal
 }
 
+/// The channels that a column may be by what is said about it.
+fn names_of(index: usize, layout: &Layout, units: &[Option<HeaderUnit>]) -> Vec<(Channel, Weight)> {
+    let Some(column) = layout.columns.get(index) else { return Vec::new() };
+    let unit = units.get(index).copied().flatten();
+    if column.unit.is_some() && unit.is_none() {
+        return Vec::new();
+    }
+    let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
+    let kind = unit.map(|unit| unit.kind).filter(|kind| *kind != Kind::Frequency);
+    channels_of(&column.name, group, &column.description, kind)
+}
+
+/// The columns that may be a channel, best first; `named` has the channels of each column's name.
 fn candidates(
     channel: Channel,
+    named: &[Vec<(Channel, Weight)>],
     layout: &Layout,
     survey: &Survey,
     units: &[Option<HeaderUnit>],
 ) -> Vec<Candidate> {
     let mut list: Vec<Candidate> = Vec::new();
-    for (index, column) in layout.columns.iter().enumerate() {
-        let data = &survey.columns[index];
-        if data.is_empty() || column.unit.is_some() && units[index].is_none() {
+    for (index, ((column, data), named)) in layout.columns.iter().zip(&survey.columns).zip(named).enumerate()
+    {
+        let Some((_, weight)) = named.iter().find(|(named, _)| *named == channel) else { continue };
+        if data.is_empty() {
             continue;
         }
-        let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
-        let kind = units[index].map(|unit| unit.kind).filter(|kind| *kind != Kind::Frequency);
-        let named = channels_of(&column.name, group, &column.description, kind);
-        let Some((_, weight)) = named.iter().find(|(named, _)| *named == channel) else { continue };
         let (low, high) = (data.quantile(OUTER), data.quantile(1.0 - OUTER));
         let fits = match units[index] {
             Some(unit) => {
@@ -77,7 +92,7 @@ fn candidates(
             }
             None => !fitting_units(channel, low, high).is_empty(),
         };
-        // What was computed by the stand counts after what was measured, and what is constant after what moves.
+        // What was computed by the stand counts after what was measured.
         let derived = if is_derived(&plain(&column.name)) { 15 } else { 0 };
         let weight = (weight + if fits { 20 } else { 0 }).saturating_sub(derived);
         list.push(Candidate { column: index, weight, fits });

@@ -102,7 +102,7 @@ fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Resul
     let ambient = log.ambient.map(|builder| builder.build(Channel::P1, log.zero_ns, &mut warnings));
     let mut gathered = gather(map, log.builders, log.zero_ns, ambient, &mut warnings);
     complete(map, &mut gathered, &log.units)?;
-    let steps = steps_without_marks(&gathered, &mut warnings);
+    let steps = steps_without_marks(map, &gathered, &mut warnings);
     let Gathered { series, elements, .. } = gathered;
     Ok(ReadReport {
         recording: Recording { events: Vec::new(), series, elements, steps },
@@ -181,7 +181,7 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> Result<R
         let last_s = span_s(&gathered.series).map_or(0.0, |(_, last_s)| last_s);
         steps_from_markers(markers, last_s, &mut warnings)
     } else {
-        steps_without_marks(&gathered, &mut warnings)
+        steps_without_marks(map, &gathered, &mut warnings)
     };
     let events = sink.events.into_iter().map(|(log_time_ns, mut event)| {
         if sink.start_time_ns.is_none() {
@@ -289,11 +289,16 @@ fn complete(
 }
 
 /// Steps from commands, or else from jumps of what was measured.
-fn steps_without_marks(gathered: &Gathered, warnings: &mut Vec<ReadWarning>) -> Vec<StepMarker> {
+fn steps_without_marks(
+    map: &ChannelMap,
+    gathered: &Gathered,
+    warnings: &mut Vec<ReadWarning>,
+) -> Vec<StepMarker> {
     let series = &gathered.series;
     let span_s = span_s(series);
-    let commanded =
-        [Channel::P3Command, Channel::ValveCommand].iter().any(|channel| series.contains_key(channel));
+    // A command that stays at a value marks no step.
+    let moves = |channel: &Channel| series.contains_key(channel) && !map.constants.contains_key(channel);
+    let commanded = [Channel::P3Command, Channel::ValveCommand].iter().any(moves);
     if commanded || !can_be_searched(series) {
         return without_rest(steps_from_commands(series, span_s, warnings), series);
     }

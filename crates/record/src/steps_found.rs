@@ -230,14 +230,17 @@ impl Signal {
                 Some(*sum)
             }))
             .collect();
-        let mut steps: Vec<f64> =
-            values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).collect();
+        let top = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
+        let floor = 0.1 * top;
+        // Without rest, where nothing moves, and with steps of 0: of a reading that stands still between its jumps the jumps
+        // alone would be left.
+        let running = values.windows(2).filter(|pair| pair[0].abs() > floor && pair[1].abs() > floor);
+        let mut steps: Vec<f64> = running.map(|pair| (pair[1] - pair[0]).abs()).collect();
         steps.sort_unstable_by(f64::total_cmp);
         // Of a normal distribution the median of the absolute values is 0.6745 standard deviations; a difference has twice the
         // variance.
         let sigma = steps.get(steps.len() / 2).copied().unwrap_or(0.0) / 0.6745 / std::f64::consts::SQRT_2;
-        let top = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
-        Signal { channel, values, sums, sigma, least_ratio, floor: 0.1 * top }
+        Signal { channel, values, sums, sigma, least_ratio, floor }
     }
 
     fn mean(&self, from: usize, to: usize) -> f64 {

@@ -15,11 +15,11 @@ pub enum LogError {
         source: io::Error,
     },
     /// No format knows the file.
-    #[error("failed to read `{}`: it is neither MCAP nor {known} (it starts with {found})", path.display())]
+    #[error("failed to read `{}`: {found}; logs are read from {known}", path.display())]
     Unknown {
         /// The file.
         path: PathBuf,
-        /// Its first bytes, as text.
+        /// What it is, and what to do.
         found: String,
         /// The formats that are read.
         known: String,

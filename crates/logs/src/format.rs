@@ -29,6 +29,9 @@ pub trait Log {
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError>;
 }
 
+/// Opens a file as a log.
+pub type OpenLog = fn(&LogFile, &LogOptions) -> Result<Box<dyn Log>, LogError>;
+
 /// One format of logs.
 #[derive(Debug, Clone, Copy)]
 pub struct LogFormat {
@@ -37,7 +40,7 @@ pub struct LogFormat {
     /// Whether the first bytes of a file (up to [`LogFormats::HEAD_BYTES`]) are of this format.
     pub recognises: fn(&[u8]) -> bool,
     /// Opens a file of this format.
-    pub open: fn(&LogFile, &LogOptions) -> Result<Box<dyn Log>, LogError>,
+    pub open: OpenLog,
 }
 
 /// The formats that a program knows, in the order in which they are asked.
@@ -65,7 +68,7 @@ impl LogFormats {
         let head = file.head(Self::HEAD_BYTES)?;
         let format = self.of_head(&head).ok_or_else(|| LogError::Unknown {
             path: file.path().to_owned(),
-            found: format!("{:?}", String::from_utf8_lossy(head.get(..8).unwrap_or(&head))),
+            found: what_it_is(&head),
             known: self.names(),
         })?;
         Ok((format, (format.open)(file, options)?))
@@ -76,4 +79,29 @@ impl LogFormats {
         let names: Vec<&str> = self.0.iter().map(|format| format.name).collect();
         names.join(", ")
     }
+}
+
+/// Formats that people have and that are not read, by their first bytes, with what to do.
+const OTHERS: [(&[u8], &str); 8] = [
+    (
+        b"\x89MCAP",
+        "it is an MCAP recording, which `mapper identify` reads; topics and fields are named in a channel map",
+    ),
+    (b"TDSm", "it is TDMS; export it as CSV or MDF 4"),
+    (b"PAR1", "it is Parquet; export it as CSV, e.g. with `polars.read_parquet(FILE).write_csv(NEW)`"),
+    (b"ARROW1", "it is Arrow; export it as CSV, e.g. with `polars.read_ipc(FILE).write_csv(NEW)`"),
+    (b"\x89HDF", "it is HDF5 or a newer MATLAB file; export it as CSV"),
+    (b"MATLAB", "it is a MATLAB file; export it as CSV"),
+    (b"\xD0\xCF\x11\xE0", "it is a workbook of Excel before 2007; save it as .xlsx"),
+    (b"\x1F\x8B", "it is packed with gzip; unpack it"),
+];
+
+/// What a file of no known format is.
+fn what_it_is(head: &[u8]) -> String {
+    if head.is_empty() {
+        return "it is empty".to_owned();
+    }
+    let other = OTHERS.iter().find(|(magic, _)| head.starts_with(magic));
+    let start = || format!("it starts with {:?}", String::from_utf8_lossy(head.get(..8).unwrap_or(head)));
+    other.map_or_else(start, |(_, words)| (*words).to_owned())
 }

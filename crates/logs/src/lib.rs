@@ -21,7 +21,7 @@ pub mod units;
 
 pub use error::LogError;
 pub use file::{LogFile, ReadSeek};
-pub use format::{Log, LogFormat, LogFormats, Row, RowSink};
+pub use format::{Log, LogFormat, LogFormats, OpenLog, Row, RowSink};
 pub use header_unit::{HeaderUnit, Reference, header_unit, split_unit};
 pub use layout::{Column, Group, Layout};
 pub use mapper_yaml::units::{Kind, Unit};

@@ -103,16 +103,10 @@ impl GroupSurvey {
             (self.first_s, self.last_s) = (t_s, t_s);
         } else {
             let step_s = t_s - self.last_s;
-            if step_s <= 0.0 {
+            if step_s > 0.0 {
+                self.step(step_s, t_s);
+            } else {
                 self.backward += 1;
-            } else if self.intervals.len() < INTERVALS {
-                self.intervals.push(step_s);
-            }
-            if step_s > GAP_INTERVALS * self.typical_s() {
-                self.gap_count += 1;
-                if self.gaps.len() < GAP_LIMIT {
-                    self.gaps.push(Gap { from_s: self.last_s, to_s: t_s });
-                }
             }
             self.last_s = t_s;
         }
@@ -120,11 +114,23 @@ impl GroupSurvey {
         self.trace.push(t_s);
     }
 
+    /// Takes a step forward to `t_s`.
+    fn step(&mut self, step_s: f64, t_s: f64) {
+        if self.intervals.len() < INTERVALS {
+            self.intervals.push(step_s);
+        }
+        if step_s > GAP_INTERVALS * self.typical_s() {
+            self.gap_count += 1;
+            if self.gaps.len() < GAP_LIMIT {
+                self.gaps.push(Gap { from_s: self.last_s, to_s: t_s });
+            }
+        }
+    }
+
     /// The typical interval so far: settled once enough rows have come.
     fn typical_s(&mut self) -> f64 {
-        if self.interval_s.is_finite() && self.intervals.len() % 64 != 0
-            || self.intervals.len() >= INTERVALS && self.interval_s > 0.0
-        {
+        let settled = self.intervals.len() >= INTERVALS || !self.intervals.len().is_multiple_of(64);
+        if self.interval_s.is_finite() && settled {
             return self.interval_s;
         }
         let mut intervals = self.intervals.clone();

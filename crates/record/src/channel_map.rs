@@ -1,6 +1,5 @@
 //! Where a recording holds the rig's channels, and what it does not say itself.
 
-use crate::definitions::Reads;
 use crate::format::ELEMENTS_TOPIC;
 use mapper_core::{
     CHANNELS, Channel, DeclaredUncertainty, Element, Group, MAX_ELEMENTS, NoiseColour, RedundantSensors,
@@ -115,14 +114,6 @@ impl ChannelMap {
         let measured = CHANNELS.iter().filter(|row| row.group != Group::Command);
         let elements = measured.flat_map(several).collect();
         ChannelMap { channels, elements, native: true, ..ChannelMap::default() }
-    }
-
-    /// Where a field of a recording is described.
-    pub(crate) fn source(&self, reads: Reads) -> Option<&ChannelSource> {
-        match reads {
-            Reads::Channel(channel) => self.channels.get(&channel),
-            Reads::Element(element) => self.elements.get(&element),
-        }
     }
 
     /// Whether this is [`ChannelMap::native`]: channels missing from the recording are then no surprise.

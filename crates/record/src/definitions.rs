@@ -25,6 +25,14 @@ impl Reads {
     }
 }
 
+/// Where the map says that a channel or a sensor is read.
+pub(crate) fn source_of(map: &ChannelMap, reads: Reads) -> Option<&ChannelSource> {
+    match reads {
+        Reads::Channel(channel) => map.channels.get(&channel),
+        Reads::Element(element) => map.elements.get(&element),
+    }
+}
+
 /// A mapped topic of a recording.
 #[derive(Debug)]
 pub(crate) struct MappedTopic {

@@ -61,6 +61,14 @@ pub enum RecordError {
     /// A log of another program cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
+    /// The file is neither a recording nor a log.
+    #[error("failed to read `{}`: it is neither an MCAP recording nor a log that can be read: {message}", path.display())]
+    Neither {
+        /// The file.
+        path: PathBuf,
+        /// Why it is no log.
+        message: String,
+    },
     /// A log of another program without a channel map.
     #[error("`{}` is the log of another program: say which column is which channel with `--channels`; `mapper log inspect {} --write-channels channels.yaml` proposes it", path.display(), path.display())]
     LogWithoutMap {

@@ -1,7 +1,7 @@
 //! Reading a log of another program by a channel map.
 
 use crate::complaints::Complaints;
-use crate::definitions::Reads;
+use crate::definitions::{Reads, source_of};
 use crate::log_blocks::Blocks;
 use crate::series_builder::SeriesBuilder;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, ReadWarning, RecordError};
@@ -157,7 +157,7 @@ fn contradictions(map: &ChannelMap, layout: &Layout, wanted: &[Wanted]) -> Vec<R
         let recorded = layout.columns.get(wanted.column)?.unit.clone()?;
         let known = header_unit(&recorded);
         let agrees = known.is_some_and(|known| known.unit.converts_like(wanted.unit));
-        let mapped = map.source(reads)?.unit.clone()?;
+        let mapped = source_of(map, reads)?.unit.clone()?;
         (!agrees).then(|| ReadWarning::UnitContradiction { channel: reads.channel(), mapped, recorded })
     };
     wanted.iter().filter_map(contradiction).collect()

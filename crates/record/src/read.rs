@@ -1,7 +1,7 @@
 //! Reading a recording, one's own or another program's.
 
 use crate::complaints::Complaints;
-use crate::definitions::Reads;
+use crate::definitions::{Reads, source_of};
 use crate::log_read::{is_mcap, log_of_path, read_log};
 use crate::read_options::ReadOptions;
 use crate::rig_sink::RigSink;
@@ -13,7 +13,7 @@ use crate::{
     AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError, plausibility,
 };
 use mapper_core::{Channel, Element, Group, Recording, RedundantSensors, Series, StepMarker};
-use mapper_logs::{LogFile, Unit};
+use mapper_logs::{LogError, LogFile, Unit};
 use mapper_yaml::{FindingKind, steps};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -83,9 +83,12 @@ pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
 
 fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Result<ReadReport, RecordError> {
     if map.is_native() {
-        // A file of no known format is said to be none, whatever the map.
-        options.logs.open(file, &map.log)?;
-        return Err(RecordError::LogWithoutMap { path: file.path().to_owned() });
+        // Any file may have been named: what cannot be read as a log is not said to need a channel map.
+        return Err(match options.logs.open(file, &map.log) {
+            Ok(_) => RecordError::LogWithoutMap { path: file.path().to_owned() },
+            Err(LogError::Content { path, message, .. }) => RecordError::Neither { path, message },
+            Err(error) => error.into(),
+        });
     }
     let log = read_log(file, map, options)?;
     let mut warnings = log.warnings;
@@ -99,7 +102,7 @@ fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Resul
     let ambient = log.ambient.map(|builder| builder.build(Channel::P1, log.zero_ns, &mut warnings));
     let mut gathered = gather(map, log.builders, log.zero_ns, ambient, &mut warnings);
     complete(map, &mut gathered, &log.units)?;
-    let steps = steps_without_marks(&gathered, &mut warnings);
+    let steps = steps_without_marks(map, &gathered, &mut warnings);
     let Gathered { series, elements, .. } = gathered;
     Ok(ReadReport {
         recording: Recording { events: Vec::new(), series, elements, steps },
@@ -178,7 +181,7 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> Result<R
         let last_s = span_s(&gathered.series).map_or(0.0, |(_, last_s)| last_s);
         steps_from_markers(markers, last_s, &mut warnings)
     } else {
-        steps_without_marks(&gathered, &mut warnings)
+        steps_without_marks(map, &gathered, &mut warnings)
     };
     let events = sink.events.into_iter().map(|(log_time_ns, mut event)| {
         if sink.start_time_ns.is_none() {
@@ -240,7 +243,7 @@ fn gather(
         if built.t_s.is_empty() {
             continue;
         }
-        if map.source(reads).is_some_and(|source| source.gauge) {
+        if source_of(map, reads).is_some_and(|source| source.gauge) {
             if built.t_s.first().is_none_or(|t_s| ambient_pa(*t_s).is_none()) {
                 warnings.push(ReadWarning::NoAmbient { channel: reads.channel() });
                 continue;
@@ -286,11 +289,16 @@ fn complete(
 }
 
 /// Steps from commands, or else from jumps of what was measured.
-fn steps_without_marks(gathered: &Gathered, warnings: &mut Vec<ReadWarning>) -> Vec<StepMarker> {
+fn steps_without_marks(
+    map: &ChannelMap,
+    gathered: &Gathered,
+    warnings: &mut Vec<ReadWarning>,
+) -> Vec<StepMarker> {
     let series = &gathered.series;
     let span_s = span_s(series);
-    let commanded =
-        [Channel::P3Command, Channel::ValveCommand].iter().any(|channel| series.contains_key(channel));
+    // A command that stays at a value marks no step.
+    let moves = |channel: &Channel| series.contains_key(channel) && !map.constants.contains_key(channel);
+    let commanded = [Channel::P3Command, Channel::ValveCommand].iter().any(moves);
     if commanded || !can_be_searched(series) {
         return without_rest(steps_from_commands(series, span_s, warnings), series);
     }

@@ -34,6 +34,12 @@ const BEGUN_SHARE: f64 = 0.1;
 /// Share of the least jump per window below which a signal counts as calm again.
 const CALM_SHARE: f64 = 0.3;
 
+/// A loop that holds the speed goes on correcting for this long after a jump, s, by less than [`SETTLING_SHARE`] of it.
+const SETTLING_S: f64 = 15.0;
+
+/// See [`SETTLING_S`].
+const SETTLING_SHARE: f64 = 0.2;
+
 /// Shaft speed below which the machine is at rest, rpm: far below any idle, far above any sensor's noise.
 const AT_REST_RPM: f64 = 1000.0;
 
@@ -172,14 +178,15 @@ impl Grid {
     fn jumps_s(&self) -> Vec<f64> {
         let (window, apart) = (self.places(WINDOW_S), self.places(APART_S));
         let mut jumps_s = Vec::new();
+        let mut last: Option<(usize, Vec<f64>)> = None;
         let mut at = window;
         while at + apart + window <= self.t_s.len() {
-            let jumped = |signal: &&Signal| {
+            let jumped = |signal: &Signal| {
                 let (before, after) =
                     (signal.mean(at - window, at), signal.mean(at + apart, at + apart + window));
                 (after - before).abs() > signal.least(before, after)
             };
-            let moved: Vec<&Signal> = self.signals.iter().filter(jumped).collect();
+            let moved: Vec<&Signal> = self.signals.iter().filter(|signal| jumped(signal)).collect();
             if moved.is_empty() {
                 at += 1;
                 continue;
@@ -189,7 +196,20 @@ impl Grid {
                 moved.iter().any(|signal| signal.has_begun(*place, at - window, at, at + apart, window))
             };
             let start = (at..end).find(begun).unwrap_or(at);
-            jumps_s.extend(self.t_s.get(start));
+            let size = |signal: &Signal| {
+                signal.mean(start + apart, start + apart + window) - signal.mean(at - window, at)
+            };
+            let sizes: Vec<f64> = self.signals.iter().map(size).collect();
+            let settles = last.as_ref().is_some_and(|(last, whole): &(usize, Vec<f64>)| {
+                let sizes =
+                    self.signals.iter().zip(&sizes).zip(whole).filter(|((signal, _), _)| jumped(signal));
+                start - last < self.places(SETTLING_S)
+                    && sizes.into_iter().all(|((_, size), whole)| size.abs() < SETTLING_SHARE * whole.abs())
+            });
+            if !settles {
+                jumps_s.extend(self.t_s.get(start));
+                last = Some((start, sizes));
+            }
             at = start + window;
             // The rest of a slow jump is no other one.
             while at + window <= self.t_s.len()
@@ -210,14 +230,17 @@ impl Signal {
                 Some(*sum)
             }))
             .collect();
-        let mut steps: Vec<f64> =
-            values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).collect();
+        let top = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
+        let floor = 0.1 * top;
+        // Without rest, where nothing moves, and with steps of 0: of a reading that stands still between its jumps the jumps
+        // alone would be left.
+        let running = values.windows(2).filter(|pair| pair[0].abs() > floor && pair[1].abs() > floor);
+        let mut steps: Vec<f64> = running.map(|pair| (pair[1] - pair[0]).abs()).collect();
         steps.sort_unstable_by(f64::total_cmp);
         // Of a normal distribution the median of the absolute values is 0.6745 standard deviations; a difference has twice the
         // variance.
         let sigma = steps.get(steps.len() / 2).copied().unwrap_or(0.0) / 0.6745 / std::f64::consts::SQRT_2;
-        let top = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
-        Signal { channel, values, sums, sigma, least_ratio, floor: 0.1 * top }
+        Signal { channel, values, sums, sigma, least_ratio, floor }
     }
 
     fn mean(&self, from: usize, to: usize) -> f64 {
@@ -281,6 +304,13 @@ mod tests {
         assert!(found.iter().zip(&jumps).all(|(found, (jump, _))| (found - jump).abs() <= 1.0), "{found:?}");
         let drift: Vec<(f64, f64)> = (0..240).map(|s| (f64::from(s), 90e3 + 20.0 * f64::from(s))).collect();
         assert_eq!(starts(&run(&drift, 240.0)), [0.0]);
+    }
+
+    #[test]
+    fn what_a_loop_corrects_behind_a_jump_is_no_jump_of_its_own() {
+        let found = starts(&run(&[(0.0, 125e3), (60.0, 78e3), (66.0, 80e3), (120.0, 83e3)], 180.0));
+        assert_eq!(found.len(), 3, "{found:?}");
+        assert!((found[1] - 60.0).abs() <= 1.0 && (found[2] - 120.0).abs() <= 1.0, "{found:?}");
     }
 
     #[test]

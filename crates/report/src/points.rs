@@ -57,6 +57,11 @@ pub fn score_text(score: &ScoreSummary) -> String {
     text
 }
 
+/// `-` where the recording does not hold it.
+fn opening(ratio: f64) -> String {
+    if ratio.is_finite() { ratio.to_string() } else { "-".to_owned() }
+}
+
 fn points_table(points: &[ScoredPoint], units: &DisplayUnits) -> comfy_table::Table {
     let display = Display::new(units);
     let with_truth = points.iter().any(|scored| scored.truth.is_some());
@@ -83,7 +88,7 @@ fn points_table(points: &[ScoredPoint], units: &DisplayUnits) -> comfy_table::Ta
         let mut row = vec![
             step_name(point),
             display.speed(point.speed_rpm),
-            format!("{}", point.valve_opening_ratio),
+            opening(point.valve_opening_ratio),
             display.flow(point.flow_corrected_kg_s),
             format!("{:.4}", point.pressure_ratio),
             percent(point.eta, 2),

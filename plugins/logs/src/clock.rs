@@ -90,11 +90,13 @@ impl ClockHand {
             Clock::Instant { .. } => {
                 let ns = self.clock.clock.instant_ns(cells)?;
                 // A time of day without a date goes on behind midnight.
-                if self.last_ns.is_some_and(|last| ns < last - NS_PER_DAY / 2) && ns.abs() < 2 * NS_PER_DAY {
-                    self.days_ns += NS_PER_DAY;
+                if self.last_ns.is_some_and(|last| ns < last.saturating_sub(NS_PER_DAY / 2))
+                    && ns.unsigned_abs() < 2 * NS_PER_DAY.unsigned_abs()
+                {
+                    self.days_ns = self.days_ns.saturating_add(NS_PER_DAY);
                 }
                 self.last_ns = Some(ns);
-                (ns + self.days_ns - self.clock.zero_ns) as f64 / 1e9
+                ns.saturating_add(self.days_ns).saturating_sub(self.clock.zero_ns) as f64 / 1e9
             }
         };
         let Some((interval_s, rows)) = self.clock.spread else { return Some(read_s) };

@@ -21,6 +21,9 @@ pub(crate) struct Clocks {
 /// Counts above this since some epoch are dates in disguise, s: eleven days.
 const LONGEST_COUNT_S: f64 = 1e6;
 
+/// Most clocks of a table; what is named like further ones is data.
+const CLOCK_LIMIT: usize = 100;
+
 /// The first rows of data.
 pub(crate) struct Sample<'a> {
     pub(crate) columns: &'a [HeadColumn],
@@ -336,6 +339,7 @@ fn found(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) 
         }
     }
     candidates.retain(Candidate::runs);
+    candidates.truncate(CLOCK_LIMIT);
     candidates
 }
 

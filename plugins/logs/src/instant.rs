@@ -3,6 +3,9 @@
 use jiff::civil::Date;
 use mapper_logs::DateOrder;
 
+/// Years of a date: what 64 bits hold as nanoseconds, and no log is older.
+const YEARS: std::ops::RangeInclusive<i64> = 1970..=2200;
+
 const NS_PER_S: i64 = 1_000_000_000;
 /// Nanoseconds of a day.
 pub(crate) const NS_PER_DAY: i64 = 86_400 * NS_PER_S;
@@ -19,8 +22,7 @@ pub(crate) struct Instant {
 impl Instant {
     /// Nanoseconds since 1970-01-01, or since midnight where there is no date.
     pub(crate) fn ns(self) -> i64 {
-        // The years of a date have four digits: no overflow.
-        self.day.unwrap_or(0) * NS_PER_DAY + self.ns_of_day.unwrap_or(0)
+        self.day.unwrap_or(0).saturating_mul(NS_PER_DAY).saturating_add(self.ns_of_day.unwrap_or(0))
     }
 }
 
@@ -84,6 +86,9 @@ fn date(text: &str, order: DateOrder) -> Option<i64> {
         DateOrder::MonthFirst => (c, a, b),
     };
     let year = if year < 100 { year + 2000 } else { year };
+    if !YEARS.contains(&year) {
+        return None;
+    }
     let date =
         Date::new(i16::try_from(year).ok()?, i8::try_from(month).ok()?, i8::try_from(day).ok()?).ok()?;
     let epoch = Date::new(1970, 1, 1).ok()?;
@@ -163,7 +168,18 @@ mod tests {
             assert_eq!(parse_instant(text, order).map(Instant::ns), Some(expected), "{text}");
         }
         assert_eq!(parse_instant("14:03", DateOrder::DayFirst).unwrap().ns(), (14 * 60 + 3) * 60 * NS_PER_S);
-        for text in ["1.5", "12", "31.02.2026", "25:00:00", "1:2:3:4:5", "2026-13-01", "T2", "1.2.3.4", ""] {
+        for text in [
+            "1.5",
+            "12",
+            "31.02.2026",
+            "25:00:00",
+            "1:2:3:4:5",
+            "2026-13-01",
+            "9026-11-22",
+            "T2",
+            "1.2.3.4",
+            "",
+        ] {
             assert_eq!(parse_instant(text, DateOrder::DayFirst), None, "{text}");
         }
     }

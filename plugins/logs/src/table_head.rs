@@ -6,6 +6,9 @@ use crate::separator::typical_length;
 use mapper_logs::{DateOrder, LogOptions, header_unit, split_unit};
 use std::collections::BTreeMap;
 
+/// Most columns of a table.
+pub(crate) const COLUMN_LIMIT: usize = 10_000;
+
 /// The head of a table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct TableHead {
@@ -49,6 +52,9 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
         .map(|row| row - 1)
         .or_else(|| others().find(|row| 10 * filled(row) >= 8 * most && most > 0));
     let width = rows.get(data_row..).unwrap_or_default().iter().map(Vec::len).max().unwrap_or(0).max(length);
+    if width > COLUMN_LIMIT {
+        return Err(format!("it has {width} columns; at most {COLUMN_LIMIT} are read"));
+    }
     let cell = |row: Option<usize>, column: usize| {
         row.and_then(|row| rows.get(row)).and_then(|row| row.get(column)).map_or("", String::as_str)
     };

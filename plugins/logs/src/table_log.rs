@@ -6,9 +6,6 @@ use crate::clock_choice::{Clocks, Sample, choose};
 use crate::table_head::{TableHead, look};
 use mapper_logs::{Column, Layout, LogError, LogOptions, Row, RowSink};
 
-/// Most columns of a table.
-const COLUMN_LIMIT: usize = 10_000;
-
 /// What was found out about a table.
 #[derive(Debug)]
 pub(crate) struct Table {
@@ -24,9 +21,6 @@ impl Table {
     /// Looks at the first rows of a table.
     pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> Result<Table, String> {
         let TableHead { columns, data_row, mut findings } = look(rows, decimal, options)?;
-        if columns.len() > COLUMN_LIMIT {
-            return Err(format!("it has {} columns; at most {COLUMN_LIMIT} are read", columns.len()));
-        }
         let sample = Sample { columns: &columns, rows: rows.get(data_row..).unwrap_or_default(), decimal };
         let mut clocks = choose(&sample, options)?;
         findings.append(&mut clocks.findings);

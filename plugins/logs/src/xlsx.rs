@@ -3,6 +3,7 @@
 use crate::cells::{Cells, Rows};
 use crate::instant::{Instant, NS_PER_DAY, parse_instant};
 use crate::number::parse_number;
+use crate::table_head::COLUMN_LIMIT;
 use crate::table_log::Table;
 use calamine::{Cell, DataRef, DataType, Reader, Xlsx, XlsxCellReader};
 use jiff::ToSpan;
@@ -18,9 +19,6 @@ const NAME: &str = "Excel";
 /// How many rows of a sheet are looked at.
 const HEAD_ROWS: usize = 400;
 
-/// Most columns of a sheet that are read.
-const COLUMN_LIMIT: usize = 10_000;
-
 /// Largest part of a workbook beside its sheets, unpacked, bytes: all of it is held in memory.
 const PART_LIMIT: u64 = 128 << 20;
 
@@ -29,6 +27,9 @@ const SHEET_LIMIT: u64 = 4 << 30;
 
 /// Days from the origin of Excel's dates to 1970-01-01.
 const EXCEL_EPOCH_DAYS: i64 = 25_569;
+
+/// Days since Excel's origin that are no dates of a log any more: the year 2200.
+const LAST_DAY: f64 = 109_940.0;
 
 /// A zip file with the parts of a workbook; what they are shows when it is opened.
 fn recognises(head: &[u8]) -> bool {
@@ -191,7 +192,7 @@ impl Value {
 
 /// Excel's days since its origin; below one a time of day.
 fn instant_of(days: f64) -> Option<Instant> {
-    if !(0.0..3e6).contains(&days) {
+    if !(0.0..LAST_DAY).contains(&days) {
         return None;
     }
     // To the microsecond: the days of now hold no more.
@@ -269,7 +270,7 @@ impl Rows for SheetRows<'_> {
                 self.next = Some((row, column, value));
                 break;
             }
-            if value.is_empty() || column >= COLUMN_LIMIT {
+            if value.is_empty() || column > COLUMN_LIMIT {
                 continue;
             }
             current = Some(row);

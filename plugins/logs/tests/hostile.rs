@@ -135,8 +135,18 @@ fn a_quote_that_is_never_closed_does_not_swallow_the_file() {
     assert!(error.contains("quote"), "{error}");
 }
 
+#[test]
+fn a_line_of_cells_alone_is_refused() {
+    let many = ["time;".repeat(30_000), "1;".repeat(30_000), "2;".repeat(30_000)].join("\n");
+    let file = LogFile::of_bytes(Path::new("log"), many.as_bytes());
+    let error = LOG_FORMATS.open(&file, &LogOptions::default()).err().unwrap().to_string();
+    assert!(error.contains("at most 10000"), "{error}");
+    // Names by the thousand, each of which could be a clock.
+    look(["time;".repeat(9_000), "1;".repeat(9_000), "2;".repeat(9_000)].join("\n").as_bytes());
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
     fn no_bytes_panic(bytes in prop::collection::vec(any::<u8>(), 0..600)) {

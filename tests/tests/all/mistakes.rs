@@ -77,5 +77,5 @@ fn a_file_that_is_not_there_is_named() {
 fn a_file_that_is_no_recording_is_refused() {
     let campaign = CampaignFile::shipped_with(&[]);
     let finished = mapper(["identify".as_ref(), campaign.path.as_os_str()]).exits(6);
-    assert!(finished.stderr.contains("not an MCAP file"), "{}", finished.stderr);
+    assert!(finished.stderr.contains("neither an MCAP recording nor a log"), "{}", finished.stderr);
 }

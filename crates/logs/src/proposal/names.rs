@@ -9,10 +9,13 @@ use std::sync::LazyLock;
 /// How well a name fits a channel; larger is better.
 pub(crate) type Weight = u32;
 
+/// Letters of a name that are looked at.
+const LONGEST: usize = 120;
+
 /// A name in small letters, umlauts written out, with `_` for all that is neither letter nor digit.
 pub(crate) fn plain(text: &str) -> String {
     let mut plain = String::new();
-    for letter in text.to_lowercase().chars() {
+    for letter in text.to_lowercase().chars().take(LONGEST) {
         match letter {
             'ä' => plain.push_str("ae"),
             'ö' => plain.push_str("oe"),

@@ -1,6 +1,6 @@
 //! What the proposed channels say of each other: a compressor raises pressure and temperature, and flow follows speed.
 
-use super::{Ambient, Certainty, Proposal};
+use super::proposed::{Ambient, Certainty, Proposal};
 use crate::units::{kind_of, unit};
 use crate::{Layout, Survey};
 use mapper_core::Channel;

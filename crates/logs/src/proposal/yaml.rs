@@ -1,6 +1,6 @@
 //! A proposal as the text of a channel map.
 
-use super::{Ambient, Certainty, Proposal, ProposedChannel};
+use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
 use crate::Layout;
 use std::fmt::Write;
 

@@ -1,0 +1,73 @@
+//! Logs of other programs by a channel map.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+use mapper_core::Channel;
+use mapper_log_formats::LOG_FORMATS;
+use mapper_record::{ChannelMap, ReadOptions, ReadReport, ReadWarning, RecordError, read_recording_from};
+use std::path::Path;
+
+/// Half a minute at one speed, half a minute at another, at this rate; P1 in mbar over ambient.
+fn log(rate_hz: usize) -> String {
+    let mut text = String::from("t [s];n [1/min];p1 [mbar rel];pAmb [mbar];T2 [degC]\n");
+    for row in 0..60 * rate_hz {
+        let t_s = row as f64 / rate_hz as f64;
+        let fast = t_s >= 30.0;
+        let (speed, inlet, outlet_degc) = if fast { (120_000, -12.5, 105.0) } else { (60_000, -2.5, 45.0) };
+        text.push_str(&format!("{t_s};{speed};{inlet};990;{outlet_degc}\n"));
+    }
+    text
+}
+
+fn read(text: &str, map: &str) -> Result<ReadReport, RecordError> {
+    let map = ChannelMap::from_yaml(map, Path::new("map.yaml")).unwrap();
+    let options = ReadOptions { logs: LOG_FORMATS, ..ReadOptions::default() };
+    read_recording_from(text.as_bytes(), Path::new("log.csv"), &map, &options)
+}
+
+const MAP: &str = "channels:\n  N: {field: n}\n  P1: {field: p1, gauge: true}\n  T2: {field: T2}\n";
+
+#[test]
+fn gauge_pressures_are_read_over_the_ambient_pressure_of_the_log_or_of_the_map() {
+    for (ambient, expected_pa) in [("{field: pAmb}", 98_750.0), ("1 bar", 99_750.0)] {
+        let read = read(&log(10), &format!("{MAP}ambient_pressure: {ambient}\n")).unwrap();
+        let p1 = &read.recording.series[&Channel::P1];
+        assert!((p1.values[0] - expected_pa).abs() < 1e-6, "{ambient}: {}", p1.values[0]);
+        assert_eq!(read.recording.series[&Channel::T2].values[0], 318.15);
+    }
+    // A gauge pressure without anything to add it to is a mistake of the map.
+    assert!(ChannelMap::from_yaml(MAP, Path::new("map.yaml")).is_err());
+}
+
+#[test]
+fn a_constant_command_does_not_hide_the_steps_that_the_shaft_shows() {
+    for constants in ["", "constants: {valve_command: \"0.7\"}\n"] {
+        let read = read(&log(10), &format!("{MAP}ambient_pressure: 99 kPa\n{constants}")).unwrap();
+        let starts: Vec<f64> = read.recording.steps.iter().map(|step| step.start_s).collect();
+        assert_eq!(starts.len(), 2, "{constants}: {starts:?}");
+        assert!(starts[0] == 0.0 && (starts[1] - 30.0).abs() <= 1.0, "{starts:?}");
+    }
+}
+
+#[test]
+fn a_fast_log_is_averaged_and_says_so() {
+    let read = read(&log(100), &format!("{MAP}ambient_pressure: 99 kPa\n")).unwrap();
+    assert!(read.warnings.contains(&ReadWarning::Averaged), "{:?}", read.warnings);
+    assert_eq!(read.recording.series[&Channel::ShaftSpeed].t_s.len(), 600);
+}
+
+#[test]
+fn units_that_contradict_the_log_are_told_and_gauge_units_need_the_word() {
+    let told =
+        read(&log(10), "channels:\n  N: {field: n, unit: rpm}\n  T2: {field: T2, unit: degF}\n").unwrap();
+    let channels: Vec<Channel> = told
+        .warnings
+        .iter()
+        .filter_map(|warning| match warning {
+            ReadWarning::UnitContradiction { channel, .. } => Some(*channel),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(channels, [Channel::T2]);
+    let error = read(&log(10), "channels:\n  P1: {field: p1}\n").unwrap_err().to_string();
+    assert!(error.contains("over the ambient pressure") && error.contains("gauge: true"), "{error}");
+}

@@ -110,8 +110,8 @@ pub struct IdentifiedPoint {
     pub target: Option<OperatingPoint>,
     /// Measured shaft speed at the end of the step, rpm.
     pub speed_rpm: f64,
-    /// Commanded valve opening relative to the nominal area.
-    #[serde(rename = "valve")]
+    /// Commanded valve opening relative to the nominal area; NaN (null in files) where nobody recorded it.
+    #[serde(rename = "valve", deserialize_with = "nan_where_null")]
     pub valve_opening_ratio: f64,
     /// Compressor mass flow at the end of the step, kg/s.
     pub flow_kg_s: f64,
@@ -177,4 +177,9 @@ impl IdentifiedPoint {
 /// What is left of a standard error when an independent part is taken out.
 fn beside(all: f64, part: f64) -> f64 {
     (all * all - part * part).max(0.0).sqrt()
+}
+
+/// A number that is null where it is not known.
+fn nan_where_null<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

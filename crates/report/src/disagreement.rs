@@ -30,7 +30,7 @@ pub fn disagreement_text(
         point.step + 1,
         display.speed(point.speed_rpm),
         units.speed,
-        point.valve_opening_ratio,
+        crate::points::opening(point.valve_opening_ratio),
         100.0 * other.eta,
         100.0 * point.eta.unwrap_or(f64::NAN),
     ))

@@ -58,7 +58,7 @@ pub fn score_text(score: &ScoreSummary) -> String {
 }
 
 /// `-` where the recording does not hold it.
-fn opening(ratio: f64) -> String {
+pub(crate) fn opening(ratio: f64) -> String {
     if ratio.is_finite() { ratio.to_string() } else { "-".to_owned() }
 }
 

@@ -6,7 +6,7 @@ use crate::doubts::doubts;
 use crate::duration::duration;
 use crate::markdown::{self, Align};
 use crate::number::{number, percent};
-use crate::points::{score_text, step_name, verdict_word};
+use crate::points::{opening, score_text, step_name, verdict_word};
 use crate::repeated_jumps::repeated_jumps_text;
 use crate::shared_errors::shared_errors_text;
 use crate::surge_text::surge_text;
@@ -266,7 +266,7 @@ fn points_section(text: &mut String, units: &DisplayUnits, points: &[ScoredPoint
             [
                 step_name(point),
                 display.speed(point.speed_rpm),
-                point.valve_opening_ratio.to_string(),
+                opening(point.valve_opening_ratio),
                 display.flow(point.flow_corrected_kg_s),
                 format!("{:.4}", point.pressure_ratio),
                 percent(point.eta, 2),

@@ -23,7 +23,6 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
             ("speed_corrected_rpm", p.speed_corrected_rpm),
             ("speed_rpm", p.speed_rpm),
             ("flow_kg_s", p.flow_kg_s),
-            ("valve", p.valve_opening_ratio),
             ("t1_k", p.t1_k),
             ("p1_pa", p.p1_pa),
         ] {

@@ -77,7 +77,7 @@ impl Row {
             kind: StepKind::Point,
             target: None,
             speed_rpm: self.speed_corrected_rpm,
-            valve_opening_ratio: 1.0,
+            valve_opening_ratio: f64::NAN,
             flow_kg_s: self.flow_corrected_kg_s,
             flow_corrected_kg_s: self.flow_corrected_kg_s,
             speed_corrected_rpm: self.speed_corrected_rpm,

@@ -134,6 +134,16 @@ fn a_log_in_the_manner_of_a_test_stand_becomes_points_with_two_commands() {
         }
     }
     assert!(found.iter().filter(|point| point["eta"].is_number()).count() >= 3);
+
+    // And leaves a map that is read again, although nobody recorded the valve.
+    let out = run.file("map");
+    let given = ["identify".as_ref(), log.as_os_str(), "--channels".as_ref(), channels.as_os_str()];
+    let campaign = ["--campaign".as_ref(), run.campaign.path.as_os_str(), "--out".as_ref(), out.as_os_str()];
+    mapper(given.into_iter().chain(campaign)).exits(0);
+    for format in ["json", "csv"] {
+        let (map, copy) = (out.join(format!("map.{format}")), out.join(format!("copy_of_{format}.json")));
+        mapper(["map".as_ref(), "convert".as_ref(), map.as_os_str(), copy.as_os_str()]).exits(0);
+    }
 }
 
 /// A file in a directory of its own.

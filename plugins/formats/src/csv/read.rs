@@ -216,7 +216,7 @@ fn own_point(
     point.pressure_ratio = or("pressure_ratio_measured", row.pressure_ratio)?;
     point.speed_rpm = or("speed_rpm", row.speed_corrected_rpm)?;
     point.flow_kg_s = or("flow_kg_s", row.flow_corrected_kg_s)?;
-    point.valve_opening_ratio = or("valve", 1.0)?;
+    point.valve_opening_ratio = or("valve", f64::NAN)?;
     point.t1_k = or("t1_k", reference.t_ref_k)?;
     point.p1_pa = or("p1_pa", reference.p_ref_pa)?;
     (point.eta_low, point.eta_high) = (number("eta_low")?, number("eta_high")?);

@@ -87,7 +87,7 @@ fn row(line: &SpeedLine, point: &MapPoint) -> [String; 28] {
         option(p.h_high_w_m2k),
         number(p.speed_rpm),
         number(p.flow_kg_s),
-        number(p.valve_opening_ratio),
+        option(Some(p.valve_opening_ratio).filter(|ratio| ratio.is_finite())),
         number(p.t1_k),
         number(p.p1_pa),
         option(p.residual_rms_k),

@@ -10,8 +10,9 @@ const WORKING_RATIO: f64 = 1.02;
 const SMALLEST_FLOW_KG_S: f64 = 1e-3;
 /// Rows are taken no denser than this, s: nothing on the compressor side is faster than a probe.
 const SPACING_S: f64 = 0.1;
-/// Most rows that are kept: an hour at 10 Hz.
-const MOST_ROWS: usize = 36_000;
+/// Most rows that are kept, of longer logs spread over all of it: five minutes at 10 Hz. What is sought goes through them some
+/// hundred thousand times.
+const MOST_ROWS: usize = 3_000;
 
 /// Complete rows, as columns of equal length. SI units.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -49,9 +50,11 @@ impl Readings {
             series.push((channel, recording.require(channel)?));
         }
         let housing = recording.series.get(&Channel::Tc);
+        let span_s = t2.t_s.last().zip(t2.t_s.first()).map_or(0.0, |(last_s, first_s)| last_s - first_s);
+        let spacing_s = SPACING_S.max(span_s / MOST_ROWS as f64);
         let mut rows = Readings::default();
         for (t_s, t2_k) in t2.t_s.iter().zip(&t2.values) {
-            if rows.t_s.last().is_some_and(|last_s| t_s - last_s < 0.999 * SPACING_S) {
+            if rows.t_s.last().is_some_and(|last_s| t_s - last_s < 0.999 * spacing_s) {
                 continue;
             }
             let at = |index: usize| {
@@ -71,7 +74,8 @@ impl Readings {
                 rows.lost += 1;
                 continue;
             }
-            if rows.t_s.len() == MOST_ROWS {
+            // Spread over the log there is one more at most.
+            if rows.t_s.len() > MOST_ROWS {
                 break;
             }
             let tc_k = housing.and_then(|tc| tc.interpolate(*t_s)).filter(|k| is_reading(Channel::Tc, *k));

@@ -121,7 +121,10 @@ pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usi
         let keep = if lag_s > 0.0 { (-elapsed_s / lag_s).exp() } else { 0.0 };
         reading_k = gas.t2_k + (reading_k - gas.t2_k) * keep;
         let capacity_j_k = capacity_ratio * compressor_capacity_j_k(&declared.params, tc_k);
-        tc_k += elapsed_s * (gas.q1_w + gas.q2_w - loss_w_k * (tc_k - surroundings_k)) / capacity_j_k;
+        // Exponential Euler: exact where gas and surroundings hold still, and bounded over any gap in the log.
+        let conductance_w_k = h_w_m2k * compressor.internal_area_m2 + loss_w_k;
+        let net_w = gas.q1_w + gas.q2_w - loss_w_k * (tc_k - surroundings_k);
+        tc_k += net_w / conductance_w_k * (1.0 - (-conductance_w_k * elapsed_s / capacity_j_k).exp());
         state = Some((tc_k, reading_k));
     }
     predicted

@@ -100,6 +100,19 @@ fn what_is_left_of_the_brake_is_what_was_expected() {
     assert!(inside / rows > 0.85, "{}", inside / rows);
 }
 
+/// A day at 10 Hz is read to its end, in no more rows than a sample can go through.
+#[test]
+fn a_long_log_is_thinned() {
+    let (mut recording, ..) = log(0);
+    for series in recording.series.values_mut() {
+        series.t_s = (0..864_000).map(|i| 0.1 * f64::from(i)).collect();
+        series.values = vec![series.values[0]; series.t_s.len()];
+    }
+    let rows = Readings::of(&recording).unwrap();
+    assert!((2_000..=3_001).contains(&rows.len()), "{}", rows.len());
+    assert!(rows.t_s.last().unwrap() > &86_000.0);
+}
+
 #[test]
 fn too_little_is_refused() {
     let (recording, declared, _) = log(0);

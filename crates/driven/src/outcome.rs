@@ -129,7 +129,7 @@ pub fn identify(
     let noisy = with_noise(&sample, &predicted, rows, seed);
     let trace = trace(rows, &predicted, &noisy);
     let judged = |from: usize, until: usize| judged(rows, &trace, &noisy, from, until);
-    let without = |change: &dyn Fn(&mut Values)| moves(&sample, &predicted, rows, &declared, fitted, change);
+    let without = |name: &str| moves(&sample, &predicted, rows, &declared, fitted, name);
     Ok(DrivenOutcome {
         fitted_until_s: fit_until_s,
         parameters: PARAMETERS
@@ -137,18 +137,14 @@ pub fn identify(
             .enumerate()
             .map(|(i, parameter)| found(*parameter, i, &sample))
             .collect(),
-        probe_moves: without(&|values| values.0[PROBE] = 0.0),
-        heat_moves: without(&|values| values.0[HEAT] = 0.0),
+        probe_moves: without("probe"),
+        heat_moves: without("h"),
         fitted: judged(0, fitted),
         held_out: (fitted < rows.len()).then(|| judged(fitted, rows.len())),
         trace,
         lost_rows: rows.lost,
     })
 }
-
-/// Places of what can be taken away.
-const HEAT: usize = 5;
-const PROBE: usize = 11;
 
 fn found(parameter: Parameter, place: usize, sample: &[Values]) -> FoundParameter {
     let at = |share: f64| quantile(sample.iter().map(|values| values.0[place]), share).unwrap_or(f64::NAN);
@@ -226,22 +222,20 @@ fn judged(rows: &Readings, trace: &Trace, noisy: &[Vec<f64>], from: usize, until
     }
 }
 
-/// How far T2 moves when something is taken away.
+/// How far T2 moves when a parameter is 0.
 fn moves(
     sample: &[Values],
     predicted: &[Predicted],
     rows: &Readings,
     declared: &Declared,
     fitted: usize,
-    change: &dyn Fn(&mut Values),
+    name: &str,
 ) -> Moves {
     let distances: Vec<f64> = sample
         .iter()
         .zip(predicted)
         .filter_map(|(values, with)| {
-            let mut values = *values;
-            change(&mut values);
-            let without = predict(rows, declared, &values, fitted);
+            let without = predict(rows, declared, &values.with(name, 0.0), fitted);
             rms(without.t2_k.iter().zip(&with.t2_k).map(|(without, with)| without - with))
         })
         .collect();

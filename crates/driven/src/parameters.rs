@@ -101,8 +101,11 @@ impl Values {
         }))
     }
 
-    /// The value of a parameter by its name; `None` for another name.
-    pub fn get(&self, name: &str) -> Option<f64> {
-        PARAMETERS.iter().position(|parameter| parameter.name == name).map(|i| self.0[i])
+    /// The same with another value of one parameter; unchanged for a name that is none.
+    pub(crate) fn with(mut self, name: &str, value: f64) -> Self {
+        if let Some(place) = PARAMETERS.iter().position(|parameter| parameter.name == name) {
+            self.0[place] = value;
+        }
+        self
     }
 }

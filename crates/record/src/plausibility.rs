@@ -6,6 +6,7 @@ use mapper_core::{Channel, Series};
 use mapper_logs::plausible::{fits, fitting_units, looks_like_gauge};
 use mapper_logs::units::{kind_of, unit};
 use mapper_logs::{Kind, Unit};
+use mapper_numerics::statistics::quantile;
 use mapper_yaml::{FindingKind, steps};
 
 /// Share of the readings left out at each end: spikes are no matter of units.
@@ -20,11 +21,9 @@ pub(crate) fn check(
     series: &Series,
     complaints: &mut Complaints,
 ) {
-    let mut values: Vec<f64> = series.values.iter().copied().filter(|value| value.is_finite()).collect();
-    values.sort_unstable_by(f64::total_cmp);
-    let quantile =
-        |share: f64| values.get((share * values.len().saturating_sub(1) as f64).round() as usize).copied();
-    let (Some(low), Some(high)) = (quantile(OUTER), quantile(1.0 - OUTER)) else { return };
+    let values: Vec<f64> = series.values.iter().copied().filter(|value| value.is_finite()).collect();
+    let at = |share: f64| quantile(&values, share);
+    let (Some(low), Some(high)) = (at(OUTER), at(1.0 - OUTER)) else { return };
     if fits(channel, low, high) {
         return;
     }

@@ -95,10 +95,8 @@ pub(crate) fn without_rest(steps: Vec<StepMarker>, series: &BTreeMap<Channel, Se
 
 /// NaN where there are no readings.
 fn median(series: &Series, start_s: f64, end_s: f64) -> f64 {
-    let mut values: Vec<f64> =
-        series.slice(start_s, end_s).1.iter().copied().filter(|value| value.is_finite()).collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    let values = series.slice(start_s, end_s).1.iter().filter(|value| value.is_finite());
+    mapper_numerics::statistics::median(values).unwrap_or(f64::NAN)
 }
 
 /// Means of the signals over equal intervals; intervals without any are left out, so that a jump in a gap shows behind it.

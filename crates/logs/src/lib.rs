@@ -9,7 +9,6 @@
 mod error;
 mod file;
 mod format;
-mod header_unit;
 mod layout;
 mod options;
 pub mod plausible;
@@ -22,9 +21,8 @@ pub mod units;
 pub use error::LogError;
 pub use file::{LogFile, ReadSeek};
 pub use format::{Log, LogFormat, LogFormats, OpenLog, Row, RowSink};
-pub use header_unit::{HeaderUnit, Reference, header_unit, split_unit};
 pub use layout::{Column, Group, Layout};
-pub use mapper_yaml::units::{Kind, Unit};
+pub use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, split_unit};
 pub use options::{DateOrder, Encoding, LogOptions, OPTION_KEYS, OptionError, OptionKey};
 pub use sparkline::sparkline;
 pub use survey::{ColumnSurvey, Gap, GroupSurvey, Survey, survey};

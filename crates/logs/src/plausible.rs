@@ -1,36 +1,16 @@
-//! What the channels of a turbocharger read, wide enough for any of them: a wrong unit shows before anything is computed.
+//! Whether the course of a column can be a channel's: a wrong unit shows before anything is computed.
 
 use crate::units::{kind_of, unit};
-use mapper_core::Channel;
+use mapper_core::{Channel, plausible};
 use mapper_yaml::units::{Kind, Unit};
-
-/// The range in which readings of a channel lie while the machine runs, in the unit used inside.
-///
-/// From a car's turbocharger (wheels of 30 mm) to a ship's (of 300 mm). The lower end is what a machine reaches that
-/// runs at all: at rest speed and flow are 0.
-pub fn running_range(channel: Channel) -> (f64, f64) {
-    match channel {
-        Channel::ShaftSpeed => (2e3, 4e5),
-        Channel::CompressorFlow | Channel::TurbineFlow => (5e-4, 20.0),
-        // From a throttled inlet at altitude to the outlet of a stage before it.
-        Channel::P1 => (3e4, 6e5),
-        Channel::P2 => (5e4, 2e6),
-        Channel::P3 | Channel::P4 | Channel::P3Command => (5e4, 2e6),
-        Channel::T1 | Channel::TAmb => (220.0, 390.0),
-        Channel::T2 => (220.0, 700.0),
-        Channel::Tc => (220.0, 800.0),
-        Channel::T3 | Channel::T4 | Channel::Tt | Channel::T3Command => (220.0, 1500.0),
-        Channel::TOil | Channel::TOilCommand => (220.0, 480.0),
-        Channel::ValveCommand => (0.0, 10.0),
-    }
-}
 
 /// Range of an ambient pressure, Pa.
 pub const AMBIENT_PA: (f64, f64) = (5e4, 1.1e5);
 
 /// Whether readings whose course lies between `low` and `high` (without its outermost twentieths) can be those of a channel.
 pub fn fits(channel: Channel, low: f64, high: f64) -> bool {
-    let (least, most) = running_range(channel);
+    let running = plausible(channel).running;
+    let (least, most) = (*running.start(), *running.end());
     match kind_of(channel) {
         // 0 at rest, but not all the time; a channel that is 0 throughout is dead, which is not a matter of units.
         Kind::Speed | Kind::MassFlow => high <= most && (high >= least || high == 0.0 && low == 0.0),

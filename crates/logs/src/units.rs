@@ -1,10 +1,7 @@
 //! What recordings of other programs spell differently from the table of `mapper-yaml`.
 
 use mapper_core::{Channel, Dimension};
-use mapper_yaml::units::{Kind, Unit, UnitError, parse_with};
-
-/// A bare ratio.
-const ONE: Unit = Unit { spellings: &["1", "-"], zero: 0.0, numerator: 1.0, denominator: 1.0, decade: 0 };
+use mapper_yaml::units::{BARE_RATIO, Kind, Unit, UnitError, parse_with};
 
 /// What a channel measures.
 pub fn kind_of(channel: Channel) -> Kind {
@@ -41,7 +38,7 @@ pub fn unit(kind: Kind, spelling: &str) -> Result<&'static Unit, UnitError> {
 /// [`UnitError`] for what is not a finite number, for an unknown unit, and for a missing one.
 pub fn parse_quantity(kind: Kind, text: &str) -> Result<f64, UnitError> {
     parse_with(kind, text, |spelling| match spelling {
-        "" => (kind == Kind::Fraction).then_some(&ONE),
+        "" => (kind == Kind::Fraction).then_some(&BARE_RATIO),
         spelling => find(kind, spelling),
     })
 }
@@ -54,7 +51,7 @@ pub fn remedy(kind: Kind, error: &UnitError) -> String {
 
 fn find(kind: Kind, spelling: &str) -> Option<&'static Unit> {
     kind.unit(spelling).or_else(|| match (kind, spelling) {
-        (Kind::Fraction, "1" | "-") => Some(&ONE),
+        (Kind::Fraction, "1" | "-") => Some(&BARE_RATIO),
         (Kind::Temperature, "C" | "celsius") => kind.unit("degC"),
         (Kind::Temperature, "F") => kind.unit("degF"),
         // Of a whole channel there is no doubt: channels hold absolute pressures.

@@ -1,35 +1,6 @@
-//! What a turbocharger on a gas stand can read: one table for all that judge readings.
+//! Judges readings by what a turbocharger on a gas stand can read.
 
-use mapper_core::{Channel, Dimension};
-use std::ops::RangeInclusive;
-
-/// What a dimension can read, SI.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plausible {
-    /// The middle reading of a machine that runs.
-    pub running: RangeInclusive<f64>,
-    /// Any single reading, standstill, spikes and faults of the meter included: beyond it the value is lost.
-    pub any: RangeInclusive<f64>,
-}
-
-/// What a channel can read.
-///
-/// | | running | why | any |
-/// |---|---|---|---|
-/// | shaft speed | 1e3..1e6 rpm | the largest idle above the first, the smallest stay below a third of the second | 0..1e7 |
-/// | flow | 1e-4..20 kg/s | from what leaks through a small one at idle to engines of 10 MW | -100..100 |
-/// | pressure | 20 kPa..2 MPa | absolute, from a throttled inlet at altitude to three stages of boost | 100..1e9 |
-/// | temperature | 200..1600 K | from an arctic cell to exhaust gas that melts turbines | 100..3000 |
-pub fn plausible(channel: Channel) -> Plausible {
-    let (running, any) = match channel.info().dimension {
-        Dimension::RotationalSpeed => (1e3..=1e6, 0.0..=1e7),
-        Dimension::MassFlow => (1e-4..=20.0, -100.0..=100.0),
-        Dimension::Pressure => (2e4..=2e6, 100.0..=1e9),
-        Dimension::Temperature => (200.0..=1600.0, 100.0..=3000.0),
-        Dimension::Ratio => (f64::MIN..=f64::MAX, f64::MIN..=f64::MAX),
-    };
-    Plausible { running, any }
-}
+use mapper_core::{Channel, Dimension, plausible};
 
 /// Whether a single value is finite and within what any rig could show; the others are lost.
 pub fn is_reading(channel: Channel, value: f64) -> bool {

@@ -3,12 +3,11 @@
 use super::names::{Weight, channels_of, is_ambient, is_derived, plain};
 use super::physics;
 use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
-use crate::header_unit::{HeaderUnit, Reference, header_unit};
 use crate::plausible::{AMBIENT_PA, fits, fitting_units, looks_like_gauge};
 use crate::units::kind_of;
 use crate::{ColumnSurvey, Layout, Survey};
 use mapper_core::{CHANNELS, Channel};
-use mapper_yaml::units::{Kind, Unit};
+use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit};
 
 /// Share of a trace left out at each end when its range is judged.
 const OUTER: f64 = 0.02;

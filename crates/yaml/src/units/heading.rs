@@ -1,6 +1,6 @@
 //! The headings of a table's columns: names and units.
 
-use super::{Kind, Unit};
+use super::{BARE_RATIO, Kind, Reference, Unit, header_unit, split_unit};
 
 /// What stands in brackets behind a name without being a unit: kinds of ratios and of efficiencies.
 const NO_UNITS: &[&str] = &["", "-", "1", "ts", "tt", "t-s", "t-t", "corr", "corrected"];
@@ -70,12 +70,12 @@ pub fn find_columns<const N: usize>(
 ) -> Result<[FoundColumn; N], HeadingError> {
     let mut found = [FoundColumn { index: 0, unit: None }; N];
     for (place, column) in found.iter_mut().zip(&wanted) {
-        let read: Vec<(String, Option<&str>)> =
+        let read: Vec<(String, Option<String>)> =
             headings.iter().map(|heading| split(heading, column.kind)).collect();
         let named = column.names.iter().find_map(|name| read.iter().position(|(plain, _)| plain == name));
         // Some write the unit alone. A share has none by which it could be told from another.
         let by_unit = || {
-            let is_unit = |heading: &&str| column.kind.unit(heading.trim()).is_some();
+            let is_unit = |heading: &&str| known(column.kind, heading.trim()).is_some();
             headings.iter().position(is_unit).filter(|_| column.kind != Kind::Fraction)
         };
         let index = named.or_else(by_unit);
@@ -86,9 +86,9 @@ pub fn find_columns<const N: usize>(
                 found: headings.join(", ").chars().take(120).collect(),
             });
         };
-        let unit = match read[index].1 {
+        let unit = match &read[index].1 {
             None => None,
-            Some(text) => Some(column.kind.unit(text).ok_or_else(|| HeadingError::Unit {
+            Some(text) => Some(known(column.kind, text).ok_or_else(|| HeadingError::Unit {
                 heading: headings[index].chars().take(60).collect(),
                 unit: text.chars().take(40).collect(),
                 kind: column.kind.name(),
@@ -101,33 +101,30 @@ pub fn find_columns<const N: usize>(
 }
 
 /// A heading's name, plain, and the text of its unit.
-fn split(heading: &str, kind: Kind) -> (String, Option<&str>) {
+fn split(heading: &str, kind: Kind) -> (String, Option<String>) {
     let heading = heading.trim();
-    if kind.unit(heading).is_some() {
-        return (plain(heading), Some(heading));
+    if known(kind, heading).is_some() {
+        return (plain(heading), Some(heading.to_owned()));
     }
+    // In brackets even what is no unit is the unit: it can be refused by name.
     if let Some((name, rest)) = heading.split_once(['[', '(']) {
         let unit = rest.trim_end_matches([']', ')', ' ']).trim();
         let is_unit = !NO_UNITS.contains(&unit.to_ascii_lowercase().as_str());
-        return (plain(name), is_unit.then_some(unit));
+        return (plain(name), is_unit.then(|| unit.to_owned()));
     }
-    let known = |unit: &str| kind.unit(unit).is_some();
-    if let Some((name, unit)) = heading.split_once('/').filter(|(_, unit)| known(unit.trim())) {
-        return (plain(name), Some(unit.trim()));
+    // `pressure_ratio` names no unit, although a ratio could be one.
+    let meant = |unit: &str| known(kind, unit).is_some_and(|unit| unit.symbol() != BARE_RATIO.symbol());
+    match split_unit(heading) {
+        (name, Some(unit)) if meant(&unit) => (plain(&name), Some(unit)),
+        _ => (plain(heading), None),
     }
-    let spellings = kind.units().iter().flat_map(|unit| unit.spellings);
-    for spelling in spellings {
-        let written = spelling.replace(['/', ' '], "_");
-        let lower = heading.to_ascii_lowercase();
-        let name = lower.strip_suffix(&written.to_ascii_lowercase()).and_then(|name| {
-            let plain = name.strip_suffix(['_', ' '])?;
-            heading.get(..plain.len())
-        });
-        if let Some(name) = name.filter(|name| !name.is_empty()) {
-            return (plain(name), Some(spelling));
-        }
-    }
-    (plain(heading), None)
+}
+
+/// The unit of a kind under any spelling that tables and logs use. A table holds absolute pressures.
+fn known(kind: Kind, text: &str) -> Option<&'static Unit> {
+    let named =
+        || header_unit(text).filter(|found| found.kind == kind && found.reference != Reference::Gauge);
+    kind.unit(text).or_else(|| Some(named()?.unit))
 }
 
 /// In lower case without blanks and underscores.
@@ -155,6 +152,7 @@ mod tests {
             (["Speed [1/min]", "flow[lb/min]"], 1.0, 0.453_592_37 / 60.0),
             (["n/rpm", "flow krpm"], f64::NAN, f64::NAN),
             (["krpm", "kg/min"], 1e3, 1.0 / 60.0),
+            (["n [U/min]", "m_dot kg/hr"], 1.0, 1.0 / 3600.0),
         ] {
             match find_columns(&headings, [SPEED, FLOW]) {
                 Ok([speed, flow]) => {

@@ -97,6 +97,10 @@ const fn decimal(spellings: &'static [&'static str], decade: i32) -> Unit {
     Unit { spellings, zero: 0.0, numerator: 1.0, denominator: 1.0, decade }
 }
 
+/// A share written as a bare number.
+pub const BARE_RATIO: Unit =
+    Unit { spellings: &["1", "-"], zero: 0.0, numerator: 1.0, denominator: 1.0, decade: 0 };
+
 const TEMPERATURE: &[Unit] = &[
     decimal(&["K"], 0),
     Unit { spellings: &["degC", "°C", "℃"], zero: 273.15, numerator: 1.0, denominator: 1.0, decade: 0 },

@@ -5,13 +5,15 @@
 //! factor, has no name for `krpm`, and parses only its own spellings; this table is short enough to be read against
 //! the definitions of its units.
 
+mod header_unit;
 mod heading;
 mod kind;
 mod parse;
 mod quantity;
 
+pub use header_unit::{HeaderUnit, Reference, header_unit, split_unit};
 pub use heading::{FoundColumn, HeadingError, WantedColumn, find_columns};
-pub use kind::{Kind, Unit};
+pub use kind::{BARE_RATIO, Kind, Unit};
 pub use parse::{UnitError, parse, parse_with};
 pub use quantity::{
     Area, Conductance, Conductivity, Dimension, Duration, Fraction, Frequency, Inertia, Length, Mass,

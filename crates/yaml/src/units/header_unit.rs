@@ -1,7 +1,6 @@
-//! Units as the headers of logs write them.
+//! Units as the headers of logs and tables write them.
 
-use crate::units::unit;
-use mapper_yaml::units::{Kind, Unit};
+use super::{BARE_RATIO, Kind, Unit};
 use serde::Serialize;
 
 /// What a pressure is measured from.
@@ -61,12 +60,12 @@ const SPELLINGS: &[(Kind, &str, &[&str])] = &[
     (Kind::Speed, "krpm", &["krpm", "1000rpm", "1000/min", "k1/min", "ku/min"]),
     (Kind::Speed, "Hz", &["hz", "1/s", "rev/s", "u/s", "rps"]),
     (Kind::Speed, "rad/s", &["rad/s"]),
-    (Kind::MassFlow, "kg/s", &["kg/s", "kgs", "kgs-1", "kg/sec"]),
-    (Kind::MassFlow, "g/s", &["g/s", "gs-1", "g/sec"]),
-    (Kind::MassFlow, "kg/h", &["kg/h", "kg/hr", "kghr", "kgh", "kgh-1", "kg/std"]),
-    (Kind::MassFlow, "kg/min", &["kg/min", "kgmin"]),
-    (Kind::MassFlow, "lb/min", &["lb/min", "lbmin", "lbm/min", "lbs/min", "ppm_lb"]),
-    (Kind::MassFlow, "lb/s", &["lb/s", "lbm/s"]),
+    (Kind::MassFlow, "kg/s", &["kg/s", "kg_s", "kgs", "kgs-1", "kg/sec"]),
+    (Kind::MassFlow, "g/s", &["g/s", "g_s", "gs-1", "g/sec"]),
+    (Kind::MassFlow, "kg/h", &["kg/h", "kg_h", "kg/hr", "kghr", "kgh", "kgh-1", "kg/std"]),
+    (Kind::MassFlow, "kg/min", &["kg/min", "kg_min", "kgmin"]),
+    (Kind::MassFlow, "lb/min", &["lb/min", "lb_min", "lbmin", "lbm/min", "lbs/min", "ppm_lb"]),
+    (Kind::MassFlow, "lb/s", &["lb/s", "lb_s", "lbm/s"]),
     (Kind::Fraction, "%", &["%", "percent", "prozent", "pct"]),
     (Kind::Fraction, "1", &["1", "-", "--", "ratio"]),
     (Kind::Duration, "s", &["s", "sec", "secs", "second", "seconds", "sek", "sekunden"]),
@@ -83,7 +82,7 @@ const PRESSURES: &[(&str, &str)] = &[
     ("mpa", "MPa"),
     ("bar", "bar"),
     ("atm", "atm"),
-    ("psi", "psi"),
+    ("psi", "psia"),
     ("pa", "Pa"),
 ];
 
@@ -98,8 +97,7 @@ pub fn header_unit(text: &str) -> Option<HeaderUnit> {
     if lower.is_empty() || lower.len() > 24 {
         return None;
     }
-    let known =
-        |kind, symbol, reference| Some(HeaderUnit { kind, unit: unit(kind, symbol).ok()?, reference });
+    let known = |kind, symbol, reference| Some(HeaderUnit { kind, unit: unit(kind, symbol)?, reference });
     for (kind, symbol, spellings) in SPELLINGS {
         if spellings.contains(&lower.as_str()) {
             return known(*kind, symbol, Reference::Unsaid);
@@ -117,6 +115,11 @@ pub fn header_unit(text: &str) -> Option<HeaderUnit> {
     None
 }
 
+/// The unit with that symbol, which for a share may be none.
+fn unit(kind: Kind, symbol: &str) -> Option<&'static Unit> {
+    kind.unit(symbol).or((symbol == BARE_RATIO.symbol()).then_some(&BARE_RATIO))
+}
+
 /// A name and its unit, where a header holds both: `T2 [degC]`, `T2 (degC)`, `p2 / kPa`, `p2 in kPa`, `T2_degC`.
 pub fn split_unit(header: &str) -> (String, Option<String>) {
     let header = header.trim();
@@ -130,18 +133,22 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
             return (name.trim().trim_end_matches(['/', ',']).trim().to_owned(), Some(unit.to_owned()));
         }
     }
+    // The longest unit is the one that is meant: `m kg/h` ends in `h` as well.
+    let mut best: Option<(&str, &str)> = None;
     for between in [" / ", " in ", "/", ", ", "_", " "] {
-        // From the left for `/`, which units hold themselves: `m / kg/s`.
-        let cuts: Vec<(usize, &str)> = header.match_indices(between).collect();
-        for (at, _) in cuts {
+        for (at, _) in header.match_indices(between) {
             let (name, unit) = (header[..at].trim(), header[at + between.len()..].trim());
-            let known = header_unit(unit);
             // A single letter behind a blank or a line is a place more often than a unit: `T_C`, `p_a`.
             let doubtful = [" ", "_"].contains(&between) && unit.chars().count() < 2;
-            if !name.is_empty() && known.is_some() && !doubtful && unit != "-" && !unit.ends_with("--") {
-                return (name.to_owned(), Some(unit.to_owned()));
+            let longer = best.is_none_or(|(_, known)| known.len() < unit.len());
+            let told = !name.is_empty() && !doubtful && unit != "-" && !unit.ends_with("--");
+            if told && longer && header_unit(unit).is_some() {
+                best = Some((name, unit));
             }
         }
+    }
+    if let Some((name, unit)) = best {
+        return (name.to_owned(), Some(unit.to_owned()));
     }
     whole()
 }
@@ -187,6 +194,9 @@ mod tests {
             ("p2 [bar(g)]", "p2", Some("bar(g)")),
             ("Drehzahl ATL in 1/min", "Drehzahl ATL", Some("1/min")),
             ("outlet_temp_degC", "outlet_temp", Some("degC")),
+            ("Flow_kg_s", "Flow", Some("kg_s")),
+            ("m_L kg/h", "m_L", Some("kg/h")),
+            ("Drehzahl 1/min", "Drehzahl", Some("1/min")),
             ("T_C", "T_C", None),
             ("T2", "T2", None),
             ("Valve (upper)", "Valve (upper)", None),

@@ -1,0 +1,49 @@
+//! What a turbocharger on a gas stand can read: one table for all that judge readings.
+
+use crate::{Channel, Dimension};
+use std::ops::RangeInclusive;
+
+/// What a channel can read, in its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plausible {
+    /// The readings of a machine that runs, from a car's turbocharger (wheels of 30 mm) to a ship's (of 300 mm).
+    pub running: RangeInclusive<f64>,
+    /// Any single reading, standstill, spikes and faults of the meter included: beyond it the value is lost.
+    pub any: RangeInclusive<f64>,
+}
+
+/// What a channel can read.
+///
+/// | | running | why | any |
+/// |---|---|---|---|
+/// | shaft speed | 1e3..4e5 rpm | the largest idle above the first, the smallest stay below the second | 0..1e7 |
+/// | flows | 1e-4..20 kg/s | from what leaks through a small one at idle to engines of 10 MW | -100..100 |
+/// | P1 | 30..600 kPa | absolute, from a throttled inlet at altitude to the outlet of a stage before it | 100..1e9 |
+/// | other pressures | 50 kPa..2 MPa | absolute; gauge readings at part load lie below; to three stages of boost | 100..1e9 |
+/// | T1, ambient | 220..390 K | from an arctic cell to the outlet of a stage without a cooler | 100..3000 |
+/// | T2 | 220..700 K | what compressor wheels stand | 100..3000 |
+/// | compressor housing | 220..800 K | what aluminium does not stand any more | 100..3000 |
+/// | oil | 220..480 K | oil burns above | 100..3000 |
+/// | turbine side | 220..1600 K | exhaust gas that melts turbines | 100..3000 |
+pub fn plausible(channel: Channel) -> Plausible {
+    let running = match channel {
+        Channel::ShaftSpeed => 1e3..=4e5,
+        Channel::CompressorFlow | Channel::TurbineFlow => 1e-4..=20.0,
+        Channel::P1 => 3e4..=6e5,
+        Channel::P2 | Channel::P3 | Channel::P4 | Channel::P3Command => 5e4..=2e6,
+        Channel::T1 | Channel::TAmb => 220.0..=390.0,
+        Channel::T2 => 220.0..=700.0,
+        Channel::Tc => 220.0..=800.0,
+        Channel::T3 | Channel::T4 | Channel::Tt | Channel::T3Command => 220.0..=1600.0,
+        Channel::TOil | Channel::TOilCommand => 220.0..=480.0,
+        Channel::ValveCommand => 0.0..=10.0,
+    };
+    let any = match channel.info().dimension {
+        Dimension::RotationalSpeed => 0.0..=1e7,
+        Dimension::MassFlow => -100.0..=100.0,
+        Dimension::Pressure => 100.0..=1e9,
+        Dimension::Temperature => 100.0..=3000.0,
+        Dimension::Ratio => f64::MIN..=f64::MAX,
+    };
+    Plausible { running, any }
+}

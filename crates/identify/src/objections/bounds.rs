@@ -2,8 +2,8 @@
 //!
 //! The gas leaves between what isentropic compression makes of it and some three times that: turbocharger compressors have 0.3
 //! to 0.85. A housing that is far from the gas moves this apparent efficiency, but at 20 K of rise and more never beyond 0.2
-//! to 1.3 (docs/physics.md: the housing exchanges at most half of the capacity flow times its distance). And turbine inlet gas is the
-//! hottest of all.
+//! to 1.3 (docs/physics.md: the housing exchanges at most half of the capacity flow times its distance). Hot turbine
+//! inlet gas that is read as T2 is beyond that; a turbine may be driven by cold gas.
 
 use crate::findings::code;
 use crate::objections::ends::Ends;
@@ -38,16 +38,16 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
         found.push(Objection::new(code::SWAPPED_CHANNELS, message, all()));
         return found;
     }
-    let hotter: Vec<usize> = known
-        .iter()
-        .filter(|end| end.t3_k.is_some_and(|t3_k| end.t2_k > t3_k))
-        .map(|end| end.position)
-        .collect();
-    if 2 * hotter.len() > known.len() {
-        let message = "T2 is hotter than T3 at most points: the channels are exchanged, or T3 is dead; correct the channel map";
+    let apparent = |end: &Ends| end.isentropic_rise_k() / (end.t2_k - end.t1_k);
+    // A turbine may be driven by cold gas, or by gas as warm as the compressor's outlet. Hot gas that is read as T2 is warmer
+    // than any compressor makes it.
+    let exchanged =
+        |end: &&&Ends| end.t3_k.is_some_and(|t3_k| end.t2_k > t3_k) && apparent(end) < *MIDDLE.start();
+    if 2 * known.iter().filter(exchanged).count() > known.len() {
+        let message = "T2 is hotter than T3 and than this pressure ratio makes the gas at most points: the channels are exchanged; correct the \
+             channel map";
         found.push(Objection::new(code::SWAPPED_CHANNELS, message.to_owned(), all()));
     }
-    let apparent = |end: &Ends| end.isentropic_rise_k() / (end.t2_k - end.t1_k);
     let judged: Vec<&&Ends> = known.iter().filter(|end| end.isentropic_rise_k() > LEAST_RISE_K).collect();
     // T2 that does not rise at all has no efficiency, and more than any.
     let value = |end: &Ends| if end.t2_k > end.t1_k { apparent(end) } else { f64::INFINITY };
@@ -72,4 +72,39 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
         found.push(Objection::new(code::SCALED_CHANNEL, message.to_owned(), impossible));
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Five ends of an efficiency of 0.7 at a pressure ratio of 2, with this gas before the turbine.
+    fn ends_with(t3_k: f64, t2_read_k: Option<f64>) -> Vec<Option<Ends>> {
+        let end = Ends {
+            position: 0,
+            end_s: 0.0,
+            valve_opening_ratio: 1.0,
+            speed_rpm: 1e5,
+            flow_kg_s: 0.1,
+            p1_pa: 1e5,
+            p2_pa: 2e5,
+            t1_k: 298.15,
+            t2_k: 0.0,
+            turbine_flow_kg_s: None,
+            t3_k: Some(t3_k),
+            t4_k: None,
+        };
+        let t2_k = t2_read_k.unwrap_or(end.t1_k + end.isentropic_rise_k() / 0.7);
+        (0..5).map(|position| Some(Ends { position, t2_k, ..end })).collect()
+    }
+
+    /// Stands drive turbines with cold gas, and adiabatic mapping with gas as warm as the compressor's outlet.
+    #[test]
+    fn gas_colder_than_the_outlet_is_no_mistake_and_hot_gas_read_as_t2_is_one() {
+        for t3_k in [300.0, 385.0, 773.15] {
+            assert!(objections(&ends_with(t3_k, None)).is_empty(), "{t3_k} K before the turbine");
+        }
+        let exchanged = objections(&ends_with(388.0, Some(773.15)));
+        assert_eq!(exchanged[0].code, code::SWAPPED_CHANNELS, "{exchanged:?}");
+    }
 }

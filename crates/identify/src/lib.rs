@@ -10,6 +10,7 @@ mod bias;
 mod cleaning;
 mod commands;
 mod config;
+mod course;
 mod covariance;
 mod dynamic;
 mod end_state;
@@ -37,6 +38,7 @@ mod zero;
 mod zero_outcome;
 
 pub use config::{DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Thresholds};
+pub use course::{T2Course, t2_course};
 pub use error::{IdentifyError, StepError};
 pub use expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use findings::code;

@@ -16,10 +16,30 @@ impl Display {
         Display { units: units.clone() }
     }
 
-    fn shown(kind: Kind, symbol: &str, value: f64, decimals: usize) -> String {
+    /// The units.
+    pub fn units(&self) -> &DisplayUnits {
+        &self.units
+    }
+
+    /// A value of the unit used inside in the unit that is shown, for drawing.
+    pub fn number(&self, kind: Kind, inside: f64) -> f64 {
+        let symbol = match kind {
+            Kind::Speed => &self.units.speed,
+            Kind::Pressure => &self.units.pressure,
+            Kind::MassFlow => &self.units.flow,
+            Kind::Temperature => &self.units.temperature,
+            _ => return inside,
+        };
+        Self::in_unit(kind, symbol, inside)
+    }
+
+    fn in_unit(kind: Kind, symbol: &str, inside: f64) -> f64 {
         // A checked campaign names only units that exist; anything else is shown in SI.
-        let shown = kind.unit(symbol).map_or(value, |unit| unit.from_inside(value));
-        format!("{shown:.decimals$}")
+        kind.unit(symbol).map_or(inside, |unit| unit.from_inside(inside))
+    }
+
+    fn shown(kind: Kind, symbol: &str, value: f64, decimals: usize) -> String {
+        format!("{:.decimals$}", Self::in_unit(kind, symbol, value))
     }
 
     /// Column head: what, and the unit of speeds.

@@ -4,17 +4,17 @@ use mapper_core::IdentifiedPoint;
 
 /// A sentence, and the steps that it is about.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Doubt<'a> {
+pub struct Doubt<'a> {
     /// Steps, from 1, in order.
     steps: Vec<usize>,
     /// What kind of doubt it is.
-    pub(crate) code: &'a str,
+    pub code: &'a str,
     /// The sentence.
-    pub(crate) message: &'a str,
+    pub message: &'a str,
 }
 
 /// What is said of the points, in order of the first step of each.
-pub(crate) fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doubt<'a>> {
+pub fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doubt<'a>> {
     let mut doubts: Vec<Doubt<'a>> = Vec::new();
     for point in points {
         let step = point.step + 1;
@@ -30,8 +30,13 @@ pub(crate) fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> V
 }
 
 impl Doubt<'_> {
+    /// How many steps it is about.
+    pub fn count(&self) -> usize {
+        self.steps.len()
+    }
+
     /// The steps in words: "step 3", "steps 2, 5 to 9".
-    pub(crate) fn steps(&self) -> String {
+    pub fn steps(&self) -> String {
         let one = if self.steps.len() == 1 { "step" } else { "steps" };
         let mut ranges: Vec<(usize, usize)> = Vec::new();
         for step in &self.steps {

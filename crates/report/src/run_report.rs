@@ -184,7 +184,8 @@ fn source_row(source: &ReportSource, before: usize) -> [String; 4] {
     ]
 }
 
-fn head_rows(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
+/// What is known of rig, conditions and making: what, and its value in words.
+pub fn head_rows(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     let mut rows = report.campaign.map(campaign_rows).unwrap_or_default();
     rows.push(("reference state of corrected quantities", report.reference.to_string()));
     rows.push(("identification", format!("{}, alpha_A = {}", report.method, report.alpha_area_ratio)));

@@ -1,16 +1,16 @@
 //! The fitted surface in the picture: lines, contours, surge and choke, and grey where it is extrapolated.
 
-use crate::labels::{contour_levels, krpm, percent};
-use crate::surface::{SUBDIVISIONS, across};
-use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, StructuredGrid, palette};
+use crate::labels::{krpm, percent};
+use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, palette};
 use mapper_core::{CompressorMap, FittedLine, FittedMap, FittedNode, SpeedLine, confidence_interval_95};
+use mapper_mesh::{SUBDIVISIONS, across, contour_levels, fitted_surface};
 
 const SURGE: palette::Colour = palette::VERMILLION;
 const CHOKE: palette::Colour = palette::PURPLE;
 /// Everything below the points of the panel pressure ratio over flow.
 pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap) {
     add_shade(panel, fitted);
-    if let Some(grid) = eta_grid(fitted) {
+    if let Some(grid) = fitted_surface(fitted) {
         let levels = contour_levels(grid.value_range());
         panel.add(Contours::new(grid, &levels, percent).shaded().colour(palette::Colour(40, 80, 120)));
     }
@@ -143,31 +143,4 @@ fn add_shade(panel: &mut Panel, fitted: &FittedMap) {
             start = end;
         }
     }
-}
-
-/// Efficiency over the supported part of the surface, finer in speed than its lines.
-fn eta_grid(fitted: &FittedMap) -> Option<StructuredGrid> {
-    let speeds: Vec<f64> = fitted.lines.iter().map(|line| line.speed_corrected_rpm).collect();
-    let columns = fitted.beta_ratio.len();
-    if speeds.len() < 2 || !speeds.windows(2).all(|w| w[1] > w[0]) {
-        return None;
-    }
-    let mut fields: [Vec<Vec<f64>>; 3] = Default::default();
-    for column in 0..columns {
-        let values: [fn(&FittedNode) -> f64; 3] = [
-            |n| n.flow_corrected_kg_s,
-            |n| n.pressure_ratio,
-            |n| if n.extrapolated { f64::NAN } else { n.eta },
-        ];
-        for (field, value) in fields.iter_mut().zip(values) {
-            let over_speed: Vec<f64> =
-                fitted.lines.iter().map(|line| line.nodes.get(column).map_or(f64::NAN, value)).collect();
-            field.push(across(&speeds, &over_speed));
-        }
-    }
-    let rows = fields[0].first()?.len();
-    // Column by column as made; the grid wants row by row.
-    let flat =
-        |field: &Vec<Vec<f64>>| (0..rows).flat_map(|r| field.iter().map(move |c| c[r])).collect::<Vec<f64>>();
-    StructuredGrid::new(rows, columns, flat(&fields[0]), flat(&fields[1]), flat(&fields[2])).ok()
 }

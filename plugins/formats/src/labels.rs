@@ -1,6 +1,4 @@
-//! Numbers as they stand in the picture, and the levels of its contours.
-
-use mapper_chart::nice_ticks;
+//! Numbers as they stand in the picture.
 
 /// A speed in krpm without needless digits.
 pub(crate) fn krpm(speed_rpm: f64) -> String {
@@ -12,22 +10,4 @@ pub(crate) fn krpm(speed_rpm: f64) -> String {
 pub(crate) fn percent(eta: f64) -> String {
     let text = format!("{:.1}", 100.0 * eta);
     text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
-}
-
-/// Round levels (fractions): finer towards the best efficiency, where the map is flat.
-pub(crate) fn contour_levels(range: Option<(f64, f64)>) -> Vec<f64> {
-    let Some((low, high)) = range else { return Vec::new() };
-    let (low, high) = (low.max(0.0), high.min(1.5));
-    if low >= high {
-        return Vec::new();
-    }
-    if high - low < 0.08 {
-        return nice_ticks(low, high, 6);
-    }
-    let coarse_end = high - 0.06;
-    // Whole percents, as integers: no drift.
-    let every = |step: i32| (1..=150 / step).map(move |i| f64::from(i * step) / 100.0);
-    let mut levels: Vec<f64> = every(5).filter(|v| *v > low && *v < coarse_end).collect();
-    levels.extend(every(2).filter(|v| *v >= coarse_end && *v < high));
-    levels
 }

@@ -9,15 +9,13 @@ mod heading;
 mod labels;
 mod lines;
 mod map_picture;
-mod monotone;
 mod reference;
 mod simulation_table;
-mod surface;
 
 pub use lines::POINT_LIMIT;
 pub use map_picture::{map_figure, map_panel};
+pub use mapper_mesh::efficiency_surface;
 pub use reference::parse_reference;
-pub use surface::efficiency_surface;
 
 use mapper_core::MapFormats;
 

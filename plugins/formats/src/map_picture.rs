@@ -4,11 +4,12 @@
 //! bury the map), and in (b) by the interval itself as a bar. Shape and colour tell good from doubtful; points without
 //! an efficiency are hollow.
 
+use crate::fitted_items;
 use crate::heading::efficiency_name;
-use crate::labels::{contour_levels, krpm, percent};
-use crate::{fitted_items, surface};
+use crate::labels::{krpm, percent};
 use mapper_chart::{Axis, Contours, Figure, Line, LineEnd, Marker, Panel, Scatter, ScatterPoint, palette};
 use mapper_core::{CompressorMap, MapPoint, Method, SurgeMark, Verdict, confidence_interval_95};
+use mapper_mesh::{contour_levels, efficiency_surface, ordered, speed_curve};
 
 /// The map as a figure of two panels; flow in kg/s, efficiency in %.
 pub fn map_figure(map: &CompressorMap) -> Figure {
@@ -78,12 +79,12 @@ fn surge_marks(map: &CompressorMap) -> Scatter {
 
 /// Lines and contours without a fit: through the points.
 fn add_measured_lines(panel: &mut Panel, map: &CompressorMap) {
-    if let Some(grid) = surface::efficiency_surface(map) {
+    if let Some(grid) = efficiency_surface(map) {
         let levels = contour_levels(grid.value_range());
         panel.add(Contours::new(grid, &levels, percent).shaded().colour(palette::Colour(40, 80, 120)));
     }
     for line in &map.lines {
-        let curve = surface::speed_curve(map, line);
+        let curve = speed_curve(map, line);
         let speed = krpm(line.speed_corrected_rpm);
         panel.add(Line::new(curve, palette::INK).width_px(1.3).end_label(speed, LineEnd::Last));
     }
@@ -103,7 +104,7 @@ fn efficiency_panel(map: &CompressorMap) -> Panel {
     let last = map.lines.len().saturating_sub(1).max(1) as f64;
     for (index, line) in map.lines.iter().enumerate() {
         let colour = palette::sequential(index as f64 / last);
-        let points: Vec<(ScatterPoint, Verdict)> = surface::ordered(map, line)
+        let points: Vec<(ScatterPoint, Verdict)> = ordered(map, line)
             .into_iter()
             .filter_map(|point| {
                 let p = &point.identified;

@@ -12,6 +12,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-chart",     &[]),
     ("mapper-numerics",  &[]),
     ("mapper-physics",   &["core", "numerics"]),
+    ("mapper-mesh",      &["core", "chart"]),
     ("mapper-campaign",  &["core", "physics", "yaml"]),
     ("mapper-planner",   &["core", "numerics", "physics"]),
     ("mapper-surge",     &["core", "numerics", "physics"]),
@@ -31,14 +32,16 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // A backend may read recordings: replay does.
     ("mapper-backends",  &["core", "numerics", "physics", "record", "yaml"]),
     ("mapper-effects",   &["core", "physics"]),
-    ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart"]),
+    ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart", "mesh"]),
     ("mapper-log-formats", &["logs"]),
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
     ("mapper-blind",     &["core", "numerics", "physics", "campaign", "runner", "record", "observe", "gap", "backends", "effects"]),
     // Words, pages and pictures made from data.
     ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "assemble", "gap", "drift", "driven", "history", "logs", "record", "reproduce", "sequence"]),
+    // The page of a run, for a browser.
+    ("mapper-page",      &["core", "chart", "mesh", "campaign", "assemble", "identify", "observe", "record", "report"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "drift", "driven", "history", "assemble", "report", "numerics"]),
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "drift", "driven", "history", "assemble", "report", "page", "numerics"]),
     // The program names the plug-ins; nothing sees the program.
     ("mapper-cli",       &["core", "physics", "campaign", "planner", "record", "drift", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "backends", "blind", "effects", "formats"]),
     // Tests run the program and read its files; chores know nothing of it.

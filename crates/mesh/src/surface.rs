@@ -1,4 +1,4 @@
-//! Efficiency between the measured points, for the picture alone, and only where points stand on all sides.
+//! Efficiency between the measured points, for pictures alone, and only where points stand on all sides.
 //!
 //! Each speed line is a row of a structured grid. Along a line the position runs from 0 at its surge-side point to 1
 //! at its choke-side point, by length on the map with both axes scaled to the map's spans; flow, pressure ratio and
@@ -17,8 +17,8 @@ use mapper_core::{CompressorMap, MapPoint, SpeedLine};
 
 /// Nodes along a line.
 const COLUMNS: usize = 49;
-/// Rows from one line to the next.
-pub(crate) const SUBDIVISIONS: usize = 8;
+/// Rows of the mesh from one line to the next.
+pub const SUBDIVISIONS: usize = 8;
 /// Distance below which points count as one, share of the map's diagonal.
 const SAME_PLACE: f64 = 0.01;
 
@@ -64,7 +64,7 @@ fn spans(map: &CompressorMap) -> Option<(f64, f64)> {
 
 /// The line's points from surge to choke side, by flow and falling pressure ratio together, so that noise does not
 /// shuffle points on the steep part at choke or the flat part at surge.
-pub(crate) fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f64)) -> Vec<&MapPoint> {
+pub fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f64)) -> Vec<&MapPoint> {
     let mut points: Vec<&MapPoint> = line.points.iter().collect();
     let key = |p: &MapPoint| p.flow_corrected_kg_s / flow_span - p.pressure_ratio / ratio_span;
     points.sort_by(|a, b| key(a).total_cmp(&key(b)));
@@ -72,14 +72,14 @@ pub(crate) fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f6
 }
 
 /// [`surge_to_choke`] with the map's own spans.
-pub(crate) fn ordered<'a>(map: &CompressorMap, line: &'a SpeedLine) -> Vec<&'a MapPoint> {
+pub fn ordered<'a>(map: &CompressorMap, line: &'a SpeedLine) -> Vec<&'a MapPoint> {
     surge_to_choke(line, spans(map).unwrap_or((1.0, 1.0)))
 }
 
 /// The speed line as drawn: (corrected flow, kg/s; pressure ratio) from surge to choke side, the surface's own edge.
 ///
 /// A line that takes no part in the surface gives its points as they are.
-pub(crate) fn speed_curve(map: &CompressorMap, line: &SpeedLine) -> Vec<(f64, f64)> {
+pub fn speed_curve(map: &CompressorMap, line: &SpeedLine) -> Vec<(f64, f64)> {
     match spans(map).and_then(|spans| row(line, spans)) {
         Some(row) => row.nodes.iter().map(|node| (node[0], node[1])).collect(),
         None => ordered(map, line).iter().map(|p| (p.flow_corrected_kg_s, p.pressure_ratio)).collect(),
@@ -151,7 +151,7 @@ fn places(line: &SpeedLine, spans: (f64, f64)) -> Vec<Place> {
 }
 
 /// Values between lines, `SUBDIVISIONS` a gap; NaN in every gap with an unknown end.
-pub(crate) fn across(speeds: &[f64], values: &[f64]) -> Vec<f64> {
+pub fn across(speeds: &[f64], values: &[f64]) -> Vec<f64> {
     let mut out = vec![f64::NAN; (speeds.len() - 1) * SUBDIVISIONS + 1];
     let mut start = 0;
     while start < values.len() {

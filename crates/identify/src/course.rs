@@ -1,0 +1,55 @@
+//! T2 of a step as its point's numbers give it, beside what was read: what a reader looks at to believe a point.
+
+use crate::IdentifyConfig;
+use crate::fit::{Geometry, rows, t2_k};
+use crate::followed::Followed;
+use crate::samples::Samples;
+use mapper_core::{IdentifiedPoint, Recording};
+use mapper_numerics::statistics::mean;
+
+/// T2 over the window of a step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct T2Course {
+    /// Index of the step.
+    pub step: usize,
+    /// Times of the rows, run time, s.
+    pub t_s: Vec<f64>,
+    /// T2 as read, K.
+    pub read_k: Vec<f64>,
+    /// T2 by eqs. 1-3 from the readings of T1, Tc, flow and pressures with the point's efficiency and h held constant, as
+    /// the declared probe reads it, K; its mean is that of the readings.
+    pub model_k: Vec<f64>,
+    /// What was added to the model for that, K: offsets that `joint` finds, and what moves within the step.
+    pub shift_k: f64,
+}
+
+/// The course of T2 over the window of a point; `None` where it has no efficiency, no h or no window, or nothing was read.
+///
+/// `joint` lets efficiency and h move along the map within a step; here they stand still, as the table of points has them, so
+/// that the difference shows what is left to them.
+pub fn t2_course(
+    recording: &Recording,
+    point: &IdentifiedPoint,
+    config: &IdentifyConfig,
+) -> Option<T2Course> {
+    let (eta, h_w_m2k, window) = (point.eta?, point.h_w_m2k?, point.window?);
+    let samples = Samples::of(recording, window, config, true);
+    let geometry = Geometry::of(config);
+    let gas_k: Vec<f64> = rows(&samples).map(|row| t2_k(geometry, row, eta, h_w_m2k)).collect();
+    let model_k = match Followed::of(&samples, geometry.probe) {
+        None => gas_k,
+        Some(followed) => {
+            // The probe's first reading is whatever it was: what it takes of the difference belongs to the model.
+            let read_k = followed.read(&gas_k);
+            let mut left: Vec<f64> =
+                samples.t2_k.iter().zip(&read_k).map(|(read, model)| read - model).collect();
+            followed.without_first_reading(&mut left);
+            samples.t2_k.iter().zip(&left).map(|(read, left)| read - left).collect()
+        }
+    };
+    let shift_k = mean(
+        samples.t2_k.iter().zip(&model_k).map(|(read, model)| read - model).collect::<Vec<_>>().as_slice(),
+    )?;
+    let model_k = model_k.into_iter().map(|model| model + shift_k).collect();
+    Some(T2Course { step: point.step, t_s: samples.t_s, read_k: samples.t2_k, model_k, shift_k })
+}

@@ -1,0 +1,25 @@
+"use strict";
+// What all drawings share: data, colours of the page's theme, sizes.
+const page = JSON.parse(document.getElementById("data").textContent);
+const style = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const byId = id => document.getElementById(id);
+const half = (low, high) => low == null || high == null ? null : (high - low) / 2;
+const shown = (value, digits, unit = "") => value == null ? "-" : value.toFixed(digits) + unit;
+const widthOf = element => Math.max(280, Math.min(720, element.clientWidth || 600));
+
+// Colours of speed lines from slow to fast: viridis, whose ends are cut where they vanish on white and on black.
+const lineNames = [...new Set(page.points.map(p => p.line))].sort((a, b) => a - b);
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const lineColour = name => {
+  const at = lineNames.length < 2 ? 0.5 : lineNames.indexOf(name) / (lineNames.length - 1);
+  return d3.interpolateViridis(dark.matches ? 0.25 + 0.7 * at : 0.05 + 0.75 * at);
+};
+const redrawn = [];
+const redraw = () => redrawn.forEach(draw => draw());
+
+// A drawing with a name for those who do not see it.
+function put(element, plot, name) {
+  plot.setAttribute("role", "img");
+  plot.setAttribute("aria-label", name);
+  element.replaceChildren(plot);
+}

@@ -1,0 +1,170 @@
+// The map and the efficiency over flow, with layers, zoom and a click on a point.
+const layer = name => document.querySelector(`input[name=layer][value=${name}]`)?.checked ?? false;
+const zoomed = { map: null };
+
+function words(p) {
+  const lines = [
+    `step ${p.name}: ${p.line} ${page.units.speed}` + (p.valve == null ? "" : `, opening ${p.valve}`),
+    `flow ${shown(p.flow, 2)} ± ${shown(p.flow_half, 2)} ${page.units.flow}`,
+    `pressure ratio ${shown(p.pr, 4)} ± ${shown(p.pr_half, 4)}`,
+    `efficiency ${shown(p.eta, 2)} ± ${shown(half(p.eta_low, p.eta_high), 2)} %`,
+  ];
+  if (p.eta_common != null) lines.push(`  common ${shown(p.eta_common, 2)}, own ${shown(p.eta_own, 2)}`);
+  if (p.h != null) lines.push(`h ${shown(p.h, 0)} ± ${shown(half(p.h_low, p.h_high), 0)} W/(m² K)`);
+  if (p.dynamic) lines.push(`two-parameter ${shown(p.dynamic[0], 2)} %`);
+  lines.push(p.verdict);
+  return lines.join("\n");
+}
+
+// Solid and dashed runs of a line; a dashed run reaches to its solid neighbours.
+function runs(nodes, out) {
+  const pieces = [];
+  let piece = [];
+  nodes.forEach((node, i) => {
+    const belongs = node.out === out || (out && (nodes[i - 1]?.out || nodes[i + 1]?.out));
+    if (belongs) piece.push(node);
+    else if (piece.length) { pieces.push(piece); piece = []; }
+  });
+  if (piece.length) pieces.push(piece);
+  return pieces;
+}
+
+function mapMarks() {
+  const marks = [Plot.gridX({ stroke: style("--grid"), strokeOpacity: 1 }), Plot.gridY({ stroke: style("--grid"), strokeOpacity: 1 })];
+  const path = (data, options) => marks.push(Plot.line(data, { x: d => d[0] ?? d.flow, y: d => d[1] ?? d.pr, clip: true, ...options }));
+  const ink = style("--ink"), soft = style("--soft");
+  if (layer("contours")) {
+    for (const contour of page.map.contours) {
+      for (const line of contour.paths) path(line, { stroke: style("--accent"), strokeOpacity: 0.55, strokeWidth: 0.9, className: "contour" });
+      const longest = d3.greatest(contour.paths, line => line.length);
+      const at = longest[Math.floor(longest.length / 2)];
+      marks.push(Plot.text([at], { x: d => d[0], y: d => d[1], text: () => `${contour.eta}`, fill: style("--accent"), stroke: style("--ground"), strokeWidth: 3, fontSize: 10, clip: true }));
+    }
+  }
+  if (layer("lines")) {
+    for (const line of page.map.lines.filter(line => line.measured || layer("extrapolated"))) {
+      for (const piece of runs(line.nodes, false)) path(piece, { stroke: line.measured ? ink : soft, strokeWidth: 1.2 });
+      if (layer("extrapolated")) for (const piece of runs(line.nodes, true)) path(piece, { stroke: soft, strokeDasharray: "4 3", strokeWidth: 1 });
+      const end = line.nodes.find(node => !node.out);
+      if (end) marks.push(Plot.text([end], { x: "flow", y: "pr", text: () => line.speed, dx: 4, dy: 6, textAnchor: "start", fill: soft, fontSize: 10, clip: true }));
+    }
+    path(page.map.surge, { stroke: style("--bad"), strokeDasharray: "6 3", strokeWidth: 1.6 });
+    path(page.map.choke, { stroke: style("--doubt"), strokeDasharray: "2 3", strokeWidth: 1.6 });
+  }
+  page.others.forEach((other, index) => {
+    if (!layer(`other${index}`)) return;
+    for (const line of other.map.lines.filter(line => line.measured))
+      for (const piece of runs(line.nodes, false)) path(piece, { stroke: d3.schemeTableau10[index % 10], strokeDasharray: "7 3", strokeWidth: 1.4 });
+  });
+  if (page.map.sought.length) {
+    marks.push(Plot.ruleY(page.map.sought, { y: "pr", x1: d => d.flow - d.flow_half, x2: d => d.flow + d.flow_half, stroke: style("--bad") }));
+    marks.push(Plot.dot(page.map.sought, { x: "flow", y: "pr", symbol: "square", fill: style("--bad"), r: 3.5 }));
+  }
+  return marks;
+}
+
+const drawnPoints = () => page.points.filter(p => p.flow != null && (!p.repeat || layer("repeats")));
+const pointMarks = (data, y) => [
+  Plot.dot(data, {
+    x: "flow", y, r: p => (p.step === chosen ? 7 : 4.5), symbol: p => (p.verdict === "good" ? "circle" : "diamond"),
+    fill: p => (p.eta == null ? "none" : lineColour(p.line)), stroke: p => (p.step === chosen ? style("--bad") : style("--ground")),
+    strokeWidth: p => (p.step === chosen ? 2.5 : 0.8), className: "points", clip: true, ariaLabel: "points",
+  }),
+  Plot.tip(data, Plot.pointer({ x: "flow", y, title: words, fill: style("--ground"), stroke: style("--line"), fontSize: 12 })),
+];
+
+// Each circle knows its step, so that it can be clicked and reached in tests.
+function clickable(plot, data) {
+  d3.select(plot).selectAll("g[aria-label=points] path, g[aria-label=points] circle").each(function () {
+    const p = data[d3.select(this).datum()];
+    if (!p) return;
+    d3.select(this).attr("class", "point").attr("data-step", p.step).on("click", event => { event.stopPropagation(); choose(p.step, true); });
+  });
+}
+
+function drawMap() {
+  const element = byId("map-plot"), data = drawnPoints();
+  const all = [...data.map(p => [p.flow, p.pr]), ...page.map.lines.filter(l => l.measured).flatMap(l => l.nodes.filter(n => !n.out).map(n => [n.flow, n.pr]))];
+  const padded = ([low, high]) => [low - 0.04 * (high - low), high + 0.04 * (high - low)];
+  const home = { x: padded(d3.extent(all, d => d[0])), y: padded(d3.extent(all, d => d[1])) };
+  const view = zoomed.map ?? home;
+  const width = widthOf(element), height = Math.round(0.78 * width);
+  const intervals = layer("intervals")
+    ? [Plot.ruleY(data, { y: "pr", x1: p => p.flow - p.flow_half, x2: p => p.flow + p.flow_half, stroke: p => lineColour(p.line), strokeOpacity: 0.7, clip: true })]
+    : [];
+  const plot = Plot.plot({
+    width, height, marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
+    x: { domain: view.x, label: `corrected flow, ${page.units.flow}` }, y: { domain: view.y, label: "total pressure ratio P2/P1" },
+    marks: [...mapMarks(), ...intervals, ...pointMarks(data, "pr")],
+  });
+  clickable(plot, data);
+  const x = plot.scale("x"), y = plot.scale("y");
+  // Dragging and the wheel move the domain; the wheel alone scrolls the page unless Ctrl is held or the map is zoomed.
+  const zoom = d3.zoom().scaleExtent([1, 40]).filter(event => event.type !== "wheel" || event.ctrlKey || event.metaKey || zoomed.map)
+    .on("end", event => {
+      if (!event.sourceEvent) return;
+      const t = event.transform;
+      const moved = (scale, range, k, shift) => range.map(pixel => scale.invert((pixel - shift) / k));
+      const next = { x: moved(x, x.range, t.k, t.x), y: moved(y, y.range, t.k, t.y) };
+      if (t.k === 1 && Math.hypot(t.x, t.y) < 3) return;
+      zoomed.map = next;
+      drawMap();
+    });
+  d3.select(plot).call(zoom).on("dblclick.zoom", null);
+  put(element, plot, `Compressor map: ${data.length} points on ${page.map.lines.filter(l => l.measured).length} speed lines; the same numbers stand in the tables below.`);
+}
+
+function drawEta() {
+  const element = byId("eta-plot"), data = drawnPoints().filter(p => p.eta != null);
+  const width = widthOf(element), height = Math.round(0.78 * width), marks = [];
+  marks.push(Plot.gridX({ stroke: style("--grid"), strokeOpacity: 1 }), Plot.gridY({ stroke: style("--grid"), strokeOpacity: 1 }));
+  const low = d3.min(data, p => p.eta_low ?? p.eta), high = d3.max(data, p => p.eta_high ?? p.eta);
+  if (layer("lines"))
+    for (const line of page.map.lines.filter(l => l.measured)) {
+      const nodes = line.nodes.filter(n => !n.out && n.eta != null && n.eta > (low ?? 0) - 3);
+      const name = d3.least(lineNames, n => Math.abs(n - line.speed));
+      marks.push(Plot.areaY(nodes, { x: "flow", y1: n => n.eta - n.half, y2: n => n.eta + n.half, fill: lineColour(name), fillOpacity: 0.15, clip: true }));
+      marks.push(Plot.line(nodes, { x: "flow", y: "eta", stroke: lineColour(name), clip: true }));
+    }
+  if (layer("intervals")) marks.push(Plot.ruleX(data.filter(p => p.eta_low != null), { x: "flow", y1: "eta_low", y2: "eta_high", stroke: p => lineColour(p.line) }));
+  if (layer("dynamic")) {
+    const two = data.filter(p => p.dynamic);
+    marks.push(Plot.ruleX(two, { x: "flow", y1: p => p.dynamic[1], y2: p => p.dynamic[2], stroke: style("--doubt"), strokeOpacity: 0.6, clip: true }));
+    marks.push(Plot.dot(two, { x: "flow", y: p => p.dynamic[0], symbol: "times", stroke: style("--doubt"), clip: true }));
+  }
+  page.others.forEach((other, index) => {
+    if (!layer(`other${index}`)) return;
+    for (const line of other.map.lines.filter(l => l.measured))
+      marks.push(Plot.line(line.nodes.filter(n => !n.out && n.eta > (low ?? 0) - 3), { x: "flow", y: "eta", stroke: d3.schemeTableau10[index % 10], strokeDasharray: "7 3", clip: true }));
+  });
+  marks.push(...pointMarks(data, "eta"));
+  const plot = Plot.plot({
+    width, height, marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
+    x: { label: `corrected flow, ${page.units.flow}`, nice: true }, y: { domain: low == null ? undefined : [Math.max(0, low - 2), high + 2], label: "efficiency, %" }, marks,
+  });
+  clickable(plot, data);
+  put(element, plot, `Efficiency over corrected flow of ${data.length} points, between ${shown(low, 1)} and ${shown(high, 1)} %.`);
+}
+
+function drawPlan() {
+  const element = byId("plan-plot");
+  if (!element) return;
+  const stops = page.points.filter(p => p.flow != null).sort((a, b) => a.step - b.step);
+  const jumps = d3.pairs(stops).map(([from, to], i) => ({ from, to, i }));
+  const shade = i => d3.interpolateLab(style("--accent"), style("--grid"))(jumps.length < 2 ? 0 : 0.85 * i / (jumps.length - 1));
+  const width = Math.max(280, Math.min(900, element.clientWidth || 800));
+  // Numbers of steps at one place stand in one row.
+  const places = d3.groups(stops, p => `${Math.round(p.flow * 2)} ${Math.round(p.pr * 60)}`).map(([, all]) => ({ ...all[0], steps: all.map(p => p.step + 1).join(", ") }));
+  const plot = Plot.plot({
+    width, height: Math.round(0.6 * width), marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
+    x: { label: `corrected flow, ${page.units.flow}` }, y: { label: "total pressure ratio P2/P1" },
+    marks: [
+      Plot.arrow([...jumps].reverse(), { x1: d => d.from.flow, y1: d => d.from.pr, x2: d => d.to.flow, y2: d => d.to.pr, stroke: d => shade(d.i), strokeWidth: d => (d.i < 5 ? 2 : 1), bend: 12, inset: 5, headLength: 6 }),
+      Plot.dot(places, { x: "flow", y: "pr", fill: style("--ground"), stroke: style("--ink"), r: 3.5 }),
+      Plot.text(places, { x: "flow", y: "pr", text: "steps", dy: -9, fontSize: 10, fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3 }),
+    ],
+  });
+  put(element, plot, `The ${jumps.length} jumps of the plan in their order; the table below lists them.`);
+}
+
+redrawn.push(drawMap, drawEta, drawPlan);

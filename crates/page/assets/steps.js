@@ -1,0 +1,60 @@
+// The transient of the chosen point.
+let chosen = page.points[0]?.step ?? null;
+
+function frame(element, options) {
+  const width = widthOf(element);
+  return { width, height: 240, marginLeft: 56, marginBottom: 36, style: { background: "transparent", color: style("--ink"), fontSize: "12px" }, ...options };
+}
+
+function drawStep() {
+  const step = page.steps.find(s => s.step === chosen), point = page.points.find(p => p.step === chosen);
+  const box = byId("step-plots");
+  byId("step-choice").value = String(chosen);
+  document.querySelectorAll("tr[data-step]").forEach(row => row.classList.toggle("chosen", Number(row.dataset.step) === chosen));
+  if (!step || !point) { box.replaceChildren(); byId("step-words").textContent = "Nothing was read in this step."; return; }
+  const model = step.model;
+  byId("step-words").textContent = `${words(point).split("\n").map(line => line.trim()).join("; ")}. ` +
+    (model ? `Model of T2 with these numbers held constant: ${shown(model.rms_k, 3)} K rms left, after its mean was shifted by ${shown(model.shift_k, 3)} K. ` : "") + point.said.join(" ");
+  const figures = [];
+  const add = (names, title, extra) => {
+    const channels = names.map(name => step.channels.find(c => c.name === name)).filter(Boolean);
+    if (!channels.length) return;
+    const figure = document.createElement("figure"), holder = document.createElement("div"), caption = document.createElement("figcaption");
+    figure.append(holder, caption);
+    box.append(figure);
+    caption.textContent = title;
+    figures.push([holder, channels, extra, title]);
+  };
+  box.replaceChildren();
+  add(["T2"], "T2 as read (dots) and by the point's numbers (line); the window is shaded", "model");
+  if (model) add(["T2"], "What the numbers leave of T2, K", "left");
+  add(["Tc"], "Housing temperature Tc");
+  add(["N"], "Shaft speed N");
+  add(["m"], "Compressor flow, as read");
+  add(["P2", "P3"], "Pressures P2 and P3");
+  for (const [holder, channels, extra, title] of figures) {
+    const rows = channels.flatMap(c => c.values.map((v, i) => ({ t: step.t[i], v, name: c.name }))).filter(r => r.v != null);
+    const marks = [Plot.gridY({ stroke: style("--grid"), strokeOpacity: 1 })];
+    if (step.window) marks.push(Plot.rectX([step.window], { x1: d => d[0], x2: d => d[1], fill: style("--accent"), fillOpacity: 0.08 }));
+    if (extra === "left") {
+      const left = model.t.map((t, i) => ({ t, v: model.left_k[i] })).filter(r => r.v != null);
+      marks.push(Plot.ruleY([0], { stroke: style("--soft") }), Plot.dot(left, { x: "t", y: "v", r: 2, fill: style("--ink") }));
+    } else if (extra === "model") {
+      marks.push(Plot.dot(rows, { x: "t", y: "v", r: 2, fill: style("--soft") }));
+      if (model) marks.push(Plot.line(model.t.map((t, i) => ({ t, v: model.t2[i] })), { x: "t", y: "v", stroke: style("--accent"), strokeWidth: 2 }));
+    } else {
+      marks.push(Plot.line(rows, { x: "t", y: "v", z: "name", stroke: d => (d.name === channels[0].name ? style("--accent") : style("--doubt")) }));
+      if (channels.length > 1) marks.push(Plot.text(rows, Plot.selectLast({ x: "t", y: "v", z: "name", text: "name", dx: -12, dy: -8, fill: style("--ink") })));
+    }
+    put(holder, Plot.plot(frame(holder, { x: { label: "time after the change of set-points, s" }, y: { label: extra === "left" ? "K" : channels[0].unit, nice: true }, marks })), `${title}, step ${point.name}`);
+  }
+}
+
+function choose(step, jump) {
+  chosen = step;
+  drawMap();
+  drawEta();
+  drawStep();
+  if (jump) byId("step").scrollIntoView({ behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
+}
+redrawn.push(drawStep);

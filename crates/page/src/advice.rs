@@ -1,0 +1,53 @@
+//! The verdict of a run in a sentence, and what to do first.
+
+use crate::page::RunPage;
+use mapper_core::Verdict;
+use mapper_report::{RunReport, disagreement_text, doubts};
+
+/// How many points are worth what, in a sentence.
+pub(crate) fn verdict(report: &RunReport<'_>) -> String {
+    let count = |verdict| report.points.iter().filter(|scored| scored.point.verdict == verdict).count();
+    let (good, all) = (count(Verdict::Good), report.points.len());
+    match (all, good) {
+        (0, _) => "No point was identified.".to_owned(),
+        (all, good) if all == good => format!("All {all} points are good."),
+        (all, good) => format!(
+            "{good} of {all} points are good, {} doubtful, {} unusable.",
+            count(Verdict::Doubtful),
+            count(Verdict::Unusable)
+        ),
+    }
+}
+
+/// Whether the map can be handed on as it is.
+pub(crate) fn is_clean(page: &RunPage<'_>) -> bool {
+    let report = page.report;
+    !report.points.is_empty()
+        && report.points.iter().all(|scored| scored.point.verdict == Verdict::Good)
+        && page.map.is_some()
+}
+
+/// What to do first, in order of weight, each a sentence.
+pub(crate) fn first_things(report: &RunReport<'_>) -> Vec<String> {
+    let mut things: Vec<String> = Vec::new();
+    if !report.outcome.starts_with("Completed") && !report.outcome.starts_with("Identified") {
+        things.push(report.outcome.to_owned());
+    }
+    if let Some(text) = disagreement_text(
+        report.points,
+        report.two_parameter,
+        &report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default(),
+    ) {
+        things.push(text.trim_end().to_owned());
+    }
+    let of = |verdict| {
+        report.points.iter().map(|scored| &scored.point).filter(move |point| point.verdict == verdict)
+    };
+    for verdict in [Verdict::Unusable, Verdict::Doubtful] {
+        // What is said of most steps comes first; three sentences are enough to begin with, the rest stands with the points.
+        let mut said = doubts(of(verdict));
+        said.sort_by_key(|doubt| std::cmp::Reverse(doubt.count()));
+        things.extend(said.iter().take(3).map(|doubt| format!("{}: {}", doubt.steps(), doubt.message)));
+    }
+    things
+}

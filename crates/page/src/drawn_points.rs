@@ -1,0 +1,86 @@
+//! Points as the script draws them, in the units that are shown.
+
+use crate::page::RunPage;
+use mapper_campaign::units::Kind;
+use mapper_core::{IdentifiedPoint, standard_error_of};
+use mapper_report::{Display, step_name, verdict_word};
+use serde::Serialize;
+
+/// One point. Efficiencies in %, half widths of 95 % intervals in points.
+#[derive(Serialize)]
+pub(crate) struct DrawnPoint {
+    step: usize,
+    name: String,
+    /// Corrected speed of its line, as text.
+    line: String,
+    speed: f64,
+    flow: f64,
+    pr: f64,
+    /// Half widths of 95 % intervals.
+    flow_half: f64,
+    pr_half: f64,
+    eta: Option<f64>,
+    eta_low: Option<f64>,
+    eta_high: Option<f64>,
+    /// The part of the half width that all points share, and the point's own.
+    eta_common: Option<f64>,
+    eta_own: Option<f64>,
+    h: Option<f64>,
+    h_low: Option<f64>,
+    h_high: Option<f64>,
+    /// By the two-parameter method alone.
+    dynamic: Option<[f64; 3]>,
+    valve: Option<f64>,
+    verdict: &'static str,
+    repeat: bool,
+    said: Vec<String>,
+}
+
+const HALF_WIDTH_95: f64 = 1.96;
+
+/// All points, repeats included.
+pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPoint> {
+    let line_of = |step: usize| {
+        let lines = page.map.into_iter().flat_map(|map| &map.lines);
+        let own = lines.filter(|line| line.points.iter().any(|point| point.identified.step == step));
+        own.map(|line| line.speed_corrected_rpm).next()
+    };
+    let points = page.report.points.iter().map(|scored| &scored.point);
+    points
+        .map(|point| {
+            let rounded = line_of(point.step).unwrap_or(point.speed_corrected_rpm);
+            DrawnPoint { line: display.speed(rounded), ..drawn(page, point, display) }
+        })
+        .collect()
+}
+
+fn drawn(page: &RunPage<'_>, point: &IdentifiedPoint, display: &Display) -> DrawnPoint {
+    let percent = |value: Option<f64>| value.map(|value| 100.0 * value);
+    let two = page.report.two_parameter.iter().find(|two| two.step == point.step);
+    let interval = point.eta_low.zip(point.eta_high).map(|(low, high)| standard_error_of(low, high));
+    DrawnPoint {
+        step: point.step,
+        name: step_name(point),
+        line: String::new(),
+        speed: display.number(Kind::Speed, point.speed_corrected_rpm),
+        flow: display.number(Kind::MassFlow, point.flow_corrected_kg_s),
+        pr: point.pressure_ratio,
+        flow_half: HALF_WIDTH_95
+            * point.common.flow_corrected_standard_error_ratio
+            * display.number(Kind::MassFlow, point.flow_corrected_kg_s),
+        pr_half: HALF_WIDTH_95 * point.common.pressure_ratio_standard_error,
+        eta: percent(point.eta),
+        eta_low: percent(point.eta_low),
+        eta_high: percent(point.eta_high),
+        eta_common: interval.map(|_| 100.0 * HALF_WIDTH_95 * point.common.eta_standard_error()),
+        eta_own: percent(point.eta_own_standard_error()).map(|own| HALF_WIDTH_95 * own),
+        h: point.h_w_m2k,
+        h_low: point.h_low_w_m2k,
+        h_high: point.h_high_w_m2k,
+        dynamic: two.map(|two| [two.eta, two.eta_low, two.eta_high].map(|value| 100.0 * value)),
+        valve: point.valve_opening_ratio.is_finite().then_some(point.valve_opening_ratio),
+        verdict: verdict_word(point.verdict),
+        repeat: !point.kind.measures(),
+        said: point.warnings.iter().map(|warning| warning.message.clone()).collect(),
+    }
+}

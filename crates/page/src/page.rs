@@ -1,0 +1,100 @@
+//! The page of a run or of identified recordings.
+
+use crate::drawn_map::{DrawnMap, drawn_map};
+use crate::drawn_points::{DrawnPoint, drawn_points};
+use crate::drawn_steps::{DrawnStep, drawn_steps};
+use crate::sections;
+use crate::shell::shell;
+use mapper_core::{CompressorMap, Recording};
+use mapper_identify::{T2Course, ZeroOutcome};
+use mapper_report::{Display, RunReport};
+use maud::html;
+use serde::Serialize;
+
+/// Everything that the page shows.
+pub struct RunPage<'a> {
+    /// What the report in Markdown says too.
+    pub report: &'a RunReport<'a>,
+    /// The map; `None` where there is none.
+    pub map: Option<&'a CompressorMap>,
+    /// What was read, as it was identified.
+    pub recording: &'a Recording,
+    /// T2 by the numbers of each point.
+    pub courses: &'a [T2Course],
+    /// What came of the isothermal zero.
+    pub zero: &'a ZeroOutcome,
+    /// When the test was run, as it is to be shown; `None` where nobody knows.
+    pub tested_at: Option<&'a str>,
+    /// Program and version.
+    pub program: &'a str,
+    /// Maps to hold this one against.
+    pub others: &'a [OtherRun<'a>],
+}
+
+/// Another run's map.
+pub struct OtherRun<'a> {
+    /// How it is called on the page.
+    pub name: String,
+    /// Its map.
+    pub map: &'a CompressorMap,
+}
+
+/// What the script draws.
+#[derive(Serialize)]
+struct Drawn {
+    units: Units,
+    points: Vec<DrawnPoint>,
+    map: DrawnMap,
+    steps: Vec<DrawnStep>,
+    others: Vec<DrawnOther>,
+}
+
+#[derive(Serialize)]
+struct Units {
+    flow: String,
+    speed: String,
+    temperature: String,
+}
+
+#[derive(Serialize)]
+struct DrawnOther {
+    name: String,
+    map: DrawnMap,
+}
+
+/// The page as HTML.
+///
+/// # Errors
+/// None in practice: JSON of numbers and strings can always be written.
+pub fn run_page(page: &RunPage<'_>) -> Result<String, serde_json::Error> {
+    let report = page.report;
+    let units = report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
+    let display = Display::new(&units);
+    let drawn = Drawn {
+        units: Units {
+            flow: units.flow.clone(),
+            speed: units.speed.clone(),
+            temperature: units.temperature.clone(),
+        },
+        points: drawn_points(page, &display),
+        map: page.map.map(|map| drawn_map(map, &display)).unwrap_or_default(),
+        steps: drawn_steps(page, &display),
+        others: page
+            .others
+            .iter()
+            .map(|other| DrawnOther { name: other.name.clone(), map: drawn_map(other.map, &display) })
+            .collect(),
+    };
+    let body = html! {
+        (sections::head::head(page))
+        main {
+            (sections::map::map(page))
+            (sections::step::step(page))
+            (sections::points::points(page, &display))
+            (sections::plan::plan(page, &display))
+            (sections::notes::notes(page, &units))
+            (sections::provenance::provenance(page))
+        }
+    };
+    shell(&format!("Compressor map of {}", report.machine), &drawn, &body)
+}

@@ -1,0 +1,37 @@
+//! Verdict and what to do first.
+
+use crate::advice::{first_things, is_clean, verdict};
+use crate::page::RunPage;
+use maud::{Markup, html};
+
+pub(crate) fn head(page: &RunPage<'_>) -> Markup {
+    let report = page.report;
+    let (clean, things) = (is_clean(page), first_things(report));
+    let serial = report.campaign.and_then(|campaign| campaign.machine.serial_number.clone());
+    html! {
+        header {
+            h1 { "Compressor map of " (report.machine) }
+            p.under {
+                @if let Some(serial) = serial { "Serial number " (serial) ". " }
+                @if let Some(when) = page.tested_at { "Tested " (when) ". " }
+                "Efficiency is isentropic, total to total; corrected to " (report.reference) "; method " (report.method) "."
+            }
+            section.verdict.clean[clean] aria-labelledby="verdict" {
+                h2 #verdict { (verdict(report)) }
+                @if things.is_empty() && clean {
+                    p { "Nothing needs attention before the map is used." }
+                }
+                @if !things.is_empty() {
+                    p { "First:" }
+                    ul { @for thing in &things { li { (thing) } } }
+                }
+            }
+            nav aria-label="Sections" {
+                @for (to, name) in [("map", "Map"), ("step", "A point's transient"), ("points", "Points"), ("plan", "Plan as flown"),
+                    ("notes", "Notes"), ("provenance", "Provenance")] {
+                    a href=(format!("#{to}")) { (name) }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! The frame of a page: content policy, style, scripts, data.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use serde::Serialize;
+
+const STYLE: &str = include_str!("../assets/page.css");
+/// d3 7.9.2 and Observable Plot 0.6.17 (ISC), as their npm packages have them: `assets/SHA256SUMS`.
+const D3: &str = include_str!("../assets/d3.min.js");
+const PLOT: &str = include_str!("../assets/plot.umd.min.js");
+/// What the page's own script is made of, in this order.
+const SCRIPTS: [&str; 4] = [
+    include_str!("../assets/common.js"),
+    include_str!("../assets/map.js"),
+    include_str!("../assets/steps.js"),
+    include_str!("../assets/tables.js"),
+];
+
+/// Nothing from outside, nothing to outside.
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; \
+                      base-uri 'none'; form-action 'none'";
+
+/// The whole page; `data` is what its script draws.
+pub(crate) fn shell(title: &str, data: &impl Serialize, body: &Markup) -> Result<String, serde_json::Error> {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                (body)
+                script type="application/json" id="data" { (PreEscaped(json_in_html(data)?)) }
+                @for script in [D3, PLOT].into_iter().chain(SCRIPTS) {
+                    script { (PreEscaped(script)) }
+                }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+/// JSON that ends no element, whatever its strings hold.
+fn json_in_html(data: &impl Serialize) -> Result<String, serde_json::Error> {
+    Ok(serde_json::to_string(data)?
+        .replace('<', "\\u003c")
+        .replace('\u{2028}', "\\u2028")
+        .replace('\u{2029}', "\\u2029"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sha2::{Digest, Sha256};
+
+    /// The libraries are byte for byte those whose hashes stand beside them.
+    #[test]
+    fn libraries_are_as_their_sums_say() {
+        let sums = include_str!("../assets/SHA256SUMS");
+        for (name, text) in [("d3.min.js", D3), ("plot.umd.min.js", PLOT)] {
+            let sum: String =
+                Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect();
+            assert!(sums.contains(&format!("{sum}  {name}")), "{name}: {sum}");
+            // Nothing in them may end the element they stand in.
+            assert!(!text.contains("</script"), "{name}");
+        }
+    }
+
+    #[test]
+    fn hostile_names_stay_text() {
+        let hostile = "</script><script>alert(1)</script>";
+        let page = shell(hostile, &[hostile], &html! { h1 { (hostile) } }).unwrap();
+        assert!(!page.contains("<script>alert"), "markup of a name got into the page");
+        let data = page.split("id=\"data\">").nth(1).unwrap().split("</script>").next().unwrap();
+        assert_eq!(serde_json::from_str::<Vec<String>>(data).unwrap(), [hostile]);
+    }
+}

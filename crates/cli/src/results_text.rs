@@ -34,6 +34,7 @@ pub fn results_text(units: &DisplayUnits, results: &Results) -> String {
         let _ = writeln!(text, "map        {}", path.display());
     }
     let _ = writeln!(text, "report     {}", results.report.display());
+    let _ = writeln!(text, "page       {}", results.page.display());
     for recording in std::iter::once(&results.recording).chain(&results.further_recordings) {
         let _ = writeln!(text, "recording  {}", recording.display());
     }

@@ -5,6 +5,7 @@ const style = name => getComputedStyle(document.documentElement).getPropertyValu
 const byId = id => document.getElementById(id);
 const half = (low, high) => low == null || high == null ? null : (high - low) / 2;
 const shown = (value, digits, unit = "") => value == null ? "-" : value.toFixed(digits) + unit;
+const short = d3.format(".3~g");
 const widthOf = element => Math.max(280, Math.min(720, element.clientWidth || 600));
 
 // Colours of speed lines from slow to fast: viridis, whose ends are cut where they vanish on white and on black.
@@ -17,8 +18,12 @@ const lineColour = name => {
 const redrawn = [];
 const redraw = () => redrawn.forEach(draw => draw());
 
-// A drawing with a name for those who do not see it.
+// A drawing with a name for those who do not see it; its parts are no elements of their own to them.
 function put(element, plot, name) {
+  plot.querySelectorAll("[aria-label]").forEach(part => {
+    part.dataset.mark = part.getAttribute("aria-label");
+    part.removeAttribute("aria-label");
+  });
   plot.setAttribute("role", "img");
   plot.setAttribute("aria-label", name);
   element.replaceChildren(plot);

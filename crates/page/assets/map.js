@@ -46,7 +46,7 @@ function mapMarks() {
       for (const piece of runs(line.nodes, false)) path(piece, { stroke: line.measured ? ink : soft, strokeWidth: 1.2 });
       if (layer("extrapolated")) for (const piece of runs(line.nodes, true)) path(piece, { stroke: soft, strokeDasharray: "4 3", strokeWidth: 1 });
       const end = line.nodes.find(node => !node.out);
-      if (end) marks.push(Plot.text([end], { x: "flow", y: "pr", text: () => line.speed, dx: 4, dy: 6, textAnchor: "start", fill: soft, fontSize: 10, clip: true }));
+      if (end) marks.push(Plot.text([end], { x: "flow", y: "pr", text: () => short(line.speed), dx: 4, dy: 6, textAnchor: "start", fill: soft, fontSize: 10, clip: true }));
     }
     path(page.map.surge, { stroke: style("--bad"), strokeDasharray: "6 3", strokeWidth: 1.6 });
     path(page.map.choke, { stroke: style("--doubt"), strokeDasharray: "2 3", strokeWidth: 1.6 });
@@ -68,18 +68,18 @@ const pointMarks = (data, y) => [
   Plot.dot(data, {
     x: "flow", y, r: p => (p.step === chosen ? 7 : 4.5), symbol: p => (p.verdict === "good" ? "circle" : "diamond"),
     fill: p => (p.eta == null ? "none" : lineColour(p.line)), stroke: p => (p.step === chosen ? style("--bad") : style("--ground")),
-    strokeWidth: p => (p.step === chosen ? 2.5 : 0.8), className: "points", clip: true, ariaLabel: "points",
+    strokeWidth: p => (p.step === chosen ? 2.5 : 0.8), className: "points", clip: true,
   }),
   Plot.tip(data, Plot.pointer({ x: "flow", y, title: words, fill: style("--ground"), stroke: style("--line"), fontSize: 12 })),
 ];
 
-// Each circle knows its step, so that it can be clicked and reached in tests.
+// Each mark knows its step; a click takes the point under the pointer, as the words beside it do.
 function clickable(plot, data) {
-  d3.select(plot).selectAll("g[aria-label=points] path, g[aria-label=points] circle").each(function () {
+  d3.select(plot).selectAll("g.points path, g.points circle").each(function () {
     const p = data[d3.select(this).datum()];
-    if (!p) return;
-    d3.select(this).attr("class", "point").attr("data-step", p.step).on("click", event => { event.stopPropagation(); choose(p.step, true); });
+    if (p) d3.select(this).attr("class", "point").attr("data-step", p.step);
   });
+  plot.addEventListener("click", () => { if (plot.value) choose(plot.value.step, true); });
 }
 
 function drawMap() {
@@ -154,7 +154,7 @@ function drawPlan() {
   const shade = i => d3.interpolateLab(style("--accent"), style("--grid"))(jumps.length < 2 ? 0 : 0.85 * i / (jumps.length - 1));
   const width = Math.max(280, Math.min(900, element.clientWidth || 800));
   // Numbers of steps at one place stand in one row.
-  const places = d3.groups(stops, p => `${Math.round(p.flow * 2)} ${Math.round(p.pr * 60)}`).map(([, all]) => ({ ...all[0], steps: all.map(p => p.step + 1).join(", ") }));
+  const places = d3.groups(stops, p => `${p.line} ${p.valve}`).map(([, all]) => ({ ...all[0], steps: all.map(p => p.step + 1).join(", ") }));
   const plot = Plot.plot({
     width, height: Math.round(0.6 * width), marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
     x: { label: `corrected flow, ${page.units.flow}` }, y: { label: "total pressure ratio P2/P1" },

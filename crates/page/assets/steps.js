@@ -3,7 +3,7 @@ let chosen = page.points[0]?.step ?? null;
 
 function frame(element, options) {
   const width = widthOf(element);
-  return { width, height: 240, marginLeft: 56, marginBottom: 36, style: { background: "transparent", color: style("--ink"), fontSize: "12px" }, ...options };
+  return { width, height: 250, marginTop: 30, marginLeft: 56, marginBottom: 36, style: { background: "transparent", color: style("--ink"), fontSize: "12px" }, ...options };
 }
 
 function drawStep() {

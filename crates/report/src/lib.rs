@@ -69,7 +69,7 @@ pub use plan_text::plan_text;
 pub use points::{points_text, score_text, step_name, verdict_word};
 pub use repeated_jumps::repeated_jumps_text;
 pub use reproduction_page::reproduction_page;
-pub use run_report::{ReportSource, RunReport, SurgeReport, head_rows, run_report};
+pub use run_report::{ReportSource, RunReport, SurgeReport, head_rows, instant, run_report};
 pub use sensors_text::{declared_sensors_text, sensors_text};
 pub use sequence_page::sequence_page;
 pub use shared_errors::shared_errors_text;

@@ -169,13 +169,17 @@ pub fn run_report(report: &RunReport<'_>) -> String {
     text
 }
 
+/// A time since 1970-01-01 UTC, ns, as people read it; `None` for 0: simulated time starts there, and so does a log that knows
+/// only seconds, which is no date.
+pub fn instant(ns: u64) -> Option<String> {
+    let seconds = i64::try_from(ns / 1_000_000_000).ok().filter(|seconds| *seconds > 0)?;
+    Some(jiff::Timestamp::from_second(seconds).ok()?.strftime("%Y-%m-%d %H:%M:%S UTC").to_string())
+}
+
 fn source_row(source: &ReportSource, before: usize) -> [String; 4] {
-    // Simulated time starts at 0, and so does a log that knows only seconds: that is no date.
-    let begins = i64::try_from(source.start_time_ns / 1_000_000_000).ok().filter(|seconds| *seconds > 0);
-    let begins = begins.and_then(|seconds| jiff::Timestamp::from_second(seconds).ok());
     [
         source.file.clone(),
-        begins.map_or_else(|| "not stated".to_owned(), |time| time.to_string()),
+        instant(source.start_time_ns).unwrap_or_else(|| "not stated".to_owned()),
         duration(source.duration_s),
         match source.steps {
             0 => "none".to_owned(),

@@ -5,6 +5,7 @@ use crate::fusing::fused;
 use crate::recorded::{Recorded, same_machine};
 use crate::surge::marks_of;
 use crate::{Session, SessionError, SessionEvent};
+use mapper_assemble::{RepeatedJump, repeated_jumps};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{IdentifiedPoint, Method, Recording, StepMarker, StepOrigin, ThermalModel, joined};
 use mapper_identify::{IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, identify_beside, method_for};
@@ -58,6 +59,12 @@ impl Identified {
     /// The points without their truth.
     pub fn points_alone(&self) -> impl Iterator<Item = &IdentifiedPoint> {
         self.points.iter().map(|scored| &scored.point)
+    }
+
+    /// Jumps that were made more than once.
+    pub fn repeats(&self) -> Vec<RepeatedJump> {
+        let points: Vec<IdentifiedPoint> = self.points_alone().cloned().collect();
+        repeated_jumps(&self.recording.steps, &points)
     }
 }
 

@@ -3,16 +3,18 @@
 use crate::files::{json_text, write_new};
 use crate::identified::{Identified, SoughtSurge};
 use crate::recorded::Recorded;
+use crate::run::PROGRAM;
 use crate::{Registry, Session, SessionError, run_directory};
-use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble, repeated_jumps};
+use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
 use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Method, Plan, ThermalModel};
-use mapper_identify::{TwoParameter, ZeroOutcome};
+use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_observe::FusedChannel;
+use mapper_page::{OtherRun, RunPage, run_page};
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_report::{ReportSource, RunReport, SurgeReport, run_report};
+use mapper_report::{ReportSource, RunReport, SurgeReport, instant, run_report};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -34,6 +36,8 @@ pub struct Results {
     pub map: BTreeMap<String, PathBuf>,
     /// The test report.
     pub report: PathBuf,
+    /// The same and more as a page for a browser.
+    pub page: PathBuf,
     /// How far the points are from the truth; `None` on a real rig.
     pub score: Option<ScoreSummary>,
     /// Jumps that were made more than once.
@@ -58,14 +62,43 @@ pub struct Results {
 }
 
 /// What is known of where recordings come from.
-struct Told<'a> {
-    campaign: Option<&'a Campaign>,
-    plan: Option<&'a Plan>,
+pub(crate) struct Told {
+    campaign: Option<Campaign>,
+    plan: Option<Plan>,
     /// How it ended, or how the points were made.
-    outcome: &'a str,
-    machine: &'a str,
-    formats: Vec<&'a str>,
-    sources: &'a [ReportSource],
+    outcome: String,
+    machine: String,
+    /// When, as people read it.
+    tested_at: Option<String>,
+    sources: Vec<ReportSource>,
+}
+
+impl Told {
+    /// What recordings say of themselves.
+    pub(crate) fn of(recorded: &[Recorded]) -> Told {
+        let campaign = recorded.first().and_then(|first| first.campaign.clone());
+        let plan = match recorded {
+            [only] => only.read.plan_json.as_deref().and_then(|json| serde_json::from_slice(json).ok()),
+            _ => None,
+        };
+        let file = recorded.first().and_then(|first| first.path.file_stem());
+        let named = || file.unwrap_or_default().to_string_lossy().into_owned();
+        let sources: Vec<ReportSource> = recorded.iter().map(source).collect();
+        Told {
+            outcome: String::new(),
+            machine: campaign.as_ref().map_or_else(named, |campaign| campaign.machine.name.clone()),
+            tested_at: sources.first().and_then(|source| instant(source.start_time_ns)),
+            campaign,
+            plan,
+            sources,
+        }
+    }
+
+    fn formats(&self) -> Vec<String> {
+        let usual = Outputs::default();
+        let outputs = self.campaign.as_ref().map_or(&usual, |campaign| &campaign.outputs);
+        outputs.formats.iter().map(|format| format.name().to_owned()).collect()
+    }
 }
 
 impl Session<'_> {
@@ -79,6 +112,7 @@ impl Session<'_> {
         campaign: &Campaign,
         plan: &Plan,
         outcome: &str,
+        started_ns: u64,
         directory: &Path,
         recording: &Path,
     ) -> Result<Results, SessionError> {
@@ -86,10 +120,14 @@ impl Session<'_> {
         let remarks: Vec<String> = read.warnings.iter().map(ToString::to_string).collect();
         let recorded = Recorded::of(recording.to_owned(), read, Some(campaign.clone()));
         let identified = self.identify(vec![recorded], &ChannelMap::native(), None)?;
-        let formats = campaign.outputs.formats.iter().map(|format| format.name()).collect();
-        let machine = &campaign.machine.name;
-        let told =
-            Told { campaign: Some(campaign), plan: Some(plan), outcome, machine, formats, sources: &[] };
+        let told = Told {
+            campaign: Some(campaign.clone()),
+            plan: Some(plan.clone()),
+            outcome: outcome.to_owned(),
+            machine: campaign.machine.name.clone(),
+            tested_at: instant(started_ns),
+            sources: Vec::new(),
+        };
         self.written(&told, identified, (recording.to_owned(), Vec::new()), remarks, directory)
     }
 
@@ -111,85 +149,90 @@ impl Session<'_> {
                 return Err(SessionError::file("write", &path)(std::io::ErrorKind::AlreadyExists.into()));
             }
         }
-        let campaign = recorded.first().and_then(|first| first.campaign.clone());
-        let plan: Option<Plan> = match recorded.as_slice() {
-            [only] => only.read.plan_json.as_deref().and_then(|json| serde_json::from_slice(json).ok()),
-            _ => None,
-        };
-        let sources: Vec<ReportSource> = recorded.iter().map(source).collect();
         let remarks = recorded.iter().flat_map(|one| remarks_of(one, recorded.len() > 1)).collect();
         let mut files = recorded.iter().map(|one| one.path.clone());
         let first = files.next().ok_or(SessionError::NoRecording)?;
         let further: Vec<PathBuf> = files.collect();
-        let named = first.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let told = Told::of(&recorded);
         let identified = self.identify(recorded, map, method)?;
-        let usual = Outputs::default();
-        let outputs = campaign.as_ref().map_or(&usual, |campaign| &campaign.outputs);
-        let told = Told {
-            campaign: campaign.as_ref(),
-            plan: plan.as_ref(),
-            outcome: &format!("Identified by the method `{}`.", identified.config.method),
-            machine: campaign.as_ref().map_or(&named, |campaign| &campaign.machine.name),
-            formats: outputs.formats.iter().map(|format| format.name()).collect(),
-            sources: &sources,
-        };
+        let told = Told { outcome: identified_by(identified.config.method), ..told };
         std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
         self.written(&told, identified, (first, further), remarks, directory)
+    }
+
+    /// The page of one run or recording, with the maps of others to hold it against. Nothing is written.
+    ///
+    /// # Errors
+    /// As [`Session::identify`].
+    pub fn page(
+        &self,
+        shown: Recorded,
+        others: Vec<Recorded>,
+        channels: &ChannelMap,
+    ) -> Result<String, SessionError> {
+        let several = [shown];
+        let told = Told::of(&several);
+        let [shown] = several;
+        let mut remarks = remarks_of(&shown, false);
+        let identified = self.identify(vec![shown], channels, None)?;
+        let told = Told { outcome: identified_by(identified.config.method), ..told };
+        remarks.extend(identified.remarks.iter().cloned());
+        let map = compressor_map(&told.machine, &identified, &mut remarks);
+        let reference = identified.config.reference;
+        let mut other_maps: Vec<(String, CompressorMap)> = Vec::new();
+        for other in others {
+            let name = name_of(&other.path);
+            let machine = Told::of(std::slice::from_ref(&other)).machine;
+            let identified = self.identify(vec![other], channels, None)?;
+            match compressor_map(&machine, &identified, &mut Vec::new()) {
+                Some(map) => other_maps.push((name, map.at_reference(reference))),
+                None => remarks.push(format!("{name} has no map to hold this one against")),
+            }
+        }
+        let others: Vec<OtherRun<'_>> =
+            other_maps.iter().map(|(name, map)| OtherRun { name: name.clone(), map }).collect();
+        let repeats = identified.repeats();
+        let report = run_report_of(&told, &identified, &remarks, &repeats, false);
+        page_of(&told, &identified, &report, map.as_ref(), &others)
     }
 
     /// The files of what was identified.
     fn written(
         &self,
-        told: &Told<'_>,
+        told: &Told,
         identified: Identified,
         (recording_file, further_recordings): (PathBuf, Vec<PathBuf>),
         mut remarks: Vec<String>,
         directory: &Path,
     ) -> Result<Results, SessionError> {
         remarks.extend(identified.remarks.iter().cloned());
-        let compressor_map = compressor_map(told.machine, &identified, &mut remarks);
+        let compressor_map = compressor_map(&told.machine, &identified, &mut remarks);
         let map = match &compressor_map {
-            Some(map) => export(self.registry, &told.formats, map, directory, &mut remarks)?,
+            Some(map) => export(self.registry, &told.formats(), map, directory, &mut remarks)?,
             None => BTreeMap::new(),
         };
-        let Identified {
-            recording, config, points, thermal, two_parameter, sensors, zero, score, surge, ..
-        } = identified;
-        let mut points_file = json!({"reference": config.reference, "points": points, "thermal": thermal, "two_parameter": two_parameter, "zero": zero});
-        if !sensors.is_empty() {
-            points_file["sensors"] = json!(sensors);
+        let mut points_file = json!({
+            "reference": identified.config.reference,
+            "points": identified.points,
+            "thermal": identified.thermal,
+            "two_parameter": identified.two_parameter,
+            "zero": identified.zero,
+        });
+        if !identified.sensors.is_empty() {
+            points_file["sensors"] = json!(identified.sensors);
         }
-        if let Some(surge) = &surge {
+        if let Some(surge) = &identified.surge {
             points_file["surge"] = json!(surge);
         }
         write_new(&directory.join(run_directory::POINTS), json_text(&points_file)?.as_bytes())?;
+        let repeats = identified.repeats();
+        let shown = run_report_of(told, &identified, &remarks, &repeats, map.contains_key("svg"));
         let report = directory.join(run_directory::REPORT);
-        let alone: Vec<IdentifiedPoint> = points.iter().map(|scored| scored.point.clone()).collect();
-        let repeats = repeated_jumps(&recording.steps, &alone);
-        let text = run_report(&RunReport {
-            machine: told.machine,
-            campaign: told.campaign,
-            plan: told.plan,
-            sources: told.sources,
-            outcome: told.outcome,
-            remarks: &remarks,
-            reference: config.reference,
-            method: config.method,
-            alpha_area_ratio: config.alpha_area_ratio,
-            events: &recording.events,
-            points: &points,
-            repeats: &repeats,
-            two_parameter: &two_parameter,
-            sensors: &sensors,
-            score: score.as_ref(),
-            surge: surge.as_ref().map(|surge| SurgeReport {
-                marks: &surge.marks,
-                remarks: &surge.remarks,
-                surges: surge.surges,
-            }),
-            has_picture: map.contains_key("svg"),
-        });
-        write_new(&report, text.as_bytes())?;
+        write_new(&report, run_report(&shown).as_bytes())?;
+        let page = directory.join(run_directory::PAGE);
+        let page_text = page_of(told, &identified, &shown, compressor_map.as_ref(), &[])?;
+        write_new(&page, page_text.as_bytes())?;
+        let Identified { points, thermal, two_parameter, sensors, zero, score, surge, .. } = identified;
         Ok(Results {
             run: directory.to_owned(),
             recording: recording_file,
@@ -197,6 +240,7 @@ impl Session<'_> {
             points,
             map,
             report,
+            page,
             score,
             repeats,
             thermal,
@@ -208,6 +252,74 @@ impl Session<'_> {
             compressor_map,
         })
     }
+}
+
+/// How a recording is called beside others: by its run's directory, or by its file.
+fn name_of(path: &Path) -> String {
+    let named = match path.file_name() {
+        Some(file) if file == run_directory::RECORDING => path.parent().and_then(Path::file_name),
+        file => file,
+    };
+    named.unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn identified_by(method: Method) -> String {
+    format!("Identified by the method `{method}`.")
+}
+
+/// What the report and the page show of what was identified.
+fn run_report_of<'a>(
+    told: &'a Told,
+    identified: &'a Identified,
+    remarks: &'a [String],
+    repeats: &'a [RepeatedJump],
+    has_picture: bool,
+) -> RunReport<'a> {
+    RunReport {
+        machine: &told.machine,
+        campaign: told.campaign.as_ref(),
+        plan: told.plan.as_ref(),
+        sources: &told.sources,
+        outcome: &told.outcome,
+        remarks,
+        reference: identified.config.reference,
+        method: identified.config.method,
+        alpha_area_ratio: identified.config.alpha_area_ratio,
+        events: &identified.recording.events,
+        points: &identified.points,
+        repeats,
+        two_parameter: &identified.two_parameter,
+        sensors: &identified.sensors,
+        score: identified.score.as_ref(),
+        surge: identified.surge.as_ref().map(|surge| SurgeReport {
+            marks: &surge.marks,
+            remarks: &surge.remarks,
+            surges: surge.surges,
+        }),
+        has_picture,
+    }
+}
+
+/// The page of what was identified, beside other runs' maps.
+fn page_of(
+    told: &Told,
+    identified: &Identified,
+    report: &RunReport<'_>,
+    map: Option<&CompressorMap>,
+    others: &[OtherRun<'_>],
+) -> Result<String, SessionError> {
+    let course = |point: &IdentifiedPoint| t2_course(&identified.recording, point, &identified.config);
+    let courses: Vec<T2Course> = identified.points_alone().filter_map(course).collect();
+    Ok(run_page(&RunPage {
+        report,
+        map,
+        recording: &identified.recording,
+        courses: &courses,
+        zero: &identified.zero,
+        tested_at: told.tested_at.as_deref(),
+        program: PROGRAM,
+        others,
+    })?)
 }
 
 /// A recording as a report names it.
@@ -263,13 +375,13 @@ fn compressor_map(
 /// Writes the map in these formats.
 fn export(
     registry: &Registry,
-    formats: &[&str],
+    formats: &[String],
     map: &CompressorMap,
     directory: &Path,
     remarks: &mut Vec<String>,
 ) -> Result<BTreeMap<String, PathBuf>, SessionError> {
     let mut files = BTreeMap::new();
-    for name in formats.iter().copied() {
+    for name in formats {
         let format = registry.written_format(name)?;
         let bytes = match format.write(map) {
             Ok(bytes) => bytes,

@@ -173,8 +173,9 @@ impl PreparedRun<'_> {
             finished?;
         }
         let executed = self.executed(&directory);
-        let results = executed
-            .and_then(|plan| session.results(campaign, &plan, &sentence(&end), &directory, &recording));
+        let results = executed.and_then(|plan| {
+            session.results(campaign, &plan, &sentence(&end), self.request.started_ns, &directory, &recording)
+        });
         Ok(RunOutcome { directory, recording, end, results })
     }
 

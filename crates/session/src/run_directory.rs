@@ -20,6 +20,9 @@ pub const POINTS: &str = "points.json";
 /// The test report.
 pub const REPORT: &str = "report.md";
 
+/// The same and more as a page for a browser.
+pub const PAGE: &str = "report.html";
+
 /// Creates `<parent>/<campaign>-<time>`, with `-2`, `-3`, ... behind it where that exists already.
 ///
 /// # Errors

@@ -1,6 +1,6 @@
 //! Pages that the program writes, in a browser.
 
-use mapper_tests::{CampaignFile, mapper, only_run, repository, scratch};
+use mapper_tests::{CampaignFile, mapper, only_run, python, repository, scratch};
 use std::process::Command;
 
 /// A rig with a probe that conducts along its stem, four points of it.
@@ -69,4 +69,95 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     }
     // It needs nothing but itself.
     assert!(!dom.contains("src=\"http") && !dom.contains("href=\"http"));
+}
+
+/// Nine points of turbo_a with repeats, without a soak; the operator's name is markup.
+const NINE_POINTS: &[(&str, &str)] = &[
+    (
+        "speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]",
+        "speeds: [80 krpm, 110 krpm, 140 krpm]",
+    ),
+    ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.0, 1.4]"),
+    ("warm_up: 2 min ", "warm_up: 60 s "),
+    ("zero: {soak: 30 min, evenness: 0.03 K, pressure_evenness: 3 Pa}\n", ""),
+    ("operator: virtual\n", "operator: '</script><img src=x onerror=alert(1)>'\n"),
+];
+
+/// A run of them: its campaign, which goes away with the returned value, and its directory.
+fn run_of_nine_points() -> (CampaignFile, std::path::PathBuf) {
+    let campaign = CampaignFile::shipped_with(NINE_POINTS);
+    let runs = campaign.runs();
+    mapper(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), runs.as_os_str()]).exits(0);
+    let run = only_run(&runs);
+    (campaign, run)
+}
+
+#[test]
+#[cfg_attr(
+    not(all(with_chromium, with_python)),
+    ignore = "needs Chromium and Python: run `cargo xtask test`"
+)]
+fn the_page_of_a_run_is_read_as_people_do() {
+    let (_campaign, run) = run_of_nine_points();
+    let page = run.join("report.html");
+    let text = std::fs::read_to_string(&page).unwrap();
+    // A night of 60 points has to fit into 2 MB; this one is smaller, and most of it are the two libraries.
+    assert!(text.len() < 1_000_000, "{} bytes", text.len());
+    assert!(!text.contains("<img src=x"), "markup of a name got into the page");
+    assert!(text.contains("&lt;img src=x onerror=alert(1)&gt;"), "the name is shown as text");
+
+    let Some(chromium) = option_env!("MAPPER_TEST_CHROMIUM") else {
+        panic!("needs Chromium: run `cargo xtask test`")
+    };
+    let pictures = scratch();
+    let seen = python("browse_report.py", [chromium.as_ref(), page.as_os_str(), pictures.path().as_os_str()]);
+    // Nothing was asked of anybody, nothing was complained of, nobody is shut out.
+    assert_eq!(seen["requests"], serde_json::json!([]));
+    assert_eq!(seen["said"], serde_json::json!([]));
+    assert_eq!(seen["serious"], serde_json::json!([]));
+    for size in ["1400_light", "1400_dark", "390_light", "390_dark"] {
+        assert_eq!(seen[format!("overflow_{size}")], 0, "{size}: the page is wider than the screen");
+    }
+    // Every point that was identified is drawn, and no layer is lost: a channel with a wrong name drops one silently.
+    let points: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(run.join("points.json")).unwrap()).unwrap();
+    let points = points["points"].as_array().unwrap();
+    let of_the_map = points.iter().filter(|point| point["kind"] != "repeat").count();
+    assert_eq!(seen["points"], of_the_map);
+    assert_eq!(seen["points_with_repeats"], points.len());
+    assert_eq!(seen["eta_points"], of_the_map);
+    assert_eq!(seen["jumps"], points.len() - 1);
+    assert!(seen["paths"].as_u64() > seen["paths_without_contours"].as_u64(), "contours are drawn");
+    assert_eq!(seen["chosen"], seen["clicked"], "a click on a point shows its transient");
+    assert_eq!(seen["step_plots"], 6);
+    assert_eq!(seen["by_keyboard"], true);
+    // The words at the pointer are those of the point that was clicked.
+    let clicked: usize = seen["clicked"].as_str().unwrap().parse().unwrap();
+    let point = points.iter().find(|point| point["step"] == clicked).unwrap();
+    let eta = format!("efficiency {:.2}", 100.0 * point["eta"].as_f64().unwrap());
+    assert!(seen["tip"].as_str().unwrap().contains(&eta), "{}", seen["tip"]);
+    assert!(seen["step_words"].as_str().unwrap().contains(&eta), "{}", seen["step_words"]);
+    let column = |name: &str| -> Vec<f64> {
+        seen[name].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
+    };
+    assert!(column("sorted_up").is_sorted() && column("sorted_down").iter().rev().is_sorted());
+    // The print is a PDF.
+    assert!(std::fs::read(pictures.path().join("report.pdf")).unwrap().starts_with(b"%PDF"));
+}
+
+#[test]
+fn another_run_is_drawn_beside_the_first_and_nothing_is_overwritten() {
+    let (_campaign, run) = run_of_nine_points();
+    let folder = scratch();
+    let out = folder.path().join("both.html");
+    let made =
+        || mapper(["report".as_ref(), run.as_os_str(), run.as_os_str(), "-o".as_ref(), out.as_os_str()]);
+    made().exits(0);
+    let text = std::fs::read_to_string(&out).unwrap();
+    assert!(text.contains("value=\"other0\""), "the other run has its switch");
+    // The page that the run left has the same points.
+    let points =
+        |page: &str| page.split("\"points\":").nth(1).unwrap().split("\"map\":").next().unwrap().to_owned();
+    assert_eq!(points(&text), points(&std::fs::read_to_string(run.join("report.html")).unwrap()));
+    assert!(made().exits(1).stderr.contains("both.html"), "an existing file is not replaced");
 }

@@ -9,6 +9,7 @@ subcommands! { Command:
     plan::Plan,
     run::Run,
     identify::Identify,
+    report::Report,
     transient::Transient,
     log::Log,
     gap::Gap,

@@ -22,10 +22,9 @@ pub(crate) fn plan(page: &RunPage<'_>, display: &Display) -> Markup {
         display.speed_head("N reached"),
         "lasted s".to_owned(),
         "planned s".to_owned(),
-        "dTc K expected".to_owned(),
         "dTc K".to_owned(),
-        "sigma eta, points, expected".to_owned(),
-        "sigma eta, points".to_owned(),
+        "sigma of eta expected, points".to_owned(),
+        "found, points".to_owned(),
     ];
     let rows: Vec<Row> = plan.steps.iter().map(|step| row(page, display, step)).collect();
     let missing = plan.steps.iter().filter(|step| !flown(page, step)).count();
@@ -33,9 +32,9 @@ pub(crate) fn plan(page: &RunPage<'_>, display: &Display) -> Markup {
         section #plan aria-labelledby="plan-head" {
             h2 #plan-head { "Plan as flown" }
             p {
-                "Order `" (plan.objective) "`, " (duration(plan.duration_s())) " planned"
+                "Order " code { (plan.objective) } ", " (duration(plan.duration_s())) " planned"
                 @if missing > 0 { "; " (missing) " of " (plan.steps.len()) " steps were not flown" } "."
-                " The thermal gradient of a step is the change of the housing temperature Tc within its window."
+                " The thermal gradient of a step, dTc, is the change of the housing temperature within the window that was used; sigma is one standard error."
             }
             figure { div #plan-plot {} figcaption { "Jumps in their order; the first are darkest." } }
             (data_table("Steps", &heads, &rows))
@@ -68,7 +67,6 @@ fn row(page: &RunPage<'_>, display: &Display, step: &PlanStep) -> Row {
             },
             optional(lasted_s, 1),
             optional(Some(step.dwell_s), 1),
-            optional(step.predicted.dtc_k, 1),
             optional(point.and_then(|point| point.dtc_k), 1),
             Cell::number(percent(step.predicted.sigma_eta, 2), step.predicted.sigma_eta.unwrap_or(f64::NAN)),
             Cell::number(percent(sigma, 2), sigma.unwrap_or(f64::NAN)),

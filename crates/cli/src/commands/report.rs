@@ -1,0 +1,48 @@
+//! `mapper report`: the page of a run, beside other runs.
+
+use crate::failure::Failure;
+use crate::given::{channel_map, given_campaign};
+use crate::{output, registry};
+use clap::Args;
+use mapper_session::{Recorded, Session, SessionError, write_new};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Make the page of a run: map, points, transients, plan and provenance in one HTML file
+#[derive(Debug, Args)]
+pub struct Report {
+    /// Run directory, MCAP file or log of another program; further ones are drawn beside it
+    #[arg(required = true, value_name = "RUN")]
+    pub runs: Vec<PathBuf>,
+    /// Write the page here; an existing file is not replaced
+    #[arg(short, long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Channel map: where recordings made by another program hold the rig's channels (YAML)
+    #[arg(long, value_name = "FILE")]
+    pub channels: Option<PathBuf>,
+    /// Campaign with machine, sensors and window, instead of the one attached to the recordings
+    #[arg(long, value_name = "FILE")]
+    pub campaign: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Report {
+    /// Identifies the runs and writes the page.
+    pub fn run(&self) -> Result<(), Failure> {
+        let map = channel_map(self.channels.as_deref())?;
+        let given = given_campaign(self.campaign.as_deref())?;
+        let registry = registry::registry();
+        let read = |path: &PathBuf| Recorded::read(&registry, path, &map, given.as_ref());
+        let mut recorded = self.runs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let others = recorded.split_off(1.min(recorded.len()));
+        let shown = recorded.pop().ok_or(SessionError::NoRecording)?;
+        let page = Session::new(&registry).page(shown, others, &map)?;
+        write_new(&self.out, page.as_bytes())?;
+        match self.json {
+            true => output::print_json(&json!({ "page": self.out })),
+            false => output::print(&format!("page       {}\n", self.out.display())),
+        }
+    }
+}

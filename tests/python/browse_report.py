@@ -1,0 +1,81 @@
+"""Opens a run's page in Chromium as a reader would, and says as JSON what happened.
+
+    python browse_report.py CHROMIUM PAGE FOLDER
+
+Pictures of the page (390 and 1400 px wide, light and dark) and the print as A4 PDF are left in FOLDER.
+"""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import sync_playwright
+
+chromium, page_file, folder = shutil.which(sys.argv[1]), Path(sys.argv[2]), Path(sys.argv[3])
+said, requests, serious = [], [], []
+result = {}
+
+
+def opened(browser, width, height, scheme):
+    page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    page.goto(page_file.as_uri())
+    page.wait_for_selector("html[data-drawn=true]")
+    return page
+
+
+with sync_playwright() as playwright:
+    browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+    for width, height in [(1400, 1000), (390, 844)]:
+        for scheme in ["light", "dark"]:
+            page = opened(browser, width, height, scheme)
+            page.screenshot(path=folder / f"report-{width}-{scheme}.png", full_page=True)
+            for violation in Axe().run(page).response["violations"]:
+                if violation["impact"] in ("serious", "critical"):
+                    serious.append(f"{width} {scheme}: {violation['id']}: {violation['nodes'][0]['html'][:200]}")
+            # Tables may be wider than a phone, the page may not.
+            result[f"overflow_{width}_{scheme}"] = page.evaluate(
+                "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+            )
+            page.close()
+
+    page = opened(browser, 1400, 1000, "light")
+    count = lambda selector: page.locator(selector).count()
+    result["title"] = page.title()
+    result["points"] = count("#map-plot .point")
+    result["eta_points"] = count("#eta-plot .point")
+    result["paths"] = count("#map-plot g[data-mark=line] path")
+    result["jumps"] = count("#plan-plot g[data-mark=arrow] path")
+    page.uncheck("input[value=contours]")
+    result["paths_without_contours"] = count("#map-plot g[data-mark=line] path")
+    page.check("input[value=repeats]")
+    result["points_with_repeats"] = count("#map-plot .point")
+    point = page.locator("#map-plot .point").nth(3)
+    point.hover()
+    page.wait_for_selector("#map-plot g[aria-label=tip] text")
+    result["tip"] = page.locator("#map-plot g[aria-label=tip]").text_content()
+    step = point.get_attribute("data-step")
+    point.click()
+    result["clicked"], result["chosen"] = step, page.input_value("#step-choice")
+    result["step_plots"] = count("#step-plots svg")
+    result["step_words"] = page.text_content("#step-words")
+    table = page.locator("table.data").first
+    column = lambda: [float(text) for text in table.locator("tbody tr td:nth-child(5)").all_text_contents()]
+    head = table.locator("thead th:nth-child(5) button")
+    head.click()
+    result["sorted_up"] = column()
+    head.click()
+    result["sorted_down"] = column()
+    # By keyboard alone.
+    page.focus("#step-choice")
+    page.keyboard.press("ArrowDown")
+    result["by_keyboard"] = page.input_value("#step-choice") != step
+    page.pdf(path=folder / "report.pdf", format="A4", landscape=True)
+    browser.close()
+
+result.update(said=said, serious=serious, requests=[url for url in requests if url != page_file.as_uri()])
+json.dump(result, sys.stdout)

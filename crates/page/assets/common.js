@@ -1,7 +1,8 @@
 "use strict";
 // What all drawings share: data, colours of the page's theme, sizes.
+const root = document.documentElement;
 const page = JSON.parse(document.getElementById("data").textContent);
-const style = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const style = name => getComputedStyle(root).getPropertyValue(name).trim();
 const byId = id => document.getElementById(id);
 const half = (low, high) => low == null || high == null ? null : (high - low) / 2;
 const shown = (value, digits, unit = "") => value == null ? "-" : value.toFixed(digits) + unit;
@@ -13,7 +14,7 @@ const lineNames = [...new Set(page.points.map(p => p.line))].sort((a, b) => a - 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const lineColour = name => {
   const at = lineNames.length < 2 ? 0.5 : lineNames.indexOf(name) / (lineNames.length - 1);
-  return d3.interpolateViridis(dark.matches ? 0.25 + 0.7 * at : 0.05 + 0.75 * at);
+  return d3.interpolateViridis(dark.matches && !("print" in root.dataset) ? 0.25 + 0.7 * at : 0.05 + 0.75 * at);
 };
 const redrawn = [];
 const redraw = () => redrawn.forEach(draw => draw());

@@ -34,10 +34,10 @@ document.querySelectorAll("input[name=layer]").forEach(box => box.addEventListen
 byId("whole").addEventListener("click", () => { zoomed.map = null; drawMap(); });
 byId("step-choice").addEventListener("change", event => choose(Number(event.target.value), false));
 dark.addEventListener("change", redraw);
-// Print is always light, and A4 is narrower than a screen.
-addEventListener("beforeprint", redraw);
-addEventListener("afterprint", redraw);
+// Print is always light.
+addEventListener("beforeprint", () => { root.dataset.print = ""; redraw(); });
+addEventListener("afterprint", () => { delete root.dataset.print; redraw(); });
 let resized;
 addEventListener("resize", () => { clearTimeout(resized); resized = setTimeout(redraw, 150); });
 redraw();
-document.documentElement.dataset.drawn = "true";
+root.dataset.drawn = "true";

@@ -2,7 +2,7 @@
 
     python browse_report.py CHROMIUM PAGE FOLDER
 
-Pictures of the page (390 and 1400 px wide, light and dark) and the print as A4 PDF are left in FOLDER.
+Pictures of the page (390 and 1400 px wide, light and dark), of its head, and the print as A4 PDF are left in FOLDER.
 """
 
 import json
@@ -70,6 +70,8 @@ with sync_playwright() as playwright:
     result["sorted_up"] = column()
     head.click()
     result["sorted_down"] = column()
+    page.evaluate("scrollTo(0, 0)")
+    page.screenshot(path=folder / "report.png")
     # By keyboard alone.
     page.focus("#step-choice")
     page.keyboard.press("ArrowDown")

@@ -44,6 +44,17 @@ with sync_playwright() as playwright:
             page.close()
 
     page = opened(browser, 1400, 1000, "light")
+    page.screenshot(path=folder / "report.png")
+    ticks = lambda: page.locator("#map-plot g[data-mark='x-axis tick label'] text").all_text_contents()
+    before = ticks()
+    page.locator("#map-plot svg").hover()
+    page.keyboard.down("Control")
+    page.mouse.wheel(0, -600)
+    page.keyboard.up("Control")
+    page.wait_for_timeout(400)
+    result["zoomed"] = before and ticks() != before
+    page.click("#whole")
+    result["whole_again"] = ticks() == before
     count = lambda selector: page.locator(selector).count()
     result["title"] = page.title()
     result["points"] = count("#map-plot .point")
@@ -70,8 +81,6 @@ with sync_playwright() as playwright:
     result["sorted_up"] = column()
     head.click()
     result["sorted_down"] = column()
-    page.evaluate("scrollTo(0, 0)")
-    page.screenshot(path=folder / "report.png")
     # By keyboard alone.
     page.focus("#step-choice")
     page.keyboard.press("ArrowDown")

@@ -128,6 +128,7 @@ fn the_page_of_a_run_is_read_as_people_do() {
     assert_eq!(seen["eta_points"], of_the_map);
     assert_eq!(seen["jumps"], points.len() - 1);
     assert!(seen["paths"].as_u64() > seen["paths_without_contours"].as_u64(), "contours are drawn");
+    assert_eq!([&seen["zoomed"], &seen["whole_again"]], [true, true], "the map is zoomed and whole again");
     assert_eq!(seen["chosen"], seen["clicked"], "a click on a point shows its transient");
     assert_eq!(seen["step_plots"], 6);
     assert_eq!(seen["by_keyboard"], true);

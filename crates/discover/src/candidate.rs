@@ -1,6 +1,5 @@
 //! A law as a hypothesis: terms with coefficients fitted by runs of the model, with tolerances and what stands beside it.
 
-use crate::columns::Base;
 use crate::law_effect::LawEffect;
 use crate::select::Choice;
 use crate::term::Term;
@@ -119,7 +118,7 @@ pub fn sort(candidates: &mut [Candidate]) {
 }
 
 /// Choices that are worth a fit: the best, and the best of every part of the machine that promises something beside it.
-pub fn worth(library: &[Term], choices: &[Choice], base: &Base<'_>) -> Vec<Choice> {
+pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
     let Some(best) = choices.first() else { return Vec::new() };
     let mut worth: Vec<Choice> = Vec::new();
     let part = |choice: &Choice| library[choice.terms[0]].submodel();
@@ -128,7 +127,7 @@ pub fn worth(library: &[Term], choices: &[Choice], base: &Base<'_>) -> Vec<Choic
     for choice in choices.iter().filter(|choice| choice.gain > least) {
         let of_part = worth.iter().filter(|other| part(other) == part(choice)).count();
         let parts = if part(choice) == part(best) { OF_THE_BEST_PART } else { OF_OTHER_PARTS };
-        if of_part < parts && worth.len() < MOST && base.study.steps.len() > 1 {
+        if of_part < parts && worth.len() < MOST {
             worth.push(choice.clone());
         }
     }

@@ -1,5 +1,7 @@
 //! The course of a force in time: a level, or a part that decays after a jump, during some spans.
 
+use std::fmt::{Display, Formatter, Result};
+
 /// Time constant of the part of a force that decays after a jump, s: near that of the housings.
 pub const DECAY_S: f64 = 30.0;
 
@@ -32,6 +34,11 @@ pub struct Course {
 }
 
 impl Course {
+    /// Nothing before a time, s, and 1 from it on.
+    pub fn from(begin_s: f64) -> Course {
+        Course { shape: Shape::Level, spans_s: vec![(begin_s, f64::INFINITY)] }
+    }
+
     /// Its value at a time; NaN stands for the rest before the recording.
     pub fn at(&self, t_s: f64) -> f64 {
         let mut spans = self.spans_s.iter();
@@ -41,5 +48,13 @@ impl Course {
         }
         let here = spans.find(|(begin_s, end_s)| (*begin_s..*end_s).contains(&t_s));
         here.map_or(0.0, |(begin_s, _)| self.shape.at(t_s - begin_s))
+    }
+}
+
+/// As an effect's script has it; a level alone can be written.
+impl Display for Course {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let begin_s = self.spans_s.first().map_or(f64::NEG_INFINITY, |(begin_s, _)| *begin_s);
+        write!(f, "(if at.t_s < {begin_s:?} {{ 0.0 }} else {{ 1.0 }})")
     }
 }

@@ -1,6 +1,8 @@
 //! From a diagnosis that leaves something to the laws that account for it, and to where it is missing.
 
-use crate::candidate::{Bench, Candidate, sort, worth};
+use crate::balance::Balance;
+use crate::begun::begun;
+use crate::candidate::{Bench, Candidate, worth};
 use crate::columns::{Base, Products};
 use crate::force::{Force, forces};
 use crate::held_out::shrink;
@@ -13,10 +15,10 @@ use mapper_gap::adequacy::adequacy;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, prior};
 use mapper_gap::fit::{Effort, Fit, fit};
-use mapper_gap::place::{BEND, Explanation, Gain, Part, of_fits, places_of, signature};
+use mapper_gap::place::{BEND, Explanation, RARITY, Gain, Part, of_fits, places_of, signature};
 use mapper_gap::report::{Law, MissingForce, Place, Verdict};
 use mapper_gap::selection::Selection;
-use mapper_gap::whiten::Linearised;
+use mapper_gap::study::{Study, members};
 
 /// What is found beyond the catalogue.
 #[derive(Debug, Default)]
@@ -52,7 +54,7 @@ pub fn discover(
         return Discovered::default();
     }
     let Diagnosed { study, linearised, null, .. } = diagnosed;
-    progress(0.0, "missing forces");
+    progress(0.0, "laws");
     let library = library();
     let everywhere = Selection::all(study);
     let mut training = everywhere.clone();
@@ -60,15 +62,29 @@ pub fn discover(
         training.steps[*step] = false;
     }
     let nothing = Base::nothing(study, linearised);
-    let forces = forces(&nothing, &everywhere.steps);
-    progress(0.3, "laws");
     let mut bench = Bench { study: study.clone(), library };
-    let alone = found(&mut bench, &nothing, &training, &everywhere);
-    progress(0.8, "what a law leaves");
-    let laws = propose(diagnosed, calibration, &bench, alone.as_ref(), &training);
+    let mut found = found(&mut bench, &nothing, &training, &everywhere, &|fit| {
+        calibration.outside(adequacy(study, linearised, fit, 0.0).features()) < 0.5
+    });
+    progress(0.4, "a law beside a cause");
+    let left = found.as_ref().is_none_or(|found| !found.adequate);
+    if let (true, Some(best), Verdict::PartlyExplained) = (left, diagnosed.fits.first(), diagnosed.diagnosis.verdict) {
+        if let Some(beside) = beside(&mut bench, diagnosed, best, calibration, &training, &everywhere) {
+            let better = found.as_ref().and_then(|found| found.fitted.first()).is_none_or(|alone| {
+                beside.fitted.first().is_some_and(|both| both.score() > alone.score() + RARE_BESIDE)
+            });
+            found = if better { Some(beside) } else { found };
+        }
+    }
+    progress(0.6, "what a law leaves");
+    let laws = propose(diagnosed, calibration, &bench, found.as_ref(), &training);
     // Where a law leaves nothing but noise, what a straight line makes of other parts counts for nothing.
-    let bend = if laws.first().is_some_and(|law| law.probability > 0.5) { 0.0 } else { BEND };
-    let places = places(diagnosed, &bench, alone.as_ref(), &forces, null, bend);
+    let settled = laws.first().filter(|law| law.probability > 0.5);
+    let bend = if settled.is_some() { 0.0 } else { BEND };
+    progress(0.7, "missing forces");
+    let here = |balance: &Balance| settled.is_none_or(|law| law.submodel == balance.submodel().name());
+    let forces = forces(&nothing, &everywhere.steps, &here);
+    let places = places(diagnosed, &bench, found.as_ref(), &forces, null, bend);
     progress(1.0, "done");
     Discovered { laws, forces: forces.into_iter().take(FORCES).map(told_force).collect(), places: Some(places) }
 }
@@ -88,44 +104,98 @@ struct Found {
     fitted: Vec<Candidate>,
     /// Share of the folds in which the best shows again.
     stability: f64,
+    /// Whether the best leaves nothing but noise.
+    adequate: bool,
+}
+
+/// A law beside a cause costs as much as a second cause does.
+const RARE_BESIDE: f64 = 3.0;
+
+/// The search beside the catalogue's best.
+fn beside(
+    bench: &mut Bench,
+    diagnosed: &Diagnosed,
+    best: &Fit,
+    calibration: &Calibration,
+    training: &Selection,
+    everywhere: &Selection,
+) -> Option<Found> {
+    let Diagnosed { study, linearised, .. } = diagnosed;
+    let there = linearised.at(study, &best.hypothesis).ok()?;
+    let base = Base::beside(study, &there, best);
+    found(bench, &base, training, everywhere, &|fit| {
+        calibration.outside(adequacy(study, linearised, fit, 0.0).features()) < 0.5
+    })
 }
 
 /// Searches the library from a base: in closed form, then by runs of the model.
-fn found(bench: &mut Bench, base: &Base<'_>, training: &Selection, everywhere: &Selection) -> Option<Found> {
+fn found(
+    bench: &mut Bench,
+    base: &Base<'_>,
+    training: &Selection,
+    everywhere: &Selection,
+    adequate: &dyn Fn(&Fit) -> bool,
+) -> Option<Found> {
     let changes = base.changes(&bench.library);
     let usable: Vec<usize> = (0..changes.len()).filter(|place| changes[*place].is_some()).collect();
     let columns: Vec<Vec<f64>> = changes.into_iter().flatten().collect();
     let products = Products::new(base, &columns);
     let of = |counts: &[bool]| Some(choices(&bench.library, &usable, &products.projected(counts)?));
     let on_training = of(&training.steps)?;
-    let folds: Vec<Vec<Choice>> = (0..FOLDS)
-        .filter_map(|fold| {
-            let counts: Vec<bool> =
-                training.steps.iter().enumerate().map(|(step, counts)| *counts && step % FOLDS != fold).collect();
-            of(&counts)
+    let folds: Vec<Vec<bool>> = (0..FOLDS)
+        .map(|fold| {
+            let steps = training.steps.iter().enumerate();
+            steps.map(|(step, counts)| *counts && step % FOLDS != fold).collect()
         })
         .collect();
-    let chosen = worth(&bench.library, &on_training, base);
-    let quick = Effort { iterations: 3, enough: 1.0, ..Effort::default() };
-    let mut trained = bench.fit(&base.hypothesis, base.linearised, &chosen, training, quick);
-    // Tolerances act otherwise beside something strong.
-    let beside: Option<Linearised> =
-        trained.first().and_then(|best| base.linearised.at(&bench.study, &best.fit.hypothesis).ok());
-    let linearised = beside.as_ref().unwrap_or(base.linearised);
-    let effort = Effort { iterations: 5, enough: 0.2, ..Effort::default() };
-    trained.truncate(FINALISTS);
-    trained = bench.refit(&trained, linearised, training, effort);
-    let mut fitted = bench.refit(&trained, linearised, everywhere, effort);
-    sort(&mut fitted);
-    let best = trained.first()?;
+    let in_folds: Vec<Vec<Choice>> = folds.iter().filter_map(|counts| of(counts)).collect();
+    let chosen = worth(&bench.library, &on_training);
+    let found = fitted(bench, base, &chosen, training, everywhere)?;
+    let (trained, fitted_best) = (found.0.first()?, found.1.first()?);
     let part = |choice: &Choice| bench.library[choice.terms[0]].submodel();
-    let again = folds.iter().filter(|fold| {
+    let again = in_folds.iter().filter(|fold| {
         let Some(first) = fold.first() else { return false };
-        let own = fold.iter().find(|choice| choice.terms == best.choice.terms);
-        part(first) == part(&best.choice) && own.is_some_and(|own| own.gain > LIKE * first.gain)
+        let own = fold.iter().find(|choice| choice.terms == trained.choice.terms);
+        part(first) == part(&trained.choice) && own.is_some_and(|own| own.gain > LIKE * first.gain)
     });
     let stability = again.count() as f64 / folds.len().max(1) as f64;
-    Some(Found { trained, fitted, stability })
+    if adequate(&fitted_best.fit) {
+        return Some(Found { trained: found.0, fitted: found.1, stability, adequate: true });
+    }
+    // What none of them explains may have begun in the middle.
+    let alone = Found { trained: found.0, fitted: found.1, stability, adequate: false };
+    let Some((later, stability)) = begun(base, &mut bench.library, &on_training, &training.steps, &folds) else {
+        return Some(alone);
+    };
+    let promised = later.first().is_some_and(|later| on_training.first().is_none_or(|first| later.gain > first.gain));
+    let fits = if promised { fitted(bench, base, &later, training, everywhere) } else { None };
+    Some(match fits {
+        Some((trained, fitted)) if fitted.first()?.score() > alone.fitted.first()?.score() => {
+            let adequate = adequate(&fitted.first()?.fit);
+            Found { trained, fitted, stability, adequate }
+        }
+        _ => alone,
+    })
+}
+
+/// Choices fitted by runs of the model: on the steps that count for the search, and the best of them on all steps.
+fn fitted(
+    bench: &mut Bench,
+    base: &Base<'_>,
+    chosen: &[Choice],
+    training: &Selection,
+    everywhere: &Selection,
+) -> Option<(Vec<Candidate>, Vec<Candidate>)> {
+    let quick = Effort { iterations: 3, enough: 1.0, ..Effort::default() };
+    let mut trained = bench.fit(&base.hypothesis, base.linearised, chosen, training, quick);
+    trained.truncate(FINALISTS);
+    // Tolerances act otherwise beside something strong.
+    let beside = base.linearised.at(&bench.study, &trained.first()?.fit.hypothesis).ok();
+    let linearised = beside.as_ref().unwrap_or(base.linearised);
+    let effort = Effort { iterations: 5, enough: 0.2, ..Effort::default() };
+    let trained = bench.refit(&trained, linearised, training, effort);
+    let fitted = bench.refit(&trained, linearised, everywhere, effort);
+    Some((trained, fitted))
 }
 
 /// Laws fitted to the end.
@@ -184,12 +254,18 @@ fn propose(
         terms,
         probability: (1.0 - left) / weights,
         shrink,
-        beside: Vec::new(),
+        beside: names_beside(study, best),
         stability: found.stability,
         equivalent: equivalent.collect(),
         rhai: None,
         script: script(&bench.library, best, &told),
     }]
+}
+
+/// Effects of the catalogue beside a law.
+fn names_beside(study: &Study, law: &Candidate) -> Vec<String> {
+    let others = law.fit.hypothesis.effects.iter().filter_map(|(index, _)| study.effects.get(*index));
+    others.map(|effect| effect.info().id.to_string()).collect()
 }
 
 /// Prior of all laws together.
@@ -210,12 +286,26 @@ fn places(
     let fitted = found.map_or(&[][..], |found| &found.fitted);
     explanations.extend(fitted.iter().map(|law| {
         let gain = null.cost - law.fit.cost;
-        let part = Part {
+        let others: Vec<usize> =
+            members(&law.fit.hypothesis).into_iter().filter(|effect| *effect != law.effect).collect();
+        let without = fits.iter().find(|fit| members(&fit.hypothesis) == others);
+        let of_others = without.map_or(0.0, |fit| null.cost - fit.cost).clamp(0.0, gain.max(0.0));
+        let law_part = Part {
             submodel: bench.library[law.choice.terms[0]].submodel(),
-            gain: gain.max(0.0),
+            gain: (gain - of_others).max(0.0),
             signature: Box::new(move || signature(&bench.study, &law.fit, law.effect)),
         };
-        Explanation { score: 0.5 * gain - law.choice.rarity - 5.0, parts: vec![part] }
+        let each = of_others / others.len().max(1) as f64;
+        let other_parts = others.iter().map(|effect| {
+            let effect = *effect;
+            Part {
+                submodel: study.effects[effect].info().submodel,
+                gain: each,
+                signature: Box::new(move || signature(&bench.study, &law.fit, effect)),
+            }
+        });
+        let score = 0.5 * gain - law.choice.rarity - RARITY * (1 + others.len()) as f64;
+        Explanation { score, parts: std::iter::once(law_part).chain(other_parts).collect() }
     }));
     // What a straight line promises counts from the straight line's own null.
     let linear_null = 0.5 * (null.cost - linear_cost(diagnosed));

@@ -55,7 +55,7 @@ impl Display for Expression {
             Times(a, b) => write!(f, "{a} * {b}"),
             Power(base, exponent) => write!(f, "({base}) ** {}", number(*exponent)),
             Ln(of) => write!(f, "({of}).ln()"),
-            InTime(_) => write!(f, "course"),
+            InTime(course) => write!(f, "{course}"),
         }
     }
 }

@@ -18,19 +18,17 @@ use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector};
 
 /// Steps whose answers come from one run: a housing forgets in a minute or two what was so many steps before.
-const APART: usize = 5;
+pub const APART: usize = 5;
 
 /// Balances whose force needs runs of the model.
-const RUN: [Balance; 10] = [
+const RUN: [Balance; 8] = [
     Balance::CompressorHousing,
     Balance::TurbineHousing,
     Balance::Shaft,
     Balance::Outlet,
     Balance::GasBefore,
     Balance::GasAfter,
-    Balance::GasOutlet,
     Balance::Work,
-    Balance::Convection,
     Balance::MapFlow,
 ];
 
@@ -47,15 +45,17 @@ pub struct Force {
     pub levels: Vec<(f64, f64)>,
 }
 
-/// The missing force of every balance, each as if it were the only one; best evidence first.
-pub fn forces(base: &Base<'_>, counts: &[bool]) -> Vec<Force> {
+/// Every balance that has a force in a recording.
+pub fn balances(study: &Study) -> Vec<Balance> {
+    let recorded = |channel: &Channel| *channel != Channel::P3 && study.table.column(*channel).is_some();
+    RUN.into_iter().chain(OUTPUTS.into_iter().filter(recorded).map(Balance::Reading)).collect()
+}
+
+/// The missing force of every balance that is `wanted`, each as if it were the only one; best evidence first.
+pub fn forces(base: &Base<'_>, counts: &[bool], wanted: &dyn Fn(&Balance) -> bool) -> Vec<Force> {
     let study = base.study;
     let points = study.points(&study.nothing()).unwrap_or_default();
-    let readings = OUTPUTS
-        .into_iter()
-        .filter(|channel| *channel != Channel::P3 && study.table.column(*channel).is_some())
-        .map(Balance::Reading);
-    let balances: Vec<Balance> = RUN.into_iter().chain(readings).collect();
+    let balances: Vec<Balance> = balances(study).into_iter().filter(wanted).collect();
     let mut found: Vec<Force> = parallel::map(&balances, |balance| {
         let columns = columns(base, *balance);
         force(base, *balance, &columns, counts, &points)
@@ -67,8 +67,8 @@ pub fn forces(base: &Base<'_>, counts: &[bool]) -> Vec<Force> {
     found
 }
 
-/// Changes for a plain force in one step each: levels first, then the parts that decay after each jump.
-fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
+/// Changes for a plain force in one step each, in the channels' units: levels first, then the parts that decay after each jump.
+pub fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
     let study = base.study;
     let steps = study.steps.len();
     let mut columns: Vec<Vec<f64>> = Vec::new();
@@ -191,7 +191,7 @@ const SMOOTH: f64 = 0.5;
 const FREE: f64 = 0.02;
 
 /// Prior covariance of levels and decaying parts for a force of plain size.
-fn covariance(study: &Study, points: &[PointState]) -> DMatrix<f64> {
+pub fn covariance(study: &Study, points: &[PointState]) -> DMatrix<f64> {
     let steps = study.steps.len();
     let at = |step: usize| {
         let speed_rpm = points.get(step).map_or(0.0, |point| point.speed_rpm);

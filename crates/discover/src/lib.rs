@@ -4,6 +4,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod balance;
+pub mod begun;
 pub mod candidate;
 pub mod columns;
 pub mod course;
@@ -18,4 +19,5 @@ pub mod quantity;
 pub mod script;
 pub mod select;
 pub mod sentence;
+pub mod signatures;
 pub mod term;

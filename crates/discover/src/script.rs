@@ -7,7 +7,7 @@ use crate::sentence::{Told, sink};
 use crate::term::Term;
 use std::fmt::Write as _;
 
-/// The script; `None` where a term cannot be written as one (a lag has a memory, which scripts have not).
+/// The script; `None` where a term cannot be written as one.
 pub fn script(library: &[Term], candidate: &Candidate, told: &Told) -> Option<String> {
     let terms: Vec<&Term> = candidate.choice.terms.iter().map(|place| &library[*place]).collect();
     script_of(&terms, told)
@@ -42,7 +42,11 @@ pub fn script_of(terms: &[&Term], told: &Told) -> Option<String> {
             let low = if term.positive { 0.0 } else { -most };
             parameters += &line(&name, term.unit, low, most, 0.0, term.step);
             for (balance, formula) in &term.acts_on {
-                put(*balance, format!("p.{name} * ({formula})"));
+                if let Balance::Lag(channel) = balance {
+                    parameters += &format!("//! lag: {} {name}\n", channel.symbol());
+                } else {
+                    put(*balance, format!("p.{name} * ({formula})"));
+                }
             }
         }
     }
@@ -65,7 +69,7 @@ pub fn script_of(terms: &[&Term], told: &Told) -> Option<String> {
             }
             Balance::Work | Balance::Convection | Balance::MapFlow => ("at, p, value", format!("value * (1.0 + {sum})")),
             Balance::Reading(_) => ("at, p, value", format!("value + {sum}")),
-            Balance::Lag(_) => return None,
+            Balance::Lag(_) => continue,
         };
         write!(text, "\nfn {name}({arguments}) {{\n    {body}\n}}\n").ok()?;
     }

@@ -13,6 +13,8 @@ pub struct Choice {
     pub gain: f64,
     /// What is taken off the evidence for one choice among many.
     pub rarity: f64,
+    /// Step from which on it is there; 0 from the beginning.
+    pub begin: usize,
     /// Coefficients, in steps.
     pub coefficients: Vec<f64>,
 }
@@ -27,7 +29,7 @@ pub fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64>) -> V
         let wrong = terms.iter().zip(coefficients.iter()).any(|(term, c)| library[*term].positive && *c < 0.0);
         if !wrong && gain.is_finite() {
             let coefficients = coefficients.iter().copied().collect();
-            found.push(Choice { terms, gain: gain - rarity, rarity, coefficients });
+            found.push(Choice { terms, gain: gain - rarity, rarity, begin: 0, coefficients });
         }
     };
     let simple = (usable.len() as f64).ln();

@@ -45,6 +45,11 @@ impl Term {
         self.acts_on[0].0
     }
 
+    /// Whether it has a memory of its own, as a lag has.
+    pub fn has_memory(&self) -> bool {
+        self.acts_on.iter().any(|(balance, _)| matches!(balance, Balance::Lag(_)))
+    }
+
     /// Name of what it acts on, for sentences.
     pub fn words_of_place(&self) -> String {
         self.balance().place_words()

@@ -19,7 +19,7 @@ const LEAST_SHARE: f64 = 0.01;
 pub const BEND: f64 = 0.01;
 
 /// What one more effect costs in the logarithm of the evidence, roughly.
-const RARITY: f64 = 5.0;
+pub const RARITY: f64 = 5.0;
 
 /// Phases of a step: name and first second after the jump.
 const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 30.0)];

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// What is known where a hook is asked; values that come later in the gas path are NaN.
 #[derive(Debug, Clone, Copy)]
 pub struct Site<'a> {
-    /// Time, s, where the model is driven along a recording; NaN elsewhere.
+    /// Time, s; NaN in a steady state and while everything holds still.
     pub t_s: f64,
     /// Boundary conditions.
     pub boundary: &'a BoundaryConditions,

@@ -38,7 +38,8 @@ pub fn begun(
     let mut terms: Vec<usize> = tried.iter().flat_map(|choice| choice.terms.iter().copied()).collect();
     terms.sort_unstable();
     terms.dedup();
-    let columns: Vec<Vec<f64>> = terms.iter().flat_map(|term| from_each_step(base, &library[*term])).collect();
+    let columns: Vec<Vec<f64>> =
+        terms.iter().flat_map(|term| from_each_step(base, &library[*term])).collect();
     let products = Products::new(base, &columns);
     let best = |counts: &[bool]| {
         let projected: DMatrix<f64> = products.projected(counts)?;
@@ -53,9 +54,19 @@ pub fn begun(
                     .collect();
                 let Some(weighed) = weigh(&projected, &places?, PRIOR_STEPS) else { continue };
                 let coefficients: Vec<f64> = weighed.coefficients.iter().copied().collect();
-                let wrong = choice.terms.iter().zip(&coefficients).any(|(term, c)| library[*term].positive && *c < 0.0);
+                let wrong = choice
+                    .terms
+                    .iter()
+                    .zip(&coefficients)
+                    .any(|(term, c)| library[*term].positive && *c < 0.0);
                 if !wrong && weighed.gain.is_finite() {
-                    found.push(Choice { gain: weighed.gain - rarity, rarity, begin, coefficients, terms: choice.terms.clone() });
+                    found.push(Choice {
+                        gain: weighed.gain - rarity,
+                        rarity,
+                        begin,
+                        coefficients,
+                        terms: choice.terms.clone(),
+                    });
                 }
             }
         }
@@ -67,7 +78,8 @@ pub fn begun(
     let again = folds.iter().filter(|fold| {
         let in_fold = best(fold);
         let of_fold = in_fold.as_ref().and_then(|found| found.first());
-        of_fold.is_some_and(|of_fold| of_fold.terms == first.terms && of_fold.begin.abs_diff(first.begin) <= 1)
+        of_fold
+            .is_some_and(|of_fold| of_fold.terms == first.terms && of_fold.begin.abs_diff(first.begin) <= 1)
     });
     let stability = again.count() as f64 / folds.len().max(1) as f64;
     let mut chosen: Vec<Choice> = Vec::new();

@@ -3,7 +3,9 @@
 
 use crate::law_effect::LawEffect;
 use crate::term::Term;
+use mapper_core::Channel;
 use mapper_gap::fit::Fit;
+use mapper_gap::nuisance::OUTPUTS;
 use mapper_gap::study::{Hypothesis, Prediction, Study};
 use mapper_gap::whiten::{Linearised, rows_of_step};
 use mapper_numerics::parallel;
@@ -69,15 +71,59 @@ impl<'a> Base<'a> {
     pub fn raw_changes(&self, terms: &[Term]) -> Vec<Option<Vec<f64>>> {
         let mut own = self.study.clone();
         let first = own.effects.len();
-        own.effects.extend(terms.iter().map(|term| Arc::new(LawEffect::new(vec![term.clone()])) as _));
-        let places: Vec<usize> = (0..terms.len()).collect();
-        parallel::map(&places, |place| {
+        let runs = runs(terms);
+        own.effects.extend(runs.iter().map(|run| {
+            let together = run.iter().map(|place| terms[*place].clone()).collect();
+            Arc::new(LawEffect::new(together)) as _
+        }));
+        let places: Vec<usize> = (0..runs.len()).collect();
+        let changes = parallel::map(&places, |place| {
             let mut there = self.hypothesis.clone();
-            there.effects.push((first + place, vec![BESIDE * terms[*place].step]));
+            let values = runs[*place].iter().map(|term| BESIDE * terms[*term].step).collect();
+            there.effects.push((first + place, values));
             let there = own.predict(&there).ok()?;
-            Some(there.values.iter().zip(&self.prediction.values).map(|(t, b)| (t - b) / BESIDE).collect())
-        })
+            let change = there.values.iter().zip(&self.prediction.values).map(|(t, b)| (t - b) / BESIDE);
+            Some(change.collect::<Vec<f64>>())
+        });
+        let mut of_terms: Vec<Option<Vec<f64>>> = vec![None; terms.len()];
+        for (run, change) in runs.iter().zip(changes) {
+            for term in run {
+                let sensor = terms[*term].sensor();
+                of_terms[*term] = change.clone().map(|change| match sensor {
+                    Some(channel) => self.of_sensor(channel, &change),
+                    None => change,
+                });
+            }
+        }
+        of_terms
     }
+
+    /// A change in one sensor's readings alone.
+    fn of_sensor(&self, channel: Channel, change: &[f64]) -> Vec<f64> {
+        let mut own = vec![0.0; change.len()];
+        for group in self.study.groups.iter().filter(|group| OUTPUTS[group.output] == channel) {
+            own[group.rows.clone()].copy_from_slice(&change[group.rows.clone()]);
+        }
+        own
+    }
+}
+
+/// Terms that share a run, by place: those of different sensors do not see each other.
+fn runs(terms: &[Term]) -> Vec<Vec<usize>> {
+    let mut runs: Vec<Vec<usize>> = Vec::new();
+    for (place, term) in terms.iter().enumerate() {
+        let beside = |run: &&mut Vec<usize>| {
+            term.sensor().is_some()
+                && run
+                    .iter()
+                    .all(|other| terms[*other].sensor().is_some() && terms[*other].sensor() != term.sensor())
+        };
+        match runs.iter_mut().find(beside) {
+            Some(run) => run.push(place),
+            None => runs.push(vec![place]),
+        }
+    }
+    runs
 }
 
 /// Products of columns over the rows of each step.

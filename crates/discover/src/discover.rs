@@ -15,7 +15,7 @@ use mapper_gap::adequacy::adequacy;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, prior};
 use mapper_gap::fit::{Effort, Fit, fit};
-use mapper_gap::place::{BEND, Explanation, RARITY, Gain, Part, of_fits, places_of, signature};
+use mapper_gap::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
 use mapper_gap::report::{Law, MissingForce, Place, Verdict};
 use mapper_gap::selection::Selection;
 use mapper_gap::study::{Study, members};
@@ -68,13 +68,14 @@ pub fn discover(
     });
     progress(0.4, "a law beside a cause");
     let left = found.as_ref().is_none_or(|found| !found.adequate);
-    if let (true, Some(best), Verdict::PartlyExplained) = (left, diagnosed.fits.first(), diagnosed.diagnosis.verdict) {
-        if let Some(beside) = beside(&mut bench, diagnosed, best, calibration, &training, &everywhere) {
-            let better = found.as_ref().and_then(|found| found.fitted.first()).is_none_or(|alone| {
-                beside.fitted.first().is_some_and(|both| both.score() > alone.score() + RARE_BESIDE)
-            });
-            found = if better { Some(beside) } else { found };
-        }
+    if left
+        && diagnosed.diagnosis.verdict == Verdict::PartlyExplained
+        && let Some(best) = diagnosed.fits.first()
+        && let Some(both) = beside(&mut bench, diagnosed, best, calibration, &training, &everywhere)
+    {
+        let score = |found: &Found| found.fitted.first().map_or(f64::NEG_INFINITY, Candidate::score);
+        let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + RARE_BESIDE);
+        found = if better { Some(both) } else { found };
     }
     progress(0.6, "what a law leaves");
     let laws = propose(diagnosed, calibration, &bench, found.as_ref(), &training);
@@ -86,7 +87,11 @@ pub fn discover(
     let forces = forces(&nothing, &everywhere.steps, &here);
     let places = places(diagnosed, &bench, found.as_ref(), &forces, null, bend);
     progress(1.0, "done");
-    Discovered { laws, forces: forces.into_iter().take(FORCES).map(told_force).collect(), places: Some(places) }
+    Discovered {
+        laws,
+        forces: forces.into_iter().take(FORCES).map(told_force).collect(),
+        places: Some(places),
+    }
 }
 
 /// Whether a diagnosis leaves something to be found.
@@ -164,10 +169,12 @@ fn found(
     }
     // What none of them explains may have begun in the middle.
     let alone = Found { trained: found.0, fitted: found.1, stability, adequate: false };
-    let Some((later, stability)) = begun(base, &mut bench.library, &on_training, &training.steps, &folds) else {
+    let Some((later, stability)) = begun(base, &mut bench.library, &on_training, &training.steps, &folds)
+    else {
         return Some(alone);
     };
-    let promised = later.first().is_some_and(|later| on_training.first().is_none_or(|first| later.gain > first.gain));
+    let promised =
+        later.first().is_some_and(|later| on_training.first().is_none_or(|first| later.gain > first.gain));
     let fits = if promised { fitted(bench, base, &later, training, everywhere) } else { None };
     Some(match fits {
         Some((trained, fitted)) if fitted.first()?.score() > alone.fitted.first()?.score() => {
@@ -212,13 +219,16 @@ fn propose(
     training: &Selection,
 ) -> Vec<Law> {
     let Some(found) = found else { return Vec::new() };
-    let (Some(trained), Some(best)) = (found.trained.first(), found.fitted.first()) else { return Vec::new() };
+    let Some(best) = found.fitted.first() else { return Vec::new() };
+    let Some(trained) = found.trained.iter().find(|trained| trained.effect == best.effect) else {
+        return Vec::new();
+    };
     let Diagnosed { study, linearised, null, fits, .. } = diagnosed;
     // Beyond nothing, and beyond the catalogue.
-    let inside = fits.iter().map(|fit| fit.score + prior(calibration, study, fit)).fold(
-        null.score + prior(calibration, study, null),
-        f64::max,
-    );
+    let inside = fits
+        .iter()
+        .map(|fit| fit.score + prior(calibration, study, fit))
+        .fold(null.score + prior(calibration, study, null), f64::max);
     if best.score() + PRIOR_LAW.ln() - inside < calibration.threshold {
         return Vec::new();
     }

@@ -32,7 +32,11 @@ pub fn weigh(products: &DMatrix<f64>, places: &[usize], prior_sigma: f64) -> Opt
 }
 
 /// The same for coefficients of a common prior covariance `scale^2 shape`.
-pub fn weigh_process(products: &DMatrix<f64>, right: &DVector<f64>, covariance: &DMatrix<f64>) -> Option<Posterior> {
+pub fn weigh_process(
+    products: &DMatrix<f64>,
+    right: &DVector<f64>,
+    covariance: &DMatrix<f64>,
+) -> Option<Posterior> {
     let k = right.len();
     // With K = R R': I + R' G R stays well conditioned whatever K is.
     let mut jittered = covariance.clone();

@@ -77,7 +77,9 @@ pub fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
             Balance::Reading(channel) => read(study, channel, shape),
             _ => run(base, balance, shape),
         };
-        columns.extend((0..steps).filter(|step| shape == Shape::Level || *step > 0).map(|step| of_shape[step].clone()));
+        columns.extend(
+            (0..steps).filter(|step| shape == Shape::Level || *step > 0).map(|step| of_shape[step].clone()),
+        );
     }
     for column in &mut columns {
         column.iter_mut().for_each(|value| *value *= balance.plain_size());
@@ -162,10 +164,11 @@ fn force(
     let mut best: Option<Posterior> = None;
     for exponent in -4..=6 {
         let scale = 2f64.powi(exponent);
-        if let Some(posterior) = weigh_process(&products, &right, &(&shape * (scale * scale))) {
-            if best.as_ref().is_none_or(|best| posterior.gain > best.gain) {
-                best = Some(posterior);
-            }
+        let posterior = weigh_process(&products, &right, &(&shape * (scale * scale)));
+        if let Some(posterior) = posterior
+            && best.as_ref().is_none_or(|best| posterior.gain > best.gain)
+        {
+            best = Some(posterior);
         }
     }
     let best = best?;

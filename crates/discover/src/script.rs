@@ -19,7 +19,8 @@ pub fn script_of(terms: &[&Term], told: &Told) -> Option<String> {
     let mut parameters = String::new();
     // Each balance with the sum that acts on it.
     let mut sums: Vec<(Balance, Vec<String>)> = Vec::new();
-    let mut put = |balance: Balance, text: String| match sums.iter_mut().find(|(other, _)| *other == balance) {
+    let mut put = |balance: Balance, text: String| match sums.iter_mut().find(|(other, _)| *other == balance)
+    {
         Some((_, texts)) => texts.push(text),
         None => sums.push((balance, vec![text])),
     };
@@ -54,20 +55,27 @@ pub fn script_of(terms: &[&Term], told: &Told) -> Option<String> {
         "//! effect: law_of_{submodel}\n//! description: {}\n//! equation: as below\n//! source: found by mapper gap diagnose\n//! submodel: {submodel}\n{parameters}",
         told.sentence
     );
-    let found: Vec<String> =
-        told.terms.iter().map(|t| format!("{}: {} ({} .. {}) {}", t.term, t.value, t.low, t.high, t.unit)).collect();
+    let found: Vec<String> = told
+        .terms
+        .iter()
+        .map(|t| format!("{}: {} ({} .. {}) {}", t.term, t.value, t.low, t.high, t.unit))
+        .collect();
     write!(text, "\n// Found, with 95 % intervals: {}.\n// `at` is the machine at one instant, `p` the parameters; SI.\n", found.join("; ")).ok()?;
     let mut gas = false;
     for (balance, texts) in &sums {
         let name = balance.hook_name()?;
         let sum = texts.join(" + ");
         let (arguments, body) = match balance {
-            Balance::CompressorHousing | Balance::TurbineHousing | Balance::Shaft | Balance::Outlet => ("at, p", sum),
+            Balance::CompressorHousing | Balance::TurbineHousing | Balance::Shaft | Balance::Outlet => {
+                ("at, p", sum)
+            }
             Balance::GasBefore | Balance::GasAfter | Balance::GasOutlet => {
                 gas = true;
                 ("at, p, value", format!("value + ({sum}) / (at.flow_kg_s * cp_j_kgk(value))"))
             }
-            Balance::Work | Balance::Convection | Balance::MapFlow => ("at, p, value", format!("value * (1.0 + {sum})")),
+            Balance::Work | Balance::Convection | Balance::MapFlow => {
+                ("at, p, value", format!("value * (1.0 + {sum})"))
+            }
             Balance::Reading(_) => ("at, p, value", format!("value + {sum}")),
             Balance::Lag(_) => continue,
         };

@@ -26,7 +26,8 @@ pub fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64>) -> V
     let mut offer = |places: &[usize], rarity: f64| {
         let Some(Weighed { gain, coefficients }) = weigh(products, places, PRIOR_STEPS) else { return };
         let terms: Vec<usize> = places.iter().map(|place| usable[*place]).collect();
-        let wrong = terms.iter().zip(coefficients.iter()).any(|(term, c)| library[*term].positive && *c < 0.0);
+        let wrong =
+            terms.iter().zip(coefficients.iter()).any(|(term, c)| library[*term].positive && *c < 0.0);
         if !wrong && gain.is_finite() {
             let coefficients = coefficients.iter().copied().collect();
             found.push(Choice { terms, gain: gain - rarity, rarity, begin: 0, coefficients });
@@ -58,7 +59,9 @@ fn go_together(a: &Term, b: &Term) -> bool {
         (Role::Slope, Role::Level) | (Role::Level, Role::Slope) => same_balance,
         (Role::Slope, _) | (_, Role::Slope) => false,
         // A level beside a known sink is a sink that is not known.
-        (Role::Level, Role::Exchange) | (Role::Exchange, Role::Level) => !same_balance && a.submodel() == b.submodel(),
+        (Role::Level, Role::Exchange) | (Role::Exchange, Role::Level) => {
+            !same_balance && a.submodel() == b.submodel()
+        }
         _ => a.submodel() == b.submodel(),
     }
 }

@@ -24,7 +24,9 @@ impl Uncertain {
         }
         // Two figures of the interval.
         let decimals = (1.0 - half.log10().floor()).clamp(0.0, 9.0) as usize;
-        format!("({value:.decimals$} +/- {half:.decimals$}) {}", if unit == "1" { "" } else { unit }).trim_end().to_owned()
+        format!("({value:.decimals$} +/- {half:.decimals$}) {}", if unit == "1" { "" } else { unit })
+            .trim_end()
+            .to_owned()
     }
 }
 
@@ -47,7 +49,9 @@ pub fn tell(library: &[Term], candidate: &Candidate, interval_factor: f64) -> To
     // The law's coordinates are the last of the fit, in steps.
     let first = covariance.nrows().saturating_sub(terms.len());
     let cov = |i: usize, j: usize| {
-        covariance.get((first + i, first + j)).copied().unwrap_or(f64::INFINITY) * terms[i].step * terms[j].step
+        covariance.get((first + i, first + j)).copied().unwrap_or(f64::INFINITY)
+            * terms[i].step
+            * terms[j].step
     };
     let widened = 1.96 * interval_factor;
     let numbers: Vec<Uncertain> = (0..terms.len())
@@ -62,7 +66,8 @@ pub fn tell(library: &[Term], candidate: &Candidate, interval_factor: f64) -> To
     };
     if let Some((slope, level)) = sink(&terms) {
         let ratio = values[level] / values[slope];
-        let variance = (cov(level, level) - 2.0 * ratio * cov(level, slope) + ratio * ratio * cov(slope, slope))
+        let variance = (cov(level, level) - 2.0 * ratio * cov(level, slope)
+            + ratio * ratio * cov(slope, slope))
             / (values[slope] * values[slope]);
         let sink = Uncertain { value: REFERENCE_K + ratio, half: widened * variance.max(0.0).sqrt() };
         let in_celsius = Uncertain { value: sink.value - 273.15, ..sink };

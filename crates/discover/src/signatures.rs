@@ -35,7 +35,8 @@ pub fn signatures(study: &Study, linearised: &Linearised) -> Signatures {
         let values = parameters.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high)).collect();
         let mut with = study.nothing();
         with.effects.push((*place, values));
-        let there = study.predict(&with).map_or_else(|_| linearised.base.values.clone(), |there| there.values);
+        let there =
+            study.predict(&with).map_or_else(|_| linearised.base.values.clone(), |there| there.values);
         let mut change: Vec<f64> = there.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
         linearised.whiten(study, &mut change);
         change
@@ -65,7 +66,11 @@ pub fn signatures(study: &Study, linearised: &Linearised) -> Signatures {
         .map(|effect| {
             let of = |row: &Vec<(f64, f64)>| row.get(*effect).copied().unwrap_or((0.0, 0.0));
             let sigma = shares.first().map_or(0.0, |row| of(row).0.sqrt());
-            (study.effects[*effect].info().id.to_string(), sigma, shares.iter().map(|row| of(row).1).collect())
+            (
+                study.effects[*effect].info().id.to_string(),
+                sigma,
+                shares.iter().map(|row| of(row).1).collect(),
+            )
         })
         .collect();
     Signatures { balances, effects }

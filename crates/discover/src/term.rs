@@ -2,10 +2,10 @@
 
 use crate::balance::Balance;
 use crate::expression::Expression;
+use mapper_core::Channel;
 use mapper_physics::air;
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
-use mapper_core::Channel;
 
 /// What a term is to others of its balance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +43,14 @@ impl Term {
     /// Where it sits.
     pub fn balance(&self) -> Balance {
         self.acts_on[0].0
+    }
+
+    /// The sensor in whose reading alone it acts, if it does.
+    pub fn sensor(&self) -> Option<Channel> {
+        match self.acts_on[..] {
+            [(Balance::Reading(channel) | Balance::Lag(channel), _)] => Some(channel),
+            _ => None,
+        }
     }
 
     /// Whether it has a memory of its own, as a lag has.
@@ -101,7 +109,11 @@ impl TermHooks {
     /// Temperature of the gas after heat from a balance.
     fn heated_k(&self, at: Balance, site: &Site<'_>, gas_k: f64) -> f64 {
         let heat_w = self.sum(at, site, gas_k);
-        if heat_w == 0.0 { gas_k } else { gas_k + heat_w / (site.flow_kg_s * air::heat_capacity_j_kgk(gas_k)) }
+        if heat_w == 0.0 {
+            gas_k
+        } else {
+            gas_k + heat_w / (site.flow_kg_s * air::heat_capacity_j_kgk(gas_k))
+        }
     }
 }
 

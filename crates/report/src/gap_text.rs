@@ -67,16 +67,19 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     text
 }
 
+/// A law less probable than this closes a gap without being its truth.
+const NOT_THE_TRUTH: f64 = 0.05;
+
 /// What is missing and by which law.
 fn laws(diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
     if let (Some(force), Some(place)) = (diagnosis.forces.first(), diagnosis.r#where.first())
         && force.submodel == place.submodel
     {
-        let (low, high) = force
-            .steps
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), [value, ..]| (low.min(*value), high.max(*value)));
+        let (low, high) =
+            force.steps.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), [value, ..]| {
+                (low.min(*value), high.max(*value))
+            });
         text += &format!(
             "\nmissing\n  {}: {} .. {} over the steps\n",
             force.force,
@@ -91,6 +94,9 @@ fn laws(diagnosis: &Diagnosis) -> String {
             100.0 * law.probability,
             100.0 * law.shrink
         );
+        if law.probability < NOT_THE_TRUTH {
+            text += "  what it leaves is more than noise: its form is not the true one\n";
+        }
         for other in &law.equivalent {
             text += &format!("  cannot be told apart from: {other}\n");
         }

@@ -45,7 +45,8 @@ impl ScriptEffect {
         }
         let Header { info, lags } = header::read(text).map_err(|(line, message)| fail(line, message))?;
         let names: Vec<String> = info.parameters.iter().map(|parameter| parameter.name.to_string()).collect();
-        let program = Program::new(text, names, lags.is_empty()).map_err(|(line, message)| fail(line, message))?;
+        let program =
+            Program::new(text, names, lags.is_empty()).map_err(|(line, message)| fail(line, message))?;
         Ok(ScriptEffect { info, lags, program: Arc::new(program) })
     }
 }

@@ -52,8 +52,9 @@ pub(super) fn read(text: &str) -> Result<Header, Mistake> {
                 parameters.push(parameter);
             }
             "lag" => {
-                let (channel, name) =
-                    value.split_once(char::is_whitespace).ok_or_else(|| here(format!("write `{LAG_FORM}`")))?;
+                let (channel, name) = value
+                    .split_once(char::is_whitespace)
+                    .ok_or_else(|| here(format!("write `{LAG_FORM}`")))?;
                 let channel: Channel = channel.parse().map_err(|unknown| here(format!("{unknown}")))?;
                 lags.push((channel, name.trim().to_owned()));
             }

@@ -10,10 +10,12 @@ use crate::term::{Role, Term};
 use mapper_gap::whiten::rows_of_step;
 use nalgebra::DMatrix;
 
-/// Choices that are tried with a beginning.
-const TRIED: usize = 8;
+/// Terms that are tried with a beginning.
+const TRIED: usize = 12;
 /// Of one part of the machine.
-const OF_A_PART: usize = 3;
+const OF_A_PART: usize = 7;
+/// Parts of the machine whose constants are tried.
+const PARTS: usize = 2;
 
 /// The best choices again, each with the step from which on the recording asks for it, best first. Their terms are added to the
 /// library. `choices` were made on the same products' steps, best first.
@@ -24,12 +26,23 @@ pub fn begun(
     counts: &[bool],
     folds: &[Vec<bool>],
 ) -> Option<(Vec<Choice>, f64)> {
-    let mut tried: Vec<&Choice> = Vec::new();
+    let part = |choice: &Choice| library[choice.terms[0]].submodel();
+    let mut parts = Vec::new();
     for choice in choices {
-        let part = |choice: &Choice| library[choice.terms[0]].submodel();
+        if parts.len() < PARTS && !parts.contains(&part(choice)) {
+            parts.push(part(choice));
+        }
+    }
+    // A constant that begins looks like anything but a constant: those of the best parts are tried whatever they promise.
+    let constants = choices.iter().filter(|choice| {
+        choice.terms.iter().all(|term| library[*term].is_constant()) && parts.contains(&part(choice))
+    });
+    let mut tried: Vec<&Choice> = Vec::new();
+    for choice in constants.chain(choices) {
         let lags = choice.terms.iter().any(|term| library[*term].has_memory());
         let of_part = tried.iter().filter(|other| part(other) == part(choice)).count();
-        if !lags && of_part < OF_A_PART && tried.len() < TRIED {
+        let known = tried.iter().any(|other| other.terms == choice.terms);
+        if choice.terms.len() == 1 && !lags && !known && of_part < OF_A_PART && tried.len() < TRIED {
             tried.push(choice);
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::law_effect::LawEffect;
 use crate::select::Choice;
-use crate::term::Term;
+use crate::term::{Role, Term};
 use mapper_gap::fit::{Effort, Fit, fit};
 use mapper_gap::selection::Selection;
 use mapper_gap::study::{Hypothesis, Study};
@@ -26,6 +26,19 @@ impl Candidate {
     /// Logarithm of the evidence, rarity included.
     pub fn score(&self) -> f64 {
         self.fit.score - self.choice.rarity
+    }
+
+    /// Whether the data tell every coefficient from 0, but for the level beside a slope, which may be anything.
+    pub fn is_determined(&self, library: &[Term]) -> bool {
+        let covariance = &self.fit.covariance;
+        let terms: Vec<&Term> = self.choice.terms.iter().map(|place| &library[*place]).collect();
+        let first = covariance.nrows().saturating_sub(terms.len());
+        let sink = terms.iter().any(|term| term.role == Role::Slope);
+        let values = self.coefficients();
+        terms.iter().zip(values).enumerate().all(|(place, (term, value))| {
+            let variance = covariance.get((first + place, first + place)).copied().unwrap_or(f64::INFINITY);
+            (sink && term.role == Role::Level) || (value / term.step).abs() > LEAST_SIGMAS * variance.sqrt()
+        })
     }
 
     /// The law's coefficients.
@@ -112,6 +125,16 @@ impl Bench {
     }
 }
 
+/// A coefficient nearer to 0 than this, in standard errors, says nothing.
+const LEAST_SIGMAS: f64 = 2.0;
+
+/// Drops candidates with a coefficient that says nothing, where others are left.
+pub fn keep_determined(library: &[Term], candidates: &mut Vec<Candidate>) {
+    if candidates.iter().any(|candidate| candidate.is_determined(library)) {
+        candidates.retain(|candidate| candidate.is_determined(library));
+    }
+}
+
 /// Best first.
 pub fn sort(candidates: &mut [Candidate]) {
     candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
@@ -137,6 +160,6 @@ pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
 /// Share of the best's promise that another part of the machine must promise.
 const PROMISE: f64 = 0.3;
 /// Laws that are fitted.
-const MOST: usize = 8;
-const OF_THE_BEST_PART: usize = 4;
+const MOST: usize = 6;
+const OF_THE_BEST_PART: usize = 3;
 const OF_OTHER_PARTS: usize = 1;

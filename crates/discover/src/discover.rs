@@ -2,7 +2,7 @@
 
 use crate::balance::Balance;
 use crate::begun::begun;
-use crate::candidate::{Bench, Candidate, worth};
+use crate::candidate::{Bench, Candidate, keep_determined, worth};
 use crate::columns::{Base, Products};
 use crate::force::{Force, forces};
 use crate::held_out::shrink;
@@ -195,13 +195,15 @@ fn fitted(
 ) -> Option<(Vec<Candidate>, Vec<Candidate>)> {
     let quick = Effort { iterations: 3, enough: 1.0, ..Effort::default() };
     let mut trained = bench.fit(&base.hypothesis, base.linearised, chosen, training, quick);
+    keep_determined(&bench.library, &mut trained);
     trained.truncate(FINALISTS);
     // Tolerances act otherwise beside something strong.
     let beside = base.linearised.at(&bench.study, &trained.first()?.fit.hypothesis).ok();
     let linearised = beside.as_ref().unwrap_or(base.linearised);
     let effort = Effort { iterations: 5, enough: 0.2, ..Effort::default() };
     let trained = bench.refit(&trained, linearised, training, effort);
-    let fitted = bench.refit(&trained, linearised, everywhere, effort);
+    let mut fitted = bench.refit(&trained, linearised, everywhere, effort);
+    keep_determined(&bench.library, &mut fitted);
     Some((trained, fitted))
 }
 

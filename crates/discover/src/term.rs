@@ -53,6 +53,11 @@ impl Term {
         }
     }
 
+    /// Whether it is the same whatever the machine does.
+    pub fn is_constant(&self) -> bool {
+        matches!(self.acts_on[..], [(_, Expression::Number(_))])
+    }
+
     /// Whether it has a memory of its own, as a lag has.
     pub fn has_memory(&self) -> bool {
         self.acts_on.iter().any(|(balance, _)| matches!(balance, Balance::Lag(_)))

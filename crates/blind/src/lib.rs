@@ -30,6 +30,7 @@ pub use interval::{Share, clopper_pearson_95};
 pub use kind::CaseKind;
 pub use make::{Made, make};
 pub use outside::{OutsideUse, outside_kinds};
+pub use ruler::study_without_causes;
 pub use seal::{ANSWERS_NAME, MANIFEST_NAME, Manifest};
 pub use strength::Ruler;
 pub use truth::{Truth, TruthPoint};

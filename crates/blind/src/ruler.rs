@@ -6,7 +6,7 @@ use crate::error::BlindError;
 use crate::kind::CaseKind;
 use crate::lab::Schedule;
 use crate::strength::Ruler;
-use mapper_campaign::Campaign;
+use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::NoiseColour;
 use mapper_gap::signature::lengths;
 use mapper_gap::study::{EffectValues, Study};
@@ -17,6 +17,22 @@ use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// A recording of the campaign that has noise, offsets, tolerances and weather, and no cause, made ready with `effects`; equal
+/// seeds give equal recordings.
+///
+/// # Errors
+/// [`BlindError`] where the campaign has no nominal model or cannot be run.
+pub fn study_without_causes(
+    campaign: &Campaign,
+    effects: Vec<Arc<dyn Effect>>,
+    seed: u64,
+) -> Result<(Study, Linearised), BlindError> {
+    let nominal = nominal_model(campaign)?;
+    let StudyRuler { study, linearised } =
+        StudyRuler::new(campaign, &Schedule::new(campaign, &nominal)?, &nominal, effects, seed)?;
+    Ok((study, linearised))
+}
 
 /// Measures signatures on one recording of the campaign that has noise, offsets, tolerances and weather, and no cause.
 /// Those of other recordings of the same campaign differ by the weather, some per cent.

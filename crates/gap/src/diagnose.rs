@@ -205,6 +205,8 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         candidates: weighed.candidates,
         probability_none: weighed.none,
         probability_outside: weighed.outside_probability,
+        laws: Vec::new(),
+        forces: Vec::new(),
         gap,
         next,
         warnings,

@@ -1,7 +1,9 @@
-//! Where the gap lies: the parts of the model whose freedom accounts for most of it.
+//! Where the gap lies: what explains it, and in which parts of the machine that sits.
 //!
-//! A part's gain is by how much the best effect that sits in it reduces the misfit, nuisances refitted. Channel, phase and
-//! region are those in which that effect shows most.
+//! Each explanation (a fitted cause, a law, a force missing in one balance) has a score and its parts. A part's share of an
+//! explanation is by how much it reduces the misfit beside the others; a part's share of the gap is the mean of these over
+//! the explanations, weighted with their probability. So shares add up to 1, and what is in order has none: whatever a
+//! healthy sensor would have to read to account for the gap, something else accounts for it better.
 
 use crate::fit::Fit;
 use crate::nuisance::OUTPUTS;
@@ -10,8 +12,14 @@ use crate::study::{PointState, Study, members};
 use crate::whiten::Linearised;
 use mapper_physics::effect::Submodel;
 
-/// A part that reduces it by less, in squared sigmas, is not a place.
-const LEAST_GAIN: f64 = 4.0;
+/// A part with less of the gap is not a place.
+const LEAST_SHARE: f64 = 0.01;
+
+/// A straight line is off by this part of what it gains: explanations nearer to each other than that stay open.
+pub const BEND: f64 = 0.01;
+
+/// What one more effect costs in the logarithm of the evidence, roughly.
+pub const RARITY: f64 = 5.0;
 
 /// Phases of a step: name and first second after the jump.
 const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 30.0)];
@@ -25,17 +33,54 @@ pub struct Gain<'a> {
     pub gain: f64,
 }
 
-/// One part with its gain, the fit in which it shows, and the effect that stands for it.
-#[derive(Clone, Copy)]
-struct Part<'a> {
-    submodel: Submodel,
-    gain: f64,
-    fit: &'a Fit,
-    effect: usize,
+/// What a part of the machine does in an explanation.
+pub struct Part<'a> {
+    /// The part.
+    pub submodel: Submodel,
+    /// By how much it reduces the misfit beside the others, squared sigmas.
+    pub gain: f64,
+    /// What it changes in the recording, in the channels' units.
+    pub signature: Box<dyn Fn() -> Option<Vec<f64>> + 'a>,
+}
+
+/// Something that accounts for the gap, in one part of the machine or several.
+pub struct Explanation<'a> {
+    /// Logarithm of the evidence, over that of nothing.
+    pub score: f64,
+    /// Its parts.
+    pub parts: Vec<Part<'a>>,
+}
+
+/// The fits as explanations. `fits` are single effects and more, best first.
+pub fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>]) -> Vec<Explanation<'a>> {
+    let explanation = |candidate: &'a Gain<'_>| {
+        let all = members(&candidate.fit.hypothesis);
+        let parts = all.iter().map(|effect| {
+            let without: Vec<usize> = all.iter().copied().filter(|other| other != effect).collect();
+            let others = fits.iter().find(|f| members(&f.fit.hypothesis) == without).map_or(0.0, |f| f.gain);
+            let effect = *effect;
+            Part {
+                submodel: study.effects[effect].info().submodel,
+                gain: (candidate.gain - others).max(0.0),
+                signature: Box::new(move || signature(study, candidate.fit, effect)),
+            }
+        });
+        // Scores of fits to some steps and to all are not alike, gains are.
+        Explanation { score: 0.5 * candidate.gain - RARITY * all.len() as f64, parts: parts.collect() }
+    };
+    fits.iter().map(explanation).collect()
+}
+
+/// What one effect of a fit changes.
+pub fn signature(study: &Study, fit: &Fit, effect: usize) -> Option<Vec<f64>> {
+    let mut without = fit.hypothesis.clone();
+    without.effects.retain(|(index, _)| *index != effect);
+    let there = study.predict(&without).ok()?;
+    Some(fit.prediction.values.iter().zip(&there.values).map(|(with, without)| with - without).collect())
 }
 
 /// Places of the gap, largest first. `fits` are single effects and pairs, best first; where `named` is set, the first of
-/// them is the cause, and its parts come first.
+/// them is the cause.
 pub fn places(
     study: &Study,
     linearised: &Linearised,
@@ -43,63 +88,68 @@ pub fn places(
     fits: &[Gain<'_>],
     named: bool,
 ) -> Vec<Place> {
-    // What no hypothesis gets below is noise.
-    let excess = fits.iter().map(|f| f.gain).fold(1.0, f64::max);
-    let submodel = |effect: usize| study.effects[effect].info().submodel;
-    let mut first: Vec<Part<'_>> = Vec::new();
-    if let (true, Some(best)) = (named, fits.first()) {
-        let of_best = members(&best.fit.hypothesis);
-        for effect in &of_best {
-            // By how much this one reduces it beside the others.
-            let without: Vec<usize> = of_best.iter().copied().filter(|other| other != effect).collect();
-            let others = fits.iter().find(|f| members(&f.fit.hypothesis) == without).map_or(0.0, |f| f.gain);
-            let gain = (best.gain - others).max(0.0);
-            offer(&mut first, Part { submodel: submodel(*effect), gain, fit: best.fit, effect: *effect });
-        }
-    }
-    let mut singles: Vec<Part<'_>> = Vec::new();
-    for candidate in fits {
-        if let [effect] = members(&candidate.fit.hypothesis)[..] {
-            let part = submodel(effect);
-            if first.iter().all(|other| other.submodel != part) {
-                offer(
-                    &mut singles,
-                    Part { submodel: part, gain: candidate.gain, fit: candidate.fit, effect },
-                );
+    let considered = if named { &fits[..fits.len().min(1)] } else { fits };
+    // The fits beside it tell what each of its members does.
+    let mut explanations = of_fits(study, fits);
+    explanations.truncate(considered.len());
+    places_of(study, linearised, null, &explanations, if named { 0.0 } else { BEND })
+}
+
+/// Places of the gap by what explains it, largest first. Explanations nearer to each other than `bend` of what the best gains
+/// stay open; 0 where the best leaves nothing.
+pub fn places_of(
+    study: &Study,
+    linearised: &Linearised,
+    null: &Fit,
+    explanations: &[Explanation<'_>],
+    bend: f64,
+) -> Vec<Place> {
+    let gain = |e: &Explanation<'_>| e.parts.iter().map(|part| part.gain).sum::<f64>();
+    let best = explanations.iter().map(|e| e.score).fold(f64::NEG_INFINITY, f64::max);
+    let most = explanations.iter().map(gain).fold(0.0, f64::max);
+    let temperature = 1.0 + bend * 0.5 * most;
+    let weights: Vec<f64> = explanations.iter().map(|e| ((e.score - best) / temperature).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    // Share, and the explanation in which the part has most.
+    let mut parts: Vec<(Submodel, f64, f64, &Part<'_>)> = Vec::new();
+    let mut whole = 0.0;
+    for (explanation, weight) in explanations.iter().zip(&weights) {
+        let of_all = gain(explanation);
+        whole += weight / total * of_all;
+        for part in explanation.parts.iter().filter(|_| of_all > 0.0) {
+            let share = weight / total * part.gain / of_all;
+            match parts.iter_mut().find(|(submodel, ..)| *submodel == part.submodel) {
+                Some((_, sum, largest, shown)) => {
+                    *sum += share;
+                    if share > *largest {
+                        (*largest, *shown) = (share, part);
+                    }
+                }
+                None => parts.push((part.submodel, share, share, part)),
             }
         }
     }
-    first.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    singles.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    first.extend(singles);
+    parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+    parts.retain(|(_, share, ..)| *share >= LEAST_SHARE);
     let points = study.points(&null.hypothesis).unwrap_or_default();
-    first
+    let shown = parts.into_iter().filter_map(|(submodel, share, _, part)| {
+        Some((submodel, share, show(study, linearised, &(part.signature)()?, &points)?))
+    });
+    let shown: Vec<(Submodel, f64, Shown)> = shown.collect();
+    let sum: f64 = shown.iter().map(|(_, share, _)| share).sum();
+    shown
         .into_iter()
-        .filter(|part| part.gain > LEAST_GAIN)
-        .filter_map(|part| {
-            let Part { submodel, gain, fit, effect } = part;
-            let shown = show(study, linearised, fit, effect, &points)?;
-            Some(Place {
-                submodel: submodel.name().to_owned(),
-                channel: OUTPUTS[shown.output].symbol().to_owned(),
-                phase: shown.phase.to_owned(),
-                region: shown.region,
-                share: (gain / excess).clamp(0.0, 1.0),
-                sigma: gain.max(0.0).sqrt(),
-                size: shown.size,
-                unit: OUTPUTS[shown.output].unit().to_owned(),
-            })
+        .map(|(submodel, share, shown)| Place {
+            submodel: submodel.name().to_owned(),
+            channel: OUTPUTS[shown.output].symbol().to_owned(),
+            phase: shown.phase.to_owned(),
+            region: shown.region,
+            share: share / sum,
+            sigma: (share / sum * whole).max(0.0).sqrt(),
+            size: shown.size,
+            unit: OUTPUTS[shown.output].unit().to_owned(),
         })
         .collect()
-}
-
-/// Keeps the better of two for one part.
-fn offer<'a>(parts: &mut Vec<Part<'a>>, part: Part<'a>) {
-    match parts.iter_mut().find(|other| other.submodel == part.submodel) {
-        Some(other) if other.gain >= part.gain => {}
-        Some(other) => *other = part,
-        None => parts.push(part),
-    }
 }
 
 struct Shown {
@@ -109,21 +159,13 @@ struct Shown {
     size: f64,
 }
 
-/// Where one effect of a fit shows most: its signature against the same fit without it.
-fn show(
-    study: &Study,
-    linearised: &Linearised,
-    fit: &Fit,
-    effect: usize,
-    points: &[PointState],
-) -> Option<Shown> {
-    let mut without = fit.hypothesis.clone();
-    without.effects.retain(|(index, _)| *index != effect);
-    let there = study.predict(&without).ok()?;
-    let signature: Vec<f64> =
-        fit.prediction.values.iter().zip(&there.values).map(|(with, without)| with - without).collect();
-    let mut whitened = signature.clone();
+/// Where a signature shows most; `None` where it shows nowhere.
+fn show(study: &Study, linearised: &Linearised, signature: &[f64], points: &[PointState]) -> Option<Shown> {
+    let mut whitened = signature.to_vec();
     linearised.whiten(study, &mut whitened);
+    if whitened.iter().map(|w| w * w).sum::<f64>() < 1e-6 {
+        return None;
+    }
     let energy = |keep: &dyn Fn(usize, usize, f64) -> bool| {
         let (mut whole, mut squares, mut count) = (0.0, 0.0, 0usize);
         for group in &study.groups {

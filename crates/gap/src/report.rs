@@ -30,6 +30,10 @@ pub struct Diagnosis {
     pub probability_none: f64,
     /// Probability that the cause is outside the catalogue.
     pub probability_outside: f64,
+    /// Laws found for what the catalogue leaves, best first; empty where none is proposed.
+    pub laws: Vec<Law>,
+    /// What each balance lacks if it alone lacks something, the most probable first; empty where nothing was looked for.
+    pub forces: Vec<MissingForce>,
     /// The gap before and after.
     pub gap: Gap,
     /// What to do next; `None` where nothing is left to settle.
@@ -70,6 +74,63 @@ pub struct Estimate {
     pub high: f64,
     /// Unit.
     pub unit: String,
+}
+
+/// A law that was found for a missing force.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Law {
+    /// Part of the model in which it sits.
+    pub submodel: String,
+    /// What it says, with its numbers.
+    pub sentence: String,
+    /// Its terms.
+    pub terms: Vec<LawTerm>,
+    /// Probability that it is this law, among all that were tried and none of them.
+    pub probability: f64,
+    /// Share of the gap that it removes on steps used neither to find nor to fit it.
+    pub shrink: f64,
+    /// Effects of the catalogue beside which it was found; empty where it stands alone.
+    pub beside: Vec<String>,
+    /// Share of the folds of steps, each left out once, in which the others ask for the same part and for this law's terms or
+    /// their like.
+    pub stability: f64,
+    /// Laws that the recording does not tell from this one, as sentences.
+    pub equivalent: Vec<String>,
+    /// The effect file that was written for it.
+    pub rhai: Option<String>,
+    /// What that file holds; `None` where a script cannot say it.
+    #[serde(skip)]
+    pub script: Option<String>,
+}
+
+/// One number of a law with its 95 % interval.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LawTerm {
+    /// What it is.
+    pub term: String,
+    /// Best value.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// The force that one balance lacks, if it is the only one that lacks something.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MissingForce {
+    /// Part of the model.
+    pub submodel: String,
+    /// What is missing.
+    pub force: String,
+    /// Its unit.
+    pub unit: String,
+    /// Logarithm of the evidence for it, over nothing missing.
+    pub evidence: f64,
+    /// At the end of each step: value and the ends of its 95 % interval.
+    pub steps: Vec<[f64; 3]>,
 }
 
 /// A cause: one effect or several together.

@@ -124,6 +124,10 @@ impl<I: Inputs> Inputs for Shifted<'_, I> {
         boundary
     }
 
+    fn time_s(&self, t_s: f64) -> f64 {
+        self.inputs.time_s(t_s)
+    }
+
     fn next_kink_s(&self, t_s: f64) -> f64 {
         self.inputs.next_kink_s(t_s)
     }

@@ -145,7 +145,7 @@ where
             inputs,
             last_s: before_end_s,
             boundary_s: pair[0],
-            prepared: model.prepare(&boundary),
+            prepared: model.prepare_at(inputs.time_s(pair[0]), &boundary),
         };
         // The speed line has a corner on the surge line, with an infinite slope on one side: short steps across it.
         let fast = end_s - pair[0] < 0.11;
@@ -212,7 +212,7 @@ impl<I: Inputs> DrivenSystem<'_, I> {
     fn prepare_for(&mut self, t_s: f64) {
         let t_s = t_s.min(self.last_s);
         if t_s != self.boundary_s {
-            self.prepared = self.model.prepare(&self.inputs.at(t_s));
+            self.prepared = self.model.prepare_at(self.inputs.time_s(t_s), &self.inputs.at(t_s));
             self.boundary_s = t_s;
         }
     }

@@ -11,6 +11,8 @@ use std::sync::Arc;
 /// What is known where a hook is asked; values that come later in the gas path are NaN.
 #[derive(Debug, Clone, Copy)]
 pub struct Site<'a> {
+    /// Time, s; NaN in a steady state and while everything holds still.
+    pub t_s: f64,
     /// Boundary conditions.
     pub boundary: &'a BoundaryConditions,
     /// States.
@@ -41,6 +43,7 @@ impl<'a> Site<'a> {
     /// A site of whose gas path nothing is known yet.
     #[inline]
     pub(crate) fn before_the_gas(
+        t_s: f64,
         boundary: &'a BoundaryConditions,
         state: &'a State,
         wall_k: f64,
@@ -48,6 +51,7 @@ impl<'a> Site<'a> {
         bearing_k: f64,
     ) -> Self {
         Site {
+            t_s,
             boundary,
             state,
             extra_k: &[],
@@ -109,6 +113,11 @@ pub trait Hooks: std::fmt::Debug + Send + Sync {
 
     /// Heat added to the turbine housing, W.
     fn heat_to_turbine_w(&self, _site: &Site<'_>) -> f64 {
+        0.0
+    }
+
+    /// Flow added to the volume behind the compressor, at the gas temperature there, kg/s; a leak is negative.
+    fn flow_to_outlet_kg_s(&self, _site: &Site<'_>) -> f64 {
         0.0
     }
 

@@ -7,6 +7,11 @@ pub trait Inputs {
     /// Boundary conditions at `t_s`.
     fn at(&self, t_s: f64) -> BoundaryConditions;
 
+    /// Time that hooks are told at `t_s`, s; NaN where nothing has a time, as in a steady state.
+    fn time_s(&self, t_s: f64) -> f64 {
+        t_s
+    }
+
     /// The next time after `t_s` at which a value or a slope jumps; infinity where none does.
     fn next_kink_s(&self, t_s: f64) -> f64;
 
@@ -17,6 +22,10 @@ pub trait Inputs {
 impl Inputs for BoundaryConditions {
     fn at(&self, _t_s: f64) -> BoundaryConditions {
         *self
+    }
+
+    fn time_s(&self, _t_s: f64) -> f64 {
+        f64::NAN
     }
 
     fn next_kink_s(&self, _t_s: f64) -> f64 {

@@ -32,6 +32,7 @@ pub struct Model {
 #[derive(Debug)]
 pub struct PreparedModel<'a> {
     model: &'a Model,
+    t_s: f64,
     boundary: BoundaryConditions,
     turbine: TurbineInlet,
     bearing_conductance_w_k: f64,
@@ -74,6 +75,12 @@ impl Model {
     /// The model under fixed boundary conditions, which the caller has [checked](BoundaryConditions::check).
     #[inline]
     pub fn prepare(&self, boundary: &BoundaryConditions) -> PreparedModel<'_> {
+        self.prepare_at(f64::NAN, boundary)
+    }
+
+    /// The same at a time, s, which hooks are told.
+    #[inline]
+    pub fn prepare_at(&self, t_s: f64, boundary: &BoundaryConditions) -> PreparedModel<'_> {
         let reference = self.map.reference();
         let humidity_kg_kg = self.params.compressor.humidity_kg_kg;
         let moist_cp_ratio = air::moist_heat_capacity_ratio(humidity_kg_kg);
@@ -82,6 +89,7 @@ impl Model {
         let cp1_j_kgk = moist_cp_ratio * air::heat_capacity_j_kgk(boundary.t1_k);
         PreparedModel {
             model: self,
+            t_s,
             boundary: *boundary,
             turbine: TurbineInlet::new(&self.params.turbine, boundary),
             bearing_conductance_w_k: housing::bearing_conductance_w_k(&self.params.bearing),
@@ -133,7 +141,7 @@ impl PreparedModel<'_> {
             state.tt_k,
             boundary.oil_temperature_k,
         );
-        let mut site = Site::before_the_gas(boundary, state, wall_k, pressure_ratio, bearing_k);
+        let mut site = Site::before_the_gas(self.t_s, boundary, state, wall_k, pressure_ratio, bearing_k);
         let mut flow_kg_s = flow_corrected_kg_s * self.flow_correction_ratio;
         let mut efficiency = on_map.efficiency * compressor.efficiency_scale_ratio;
         if HOOKED {
@@ -286,6 +294,7 @@ impl PreparedModel<'_> {
             compressor_heat_w: sum(|hook, site| hook.heat_to_compressor_w(site)),
             inner_heat_w: sum(|hook, site| hook.heat_to_inner_w(site)),
             turbine_heat_w: sum(|hook, site| hook.heat_to_turbine_w(site)),
+            outlet_flow_kg_s: sum(|hook, site| hook.flow_to_outlet_kg_s(site)),
             shaft_power_w: sum(|hook, site| hook.shaft_torque_nm(site)) * site.state.shaft_speed_rad_s,
             extra_rates_k_s: hooks.extra_rates_k_s(site),
         }
@@ -301,6 +310,7 @@ impl PreparedModel<'_> {
             t2_prime_k: outputs.t2_prime_k,
             t2_k: outputs.t2_k,
             ..Site::before_the_gas(
+                self.t_s,
                 &self.boundary,
                 state,
                 outputs.wall_k,
@@ -365,7 +375,7 @@ impl PreparedModel<'_> {
         let all: [f64; MAX_STATES] = [
             self.shaft_balance_w(outputs) / (params.shaft_inertia_kgm2 * state.shaft_speed_rad_s),
             air::HEAT_CAPACITY_RATIO * self.gas_constant_j_kgk * outputs.t2_k / params.outlet.volume_m3
-                * (outputs.flow_kg_s - outputs.valve_flow_kg_s),
+                * (outputs.flow_kg_s - outputs.valve_flow_kg_s + outputs.added.outlet_flow_kg_s),
             self.compressor_housing_balance_w(state, outputs)
                 / (outer_ratio * housing::compressor_capacity_j_k(params, state.tc_k)),
             self.turbine_housing_balance_w(state, outputs)

@@ -69,6 +69,8 @@ pub struct Added {
     pub turbine_heat_w: f64,
     /// Power to the shaft, W.
     pub shaft_power_w: f64,
+    /// Flow to the volume behind the compressor, kg/s.
+    pub outlet_flow_kg_s: f64,
     /// Rates of the hidden temperatures, K/s.
     pub extra_rates_k_s: [f64; MAX_EXTRA],
 }

@@ -214,7 +214,7 @@ where
         let kink_s = inputs.next_kink_s(start_s);
         let stretch_end_s = kink_s.min(end_s);
         let boundary = checked(inputs, start_s)?;
-        let prepared = model.prepare(&boundary);
+        let prepared = model.prepare_at(inputs.time_s(start_s), &boundary);
         let constant = inputs.is_constant_after(start_s);
         let mut system = ModelSystem { model, prepared, inputs, constant };
         while integrator.t_s < stretch_end_s {
@@ -307,7 +307,7 @@ struct ModelSystem<'a, I: Inputs> {
 impl<I: Inputs> ModelSystem<'_, I> {
     fn prepare_for(&mut self, t_s: f64) {
         if !self.constant {
-            self.prepared = self.model.prepare(&self.inputs.at(t_s));
+            self.prepared = self.model.prepare_at(self.inputs.time_s(t_s), &self.inputs.at(t_s));
         }
     }
 }

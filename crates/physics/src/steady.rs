@@ -183,7 +183,7 @@ fn gas_path_at_rest(
     let highest_pa = boundary.p1_pa * (1.0 + 2.0 * (surge_pr - 1.0).max(1e-3));
     let p2_pa = root_between(boundary.p1_pa, highest_pa, 0.0, |p2_pa| {
         let outputs = prepared.evaluate(&at(p2_pa));
-        outputs.flow_kg_s - outputs.valve_flow_kg_s
+        outputs.flow_kg_s - outputs.valve_flow_kg_s + outputs.added.outlet_flow_kg_s
     })
     .ok_or(SteadyError::NoFlowBalance { speed_rpm, valve_opening_ratio })?;
     let state = at(p2_pa);

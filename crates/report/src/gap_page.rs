@@ -1,6 +1,7 @@
 //! A diagnosis as a page with pictures: one HTML file that needs nothing else.
 
 use crate::gap_text::{gap_text, headline};
+use crate::number::four_figures;
 use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
 use mapper_core::Channel;
@@ -32,11 +33,18 @@ pub fn gap_page(title: &str, done: &Diagnosed) -> String {
             body {
                 h1 { (headline(diagnosis)) }
                 p { (title) }
+                @for law in &diagnosis.laws {
+                    p { "A law for what is missing in " (law.submodel) ": " b { (law.sentence) } }
+                }
                 h2 { "Which" }
                 (causes(done))
                 h2 { "Where" }
                 (places(done))
                 (PreEscaped(map_of_where(done)))
+                @if !diagnosis.forces.is_empty() {
+                    h2 { "Missing forces, each as if it were the only one" }
+                    (forces(done))
+                }
                 h2 { "Residuals without the cause, step by channel, in sigma" }
                 p {
                     "Each number is the root mean square of a step and channel in units of what is declared: 1 is noise. \
@@ -74,6 +82,28 @@ fn causes(done: &Diagnosed) -> Markup {
                     td { (format!("{:.1} %", 100.0 * probability)) }
                     td.left {
                         span.bar style=(format!("width:{:.0}px", 300.0 * probability.clamp(0.0, 1.0))) {}
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What each balance lacks at the end of each step, if it alone lacks something.
+fn forces(done: &Diagnosed) -> Markup {
+    html! {
+        table {
+            tr {
+                th { "balance" }
+                th { "unit" }
+                @for step in 1..=done.study.steps.len() { th { (step) } }
+            }
+            @for force in &done.diagnosis.forces {
+                tr {
+                    td { (force.force) }
+                    td { (force.unit) }
+                    @for [value, low, high] in &force.steps {
+                        td title=(format!("{low:.3e} .. {high:.3e}")) { (four_figures(*value)) }
                     }
                 }
             }

@@ -38,6 +38,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     }
     text += &format!("  {:>5.1} %  nothing beyond tolerance\n", 100.0 * diagnosis.probability_none);
     text += &format!("  {:>5.1} %  a cause outside the catalogue\n", 100.0 * diagnosis.probability_outside);
+    text += &laws(diagnosis);
     text += &how_far(&diagnosis.gap);
     if let Some(next) = &diagnosis.next {
         text += "\nwhat next\n";
@@ -61,6 +62,46 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         text += "\nbefore you believe it\n";
         for warning in &diagnosis.warnings {
             text += &format!("  {warning}\n");
+        }
+    }
+    text
+}
+
+/// A law less probable than this closes a gap without being its truth.
+const NOT_THE_TRUTH: f64 = 0.05;
+
+/// What is missing and by which law.
+fn laws(diagnosis: &Diagnosis) -> String {
+    let mut text = String::new();
+    if let (Some(force), Some(place)) = (diagnosis.forces.first(), diagnosis.r#where.first())
+        && force.submodel == place.submodel
+    {
+        let (low, high) =
+            force.steps.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), [value, ..]| {
+                (low.min(*value), high.max(*value))
+            });
+        text += &format!(
+            "\nmissing\n  {}: {} .. {} over the steps\n",
+            force.force,
+            four_figures(low),
+            with_unit(four_figures(high), &force.unit)
+        );
+    }
+    for law in &diagnosis.laws {
+        text += &format!(
+            "\nlaw\n  {}\n  {:.0} %; removes {:.0} % of the gap on held-out steps\n",
+            law.sentence,
+            100.0 * law.probability,
+            100.0 * law.shrink
+        );
+        if law.probability < NOT_THE_TRUTH {
+            text += "  what it leaves is more than noise: its form is not the true one\n";
+        }
+        for other in &law.equivalent {
+            text += &format!("  cannot be told apart from: {other}\n");
+        }
+        if let Some(file) = &law.rhai {
+            text += &format!("  written to {file}: give it with --effect\n");
         }
     }
     text

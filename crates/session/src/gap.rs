@@ -7,6 +7,7 @@ use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
 use mapper_core::Recording;
+use mapper_discover::discover::discover;
 use mapper_drift::{CauseKind, DriftReport, without_drift};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, Question, diagnose};
@@ -68,15 +69,22 @@ impl Session<'_> {
         let progress = |done_ratio: f64, what: &str| {
             self.tell(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };
+        let calibration = Calibration::shipped().map_err(SessionError::Calibration)?;
         let mut diagnosed = diagnose(Question {
             recording: &recording,
             declared,
             jumps: allowed_jumps(campaign, &model)?,
             model,
             effects,
-            calibration: Calibration::shipped().map_err(SessionError::Calibration)?,
+            calibration: calibration.clone(),
             progress: &progress,
         })?;
+        let found = discover(&diagnosed, &calibration, &progress);
+        diagnosed.diagnosis.laws = found.laws;
+        diagnosed.diagnosis.forces = found.forces;
+        if let Some(places) = found.places {
+            diagnosed.diagnosis.r#where = places;
+        }
         // What was wrong with the file belongs to what is said about it.
         let warnings = recorded.read.warnings.iter().map(ToString::to_string);
         diagnosed.diagnosis.warnings.extend(warnings);
@@ -138,8 +146,11 @@ fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     {
         diagnosis.verdict = Verdict::WithinTolerance;
         diagnosis.r#where.clear();
+        diagnosis.forces.clear();
         diagnosis.next = None;
     }
+    // What changes with time is in no law.
+    diagnosis.laws.clear();
     if !taken_off && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
         diagnosis.verdict = Verdict::Unexplained;
     }

@@ -13,7 +13,9 @@ pub use error::ScriptEffectError;
 pub use hook_names::HOOK_NAMES;
 
 use engine::Program;
+use header::Header;
 use hooks::ScriptHooks;
+use mapper_core::Channel;
 use mapper_physics::effect::{Effect, EffectError, EffectInfo, NamedValues, Rig};
 use std::path::Path;
 use std::sync::Arc;
@@ -25,6 +27,8 @@ const SCRIPT_LIMIT: usize = 64 << 10;
 #[derive(Debug, Clone)]
 pub struct ScriptEffect {
     info: EffectInfo,
+    /// Sensors that follow late, each by the parameter that holds its time constant, s.
+    lags: Vec<(Channel, String)>,
     program: Arc<Program>,
 }
 
@@ -39,10 +43,11 @@ impl ScriptEffect {
         if text.len() > SCRIPT_LIMIT {
             return Err(fail(None, format!("{} bytes are more than {SCRIPT_LIMIT}", text.len())));
         }
-        let info = header::read(text).map_err(|(line, message)| fail(line, message))?;
+        let Header { info, lags } = header::read(text).map_err(|(line, message)| fail(line, message))?;
         let names: Vec<String> = info.parameters.iter().map(|parameter| parameter.name.to_string()).collect();
-        let program = Program::new(text, names).map_err(|(line, message)| fail(line, message))?;
-        Ok(ScriptEffect { info, program: Arc::new(program) })
+        let program =
+            Program::new(text, names, lags.is_empty()).map_err(|(line, message)| fail(line, message))?;
+        Ok(ScriptEffect { info, lags, program: Arc::new(program) })
     }
 }
 
@@ -54,6 +59,12 @@ impl Effect for ScriptEffect {
     fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
         // At neutral it is not there, however the script rounds.
         if values.is_neutral() {
+            return Ok(());
+        }
+        for (channel, name) in &self.lags {
+            rig.instruments.path_mut(*channel).lag_s += values.get(name)?;
+        }
+        if self.program.takes_no_part() {
             return Ok(());
         }
         Ok(rig.hook(ScriptHooks::new(self.program.clone(), self.program.numbers(values)?))?)

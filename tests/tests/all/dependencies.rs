@@ -26,6 +26,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-assemble",  &["core", "numerics", "physics", "identify"]),
     ("mapper-drift",     &["core", "numerics", "physics", "observe", "identify"]),
     ("mapper-gap",       &["core", "numerics", "physics", "observe"]),
+    ("mapper-discover",  &["core", "numerics", "physics", "gap"]),
     ("mapper-history",   &["numerics"]),
     ("mapper-reproduce", &["core", "numerics", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
@@ -41,9 +42,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // The page of a run, for a browser.
     ("mapper-page",      &["core", "chart", "mesh", "campaign", "assemble", "identify", "observe", "record", "report"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "drift", "driven", "history", "assemble", "report", "page", "numerics"]),
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics"]),
     // The program names the plug-ins; nothing sees the program.
-    ("mapper-cli",       &["core", "physics", "campaign", "planner", "record", "drift", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "backends", "blind", "effects", "formats"]),
+    ("mapper-cli",       &["core", "physics", "campaign", "planner", "record", "drift", "gap", "discover", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "backends", "blind", "effects", "formats"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

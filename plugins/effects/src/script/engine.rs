@@ -34,7 +34,8 @@ pub(super) struct At {
 type Field = fn(&Site<'_>) -> f64;
 
 /// What a script sees, by its name. Values that come later in the gas path than a hook are NaN there.
-const FIELDS: [(&str, Field); 22] = [
+const FIELDS: [(&str, Field); 23] = [
+    ("t_s", |site| site.t_s),
     ("speed_rad_s", |site| site.state.shaft_speed_rad_s),
     ("speed_rpm", |site| site.state.shaft_speed_rpm()),
     ("p1_pa", |site| site.boundary.p1_pa),
@@ -91,7 +92,8 @@ thread_local! {
 
 impl Program {
     /// Compiles a script to see that it can be.
-    pub(super) fn new(text: &str, parameters: Vec<String>) -> Result<Self, Mistake> {
+    /// `takes_part`: whether it must define one hook at least.
+    pub(super) fn new(text: &str, parameters: Vec<String>, takes_part: bool) -> Result<Self, Mistake> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let Compiled { ast, .. } = compile(text, &parameters)?;
         let mut defined = BTreeSet::new();
@@ -114,7 +116,7 @@ impl Program {
             }
             defined.insert(name.to_owned());
         }
-        if defined.is_empty() {
+        if defined.is_empty() && takes_part {
             let names: Vec<&str> = HOOK_NAMES.iter().map(|(name, _)| *name).collect();
             let message = format!(
                 "it takes part nowhere: define one of {}, reading_T2 (or another channel)",
@@ -129,6 +131,11 @@ impl Program {
     /// The value of each parameter of the script.
     pub(super) fn numbers(&self, values: &NamedValues<'_>) -> Result<Numbers, EffectError> {
         Ok(Numbers(self.parameters.iter().map(|name| values.get(name)).collect::<Result<_, _>>()?))
+    }
+
+    /// Whether it defines no hook at all.
+    pub(super) fn takes_no_part(&self) -> bool {
+        self.defined.is_empty()
     }
 
     pub(super) fn defines(&self, name: &str) -> bool {

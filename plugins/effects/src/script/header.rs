@@ -1,5 +1,6 @@
 //! The header of a script: lines `//! key: value` that say what the effect is.
 
+use mapper_core::Channel;
 use mapper_physics::effect::{EffectInfo, EffectParameter, Submodel};
 use std::borrow::Cow;
 
@@ -9,12 +10,24 @@ pub(super) type Mistake = (Option<usize>, String);
 /// Maximum number of parameters of a script: each is a dimension of the fit.
 const PARAMETER_LIMIT: usize = 4;
 
+/// How a lag is written.
+const LAG_FORM: &str = "//! lag: CHANNEL PARAMETER";
+
 /// How a parameter is written.
 const PARAMETER_FORM: &str = "//! parameter: NAME [UNIT] LOW .. HIGH, neutral VALUE, step VALUE";
 
-pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
+/// What a header says.
+pub(super) struct Header {
+    /// Of the effect.
+    pub info: EffectInfo,
+    /// Sensors that follow late, each by the parameter that holds its time constant.
+    pub lags: Vec<(Channel, String)>,
+}
+
+pub(super) fn read(text: &str) -> Result<Header, Mistake> {
     let (mut id, mut description, mut equation, mut source) = (None, None, None, None);
     let mut submodel = None;
+    let mut lags: Vec<(Channel, String)> = Vec::new();
     let mut parameters: Vec<EffectParameter> = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let Some(header) = line.trim_start().strip_prefix("//!") else { continue };
@@ -38,8 +51,15 @@ pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
                 check(&parameter, &parameters).map_err(here)?;
                 parameters.push(parameter);
             }
+            "lag" => {
+                let (channel, name) = value
+                    .split_once(char::is_whitespace)
+                    .ok_or_else(|| here(format!("write `{LAG_FORM}`")))?;
+                let channel: Channel = channel.parse().map_err(|unknown| here(format!("{unknown}")))?;
+                lags.push((channel, name.trim().to_owned()));
+            }
             other => {
-                let keys = "effect, description, equation, source, submodel, parameter";
+                let keys = "effect, description, equation, source, submodel, parameter, lag";
                 return Err(here(format!("`{other}` is not a key of an effect; the keys are {keys}")));
             }
         }
@@ -49,7 +69,10 @@ pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
         return Err(missing(PARAMETER_FORM));
     }
     let id = id.ok_or_else(|| missing("//! effect: NAME"))?;
-    Ok(EffectInfo {
+    if let Some((_, name)) = lags.iter().find(|(_, name)| parameters.iter().all(|p| p.name != *name)) {
+        return Err((None, format!("the lag's `{name}` is not a parameter; write `{LAG_FORM}`")));
+    }
+    let info = EffectInfo {
         description: description.unwrap_or_else(|| id.clone()),
         equation: equation.unwrap_or(Cow::Borrowed("as in its script")),
         source: source.unwrap_or(Cow::Borrowed("suspected by the user")),
@@ -57,7 +80,8 @@ pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
         also_shows_in: Vec::new(),
         id,
         parameters,
-    })
+    };
+    Ok(Header { info, lags })
 }
 
 fn submodel_called(name: &str) -> Result<Submodel, String> {

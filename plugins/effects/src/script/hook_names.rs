@@ -2,7 +2,7 @@
 
 /// Functions a script may define, besides `reading_CHANNEL(at, p, value)`, with the number of their arguments:
 /// `(at, p, value)` gives the value the model shall use, `(at, p)` what is added.
-pub const HOOK_NAMES: [(&str, usize); 10] = [
+pub const HOOK_NAMES: [(&str, usize); 11] = [
     ("flow_kg_s", 3),
     ("efficiency", 3),
     ("h_w_m2k", 3),
@@ -13,4 +13,5 @@ pub const HOOK_NAMES: [(&str, usize); 10] = [
     ("heat_to_inner_w", 2),
     ("heat_to_turbine_w", 2),
     ("shaft_torque_nm", 2),
+    ("flow_to_outlet_kg_s", 2),
 ];

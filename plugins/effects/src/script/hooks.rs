@@ -87,6 +87,10 @@ impl Hooks for ScriptHooks {
         self.add(9, site)
     }
 
+    fn flow_to_outlet_kg_s(&self, site: &Site<'_>) -> f64 {
+        self.add(10, site)
+    }
+
     fn reading(&self, site: &Site<'_>, channel: Channel, value: f64) -> f64 {
         match &self.readings[channel as usize] {
             Some(name) => self.program.call(name, (At::new(site), self.numbers.clone(), value), &self.fault),

@@ -6,10 +6,11 @@ use crate::progress::Progress;
 use crate::{output, registry};
 use clap::Args;
 use mapper_drift::DriftReport;
+use mapper_gap::report::Law;
 use mapper_report::{gap_page, gap_text, sensors_text, zero_text};
 use mapper_session::{Recorded, Session, SessionError, write_new};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Say where a recording departs from the nominal model, which effect causes it, how far that closes the gap, what to do next
 #[derive(Debug, Args)]
@@ -28,6 +29,9 @@ pub struct Diagnose {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+    /// Write each law that is found as an effect in rhai into this directory
+    #[arg(long, value_name = "DIR")]
+    pub laws: Option<PathBuf>,
     /// Also write an HTML page with pictures to this new file
     #[arg(long, value_name = "OUT")]
     pub html: Option<PathBuf>,
@@ -43,8 +47,9 @@ impl Diagnose {
         let on_event = |event: &_| progress.show(event);
         let session = Session { on_event: &on_event, ..Session::new(&registry) };
         let effects = registry.effects_with(&self.effects)?;
-        let gap = session.diagnose_gap(&recorded, &campaign, &map, effects)?;
+        let mut gap = session.diagnose_gap(&recorded, &campaign, &map, effects)?;
         progress.clear();
+        write_laws(&mut gap.diagnosed.diagnosis.laws, self.laws.as_deref(), self.html.as_deref())?;
         if let Some(file) = &self.html {
             let title = recorded.path.display().to_string();
             write_new(file, gap_page(&title, &gap.diagnosed).as_bytes())?;
@@ -61,6 +66,21 @@ impl Diagnose {
         }
         output::print(&[gap_text(diagnosis), sensors_text(&gap.sensors), zero_text(&gap.zero)].concat())
     }
+}
+
+/// Writes the laws that can be written into `directory`; beside the page where only that was asked for.
+fn write_laws(laws: &mut [Law], directory: Option<&Path>, page: Option<&Path>) -> Result<(), Failure> {
+    for (place, law) in laws.iter_mut().enumerate() {
+        let Some(script) = &law.script else { continue };
+        let file = match (directory, page) {
+            (Some(directory), _) => directory.join(format!("law_{}.rhai", place + 1)),
+            (None, Some(page)) => page.with_extension(format!("law_{}.rhai", place + 1)),
+            (None, None) => continue,
+        };
+        write_new(&file, script.as_bytes())?;
+        law.rhai = Some(file.display().to_string());
+    }
+    Ok(())
 }
 
 /// Verdict, cause, course and size of what drifted.

@@ -3,9 +3,13 @@
 use crate::failure::Failure;
 use crate::{output, registry};
 use clap::Args;
+use mapper_blind::study_without_causes;
+use mapper_discover::signatures::signatures;
+use mapper_physics::effect::Effect;
 use mapper_report::with_heads;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// List the effects that a rig may have and the nominal model does not
 #[derive(Debug, Args)]
@@ -13,6 +17,9 @@ pub struct Effects {
     /// Also check and list a suspected effect written in rhai; may be repeated
     #[arg(long = "effect", value_name = "FILE")]
     pub effects: Vec<PathBuf>,
+    /// Print which missing force could stand in for which effect on this campaign (YAML): what can be told apart
+    #[arg(long, value_name = "CAMPAIGN")]
+    pub signatures: Option<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -22,6 +29,9 @@ impl Effects {
     /// Lists the catalogue.
     pub fn run(&self) -> Result<(), Failure> {
         let effects = registry::registry().effects_with(&self.effects)?;
+        if let Some(campaign) = &self.signatures {
+            return self.print_signatures(campaign, effects);
+        }
         if self.json {
             let list: Vec<_> = effects.iter().map(|effect| effect.info().clone()).collect();
             return output::print_json(&json!({ "effects": list }));
@@ -43,5 +53,38 @@ impl Effects {
             }
         }
         output::print(&format!("{table}\n"))
+    }
+
+    /// The matrix of effects against balances on a recording of the campaign without causes.
+    fn print_signatures(&self, campaign: &Path, effects: Vec<Arc<dyn Effect>>) -> Result<(), Failure> {
+        let campaign = mapper_campaign::load(campaign).map_err(Failure::of_campaign)?;
+        let (study, linearised) = study_without_causes(&campaign, effects, campaign.seed)?;
+        let matrix = signatures(&study, &linearised);
+        let names: Vec<String> = matrix.balances.iter().map(|balance| balance.words()).collect();
+        if self.json {
+            let rows: Vec<_> = matrix
+                .effects
+                .iter()
+                .map(|(id, sigma, shares)| {
+                    let of: serde_json::Map<_, _> =
+                        names.iter().cloned().zip(shares.iter().map(|share| json!(share))).collect();
+                    json!({ "effect": id, "sigma": sigma, "shares": of })
+                })
+                .collect();
+            return output::print_json(&json!({ "signatures": rows }));
+        }
+        let letters: Vec<String> = (0..names.len()).map(|place| (place + 1).to_string()).collect();
+        let heads: Vec<String> = ["effect", "sigma"].map(str::to_owned).into_iter().chain(letters).collect();
+        let mut table = with_heads(&heads);
+        for (id, sigma, shares) in &matrix.effects {
+            let shares = shares.iter().map(|share| format!("{:.0}", 100.0 * share));
+            table.add_row([id.clone(), format!("{sigma:.0}")].into_iter().chain(shares));
+        }
+        let legend: Vec<String> =
+            names.iter().enumerate().map(|(place, name)| format!("{:>4}  {name}", place + 1)).collect();
+        output::print(&format!(
+            "{table}\n% of each effect's signature (one typical step) for which a force missing in one balance could stand in:\n{}\n",
+            legend.join("\n")
+        ))
     }
 }

@@ -1,0 +1,354 @@
+//! From a diagnosis that leaves something to the laws that account for it, and to where it is missing.
+
+use crate::balance::Balance;
+use crate::begun::begun;
+use crate::candidate::{Bench, Candidate, keep_determined, worth};
+use crate::columns::{Base, Products};
+use crate::force::{Force, forces};
+use crate::held_out::shrink;
+use crate::library::library;
+use crate::script::script;
+use crate::select::{Choice, choices};
+use crate::sentence::{Told, tell};
+use mapper_gap::additions::additions;
+use mapper_gap::adequacy::adequacy;
+use mapper_gap::calibration::Calibration;
+use mapper_gap::diagnose::{Diagnosed, prior};
+use mapper_gap::fit::{Effort, Fit, fit};
+use mapper_gap::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
+use mapper_gap::report::{Law, MissingForce, Place, Verdict};
+use mapper_gap::selection::Selection;
+use mapper_gap::study::{Study, members};
+
+/// What is found beyond the catalogue.
+#[derive(Debug, Default)]
+pub struct Discovered {
+    /// Laws that are proposed, best first; usually one or none.
+    pub laws: Vec<Law>,
+    /// What each balance lacks, most probable first.
+    pub forces: Vec<MissingForce>,
+    /// Places of the gap; `None` where those of the diagnosis stand.
+    pub places: Option<Vec<Place>>,
+}
+
+/// Folds of steps, each left out once, in which a law must show again.
+const FOLDS: usize = 6;
+/// A law must remove this share of the gap on steps that were not used.
+const LEAST_SHRINK: f64 = 0.5;
+/// A law is doubted that is found in fewer of the folds.
+const LEAST_STABILITY: f64 = 0.5;
+/// Laws whose evidence is this near cannot be told apart, in temperatures of the calibration.
+const NEAR: f64 = 3.0;
+/// Equivalent laws that are named.
+const MOST_EQUIVALENT: usize = 3;
+/// Balances whose force is told.
+const FORCES: usize = 3;
+
+/// Looks for what the catalogue does not have. Only where a diagnosis leaves something: [`wanted`] says so.
+pub fn discover(
+    diagnosed: &Diagnosed,
+    calibration: &Calibration,
+    progress: &(dyn Fn(f64, &str) + Sync),
+) -> Discovered {
+    if !wanted(diagnosed) {
+        return Discovered::default();
+    }
+    let Diagnosed { study, linearised, null, .. } = diagnosed;
+    progress(0.0, "laws");
+    let library = library();
+    let everywhere = Selection::all(study);
+    let mut training = everywhere.clone();
+    for step in &diagnosed.diagnosis.gap.held_out_steps {
+        training.steps[*step] = false;
+    }
+    let nothing = Base::nothing(study, linearised);
+    let mut bench = Bench { study: study.clone(), library };
+    let mut found = found(&mut bench, &nothing, &training, &everywhere, &|fit| {
+        calibration.outside(adequacy(study, linearised, fit, 0.0).features()) < 0.5
+    });
+    progress(0.4, "a law beside a cause");
+    let left = found.as_ref().is_none_or(|found| !found.adequate);
+    if left
+        && diagnosed.diagnosis.verdict == Verdict::PartlyExplained
+        && let Some(best) = diagnosed.fits.first()
+        && let Some(both) = beside(&mut bench, diagnosed, best, calibration, &training, &everywhere)
+    {
+        let score = |found: &Found| found.fitted.first().map_or(f64::NEG_INFINITY, Candidate::score);
+        let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + RARE_BESIDE);
+        found = if better { Some(both) } else { found };
+    }
+    progress(0.6, "what a law leaves");
+    let laws = propose(diagnosed, calibration, &bench, found.as_ref(), &training);
+    // Where a law leaves nothing but noise, what a straight line makes of other parts counts for nothing.
+    let settled = laws.first().filter(|law| law.probability > 0.5);
+    let bend = if settled.is_some() { 0.0 } else { BEND };
+    progress(0.7, "missing forces");
+    let here = |balance: &Balance| settled.is_none_or(|law| law.submodel == balance.submodel().name());
+    let forces = forces(&nothing, &everywhere.steps, &here);
+    let places = places(diagnosed, &bench, found.as_ref(), &forces, null, bend);
+    progress(1.0, "done");
+    Discovered {
+        laws,
+        forces: forces.into_iter().take(FORCES).map(told_force).collect(),
+        places: Some(places),
+    }
+}
+
+/// Whether a diagnosis leaves something to be found.
+pub fn wanted(diagnosed: &Diagnosed) -> bool {
+    matches!(diagnosed.diagnosis.verdict, Verdict::PartlyExplained | Verdict::Unexplained)
+        || (diagnosed.diagnosis.verdict != Verdict::WithinTolerance
+            && diagnosed.diagnosis.probability_outside > 0.5)
+}
+
+/// Laws that were fitted.
+struct Found {
+    /// On the steps that count for the search, best first.
+    trained: Vec<Candidate>,
+    /// The best of these on all steps, best first.
+    fitted: Vec<Candidate>,
+    /// Share of the folds in which the best shows again.
+    stability: f64,
+    /// Whether the best leaves nothing but noise.
+    adequate: bool,
+}
+
+/// A law beside a cause costs as much as a second cause does.
+const RARE_BESIDE: f64 = 3.0;
+
+/// The search beside the catalogue's best.
+fn beside(
+    bench: &mut Bench,
+    diagnosed: &Diagnosed,
+    best: &Fit,
+    calibration: &Calibration,
+    training: &Selection,
+    everywhere: &Selection,
+) -> Option<Found> {
+    let Diagnosed { study, linearised, .. } = diagnosed;
+    let there = linearised.at(study, &best.hypothesis).ok()?;
+    let base = Base::beside(study, &there, best);
+    found(bench, &base, training, everywhere, &|fit| {
+        calibration.outside(adequacy(study, linearised, fit, 0.0).features()) < 0.5
+    })
+}
+
+/// Searches the library from a base: in closed form, then by runs of the model.
+fn found(
+    bench: &mut Bench,
+    base: &Base<'_>,
+    training: &Selection,
+    everywhere: &Selection,
+    adequate: &dyn Fn(&Fit) -> bool,
+) -> Option<Found> {
+    let changes = base.changes(&bench.library);
+    let usable: Vec<usize> = (0..changes.len()).filter(|place| changes[*place].is_some()).collect();
+    let columns: Vec<Vec<f64>> = changes.into_iter().flatten().collect();
+    let products = Products::new(base, &columns);
+    let of = |counts: &[bool]| Some(choices(&bench.library, &usable, &products.projected(counts)?));
+    let on_training = of(&training.steps)?;
+    let folds: Vec<Vec<bool>> = (0..FOLDS)
+        .map(|fold| {
+            let steps = training.steps.iter().enumerate();
+            steps.map(|(step, counts)| *counts && step % FOLDS != fold).collect()
+        })
+        .collect();
+    let in_folds: Vec<Vec<Choice>> = folds.iter().filter_map(|counts| of(counts)).collect();
+    let chosen = worth(&bench.library, &on_training);
+    let found = fitted(bench, base, &chosen, training, everywhere)?;
+    let (trained, fitted_best) = (found.0.first()?, found.1.first()?);
+    let part = |choice: &Choice| bench.library[choice.terms[0]].submodel();
+    let again = in_folds.iter().filter(|fold| {
+        let Some(first) = fold.first() else { return false };
+        let own = fold.iter().find(|choice| choice.terms == trained.choice.terms);
+        part(first) == part(&trained.choice) && own.is_some_and(|own| own.gain > LIKE * first.gain)
+    });
+    let stability = again.count() as f64 / folds.len().max(1) as f64;
+    if adequate(&fitted_best.fit) {
+        return Some(Found { trained: found.0, fitted: found.1, stability, adequate: true });
+    }
+    // What none of them explains may have begun in the middle.
+    let alone = Found { trained: found.0, fitted: found.1, stability, adequate: false };
+    let Some((later, stability)) = begun(base, &mut bench.library, &on_training, &training.steps, &folds)
+    else {
+        return Some(alone);
+    };
+    let promised =
+        later.first().is_some_and(|later| on_training.first().is_none_or(|first| later.gain > first.gain));
+    let fits = if promised { fitted(bench, base, &later, training, everywhere) } else { None };
+    Some(match fits {
+        Some((trained, fitted)) if fitted.first()?.score() > alone.fitted.first()?.score() => {
+            let adequate = adequate(&fitted.first()?.fit);
+            Found { trained, fitted, stability, adequate }
+        }
+        _ => alone,
+    })
+}
+
+/// Choices fitted by runs of the model: on the steps that count for the search, and the best of them on all steps.
+fn fitted(
+    bench: &mut Bench,
+    base: &Base<'_>,
+    chosen: &[Choice],
+    training: &Selection,
+    everywhere: &Selection,
+) -> Option<(Vec<Candidate>, Vec<Candidate>)> {
+    let quick = Effort { iterations: 3, enough: 1.0, ..Effort::default() };
+    let mut trained = bench.fit(&base.hypothesis, base.linearised, chosen, training, quick);
+    keep_determined(&bench.library, &mut trained);
+    trained.truncate(FINALISTS);
+    // Tolerances act otherwise beside something strong.
+    let beside = base.linearised.at(&bench.study, &trained.first()?.fit.hypothesis).ok();
+    let linearised = beside.as_ref().unwrap_or(base.linearised);
+    let effort = Effort { iterations: 5, enough: 0.2, ..Effort::default() };
+    let trained = bench.refit(&trained, linearised, training, effort);
+    let mut fitted = bench.refit(&trained, linearised, everywhere, effort);
+    keep_determined(&bench.library, &mut fitted);
+    Some((trained, fitted))
+}
+
+/// Laws fitted to the end.
+const FINALISTS: usize = 3;
+/// In a fold a law shows again where its evidence is this share of the best's.
+const LIKE: f64 = 0.95;
+
+/// The best law, where it is one.
+fn propose(
+    diagnosed: &Diagnosed,
+    calibration: &Calibration,
+    bench: &Bench,
+    found: Option<&Found>,
+    training: &Selection,
+) -> Vec<Law> {
+    let Some(found) = found else { return Vec::new() };
+    let Some(best) = found.fitted.first() else { return Vec::new() };
+    let Some(trained) = found.trained.iter().find(|trained| trained.effect == best.effect) else {
+        return Vec::new();
+    };
+    let Diagnosed { study, linearised, null, fits, .. } = diagnosed;
+    // Beyond nothing, and beyond the catalogue.
+    let inside = fits
+        .iter()
+        .map(|fit| fit.score + prior(calibration, study, fit))
+        .fold(null.score + prior(calibration, study, null), f64::max);
+    if best.score() + PRIOR_LAW.ln() - inside < calibration.threshold {
+        return Vec::new();
+    }
+    let Ok(before) = fit(&bench.study, linearised, &study.nothing(), training, Effort::default()) else {
+        return Vec::new();
+    };
+    let held_out = &diagnosed.diagnosis.gap.held_out_steps;
+    let shrink = shrink(study, &before, &trained.fit, held_out);
+    if shrink < LEAST_SHRINK || found.stability < LEAST_STABILITY {
+        return Vec::new();
+    }
+    let everywhere = Selection::all(study);
+    let (own, own_fit) = bench.alone(study, best);
+    let one_more = additions(&own, linearised, &everywhere, &own_fit)
+        .into_iter()
+        .map(|addition| addition.gain)
+        .fold(0.0, f64::max);
+    let left = calibration.outside(adequacy(&bench.study, linearised, &best.fit, one_more).features());
+    let near = |other: &&Candidate| best.score() - other.score() < NEAR * calibration.temperature;
+    let weights: f64 = found
+        .fitted
+        .iter()
+        .map(|other| ((other.score() - best.score()) / calibration.temperature).exp())
+        .sum::<f64>()
+        + ((inside - best.score() - PRIOR_LAW.ln()) / calibration.temperature).exp();
+    let say = |candidate: &Candidate| tell(&bench.library, candidate, calibration.interval_factor);
+    let Told { sentence, terms, sink_k } = say(best);
+    let told = Told { sentence: sentence.clone(), terms: terms.clone(), sink_k };
+    let equivalent = found.fitted.iter().skip(1).filter(near).take(MOST_EQUIVALENT).map(|c| say(c).sentence);
+    vec![Law {
+        submodel: bench.library[best.choice.terms[0]].submodel().name().to_owned(),
+        sentence,
+        terms,
+        probability: (1.0 - left) / weights,
+        shrink,
+        beside: names_beside(study, best),
+        stability: found.stability,
+        equivalent: equivalent.collect(),
+        rhai: None,
+        script: script(&bench.library, best, &told),
+    }]
+}
+
+/// Effects of the catalogue beside a law.
+fn names_beside(study: &Study, law: &Candidate) -> Vec<String> {
+    let others = law.fit.hypothesis.effects.iter().filter_map(|(index, _)| study.effects.get(*index));
+    others.map(|effect| effect.info().id.to_string()).collect()
+}
+
+/// Prior of all laws together.
+const PRIOR_LAW: f64 = 0.15;
+
+/// Places by all that was tried: effects, laws, forces.
+fn places(
+    diagnosed: &Diagnosed,
+    bench: &Bench,
+    found: Option<&Found>,
+    forces: &[Force],
+    null: &Fit,
+    bend: f64,
+) -> Vec<Place> {
+    let Diagnosed { study, linearised, fits, .. } = diagnosed;
+    let gains: Vec<Gain<'_>> = fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
+    let mut explanations: Vec<Explanation<'_>> = of_fits(study, &gains);
+    let fitted = found.map_or(&[][..], |found| &found.fitted);
+    explanations.extend(fitted.iter().map(|law| {
+        let gain = null.cost - law.fit.cost;
+        let others: Vec<usize> =
+            members(&law.fit.hypothesis).into_iter().filter(|effect| *effect != law.effect).collect();
+        let without = fits.iter().find(|fit| members(&fit.hypothesis) == others);
+        let of_others = without.map_or(0.0, |fit| null.cost - fit.cost).clamp(0.0, gain.max(0.0));
+        let law_part = Part {
+            submodel: bench.library[law.choice.terms[0]].submodel(),
+            gain: (gain - of_others).max(0.0),
+            signature: Box::new(move || signature(&bench.study, &law.fit, law.effect)),
+        };
+        let each = of_others / others.len().max(1) as f64;
+        let other_parts = others.iter().map(|effect| {
+            let effect = *effect;
+            Part {
+                submodel: study.effects[effect].info().submodel,
+                gain: each,
+                signature: Box::new(move || signature(&bench.study, &law.fit, effect)),
+            }
+        });
+        let score = 0.5 * gain - law.choice.rarity - RARITY * (1 + others.len()) as f64;
+        Explanation { score, parts: std::iter::once(law_part).chain(other_parts).collect() }
+    }));
+    // What a straight line promises counts from the straight line's own null.
+    let linear_null = 0.5 * (null.cost - linear_cost(diagnosed));
+    for force in forces.iter().filter(|force| force.gain > 0.0) {
+        let part = Part {
+            submodel: force.balance.submodel(),
+            gain: 2.0 * force.gain,
+            signature: Box::new(move || Some(force.signature.clone())),
+        };
+        explanations.push(Explanation { score: force.gain + linear_null, parts: vec![part] });
+    }
+    places_of(study, linearised, null, &explanations, bend)
+}
+
+/// Cost of nothing but tolerances, by the straight line from where nothing is off.
+fn linear_cost(diagnosed: &Diagnosed) -> f64 {
+    let base = Base::nothing(&diagnosed.study, &diagnosed.linearised);
+    let everywhere = Selection::all(&diagnosed.study);
+    Products::new(&base, &[]).projected(&everywhere.steps).map_or(diagnosed.null.cost, |left| left[(0, 0)])
+}
+
+fn told_force(force: Force) -> MissingForce {
+    MissingForce {
+        submodel: force.balance.submodel().name().to_owned(),
+        force: force.balance.words(),
+        unit: force.balance.unit().to_owned(),
+        evidence: force.gain,
+        steps: force
+            .levels
+            .iter()
+            .map(|(level, sigma)| [*level, level - 1.96 * sigma, level + 1.96 * sigma])
+            .collect(),
+    }
+}

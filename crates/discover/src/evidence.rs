@@ -1,0 +1,70 @@
+//! Evidence of a few linear terms in closed form.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Prior width of a coefficient, in its plain steps: as effects have it.
+pub const PRIOR_STEPS: f64 = 10.0;
+
+/// What some terms make of the projected products: logarithm of the evidence over nothing, and the coefficients in steps.
+#[derive(Debug, Clone)]
+pub struct Weighed {
+    /// Logarithm of the evidence, over that of nothing.
+    pub gain: f64,
+    /// Coefficients, steps.
+    pub coefficients: DVector<f64>,
+}
+
+/// Weighs the terms at `places` of the projected products, whose last row and column are the residual's; `prior_sigma` in
+/// steps.
+pub fn weigh(products: &DMatrix<f64>, places: &[usize], prior_sigma: f64) -> Option<Weighed> {
+    let last = products.nrows() - 1;
+    let k = places.len();
+    let mut matrix = DMatrix::from_fn(k, k, |i, j| products[(places[i], places[j])]);
+    let right = DVector::from_fn(k, |i, _| products[(places[i], last)]);
+    for i in 0..k {
+        matrix[(i, i)] += prior_sigma.powi(-2);
+    }
+    let cholesky = matrix.cholesky()?;
+    let coefficients = cholesky.solve(&right);
+    let half_ln_determinant: f64 = cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+    let gain = 0.5 * right.dot(&coefficients) - half_ln_determinant - k as f64 * prior_sigma.ln();
+    Some(Weighed { gain, coefficients })
+}
+
+/// The same for coefficients of a common prior covariance `scale^2 shape`.
+pub fn weigh_process(
+    products: &DMatrix<f64>,
+    right: &DVector<f64>,
+    covariance: &DMatrix<f64>,
+) -> Option<Posterior> {
+    let k = right.len();
+    // With K = R R': I + R' G R stays well conditioned whatever K is.
+    let mut jittered = covariance.clone();
+    for i in 0..k {
+        jittered[(i, i)] *= 1.0 + 1e-9;
+    }
+    let root = jittered.cholesky()?.l();
+    let mut inner = root.tr_mul(&(products * &root));
+    for i in 0..k {
+        inner[(i, i)] += 1.0;
+    }
+    let cholesky = inner.cholesky()?;
+    let asked = root.tr_mul(right);
+    let answer = cholesky.solve(&asked);
+    let half_ln_determinant: f64 = cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+    let gain = 0.5 * asked.dot(&answer) - half_ln_determinant;
+    let mean = &root * answer;
+    let covariance = &root * cholesky.solve(&root.transpose());
+    Some(Posterior { gain, mean, covariance })
+}
+
+/// A process as the data leave it.
+#[derive(Debug, Clone)]
+pub struct Posterior {
+    /// Logarithm of the evidence, over that of nothing.
+    pub gain: f64,
+    /// Mean.
+    pub mean: DVector<f64>,
+    /// Covariance.
+    pub covariance: DMatrix<f64>,
+}

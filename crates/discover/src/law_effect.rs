@@ -1,0 +1,55 @@
+//! Terms as an effect, so that whatever fits effects fits laws.
+
+use crate::term::{Term, put_into};
+use mapper_physics::effect::{Effect, EffectError, EffectInfo, EffectParameter, NamedValues, Rig};
+use std::borrow::Cow;
+
+/// How many steps a coefficient may be away from nothing.
+pub const MOST_STEPS: f64 = 60.0;
+
+/// Some terms of one part of the machine, each with a coefficient.
+#[derive(Debug, Clone)]
+pub struct LawEffect {
+    info: EffectInfo,
+    terms: Vec<Term>,
+}
+
+impl LawEffect {
+    /// The effect of one or more terms.
+    pub fn new(terms: Vec<Term>) -> LawEffect {
+        let parameters = terms
+            .iter()
+            .enumerate()
+            .map(|(place, term)| EffectParameter {
+                name: Cow::Owned(format!("c{}", place + 1)),
+                unit: Cow::Borrowed(term.unit),
+                low: if term.positive { 0.0 } else { -MOST_STEPS * term.step },
+                high: MOST_STEPS * term.step,
+                neutral: 0.0,
+                typical_step: term.step,
+            })
+            .collect();
+        let info = EffectInfo {
+            id: Cow::Borrowed("law"),
+            description: Cow::Borrowed("terms that were found"),
+            equation: Cow::Borrowed("as its terms"),
+            source: Cow::Borrowed("found by regression"),
+            submodel: terms.first().map_or(mapper_physics::effect::Submodel::Shaft, Term::submodel),
+            also_shows_in: Vec::new(),
+            parameters,
+        };
+        LawEffect { info, terms }
+    }
+}
+
+impl Effect for LawEffect {
+    fn info(&self) -> &EffectInfo {
+        &self.info
+    }
+
+    fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
+        let with: Vec<(Term, f64)> =
+            self.terms.iter().cloned().zip(values.iter().map(|(_, value)| value)).collect();
+        Ok(put_into(rig, &with)?)
+    }
+}

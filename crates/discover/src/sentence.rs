@@ -1,0 +1,106 @@
+//! A law in words and numbers.
+
+use crate::candidate::Candidate;
+use crate::library::REFERENCE_K;
+use crate::term::{Role, Term};
+use mapper_core::with_unit;
+use mapper_gap::report::LawTerm;
+
+/// A number with its standard error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Uncertain {
+    /// Value.
+    pub value: f64,
+    /// Half of its 95 % interval.
+    pub half: f64,
+}
+
+impl Uncertain {
+    /// In words: as many figures as the interval allows.
+    pub fn words(self, unit: &str) -> String {
+        let Uncertain { value, half } = self;
+        if !half.is_finite() || half <= 0.0 {
+            return with_unit(value, unit).to_string();
+        }
+        // Two figures of the interval.
+        let decimals = (1.0 - half.log10().floor()).clamp(0.0, 9.0) as usize;
+        format!("({value:.decimals$} +/- {half:.decimals$}) {}", if unit == "1" { "" } else { unit })
+            .trim_end()
+            .to_owned()
+    }
+}
+
+/// A law's numbers and its sentence.
+#[derive(Debug, Clone)]
+pub struct Told {
+    /// The sentence.
+    pub sentence: String,
+    /// Its numbers.
+    pub terms: Vec<LawTerm>,
+    /// Temperature of what heat is exchanged with, K, where it is one of the numbers.
+    pub sink_k: Option<f64>,
+}
+
+/// Tells a law; `interval_factor` widens its standard errors.
+pub fn tell(library: &[Term], candidate: &Candidate, interval_factor: f64) -> Told {
+    let terms: Vec<&Term> = candidate.choice.terms.iter().map(|place| &library[*place]).collect();
+    let values = candidate.coefficients();
+    let covariance = &candidate.fit.covariance;
+    // The law's coordinates are the last of the fit, in steps.
+    let first = covariance.nrows().saturating_sub(terms.len());
+    let cov = |i: usize, j: usize| {
+        covariance.get((first + i, first + j)).copied().unwrap_or(f64::INFINITY)
+            * terms[i].step
+            * terms[j].step
+    };
+    let widened = 1.96 * interval_factor;
+    let numbers: Vec<Uncertain> = (0..terms.len())
+        .map(|i| Uncertain { value: values[i], half: widened * cov(i, i).max(0.0).sqrt() })
+        .collect();
+    let row = |term: String, number: Uncertain, unit: &str| LawTerm {
+        term,
+        value: number.value,
+        low: number.value - number.half,
+        high: number.value + number.half,
+        unit: unit.to_owned(),
+    };
+    if let Some((slope, level)) = sink(&terms) {
+        let ratio = values[level] / values[slope];
+        let variance = (cov(level, level) - 2.0 * ratio * cov(level, slope)
+            + ratio * ratio * cov(slope, slope))
+            / (values[slope] * values[slope]);
+        let sink = Uncertain { value: REFERENCE_K + ratio, half: widened * variance.max(0.0).sqrt() };
+        let in_celsius = Uncertain { value: sink.value - 273.15, ..sink };
+        let from = terms[slope].words_of_place();
+        let sentence = format!(
+            "{} from {from} to something at {}",
+            numbers[slope].words(terms[slope].unit),
+            in_celsius.words("degC")
+        );
+        let told = vec![
+            row(format!("conductance from {from}"), numbers[slope], terms[slope].unit),
+            row("temperature of what it goes to".to_owned(), sink, "K"),
+        ];
+        return Told { sentence, terms: told, sink_k: Some(sink.value) };
+    }
+    let sentences: Vec<String> = terms
+        .iter()
+        .zip(&numbers)
+        .map(|(term, number)| term.words.replacen("{}", &number.words(term.unit), 1))
+        .collect();
+    let told = terms
+        .iter()
+        .zip(&numbers)
+        .map(|(term, number)| row(term.words.replacen("{}", "x", 1), *number, term.unit))
+        .collect();
+    Told { sentence: sentences.join(", and "), terms: told, sink_k: None }
+}
+
+/// Places of slope and level where the law is heat to something of unknown temperature.
+pub fn sink(terms: &[&Term]) -> Option<(usize, usize)> {
+    match terms {
+        [a, b] if a.role == Role::Slope && b.role == Role::Level => Some((0, 1)),
+        [a, b] if a.role == Role::Level && b.role == Role::Slope => Some((1, 0)),
+        _ => None,
+    }
+}

@@ -1,0 +1,169 @@
+//! A term: a formula that may be (part of) a missing force, with the unit and the usual size of its coefficient.
+
+use crate::balance::Balance;
+use crate::expression::Expression;
+use mapper_core::Channel;
+use mapper_physics::air;
+use mapper_physics::effect::{Rig, Submodel};
+use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
+
+/// What a term is to others of its balance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// A constant.
+    Level,
+    /// In proportion to a temperature against the reference of the library: with the level, heat to something of unknown
+    /// temperature.
+    Slope,
+    /// Heat exchanged with something of known temperature.
+    Exchange,
+    /// Anything else.
+    Other,
+}
+
+/// A term of the library.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// Where it acts, with the formula that the coefficient multiplies; the first is where it sits. Heat that passes between
+    /// two parts acts on both.
+    pub acts_on: Vec<(Balance, Expression)>,
+    /// Unit of the coefficient.
+    pub unit: &'static str,
+    /// A coefficient of this size is plainly there.
+    pub step: f64,
+    /// What it says, with `{}` where the coefficient stands.
+    pub words: String,
+    /// What it is to others of its balance.
+    pub role: Role,
+    /// Whether the coefficient can only be positive: a conductance, an area, a time.
+    pub positive: bool,
+}
+
+impl Term {
+    /// Where it sits.
+    pub fn balance(&self) -> Balance {
+        self.acts_on[0].0
+    }
+
+    /// The sensor in whose reading alone it acts, if it does.
+    pub fn sensor(&self) -> Option<Channel> {
+        match self.acts_on[..] {
+            [(Balance::Reading(channel) | Balance::Lag(channel), _)] => Some(channel),
+            _ => None,
+        }
+    }
+
+    /// Whether it is the same whatever the machine does.
+    pub fn is_constant(&self) -> bool {
+        matches!(self.acts_on[..], [(_, Expression::Number(_))])
+    }
+
+    /// Whether it has a memory of its own, as a lag has.
+    pub fn has_memory(&self) -> bool {
+        self.acts_on.iter().any(|(balance, _)| matches!(balance, Balance::Lag(_)))
+    }
+
+    /// Name of what it acts on, for sentences.
+    pub fn words_of_place(&self) -> String {
+        self.balance().place_words()
+    }
+
+    /// The part of the machine in which it sits.
+    pub fn submodel(&self) -> Submodel {
+        self.balance().submodel()
+    }
+}
+
+/// Terms with their coefficients, at work in a model.
+#[derive(Debug)]
+pub struct TermHooks {
+    /// Balance, coefficient, formula.
+    acting: Vec<(Balance, f64, Expression)>,
+    /// Whether something acts on each kind of place, so that nothing is asked in vain.
+    on_readings: bool,
+}
+
+/// Puts terms with coefficients into a rig.
+///
+/// # Errors
+/// Never in practice: terms have no hidden temperatures.
+pub fn put_into(rig: &mut Rig, terms: &[(Term, f64)]) -> Result<(), TooManyExtraStates> {
+    let mut acting = Vec::new();
+    for (term, coefficient) in terms {
+        for (balance, formula) in &term.acts_on {
+            if let Balance::Lag(channel) = balance {
+                rig.instruments.path_mut(*channel).lag_s += coefficient;
+            } else if *coefficient != 0.0 {
+                acting.push((*balance, *coefficient, formula.clone()));
+            }
+        }
+    }
+    if acting.is_empty() {
+        return Ok(());
+    }
+    let on_readings = acting.iter().any(|(balance, ..)| matches!(balance, Balance::Reading(_)));
+    rig.hook(TermHooks { acting, on_readings })
+}
+
+impl TermHooks {
+    fn sum(&self, at: Balance, site: &Site<'_>, value: f64) -> f64 {
+        let here = self.acting.iter().filter(|(balance, ..)| *balance == at);
+        here.map(|(_, coefficient, formula)| coefficient * formula.of(site, value)).sum()
+    }
+
+    /// Temperature of the gas after heat from a balance.
+    fn heated_k(&self, at: Balance, site: &Site<'_>, gas_k: f64) -> f64 {
+        let heat_w = self.sum(at, site, gas_k);
+        if heat_w == 0.0 {
+            gas_k
+        } else {
+            gas_k + heat_w / (site.flow_kg_s * air::heat_capacity_j_kgk(gas_k))
+        }
+    }
+}
+
+impl Hooks for TermHooks {
+    fn flow_kg_s(&self, site: &Site<'_>, flow_kg_s: f64) -> f64 {
+        flow_kg_s * (1.0 + self.sum(Balance::MapFlow, site, flow_kg_s))
+    }
+
+    fn efficiency(&self, site: &Site<'_>, efficiency: f64) -> f64 {
+        efficiency * (1.0 + self.sum(Balance::Work, site, efficiency))
+    }
+
+    fn h_w_m2k(&self, site: &Site<'_>, h_w_m2k: f64) -> f64 {
+        h_w_m2k * (1.0 + self.sum(Balance::Convection, site, h_w_m2k))
+    }
+
+    fn gas_before_k(&self, site: &Site<'_>, t1_prime_k: f64) -> f64 {
+        self.heated_k(Balance::GasBefore, site, t1_prime_k)
+    }
+
+    fn gas_after_k(&self, site: &Site<'_>, t2_prime_k: f64) -> f64 {
+        self.heated_k(Balance::GasAfter, site, t2_prime_k)
+    }
+
+    fn gas_outlet_k(&self, site: &Site<'_>, t2_k: f64) -> f64 {
+        self.heated_k(Balance::GasOutlet, site, t2_k)
+    }
+
+    fn heat_to_compressor_w(&self, site: &Site<'_>) -> f64 {
+        self.sum(Balance::CompressorHousing, site, f64::NAN)
+    }
+
+    fn heat_to_turbine_w(&self, site: &Site<'_>) -> f64 {
+        self.sum(Balance::TurbineHousing, site, f64::NAN)
+    }
+
+    fn flow_to_outlet_kg_s(&self, site: &Site<'_>) -> f64 {
+        self.sum(Balance::Outlet, site, f64::NAN)
+    }
+
+    fn shaft_torque_nm(&self, site: &Site<'_>) -> f64 {
+        self.sum(Balance::Shaft, site, f64::NAN)
+    }
+
+    fn reading(&self, site: &Site<'_>, channel: Channel, value: f64) -> f64 {
+        if self.on_readings { value + self.sum(Balance::Reading(channel), site, value) } else { value }
+    }
+}

@@ -77,13 +77,17 @@ fn imagined(recorded: &Study, jump: &AllowedJump, interval_s: f64) -> Option<Stu
         .filter(|channel| *channel != Channel::P3 && recorded.table.column(*channel).is_some());
     let recording = Recording { series: measured.map(series).collect(), steps, ..Recording::default() };
     let table = Table::new(&recording)?;
-    Some(Study::new(
+    let mut study = Study::with_actuators(
         &recording,
         table,
         recorded.declared.clone(),
         recorded.nominal.model.clone(),
         recorded.effects.clone(),
-    ))
+        recorded.actuators,
+    );
+    study.catalogue = recorded.catalogue;
+    // A jump made after the recording: what began in it is there.
+    Some(study)
 }
 
 /// A fit's hypothesis at a new start, of which its own start says nothing.

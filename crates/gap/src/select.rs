@@ -104,7 +104,7 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
 fn singles(search: Search<'_>) -> Vec<Fit> {
     let Search { study, linearised, selection, .. } = search;
     let mut starts: Vec<Hypothesis> = Vec::new();
-    for index in 0..study.effects.len() {
+    for index in 0..study.catalogue {
         starts.extend(starts_of(study, &study.nothing(), index));
     }
     let quick = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0 };

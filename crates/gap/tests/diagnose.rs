@@ -41,7 +41,8 @@ fn ask_beside(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Di
     let effects: Vec<Arc<dyn Effect>> =
         candidates.iter().map(|id| mapper_effects::find(id).unwrap()).chain(more).collect();
     diagnose(Question {
-        jumps: Vec::new(),
+        tolerances_declared: true,
+            jumps: Vec::new(),
         recording,
         declared: declared(),
         model: Model::nominal(),
@@ -229,7 +230,8 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
     add(&mut rig, mapper_effects::find("inlet_htc").unwrap().as_ref(), &[1.6]).unwrap();
     let effects = |ids: &[&str]| ids.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
     let question = |recording, model, ids: &[&str]| Question {
-        jumps: Vec::new(),
+        tolerances_declared: true,
+            jumps: Vec::new(),
         recording,
         declared: declared(),
         model,

@@ -10,6 +10,7 @@ use mapper_core::Recording;
 use mapper_drift::{CauseKind, DriftReport, without_drift};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, Question, diagnose};
+use mapper_gap::next::look_beside;
 use mapper_gap::outlook::AllowedJump;
 use mapper_gap::report::{Diagnosis, Verdict};
 use mapper_identify::ZeroOutcome;
@@ -46,6 +47,11 @@ impl Session<'_> {
         effects: Vec<Arc<dyn Effect>>,
     ) -> Result<Gap, SessionError> {
         same_machine(recorded, campaign)?;
+        // Drift comes first: of the whole work it is about this share.
+        let progress = |done_ratio: f64, what: &str| {
+            self.tell(SessionEvent::Progress { done_ratio, what: what.to_owned() });
+        };
+        progress(0.0, "drift");
         let mut model = nominal_model(campaign)?;
         // A recording in which drift cannot be looked for may still have a gap.
         let drift = self.drift(slice::from_ref(recorded), campaign, map).ok();
@@ -65,17 +71,19 @@ impl Session<'_> {
             tolerances: campaign.tolerances,
             nominal: campaign.boundary,
         };
-        let progress = |done_ratio: f64, what: &str| {
-            self.tell(SessionEvent::Progress { done_ratio, what: what.to_owned() });
+        let after_drift = |done_ratio: f64, what: &str| {
+            progress(DRIFT_SHARE + (1.0 - DRIFT_SHARE) * done_ratio, what);
         };
+        progress(DRIFT_SHARE, "jumps that are allowed");
         let mut diagnosed = diagnose(Question {
             recording: &recording,
             declared,
+            tolerances_declared: campaign.tolerances_declared,
             jumps: allowed_jumps(campaign, &model)?,
             model,
             effects,
             calibration: Calibration::shipped().map_err(SessionError::Calibration)?,
-            progress: &progress,
+            progress: &after_drift,
         })?;
         // What was wrong with the file belongs to what is said about it.
         let warnings = recorded.read.warnings.iter().map(ToString::to_string);
@@ -84,6 +92,9 @@ impl Session<'_> {
         Ok(Gap { diagnosed, drift, sensors, zero })
     }
 }
+
+/// Share of the time that the search for drift takes.
+const DRIFT_SHARE: f64 = 0.15;
 
 /// Points up to which every jump between them is simulated to see whether it is allowed.
 const MAX_POINTS: usize = 40;
@@ -142,5 +153,6 @@ fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     }
     if !taken_off && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
         diagnosis.verdict = Verdict::Unexplained;
+        diagnosis.next.get_or_insert_with(|| look_beside(&diagnosis.r#where));
     }
 }

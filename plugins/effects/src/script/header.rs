@@ -50,6 +50,7 @@ pub(super) fn read(text: &str) -> Result<EffectInfo, Mistake> {
     }
     let id = id.ok_or_else(|| missing("//! effect: NAME"))?;
     Ok(EffectInfo {
+        name: Cow::Owned(id.replace('_', " ")),
         description: description.unwrap_or_else(|| id.clone()),
         equation: equation.unwrap_or(Cow::Borrowed("as in its script")),
         source: source.unwrap_or(Cow::Borrowed("suspected by the user")),

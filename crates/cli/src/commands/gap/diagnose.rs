@@ -7,7 +7,7 @@ use crate::{output, registry};
 use clap::Args;
 use mapper_drift::DriftReport;
 use mapper_report::{gap_page, gap_text, sensors_text, zero_text};
-use mapper_session::{Recorded, Session, SessionError, write_new};
+use mapper_session::{Recorded, Session, SessionError, SessionEvent, write_new};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -39,6 +39,7 @@ impl Diagnose {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;
         let (registry, progress) = (registry::registry(), Progress::new());
+        progress.show(&SessionEvent::Progress { done_ratio: 0.0, what: "reading".to_owned() });
         let recorded = Recorded::read(&registry, &self.recording, &map, Some(&campaign))?;
         let on_event = |event: &_| progress.show(event);
         let session = Session { on_event: &on_event, ..Session::new(&registry) };

@@ -101,16 +101,8 @@ const MOST: f64 = 0.5;
 /// # Errors
 /// [`GapError`] with a clear word where no diagnosis can be made.
 pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
-    let Question {
-        recording,
-        declared,
-        model,
-        effects,
-        tolerances_declared,
-        jumps,
-        calibration,
-        progress,
-    } = question;
+    let Question { recording, declared, model, effects, tolerances_declared, jumps, calibration, progress } =
+        question;
     progress(0.0, "reading");
     let table = Table::new(recording).ok_or(Problem::Empty)?;
     let warnings = usable(recording, &table, &declared)?;
@@ -222,7 +214,11 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         let removed = 1.0 - (best.cost - n).max(0.0) / (null.cost - n).max(1.0);
         let smooth = 1.0 - left.smooth_excess.max(0.0) / left_by_null.smooth_excess.max(1.0);
         let better = gap.worse.is_empty();
-        if removed > MOST && smooth > MOST && better { Verdict::PartlyExplained } else { Verdict::Unexplained }
+        if removed > MOST && smooth > MOST && better {
+            Verdict::PartlyExplained
+        } else {
+            Verdict::Unexplained
+        }
     };
     let mut gains: Vec<Gain<'_>> = fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
     for fit in &found.fits {

@@ -52,10 +52,8 @@ pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
     let squares: f64 = g_before.iter().map(|g| g.max(0.0).powi(2)).sum();
     let independent = if squares > 0.0 { total * total / squares } else { 0.0 };
     let (low, high) = share_interval_95(independent * removed.clamp(0.0, 1.0), independent);
-    let bare = Unseen {
-        residual: nominal.residual(study, &nominal.base),
-        values: nominal.base.values.clone(),
-    };
+    let bare =
+        Unseen { residual: nominal.residual(study, &nominal.base), values: nominal.base.values.clone() };
     let channels = channels(study, &bare, &before, &after);
     let worse = worse(study, &before, &after, &channels);
     let claimed = worse.is_empty() && !compared.causes.is_empty();

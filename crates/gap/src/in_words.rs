@@ -13,7 +13,9 @@ const SIGMA: f64 = 5.670_374_419e-8;
 /// A value of an effect's parameter in words: "+5 %" for a factor of 1.05, "370 W at 150 krpm" for a friction.
 pub fn size(parameter: &EffectParameter, value: f64) -> String {
     match parameter.unit.as_ref() {
-        "1" if parameter.neutral == 1.0 => format!("{}{} %", sign(value - 1.0), figures(100.0 * (value - 1.0).abs())),
+        "1" if parameter.neutral == 1.0 => {
+            format!("{}{} %", sign(value - 1.0), figures(100.0 * (value - 1.0).abs()))
+        }
         "1" => format!("{} %", figures(100.0 * value)),
         "m" => format!("{} mm", figures(1e3 * value)),
         "kg/kg" => format!("{} g/kg", figures(1e3 * value)),

@@ -12,14 +12,14 @@ use crate::weigh::{by_weight, weight};
 use crate::whiten::{Linearised, rows_of_step};
 use mapper_numerics::parallel;
 
-/// Beginnings that are fitted beside each base.
-const TRIED: usize = 4;
+/// Beginnings that are fitted.
+const TRIED: usize = 6;
 /// Of these, from the same effect at most.
 const OF_ONE_EFFECT: usize = 2;
 /// A beginning must promise this off the cost to be fitted.
 const WORTH: f64 = 30.0;
 
-const EFFORT: Effort = Effort { iterations: 6, enough: 0.3, most_sigmas: 3.0 };
+const EFFORT: Effort = Effort { iterations: 5, enough: 0.5, most_sigmas: crate::fit::MOST_SIGMAS };
 
 /// A cause that begins, as a straight line sees it.
 struct Late {
@@ -48,9 +48,13 @@ pub(crate) fn late(
         bases.extend(best.filter(|best| best.hypothesis.effects.len() > 1).cloned());
         bases
     };
-    let mut promising: Vec<Late> =
-        bases.iter().enumerate().flat_map(|(place, base)| looks(study, linearised, selection, base, place)).collect();
+    let mut promising: Vec<Late> = bases
+        .iter()
+        .enumerate()
+        .flat_map(|(place, base)| looks(study, linearised, selection, base, place))
+        .collect();
     promising.sort_by(|a, b| (bases[a.base].cost - a.gain).total_cmp(&(bases[b.base].cost - b.gain)));
+    promising.truncate(TRIED);
     let mut found = Vec::new();
     for round in 0..2 {
         let starts: Vec<Hypothesis> = promising
@@ -71,7 +75,9 @@ pub(crate) fn late(
         }
         by_weight(calibration, study, &mut found);
         // The step beside, and the other way of beginning.
-        let Some(best) = found.first().filter(|_| round == 0) else { break };
+        let to_beat = weight(calibration, study, fits.first().unwrap_or(null));
+        let beats = |best: &&Fit| round == 0 && weight(calibration, study, best) > to_beat;
+        let Some(best) = found.first().filter(beats) else { break };
         promising = beside(study, best, &bases);
     }
     let Some(best) = found.first() else { return };
@@ -87,7 +93,13 @@ pub(crate) fn late(
 
 /// What beginnings promise beside a base: what an effect changes is taken in the steps from each one on, as if nothing before
 /// it had been changed and nothing lasted.
-fn looks(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit, place: usize) -> Vec<Late> {
+fn looks(
+    study: &Study,
+    linearised: &Linearised,
+    selection: &Selection,
+    base: &Fit,
+    place: usize,
+) -> Vec<Late> {
     let Some(projector) = Projector::new(study, linearised, selection, &base.effect_columns) else {
         return Vec::new();
     };
@@ -140,7 +152,9 @@ fn looks(study: &Study, linearised: &Linearised, selection: &Selection, base: &F
         Some(all)
     };
     let mut best: Vec<Late> = parallel::map(&effects, of_effect).into_iter().flatten().flatten().collect();
-    best.retain(|late| late.gain > WORTH && late.value != study.effects[late.effect].info().parameters[0].neutral);
+    best.retain(|late| {
+        late.gain > WORTH && late.value != study.effects[late.effect].info().parameters[0].neutral
+    });
     best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     best.truncate(TRIED);
     best
@@ -151,7 +165,9 @@ fn beside(study: &Study, best: &Fit, bases: &[Fit]) -> Vec<Late> {
     let late = best.hypothesis.effects.iter().find(|(index, _)| study.courses[*index].onset().is_some());
     let Some((index, values)) = late else { return Vec::new() };
     let rest: Vec<usize> = members(&best.hypothesis).into_iter().filter(|other| other != index).collect();
-    let Some(base) = bases.iter().position(|base| members(&base.hypothesis) == rest) else { return Vec::new() };
+    let Some(base) = bases.iter().position(|base| members(&base.hypothesis) == rest) else {
+        return Vec::new();
+    };
     let Some(effect) =
         (0..study.catalogue).find(|i| std::sync::Arc::ptr_eq(&study.effects[*i], &study.effects[*index]))
     else {
@@ -161,7 +177,7 @@ fn beside(study: &Study, best: &Fit, bases: &[Fit]) -> Vec<Late> {
     let first = course.onset().unwrap_or(0);
     let last = study.steps.len().saturating_sub(1);
     let mut courses: Vec<Course> = Vec::new();
-    for step in [first.saturating_sub(2), first.saturating_sub(1), first, first + 1, first + 2] {
+    for step in [first.saturating_sub(1), first, first + 1] {
         if (1..=last).contains(&step) {
             courses.extend([Course::From(step), Course::Growing(step)]);
         }

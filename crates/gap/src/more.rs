@@ -18,6 +18,9 @@ const WORTH: f64 = 12.0;
 const TRIED: usize = 4;
 /// Above this share of the number of values, a set's cost says that one of its members stands in for another.
 const INADEQUATE: f64 = 1.05;
+/// A further effect that leaves more than this share of the excess cost is one of many that chip at a cause of another kind:
+/// nothing is built upon it.
+const HALVED: f64 = 0.5;
 
 const EFFORT: Effort = Effort { iterations: 6, enough: 0.3, most_sigmas: crate::fit::MOST_SIGMAS };
 
@@ -37,13 +40,19 @@ pub(crate) fn extend(
         let mut further = additions(study, linearised, selection, best);
         further.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let one_more = further.first().map_or(0.0, |first| first.gain.max(0.0));
-        if effects < 2 || effects >= MOST_EFFECTS || one_more < WORTH {
+        if !(2..MOST_EFFECTS).contains(&effects) || one_more < WORTH {
             return one_more;
         }
-        let starts: Vec<Hypothesis> = further.into_iter().take(TRIED).map(|addition| addition.start).collect();
+        let starts: Vec<Hypothesis> =
+            further.into_iter().take(TRIED).map(|addition| addition.start).collect();
         let mut larger = fitted(study, linearised, selection, &starts);
         by_weight(calibration, study, &mut larger);
-        swap(study, linearised, selection, calibration, &mut larger);
+        let values: usize = selection.rows(study).iter().map(ExactSizeIterator::len).sum();
+        let excess = |fit: &Fit| (fit.cost - values as f64).max(0.0);
+        let halved = larger.first().is_some_and(|found| excess(found) < HALVED * excess(best));
+        if halved && larger.first().is_some_and(|found| found.cost > INADEQUATE * values as f64) {
+            swap(study, linearised, selection, calibration, &mut larger);
+        }
         let Some(found) = larger.first() else { return one_more };
         if weight(calibration, study, found) < weight(calibration, study, best) + calibration.threshold {
             return one_more;
@@ -54,15 +63,13 @@ pub(crate) fn extend(
             keep_best(fits, found);
         }
         by_weight(calibration, study, fits);
+        if !halved {
+            return one_more;
+        }
     }
 }
 
-fn fitted(
-    study: &Study,
-    linearised: &Linearised,
-    selection: &Selection,
-    starts: &[Hypothesis],
-) -> Vec<Fit> {
+fn fitted(study: &Study, linearised: &Linearised, selection: &Selection, starts: &[Hypothesis]) -> Vec<Fit> {
     let mut fits: Vec<Fit> = Vec::new();
     let found = parallel::map(starts, |start| fit(study, linearised, start, selection, EFFORT));
     for fitted in found.into_iter().flatten().filter(|fitted| does_something(study, fitted)) {
@@ -79,8 +86,7 @@ fn swap(
     calibration: &Calibration,
     sets: &mut Vec<Fit>,
 ) {
-    let values: usize = selection.rows(study).iter().map(ExactSizeIterator::len).sum();
-    let Some(best) = sets.first().filter(|best| best.cost > INADEQUATE * values as f64) else { return };
+    let Some(best) = sets.first() else { return };
     let without: Vec<Hypothesis> = members(&best.hypothesis)
         .into_iter()
         .map(|dropped| {

@@ -80,7 +80,9 @@ pub fn look_beside(places: &[Place]) -> Next {
     let part = place.and_then(|place| Submodel::ALL.into_iter().find(|part| part.name() == place.submodel));
     let (sensor, lies) = match part {
         Some(part) => (sensor_for(part), format!("most of it lies in {}", part.name())),
-        None => ("a second thermocouple in the compressor housing, near the gas", "no part stands out".to_owned()),
+        None => {
+            ("a second thermocouple in the compressor housing, near the gas", "no part stands out".to_owned())
+        }
     };
     Next::Sensor {
         sensor: sensor.to_owned(),

@@ -15,8 +15,9 @@ use mapper_numerics::parallel;
 /// 95 % quantile of the standard normal distribution: so many sigmas above what is needed, an effect is seen in 95 of 100
 /// recordings.
 const SURELY: f64 = 1.645;
-/// Runs in which a size is found.
-const LOOKS: usize = 3;
+/// Runs in which a size is found, and how near in the logarithm of the length is near enough.
+const LOOKS: usize = 5;
+const NEAR: f64 = 0.05;
 
 /// The smallest size of each effect, on the side of its typical step, that would have been named in 95 of 100 recordings like this
 /// one; effects that would not have been within their range have no size.
@@ -24,7 +25,8 @@ pub fn smallest_seen(study: &Study, linearised: &Linearised, calibration: &Calib
     let everywhere = Selection::all(study);
     let Some(projector) = Projector::new(study, linearised, &everywhere, &[]) else { return Vec::new() };
     let count = study.catalogue.max(2) as f64;
-    let against = calibration.threshold + calibration.prior_none.ln() - (calibration.prior_single / count).ln();
+    let against =
+        calibration.threshold + calibration.prior_none.ln() - (calibration.prior_single / count).ln();
     let indices: Vec<usize> = (0..study.catalogue).collect();
     let found = parallel::map(&indices, |index| {
         let info = study.effects[*index].info();
@@ -53,22 +55,34 @@ pub fn smallest_seen(study: &Study, linearised: &Linearised, calibration: &Calib
             let value = if coordinate.is_logarithmic() { 1.0 / away } else { parameter.neutral + away };
             value.clamp(parameter.low, parameter.high)
         };
-        let mut value = value_at(away((parameter.neutral + parameter.typical_step).clamp(parameter.low, parameter.high)));
+        let furthest = away(value_at(away(parameter.neutral + parameter.typical_step) * 1e9));
+        let mut here = away(value_at(away(parameter.neutral + parameter.typical_step)));
         let mut seen = false;
+        let mut before: Option<(f64, f64)> = None;
         for _ in 0..LOOKS {
-            let (here, sigma) = (away(value), length(value)?);
+            let sigma = length(value_at(here))?;
             if sigma <= 1e-6 || here == 0.0 {
                 return None;
             }
             // Laplace's evidence of one parameter of this curvature, held against what a cause needs.
-            let unit = coordinate.of(value) - coordinate.of(parameter.neutral);
+            let unit = coordinate.of(value_at(here)) - coordinate.of(parameter.neutral);
             let curvature = (sigma / unit.abs().max(1e-9)).powi(2);
-            let needed = against + 0.5 * curvature.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln() + PRIOR_STEPS.ln();
+            let needed =
+                against + 0.5 * curvature.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln() + PRIOR_STEPS.ln();
             let wanted = (2.0 * needed.max(0.0)).sqrt() + SURELY;
-            let moved = value_at(here * wanted / sigma);
-            seen = moved != value_at(here * 1e6) || sigma >= wanted;
-            value = moved;
+            seen = sigma > 0.9 * wanted;
+            if (sigma / wanted).ln().abs() < NEAR {
+                break;
+            }
+            // In logarithms, by the power that two looks show: effects bend.
+            let power = before.map_or(1.0, |(there, length): (f64, f64)| {
+                ((sigma / length).ln() / (here / there).ln()).clamp(0.6, 3.0)
+            });
+            before = Some((here, sigma));
+            let moved = here * (wanted / sigma).powf(1.0 / if power.is_finite() { power } else { 1.0 });
+            here = if moved.abs() > furthest.abs() { furthest } else { moved };
         }
+        let value = value_at(here);
         Some(SmallestSeen {
             effect: info.id.to_string(),
             name: info.name.to_string(),

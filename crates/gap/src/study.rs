@@ -3,6 +3,8 @@
 use crate::actuators::Actuators;
 use crate::course::Course;
 use crate::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
+pub use crate::point_state::PointState;
+use crate::rest::{rested, with_metal_held};
 use crate::shape::{SHAPES, ShapedMap};
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_observe::block::{Block, block_mean, blocks};
@@ -72,30 +74,6 @@ pub struct Prediction {
     pub values: Vec<f64>,
     /// Their slopes, unit/s.
     pub slopes: Vec<f64>,
-}
-
-/// The model at the end of a step.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct PointState {
-    /// Shaft speed, rpm.
-    pub speed_rpm: f64,
-    /// Isentropic efficiency, fraction.
-    pub efficiency: f64,
-    /// Heat-transfer coefficient, W/(m2 K).
-    pub h_w_m2k: f64,
-    /// Place on the speed line: 0 choke, 1 surge.
-    pub surge_position_ratio: f64,
-}
-
-impl PointState {
-    fn of(state: &State, outputs: &Outputs) -> PointState {
-        PointState {
-            speed_rpm: state.shaft_speed_rpm(),
-            efficiency: outputs.efficiency,
-            h_w_m2k: outputs.h_w_m2k,
-            surge_position_ratio: outputs.surge_position_ratio,
-        }
-    }
 }
 
 /// Why no prediction can be made.
@@ -209,8 +187,7 @@ impl Study {
                 StudyStep { marker: *marker, jumped, blocks: blocks(&table, start_s, end_s, &schedule) }
             })
             .collect();
-        let inputs =
-            SmoothedInputs::read(&table, recording, &declared, (actuators.p3, actuators.valve));
+        let inputs = SmoothedInputs::read(&table, recording, &declared, (actuators.p3, actuators.valve));
         let mut groups = Vec::new();
         let mut measured = Vec::new();
         let mut rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>> =
@@ -332,7 +309,10 @@ impl Study {
     /// Stretches of steps in which a hypothesis' rig stays what it is: the first step of each.
     fn stretches(&self, hypothesis: &Hypothesis) -> Vec<usize> {
         let shares = |step: usize| {
-            hypothesis.effects.iter().map(move |(index, _)| self.courses[*index].share(step, self.steps.len()))
+            hypothesis
+                .effects
+                .iter()
+                .map(move |(index, _)| self.courses[*index].share(step, self.steps.len()))
         };
         let steady = hypothesis.effects.iter().all(|(index, _)| self.courses[*index] == Course::Throughout);
         let last = if steady { 1 } else { self.steps.len().max(1) };
@@ -511,34 +491,11 @@ impl Study {
         let mut start = if self.rested {
             settle(&rig.model, &boundary, guess)?
         } else {
-            let mut heavy = rig.model.clone();
-            heavy.params.compressor.housing_mass_kg *= HEAVY_RATIO;
-            heavy.params.turbine.housing_mass_kg *= HEAVY_RATIO;
-            settle(&heavy, &boundary, guess)?
+            settle(&with_metal_held(&rig.model), &boundary, guess)?
         };
         for (knob, by) in &circumstances.knobs {
             knob.start(&mut start, *by);
         }
         Ok(start)
     }
-}
-
-/// Metal this much heavier keeps its temperature while all else comes to rest.
-const HEAVY_RATIO: f64 = 1e9;
-/// Time over which the metal is watched at the start, s, and the rate above which it does not rest, K/s: some hundred times what
-/// noise makes of it, and a tenth of what a machine does that was cold minutes ago.
-const WATCH_S: f64 = 30.0;
-const RESTLESS_K_S: f64 = 0.05;
-
-/// Whether the metal's temperatures stand still when a recording's first step begins.
-fn rested(table: &Table, start_s: f64) -> bool {
-    [Channel::Tc, Channel::Tt].into_iter().all(|channel| {
-        let Some(column) = table.column(channel) else { return true };
-        let middle = |from_s: f64| {
-            let range = table.range(from_s, from_s + 0.3 * WATCH_S);
-            mean_reading(&column[range].iter().copied().filter(|v| v.is_finite()).collect::<Vec<_>>())
-        };
-        let (Some(first), Some(last)) = (middle(start_s), middle(start_s + 0.7 * WATCH_S)) else { return true };
-        (last - first).abs() < RESTLESS_K_S * 0.7 * WATCH_S
-    })
 }

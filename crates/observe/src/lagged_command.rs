@@ -320,10 +320,7 @@ mod tests {
                 }
             })
             .collect();
-        let truth = (
-            Response { lag_s: 0.2, slew_per_s: 80e3 },
-            Response { lag_s: 0.1, slew_per_s: 0.4 },
-        );
+        let truth = (Response { lag_s: 0.2, slew_per_s: 80e3 }, Response { lag_s: 0.1, slew_per_s: 0.4 });
         let read = |p3: Response, valve: Response| {
             let mut recording = Recording { steps: steps.clone(), ..Recording::default() };
             let command = LaggedCommand::of_recording(&recording, p3, valve);

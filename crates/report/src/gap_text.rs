@@ -131,7 +131,8 @@ fn parameter(name: &str, estimate: &Estimate) -> String {
 
 /// How small each effect would have been seen.
 fn smallest_seen(effects: &[SmallestSeen]) -> String {
-    let mut text = "\nan effect would have been named, in 95 of 100 recordings like this one, from\n".to_owned();
+    let mut text =
+        "\nan effect would have been named, in 95 of 100 recordings like this one, from\n".to_owned();
     for seen in effects {
         let size = seen.size.as_deref().unwrap_or("no size within its range");
         text += &format!("  {:40} {size}\n", format!("{} ({})", seen.name, seen.effect));
@@ -194,7 +195,8 @@ fn points(points: &[PointGap]) -> String {
     } else {
         format!("changes the efficiency by up to {eta_points:+.2} points")
     };
-    let h = if h_w_m2k.abs() < 0.5 { "nor h".to_owned() } else { format!("h by up to {h_w_m2k:+.0} W/(m2 K)") };
+    let h =
+        if h_w_m2k.abs() < 0.5 { "nor h".to_owned() } else { format!("h by up to {h_w_m2k:+.0} W/(m2 K)") };
     let joined = if eta_points.abs() < 0.005 && h_w_m2k.abs() >= 0.5 { "but changes " } else { "" };
     let nor = if eta_points.abs() >= 0.005 && h_w_m2k.abs() < 0.5 { "not h".to_owned() } else { h };
     format!("  at equal speed and pressures the cause {eta}, {joined}{nor}\n")

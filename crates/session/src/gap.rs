@@ -2,18 +2,25 @@
 
 use crate::declared::identification_with;
 use crate::fusing::{Fused, fused, recordings};
-use crate::planning::{nominal_model, with_plan_request};
+use crate::planning::{nominal_model, plan, with_plan_request};
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
-use mapper_core::Recording;
+use mapper_core::{Recording, StepMarker};
 use mapper_drift::{CauseKind, DriftReport, without_drift};
+use mapper_gap::actuators::Actuators;
 use mapper_gap::calibration::Calibration;
-use mapper_gap::diagnose::{Diagnosed, Question, diagnose};
+use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
 use mapper_gap::next::look_beside;
-use mapper_gap::outlook::AllowedJump;
+use mapper_gap::outlook::{Alike, AllowedJump};
+use mapper_gap::problem::Problem;
 use mapper_gap::report::{Diagnosis, Verdict};
+use mapper_gap::study::Study;
+use mapper_gap::twin::{Expected, Found, Held, forecast_steps, hold};
+use mapper_gap::usable::usable;
 use mapper_identify::ZeroOutcome;
+use mapper_observe::lagged_command::Response;
+use mapper_observe::table::Table;
 use mapper_observe::{Declared, FusedChannel};
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
@@ -46,31 +53,13 @@ impl Session<'_> {
         map: &ChannelMap,
         effects: Vec<Arc<dyn Effect>>,
     ) -> Result<Gap, SessionError> {
-        same_machine(recorded, campaign)?;
         // Drift comes first: of the whole work it is about this share.
         let progress = |done_ratio: f64, what: &str| {
             self.tell(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };
         progress(0.0, "drift");
-        let mut model = nominal_model(campaign)?;
-        // A recording in which drift cannot be looked for may still have a gap.
-        let drift = self.drift(slice::from_ref(recorded), campaign, map).ok();
-        let drift = drift.map(|drift| drift.report).filter(|report| report.cause.is_some());
-        let config = identification_with(campaign, map);
-        let Fused { recordings, config, channels } =
-            fused(recordings(slice::from_ref(recorded)), config, Some(campaign), map);
-        let sensors = channels.into_iter().next().unwrap_or_default();
-        let recording = taken_off(recordings.into_iter().next().unwrap_or_default(), drift.as_ref());
-        model.params.t2_probe_diameter_m = config.probe_diameter_m;
-        // A zero leaves less of the offsets.
-        let zero = ZeroOutcome::of(&recording, &config, campaign.zero);
-        let (recording, zeroed) = zero.take_off(recording, config);
-        let declared = Declared {
-            sensors: zeroed.declared,
-            noise_colour: map.noise_colour.unwrap_or_default(),
-            tolerances: campaign.tolerances,
-            nominal: campaign.boundary,
-        };
+        let Prepared { recording, declared, model, drift, sensors, zero } =
+            self.prepared_for_gap(recorded, campaign, map)?;
         let after_drift = |done_ratio: f64, what: &str| {
             progress(DRIFT_SHARE + (1.0 - DRIFT_SHARE) * done_ratio, what);
         };
@@ -91,6 +80,110 @@ impl Session<'_> {
         note_drift(&mut diagnosed.diagnosis, drift.as_ref());
         Ok(Gap { diagnosed, drift, sensors, zero })
     }
+
+    /// A recording as the diagnosis takes it: drift of a sensor and offsets at rest subtracted.
+    fn prepared_for_gap(
+        &self,
+        recorded: &Recorded,
+        campaign: &Campaign,
+        map: &ChannelMap,
+    ) -> Result<Prepared, SessionError> {
+        same_machine(recorded, campaign)?;
+        let mut model = nominal_model(campaign)?;
+        // A recording in which drift cannot be looked for may still have a gap.
+        let drift = self.drift(slice::from_ref(recorded), campaign, map).ok();
+        let drift = drift.map(|drift| drift.report).filter(|report| report.cause.is_some());
+        let config = identification_with(campaign, map);
+        let Fused { recordings, config, channels } =
+            fused(recordings(slice::from_ref(recorded)), config, Some(campaign), map);
+        let sensors = channels.into_iter().next().unwrap_or_default();
+        let recording = taken_off(recordings.into_iter().next().unwrap_or_default(), drift.as_ref());
+        model.params.t2_probe_diameter_m = config.probe_diameter_m;
+        // A zero leaves less of the offsets.
+        let zero = ZeroOutcome::of(&recording, &config, campaign.zero);
+        let (recording, zeroed) = zero.take_off(recording, config);
+        let declared = Declared {
+            sensors: zeroed.declared,
+            noise_colour: map.noise_colour.unwrap_or_default(),
+            tolerances: campaign.tolerances,
+            nominal: campaign.boundary,
+        };
+        Ok(Prepared { recording, declared, model, drift, sensors, zero })
+    }
+
+    /// Holds the machine that a diagnosis found against a recording that it has not seen; nothing is fitted.
+    ///
+    /// # Errors
+    /// As [`Session::diagnose_gap`], and [`SessionError::Twin`] where diagnosis and recording do not belong together.
+    pub fn hold_twin(
+        &self,
+        recorded: &Recorded,
+        campaign: &Campaign,
+        map: &ChannelMap,
+        effects: Vec<Arc<dyn Effect>>,
+        found: &Found,
+    ) -> Result<Held, SessionError> {
+        let Prepared { recording, declared, model, .. } = self.prepared_for_gap(recorded, campaign, map)?;
+        let table = Table::new(&recording).ok_or(GapError::from(Problem::Empty))?;
+        usable(&recording, &table, &declared).map_err(GapError::from)?;
+        let actuators = if campaign.tolerances_declared {
+            Actuators::declared(&table, &recording, &declared)
+        } else {
+            Actuators::undeclared(&table, &recording, &declared)
+        };
+        let study = Study::with_actuators(&recording, table, declared, model, effects, actuators);
+        Ok(hold(&study, found)?)
+    }
+
+    /// What the machine that a diagnosis found is expected to read at the end of each step of a campaign's plan.
+    ///
+    /// # Errors
+    /// [`SessionError`] where no plan can be made, or the twin cannot follow it.
+    pub fn forecast_twin(
+        &self,
+        campaign: &Campaign,
+        map: &ChannelMap,
+        effects: Vec<Arc<dyn Effect>>,
+        found: &Found,
+    ) -> Result<Vec<Expected>, SessionError> {
+        let model = nominal_model(campaign)?;
+        let plan = plan(campaign, &model)?;
+        let sensors = identification_with(campaign, map).declared;
+        let lag = Response::lag(campaign.tolerances.actuator_lag_s);
+        let like = Alike {
+            channels: sensors.keys().copied().collect(),
+            declared: Declared {
+                sensors,
+                noise_colour: map.noise_colour.unwrap_or_default(),
+                tolerances: campaign.tolerances,
+                nominal: campaign.boundary,
+            },
+            model,
+            effects,
+            actuators: Actuators { p3: lag, valve: Response::lag(0.0), judged: campaign.tolerances_declared },
+        };
+        let steps = plan.steps.iter().map(|step| StepMarker {
+            index: step.index,
+            kind: step.kind,
+            start_s: step.start_s,
+            end_s: step.start_s + step.dwell_s,
+            from: step.from,
+            to: Some(step.to),
+            p3_pa: step.p3_pa,
+            valve_opening_ratio: step.to.valve_opening_ratio,
+        });
+        Ok(forecast_steps(like, steps.collect(), found)?)
+    }
+}
+
+/// A recording made ready for the diagnosis.
+struct Prepared {
+    recording: Recording,
+    declared: Declared,
+    model: Model,
+    drift: Option<DriftReport>,
+    sensors: Vec<FusedChannel>,
+    zero: ZeroOutcome,
 }
 
 /// Share of the time that the search for drift takes.

@@ -13,6 +13,7 @@ use crate::nuisance::NuisanceKind;
 use crate::report::Verdict;
 use crate::selection::Selection;
 use crate::study::{EffectValues, Hypothesis, Study};
+use mapper_numerics::parallel;
 use mapper_observe::knob::Knob;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -67,7 +68,7 @@ pub struct Over {
     pub size: String,
 }
 
-/// Standard errors from neutral beyond which a cause is there, and between two recordings beyond which it changed.
+/// Sigmas by which a recording is worse without a cause that is there, and standard errors between two recordings beyond which it changed.
 const THERE: f64 = 3.0;
 /// Causes that are followed at most.
 const MOST: usize = 4;
@@ -80,18 +81,19 @@ pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> V
     if effects.is_empty() || diagnosed.iter().any(|d| d.study.nuisances != first.study.nuisances) {
         return Vec::new();
     }
-    let fits: Vec<Fit> = diagnosed.iter().filter_map(|d| refitted(d, &effects)).collect();
-    if fits.len() != diagnosed.len() {
+    let fitted: Vec<(Fit, Vec<bool>)> = diagnosed.iter().filter_map(|d| refitted(d, &effects)).collect();
+    if fitted.len() != diagnosed.len() {
         return Vec::new();
     }
+    let (fits, there): (Vec<Fit>, Vec<Vec<bool>>) = fitted.into_iter().unzip();
     let study = &first.study;
     let at = coordinates(study, &fits[0].hypothesis);
     let neutral = neutral_coordinates(study, &fits[0].hypothesis, &at);
     let factor = calibration.interval_factor;
-    let place_of = |fit: &Fit| -> Vec<f64> {
-        parameters(&fit.hypothesis).iter().zip(&at).map(|(value, coordinate)| coordinate.of(*value)).collect()
-    };
-    let places: Vec<Vec<f64>> = fits.iter().map(place_of).collect();
+    let places: Vec<Vec<f64>> = fits
+        .iter()
+        .map(|fit| parameters(&fit.hypothesis).iter().zip(&at).map(|(value, c)| c.of(*value)).collect())
+        .collect();
     let sigma = |fit: &Fit, k: usize| factor * fit.covariance[(k, k)].max(0.0).sqrt();
     let named: Vec<(usize, usize)> = fits[0]
         .hypothesis
@@ -101,8 +103,10 @@ pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> V
         .collect();
     let mut over = Vec::new();
     for (k, (index, number)) in named.iter().enumerate() {
-        let there = |i: usize| (places[i][k] - neutral[k]).abs() > THERE * sigma(&fits[i], k);
-        let present: Vec<bool> = (0..fits.len()).map(there).collect();
+        let effect = fits[0].hypothesis.effects.iter().position(|(other, _)| other == index).unwrap_or(0);
+        let present: Vec<bool> = there.iter().map(|there| there[effect]).collect();
+        // Where the cause is not there, its size is none, as surely as its curvature says.
+        let place = |i: usize| if present[i] { places[i][k] } else { neutral[k] };
         let having: Vec<&Fit> =
             fits.iter().zip(&present).filter(|(_, there)| **there).map(|(f, _)| f).collect();
         let Some((x, spread)) =
@@ -136,7 +140,7 @@ pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> V
             parameter: parameter.name.to_string(),
             unit: parameter.unit.to_string(),
             fate,
-            each: (0..fits.len()).map(|i| value(places[i][k], sigma(&fits[i], k))).collect(),
+            each: (0..fits.len()).map(|i| value(place(i), sigma(&fits[i], k))).collect(),
             present,
             size: in_words::size(parameter, together.value),
             together,
@@ -165,9 +169,11 @@ fn named_anywhere(diagnosed: &[&Diagnosed]) -> EffectValues {
     effects
 }
 
-/// One recording fitted with all effects that are named in any.
-fn refitted(diagnosed: &Diagnosed, effects: &EffectValues) -> Option<Fit> {
+/// One recording fitted with all effects that are named in any, and whether it has each of them: whether the fit is worse
+/// without it by [`THERE`] sigmas.
+fn refitted(diagnosed: &Diagnosed, effects: &EffectValues) -> Option<(Fit, Vec<bool>)> {
     let study = &diagnosed.study;
+    let everywhere = Selection::all(study);
     let nuisances = diagnosed.fits.first().unwrap_or(&diagnosed.null).hypothesis.nuisances.clone();
     let own = diagnosed.fits.first().map(|fit| &fit.hypothesis.effects);
     let start = effects
@@ -179,7 +185,15 @@ fn refitted(diagnosed: &Diagnosed, effects: &EffectValues) -> Option<Fit> {
         .collect();
     let start = Hypothesis { nuisances, effects: start };
     let beside = diagnosed.linearised.at(study, &start).ok()?;
-    fit(study, &beside, &start, &Selection::all(study), Effort::default()).ok()
+    let whole = fit(study, &beside, &start, &everywhere, Effort::default()).ok()?;
+    let places: Vec<usize> = (0..effects.len()).collect();
+    let there = parallel::map(&places, |place| {
+        let mut without = whole.hypothesis.clone();
+        without.effects.remove(*place);
+        let without = fit(study, &beside, &without, &everywhere, Effort::default());
+        without.is_ok_and(|without| without.cost - whole.cost > THERE * THERE)
+    });
+    Some((whole, there))
 }
 
 fn neutral_coordinates(study: &Study, hypothesis: &Hypothesis, at: &[Coordinate]) -> Vec<f64> {

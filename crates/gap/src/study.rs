@@ -276,9 +276,6 @@ impl Study {
     }
 
     /// The rig of a hypothesis in one step, and the circumstances in which it runs.
-    ///
-    /// # Errors
-    /// [`EffectError`] where a value is out of its range.
     fn rig(&self, hypothesis: &Hypothesis, step: usize) -> Result<(Rig, Circumstances), EffectError> {
         let mut rig = self.nominal.clone();
         let mut circumstances = Circumstances::default();

@@ -8,7 +8,7 @@ use crate::fit::Fit;
 use crate::in_words;
 use crate::next::Rivals;
 use crate::report::{Candidate, Estimate, Onset};
-use crate::study::{Study, members};
+use crate::study::Study;
 use std::collections::BTreeMap;
 
 /// Scores turned into probabilities.
@@ -57,10 +57,10 @@ pub(crate) fn by_weight(calibration: &Calibration, study: &Study, fits: &mut [Fi
     fits.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
 }
 
-/// Whether all effects of `part` are among those of `whole`.
-fn holds(whole: &Fit, part: &Fit) -> bool {
-    let whole = members(&whole.hypothesis);
-    members(&part.hypothesis).iter().all(|effect| whole.contains(effect))
+/// Whether all effects of `part` are among those of `whole`, whenever they begin.
+fn holds(study: &Study, whole: &Fit, part: &Fit) -> bool {
+    let whole = ids(study, whole);
+    ids(study, part).iter().all(|effect| whole.contains(effect))
 }
 
 pub(crate) fn weigh(
@@ -86,7 +86,7 @@ pub(crate) fn weigh(
     let mut probabilities: Vec<f64> = Vec::new();
     for (place, fit) in fits.iter().enumerate() {
         let probability = inside * weights[place + 1] / total;
-        match shown.iter().position(|better| holds(fit, &fits[*better])) {
+        match shown.iter().position(|better| holds(study, fit, &fits[*better])) {
             Some(better) => probabilities[better] += probability,
             None => {
                 shown.push(place);

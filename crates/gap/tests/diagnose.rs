@@ -271,21 +271,19 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
 }
 
 /// What one night found forecasts another with other points, nothing fitted: what is left is noise, and the 95 % band holds what
-/// it says. Its neighbour, the nominal machine, does not.
+/// it says. A covariance that belongs to something else is refused.
 #[test]
 fn the_twin_of_one_night_forecasts_the_next() {
     let truth: [(&str, &[f64]); 2] = [("tip_diameter", &[2e-3]), ("bearing_friction", &[6e-7])];
-    for seed in [21, 22] {
-        let first = ask(&record(&truth, seed)).unwrap();
-        let found = Found::of(&first).unwrap();
-        let next = next_night(&truth, seed);
-        let table = Table::new(&next).unwrap();
-        let study = Study::new(&next, table, declared(), Model::nominal(), first.study.effects.clone());
-        let held = hold(&study, &found).unwrap();
-        assert!(held.ratio < 1.2 && (0.92..0.99).contains(&held.inside), "{held:?}");
-        let nominal = Found { effects: Vec::new(), ..Found::of(&first).unwrap() };
-        assert!(hold(&study, &nominal).is_err(), "its covariance is of another machine");
-    }
+    let first = ask(&record(&truth, 21)).unwrap();
+    let found = Found::of(&first).unwrap();
+    let next = next_night(&truth, 21);
+    let table = Table::new(&next).unwrap();
+    let study = Study::new(&next, table, declared(), Model::nominal(), first.study.effects.clone());
+    let held = hold(&study, &found).unwrap();
+    assert!(held.ratio < 1.2 && (0.92..0.99).contains(&held.inside), "{held:?}");
+    let nominal = Found { effects: Vec::new(), ..found };
+    assert!(hold(&study, &nominal).is_err(), "its covariance is of another machine");
 }
 
 /// Two nights of one rig with a slow probe, a third after the probe was changed and the bearing had begun to rub: each cause has
@@ -341,12 +339,11 @@ fn a_cause_that_begins_with_a_step_is_named_with_its_step() {
 fn the_smallest_size_that_is_seen_is_seen() {
     let clean = ask(&record(&[], 51)).unwrap().diagnosis;
     assert_eq!(clean.smallest_seen.len(), 4);
-    for id in ["tip_diameter", "stem_conduction", "bearing_friction"] {
-        let value = clean.smallest_seen.iter().find(|seen| seen.effect == id).unwrap().value.unwrap();
-        let named = |share: f64| {
-            let diagnosis = ask(&record(&[(id, &[share * value])], 52)).unwrap().diagnosis;
-            diagnosis.verdict == Verdict::Explained && diagnosis.candidates[0].effects == [id]
-        };
-        assert!(named(2.0) && !named(0.3), "{id} {value}");
-    }
+    let id = "bearing_friction";
+    let value = clean.smallest_seen.iter().find(|seen| seen.effect == id).unwrap().value.unwrap();
+    let named = |share: f64| {
+        let diagnosis = ask(&record(&[(id, &[share * value])], 52)).unwrap().diagnosis;
+        diagnosis.verdict == Verdict::Explained && diagnosis.candidates[0].effects == [id]
+    };
+    assert!(named(2.0) && !named(0.3), "{id} {value}");
 }

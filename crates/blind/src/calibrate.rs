@@ -85,6 +85,7 @@ pub fn calibrate(
     for case in &cases {
         let recording = schedule.record(case)?;
         let diagnosed = diagnose(Question {
+            tolerances_declared: true,
             jumps: Vec::new(),
             recording: &recording,
             declared: declared(campaign),

@@ -32,7 +32,7 @@ pub struct Draw {
     pub seed: u64,
     /// Number of cases.
     pub cases: usize,
-    /// Kinds to draw from; all where empty.
+    /// Kinds to draw from; the usual ones where empty.
     pub kinds: Vec<CaseKind>,
     /// Which outside causes are drawn from.
     pub outside: OutsideUse,
@@ -58,7 +58,7 @@ impl Draw {
             catalogue.iter().filter(|effect| shows(effect, ruler)).cloned().collect();
         let mut catalogue = Deck::new(&placed);
         let mut outside = Deck::new(&outside_kinds(self.outside));
-        let kinds = if self.kinds.is_empty() { &CaseKind::ALL[..] } else { &self.kinds[..] };
+        let kinds = if self.kinds.is_empty() { &CaseKind::USUAL[..] } else { &self.kinds[..] };
         (0..self.cases)
             .map(|index| {
                 let kind = kinds[random.random_range(0..kinds.len())];
@@ -67,6 +67,7 @@ impl Draw {
                     CaseKind::None => 0,
                     CaseKind::Single | CaseKind::Outside => 1,
                     CaseKind::Pair => 2,
+                    CaseKind::Triple => 3,
                 };
                 let mut causes: Vec<Cause> = Vec::new();
                 while causes.len() < wanted.min(deck.effects.len()) {
@@ -148,7 +149,7 @@ mod tests {
         let print = |cases: &[Case]| format!("{cases:?}");
         assert_eq!(print(&cases), print(&drawn(3)));
         assert_ne!(print(&cases), print(&drawn(4)));
-        for kind in CaseKind::ALL {
+        for kind in CaseKind::USUAL {
             // A quarter of 400, with a standard deviation of 9.
             let count = cases.iter().filter(|case| case.kind == kind).count();
             assert!((60..140).contains(&count), "{count} of {kind:?}");

@@ -1,6 +1,6 @@
 //! Shares with their exact intervals.
 
-use statrs::function::beta::inv_beta_reg;
+use mapper_numerics::statistics::share_interval_95;
 use std::fmt;
 
 /// `hits` out of `trials`.
@@ -21,10 +21,7 @@ impl Share {
 
 /// Both ends of the exact 95 % interval of a binomial share (Clopper and Pearson 1934); 0 and 1 without trials.
 pub fn clopper_pearson_95(share: Share) -> (f64, f64) {
-    let (hits, misses) = (share.hits as f64, share.trials.saturating_sub(share.hits) as f64);
-    let low = if hits > 0.0 { inv_beta_reg(hits, misses + 1.0, 0.025) } else { 0.0 };
-    let high = if misses > 0.0 { inv_beta_reg(hits + 1.0, misses, 0.975) } else { 1.0 };
-    (low, high)
+    share_interval_95(share.hits as f64, share.trials as f64)
 }
 
 impl fmt::Display for Share {

@@ -14,11 +14,13 @@ pub enum CaseKind {
     Pair,
     /// A cause that is not a candidate.
     Outside,
+    /// Three effects of the catalogue; drawn only where asked for.
+    Triple,
 }
 
 impl CaseKind {
-    /// All kinds.
-    pub const ALL: [CaseKind; 4] = [CaseKind::None, CaseKind::Single, CaseKind::Pair, CaseKind::Outside];
+    /// Kinds that are drawn where none is asked for.
+    pub const USUAL: [CaseKind; 4] = [CaseKind::None, CaseKind::Single, CaseKind::Pair, CaseKind::Outside];
 
     /// Its name in files and tables.
     pub fn name(self) -> &'static str {
@@ -27,6 +29,7 @@ impl CaseKind {
             CaseKind::Single => "single",
             CaseKind::Pair => "pair",
             CaseKind::Outside => "outside",
+            CaseKind::Triple => "triple",
         }
     }
 }

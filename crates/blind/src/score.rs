@@ -113,6 +113,10 @@ pub struct Score {
     pub pair: Share,
     /// Pairs of which at least one was named.
     pub one_of_pair: Share,
+    /// Triples of which all three were named.
+    pub triple: Share,
+    /// Triples of which at least two were named.
+    pub two_of_triple: Share,
     /// Outside causes that were said to be so.
     pub outside: Share,
     /// Outside causes that were explained by the catalogue.
@@ -174,7 +178,8 @@ fn kind_of(truth: &Truth) -> CaseKind {
     match truth.effects.len() {
         0 => CaseKind::None,
         1 => CaseKind::Single,
-        _ => CaseKind::Pair,
+        2 => CaseKind::Pair,
+        _ => CaseKind::Triple,
     }
 }
 
@@ -222,6 +227,11 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
                     at_least.count(one);
                 }
             }
+            CaseKind::Triple => {
+                score.triple.count(right);
+                let named = judged.as_ref().map_or(0, |judged| judged.named.intersection(&causes).count());
+                score.two_of_triple.count(named >= 2);
+            }
             CaseKind::Outside => {
                 let falsely = verdict == Some("explained");
                 for (said, explained) in [
@@ -237,7 +247,7 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
         squared_misses.push((1.0 - p_truth.min(1.0)).powi(2));
         if let (Some(diagnosis), Some(judged)) = (&diagnosis, &judged) {
             set_sizes.push(judged.set_size as f64);
-            if matches!(kind, CaseKind::Single | CaseKind::Pair) {
+            if matches!(kind, CaseKind::Single | CaseKind::Pair | CaseKind::Triple) {
                 let first_two = diagnosis.places.iter().take(2);
                 let right = first_two
                     .flat_map(|place| causes.iter().map(|id| shows_in(id, &place.submodel)))
@@ -302,12 +312,14 @@ impl Judged {
         let right = match kind {
             CaseKind::None => verdict == "within_tolerance",
             CaseKind::Outside => matches!(verdict, "unexplained" | "partly_explained"),
-            CaseKind::Single | CaseKind::Pair => verdict != "within_tolerance" && in_set && set_size <= 3,
+            CaseKind::Single | CaseKind::Pair | CaseKind::Triple => {
+                verdict != "within_tolerance" && in_set && set_size <= 3
+            }
         };
         let p_truth = match kind {
             CaseKind::None => diagnosis.probability_none.unwrap_or(0.0),
             CaseKind::Outside => diagnosis.probability_outside.unwrap_or(0.0),
-            CaseKind::Single | CaseKind::Pair => diagnosis
+            CaseKind::Single | CaseKind::Pair | CaseKind::Triple => diagnosis
                 .candidates
                 .iter()
                 .filter(|candidate| candidate.effects == *causes || candidate.equivalent.contains(causes))
@@ -350,6 +362,8 @@ impl Score {
             ("single effect named", self.single.to_string()),
             ("both of two named", self.pair.to_string()),
             ("  at least one of two", self.one_of_pair.to_string()),
+            ("all of three named", self.triple.to_string()),
+            ("  at least two of three", self.two_of_triple.to_string()),
             ("outside, said so", self.outside.to_string()),
             ("  falsely explained", self.falsely_explained.to_string()),
             ("place right (first two)", self.place.to_string()),

@@ -4,6 +4,10 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mapper_session::SessionEvent;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+/// How often the clock of a bar is drawn.
+const TICK: Duration = Duration::from_millis(250);
 
 /// Shows what a session tells. It may be told from many threads.
 pub struct Progress {
@@ -39,7 +43,9 @@ impl Progress {
                 self.bar.println(format!("{:8.1} s  {}", event.t_s, event.message));
             }
             SessionEvent::Progress { done_ratio, what } => {
-                self.begin(100, "[{bar:40}] {percent:>3} % {msg}");
+                self.begin(100, "[{bar:40}] {percent:>3} % {elapsed_precise} {msg}");
+                // Between two reports the clock shows that work goes on.
+                self.bar.enable_steady_tick(TICK);
                 self.bar.set_position((100.0 * done_ratio) as u64);
                 self.bar.set_message(what.clone());
             }

@@ -30,6 +30,7 @@ impl LawEffect {
             })
             .collect();
         let info = EffectInfo {
+            name: Cow::Borrowed("a law that is proposed"),
             id: Cow::Borrowed("law"),
             description: Cow::Borrowed("terms that were found"),
             equation: Cow::Borrowed("as its terms"),

@@ -38,6 +38,7 @@ fn ask(rig: &Rig, seed: u64) -> Diagnosed {
     // Candidates that have no part in what is planted.
     let candidates = ["tip_diameter", "flowmeter_gain"];
     diagnose(Question {
+        tolerances_declared: true,
         jumps: Vec::new(),
         recording: &recording,
         declared: declared(),

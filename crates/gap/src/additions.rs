@@ -30,7 +30,7 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
     }
     let used = members(&base.hypothesis);
     let mut starts: Vec<(usize, Hypothesis)> = Vec::new();
-    for index in (0..study.effects.len()).filter(|index| !used.contains(index)) {
+    for index in (0..study.catalogue).filter(|index| !used.contains(index)) {
         starts.extend(starts_of(study, &base.hypothesis, index).into_iter().map(|start| (index, start)));
     }
     let mut best: Vec<Addition> = Vec::new();

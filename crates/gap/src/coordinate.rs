@@ -20,6 +20,11 @@ impl Coordinate {
         Coordinate { low: parameter.low, high: parameter.high, scale, logarithmic }
     }
 
+    /// Whether it is the parameter's logarithm.
+    pub fn is_logarithmic(&self) -> bool {
+        self.logarithmic
+    }
+
     /// Coordinate of a value.
     pub fn of(&self, value: f64) -> f64 {
         if self.logarithmic { value.max(1e-300).ln() } else { value / self.scale }

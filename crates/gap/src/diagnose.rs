@@ -1,21 +1,28 @@
 //! The whole diagnosis of one recording.
 
+use crate::actuators::Actuators;
 use crate::additions::additions;
 use crate::adequacy::{Adequacy, adequacy};
 use crate::another_machine::another_machine;
+use crate::assumed::assumed;
 use crate::calibration::Calibration;
-use crate::coordinate::{coordinates, parameters};
 use crate::fit::{Effort, Fit, fit};
-use crate::how_far::{held_out, how_far};
-use crate::next::{Rivals, next, sensor_beside};
+use crate::folds::Folds;
+use crate::how_far::{Compared, how_far};
+use crate::late::late;
+use crate::more::extend;
+use crate::next::{look_beside, next};
 use crate::outlook::AllowedJump;
 use crate::place::{Gain, places};
 use crate::problem::Problem;
-use crate::report::{Candidate, Diagnosis, Estimate, Verdict};
+use crate::report::{Diagnosis, Verdict};
 use crate::select::{Search, does_something, keep_best, refit, search};
 use crate::selection::Selection;
+use crate::smallest_seen::smallest_seen;
 use crate::study::{Hypothesis, PredictError, Prediction, Study, members};
 use crate::usable::usable;
+pub use crate::weigh::prior;
+use crate::weigh::{by_weight, rivals, weigh, weight};
 use crate::whiten::Linearised;
 use mapper_core::Recording;
 use mapper_numerics::parallel;
@@ -23,7 +30,6 @@ use mapper_observe::declared::Declared;
 use mapper_observe::table::Table;
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Why a recording cannot be diagnosed.
@@ -47,6 +53,9 @@ pub struct Question<'a> {
     pub model: Model,
     /// Candidate effects.
     pub effects: Vec<Arc<dyn Effect>>,
+    /// Whether the campaign declares its tolerances; where it does not, the usual ones hold, and its actuators follow as the
+    /// recording says.
+    pub tolerances_declared: bool,
     /// Jumps that the planner allows on this machine, for what to do next; those of the recording where there are none.
     pub jumps: Vec<AllowedJump>,
     /// Numbers behind the probabilities.
@@ -79,6 +88,11 @@ pub struct Diagnosed {
 const FINALISTS: usize = 7;
 /// Of these, beyond the first three, a fit this far behind the best in the logarithm of the evidence is left out.
 const HOPELESS: f64 = 60.0;
+/// Causes among which each fold chooses again, and how far behind the best in the logarithm of the evidence one may be.
+const CHOSEN_AGAIN: usize = 3;
+const CLOSE: f64 = 10.0;
+/// Steps that it takes to see with which of them a cause begins.
+const LEAST_STEPS: usize = 6;
 /// Share of the null's misfit that a cause must remove to explain a gap in part.
 const MOST: f64 = 0.5;
 
@@ -87,30 +101,33 @@ const MOST: f64 = 0.5;
 /// # Errors
 /// [`GapError`] with a clear word where no diagnosis can be made.
 pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
-    let Question { recording, declared, model, effects, jumps, calibration, progress } = question;
+    let Question { recording, declared, model, effects, tolerances_declared, jumps, calibration, progress } =
+        question;
     progress(0.0, "reading");
     let table = Table::new(recording).ok_or(Problem::Empty)?;
     let warnings = usable(recording, &table, &declared)?;
-    let study = Study::new(recording, table, declared, model, effects);
+    let actuators = if tolerances_declared {
+        Actuators::declared(&table, recording, &declared)
+    } else {
+        Actuators::undeclared(&table, recording, &declared)
+    };
+    let mut study = Study::with_actuators(recording, table, declared, model, effects, actuators);
+    progress(0.02, "tolerances");
     let linearised = Linearised::new(&study)?;
     another_machine(&study, &linearised.base.values)?;
     // Hold-outs are chosen by place, before anything is fitted.
-    let held_out = held_out(&study);
-    let mut training = Selection::all(&study);
-    for step in &held_out {
-        training.steps[*step] = false;
-    }
+    let folds = Folds::of(&study);
+    let everywhere = Selection::all(&study);
     let found = search(Search {
         study: &study,
         nominal: &linearised,
         linearised: &linearised,
-        selection: &training,
+        selection: &everywhere,
         progress,
     })?;
-    progress(0.75, "all steps");
-    let everywhere = Selection::all(&study);
+    progress(0.65, "closest causes");
+    let null = found.null;
     let beside = found.refound.as_ref().map_or(&linearised, |(linearised, _)| linearised);
-    // Far behind the best without the held-out steps is far behind it with them.
     let hopeless = |f: &&Fit| found.fits.first().is_some_and(|best| best.score - f.score > HOPELESS);
     let mut finalists: Vec<&Fit> = found
         .fits
@@ -120,7 +137,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         .filter(|(place, f)| *place < 3 || !hopeless(f))
         .map(|(_, f)| f)
         .collect();
-    // Whatever a pair adds, its members alone must have lost on all steps likewise.
+    // Whatever a pair adds, its members alone must have lost likewise.
     if let Some(best) = found.fits.first() {
         for effect in members(&best.hypothesis) {
             let alone = found.fits.iter().find(|f| members(&f.hypothesis) == [effect]);
@@ -128,7 +145,6 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         }
     }
     let effort = Effort { iterations: 5, enough: 0.1, ..Effort::default() };
-    let null = fit(&study, &linearised, &found.null.hypothesis, &everywhere, Effort::default())?;
     let mut fits: Vec<Fit> = Vec::new();
     let again = parallel::map(&finalists, |f| fit(&study, beside, &f.hypothesis, &everywhere, effort));
     for fitted in again.into_iter().flatten() {
@@ -155,14 +171,40 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         refit(finals, &mut fits, 4, effort);
         by_weight(&calibration, &study, &mut fits);
     }
-    progress(0.9, "what is left");
+    progress(0.75, "three and more causes");
+    let mut one_more = extend(&study, beside, &everywhere, &calibration, &null, &mut fits);
+    let mut left = adequacy(&study, &linearised, fits.first().unwrap_or(&null), one_more);
+    if calibration.outside(left.features()) > 0.5 && study.steps.len() >= LEAST_STEPS {
+        progress(0.8, "causes that begin");
+        late(&mut study, beside, &everywhere, &calibration, &null, &mut fits);
+        let begun = fits.first().filter(|best| {
+            best.hypothesis.effects.iter().any(|(index, _)| study.courses[*index].onset().is_some())
+        });
+        if let Some(best) = begun {
+            one_more = most_gain(&study, beside, &everywhere, best);
+            left = adequacy(&study, &linearised, best, one_more);
+        }
+    }
+    progress(0.88, "what is left");
     let best = fits.first().unwrap_or(&null);
-    let one_more =
-        additions(&study, beside, &everywhere, best).into_iter().map(|a| a.gain).fold(0.0, f64::max);
-    let left = adequacy(&study, &linearised, best, one_more);
     let left_by_null = adequacy(&study, &linearised, &null, 0.0);
     let weighed = weigh(&study, &calibration, &null, &fits, &left);
     let named = weighed.named;
+    let weight = |fit: &Fit| weight(&calibration, &study, fit);
+    let causes: Vec<&Fit> = fits
+        .iter()
+        .filter(|_| named)
+        .take(CHOSEN_AGAIN)
+        .filter(|fit| weight(best) - weight(fit) < CLOSE)
+        .collect();
+    let compared = Compared {
+        study: &study,
+        linearised: [&linearised, beside],
+        null: &null,
+        causes: &causes,
+        weight: &weight,
+    };
+    let gap = how_far(compared, &folds);
     let verdict = if !named {
         if weighed.outside > 0.5 { Verdict::Unexplained } else { Verdict::WithinTolerance }
     } else if weighed.outside <= 0.5 {
@@ -171,18 +213,17 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         let n = null.residual.len() as f64;
         let removed = 1.0 - (best.cost - n).max(0.0) / (null.cost - n).max(1.0);
         let smooth = 1.0 - left.smooth_excess.max(0.0) / left_by_null.smooth_excess.max(1.0);
-        if removed > MOST && smooth > MOST { Verdict::PartlyExplained } else { Verdict::Unexplained }
+        let better = gap.worse.is_empty();
+        if removed > MOST && smooth > MOST && better {
+            Verdict::PartlyExplained
+        } else {
+            Verdict::Unexplained
+        }
     };
-    // The gap before and after, by what was found and fitted without the held-out steps.
-    let trained = found.fits.iter().find(|f| members(&f.hypothesis) == members(&best.hypothesis));
-    let after = if named { trained.unwrap_or(&found.null) } else { &found.null };
-    let gap = how_far(&study, &found.null, after, &held_out, 7);
     let mut gains: Vec<Gain<'_>> = fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
-    let counted = training.steps.iter().filter(|counts| **counts).count().max(1);
-    let whole = study.steps.len() as f64 / counted as f64;
     for fit in &found.fits {
         if gains.iter().all(|other| members(&other.fit.hypothesis) != members(&fit.hypothesis)) {
-            gains.push(Gain { fit, gain: whole * (found.null.cost - fit.cost) });
+            gains.push(Gain { fit, gain: null.cost - fit.cost });
         }
     }
     let r#where = if verdict == Verdict::WithinTolerance {
@@ -193,10 +234,13 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     progress(0.95, "what next");
     let next = match verdict {
         Verdict::WithinTolerance => None,
-        Verdict::Unexplained => sensor_beside(&r#where),
-        Verdict::Explained | Verdict::PartlyExplained => {
-            rivals(&weighed, &fits).and_then(|rivals| next(&study, rivals, &jumps))
-        }
+        Verdict::Unexplained | Verdict::PartlyExplained => Some(look_beside(&r#where)),
+        Verdict::Explained => rivals(&weighed, &fits).and_then(|rivals| next(&study, rivals, &jumps)),
+    };
+    let smallest_seen = if verdict == Verdict::WithinTolerance {
+        smallest_seen(&study, &linearised, &calibration)
+    } else {
+        Vec::new()
     };
     progress(1.0, "done");
     let diagnosis = Diagnosis {
@@ -204,16 +248,23 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         r#where,
         candidates: weighed.candidates,
         probability_none: weighed.none,
-        probability_outside: weighed.outside_probability,
+        probability_outside: weighed.outside,
         laws: Vec::new(),
         forces: Vec::new(),
         gap,
         next,
+        smallest_seen,
+        assumed: if tolerances_declared { Vec::new() } else { assumed(&study) },
         warnings,
     };
     let without_cause = without_cause(&study, &linearised, fits.first().filter(|_| named))
         .unwrap_or_else(|| (null.prediction.clone(), null.residual.clone()));
     Ok(Diagnosed { diagnosis, study, null, without_cause, fits, adequacy: left, linearised })
+}
+
+/// What one more effect would take off the cost at most.
+fn most_gain(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> f64 {
+    additions(study, linearised, selection, base).into_iter().map(|a| a.gain).fold(0.0, f64::max)
 }
 
 fn without_cause(
@@ -225,136 +276,4 @@ fn without_cause(
     let prediction = study.predict(&bare).ok()?;
     let residual = linearised.residual(study, &prediction);
     Some((prediction, residual))
-}
-
-/// Scores turned into probabilities.
-struct Weighed {
-    candidates: Vec<Candidate>,
-    none: f64,
-    /// Probability that is reported.
-    outside_probability: f64,
-    /// Probability by what the best fit leaves, by which the verdict is made.
-    outside: f64,
-    /// Whether a cause is named at all.
-    named: bool,
-}
-
-/// Logarithm of what is known of a cause before any data: pairs are rarer than singles, and many.
-pub fn prior(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
-    let count = study.effects.len().max(2) as f64;
-    match fit.hypothesis.effects.len() {
-        0 => calibration.prior_none.ln(),
-        1 => (calibration.prior_single / count).ln(),
-        _ => (calibration.prior_pair / (0.5 * count * (count - 1.0))).ln(),
-    }
-}
-
-/// Best first, priors included.
-fn by_weight(calibration: &Calibration, study: &Study, fits: &mut [Fit]) {
-    let weight = |fit: &Fit| fit.score + prior(calibration, study, fit);
-    fits.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
-}
-
-fn weigh(study: &Study, calibration: &Calibration, null: &Fit, fits: &[Fit], left: &Adequacy) -> Weighed {
-    let scores: Vec<f64> =
-        std::iter::once(null).chain(fits).map(|fit| fit.score + prior(calibration, study, fit)).collect();
-    let top = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = scores.iter().map(|s| ((s - top) / calibration.temperature).exp()).collect();
-    let total: f64 = weights.iter().sum();
-    let best_cause = scores.iter().skip(1).copied().fold(f64::NEG_INFINITY, f64::max);
-    let named = best_cause - scores[0] > calibration.threshold;
-    let outside = calibration.outside(left.features());
-    // Where nothing is named, an inadequate fit speaks for an outside cause likewise.
-    let inside = 1.0 - outside;
-    let none = inside * weights[0] / total;
-    let candidates = fits
-        .iter()
-        .enumerate()
-        .map(|(place, fit)| Candidate {
-            effects: names(study, fit),
-            probability: inside * weights[place + 1] / total,
-            parameters: estimates(study, calibration, fit),
-            equivalent: if place == 0 && named {
-                equivalents(study, calibration, fits, &scores)
-            } else {
-                Vec::new()
-            },
-        })
-        .collect();
-    Weighed { candidates, none, outside_probability: outside, outside, named }
-}
-
-fn names(study: &Study, fit: &Fit) -> Vec<String> {
-    fit.hypothesis.effects.iter().map(|(index, _)| study.effects[*index].info().id.to_string()).collect()
-}
-
-/// Maximum number of causes named beside the first: a longer list helps nobody.
-const MOST_EQUIVALENT: usize = 2;
-
-/// Other causes whose scores the data do not tell from the best's, the nearest first; a cause that only adds to the best is
-/// none.
-fn equivalents(study: &Study, calibration: &Calibration, fits: &[Fit], scores: &[f64]) -> Vec<Vec<String>> {
-    let Some(best) = fits.first() else { return Vec::new() };
-    let of_best = members(&best.hypothesis);
-    fits.iter()
-        .enumerate()
-        .skip(1)
-        .filter(|(place, fit)| {
-            let close = scores[1] - scores[place + 1] < 3.0 * calibration.temperature;
-            let others = members(&fit.hypothesis);
-            close && !of_best.iter().all(|effect| others.contains(effect))
-        })
-        .map(|(_, fit)| names(study, fit))
-        .take(MOST_EQUIVALENT)
-        .collect()
-}
-
-/// Parameters with their 95 % intervals, taken in the search's coordinate so that they stay within their range.
-fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> BTreeMap<String, Estimate> {
-    let coordinates = coordinates(study, &fit.hypothesis);
-    let values = parameters(&fit.hypothesis);
-    let mut estimates = BTreeMap::new();
-    let mut place = 0;
-    for (index, of_effect) in &fit.hypothesis.effects {
-        let info = study.effects[*index].info();
-        for parameter in info.parameters.iter().take(of_effect.len()) {
-            let coordinate = coordinates[place];
-            let at = coordinate.of(values[place]);
-            let variance = fit.covariance.get((place, place)).copied().unwrap_or(f64::INFINITY);
-            let away = 1.96 * calibration.interval_factor * variance.max(0.0).sqrt();
-            let (a, b) = (coordinate.value(at - away), coordinate.value(at + away));
-            let name = if info.parameters.len() == 1 {
-                info.id.to_string()
-            } else {
-                format!("{}.{}", info.id, parameter.name)
-            };
-            let estimate = Estimate {
-                value: values[place],
-                low: a.min(b),
-                high: a.max(b),
-                unit: parameter.unit.to_string(),
-            };
-            estimates.insert(name, estimate);
-            place += 1;
-        }
-    }
-    estimates
-}
-
-/// Share of the first among the causes that are open from which on it is settled.
-const SETTLED: f64 = 0.95;
-
-/// The causes that are still open, best first; `None` where the first is settled. A mere addition to the best is no
-/// rival of it.
-fn rivals<'a>(weighed: &Weighed, fits: &'a [Fit]) -> Option<Rivals<'a>> {
-    let of_first = members(&fits.first()?.hypothesis);
-    let rival = |fit: &Fit| {
-        let others = members(&fit.hypothesis);
-        !of_first.iter().all(|effect| others.contains(effect))
-    };
-    let open: Vec<usize> = (0..fits.len()).filter(|place| *place == 0 || rival(&fits[*place])).collect();
-    let probabilities: Vec<f64> = open.iter().map(|place| weighed.candidates[*place].probability).collect();
-    let total: f64 = probabilities.iter().sum();
-    (open.len() > 1 && probabilities[0] < SETTLED * total)
-        .then(|| Rivals { fits: open.iter().map(|place| &fits[*place]).collect(), probabilities })
 }

@@ -1,97 +1,193 @@
-//! How far the gap shrinks, on steps that were used neither for selection nor for fitting.
+//! How far the gap shrinks, on steps that were not used to fit.
 
 use crate::adequacy::misfit_of_steps;
-use crate::fit::Fit;
+use crate::fit::{Effort, Fit, fit};
+use crate::folds::Folds;
 use crate::nuisance::OUTPUTS;
 use crate::report::{ChannelGap, Gap, PointGap};
+use crate::selection::{Selection, dot_over};
 use crate::study::{Hypothesis, Study};
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64;
+use crate::whiten::{Linearised, rows_of_step};
+use mapper_numerics::parallel;
+use mapper_numerics::statistics::share_interval_95;
 use std::collections::BTreeMap;
 
-/// Every how many steps one is held out.
-const EVERY: usize = 3;
-/// Resamples of the held-out steps for the interval.
-const RESAMPLES: usize = 2000;
-
-/// Steps held out of a recording: every third, chosen by place alone; none where steps are too few.
-pub fn held_out(study: &Study) -> Vec<usize> {
-    let steps = study.steps.len();
-    if steps < 2 * EVERY { Vec::new() } else { (0..steps).filter(|step| step % EVERY == EVERY - 1).collect() }
+/// What is compared.
+#[derive(Clone, Copy)]
+pub struct Compared<'a> {
+    /// The recording.
+    pub study: &'a Study,
+    /// Linearised where nothing is off, and beside the best cause.
+    pub linearised: [&'a Linearised; 2],
+    /// Tolerances alone.
+    pub null: &'a Fit,
+    /// The causes among which each fold chooses again, best first; none where none is named.
+    pub causes: &'a [&'a Fit],
+    /// Logarithm of the evidence of a fit, priors included.
+    pub weight: &'a (dyn Fn(&Fit) -> f64 + Sync),
 }
 
-/// Compares two fits made without the held-out steps on them. `seed` draws the interval's resamples.
-pub fn how_far(study: &Study, before: &Fit, after: &Fit, held_out: &[usize], seed: u64) -> Gap {
-    // Where nothing could be held out, all steps are compared, and the list says so by being empty.
-    let all: Vec<usize> = (0..study.steps.len()).collect();
-    let steps = if held_out.is_empty() { &all[..] } else { held_out };
-    let of = |fit: &Fit| {
-        let misfit = misfit_of_steps(study, &fit.residual);
-        steps.iter().map(|step| misfit[*step]).collect::<Vec<f64>>()
-    };
-    let (g_before, g_after) = (of(before), of(after));
-    let share = |places: &[usize]| {
-        let sum = |g: &[f64]| places.iter().map(|i| g[*i].max(0.0)).sum::<f64>();
-        let total = sum(&g_before);
-        if total > 0.0 { 1.0 - sum(&g_after) / total } else { 0.0 }
-    };
-    let every: Vec<usize> = (0..steps.len()).collect();
-    let mut random = Pcg64::seed_from_u64(seed);
-    let mut drawn: Vec<f64> = (0..RESAMPLES)
-        .map(|_| {
-            let places: Vec<usize> = every.iter().map(|_| random.random_range(0..steps.len())).collect();
-            share(&places)
-        })
-        .collect();
-    drawn.sort_by(f64::total_cmp);
-    let quantile = |p: f64| drawn.get((p * (RESAMPLES - 1) as f64) as usize).copied().unwrap_or(0.0);
+/// Whitened residuals and predicted values of all steps, each step by a fit that did not see it.
+struct Unseen {
+    residual: Vec<f64>,
+    values: Vec<f64>,
+}
+
+/// Effort of a fit without some of the steps: it begins at the best of all of them.
+const EFFORT: Effort = Effort { iterations: 5, enough: 0.2, most_sigmas: crate::fit::MOST_SIGMAS };
+
+/// Compares tolerances alone with the best cause, step by step, each by a fit that did not see the step: in every fold the
+/// cause is chosen among the first few, and fitted, without the steps of the fold.
+pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
+    let Compared { study, linearised: [nominal, _], null, .. } = compared;
+    let (before, after) = unseen(compared, folds);
+    let steps: Vec<usize> = (0..study.steps.len()).collect();
+    let (g_before, g_after) =
+        (misfit_of_steps(study, &before.residual), misfit_of_steps(study, &after.residual));
     let mean = |g: &[f64]| g.iter().sum::<f64>() / g.len().max(1) as f64;
+    let positive = |g: &[f64]| g.iter().map(|g| g.max(0.0)).sum::<f64>();
+    let total = positive(&g_before);
+    let removed = if total > 0.0 { 1.0 - positive(&g_after) / total } else { 0.0 };
+    // Few steps that hold most of the gap are few steps.
+    let squares: f64 = g_before.iter().map(|g| g.max(0.0).powi(2)).sum();
+    let independent = if squares > 0.0 { total * total / squares } else { 0.0 };
+    let (low, high) = share_interval_95(independent * removed.clamp(0.0, 1.0), independent);
+    let bare =
+        Unseen { residual: nominal.residual(study, &nominal.base), values: nominal.base.values.clone() };
+    let channels = channels(study, &bare, &before, &after);
+    let worse = worse(study, &before, &after, &channels);
+    let claimed = worse.is_empty() && !compared.causes.is_empty();
     Gap {
+        nominal: mean(&misfit_of_steps(study, &bare.residual)),
         before: mean(&g_before),
         after: mean(&g_after),
-        shrink: share(&every),
-        shrink_low: quantile(0.025),
-        shrink_high: quantile(0.975),
-        held_out_steps: held_out.to_vec(),
-        channels: channels(study, before, after, steps),
-        points: points(study, &before.hypothesis, &after.hypothesis),
+        shrink: if claimed { removed } else { 0.0 },
+        shrink_low: if claimed { low } else { 0.0 },
+        shrink_high: if claimed { high } else { 0.0 },
+        worse,
+        held_out_steps: if folds.steps.len() > 1 { steps } else { Vec::new() },
+        folds: folds.steps.clone(),
+        channels,
+        points: points(study, &compared.causes.first().unwrap_or(&null).hypothesis),
     }
 }
 
+fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
+    let Compared { study, linearised: [nominal, beside], null, causes, weight } = compared;
+    let whole = |fit: &Fit| Unseen { residual: fit.residual.clone(), values: fit.prediction.values.clone() };
+    if folds.steps.len() < 2 {
+        return (whole(null), whole(causes.first().unwrap_or(&null)));
+    }
+    // Each fold with the null and each cause.
+    let jobs: Vec<(usize, usize)> =
+        (0..folds.steps.len()).flat_map(|fold| (0..=causes.len()).map(move |which| (fold, which))).collect();
+    let fitted = parallel::map(&jobs, |(fold, which)| {
+        let mut selection = Selection::all(study);
+        for step in &folds.steps[*fold] {
+            selection.steps[*step] = false;
+        }
+        let (linearised, whole) = match which.checked_sub(1) {
+            None => (nominal, null),
+            Some(cause) => (beside, causes[cause]),
+        };
+        // A fold that cannot be fitted keeps the fit to all steps: it claims less than it could.
+        fit(study, linearised, &whole.hypothesis, &selection, EFFORT).unwrap_or_else(|_| whole.clone())
+    });
+    let (mut before, mut after) = (whole(null), whole(null));
+    for (fold, steps) in folds.steps.iter().enumerate() {
+        let of_fold: Vec<&Fit> =
+            jobs.iter().zip(&fitted).filter(|((f, _), _)| *f == fold).map(|(_, fit)| fit).collect();
+        let Some((bare, causes)) = of_fold.split_first() else { continue };
+        let best = causes.iter().max_by(|a, b| weight(a).total_cmp(&weight(b))).unwrap_or(bare);
+        for step in steps {
+            for row in rows_of_step(study, *step) {
+                before.residual[row] = bare.residual[row];
+                before.values[row] = bare.prediction.values[row];
+                after.residual[row] = best.residual[row];
+                after.values[row] = best.prediction.values[row];
+            }
+        }
+    }
+    (before, after)
+}
+
 /// Root mean square of measured minus predicted block means, for each channel, in its unit.
-fn channels(study: &Study, before: &Fit, after: &Fit, steps: &[usize]) -> BTreeMap<String, ChannelGap> {
+fn channels(
+    study: &Study,
+    nominal: &Unseen,
+    before: &Unseen,
+    after: &Unseen,
+) -> BTreeMap<String, ChannelGap> {
     let mut channels = BTreeMap::new();
     for (output, channel) in OUTPUTS.iter().enumerate() {
-        let groups = || study.groups.iter().filter(|g| g.output == output && steps.contains(&g.step));
-        let count: usize = groups().map(|g| g.rows.len()).sum();
-        if count == 0 {
+        let rows: Vec<usize> =
+            study.groups.iter().filter(|g| g.output == output).flat_map(|g| g.rows.clone()).collect();
+        if rows.is_empty() {
             continue;
         }
-        let rms = |fit: &Fit| {
-            let squares = groups().flat_map(|g| g.rows.clone());
-            let sum: f64 =
-                squares.map(|row| (study.measured[row] - fit.prediction.values[row]).powi(2)).sum();
-            (sum / count as f64).sqrt()
+        let rms = |told: &Unseen| {
+            let sum: f64 = rows.iter().map(|row| (study.measured[*row] - told.values[*row]).powi(2)).sum();
+            (sum / rows.len() as f64).sqrt()
         };
-        let row = ChannelGap { before: rms(before), after: rms(after), unit: channel.unit().to_owned() };
+        let row = ChannelGap {
+            nominal: rms(nominal),
+            before: rms(before),
+            after: rms(after),
+            unit: channel.unit().to_owned(),
+        };
         channels.insert(channel.symbol().to_owned(), row);
     }
     channels
 }
 
-fn points(study: &Study, before: &Hypothesis, after: &Hypothesis) -> Vec<PointGap> {
-    let (Ok(before), Ok(after)) = (study.points(before), study.points(after)) else { return Vec::new() };
+/// A channel is worse where its residual is larger by this share, and by more than chance makes of it, in standard deviations.
+const WORSE_RATIO: f64 = 1.1;
+const WORSE_SIGMAS: f64 = 3.0;
+
+/// Channels that the cause makes worse on steps that it did not see.
+fn worse(
+    study: &Study,
+    before: &Unseen,
+    after: &Unseen,
+    channels: &BTreeMap<String, ChannelGap>,
+) -> Vec<String> {
+    let is_worse = |output: &usize| {
+        let Some(gap) = channels.get(OUTPUTS[*output].symbol()) else { return false };
+        let rows: Vec<_> =
+            study.groups.iter().filter(|g| g.output == *output).map(|g| g.rows.clone()).collect();
+        let squares = |of: &[f64]| dot_over(&rows, of, of);
+        let apart: Vec<f64> = before.residual.iter().zip(&after.residual).map(|(b, a)| b - a).collect();
+        let more = squares(&after.residual) - squares(&before.residual);
+        // Of two predictions that are as good as each other the misfits differ by twice their distance, one sigma.
+        let chance = 2.0 * squares(&apart).sqrt();
+        gap.after > WORSE_RATIO * gap.before && more > WORSE_SIGMAS * chance.max(WORSE_SIGMAS)
+    };
+    (0..OUTPUTS.len()).filter(is_worse).map(|output| OUTPUTS[output].symbol().to_owned()).collect()
+}
+
+/// Efficiency and heat transfer at the end of each step: by the cause with the tolerances found beside it, by these tolerances
+/// alone, and by the nominal model, all at the same speed, pressures and metal temperatures. What does not touch the efficiency
+/// does not move it, however far it moves the operating point.
+fn points(study: &Study, after: &Hypothesis) -> Vec<PointGap> {
+    let tolerances = Hypothesis { nuisances: after.nuisances.clone(), effects: Vec::new() };
+    let nothing = study.nothing();
+    let Ok(points) = study.points_beside(after, &[&nothing, &tolerances]) else { return Vec::new() };
     study
         .steps
         .iter()
-        .zip(before.iter().zip(&after))
-        .map(|(step, (before, after))| PointGap {
-            speed_rpm: after.speed_rpm,
-            valve: step.marker.valve_opening_ratio,
-            eta_before: before.efficiency,
-            eta_after: after.efficiency,
-            h_before_w_m2k: before.h_w_m2k,
-            h_after_w_m2k: after.h_w_m2k,
+        .zip(points)
+        .filter_map(|(step, (after, beside))| {
+            let [nominal, before] = beside.as_slice() else { return None };
+            Some(PointGap {
+                speed_rpm: after.speed_rpm,
+                valve: step.marker.valve_opening_ratio,
+                eta_nominal: nominal.efficiency,
+                eta_before: before.efficiency,
+                eta_after: after.efficiency,
+                h_nominal_w_m2k: nominal.h_w_m2k,
+                h_before_w_m2k: before.h_w_m2k,
+                h_after_w_m2k: after.h_w_m2k,
+            })
         })
         .collect()
 }

@@ -3,27 +3,40 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod actuators;
 pub mod additions;
 pub mod adequacy;
 pub mod another_machine;
+mod assumed;
 pub mod calibration;
 pub mod coordinate;
+pub mod course;
 pub mod diagnose;
 pub mod fit;
+pub mod folds;
 pub mod how_far;
+mod in_words;
+pub mod joint;
+mod late;
+mod more;
 pub mod next;
 mod normal;
 pub mod nuisance;
 pub mod outlook;
 pub mod place;
+pub mod point_state;
 pub mod problem;
 mod projector;
 pub mod report;
+mod rest;
 pub mod screen;
 pub mod select;
 pub mod selection;
 pub mod shape;
 pub mod signature;
+pub mod smallest_seen;
 pub mod study;
+pub mod twin;
 pub mod usable;
+mod weigh;
 pub mod whiten;

@@ -73,17 +73,23 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[AllowedJump]) -> O
     }
 }
 
-/// The sensor that would look into the part where most of an unexplained gap lies.
-pub fn sensor_beside(places: &[Place]) -> Option<Next> {
-    let place = places.first()?;
-    let part = Submodel::ALL.into_iter().find(|part| part.name() == place.submodel)?;
-    Some(Next::Sensor {
-        sensor: sensor_for(part).to_owned(),
+/// The step that is left where the catalogue does not explain the gap: the sensor that would look into the part where most of it
+/// lies, or where no part is known, a suspicion.
+pub fn look_beside(places: &[Place]) -> Next {
+    let place = places.first();
+    let part = place.and_then(|place| Submodel::ALL.into_iter().find(|part| part.name() == place.submodel));
+    let (sensor, lies) = match part {
+        Some(part) => (sensor_for(part), format!("most of it lies in {}", part.name())),
+        None => {
+            ("a second thermocouple in the compressor housing, near the gas", "no part stands out".to_owned())
+        }
+    };
+    Next::Sensor {
+        sensor: sensor.to_owned(),
         reason: format!(
-            "no effect of the catalogue explains the gap, and most of it lies in {}: write a suspected effect in rhai and give it with --effect, or measure there",
-            place.submodel
+            "no effect of the catalogue explains all of the gap, and {lies}: write a suspected effect in rhai and give it with --effect, or measure there"
         ),
-    })
+    }
 }
 
 fn point(point: OperatingPoint) -> JumpPoint {

@@ -1,17 +1,22 @@
 //! What a jump that was not made would show: the candidates' predictions of it, and how far apart they are once each
 //! is fitted again.
 
+use crate::actuators::Actuators;
 use crate::coordinate::coordinates;
 use crate::fit::{Fit, effect_changes};
 use crate::nuisance::{NuisanceKind, OUTPUTS};
 use crate::study::{Hypothesis, Study};
 use crate::whiten::{Linearised, dot};
 use mapper_core::{Channel, OperatingPoint, Recording, Series, StepKind, StepMarker};
+use mapper_observe::declared::Declared;
 use mapper_observe::knob::Knob;
 use mapper_observe::table::Table;
+use mapper_physics::effect::Effect;
+use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::steady::hold_speed;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// A jump that may be run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,11 +41,55 @@ const FINE_S: f64 = 0.1;
 /// Maximum number of samples of a jump; a dwell that is longer is looked at up to there.
 const MOST_S: f64 = 600.0;
 
-/// A jump made ready like a recording, of rest at its start and its dwell, with nothing in it but its inputs.
+/// What imagined steps have in common with a recording.
+#[derive(Debug, Clone)]
+pub struct Alike {
+    /// What is declared.
+    pub declared: Declared,
+    /// The nominal machine.
+    pub model: Model,
+    /// Candidate effects.
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// Channels that would be measured.
+    pub channels: Vec<Channel>,
+    /// How the actuators follow.
+    pub actuators: Actuators,
+}
+
+/// Steps made ready like a recording, with nothing in it but the inputs: `rest` is where they begin.
+pub(crate) fn imagined_steps(
+    like: Alike,
+    steps: Vec<StepMarker>,
+    rest: &OperatingPoint,
+    interval_s: f64,
+) -> Option<Study> {
+    let end_s = steps.last()?.end_s;
+    let t_s: Vec<f64> = (0..(end_s / interval_s) as usize).map(|i| interval_s * i as f64).collect();
+    // The rest at the start, as a first guess; the inputs are those of the campaign.
+    let boundary =
+        BoundaryConditions { valve_opening_ratio: rest.valve_opening_ratio, ..like.declared.nominal };
+    let held = hold_speed(&like.model, rest.speed_rpm, &boundary).ok()?.state;
+    let level = |channel: Channel| match channel {
+        Channel::ShaftSpeed => rest.speed_rpm,
+        Channel::P2 => held.p2_pa,
+        Channel::Tc => held.tc_k,
+        Channel::Tt => held.tt_k,
+        Channel::T2 => held.t2_tip_k,
+        _ => 0.0,
+    };
+    let series =
+        |channel: Channel| (channel, Series { t_s: t_s.clone(), values: vec![level(channel); t_s.len()] });
+    // What drives the model comes from the campaign; what the rig measured would be measured again.
+    let measured =
+        OUTPUTS.into_iter().filter(|channel| *channel != Channel::P3 && like.channels.contains(channel));
+    let recording = Recording { series: measured.map(series).collect(), steps, ..Recording::default() };
+    let table = Table::new(&recording)?;
+    Some(Study::with_actuators(&recording, table, like.declared, like.model, like.effects, like.actuators))
+}
+
+/// A jump made ready like a recording, of rest at its start and its dwell. What began in the recording is there.
 fn imagined(recorded: &Study, jump: &AllowedJump, interval_s: f64) -> Option<Study> {
     let dwell_s = jump.dwell_s.clamp(10.0, MOST_S);
-    let count = ((HOLD_S + dwell_s) / interval_s) as usize;
-    let t_s: Vec<f64> = (0..count).map(|i| interval_s * i as f64).collect();
     let marker = |index: usize, from: f64, to: f64, p3_pa: f64, point: OperatingPoint| StepMarker {
         index,
         kind: StepKind::Repeat,
@@ -55,35 +104,16 @@ fn imagined(recorded: &Study, jump: &AllowedJump, interval_s: f64) -> Option<Stu
         marker(0, 0.0, HOLD_S, jump.from_p3_pa, jump.from),
         marker(1, HOLD_S, HOLD_S + dwell_s, jump.to_p3_pa, jump.to),
     ];
-    // The rest at the start, as a first guess; the inputs are those of the campaign.
-    let boundary = BoundaryConditions {
-        valve_opening_ratio: jump.from.valve_opening_ratio,
-        ..recorded.declared.nominal
+    let like = Alike {
+        declared: recorded.declared.clone(),
+        model: recorded.nominal.model.clone(),
+        effects: recorded.effects.clone(),
+        channels: recorded.table.columns.keys().copied().collect(),
+        actuators: recorded.actuators,
     };
-    let rest = hold_speed(&recorded.nominal.model, jump.from.speed_rpm, &boundary).ok()?.state;
-    let level = |channel: Channel| match channel {
-        Channel::ShaftSpeed => jump.from.speed_rpm,
-        Channel::P2 => rest.p2_pa,
-        Channel::Tc => rest.tc_k,
-        Channel::Tt => rest.tt_k,
-        Channel::T2 => rest.t2_tip_k,
-        _ => 0.0,
-    };
-    let series =
-        |channel: Channel| (channel, Series { t_s: t_s.clone(), values: vec![level(channel); t_s.len()] });
-    // What drives the model comes from the campaign; what the rig measured would be measured again.
-    let measured = OUTPUTS
-        .into_iter()
-        .filter(|channel| *channel != Channel::P3 && recorded.table.column(*channel).is_some());
-    let recording = Recording { series: measured.map(series).collect(), steps, ..Recording::default() };
-    let table = Table::new(&recording)?;
-    Some(Study::new(
-        &recording,
-        table,
-        recorded.declared.clone(),
-        recorded.nominal.model.clone(),
-        recorded.effects.clone(),
-    ))
+    let mut study = imagined_steps(like, steps, &jump.from, interval_s)?;
+    study.catalogue = recorded.catalogue;
+    Some(study)
 }
 
 /// A fit's hypothesis at a new start, of which its own start says nothing.

@@ -38,6 +38,10 @@ pub struct Diagnosis {
     pub gap: Gap,
     /// What to do next; `None` where nothing is left to settle.
     pub next: Option<Next>,
+    /// Where nothing is named: how small each effect would have been seen.
+    pub smallest_seen: Vec<SmallestSeen>,
+    /// What was assumed because the campaign does not declare it; one sentence each.
+    pub assumed: Vec<String>,
     /// What could not be used, and what to know before believing the rest; one sentence each.
     pub warnings: Vec<String>,
 }
@@ -74,6 +78,38 @@ pub struct Estimate {
     pub high: f64,
     /// Unit.
     pub unit: String,
+    /// Value at which the effect is not there.
+    pub neutral: f64,
+    /// The best value in words.
+    pub size: String,
+}
+
+/// With which step a cause begins.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Onset {
+    /// The step, by index.
+    pub step: usize,
+    /// Its start, s of the recording.
+    pub t_s: f64,
+    /// Whether the cause grows from there to the end; else it is whole from there on.
+    pub grows: bool,
+}
+
+/// How small an effect would have been seen.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SmallestSeen {
+    /// Id of the effect.
+    pub effect: String,
+    /// Its name for people.
+    pub name: String,
+    /// The parameter that says its size.
+    pub parameter: String,
+    /// The value that would have been named in 95 of 100 recordings like this one; `None` where none within its range would.
+    pub value: Option<f64>,
+    /// Unit.
+    pub unit: String,
+    /// The value in words.
+    pub size: Option<String>,
 }
 
 /// A law that was found for a missing force.
@@ -138,17 +174,23 @@ pub struct MissingForce {
 pub struct Candidate {
     /// Ids of its effects.
     pub effects: Vec<String>,
-    /// Calibrated probability.
+    /// Their names for people.
+    pub names: Vec<String>,
+    /// Calibrated probability that it is these effects, with or without others too weak to tell.
     pub probability: f64,
     /// Parameters; `inner_node.phi` where an effect has several.
     pub parameters: BTreeMap<String, Estimate>,
+    /// Effects that begin with a step, by id.
+    pub onsets: BTreeMap<String, Onset>,
     /// Causes that the data cannot tell apart from this one.
     pub equivalent: Vec<Vec<String>>,
 }
 
-/// Root mean square residual of a channel.
+/// Root mean square residual of a channel over the steps, each predicted by a fit that did not see it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelGap {
+    /// With the nominal model as it stands, nothing fitted.
+    pub nominal: f64,
     /// With the nominal model, tolerances fitted.
     pub before: f64,
     /// With the best cause.
@@ -157,38 +199,48 @@ pub struct ChannelGap {
     pub unit: String,
 }
 
-/// Efficiency and heat transfer at the end of a step.
+/// Efficiency and heat transfer at the end of a step, three times at the same speed, pressures and metal temperatures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PointGap {
     /// Shaft speed, rpm.
     pub speed_rpm: f64,
     /// Valve opening.
     pub valve: f64,
-    /// Efficiency by the nominal model, tolerances fitted.
+    /// Efficiency by the nominal model as it stands.
+    pub eta_nominal: f64,
+    /// Efficiency with the tolerances found beside the best cause, without the cause.
     pub eta_before: f64,
     /// Efficiency with the best cause.
     pub eta_after: f64,
-    /// Heat-transfer coefficient by the nominal model, tolerances fitted, W/(m2 K).
+    /// Heat-transfer coefficient by the nominal model as it stands, W/(m2 K).
+    pub h_nominal_w_m2k: f64,
+    /// Heat-transfer coefficient with the tolerances found beside the best cause, without the cause, W/(m2 K).
     pub h_before_w_m2k: f64,
     /// Heat-transfer coefficient with the best cause, W/(m2 K).
     pub h_after_w_m2k: f64,
 }
 
-/// The gap on steps used neither to select nor to fit.
+/// The gap, each step predicted by a fit that did not see it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Gap {
-    /// Mean of `(|r|^2 - n)/n` over the held-out steps, nominal model with tolerances fitted.
+    /// Mean of `(|r|^2 - n)/n` over the steps, nominal model as it stands.
+    pub nominal: f64,
+    /// The same with tolerances fitted.
     pub before: f64,
     /// The same with the best cause.
     pub after: f64,
-    /// Share removed.
+    /// Share removed; 0 where a channel gets worse.
     pub shrink: f64,
-    /// 95 % interval of the share: lower end.
+    /// 95 % interval of the share in steps like these: lower end.
     pub shrink_low: f64,
     /// Upper end.
     pub shrink_high: f64,
-    /// Steps held out, by index.
+    /// Channels that the cause makes worse.
+    pub worse: Vec<String>,
+    /// Steps that were held out in one of the folds, by index; none where steps are too few.
     pub held_out_steps: Vec<usize>,
+    /// The folds: steps that were held out together.
+    pub folds: Vec<Vec<usize>>,
     /// Each channel.
     pub channels: BTreeMap<String, ChannelGap>,
     /// Each operating point.

@@ -29,6 +29,10 @@ const WORTH: f64 = 6.0;
 /// effect changes act otherwise beside it than where nothing is off.
 const STRONG: f64 = 30.0;
 
+/// A single that promises less than this off the cost in a straight line is not fitted: it would not be named by ten times as
+/// much.
+const PROMISES: f64 = 0.5;
+
 /// What the search works with.
 #[derive(Clone, Copy)]
 pub struct Search<'a> {
@@ -104,13 +108,15 @@ pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
 fn singles(search: Search<'_>) -> Vec<Fit> {
     let Search { study, linearised, selection, .. } = search;
     let mut starts: Vec<Hypothesis> = Vec::new();
-    for index in 0..study.effects.len() {
+    for index in 0..study.catalogue {
         starts.extend(starts_of(study, &study.nothing(), index));
     }
     let quick = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0 };
     let tried = parallel::map(&starts, |start| {
-        let started = linear_start(study, linearised, selection, start)?;
-        fit(study, linearised, &started, selection, quick).ok()
+        let (started, promised) = linear_start(study, linearised, selection, start)?;
+        // What promises nothing is looked at where the line puts it, and no closer.
+        let effort = if promised < PROMISES { Effort { iterations: 1, ..quick } } else { quick };
+        fit(study, linearised, &started, selection, effort).ok()
     });
     let mut singles: Vec<Fit> = Vec::new();
     for fitted in tried.into_iter().flatten() {
@@ -278,21 +284,22 @@ pub fn keep_best(fits: &mut Vec<Fit>, fitted: Fit) {
     }
 }
 
-/// The start of a single, moved to where a straight line says its best lies.
+/// The start of a single, moved to where a straight line says its best lies, and what the line promises off the cost; infinity
+/// where there is no line.
 fn linear_start(
     study: &Study,
     linearised: &Linearised,
     selection: &Selection,
     start: &Hypothesis,
-) -> Option<Hypothesis> {
+) -> Option<(Hypothesis, f64)> {
     let (index, values) = start.effects.first()?;
     let parameters = &study.effects[*index].info().parameters;
-    let [parameter] = parameters.as_slice() else { return Some(start.clone()) };
+    let [parameter] = parameters.as_slice() else { return Some((start.clone(), f64::INFINITY)) };
     let projector = Projector::new(study, linearised, selection, &[])?;
     let residual = linearised.residual(study, &linearised.base);
     let right_residual = projector.right(&residual);
     // How many times `step` a straight line through neutral and it asks for.
-    let share_of = |step: f64| -> Option<f64> {
+    let share_of = |step: f64| -> Option<(f64, f64)> {
         let mut there = start.clone();
         there.effects = vec![(*index, vec![parameter.neutral + step])];
         let there = study.predict(&there).ok()?;
@@ -302,18 +309,18 @@ fn linear_start(
         let right = projector.right(&change);
         let own = projector.product(&change, &right, &change, &right);
         let seen = projector.product(&change, &right, &residual, &right_residual);
-        Some(if own > 1e-9 { (seen / own).clamp(-4.0, 4.0) } else { 0.0 })
+        Some(if own > 1e-9 { ((seen / own).clamp(-4.0, 4.0), seen * seen / own) } else { (0.0, 0.0) })
     };
     let mut step = values[0] - parameter.neutral;
     if step == 0.0 {
-        return Some(start.clone());
+        return Some((start.clone(), f64::INFINITY));
     }
-    let mut share = share_of(step)?;
+    let (mut share, mut promised) = share_of(step)?;
     let opposite = (parameter.neutral - step).clamp(parameter.low, parameter.high) - parameter.neutral;
     if share < -0.1 && opposite != 0.0 {
         // Effects bend: the line is drawn on the side it points to.
-        if let Some(there) = share_of(opposite).filter(|there| *there > 0.0) {
-            (step, share) = (opposite, there);
+        if let Some((there, gain)) = share_of(opposite).filter(|(there, _)| *there > 0.0) {
+            (step, share, promised) = (opposite, there, promised.max(gain));
         }
     }
     // Where the line says nothing, stand a little off neutral: at neutral some effects have no slope.
@@ -327,5 +334,5 @@ fn linear_start(
     };
     moved.effects = vec![(*index, vec![value])];
     // From where nothing is off, not from the null's nuisances, which may have bent far to stand in for the effect.
-    Some(moved)
+    Some((moved, promised))
 }

@@ -50,7 +50,16 @@ impl CompressorCharacteristic for ShapedMap {
     }
 
     fn evaluate(&self, speed_corrected_rpm: f64, pressure_ratio: f64) -> CharacteristicPoint {
-        let mut point = self.inner.evaluate(speed_corrected_rpm, pressure_ratio);
+        self.evaluate_scaled(speed_corrected_rpm, pressure_ratio, 1.0)
+    }
+
+    fn evaluate_scaled(
+        &self,
+        speed_corrected_rpm: f64,
+        pressure_ratio: f64,
+        flow_scale_ratio: f64,
+    ) -> CharacteristicPoint {
+        let mut point = self.inner.evaluate_scaled(speed_corrected_rpm, pressure_ratio, flow_scale_ratio);
         let shapes = basis(speed_corrected_rpm, point.surge_position_ratio);
         let change: f64 = self.coefficients.iter().zip(shapes).map(|(c, phi)| c * phi).sum();
         point.efficiency *= 1.0 + change;

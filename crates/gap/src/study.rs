@@ -1,23 +1,27 @@
 //! One recording made ready: residuals' layout, whitening, and the model's prediction for any hypothesis.
 
+use crate::actuators::Actuators;
+use crate::course::Course;
 use crate::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
+pub use crate::point_state::PointState;
+use crate::rest::{rested, with_metal_held};
 use crate::shape::{SHAPES, ShapedMap};
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_observe::block::{Block, block_mean, blocks};
 use mapper_observe::channels::DRIVERS;
 use mapper_observe::declared::Declared;
 use mapper_observe::knob::{Knob, Shifted};
-use mapper_observe::lagged_command::{LaggedCommand, measured_lag_s};
+use mapper_observe::lagged_command::{LaggedCommand, Response};
 use mapper_observe::mean::mean_reading;
 use mapper_observe::schedule::Schedule;
 use mapper_observe::smoothed_inputs::SmoothedInputs;
 use mapper_observe::start::state_as_read;
 use mapper_observe::table::Table;
 use mapper_physics::driven::{DriveError, FrozenGrid, drive, settle};
-use mapper_physics::effect::{Effect, EffectError, Rig, add};
+use mapper_physics::effect::{Effect, EffectError, EffectParameter, Rig, add};
 use mapper_physics::inputs::Inputs;
 use mapper_physics::instruments::{ChannelFollower, true_value};
-use mapper_physics::model::{Model, State};
+use mapper_physics::model::{Model, Outputs, PreparedModel, State};
 use std::sync::Arc;
 
 /// Values of one output in one step that have a common noise.
@@ -72,19 +76,6 @@ pub struct Prediction {
     pub slopes: Vec<f64>,
 }
 
-/// The model at the end of a step.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct PointState {
-    /// Shaft speed, rpm.
-    pub speed_rpm: f64,
-    /// Isentropic efficiency, fraction.
-    pub efficiency: f64,
-    /// Heat-transfer coefficient, W/(m2 K).
-    pub h_w_m2k: f64,
-    /// Place on the speed line: 0 choke, 1 surge.
-    pub surge_position_ratio: f64,
-}
-
 /// Why no prediction can be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PredictError {
@@ -109,6 +100,10 @@ pub struct Study {
     pub nominal: Rig,
     /// Candidate effects.
     pub effects: Vec<Arc<dyn Effect>>,
+    /// When each of them acts.
+    pub courses: Vec<Course>,
+    /// Number of effects of the catalogue; behind them stand those among them that begin with a step.
+    pub catalogue: usize,
     /// What may be off besides.
     pub nuisances: Vec<Nuisance>,
     /// Values of one output and step each.
@@ -117,8 +112,10 @@ pub struct Study {
     pub measured: Vec<f64>,
     /// The recorded inputs.
     pub inputs: SmoothedInputs,
-    /// Time constant of P3 behind its command as recorded, s, and its standard error.
-    pub measured_lag_s: Option<(f64, f64)>,
+    /// How P3 and the valve follow their commands, as recorded.
+    pub actuators: Actuators,
+    /// Whether the metal rested when the recording began.
+    rested: bool,
     grid: FrozenGrid,
     /// Times at which the model is read; two a block, and one at each jump.
     times_s: Vec<f64>,
@@ -141,8 +138,16 @@ const AFTER_JUMP: Schedule = Schedule {
     ..SLOW
 };
 
+/// Blocks after a jump of a recording with more steps than [`MANY_STEPS`]: half as many, for half the time.
+const AFTER_ONE_OF_MANY: Schedule = Schedule {
+    lengths_s: &[(1.0, 0.2), (3.0, 0.5), (7.0, 2.0), (15.0, 4.0), (31.0, 8.0), (f64::INFINITY, 16.0)],
+    ..SLOW
+};
+/// Number of steps above which each counts in fewer blocks.
+const MANY_STEPS: usize = 30;
+
 impl Study {
-    /// Makes a recording ready.
+    /// Makes a recording ready whose campaign declares how its actuators follow.
     pub fn new(
         recording: &Recording,
         table: Table,
@@ -150,8 +155,23 @@ impl Study {
         model: Model,
         effects: Vec<Arc<dyn Effect>>,
     ) -> Study {
+        let actuators = Actuators::declared(&table, recording, &declared);
+        Study::with_actuators(recording, table, declared, model, effects, actuators)
+    }
+
+    /// Makes a recording ready.
+    pub fn with_actuators(
+        recording: &Recording,
+        table: Table,
+        declared: Declared,
+        model: Model,
+        effects: Vec<Arc<dyn Effect>>,
+        actuators: Actuators,
+    ) -> Study {
         let mut nominal = Rig::new(model);
         nominal.instruments.p3_lag_s = declared.tolerances.actuator_lag_s;
+        let many = recording.steps.len() > MANY_STEPS;
+        let after_jump = if many { AFTER_ONE_OF_MANY } else { AFTER_JUMP };
         let first_s = table.t_s.first().copied().unwrap_or(0.0);
         let steps: Vec<StudyStep> = recording
             .steps
@@ -163,19 +183,21 @@ impl Study {
                 let end_s = recording.steps.get(index + 1).map_or(marker.end_s, |next| next.start_s);
                 let start_s =
                     if jumped { marker.start_s } else { marker.start_s.max(end_s - HOLD_S).max(first_s) };
-                let schedule = if jumped { AFTER_JUMP } else { SLOW };
+                let schedule = if jumped { after_jump } else { SLOW };
                 StudyStep { marker: *marker, jumped, blocks: blocks(&table, start_s, end_s, &schedule) }
             })
             .collect();
-        let measured_lag = measured_lag_s(&table, recording, declared.noise_sigma(Channel::P3));
-        let lag_s = measured_lag.map_or(nominal.instruments.p3_lag_s, |(lag_s, _)| lag_s);
-        let inputs = SmoothedInputs::read(&table, recording, &declared, lag_s);
+        let inputs = SmoothedInputs::read(&table, recording, &declared, (actuators.p3, actuators.valve));
         let mut groups = Vec::new();
         let mut measured = Vec::new();
         let mut rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>> =
             steps.iter().map(|step| vec![[None; OUTPUTS.len()]; step.blocks.len()]).collect();
         for (step_index, step) in steps.iter().enumerate() {
             for (output, channel) in OUTPUTS.iter().enumerate() {
+                // Where nobody says how P3 follows its command, no way of following is wrong.
+                if *channel == Channel::P3 && !actuators.judged {
+                    continue;
+                }
                 let Some(column) = table.column(*channel) else { continue };
                 let start = measured.len();
                 let mut of_group = Vec::new();
@@ -218,6 +240,10 @@ impl Study {
         let (times_s, places): (Vec<f64>, Vec<_>) = reads.into_iter().unzip();
         Study {
             nuisances: nuisances(&declared),
+            courses: vec![Course::Throughout; effects.len()],
+            catalogue: effects.len(),
+            actuators,
+            rested: rested(&table, start_s),
             grid: FrozenGrid::new(start_s, end_s, &jumps_s, &times_s),
             declared,
             table,
@@ -227,11 +253,21 @@ impl Study {
             groups,
             measured,
             inputs,
-            measured_lag_s: measured_lag,
             times_s,
             places,
             rows,
         }
+    }
+
+    /// Adds a candidate: an effect of the catalogue that begins with a step. Gives its index.
+    pub fn add_late(&mut self, effect: usize, course: Course) -> usize {
+        let known = (self.catalogue..self.effects.len())
+            .find(|i| self.courses[*i] == course && Arc::ptr_eq(&self.effects[*i], &self.effects[effect]));
+        known.unwrap_or_else(|| {
+            self.effects.push(self.effects[effect].clone());
+            self.courses.push(course);
+            self.effects.len() - 1
+        })
     }
 
     /// The hypothesis that nothing is off.
@@ -239,15 +275,20 @@ impl Study {
         Hypothesis { nuisances: vec![0.0; self.nuisances.len()], effects: Vec::new() }
     }
 
-    /// The rig of a hypothesis, and the circumstances in which it runs.
-    ///
-    /// # Errors
-    /// [`EffectError`] where a value is out of its range.
-    fn rig(&self, hypothesis: &Hypothesis) -> Result<(Rig, Circumstances), EffectError> {
+    /// The rig of a hypothesis in one step, and the circumstances in which it runs.
+    fn rig(&self, hypothesis: &Hypothesis, step: usize) -> Result<(Rig, Circumstances), EffectError> {
         let mut rig = self.nominal.clone();
         let mut circumstances = Circumstances::default();
         for (index, values) in &hypothesis.effects {
-            add(&mut rig, self.effects[*index].as_ref(), values)?;
+            let share = self.courses[*index].share(step, self.steps.len());
+            if share == 1.0 {
+                add(&mut rig, self.effects[*index].as_ref(), values)?;
+            } else if share > 0.0 {
+                let parameters = &self.effects[*index].info().parameters;
+                let grown = |(p, value): (&EffectParameter, &f64)| p.neutral + share * (value - p.neutral);
+                let values: Vec<f64> = parameters.iter().zip(values).map(grown).collect();
+                add(&mut rig, self.effects[*index].as_ref(), &values)?;
+            }
         }
         for (nuisance, sigmas) in self.nuisances.iter().zip(&hypothesis.nuisances) {
             apply(nuisance.kind, sigmas * nuisance.sigma, &mut rig, &mut circumstances);
@@ -262,25 +303,89 @@ impl Study {
         Ok((rig, circumstances))
     }
 
+    /// Stretches of steps in which a hypothesis' rig stays what it is: the first step of each.
+    fn stretches(&self, hypothesis: &Hypothesis) -> Vec<usize> {
+        let shares = |step: usize| {
+            hypothesis
+                .effects
+                .iter()
+                .map(move |(index, _)| self.courses[*index].share(step, self.steps.len()))
+        };
+        let steady = hypothesis.effects.iter().all(|(index, _)| self.courses[*index] == Course::Throughout);
+        let last = if steady { 1 } else { self.steps.len().max(1) };
+        (0..last).filter(|step| *step == 0 || !shares(*step).eq(shares(step - 1))).collect()
+    }
+
+    /// Drives the model of a hypothesis through the recording. `on_sample` gets the index of each of `times_s`, the rig, how
+    /// it runs, and the model there.
+    fn drive(
+        &self,
+        hypothesis: &Hypothesis,
+        times_s: &[f64],
+        mut on_sample: impl FnMut(usize, &(Rig, Circumstances), &PreparedModel<'_>, &State, &Outputs),
+    ) -> Result<(), PredictError> {
+        let stretches = self.stretches(hypothesis);
+        let mut state: Option<State> = None;
+        let mut done = 0;
+        for (place, first) in stretches.iter().enumerate() {
+            let there = self.rig(hypothesis, *first)?;
+            let (rig, circumstances) = &there;
+            let inputs = Shifted { inputs: &self.inputs, shifts: &circumstances.knobs };
+            let start = match state {
+                None => self.start(rig, &inputs, circumstances)?,
+                Some(state) => state,
+            };
+            let sample = |index: usize, prepared: &PreparedModel<'_>, state: &State, outputs: &Outputs| {
+                on_sample(done + index, &there, prepared, state, outputs);
+            };
+            let Some(next) = stretches.get(place + 1) else {
+                if stretches.len() == 1 {
+                    drive(&rig.model, &inputs, start, &self.grid, times_s, sample)?;
+                } else {
+                    let grid = self.grid.part(self.steps[*first].marker.start_s, f64::INFINITY);
+                    drive(&rig.model, &inputs, start, &grid, &times_s[done..], sample)?;
+                }
+                break;
+            };
+            let end_s = self.steps[*next].marker.start_s;
+            let from_s = if place == 0 { f64::NEG_INFINITY } else { self.steps[*first].marker.start_s };
+            let until = times_s.partition_point(|t| *t <= end_s);
+            let grid = self.grid.part(from_s, end_s);
+            let mut ended = drive(&rig.model, &inputs, start, &grid, &times_s[done..until], sample)?;
+            done = until;
+            // A probe that follows at once has no state of its own until one follows slowly.
+            if rig.model.params.t2_probe_diameter_m == 0.0 {
+                let boundary = inputs.at(end_s - 1e-6);
+                ended.t2_tip_k = rig.model.prepare(&boundary).evaluate(&ended).t2_k;
+            }
+            state = Some(ended);
+        }
+        Ok(())
+    }
+
     /// What the model gives.
     ///
     /// # Errors
     /// [`PredictError`] where a value is out of its range or the model cannot follow.
     pub fn predict(&self, hypothesis: &Hypothesis) -> Result<Prediction, PredictError> {
-        let (rig, circumstances) = self.rig(hypothesis)?;
-        let inputs = Shifted { inputs: &self.inputs, shifts: &circumstances.knobs };
-        let mut followers = OUTPUTS.map(|channel| ChannelFollower::new(*rig.instruments.path(channel)));
-        let command = LaggedCommand::new(self.inputs.command.levels().to_vec(), rig.instruments.p3_lag_s);
+        let mut followers =
+            OUTPUTS.map(|channel| ChannelFollower::new(*self.nominal.instruments.path(channel)));
         let mut values = vec![0.0; self.measured.len()];
-        let start = self.start(&rig, &inputs, &circumstances)?;
-        drive(&rig.model, &inputs, start, &self.grid, &self.times_s, |index, prepared, state, outputs| {
+        let mut delay_s = [0.0; OUTPUTS.len()];
+        let mut command: Option<LaggedCommand> = None;
+        self.drive(hypothesis, &self.times_s, |index, (rig, circumstances), prepared, state, outputs| {
+            delay_s = circumstances.delay_s;
             let t_s = self.times_s[index];
             let place = self.places[index];
+            if command.as_ref().is_none_or(|command| command.p3.lag_s != rig.instruments.p3_lag_s) {
+                let p3 = Response { lag_s: rig.instruments.p3_lag_s, ..self.actuators.p3 };
+                let levels = self.inputs.command.levels().to_vec();
+                command = Some(LaggedCommand::new(levels, p3, self.actuators.valve));
+            }
             for (output, channel) in OUTPUTS.iter().enumerate() {
-                let seen = if *channel == Channel::P3 {
-                    command.p3_pa(t_s)
-                } else {
-                    true_value(*channel, prepared, state, outputs).unwrap_or(f64::NAN)
+                let seen = match &command {
+                    Some(command) if *channel == Channel::P3 => command.p3_pa(t_s),
+                    _ => true_value(*channel, prepared, state, outputs).unwrap_or(f64::NAN),
                 };
                 // T4 is what is left of T3' after a drop that is known to a few per cent only.
                 let seen = if *channel == Channel::T4 {
@@ -288,6 +393,7 @@ impl Study {
                 } else {
                     seen
                 };
+                followers[output].turn_to(*rig.instruments.path(*channel));
                 let reading = followers[output].read(t_s, seen);
                 let Some((step, block)) = place else { continue };
                 let Some(row) = self.rows[step][block][output] else { continue };
@@ -297,7 +403,7 @@ impl Study {
         })?;
         let slopes = self.slopes(&values);
         for group in &self.groups {
-            let delay_s = circumstances.delay_s[group.output];
+            let delay_s = delay_s[group.output];
             if delay_s != 0.0 {
                 for row in group.rows.clone() {
                     values[row] -= delay_s * slopes[row];
@@ -312,22 +418,36 @@ impl Study {
     /// # Errors
     /// [`PredictError`].
     pub fn points(&self, hypothesis: &Hypothesis) -> Result<Vec<PointState>, PredictError> {
-        let (rig, circumstances) = self.rig(hypothesis)?;
-        let inputs = Shifted { inputs: &self.inputs, shifts: &circumstances.knobs };
-        let start = self.start(&rig, &inputs, &circumstances)?;
+        Ok(self.points_beside(hypothesis, &[])?.into_iter().map(|(point, _)| point).collect())
+    }
+
+    /// The model at the end of each step, and what the models of other hypotheses say of the same instant: their efficiency and
+    /// h at the same speed, pressures and metal temperatures.
+    ///
+    /// # Errors
+    /// [`PredictError`].
+    pub fn points_beside(
+        &self,
+        hypothesis: &Hypothesis,
+        others: &[&Hypothesis],
+    ) -> Result<Vec<(PointState, Vec<PointState>)>, PredictError> {
         let times_s: Vec<f64> = self
             .steps
             .iter()
             .map(|step| step.blocks.last().map_or(step.marker.end_s, |block| block.mean_s + block.spread_s))
             .collect();
-        let mut points = vec![PointState::default(); times_s.len()];
-        drive(&rig.model, &inputs, start, &self.grid, &times_s, |index, _, state, outputs| {
-            points[index] = PointState {
-                speed_rpm: state.shaft_speed_rpm(),
-                efficiency: outputs.efficiency,
-                h_w_m2k: outputs.h_w_m2k,
-                surge_position_ratio: outputs.surge_position_ratio,
+        let mut rigs = Vec::with_capacity(times_s.len());
+        for step in 0..times_s.len() {
+            let of_step: Result<Vec<_>, _> = others.iter().map(|other| self.rig(other, step)).collect();
+            rigs.push(of_step?);
+        }
+        let mut points = vec![(PointState::default(), Vec::new()); times_s.len()];
+        self.drive(hypothesis, &times_s, |index, _, prepared, state, outputs| {
+            let beside = |(rig, _): &(Rig, Circumstances)| {
+                let outputs = rig.model.prepare(prepared.boundary()).evaluate(state);
+                PointState::of(state, &outputs)
             };
+            points[index] = (PointState::of(state, outputs), rigs[index].iter().map(beside).collect());
         })?;
         Ok(points)
     }
@@ -349,7 +469,8 @@ impl Study {
         slopes
     }
 
-    /// Rest under the first inputs, shifted as the circumstances say.
+    /// Rest under the first inputs, shifted as the circumstances say; where the metal had not come to rest when the recording
+    /// began, rest of all else around the metal as measured.
     fn start(
         &self,
         rig: &Rig,
@@ -363,7 +484,12 @@ impl Study {
             let column = &self.table.column(channel)?[self.table.range(start_s, f64::INFINITY)];
             mean_reading(&column.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>())
         };
-        let mut start = settle(&rig.model, &boundary, state_as_read(&boundary, read))?;
+        let guess = state_as_read(&boundary, read);
+        let mut start = if self.rested {
+            settle(&rig.model, &boundary, guess)?
+        } else {
+            settle(&with_metal_held(&rig.model), &boundary, guess)?
+        };
         for (knob, by) in &circumstances.knobs {
             knob.start(&mut start, *by);
         }

@@ -8,8 +8,12 @@ use common::{Visits, boundary, declared};
 use mapper_core::{Channel, OperatingPoint, Recording};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
+use mapper_gap::joint::{Fate, Value, over_recordings};
 use mapper_gap::outlook::{AllowedJump, apart, apart_at_first_sight};
 use mapper_gap::report::Verdict;
+use mapper_gap::study::Study;
+use mapper_gap::twin::{Found, hold};
+use mapper_observe::table::Table;
 use mapper_physics::effect::{Effect, Rig, add};
 use mapper_physics::model::Model;
 use mapper_physics::steady::hold_speed;
@@ -30,6 +34,17 @@ fn record_of(rig: &Rig, seed: u64) -> Recording {
     common::record_of(rig, &VISITS, seed)
 }
 
+/// Another night of the same rig: other points.
+const NEXT: Visits = Visits { speeds_rpm: &[100e3, 65e3, 125e3, 85e3, 110e3], dwell_s: 60.0 };
+
+fn next_night(effects: &[(&str, &[f64])], seed: u64) -> Recording {
+    let mut rig = Rig::new(Model::nominal());
+    for (id, values) in effects {
+        add(&mut rig, mapper_effects::find(id).unwrap().as_ref(), values).unwrap();
+    }
+    common::record_of(&rig, &NEXT, seed)
+}
+
 /// With a few candidates only: the search over all of them is checked by `mapper gap blind`.
 fn ask(recording: &Recording) -> Result<Diagnosed, GapError> {
     ask_beside(recording, None)
@@ -41,6 +56,7 @@ fn ask_beside(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Di
     let effects: Vec<Arc<dyn Effect>> =
         candidates.iter().map(|id| mapper_effects::find(id).unwrap()).chain(more).collect();
     diagnose(Question {
+        tolerances_declared: true,
         jumps: Vec::new(),
         recording,
         declared: declared(),
@@ -229,6 +245,7 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
     add(&mut rig, mapper_effects::find("inlet_htc").unwrap().as_ref(), &[1.6]).unwrap();
     let effects = |ids: &[&str]| ids.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
     let question = |recording, model, ids: &[&str]| Question {
+        tolerances_declared: true,
         jumps: Vec::new(),
         recording,
         declared: declared(),
@@ -251,4 +268,82 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
     assert_eq!(diagnosis.candidates[0].effects, ["tip_diameter"]);
     let named = diagnosis.candidates.iter().flat_map(|candidate| &candidate.effects);
     assert!(named.into_iter().all(|id| id != "inlet_htc"));
+}
+
+/// What one night found forecasts another with other points, nothing fitted: what is left is noise, and the 95 % band holds what
+/// it says. A covariance that belongs to something else is refused.
+#[test]
+fn the_twin_of_one_night_forecasts_the_next() {
+    let truth: [(&str, &[f64]); 2] = [("tip_diameter", &[2e-3]), ("bearing_friction", &[6e-7])];
+    let first = ask(&record(&truth, 21)).unwrap();
+    let found = Found::of(&first).unwrap();
+    let next = next_night(&truth, 21);
+    let table = Table::new(&next).unwrap();
+    let study = Study::new(&next, table, declared(), Model::nominal(), first.study.effects.clone());
+    let held = hold(&study, &found).unwrap();
+    assert!(held.ratio < 1.2 && (0.92..0.99).contains(&held.inside), "{held:?}");
+    let nominal = Found { effects: Vec::new(), ..found };
+    assert!(hold(&study, &nominal).is_err(), "its covariance is of another machine");
+}
+
+/// Two nights of one rig with a slow probe, a third after the probe was changed and the bearing had begun to rub: each cause has
+/// its fate, and two nights know the probe better than one, but not better than two that share nothing would.
+#[test]
+fn causes_persist_come_and_go_over_the_nights() {
+    let probe: (&str, &[f64]) = ("tip_diameter", &[2e-3]);
+    let friction: (&str, &[f64]) = ("bearing_friction", &[1e-6]);
+    let nights: Vec<Diagnosed> =
+        [record(&[probe], 31), next_night(&[probe], 31), next_night(&[friction], 31)]
+            .iter()
+            .map(|recording| ask(recording).unwrap())
+            .collect();
+    let nights: Vec<&Diagnosed> = nights.iter().collect();
+    let calibration = Calibration::shipped().unwrap();
+    let over = over_recordings(&nights, &calibration);
+    let fate = |id: &str| over.iter().find(|cause| cause.effect == id).unwrap().fate;
+    assert_eq!((fate("tip_diameter"), fate("bearing_friction")), (Fate::Went, Fate::Came), "{over:?}");
+    let two = over_recordings(&nights[..2], &calibration);
+    let probe = &two[0];
+    assert_eq!((probe.effect.as_str(), probe.fate), ("tip_diameter", Fate::Persists));
+    let width = |value: &Value| value.high - value.low;
+    let narrowest = probe.each.iter().map(width).fold(f64::INFINITY, f64::min);
+    let apart = 1.0 / probe.each.iter().map(|v| width(v).powi(-2)).sum::<f64>().sqrt();
+    let together = width(&probe.together);
+    assert!(together < narrowest && together > 0.99 * apart, "{together} {narrowest} {apart}");
+}
+
+/// The bearing begins to rub in the middle of a recording.
+#[test]
+fn a_cause_that_begins_with_a_step_is_named_with_its_step() {
+    let mut recording = record(&[], 41);
+    let late = record(&[("bearing_friction", &[1e-6])], 41);
+    // The same seed has the same noise and offsets; the machine before and after meet in the jump of step 4.
+    let start_s = recording.steps[3].start_s;
+    for (channel, series) in &mut recording.series {
+        let other = &late.series[channel];
+        for (i, t) in series.t_s.iter().enumerate() {
+            if *t >= start_s {
+                series.values[i] = other.values[i];
+            }
+        }
+    }
+    let diagnosed = ask(&recording).unwrap();
+    let first = &diagnosed.diagnosis.candidates[0];
+    assert_eq!(first.effects, ["bearing_friction"], "{:?}", diagnosed.diagnosis.candidates);
+    assert_eq!(first.onsets["bearing_friction"].step, 3);
+    assert!(!first.onsets["bearing_friction"].grows);
+}
+
+/// Where nothing is named, what is said to be seen is seen: planted at twice that size it is named, at a third it is not.
+#[test]
+fn the_smallest_size_that_is_seen_is_seen() {
+    let clean = ask(&record(&[], 51)).unwrap().diagnosis;
+    assert_eq!(clean.smallest_seen.len(), 4);
+    let id = "bearing_friction";
+    let value = clean.smallest_seen.iter().find(|seen| seen.effect == id).unwrap().value.unwrap();
+    let named = |share: f64| {
+        let diagnosis = ask(&record(&[(id, &[share * value])], 52)).unwrap().diagnosis;
+        diagnosis.verdict == Verdict::Explained && diagnosis.candidates[0].effects == [id]
+    };
+    assert!(named(2.0) && !named(0.3), "{id} {value}");
 }

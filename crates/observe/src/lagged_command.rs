@@ -1,8 +1,10 @@
-//! P3 behind its command: a first-order lag, and its time constant as recorded.
+//! P3 and the valve behind their commands: a first-order lag and a limited rate, and both as recorded.
 
 use crate::table::Table;
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_numerics::minimise::minimise;
+use mapper_numerics::statistics::median;
+use mapper_physics::orifice;
 
 /// Change of a command below which it counts as held.
 const HELD_RATIO: f64 = 1e-6;
@@ -18,38 +20,78 @@ pub struct Level {
     pub valve_opening_ratio: f64,
 }
 
-/// P3 behind its command.
+/// How an actuator follows its command.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Response {
+    /// Time constant of its first-order lag, s, >= 0; 0 follows at once.
+    pub lag_s: f64,
+    /// Largest rate, unit of the actuator per second, > 0; infinity for none.
+    pub slew_per_s: f64,
+}
+
+impl Response {
+    /// A lag without a limit of the rate.
+    pub fn lag(lag_s: f64) -> Response {
+        Response { lag_s, slew_per_s: f64::INFINITY }
+    }
+
+    /// Where it stands `elapsed_s` after it began to go from `from` to `to`.
+    fn approach(self, from: f64, to: f64, elapsed_s: f64) -> f64 {
+        let (jump, elapsed_s) = (to - from, elapsed_s.max(0.0));
+        let limited = self.slew_per_s.is_finite();
+        let ramp_s = if limited { (jump.abs() / self.slew_per_s - self.lag_s).max(0.0) } else { 0.0 };
+        if elapsed_s < ramp_s {
+            from + self.slew_per_s * jump.signum() * elapsed_s
+        } else if self.lag_s > 0.0 {
+            let left = if limited { jump.abs().min(self.slew_per_s * self.lag_s) } else { jump.abs() };
+            to - left * jump.signum() * (-(elapsed_s - ramp_s) / self.lag_s).exp()
+        } else {
+            to
+        }
+    }
+}
+
+/// P3 and the valve behind their commands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaggedCommand {
     levels: Vec<Level>,
     /// P3 at the start of each level, Pa.
     at_start_pa: Vec<f64>,
-    /// Time constant, s.
-    pub lag_s: f64,
+    /// Opening at the start of each level.
+    opening_at_start: Vec<f64>,
+    /// How P3 follows; Pa/s.
+    pub p3: Response,
+    /// How the valve follows; 1/s.
+    pub valve: Response,
 }
 
 impl LaggedCommand {
-    /// The response to `levels` (rising in time, at least one) with time constant `lag_s`, from rest.
-    pub fn new(levels: Vec<Level>, lag_s: f64) -> Self {
-        let mut at_start_pa = Vec::with_capacity(levels.len());
-        for (index, level) in levels.iter().enumerate() {
-            let value = match index.checked_sub(1) {
-                None => level.p3_pa,
-                Some(before) => {
-                    let (from, held) = (&levels[before], at_start_pa[before]);
-                    approach(held, from.p3_pa, level.start_s - from.start_s, lag_s)
-                }
-            };
-            at_start_pa.push(value);
-        }
-        LaggedCommand { levels, at_start_pa, lag_s }
+    /// The response to `levels` (rising in time, at least one) from rest.
+    pub fn new(levels: Vec<Level>, p3: Response, valve: Response) -> Self {
+        let at_start = |of: fn(&Level) -> f64, response: Response| {
+            let mut at_start: Vec<f64> = Vec::with_capacity(levels.len());
+            for (index, level) in levels.iter().enumerate() {
+                let value = match index.checked_sub(1) {
+                    None => of(level),
+                    Some(before) => {
+                        let from = &levels[before];
+                        response.approach(at_start[before], of(from), level.start_s - from.start_s)
+                    }
+                };
+                at_start.push(value);
+            }
+            at_start
+        };
+        let at_start_pa = at_start(|level| level.p3_pa, p3);
+        let opening_at_start = at_start(|level| level.valve_opening_ratio, valve);
+        LaggedCommand { levels, at_start_pa, opening_at_start, p3, valve }
     }
 
     /// The response to the commands of a recording, which has at least one step: a level for each step, and within it
     /// one for each further command of P3, as a loop that holds the speed gives them.
-    pub fn of_recording(recording: &Recording, lag_s: f64) -> Self {
+    pub fn of_recording(recording: &Recording, p3: Response, valve: Response) -> Self {
         let levels = recording.steps.iter().flat_map(|step| levels_of_step(recording, step));
-        LaggedCommand::new(levels.collect(), lag_s)
+        LaggedCommand::new(levels.collect(), p3, valve)
     }
 
     /// The level that holds at `t_s`.
@@ -61,7 +103,19 @@ impl LaggedCommand {
     pub fn p3_pa(&self, t_s: f64) -> f64 {
         let index = self.level(t_s);
         let level = &self.levels[index];
-        approach(self.at_start_pa[index], level.p3_pa, t_s - level.start_s, self.lag_s)
+        self.p3.approach(self.at_start_pa[index], level.p3_pa, t_s - level.start_s)
+    }
+
+    /// Valve opening at `t_s`.
+    pub fn valve_opening_ratio(&self, t_s: f64) -> f64 {
+        let index = self.level(t_s);
+        let level = &self.levels[index];
+        self.valve.approach(self.opening_at_start[index], level.valve_opening_ratio, t_s - level.start_s)
+    }
+
+    /// Time after which a jump of P3 has all but arrived, s.
+    pub fn p3_settles_s(&self, from_pa: f64, to_pa: f64) -> f64 {
+        (to_pa - from_pa).abs() / self.p3.slew_per_s + 6.0 * self.p3.lag_s
     }
 
     /// Commanded levels.
@@ -89,12 +143,11 @@ fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Level> {
     levels
 }
 
-fn approach(from: f64, to: f64, elapsed_s: f64, lag_s: f64) -> f64 {
-    if lag_s > 0.0 { to + (from - to) * (-elapsed_s.max(0.0) / lag_s).exp() } else { to }
-}
-
-/// Lags that are tried before the closer search.
+/// Responses that are tried before the closer search: lags, and rates in jumps of the median size per second.
 const LOOKS: usize = 24;
+const RATES: [f64; 9] = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 9.0, 16.0];
+/// A limit of the rate is believed where it takes this share off the squared residuals of a lag alone.
+const LIMITED_RATIO: f64 = 0.5;
 
 /// Time constant of the measured P3 behind its command, s, and its standard error; `None` without jumps or P3.
 ///
@@ -102,30 +155,91 @@ const LOOKS: usize = 24;
 /// no offset enters.
 pub fn measured_lag_s(table: &Table, recording: &Recording, noise_sigma: f64) -> Option<(f64, f64)> {
     let values = table.column(Channel::P3)?;
-    let levels = LaggedCommand::of_recording(recording, 0.0).levels;
-    let jumps: Vec<f64> = recording
-        .steps
-        .windows(2)
-        .filter(|pair| (pair[1].p3_pa - pair[0].p3_pa).abs() > 10.0 * noise_sigma.max(1.0))
-        .map(|pair| pair[1].start_s)
-        .collect();
+    let jumps = p3_jumps(recording, noise_sigma);
+    let cost = |lag_s: f64| {
+        let at_once = Response::lag(0.0);
+        let command = LaggedCommand::of_recording(recording, Response::lag(lag_s), at_once);
+        cost_of(table, values, &jumps, |t_s| command.p3_pa(t_s)) / (noise_sigma * noise_sigma).max(1e-9)
+    };
     if jumps.is_empty() {
         return None;
     }
-    let cost = |lag_s: f64| {
-        let command = LaggedCommand::new(levels.clone(), lag_s);
-        let mut total = 0.0;
-        for jump_s in &jumps {
-            let range = table.range(jump_s - 3.0, jump_s + 12.0);
-            let rest: Vec<f64> = range
-                .filter(|i| values[*i].is_finite())
-                .map(|i| values[i] - command.p3_pa(table.t_s[i]))
-                .collect();
-            let mean = rest.iter().sum::<f64>() / rest.len().max(1) as f64;
-            total += rest.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>();
-        }
-        total / (noise_sigma * noise_sigma).max(1e-9)
-    };
+    let (lag_s, _) = best_lag(cost)?;
+    // Curvature of the cost gives the error.
+    let away_s = 0.02 * lag_s;
+    let curvature = (cost(lag_s + away_s) + cost(lag_s - away_s) - 2.0 * cost(lag_s)) / (away_s * away_s);
+    let error_s = if curvature > 0.0 { (2.0 / curvature).sqrt() } else { lag_s };
+    Some((lag_s, error_s))
+}
+
+/// How the measured P3 follows its command, its rate limited where the recording says so; `None` without jumps or P3.
+pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f64) -> Option<Response> {
+    let values = table.column(Channel::P3)?;
+    let jumps = p3_jumps(recording, noise_sigma);
+    let sizes = recording.steps.windows(2).map(|pair| (pair[1].p3_pa - pair[0].p3_pa).abs());
+    measured_response(table, values, &jumps, sizes.collect(), |response| {
+        let command = LaggedCommand::of_recording(recording, response, Response::lag(0.0));
+        move |t_s| command.p3_pa(t_s)
+    })
+}
+
+/// How the valve follows its command, as flow and pressures tell: what passes an orifice is in proportion to its area, and the
+/// volume before it fills in milliseconds. `None` without jumps of the valve, flow, P2 or T2. A lag of the flow meter counts as
+/// one of the valve.
+pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_pa: f64) -> Option<Response> {
+    let flow = table.column(Channel::CompressorFlow)?;
+    let (p2, t2) = (table.column(Channel::P2)?, table.column(Channel::T2)?);
+    let p1 = table.column(Channel::P1);
+    let openings: Vec<f64> = (0..table.t_s.len())
+        .map(|i| {
+            let p1_pa = p1.map_or(nominal_p1_pa, |p1| p1[i]);
+            flow[i] / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(1e-9)
+        })
+        .collect();
+    let moved = |pair: &[StepMarker]| (pair[1].valve_opening_ratio - pair[0].valve_opening_ratio).abs();
+    let jumps: Vec<f64> =
+        recording.steps.windows(2).filter(|pair| moved(pair) > 0.02).map(|pair| pair[1].start_s).collect();
+    // In openings, by their mean over all settled ends.
+    let mut areas: Vec<f64> = recording
+        .steps
+        .iter()
+        .filter_map(|step| {
+            let range = table.range(step.end_s - 0.3 * (step.end_s - step.start_s), step.end_s);
+            Some(median(openings[range].iter().filter(|x| x.is_finite()))? / step.valve_opening_ratio)
+        })
+        .filter(|area| area.is_finite() && *area > 0.0)
+        .collect();
+    areas.sort_by(f64::total_cmp);
+    let area_m2 = *areas.get(areas.len() / 2)?;
+    let openings: Vec<f64> = openings.iter().map(|x| x / area_m2).collect();
+    let sizes = recording.steps.windows(2).map(moved).filter(|size| *size > 0.02);
+    measured_response(table, &openings, &jumps, sizes.collect(), |response| {
+        let command = LaggedCommand::of_recording(recording, Response::lag(0.0), response);
+        move |t_s| command.valve_opening_ratio(t_s)
+    })
+}
+
+/// Starts of the steps to which P3 jumps.
+fn p3_jumps(recording: &Recording, noise_sigma: f64) -> Vec<f64> {
+    let jumped = |pair: &&[StepMarker]| (pair[1].p3_pa - pair[0].p3_pa).abs() > 10.0 * noise_sigma.max(1.0);
+    recording.steps.windows(2).filter(jumped).map(|pair| pair[1].start_s).collect()
+}
+
+/// Squared residuals of the seconds around each jump, the level free.
+fn cost_of(table: &Table, values: &[f64], jumps: &[f64], told: impl Fn(f64) -> f64) -> f64 {
+    let mut total = 0.0;
+    for jump_s in jumps {
+        let range = table.range(jump_s - 3.0, jump_s + 12.0);
+        let rest: Vec<f64> =
+            range.filter(|i| values[*i].is_finite()).map(|i| values[i] - told(table.t_s[i])).collect();
+        let mean = rest.iter().sum::<f64>() / rest.len().max(1) as f64;
+        total += rest.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>();
+    }
+    total
+}
+
+/// The lag of least cost and that cost.
+fn best_lag(cost: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
     // In the logarithm, from 1 ms to 60 s. A coarse look first: the cost has one valley for first-order responses only.
     let (shortest, longest) = (1e-3f64.ln(), 60f64.ln());
     let place = |i: usize| shortest + (longest - shortest) * i as f64 / LOOKS as f64;
@@ -133,11 +247,31 @@ pub fn measured_lag_s(table: &Table, recording: &Recording, noise_sigma: f64) ->
     let best = (0..=LOOKS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
     let (low, high) = (place(best.saturating_sub(1)), place((best + 1).min(LOOKS)));
     let lag_s = minimise(low, high, 1e-6, |x| cost(x.exp())).at.exp();
-    // Curvature of the cost gives the error.
-    let away_s = 0.02 * lag_s;
-    let curvature = (cost(lag_s + away_s) + cost(lag_s - away_s) - 2.0 * cost(lag_s)) / (away_s * away_s);
-    let error_s = if curvature > 0.0 { (2.0 / curvature).sqrt() } else { lag_s };
-    Some((lag_s, error_s))
+    Some((lag_s, cost(lag_s)))
+}
+
+fn measured_response<Told: Fn(f64) -> f64>(
+    table: &Table,
+    values: &[f64],
+    jumps: &[f64],
+    sizes: Vec<f64>,
+    follow: impl Fn(Response) -> Told,
+) -> Option<Response> {
+    let size = median(&sizes).filter(|size| *size > 0.0)?;
+    if jumps.is_empty() {
+        return None;
+    }
+    let at_rate = |slew_per_s: f64| {
+        let cost = |lag_s: f64| cost_of(table, values, jumps, follow(Response { lag_s, slew_per_s }));
+        best_lag(cost).map(|(lag_s, cost)| (cost, Response { lag_s, slew_per_s }))
+    };
+    let alone = at_rate(f64::INFINITY)?;
+    let limited = RATES.iter().filter_map(|rate| at_rate(rate * size));
+    let limited = limited.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|best| best.0 < LIMITED_RATIO * alone.0);
+    let Some((_, coarse)) = limited else { return Some(alone.1) };
+    let (low, high) = ((coarse.slew_per_s / 1.8).ln(), (coarse.slew_per_s * 1.8).ln());
+    let cost = |rate: f64| at_rate(rate.exp()).map_or(f64::INFINITY, |(cost, _)| cost);
+    at_rate(minimise(low, high, 1e-3, cost).at.exp()).map(|(_, response)| response)
 }
 
 #[cfg(test)]
@@ -168,8 +302,50 @@ mod tests {
 
     #[test]
     fn what_a_loop_says_within_a_step_is_a_level_of_its_own() {
-        let command = LaggedCommand::of_recording(&recording(), 0.3);
+        let command = LaggedCommand::of_recording(&recording(), Response::lag(0.3), Response::lag(0.0));
         let levels: Vec<_> = command.levels().iter().map(|level| (level.start_s, level.p3_pa)).collect();
         assert_eq!(levels, [(0.0, 150e3), (10.0, 200e3), (12.0, 201e3)]);
+    }
+
+    /// Jumps of 100 kPa at 80 kPa/s and a lag of 0.2 s; the valve turns by 0.5 at 0.4 1/s: what was put in is read off again.
+    #[test]
+    fn a_limited_rate_is_read_off_the_recording_and_a_plain_lag_is_none() {
+        let steps: Vec<StepMarker> = (0..6)
+            .map(|i| {
+                let start_s = 20.0 * f64::from(i);
+                let up = f64::from(i % 2);
+                StepMarker {
+                    valve_opening_ratio: 0.6 + 0.5 * up,
+                    ..step(start_s, start_s + 20.0, 150e3 + 100e3 * up)
+                }
+            })
+            .collect();
+        let truth = (Response { lag_s: 0.2, slew_per_s: 80e3 }, Response { lag_s: 0.1, slew_per_s: 0.4 });
+        let read = |p3: Response, valve: Response| {
+            let mut recording = Recording { steps: steps.clone(), ..Recording::default() };
+            let command = LaggedCommand::of_recording(&recording, p3, valve);
+            let t_s: Vec<f64> = (0..1200).map(|i| 0.1 * f64::from(i)).collect();
+            let mut put = |channel, value: &dyn Fn(f64) -> f64| {
+                let values = t_s.iter().map(|t| value(*t)).collect();
+                recording.series.insert(channel, Series { t_s: t_s.clone(), values });
+            };
+            put(Channel::P3, &|t| command.p3_pa(t));
+            put(Channel::P2, &|_| 160e3);
+            put(Channel::T2, &|_| 360.0);
+            put(Channel::CompressorFlow, &|t| {
+                orifice::flow_kg_s(2.4e-4 * command.valve_opening_ratio(t), 160e3, 360.0, 100e3)
+            });
+            let table = Table::new(&recording).unwrap();
+            let p3 = measured_p3_response(&table, &recording, 80.0).unwrap();
+            (p3, measured_valve_response(&table, &recording, 100e3).unwrap())
+        };
+        let (p3, valve) = read(truth.0, truth.1);
+        for (found, truth) in [(p3, truth.0), (valve, truth.1)] {
+            assert!((found.lag_s / truth.lag_s - 1.0).abs() < 0.05, "{found:?}");
+            assert!((found.slew_per_s / truth.slew_per_s - 1.0).abs() < 0.02, "{found:?}");
+        }
+        let (p3, valve) = read(Response::lag(0.7), Response::lag(0.3));
+        assert!(p3.slew_per_s.is_infinite() && valve.slew_per_s.is_infinite());
+        assert!((p3.lag_s - 0.7).abs() < 1e-3 && (valve.lag_s - 0.3).abs() < 1e-3);
     }
 }

@@ -6,7 +6,7 @@
 
 use crate::channels::{DRIVERS, boundary_condition};
 use crate::declared::Declared;
-use crate::lagged_command::LaggedCommand;
+use crate::lagged_command::{LaggedCommand, Response};
 use crate::smoother::{Course, smooth};
 use crate::table::Table;
 use mapper_core::{Channel, Recording};
@@ -45,10 +45,15 @@ pub struct InputNoise {
 }
 
 impl SmoothedInputs {
-    /// Reads the inputs off a recording, P3 behind its command by `lag_s`. The campaign's values stand for what is not
-    /// recorded.
-    pub fn read(table: &Table, recording: &Recording, declared: &Declared, lag_s: f64) -> SmoothedInputs {
-        let command = LaggedCommand::of_recording(recording, lag_s);
+    /// Reads the inputs off a recording, P3 and the valve behind their commands as said. The campaign's values stand for what is
+    /// not recorded.
+    pub fn read(
+        table: &Table,
+        recording: &Recording,
+        declared: &Declared,
+        (p3, valve): (Response, Response),
+    ) -> SmoothedInputs {
+        let command = LaggedCommand::of_recording(recording, p3, valve);
         let along: Vec<f64> = table.t_s.iter().map(|t| command.p3_pa(*t)).collect();
         let smoothed = |channel: Channel, values: &[f64]| {
             smooth(&table.t_s, values, declared.noise_sigma(channel), declared.noise_colour)
@@ -90,7 +95,7 @@ impl Inputs for SmoothedInputs {
         let by_command_pa = self.command.p3_pa(t_s);
         let mut boundary = BoundaryConditions {
             p3_pa: by_command_pa + self.p3_rest.at(t_s),
-            valve_opening_ratio: self.command.levels()[self.command.level(t_s)].valve_opening_ratio,
+            valve_opening_ratio: self.command.valve_opening_ratio(t_s),
             ..self.nominal
         };
         for (channel, driver) in &self.drivers {
@@ -125,7 +130,7 @@ fn share_along(
     let (mut sum_xy, mut sum_xx, mut pairs) = (0.0, 0.0, Vec::new());
     for pair in command.levels().windows(2) {
         let jump_s = pair[1].start_s;
-        let settled_s = jump_s + 6.0 * command.lag_s;
+        let settled_s = jump_s + command.p3_settles_s(pair[0].p3_pa, pair[1].p3_pa);
         // What a loop that holds the speed does right behind a jump is no jump of its own.
         if pair[0].start_s > jump_s - BESIDE_S {
             continue;

@@ -25,6 +25,31 @@ pub trait CompressorCharacteristic: Send + Sync + std::fmt::Debug {
     /// Flow, efficiency and place on the speed line. `speed_corrected_rpm` > 0.
     fn evaluate(&self, speed_corrected_rpm: f64, pressure_ratio: f64) -> CharacteristicPoint;
 
+    /// The same of a compressor that delivers `flow_scale_ratio` times the flow: `m_corr = s m(N, PR)`, and its efficiency is
+    /// the map's at the flow that it has, `eta(N, m_corr)`; the place on the speed line stays. For maps that know efficiency
+    /// over pressure ratio only, the efficiency moves along the speed line's own slope, to first order.
+    fn evaluate_scaled(
+        &self,
+        speed_corrected_rpm: f64,
+        pressure_ratio: f64,
+        flow_scale_ratio: f64,
+    ) -> CharacteristicPoint {
+        let here = self.evaluate(speed_corrected_rpm, pressure_ratio);
+        if flow_scale_ratio == 1.0 {
+            return here;
+        }
+        let flow_corrected_kg_s = flow_scale_ratio * here.flow_corrected_kg_s;
+        // A hundredth of the pressure rise to each side.
+        let beside = 0.01 * (pressure_ratio - 1.0).abs().max(0.01);
+        let [low, high] = [-beside, beside].map(|by| self.evaluate(speed_corrected_rpm, pressure_ratio + by));
+        let between_kg_s = high.flow_corrected_kg_s - low.flow_corrected_kg_s;
+        let slope =
+            if between_kg_s.abs() > 1e-9 { (high.efficiency - low.efficiency) / between_kg_s } else { 0.0 };
+        let moved = slope * (flow_corrected_kg_s - here.flow_corrected_kg_s);
+        let efficiency = (here.efficiency + moved).clamp(0.5 * here.efficiency, 1.5 * here.efficiency);
+        CharacteristicPoint { flow_corrected_kg_s, efficiency, ..here }
+    }
+
     /// Where the speed line ends on the surge side: corrected flow in kg/s and pressure ratio.
     fn surge_point(&self, speed_corrected_rpm: f64) -> (f64, f64);
 

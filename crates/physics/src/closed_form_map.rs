@@ -50,17 +50,28 @@ impl CompressorCharacteristic for ClosedFormMap {
 
     #[inline]
     fn evaluate(&self, speed_corrected_rpm: f64, pressure_ratio: f64) -> CharacteristicPoint {
+        self.evaluate_scaled(speed_corrected_rpm, pressure_ratio, 1.0)
+    }
+
+    #[inline]
+    fn evaluate_scaled(
+        &self,
+        speed_corrected_rpm: f64,
+        pressure_ratio: f64,
+        flow_scale_ratio: f64,
+    ) -> CharacteristicPoint {
         let ends = self.ends(speed_corrected_rpm);
         let (m_zs, m_ch) = (ends.zero_slope_flow_kg_s, ends.choke_flow_kg_s);
         let x = (pressure_ratio - ends.choke_pressure_ratio)
             / (ends.zero_slope_pressure_ratio - ends.choke_pressure_ratio);
-        let flow = if x <= 0.0 {
+        let unscaled = if x <= 0.0 {
             m_ch
         } else if x < 1.0 {
             m_zs + (m_ch - m_zs) * (1.0 - x.powf(2.2)).sqrt()
         } else {
             m_zs - 2.0 * m_zs * (x - 1.0)
         };
+        let flow = flow_scale_ratio * unscaled;
         let n = ends.speed_ratio;
         let fast = (n - 1.2).max(0.0);
         let peak = 0.74 - 0.07 * (n - 1.05) * (n - 1.05) - 0.10 * fast * fast;

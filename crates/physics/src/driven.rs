@@ -61,6 +61,12 @@ impl FrozenGrid {
         FrozenGrid { nodes_s }
     }
 
+    /// The steps between two of its nodes; beyond its ends nothing.
+    pub fn part(&self, from_s: f64, to_s: f64) -> FrozenGrid {
+        let inside = |t_s: &&f64| (from_s..=to_s).contains(*t_s);
+        FrozenGrid { nodes_s: self.nodes_s.iter().filter(inside).copied().collect() }
+    }
+
     /// Ends of the steps, s.
     pub fn nodes_s(&self) -> &[f64] {
         &self.nodes_s

@@ -124,6 +124,8 @@ pub struct EffectParameter {
 pub struct EffectInfo {
     /// Its name: lower case, digits and `_`.
     pub id: Cow<'static, str>,
+    /// Its name for people.
+    pub name: Cow<'static, str>,
     /// What happens, one line for people.
     pub description: Cow<'static, str>,
     /// The equation, in the symbols of `docs/physics.md`.

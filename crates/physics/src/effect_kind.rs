@@ -11,6 +11,8 @@ use std::sync::Arc;
 pub struct About {
     /// Name: lower case, digits and `_`.
     pub id: &'static str,
+    /// Its name for people, a noun that can be the subject of a sentence.
+    pub name: &'static str,
     /// What happens, one line for people.
     pub description: &'static str,
     /// The equation, in the symbols of `docs/physics.md`.
@@ -49,9 +51,10 @@ pub trait EffectKind: EffectNumbers + std::fmt::Debug + Send + Sync + 'static {
 
 /// The effect of a kind, as catalogues list it.
 pub fn effect_of<K: EffectKind>() -> Arc<dyn Effect> {
-    let About { id, description, equation, source, submodel, also_shows_in } = K::ABOUT;
+    let About { id, name, description, equation, source, submodel, also_shows_in } = K::ABOUT;
     let info = EffectInfo {
         id: Cow::Borrowed(id),
+        name: Cow::Borrowed(name),
         description: Cow::Borrowed(description),
         equation: Cow::Borrowed(equation),
         source: Cow::Borrowed(source),

@@ -91,6 +91,11 @@ impl ChannelFollower {
         ChannelFollower { path, last: None }
     }
 
+    /// Goes on as a sensor that follows along another path from here on.
+    pub fn turn_to(&mut self, path: ChannelPath) {
+        self.path = path;
+    }
+
     /// The reading of `value` at `t_s`, which rises from call to call. Between samples the input is taken as linear,
     /// for which the lag is exact; a lag of 0 is the limit of small ones.
     pub fn read(&mut self, t_s: f64, value: f64) -> f64 {

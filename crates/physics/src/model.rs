@@ -129,9 +129,12 @@ impl PreparedModel<'_> {
         let (params, boundary, hooks) = (&self.model.params, &self.boundary, &self.model.hooks);
         let compressor = &params.compressor;
         let pressure_ratio = state.p2_pa / boundary.p1_pa;
-        let on_map =
-            self.model.map.evaluate(state.shaft_speed_rpm() * self.speed_correction_ratio, pressure_ratio);
-        let flow_corrected_kg_s = on_map.flow_corrected_kg_s * compressor.flow_scale_ratio;
+        let on_map = self.model.map.evaluate_scaled(
+            state.shaft_speed_rpm() * self.speed_correction_ratio,
+            pressure_ratio,
+            compressor.flow_scale_ratio,
+        );
+        let flow_corrected_kg_s = on_map.flow_corrected_kg_s;
         let inner = self.model.has_inner_wall();
         let wall_k = if inner { state.inner_k } else { state.tc_k };
         let bearing_k = housing::bearing_k(

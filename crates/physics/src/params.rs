@@ -69,7 +69,7 @@ pub struct CompressorParams {
     pub inlet_conductance_w_k: f64,
     /// Multiplies the map's efficiency, > 0; 1.
     pub efficiency_scale_ratio: f64,
-    /// Multiplies the map's flow, > 0; 1.
+    /// Multiplies the map's flow, > 0; 1. The efficiency is the map's at the multiplied flow.
     pub flow_scale_ratio: f64,
     /// Part r of the flow that comes back, hot, from the wheel's exit to its inlet: the wheel, and with it the map, has
     /// (1 + r) times the flow that leaves the compressor; 0.

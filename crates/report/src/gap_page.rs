@@ -1,6 +1,6 @@
 //! A diagnosis as a page with pictures: one HTML file that needs nothing else.
 
-use crate::gap_text::{gap_text, headline};
+use crate::gap_text::{gap_text, headline, named};
 use crate::number::four_figures;
 use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
@@ -69,7 +69,7 @@ pub fn gap_page(title: &str, done: &Diagnosed) -> String {
 fn causes(done: &Diagnosed) -> Markup {
     let diagnosis = &done.diagnosis;
     let candidates = diagnosis.candidates.iter().take(8);
-    let rows = candidates.map(|candidate| (candidate.effects.join(" + "), candidate.probability)).chain([
+    let rows = candidates.map(|candidate| (named(candidate), candidate.probability)).chain([
         ("nothing beyond tolerance".to_owned(), diagnosis.probability_none),
         ("a cause outside the catalogue".to_owned(), diagnosis.probability_outside),
     ]);

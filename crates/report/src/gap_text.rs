@@ -2,8 +2,7 @@
 
 use crate::number::four_figures;
 use mapper_core::with_unit;
-use mapper_gap::report::{Candidate, Diagnosis, Gap, Next, Verdict};
-use mapper_physics::bearing_friction::at_150_krpm;
+use mapper_gap::report::{Candidate, Diagnosis, Estimate, Next, PointGap, SmallestSeen, Verdict};
 
 /// Causes shown.
 const CAUSES: usize = 5;
@@ -13,6 +12,9 @@ const PLACES: usize = 5;
 /// The page.
 pub fn gap_text(diagnosis: &Diagnosis) -> String {
     let mut text = format!("{}\n", headline(diagnosis));
+    if let Some(nearest) = nearest(diagnosis) {
+        text += &format!("{nearest}\n");
+    }
     if !diagnosis.r#where.is_empty() {
         text += "\nwhere\n";
         for place in diagnosis.r#where.iter().take(PLACES) {
@@ -29,6 +31,9 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
             );
         }
     }
+    if !diagnosis.smallest_seen.is_empty() {
+        text += &smallest_seen(&diagnosis.smallest_seen);
+    }
     text += "\nwhich\n";
     for candidate in diagnosis.candidates.iter().take(CAUSES) {
         text += &format!("  {:>5.1} %  {}\n", 100.0 * candidate.probability, cause(candidate));
@@ -39,7 +44,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     text += &format!("  {:>5.1} %  nothing beyond tolerance\n", 100.0 * diagnosis.probability_none);
     text += &format!("  {:>5.1} %  a cause outside the catalogue\n", 100.0 * diagnosis.probability_outside);
     text += &laws(diagnosis);
-    text += &how_far(&diagnosis.gap);
+    text += &how_far(diagnosis);
     if let Some(next) = &diagnosis.next {
         text += "\nwhat next\n";
         text += &match next {
@@ -57,6 +62,12 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
             ),
             Next::Sensor { sensor, reason } => format!("  {sensor}: {reason}\n"),
         };
+    }
+    if !diagnosis.assumed.is_empty() {
+        text += "\nassumed\n";
+        for assumption in &diagnosis.assumed {
+            text += &format!("  {assumption}\n");
+        }
     }
     if !diagnosis.warnings.is_empty() {
         text += "\nbefore you believe it\n";
@@ -107,70 +118,127 @@ fn laws(diagnosis: &Diagnosis) -> String {
     text
 }
 
-/// One sentence.
+/// One sentence: the most probable answer.
 pub fn headline(diagnosis: &Diagnosis) -> String {
-    let first = diagnosis.candidates.first().map_or_else(String::new, |c| c.effects.join(" + "));
-    match diagnosis.verdict {
-        Verdict::WithinTolerance => "nothing beyond the declared tolerances is seen".to_owned(),
-        Verdict::Explained => format!("{first} explains the gap"),
-        Verdict::PartlyExplained => {
-            format!("{first} explains most of the gap; what is left is more than tolerance")
+    let first = diagnosis.candidates.first();
+    match (diagnosis.verdict, first) {
+        (Verdict::WithinTolerance, _) => "nothing beyond the declared tolerances is seen".to_owned(),
+        (Verdict::Explained, Some(first)) => {
+            let verb = if first.effects.len() == 1 { "explains" } else { "explain" };
+            format!("{} {verb} the gap", named(first))
         }
-        Verdict::Unexplained => "no effect of the catalogue explains the gap".to_owned(),
+        _ => format!(
+            "a cause outside the catalogue is the most probable ({:.1} %)",
+            100.0 * diagnosis.probability_outside
+        ),
     }
+}
+
+/// What of the catalogue comes nearest to a cause that is not in it.
+fn nearest(diagnosis: &Diagnosis) -> Option<String> {
+    let first = diagnosis.candidates.first()?;
+    match diagnosis.verdict {
+        Verdict::PartlyExplained => Some(format!(
+            "nearest in the catalogue: {}, which leaves more than the declared tolerances",
+            named(first)
+        )),
+        Verdict::Unexplained => Some("no effect of the catalogue comes near".to_owned()),
+        Verdict::WithinTolerance | Verdict::Explained => None,
+    }
+}
+
+/// Effects by their names for people, ids behind them, and when they begin.
+pub fn named(candidate: &Candidate) -> String {
+    let one = |(id, name): (&String, &String)| match candidate.onsets.get(id) {
+        Some(onset) if onset.grows => format!("{name} ({id}) growing from step {}", onset.step + 1),
+        Some(onset) => format!("{name} ({id}) from step {} on", onset.step + 1),
+        None => format!("{name} ({id})"),
+    };
+    candidate.effects.iter().zip(&candidate.names).map(one).collect::<Vec<_>>().join(" + ")
 }
 
 /// A cause with its parameters.
 pub fn cause(candidate: &Candidate) -> String {
-    let parameters: Vec<String> = candidate
-        .parameters
-        .iter()
-        .map(|(name, e)| {
-            format!(
-                "{name} = {} ({} .. {}){}",
-                with_unit(four_figures(e.value), &e.unit),
-                four_figures(e.low),
-                four_figures(e.high),
-                beside(e.value, &e.unit)
-            )
-        })
-        .collect();
-    format!("{}: {}", candidate.effects.join(" + "), parameters.join(", "))
+    let parameters: Vec<String> = candidate.parameters.iter().map(|(name, e)| parameter(name, e)).collect();
+    format!("{}: {}", named(candidate), parameters.join(", "))
 }
 
-/// What engineers judge a parameter by, where its unit says little.
-fn beside(value: f64, unit: &str) -> String {
-    if unit == "W s2/rad2" { format!(", {}", at_150_krpm(value)) } else { String::new() }
+fn parameter(name: &str, estimate: &Estimate) -> String {
+    let written = with_unit(four_figures(estimate.value), &estimate.unit);
+    let (low, high) = (four_figures(estimate.low), four_figures(estimate.high));
+    let beside = if written == estimate.size { String::new() } else { format!(", {}", estimate.size) };
+    format!("{name} = {written} ({low} .. {high}){beside}")
 }
 
-fn how_far(gap: &Gap) -> String {
-    let mut text = format!(
-        "\nhow far, on {} steps that were used neither for selection nor for fitting\n  {:.1} % of the gap removed ({:.1} .. {:.1} %)\n",
-        gap.held_out_steps.len(),
-        100.0 * gap.shrink,
-        100.0 * gap.shrink_low,
-        100.0 * gap.shrink_high
-    );
+/// How small each effect would have been seen.
+fn smallest_seen(effects: &[SmallestSeen]) -> String {
+    let mut text =
+        "\nan effect would have been named, in 95 of 100 recordings like this one, from\n".to_owned();
+    for seen in effects {
+        let size = seen.size.as_deref().unwrap_or("no size within its range");
+        text += &format!("  {:40} {size}\n", format!("{} ({})", seen.name, seen.effect));
+    }
+    text
+}
+
+fn how_far(diagnosis: &Diagnosis) -> String {
+    let gap = &diagnosis.gap;
+    let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
+    let mut text = match gap.folds.len() {
+        0 | 1 => "\nhow far, on the steps that were fitted: too few to hold any out\n".to_owned(),
+        folds => format!(
+            "\nhow far, each of {} steps by a fit that did not see it ({folds} folds, each over all speeds and openings)\n",
+            gap.held_out_steps.len()
+        ),
+    };
+    if named && gap.worse.is_empty() {
+        text += &format!(
+            "  {:.1} % of the gap removed; of steps like these {:.0} .. {:.0} %\n",
+            100.0 * gap.shrink,
+            (100.0 * gap.shrink_low).floor(),
+            (100.0 * gap.shrink_high).ceil()
+        );
+    } else if !gap.worse.is_empty() {
+        text += &format!("  the gap does not shrink: {} gets worse\n", gap.worse.join(", "));
+    }
+    let heads = ["nominal", "tolerances fitted", "with the cause"];
+    let columns = if named { 3 } else { 2 };
+    text += &format!("  {:4}", "");
+    for head in heads.iter().take(columns) {
+        text += &format!(" {head:>18}");
+    }
+    text += "\n";
     for (channel, row) in &gap.channels {
         // Pascals are many.
         let (scale, unit) = if row.unit == "Pa" { (1e-3, "kPa") } else { (1.0, row.unit.as_str()) };
-        text += &format!(
-            "  {channel:4} {:>10} -> {:>10} {unit}\n",
-            four_figures(scale * row.before),
-            four_figures(scale * row.after)
-        );
+        text += &format!("  {channel:4}");
+        for value in [row.nominal, row.before, row.after].iter().take(columns) {
+            text += &format!(" {:>18}", four_figures(scale * value));
+        }
+        text += &format!(" {unit}\n");
     }
-    let largest = |of: fn(&mapper_gap::report::PointGap) -> f64| {
-        gap.points
-            .iter()
-            .map(of)
-            .filter(|d| d.is_finite())
-            .fold(0.0f64, |most, d| if d.abs() > most.abs() { d } else { most })
-    };
-    text += &format!(
-        "  efficiency changes by up to {:+.2} points, h by up to {:+.0} W/(m2 K)\n",
-        100.0 * largest(|p| p.eta_after - p.eta_before),
-        largest(|p| p.h_after_w_m2k - p.h_before_w_m2k)
-    );
+    if named {
+        text += &points(&gap.points);
+    }
     text
+}
+
+/// What the cause changes of efficiency and heat transfer at equal speed and pressures.
+fn points(points: &[PointGap]) -> String {
+    let largest = |of: fn(&PointGap) -> f64| {
+        let changes = points.iter().map(of).filter(|d| d.is_finite());
+        changes.fold(0.0f64, |most, d| if d.abs() > most.abs() { d } else { most })
+    };
+    let eta_points = 100.0 * largest(|p| p.eta_after - p.eta_before);
+    let h_w_m2k = largest(|p| p.h_after_w_m2k - p.h_before_w_m2k);
+    let eta = if eta_points.abs() < 0.005 {
+        "does not touch the efficiency".to_owned()
+    } else {
+        format!("changes the efficiency by up to {eta_points:+.2} points")
+    };
+    let h =
+        if h_w_m2k.abs() < 0.5 { "nor h".to_owned() } else { format!("h by up to {h_w_m2k:+.0} W/(m2 K)") };
+    let joined = if eta_points.abs() < 0.005 && h_w_m2k.abs() >= 0.5 { "but changes " } else { "" };
+    let nor = if eta_points.abs() >= 0.005 && h_w_m2k.abs() < 0.5 { "not h".to_owned() } else { h };
+    format!("  at equal speed and pressures the cause {eta}, {joined}{nor}\n")
 }

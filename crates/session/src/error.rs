@@ -4,6 +4,7 @@ use mapper_campaign::{CampaignError, NightlyError};
 use mapper_core::{BackendError, ExportError, ImportError};
 use mapper_drift::DriftError;
 use mapper_gap::diagnose::GapError;
+use mapper_gap::twin::TwinError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
 use mapper_logs::{LogError, OptionError};
@@ -189,6 +190,9 @@ pub enum SessionError {
     /// A recording cannot be diagnosed.
     #[error(transparent)]
     Gap(#[from] GapError),
+    /// A diagnosis cannot be held against a recording.
+    #[error(transparent)]
+    Twin(#[from] TwinError),
     /// The calibration that ships cannot be read.
     #[error("failed to read the calibration of the diagnosis: {0}")]
     Calibration(#[source] serde_json::Error),
@@ -319,6 +323,7 @@ impl SessionError {
             }
             E::LogOption(_) => ErrorKind::BadInput,
             E::Log(_) => ErrorKind::BadRecording,
+            E::Twin(_) => ErrorKind::BadInput,
             E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
                 ErrorKind::BadRecording
             }

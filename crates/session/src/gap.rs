@@ -2,18 +2,26 @@
 
 use crate::declared::identification_with;
 use crate::fusing::{Fused, fused, recordings};
-use crate::planning::{nominal_model, with_plan_request};
+use crate::planning::{nominal_model, plan, with_plan_request};
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
-use mapper_core::Recording;
+use mapper_core::{Recording, StepMarker};
 use mapper_discover::discover::discover;
 use mapper_drift::{CauseKind, DriftReport, without_drift};
+use mapper_gap::actuators::Actuators;
 use mapper_gap::calibration::Calibration;
-use mapper_gap::diagnose::{Diagnosed, Question, diagnose};
-use mapper_gap::outlook::AllowedJump;
-use mapper_gap::report::{Diagnosis, Verdict};
+use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
+use mapper_gap::next::look_beside;
+use mapper_gap::outlook::{Alike, AllowedJump};
+use mapper_gap::problem::Problem;
+use mapper_gap::report::{Diagnosis, Next, Verdict};
+use mapper_gap::study::Study;
+use mapper_gap::twin::{Expected, Found, Held, forecast_steps, hold};
+use mapper_gap::usable::usable;
 use mapper_identify::ZeroOutcome;
+use mapper_observe::lagged_command::Response;
+use mapper_observe::table::Table;
 use mapper_observe::{Declared, FusedChannel};
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
@@ -46,6 +54,53 @@ impl Session<'_> {
         map: &ChannelMap,
         effects: Vec<Arc<dyn Effect>>,
     ) -> Result<Gap, SessionError> {
+        // Drift comes first: of the whole work it is about this share.
+        let progress = |done_ratio: f64, what: &str| {
+            self.tell(SessionEvent::Progress { done_ratio, what: what.to_owned() });
+        };
+        progress(0.0, "drift");
+        let Prepared { recording, declared, model, drift, sensors, zero } =
+            self.prepared_for_gap(recorded, campaign, map)?;
+        let between = |from: f64, to: f64| {
+            move |done_ratio: f64, what: &str| progress(from + (to - from) * done_ratio, what)
+        };
+        let (in_catalogue, beyond) = (between(DRIFT_SHARE, CATALOGUE_END), between(CATALOGUE_END, 1.0));
+        progress(DRIFT_SHARE, "jumps that are allowed");
+        let calibration = Calibration::shipped().map_err(SessionError::Calibration)?;
+        let mut diagnosed = diagnose(Question {
+            recording: &recording,
+            declared,
+            tolerances_declared: campaign.tolerances_declared,
+            jumps: allowed_jumps(campaign, &model)?,
+            model,
+            effects,
+            calibration: calibration.clone(),
+            progress: &in_catalogue,
+        })?;
+        let found = discover(&diagnosed, &calibration, &beyond);
+        let diagnosis = &mut diagnosed.diagnosis;
+        (diagnosis.laws, diagnosis.forces) = (found.laws, found.forces);
+        if let Some(places) = found.places {
+            diagnosis.r#where = places;
+            // A sensor beside the largest place is one beside the place that has just been found.
+            if matches!(diagnosis.next, Some(Next::Sensor { .. })) {
+                diagnosis.next = Some(look_beside(&diagnosis.r#where));
+            }
+        }
+        // What was wrong with the file belongs to what is said about it.
+        let warnings = recorded.read.warnings.iter().map(ToString::to_string);
+        diagnosed.diagnosis.warnings.extend(warnings);
+        note_drift(&mut diagnosed.diagnosis, drift.as_ref());
+        Ok(Gap { diagnosed, drift, sensors, zero })
+    }
+
+    /// A recording as the diagnosis takes it: drift of a sensor and offsets at rest subtracted.
+    fn prepared_for_gap(
+        &self,
+        recorded: &Recorded,
+        campaign: &Campaign,
+        map: &ChannelMap,
+    ) -> Result<Prepared, SessionError> {
         same_machine(recorded, campaign)?;
         let mut model = nominal_model(campaign)?;
         // A recording in which drift cannot be looked for may still have a gap.
@@ -66,32 +121,88 @@ impl Session<'_> {
             tolerances: campaign.tolerances,
             nominal: campaign.boundary,
         };
-        let progress = |done_ratio: f64, what: &str| {
-            self.tell(SessionEvent::Progress { done_ratio, what: what.to_owned() });
+        Ok(Prepared { recording, declared, model, drift, sensors, zero })
+    }
+
+    /// Holds the machine that a diagnosis found against a recording that it has not seen; nothing is fitted.
+    ///
+    /// # Errors
+    /// As [`Session::diagnose_gap`], and [`SessionError::Twin`] where diagnosis and recording do not belong together.
+    pub fn hold_twin(
+        &self,
+        recorded: &Recorded,
+        campaign: &Campaign,
+        map: &ChannelMap,
+        effects: Vec<Arc<dyn Effect>>,
+        found: &Found,
+    ) -> Result<Held, SessionError> {
+        let Prepared { recording, declared, model, .. } = self.prepared_for_gap(recorded, campaign, map)?;
+        let table = Table::new(&recording).ok_or(GapError::from(Problem::Empty))?;
+        usable(&recording, &table, &declared).map_err(GapError::from)?;
+        let actuators = if campaign.tolerances_declared {
+            Actuators::declared(&table, &recording, &declared)
+        } else {
+            Actuators::undeclared(&table, &recording, &declared)
         };
-        let calibration = Calibration::shipped().map_err(SessionError::Calibration)?;
-        let mut diagnosed = diagnose(Question {
-            recording: &recording,
-            declared,
-            jumps: allowed_jumps(campaign, &model)?,
+        let study = Study::with_actuators(&recording, table, declared, model, effects, actuators);
+        Ok(hold(&study, found)?)
+    }
+
+    /// What the machine that a diagnosis found is expected to read at the end of each step of a campaign's plan.
+    ///
+    /// # Errors
+    /// [`SessionError`] where no plan can be made, or the twin cannot follow it.
+    pub fn forecast_twin(
+        &self,
+        campaign: &Campaign,
+        map: &ChannelMap,
+        effects: Vec<Arc<dyn Effect>>,
+        found: &Found,
+    ) -> Result<Vec<Expected>, SessionError> {
+        let model = nominal_model(campaign)?;
+        let plan = plan(campaign, &model)?;
+        let sensors = identification_with(campaign, map).declared;
+        let lag = Response::lag(campaign.tolerances.actuator_lag_s);
+        let like = Alike {
+            channels: sensors.keys().copied().collect(),
+            declared: Declared {
+                sensors,
+                noise_colour: map.noise_colour.unwrap_or_default(),
+                tolerances: campaign.tolerances,
+                nominal: campaign.boundary,
+            },
             model,
             effects,
-            calibration: calibration.clone(),
-            progress: &progress,
-        })?;
-        let found = discover(&diagnosed, &calibration, &progress);
-        diagnosed.diagnosis.laws = found.laws;
-        diagnosed.diagnosis.forces = found.forces;
-        if let Some(places) = found.places {
-            diagnosed.diagnosis.r#where = places;
-        }
-        // What was wrong with the file belongs to what is said about it.
-        let warnings = recorded.read.warnings.iter().map(ToString::to_string);
-        diagnosed.diagnosis.warnings.extend(warnings);
-        note_drift(&mut diagnosed.diagnosis, drift.as_ref());
-        Ok(Gap { diagnosed, drift, sensors, zero })
+            actuators: Actuators { p3: lag, valve: Response::lag(0.0), judged: campaign.tolerances_declared },
+        };
+        let steps = plan.steps.iter().map(|step| StepMarker {
+            index: step.index,
+            kind: step.kind,
+            start_s: step.start_s,
+            end_s: step.start_s + step.dwell_s,
+            from: step.from,
+            to: Some(step.to),
+            p3_pa: step.p3_pa,
+            valve_opening_ratio: step.to.valve_opening_ratio,
+        });
+        Ok(forecast_steps(like, steps.collect(), found)?)
     }
 }
+
+/// A recording made ready for the diagnosis.
+struct Prepared {
+    recording: Recording,
+    declared: Declared,
+    model: Model,
+    drift: Option<DriftReport>,
+    sensors: Vec<FusedChannel>,
+    zero: ZeroOutcome,
+}
+
+/// Share of the time that the search for drift takes.
+const DRIFT_SHARE: f64 = 0.15;
+/// Share after which the catalogue is done, and what lies beyond it begins.
+const CATALOGUE_END: f64 = 0.7;
 
 /// Points up to which every jump between them is simulated to see whether it is allowed.
 const MAX_POINTS: usize = 40;
@@ -153,5 +264,6 @@ fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     diagnosis.laws.clear();
     if !taken_off && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
         diagnosis.verdict = Verdict::Unexplained;
+        diagnosis.next.get_or_insert_with(|| look_beside(&diagnosis.r#where));
     }
 }

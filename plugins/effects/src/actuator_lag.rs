@@ -18,6 +18,7 @@ effect_parameters! {
 impl EffectKind for ActuatorLag {
     const ABOUT: About = About {
         id: "actuator_lag",
+        name: "slow P3 actuator",
         description: "the turbine inlet pressure follows its command more slowly or faster",
         equation: "dP3/dt = (P3_command - P3)/tau",
         source: "first-order actuator",

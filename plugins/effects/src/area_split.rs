@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for AreaSplit {
     const ABOUT: About = About {
         id: "area_split",
+        name: "area before the wheel",
         description: "part of the housing's internal area meets the gas before compression",
         equation: "q1 = h alpha_A A_c (T1 - Tc) before, q2 = h (1 - alpha_A) A_c (T2 - Tc) after compression",
         source: "Burke et al., eqs. 1 and 3",

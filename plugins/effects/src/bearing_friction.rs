@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for BearingFriction {
     const ABOUT: About = About {
         id: "bearing_friction",
+        name: "bearing friction",
         description: "the bearings take power from the shaft",
         equation: "I omega domega/dt = W_t - W_c - c omega^2",
         source: "viscous friction of journal bearings (Petroff)",

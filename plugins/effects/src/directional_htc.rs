@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for DirectionalHtc {
     const ABOUT: About = About {
         id: "directional_htc",
+        name: "convection that depends on direction",
         description: "convection differs between metal that heats the gas and gas that heats the metal",
         equation: "h f where the metal is hotter than the gas it touches (T1 before, T2' after compression), h elsewhere",
         source: "wall-temperature dependence beyond the viscosity ratio: Sieder and Tate (1936)",

@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for EfficiencyScale {
     const ABOUT: About = About {
         id: "efficiency_scale",
+        name: "compressor efficiency",
         description: "the compressor's efficiency is higher or lower everywhere",
         equation: "eta = s eta_nominal",
         source: "worn or fouled compressor",

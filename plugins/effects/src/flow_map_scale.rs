@@ -17,8 +17,9 @@ effect_parameters! {
 impl EffectKind for FlowMapScale {
     const ABOUT: About = About {
         id: "flow_map_scale",
+        name: "compressor flow",
         description: "the compressor delivers more or less flow at equal speed and pressure ratio",
-        equation: "m_corr = s m_corr,nominal; the efficiency stays where it is on the speed line",
+        equation: "m_corr = s m(N, PR), eta(N, m_corr): the efficiency is the map's at the flow that is delivered",
         source: "worn or fouled compressor, other trim",
         submodel: Submodel::CompressorFlow,
         also_shows_in: &[],
@@ -34,12 +35,55 @@ impl EffectKind for FlowMapScale {
 mod tests {
     use super::*;
     use crate::testing::Instant;
+    use mapper_core::ReferenceState;
+    use mapper_physics::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+    use mapper_physics::closed_form_map::ClosedFormMap;
 
+    /// At 110 krpm the best flow lies below what the point delivers: more flow is less efficient, by the closed form's own
+    /// parabola, and a map that only knows its speed lines says the same to first order.
     #[test]
-    fn flow_is_multiplied_at_equal_efficiency() {
+    fn flow_is_multiplied_and_the_efficiency_is_that_of_the_flow() {
         let (nominal, other) =
             (Instant::nominal().outputs, Instant::with(FlowMapScale { scale_ratio: 1.03 }).outputs);
         assert!((other.flow_kg_s / nominal.flow_kg_s - 1.03).abs() < 1e-12);
-        assert_eq!(other.efficiency, nominal.efficiency);
+        let map = ClosedFormMap { wheel_diameter_m: 0.052 };
+        for (speed_rpm, pressure_ratio) in [(60e3, 1.15), (110e3, 1.6), (140e3, 2.4)] {
+            let here = map.evaluate(speed_rpm, pressure_ratio);
+            let scaled = map.evaluate_scaled(speed_rpm, pressure_ratio, 1.01);
+            // Where the same speed line has that flow by itself.
+            let at = |pr: f64| map.evaluate(speed_rpm, pr).flow_corrected_kg_s - scaled.flow_corrected_kg_s;
+            let (mut low, mut high) = (1.0, pressure_ratio);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if at(middle) > 0.0 { low = middle } else { high = middle }
+            }
+            let along = map.evaluate(speed_rpm, low).efficiency;
+            assert!((scaled.efficiency - along).abs() < 1e-9, "{speed_rpm}");
+            let first_order = OnlyLines(map).evaluate_scaled(speed_rpm, pressure_ratio, 1.01).efficiency;
+            // Second order in one per cent of the flow.
+            assert!((first_order - along).abs() < 0.1 * (along - here.efficiency).abs() + 1e-4);
+        }
+    }
+
+    /// A map that knows its speed lines alone.
+    #[derive(Debug)]
+    struct OnlyLines(ClosedFormMap);
+
+    impl CompressorCharacteristic for OnlyLines {
+        fn reference(&self) -> ReferenceState {
+            self.0.reference()
+        }
+        fn evaluate(&self, speed_corrected_rpm: f64, pressure_ratio: f64) -> CharacteristicPoint {
+            self.0.evaluate(speed_corrected_rpm, pressure_ratio)
+        }
+        fn surge_point(&self, speed_corrected_rpm: f64) -> (f64, f64) {
+            self.0.surge_point(speed_corrected_rpm)
+        }
+        fn choke_flow_corrected_kg_s(&self, speed_corrected_rpm: f64) -> f64 {
+            self.0.choke_flow_corrected_kg_s(speed_corrected_rpm)
+        }
+        fn fingerprint(&self) -> String {
+            self.0.fingerprint()
+        }
     }
 }

@@ -18,6 +18,7 @@ effect_parameters! {
 impl EffectKind for FlowmeterGain {
     const ABOUT: About = About {
         id: "flowmeter_gain",
+        name: "flow meter reads in proportion",
         description: "the compressor's flow meter reads high or low in proportion",
         equation: "m_read = s m",
         source: "calibration of the meter",

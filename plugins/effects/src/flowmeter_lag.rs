@@ -18,6 +18,7 @@ effect_parameters! {
 impl EffectKind for FlowmeterLag {
     const ABOUT: About = About {
         id: "flowmeter_lag",
+        name: "slow flow meter",
         description: "the compressor's flow meter follows the flow with a lag",
         equation: "dm_read/dt = (m - m_read)/tau",
         source: "first-order meter",

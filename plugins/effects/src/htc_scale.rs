@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for HtcScale {
     const ABOUT: About = About {
         id: "htc_scale",
+        name: "convection in the compressor",
         description: "convection between gas and compressor housing is stronger or weaker everywhere",
         equation: "h = s h_nominal",
         source: "Burke et al., eq. 9: its coefficient a",

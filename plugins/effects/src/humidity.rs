@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for Humidity {
     const ABOUT: About = About {
         id: "humidity",
+        name: "moist air",
         description: "the compressor breathes moist air",
         equation: "R (1 + 0.6078 w), cp (1 + 0.84 w), flow times sqrt(287.05/R) on the compressor side",
         source: "mixture of ideal gases; cp of vapour 1850 J/(kg K)",

@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for InletHtc {
     const ABOUT: About = About {
         id: "inlet_htc",
+        name: "convection before the wheel",
         description: "convection before the wheel differs from that behind it, as in an inlet of another diameter; shows only where alpha_A is above 0",
         equation: "q1 = s h alpha_A A_c (T1 - Tc); by the law of the inlet's own diameter s is about (d_out/d_in)^(1 + b)",
         source: "Burke et al., section 5.2 and Appendix A (inlet diameter)",

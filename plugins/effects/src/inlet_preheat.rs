@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for InletPreheat {
     const ABOUT: About = About {
         id: "inlet_preheat",
+        name: "gas heated in the inlet",
         description: "the housing heats the gas between the T1 probe and the wheel",
         equation: "T1 rises by UA (Tc - T1)/(m cp); the housing gives UA (Tc - T1)",
         source: "inlet duct as a conductance",

@@ -22,6 +22,7 @@ effect_parameters! {
 impl EffectKind for InnerNode {
     const ABOUT: About = About {
         id: "inner_node",
+        name: "inner wall of the compressor housing",
         description: "the inner wall of the compressor housing has its own temperature",
         equation: "phi M c dT_i/dt = q1 + q2 - G (T_i - Tc), (1 - phi) M c dTc/dt = G (T_i - Tc) + bearing - outside",
         source: "two-node wall",

@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for OilScale {
     const ABOUT: About = About {
         id: "oil_scale",
+        name: "heat to the oil",
         description: "the oil takes more or less heat from the bearing housing",
         equation: "G_oil = s G_oil,nominal",
         source: "flow and viscosity of the oil: Burke et al., Appendix A, bearing housing",

@@ -18,6 +18,7 @@ effect_parameters! {
 impl EffectKind for P2Offset {
     const ABOUT: About = About {
         id: "p2_offset",
+        name: "offset of P2",
         description: "the pressure sensor behind the compressor reads high or low",
         equation: "P2_read = P2 + b",
         source: "calibration of the sensor",

@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for Recirculation {
     const ABOUT: About = About {
         id: "recirculation",
+        name: "recirculation",
         description: "part of the flow comes back, hot, from behind the wheel to its inlet",
         equation: "the wheel pumps (1 + r) m, the map's flow; T2' = T1' (1 + X)/(1 - r X), X = (PR^kappa - 1)/eta",
         source: "mixing balance of a ported shroud or backflow",

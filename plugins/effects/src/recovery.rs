@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for Recovery {
     const ABOUT: About = About {
         id: "recovery",
+        name: "recovery of the T2 probe",
         description: "the T2 probe recovers only part of the gas's kinetic energy",
         equation: "T_tip tends to T2 - (1 - r) v^2/(2 cp), v = m/(rho A) in the outlet pipe",
         source: "recovery factor of a probe: Moffat, Gas temperature measurement (1962)",

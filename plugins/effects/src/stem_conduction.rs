@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for StemConduction {
     const ABOUT: About = About {
         id: "stem_conduction",
+        name: "conduction along the T2 probe",
         description: "the T2 probe's stem conducts: the tip is drawn towards the housing",
         equation: "T_tip tends to T2 + chi (Tc - T2)",
         source: "fin of a thermowell, lumped to its tip: Incropera, Fundamentals of Heat and Mass Transfer, 3.6",

@@ -18,6 +18,7 @@ effect_parameters! {
 impl EffectKind for T1Offset {
     const ABOUT: About = About {
         id: "t1_offset",
+        name: "offset of T1",
         description: "the probe before the compressor reads high or low",
         equation: "T1_read = T1 + b",
         source: "calibration of the probe",

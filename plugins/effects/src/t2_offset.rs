@@ -18,6 +18,7 @@ effect_parameters! {
 impl EffectKind for T2Offset {
     const ABOUT: About = About {
         id: "t2_offset",
+        name: "offset of T2",
         description: "the probe behind the compressor reads high or low",
         equation: "T2_read = T2 + b",
         source: "calibration of the probe",

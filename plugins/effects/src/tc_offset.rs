@@ -18,6 +18,7 @@ effect_parameters! {
 impl EffectKind for TcOffset {
     const ABOUT: About = About {
         id: "tc_offset",
+        name: "offset of Tc",
         description: "the probe in the compressor housing reads high or low",
         equation: "Tc_read = Tc + b",
         source: "calibration or place of the probe",

@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for TipDiameter {
     const ABOUT: About = About {
         id: "tip_diameter",
+        name: "slow T2 probe",
         description: "the T2 probe's tip has a mass and follows the gas with a lag",
         equation: "dT_tip/dt = (T2 - T_tip)/tau, tau = rho c d^2/(6 Nu k)",
         source: "Burke et al., eqs. 11 and 12",

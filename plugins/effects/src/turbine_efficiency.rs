@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for TurbineEfficiency {
     const ABOUT: About = About {
         id: "turbine_efficiency",
+        name: "turbine efficiency",
         description: "the turbine's efficiency is higher or lower everywhere",
         equation: "eta_t = s eta_t,nominal",
         source: "worn or fouled turbine",

@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for TurbineRadiation {
     const ABOUT: About = About {
         id: "turbine_radiation",
+        name: "radiation between the housings",
         description: "the turbine housing radiates to the compressor housing",
         equation: "Q = FA sigma (Tt^4 - Tc^4)",
         source: "two-surface exchange: Incropera, 13.2",

@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for ValveArea {
     const ABOUT: About = About {
         id: "valve_area",
+        name: "valve area",
         description: "the back-pressure valve is wider or narrower than its opening says",
         equation: "CdA = s CdA,nominal",
         source: "calibration of the valve",

@@ -17,6 +17,7 @@ effect_parameters! {
 impl EffectKind for Ventilation {
     const ABOUT: About = About {
         id: "ventilation",
+        name: "air around the housings",
         description: "air moves around the housings: convection to the cell is stronger or weaker",
         equation: "Q_ext = A_ext (s 1.25 |T - T_amb|^(1/3) (T - T_amb) + eps sigma (T^4 - T_amb^4)), both housings",
         source: "Burke et al., Appendix A, external convection",

@@ -19,6 +19,7 @@ effect_parameters! {
 impl EffectKind for BackPlate {
     const ABOUT: About = About {
         id: "X_back_plate",
+        name: "heat through the back plate",
         description: "heat from the bearing side through the back plate into the gas behind the wheel",
         equation: "T2' rises by G (Tt - T2')/(m cp), taken from the turbine housing",
         source: WITHHELD,

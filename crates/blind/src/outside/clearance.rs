@@ -18,6 +18,7 @@ effect_parameters! {
 impl EffectKind for Clearance {
     const ABOUT: About = About {
         id: "X_clearance",
+        name: "clearance that grows with heat",
         description: "a clearance that grows as the compressor housing gets hotter than 320 K",
         equation: "eta (1 - k (Tc - 320 K)/100 K)",
         source: WITHHELD,

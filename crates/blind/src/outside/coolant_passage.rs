@@ -21,6 +21,7 @@ effect_parameters! {
 impl EffectKind for CoolantPassage {
     const ABOUT: About = About {
         id: "X_coolant_passage",
+        name: "coolant passage in the compressor housing",
         description: "a coolant passage from the compressor housing to water at 85 degC",
         equation: "G (358.15 K - Tc) to the compressor housing",
         source: WITHHELD,

@@ -18,6 +18,7 @@ effect_parameters! {
 impl EffectKind for CoulombFriction {
     const ABOUT: About = About {
         id: "X_coulomb_friction",
+        name: "rubbing shaft",
         description: "the shaft rubs with a constant torque",
         equation: "-M on the shaft",
         source: WITHHELD,

@@ -18,6 +18,7 @@ effect_parameters! {
 impl EffectKind for FlowDependentHtc {
     const ABOUT: About = About {
         id: "X_flow_dependent_htc",
+        name: "other exponent of convection",
         description: "the exponent of the flow in the convection is other than the correlation's",
         equation: "h (m/0.06 kg/s)^e",
         source: WITHHELD,

@@ -18,6 +18,7 @@ effect_parameters! {
 impl EffectKind for MountConduction {
     const ABOUT: About = About {
         id: "X_mount_conduction",
+        name: "conduction to the mount",
         description: "the compressor housing conducts to a mount at 20 degC",
         equation: "G (293.15 K - Tc) to the compressor housing",
         source: WITHHELD,

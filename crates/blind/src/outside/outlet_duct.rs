@@ -24,6 +24,7 @@ effect_parameters! {
 impl EffectKind for OutletDuct {
     const ABOUT: About = About {
         id: "X_outlet_duct",
+        name: "outlet duct with its own mass",
         description: "an outlet duct with a mass of its own before the T2 probe",
         equation: "T2 leaves a duct of 250 J/K at T_d + (T2 - T_d) exp(-UA/(m cp)); 1 W/K of it to the cell",
         source: WITHHELD,

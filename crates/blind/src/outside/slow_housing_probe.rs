@@ -19,6 +19,7 @@ effect_parameters! {
 impl EffectKind for SlowHousingProbe {
     const ABOUT: About = About {
         id: "X_slow_housing_probe",
+        name: "slow housing probe",
         description: "a slow probe in the compressor housing",
         equation: "dTc_read/dt = (Tc - Tc_read)/tau",
         source: WITHHELD,

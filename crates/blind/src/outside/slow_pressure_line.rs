@@ -19,6 +19,7 @@ effect_parameters! {
 impl EffectKind for SlowPressureLine {
     const ABOUT: About = About {
         id: "X_slow_pressure_line",
+        name: "slow pressure line",
         description: "a slow pressure line to the P2 sensor",
         equation: "dP2_read/dt = (P2 - P2_read)/tau",
         source: WITHHELD,

@@ -19,6 +19,7 @@ effect_parameters! {
 impl EffectKind for SpeedGain {
     const ABOUT: About = About {
         id: "X_speed_gain",
+        name: "speed sensor reads in proportion",
         description: "the speed sensor reads high or low in proportion",
         equation: "N_read = (1 + g) N",
         source: WITHHELD,

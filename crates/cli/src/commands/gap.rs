@@ -14,6 +14,8 @@ pub struct Gap {
 
 subcommands! { GapCommand:
     diagnose::Diagnose,
+    apply::Apply,
+    predict::Predict,
     blind::Blind,
     effects::Effects,
 }

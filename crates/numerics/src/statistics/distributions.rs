@@ -1,6 +1,7 @@
 //! Quantiles of the distributions that intervals are made of.
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+use statrs::function::beta::inv_beta_reg;
 
 /// 97.5 % quantile of the standard normal distribution: half of a 95 % interval, standard errors.
 pub const NORMAL_975: f64 = 1.959_963_984_540_054;
@@ -18,6 +19,15 @@ pub fn student_quantile(share: f64, degrees_of_freedom: f64) -> Option<f64> {
     let inside = share > 0.0 && share < 1.0;
     let distribution = StudentsT::new(0.0, 1.0, degrees_of_freedom).ok().filter(|_| inside)?;
     Some(distribution.inverse_cdf(share))
+}
+
+/// Both ends of the exact 95 % interval of a share of which `hits` out of `trials` were seen (Clopper and Pearson 1934); 0 and 1
+/// without trials. Neither has to be whole: `n` independent shares between 0 and 1 whose mean is `m` count as `n m` hits.
+pub fn share_interval_95(hits: f64, trials: f64) -> (f64, f64) {
+    let misses = trials - hits;
+    let low = if hits > 0.0 { inv_beta_reg(hits, misses.max(0.0) + 1.0, 0.025) } else { 0.0 };
+    let high = if misses > 0.0 { inv_beta_reg(hits.max(0.0) + 1.0, misses, 0.975) } else { 1.0 };
+    (low, high)
 }
 
 #[cfg(test)]

@@ -48,6 +48,8 @@ struct SettingsFile {
     weather: WeatherName,
     /// `drawn` from the campaign's tolerances, or `none` (the default).
     tolerances: TolerancesName,
+    /// By how much the machine is off within its tolerances, in place of a draw.
+    deviations: DeviationsFile,
     /// How the actuators follow.
     actuators: ActuatorsFile,
     /// Where the true machine differs from the declared one.
@@ -111,6 +113,44 @@ enum TolerancesName {
     None,
 }
 
+/// By how much the machine is off, as a diagnosis found it.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct DeviationsFile {
+    flow_meter_gain: Option<Quantity<Fraction>>,
+    flow_map: Option<Quantity<Fraction>>,
+    compressor_efficiency: Option<Quantity<Fraction>>,
+    turbine_efficiency: Option<Quantity<Fraction>>,
+    valve_area: Option<Quantity<Fraction>>,
+    convection: Option<Quantity<Fraction>>,
+    external_convection: Option<Quantity<Fraction>>,
+    oil_conductance: Option<Quantity<Fraction>>,
+}
+
+impl DeviationsFile {
+    /// Puts them into a rig.
+    fn put_into(&self, rig: &mut Rig) -> Result<(), BackendError> {
+        let scale = |key: &str, deviation: &Option<Quantity<Fraction>>| {
+            let ratio = deviation.as_ref().map_or(0.0, |deviation| deviation.inside);
+            within(100.0 * ratio, "%", -90.0..=900.0)
+                .map_err(|problem| problem.at(format!("deviations.{key}")))?;
+            Ok::<f64, BackendError>(1.0 + ratio)
+        };
+        let params = &mut rig.model.params;
+        rig.instruments.path_mut(Channel::CompressorFlow).gain_ratio *=
+            scale("flow_meter_gain", &self.flow_meter_gain)?;
+        params.compressor.flow_scale_ratio *= scale("flow_map", &self.flow_map)?;
+        params.compressor.efficiency_scale_ratio *=
+            scale("compressor_efficiency", &self.compressor_efficiency)?;
+        params.turbine.peak_efficiency *= scale("turbine_efficiency", &self.turbine_efficiency)?;
+        params.outlet.valve_area_m2 *= scale("valve_area", &self.valve_area)?;
+        params.compressor.nusselt_coefficient *= scale("convection", &self.convection)?;
+        params.external_convection_ratio *= scale("external_convection", &self.external_convection)?;
+        params.bearing.oil_conductance_w_k *= scale("oil_conductance", &self.oil_conductance)?;
+        Ok(())
+    }
+}
+
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct ActuatorsFile {
@@ -169,6 +209,7 @@ pub fn read_settings(
     if file.tolerances == TolerancesName::Drawn {
         draw_tolerances(&mut rig, &nominal.tolerances, nominal.seed);
     }
+    file.deviations.put_into(&mut rig)?;
     put_in(&mut rig, &file.effects, &nominal.effects)?;
     let actuators = &file.actuators;
     let draws = Draws {

@@ -73,7 +73,16 @@ impl CompressorCharacteristic for UnevenMap {
     }
 
     fn evaluate(&self, speed_corrected_rpm: f64, pressure_ratio: f64) -> CharacteristicPoint {
-        let point = self.map.evaluate(speed_corrected_rpm, pressure_ratio);
+        self.evaluate_scaled(speed_corrected_rpm, pressure_ratio, 1.0)
+    }
+
+    fn evaluate_scaled(
+        &self,
+        speed_corrected_rpm: f64,
+        pressure_ratio: f64,
+        flow_scale_ratio: f64,
+    ) -> CharacteristicPoint {
+        let point = self.map.evaluate_scaled(speed_corrected_rpm, pressure_ratio, flow_scale_ratio);
         let error_ratio = self.error_ratio(speed_corrected_rpm, point.surge_position_ratio);
         CharacteristicPoint { efficiency: point.efficiency * (1.0 + error_ratio), ..point }
     }

@@ -73,6 +73,7 @@ pub(super) fn read(text: &str) -> Result<Header, Mistake> {
         return Err((None, format!("the lag's `{name}` is not a parameter; write `{LAG_FORM}`")));
     }
     let info = EffectInfo {
+        name: Cow::Owned(id.replace('_', " ")),
         description: description.unwrap_or_else(|| id.clone()),
         equation: equation.unwrap_or(Cow::Borrowed("as in its script")),
         source: source.unwrap_or(Cow::Borrowed("suspected by the user")),

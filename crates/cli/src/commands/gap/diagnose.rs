@@ -1,14 +1,19 @@
 //! `mapper gap diagnose`: where a recording leaves the nominal model, why, how far that closes the gap, what is next.
 
+use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::given::channel_map;
 use crate::progress::Progress;
 use crate::{output, registry};
 use clap::Args;
 use mapper_drift::DriftReport;
+use mapper_gap::calibration::Calibration;
+use mapper_gap::diagnose::Diagnosed;
+use mapper_gap::joint::over_recordings;
 use mapper_gap::report::Law;
-use mapper_report::{gap_page, gap_text, sensors_text, zero_text};
-use mapper_session::{Recorded, Session, SessionError, write_new};
+use mapper_gap::twin::Found;
+use mapper_report::{gap_page, gap_text, headline, recordings_text, sensors_text, zero_text};
+use mapper_session::{Gap, Recorded, Session, SessionError, SessionEvent, write_new};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -17,9 +22,9 @@ use std::path::{Path, PathBuf};
 pub struct Diagnose {
     /// Campaign with machine, declared uncertainties and tolerances (YAML)
     pub campaign: PathBuf,
-    /// Run directory, MCAP file, or log of another program
-    #[arg(long, value_name = "FILE")]
-    pub recording: PathBuf,
+    /// Run directory, MCAP file, or log of another program; several, in order, are diagnosed each and compared
+    #[arg(long = "recording", value_name = "FILE", required = true)]
+    pub recordings: Vec<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
     #[arg(long, value_name = "MAP")]
     pub channels: Option<PathBuf>,
@@ -38,33 +43,53 @@ pub struct Diagnose {
 }
 
 impl Diagnose {
-    /// Diagnoses one recording.
+    /// Diagnoses one recording, or several and what became of their causes.
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;
-        let (registry, progress) = (registry::registry(), Progress::new());
-        let recorded = Recorded::read(&registry, &self.recording, &map, Some(&campaign))?;
-        let on_event = |event: &_| progress.show(event);
-        let session = Session { on_event: &on_event, ..Session::new(&registry) };
+        let registry = registry::registry();
         let effects = registry.effects_with(&self.effects)?;
-        let mut gap = session.diagnose_gap(&recorded, &campaign, &map, effects)?;
-        progress.clear();
-        write_laws(&mut gap.diagnosed.diagnosis.laws, self.laws.as_deref(), self.html.as_deref())?;
-        if let Some(file) = &self.html {
-            let title = recorded.path.display().to_string();
-            write_new(file, gap_page(&title, &gap.diagnosed).as_bytes())?;
+        if (self.html.is_some() || self.laws.is_some()) && self.recordings.len() > 1 {
+            let message = "--html and --laws are for one recording; give one --recording with them";
+            return Err(Failure::new(Code::BadInput, message));
         }
-        let diagnosis = &gap.diagnosed.diagnosis;
-        if self.json {
-            let mut value = serde_json::to_value(diagnosis).map_err(SessionError::from)?;
-            value["drift"] = gap.drift.as_ref().map_or(Value::Null, drift_json);
-            value["zero"] = json!(gap.zero);
-            if !gap.sensors.is_empty() {
-                value["sensors"] = json!(gap.sensors);
+        let mut gaps = Vec::with_capacity(self.recordings.len());
+        for recording in &self.recordings {
+            let progress = Progress::new();
+            progress.show(&SessionEvent::Progress { done_ratio: 0.0, what: "reading".to_owned() });
+            let recorded = Recorded::read(&registry, recording, &map, Some(&campaign))?;
+            let on_event = |event: &_| progress.show(event);
+            let session = Session { on_event: &on_event, ..Session::new(&registry) };
+            let gap = session.diagnose_gap(&recorded, &campaign, &map, effects.clone())?;
+            progress.clear();
+            gaps.push((recorded.path.display().to_string(), gap));
+        }
+        if let [(title, gap)] = &mut gaps[..] {
+            write_laws(&mut gap.diagnosed.diagnosis.laws, self.laws.as_deref(), self.html.as_deref())?;
+            if let Some(file) = &self.html {
+                write_new(file, gap_page(title, &gap.diagnosed).as_bytes())?;
             }
-            return output::print_json(&value);
         }
-        output::print(&[gap_text(diagnosis), sensors_text(&gap.sensors), zero_text(&gap.zero)].concat())
+        if let [(_, gap)] = &gaps[..] {
+            return if self.json { output::print_json(&gap_json(gap)?) } else { output::print(&text(gap)) };
+        }
+        let diagnosed: Vec<&Diagnosed> = gaps.iter().map(|(_, gap)| &gap.diagnosed).collect();
+        let calibration = Calibration::shipped().map_err(SessionError::Calibration)?;
+        let over = over_recordings(&diagnosed, &calibration);
+        if self.json {
+            let each: Result<Vec<Value>, Failure> = gaps
+                .iter()
+                .map(|(path, gap)| {
+                    let mut value = gap_json(gap)?;
+                    value["recording"] = json!(path);
+                    Ok(value)
+                })
+                .collect();
+            return output::print_json(&json!({ "recordings": each?, "causes": over }));
+        }
+        let heads: Vec<(String, String)> =
+            gaps.iter().map(|(path, gap)| (path.clone(), headline(&gap.diagnosed.diagnosis))).collect();
+        output::print(&recordings_text(&heads, &over))
     }
 }
 
@@ -81,6 +106,21 @@ fn write_laws(laws: &mut [Law], directory: Option<&Path>, page: Option<&Path>) -
         law.rhai = Some(file.display().to_string());
     }
     Ok(())
+}
+
+fn text(gap: &Gap) -> String {
+    [gap_text(&gap.diagnosed.diagnosis), sensors_text(&gap.sensors), zero_text(&gap.zero)].concat()
+}
+
+fn gap_json(gap: &Gap) -> Result<Value, Failure> {
+    let mut value = serde_json::to_value(&gap.diagnosed.diagnosis).map_err(SessionError::from)?;
+    value["found"] = json!(Found::of(&gap.diagnosed));
+    value["drift"] = gap.drift.as_ref().map_or(Value::Null, drift_json);
+    value["zero"] = json!(gap.zero);
+    if !gap.sensors.is_empty() {
+        value["sensors"] = json!(gap.sensors);
+    }
+    Ok(value)
 }
 
 /// Verdict, cause, course and size of what drifted.

@@ -51,6 +51,8 @@ enum BlindKind {
     Pair,
     /// A cause outside the catalogue.
     Outside,
+    /// Three effects of the catalogue.
+    Triple,
 }
 
 impl From<BlindKind> for CaseKind {
@@ -60,6 +62,7 @@ impl From<BlindKind> for CaseKind {
             BlindKind::Single => CaseKind::Single,
             BlindKind::Pair => CaseKind::Pair,
             BlindKind::Outside => CaseKind::Outside,
+            BlindKind::Triple => CaseKind::Triple,
         }
     }
 }

@@ -1,0 +1,107 @@
+//! `mapper gap predict`: forecasts the next recording under seal, and says afterwards how that came out.
+
+use super::apply::found_in;
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::given::channel_map;
+use crate::{output, registry};
+use clap::Args;
+use mapper_gap::twin::{Expected, Found};
+use mapper_report::held_text;
+use mapper_session::{Recorded, Session, json_text, write_new};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use sha2::{Digest, Sha256};
+use std::path::PathBuf;
+
+/// Forecast the next recording from a diagnosis and seal the forecast; with --recording, say how it came out
+#[derive(Debug, Args)]
+pub struct Predict {
+    /// Campaign of the next recording (YAML)
+    pub campaign: PathBuf,
+    /// Diagnosis, as `mapper gap diagnose --json` prints it; makes a forecast
+    #[arg(long, value_name = "FILE", required_unless_present = "recording")]
+    pub diagnosis: Option<PathBuf>,
+    /// The forecast: a new file with --diagnosis, an existing one with --recording
+    #[arg(long, value_name = "FILE")]
+    pub forecast: PathBuf,
+    /// Run directory, MCAP file, or log of another program that the forecast is held against
+    #[arg(long, value_name = "FILE", conflicts_with = "diagnosis")]
+    pub recording: Option<PathBuf>,
+    /// SHA-256 that was printed when the forecast was made; refused where the file has another
+    #[arg(long, value_name = "HASH", requires = "recording")]
+    pub seal: Option<String>,
+    /// Channel map: where a recording made by another program holds the rig's channels (YAML)
+    #[arg(long, value_name = "MAP")]
+    pub channels: Option<PathBuf>,
+    /// A suspected effect written in rhai that the diagnosis named; may be repeated
+    #[arg(long = "effect", value_name = "FILE")]
+    pub effects: Vec<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A forecast as it is stored.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Forecast {
+    /// Name of the campaign.
+    campaign: String,
+    /// The machine as found, with its covariance.
+    found: Found,
+    /// The ends of the planned steps: value and half the width of the 95 % band.
+    steps: Vec<Expected>,
+}
+
+impl Predict {
+    /// Makes a forecast, or holds one against a recording.
+    pub fn run(&self) -> Result<(), Failure> {
+        let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
+        let map = channel_map(self.channels.as_deref())?;
+        let registry = registry::registry();
+        let effects = registry.effects_with(&self.effects)?;
+        let session = Session::new(&registry);
+        let bad =
+            |message: String| Failure::new(Code::BadInput, format!("{}: {message}", self.forecast.display()));
+        if let Some(diagnosis) = &self.diagnosis {
+            let found = found_in(diagnosis)?;
+            let steps = session.forecast_twin(&campaign, &map, effects, &found)?;
+            let forecast = Forecast { campaign: campaign.name.clone(), found, steps };
+            let text = json_text(&forecast)?;
+            write_new(&self.forecast, text.as_bytes())?;
+            let (steps, seal) = (forecast.steps.len(), sha256(text.as_bytes()));
+            if self.json {
+                return output::print_json(
+                    &json!({ "forecast": self.forecast, "steps": steps, "sha256": seal }),
+                );
+            }
+            return output::print(&format!(
+                "forecast of {steps} steps in {}\nSHA-256: {seal}\n",
+                self.forecast.display()
+            ));
+        }
+        let Some(recording) = &self.recording else {
+            return Err(bad("nothing to hold it against".to_owned()));
+        };
+        let bytes = std::fs::read(&self.forecast).map_err(|error| bad(error.to_string()))?;
+        let seal = sha256(&bytes);
+        if let Some(wanted) = self.seal.as_ref().filter(|wanted| !wanted.eq_ignore_ascii_case(&seal)) {
+            return Err(bad(format!(
+                "its SHA-256 is {seal}, not {wanted}: it is not the forecast that was sealed"
+            )));
+        }
+        let forecast: Forecast =
+            serde_json::from_slice(&bytes).map_err(|error| bad(format!("not a forecast: {error}")))?;
+        let recorded = Recorded::read(&registry, recording, &map, Some(&campaign))?;
+        let held = session.hold_twin(&recorded, &campaign, &map, effects, &forecast.found)?;
+        if self.json {
+            return output::print_json(&json!({ "sha256": seal, "held": held }));
+        }
+        output::print(&held_text(&held, &seal))
+    }
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}

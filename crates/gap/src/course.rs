@@ -1,0 +1,45 @@
+//! When in a recording an effect acts.
+
+/// When in a recording an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Course {
+    /// In all of it.
+    Throughout,
+    /// From the step of this index on.
+    From(usize),
+    /// It grows evenly from step to step: not there before the step of this index, at its full size in the last one.
+    Growing(usize),
+}
+
+impl Course {
+    /// Share of its full size in a step of a recording of `steps`, 0..1.
+    pub fn share(self, step: usize, steps: usize) -> f64 {
+        match self {
+            Course::Throughout => 1.0,
+            Course::From(first) => f64::from(u8::from(step >= first)),
+            Course::Growing(first) if step < first || steps <= first => 0.0,
+            Course::Growing(first) => (step - first + 1) as f64 / (steps - first) as f64,
+        }
+    }
+
+    /// The step with which it begins; `None` where it is always there.
+    pub fn onset(self) -> Option<usize> {
+        match self {
+            Course::Throughout => None,
+            Course::From(first) | Course::Growing(first) => Some(first),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_grows_begins_with_its_step_and_is_whole_in_the_last() {
+        let shares = |course: Course| (0..5).map(|step| course.share(step, 5)).collect::<Vec<f64>>();
+        assert_eq!(shares(Course::Throughout), [1.0; 5]);
+        assert_eq!(shares(Course::From(3)), [0.0, 0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(shares(Course::Growing(1)), [0.0, 0.25, 0.5, 0.75, 1.0]);
+    }
+}

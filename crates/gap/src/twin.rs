@@ -1,0 +1,304 @@
+//! The calibrated twin: machine, effects and tolerances as a diagnosis found them, what it forecasts, and how the forecast held.
+
+use crate::coordinate::coordinates;
+use crate::diagnose::Diagnosed;
+use crate::fit::{Fit, effect_changes};
+use crate::nuisance::{NuisanceKind, OUTPUTS};
+use crate::outlook::{Alike, imagined_steps};
+use crate::report::Verdict;
+use crate::study::{Hypothesis, Study};
+use crate::whiten::{Linearised, dot};
+use mapper_core::StepMarker;
+use mapper_observe::knob::Knob;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// An effect with its values.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FoundEffect {
+    /// Its id.
+    pub id: String,
+    /// A value for each of its parameters, in their units.
+    pub values: Vec<f64>,
+}
+
+/// A tolerance or offset with its value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FoundTolerance {
+    /// What may be off.
+    pub name: String,
+    /// By how much it is, in the unit of what it changes; ratios for gains and scales.
+    pub value: f64,
+    /// By how much it may be, one sigma.
+    pub sigma: f64,
+}
+
+/// A machine as a diagnosis found it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Found {
+    /// Named effects; none where nothing is named.
+    pub effects: Vec<FoundEffect>,
+    /// Everything that may be off besides.
+    pub tolerances: Vec<FoundTolerance>,
+    /// Covariance of the tolerances, in their sigmas, and of the effects behind them, in the coordinates of the search (typical
+    /// steps, or logarithms of what spans decades).
+    pub covariance: Vec<Vec<f64>>,
+}
+
+/// Why a twin cannot be held against a recording.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TwinError {
+    /// Other things may be off here than there.
+    #[error(
+        "the diagnosis knows other tolerances than this campaign and recording ({theirs} and {ours}): take the campaign, channels and sensors of the diagnosis"
+    )]
+    Tolerances {
+        /// In the diagnosis.
+        theirs: usize,
+        /// Here.
+        ours: usize,
+    },
+    /// An effect that is not known here.
+    #[error("effect `{0}` of the diagnosis is not in the catalogue; give it with --effect")]
+    Effect(String),
+    /// Not a covariance.
+    #[error("the covariance of the diagnosis is not one of its {0} tolerances and parameters")]
+    Covariance(usize),
+    /// The twin cannot follow.
+    #[error(transparent)]
+    Predict(#[from] crate::study::PredictError),
+}
+
+/// What identifies a tolerance in files.
+fn name(kind: NuisanceKind) -> String {
+    match kind {
+        NuisanceKind::Offset(channel) => format!("offset of {channel}"),
+        NuisanceKind::FlowMeterGain => "flow_meter_gain".to_owned(),
+        NuisanceKind::Knob(Knob::Flow) => "flow_map".to_owned(),
+        NuisanceKind::Knob(Knob::Efficiency) => "compressor_efficiency".to_owned(),
+        NuisanceKind::Knob(Knob::TurbineEfficiency) => "turbine_efficiency".to_owned(),
+        NuisanceKind::Knob(Knob::ValveArea) => "valve_area".to_owned(),
+        NuisanceKind::Knob(Knob::CompressorConvection) => "convection".to_owned(),
+        NuisanceKind::Knob(Knob::ExternalConvection) => "external_convection".to_owned(),
+        NuisanceKind::Knob(Knob::OilConductance) => "oil_conductance".to_owned(),
+        NuisanceKind::Knob(knob) => format!("{knob:?}"),
+        NuisanceKind::TurbineDrop => "turbine_drop".to_owned(),
+        NuisanceKind::Shape(i) => format!("efficiency_shape {i}"),
+        NuisanceKind::Delay(output) => format!("delay of {}", OUTPUTS[output]),
+    }
+}
+
+fn is_start(name: &str) -> bool {
+    name == "StartTc" || name == "StartTt"
+}
+
+impl Found {
+    /// What a diagnosis found; `None` where the covariance cannot be formed.
+    pub fn of(diagnosed: &Diagnosed) -> Option<Found> {
+        let named = matches!(diagnosed.diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
+        let best = diagnosed.fits.first().filter(|_| named).unwrap_or(&diagnosed.null);
+        Found::of_fit(&diagnosed.study, best)
+    }
+
+    fn of_fit(study: &Study, fit: &Fit) -> Option<Found> {
+        let covariance = fit.precision.clone().cholesky()?.inverse();
+        let tolerance = |(nuisance, sigmas): (&crate::nuisance::Nuisance, &f64)| FoundTolerance {
+            name: name(nuisance.kind),
+            value: sigmas * nuisance.sigma,
+            sigma: nuisance.sigma,
+        };
+        Some(Found {
+            effects: fit
+                .hypothesis
+                .effects
+                .iter()
+                .map(|(index, values)| FoundEffect {
+                    id: study.effects[*index].info().id.to_string(),
+                    values: values.clone(),
+                })
+                .collect(),
+            tolerances: study.nuisances.iter().zip(&fit.hypothesis.nuisances).map(tolerance).collect(),
+            covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        })
+    }
+
+    /// The hypothesis of a twin in another recording, and its covariance: of that recording's own start nothing is known yet.
+    fn hypothesis(&self, study: &Study) -> Result<(Hypothesis, DMatrix<f64>), TwinError> {
+        let same = study.nuisances.len() == self.tolerances.len()
+            && study.nuisances.iter().zip(&self.tolerances).all(|(n, found)| name(n.kind) == found.name);
+        if !same {
+            let (theirs, ours) = (self.tolerances.len(), study.nuisances.len());
+            return Err(TwinError::Tolerances { theirs, ours });
+        }
+        let mut effects = Vec::new();
+        for found in &self.effects {
+            let index = (0..study.catalogue).find(|i| study.effects[*i].info().id == found.id.as_str());
+            let index = index.ok_or_else(|| TwinError::Effect(found.id.clone()))?;
+            effects.push((index, found.values.clone()));
+        }
+        let n = self.tolerances.len() + effects.iter().map(|(_, values)| values.len()).sum::<usize>();
+        if self.covariance.len() != n || self.covariance.iter().any(|row| row.len() != n) {
+            return Err(TwinError::Covariance(n));
+        }
+        let mut covariance = DMatrix::from_fn(n, n, |i, j| self.covariance[i][j]);
+        let mut nuisances = Vec::with_capacity(self.tolerances.len());
+        for (i, found) in self.tolerances.iter().enumerate() {
+            if is_start(&found.name) {
+                covariance.row_mut(i).fill(0.0);
+                covariance.column_mut(i).fill(0.0);
+                covariance[(i, i)] = 1.0;
+                nuisances.push(0.0);
+            } else {
+                nuisances.push(found.value / study.nuisances[i].sigma);
+            }
+        }
+        Ok((Hypothesis { nuisances, effects }, covariance))
+    }
+}
+
+/// How a forecast of one channel held.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HeldChannel {
+    /// Root mean square of measured minus forecast, in the channel's unit.
+    pub rms: f64,
+    /// Residual in units of the noise: 1 is noise.
+    pub ratio: f64,
+    /// Share of the values within the 95 % band.
+    pub inside: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// How a forecast held.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Held {
+    /// Residual of all channels in units of the noise: 1 is noise.
+    pub ratio: f64,
+    /// Share of all values within the 95 % band.
+    pub inside: f64,
+    /// Number of values.
+    pub values: usize,
+    /// Each channel.
+    pub channels: BTreeMap<String, HeldChannel>,
+}
+
+/// Half the width of a 95 % band, sigmas.
+const BAND_SIGMAS: f64 = 1.96;
+
+/// Holds a twin against a recording that it has not seen: driven by what was recorded of the inputs, nothing fitted. Values are
+/// means over the blocks of a step with the noise's memory taken out; the band of each is the noise and what the twin is not
+/// sure of.
+///
+/// # Errors
+/// [`TwinError`].
+pub fn hold(study: &Study, found: &Found) -> Result<Held, TwinError> {
+    let (hypothesis, covariance) = found.hypothesis(study)?;
+    let nominal = Linearised::new(study)?;
+    let there = nominal.at(study, &hypothesis)?;
+    let at = coordinates(study, &hypothesis);
+    let mut columns = there.columns.clone();
+    columns.extend(effect_changes(study, &nominal, &hypothesis, &there.base, &at));
+    let residual = nominal.residual(study, &there.base);
+    let spread = |row: usize| {
+        let j = DVector::from_fn(columns.len(), |i, _| columns[i][row]);
+        1.0 + (covariance.clone() * &j).dot(&j).max(0.0)
+    };
+    let inside: Vec<f64> = residual
+        .iter()
+        .enumerate()
+        .map(|(row, r)| f64::from(u8::from(r.abs() < BAND_SIGMAS * spread(row).sqrt())))
+        .collect();
+    let mut channels = BTreeMap::new();
+    for (output, channel) in OUTPUTS.iter().enumerate() {
+        let rows: Vec<usize> =
+            study.groups.iter().filter(|g| g.output == output).flat_map(|g| g.rows.clone()).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let mean =
+            |of: &dyn Fn(usize) -> f64| rows.iter().map(|row| of(*row)).sum::<f64>() / rows.len() as f64;
+        let held = HeldChannel {
+            rms: mean(&|row| (study.measured[row] - there.base.values[row]).powi(2)).sqrt(),
+            ratio: mean(&|row| residual[row] * residual[row]).sqrt(),
+            inside: mean(&|row| inside[row]),
+            unit: channel.unit().to_owned(),
+        };
+        channels.insert(channel.symbol().to_owned(), held);
+    }
+    let n = residual.len().max(1) as f64;
+    Ok(Held {
+        ratio: (dot(&residual, &residual) / n).sqrt(),
+        inside: inside.iter().sum::<f64>() / n,
+        values: residual.len(),
+        channels,
+    })
+}
+
+/// What a twin expects at the end of a step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Expected {
+    /// The step, by index.
+    pub step: usize,
+    /// Each channel: value and half the width of its 95 % band, in the channel's unit.
+    pub channels: BTreeMap<String, [f64; 2]>,
+}
+
+/// The ends of planned steps by a twin, inputs as the campaign has them.
+///
+/// # Errors
+/// [`TwinError`]; no steps where the nominal machine cannot rest at the first.
+pub fn forecast_steps(
+    like: Alike,
+    steps: Vec<StepMarker>,
+    found: &Found,
+) -> Result<Vec<Expected>, TwinError> {
+    let rest = steps.first().and_then(|step| step.to);
+    let study = rest.and_then(|rest| imagined_steps(like, steps, &rest, INTERVAL_S));
+    study.map_or_else(|| Ok(Vec::new()), |study| forecast(&study, found))
+}
+
+/// Samples of a forecast, s apart.
+const INTERVAL_S: f64 = 0.5;
+
+/// The ends of the steps of a study by a twin, with bands of what the twin is not sure of and of the noise of a reading.
+///
+/// # Errors
+/// [`TwinError`].
+fn forecast(study: &Study, found: &Found) -> Result<Vec<Expected>, TwinError> {
+    let (hypothesis, covariance) = found.hypothesis(study)?;
+    let here = study.predict(&hypothesis)?;
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    let changed = |moved: &Hypothesis, by: f64| -> Vec<f64> {
+        let Ok(there) = study.predict(moved) else { return vec![0.0; here.values.len()] };
+        there.values.iter().zip(&here.values).map(|(t, h)| (t - h) / by).collect()
+    };
+    for i in 0..hypothesis.nuisances.len() {
+        let mut moved = hypothesis.clone();
+        moved.nuisances[i] += 1.0;
+        columns.push(changed(&moved, 1.0));
+    }
+    let values = crate::coordinate::parameters(&hypothesis);
+    for (k, (coordinate, value)) in coordinates(study, &hypothesis).iter().zip(values).enumerate() {
+        let mut moved = hypothesis.clone();
+        let at = coordinate.of(value);
+        let away = [at + 0.02, at - 0.02].into_iter().find(|x| coordinate.of(coordinate.value(*x)) != at);
+        let away = coordinate.of(coordinate.value(away.unwrap_or(at)));
+        crate::coordinate::set_parameter(&mut moved, k, coordinate.value(away));
+        columns.push(if away == at { vec![0.0; here.values.len()] } else { changed(&moved, away - at) });
+    }
+    let mut expected: Vec<Expected> =
+        (0..study.steps.len()).map(|step| Expected { step, channels: BTreeMap::new() }).collect();
+    for group in &study.groups {
+        let Some(row) = group.rows.clone().last() else { continue };
+        let j = DVector::from_fn(columns.len(), |i, _| columns[i][row]);
+        let noise = study.declared.noise_sigma(OUTPUTS[group.output]);
+        let sigma = ((covariance.clone() * &j).dot(&j).max(0.0) + noise * noise).sqrt();
+        let channel = OUTPUTS[group.output].symbol().to_owned();
+        expected[group.step].channels.insert(channel, [here.values[row], BAND_SIGMAS * sigma]);
+    }
+    Ok(expected)
+}

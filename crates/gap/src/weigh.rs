@@ -1,0 +1,205 @@
+//! Scores turned into probabilities, and what is said of each cause.
+
+use crate::adequacy::Adequacy;
+use crate::calibration::{Calibration, FURTHER_RATIO};
+use crate::coordinate::{coordinates, parameters};
+use crate::course::Course;
+use crate::fit::Fit;
+use crate::in_words;
+use crate::next::Rivals;
+use crate::report::{Candidate, Estimate, Onset};
+use crate::study::Study;
+use std::collections::BTreeMap;
+
+/// Scores turned into probabilities.
+pub(crate) struct Weighed {
+    /// Causes, best first; what only adds to a better one is not among them.
+    pub candidates: Vec<Candidate>,
+    /// The fit of each candidate, by its place.
+    pub shown: Vec<usize>,
+    /// Probability that nothing is beyond tolerance.
+    pub none: f64,
+    /// Probability of a cause outside the catalogue, by what the best fit leaves.
+    pub outside: f64,
+    /// Whether a cause is named at all.
+    pub named: bool,
+}
+
+/// Share of causes that begin with a step among all.
+const LATE_RATIO: f64 = 0.1;
+
+/// Logarithm of what is known of a cause before any data: pairs are rarer than singles, and many; causes that begin while a
+/// recording is made are rarer still, and may begin with any step.
+pub fn prior(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
+    let count = study.catalogue.max(2) as f64;
+    let effects = fit.hypothesis.effects.len();
+    let of_number = match effects {
+        0 => calibration.prior_none.ln(),
+        1 => (calibration.prior_single / count).ln(),
+        2 => (calibration.prior_pair / (0.5 * count * (count - 1.0))).ln(),
+        _ => {
+            let sets: f64 = (0..effects).map(|i| ((count - i as f64) / (i as f64 + 1.0)).max(0.1).ln()).sum();
+            calibration.prior_triple.ln() + (effects - 3) as f64 * FURTHER_RATIO.ln() - sets
+        }
+    };
+    let late = fit.hypothesis.effects.iter().filter(|(index, _)| study.courses[*index] != Course::Throughout);
+    of_number + late.count() as f64 * (LATE_RATIO / (2.0 * study.steps.len().max(1) as f64)).ln()
+}
+
+/// Evidence of a fit, prior included.
+pub(crate) fn weight(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
+    fit.score + prior(calibration, study, fit)
+}
+
+/// Best first, priors included.
+pub(crate) fn by_weight(calibration: &Calibration, study: &Study, fits: &mut [Fit]) {
+    let weight = |fit: &Fit| weight(calibration, study, fit);
+    fits.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+}
+
+/// Whether all effects of `part` are among those of `whole`, whenever they begin.
+fn holds(study: &Study, whole: &Fit, part: &Fit) -> bool {
+    let whole = ids(study, whole);
+    ids(study, part).iter().all(|effect| whole.contains(effect))
+}
+
+pub(crate) fn weigh(
+    study: &Study,
+    calibration: &Calibration,
+    null: &Fit,
+    fits: &[Fit],
+    left: &Adequacy,
+) -> Weighed {
+    let scores: Vec<f64> =
+        std::iter::once(null).chain(fits).map(|fit| weight(calibration, study, fit)).collect();
+    let top = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = scores.iter().map(|s| ((s - top) / calibration.temperature).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    let best_cause = scores.iter().skip(1).copied().fold(f64::NEG_INFINITY, f64::max);
+    let named = best_cause - scores[0] > calibration.threshold;
+    let outside = calibration.outside(left.features());
+    // Where nothing is named, an inadequate fit speaks for an outside cause likewise.
+    let inside = 1.0 - outside;
+    let none = inside * weights[0] / total;
+    // What only adds to a better cause is that cause, with something too weak to tell.
+    let mut shown: Vec<usize> = Vec::new();
+    let mut probabilities: Vec<f64> = Vec::new();
+    for (place, fit) in fits.iter().enumerate() {
+        let probability = inside * weights[place + 1] / total;
+        match shown.iter().position(|better| holds(study, fit, &fits[*better])) {
+            Some(better) => probabilities[better] += probability,
+            None => {
+                shown.push(place);
+                probabilities.push(probability);
+            }
+        }
+    }
+    let candidates = shown
+        .iter()
+        .zip(probabilities)
+        .map(|(place, probability)| {
+            let fit = &fits[*place];
+            Candidate {
+                effects: ids(study, fit),
+                names: names(study, fit),
+                probability,
+                parameters: estimates(study, calibration, fit),
+                onsets: onsets(study, fit),
+                equivalent: if *place == 0 && named {
+                    equivalents(study, calibration, fits, &scores, &shown)
+                } else {
+                    Vec::new()
+                },
+            }
+        })
+        .collect();
+    Weighed { candidates, shown, none, outside, named }
+}
+
+fn ids(study: &Study, fit: &Fit) -> Vec<String> {
+    fit.hypothesis.effects.iter().map(|(index, _)| study.effects[*index].info().id.to_string()).collect()
+}
+
+fn names(study: &Study, fit: &Fit) -> Vec<String> {
+    fit.hypothesis.effects.iter().map(|(index, _)| study.effects[*index].info().name.to_string()).collect()
+}
+
+fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
+    let begun = fit.hypothesis.effects.iter().filter_map(|(index, _)| {
+        let course = study.courses[*index];
+        let step = course.onset()?;
+        let onset = Onset {
+            step,
+            t_s: study.steps.get(step)?.marker.start_s,
+            grows: matches!(course, Course::Growing(_)),
+        };
+        Some((study.effects[*index].info().id.to_string(), onset))
+    });
+    begun.collect()
+}
+
+/// Maximum number of causes named beside the first: a longer list helps nobody.
+const MOST_EQUIVALENT: usize = 2;
+
+/// Other causes whose scores the data do not tell from the best's, the nearest first; a cause that only adds to a better one
+/// is none.
+fn equivalents(
+    study: &Study,
+    calibration: &Calibration,
+    fits: &[Fit],
+    scores: &[f64],
+    shown: &[usize],
+) -> Vec<Vec<String>> {
+    shown
+        .iter()
+        .skip(1)
+        .filter(|place| scores[1] - scores[**place + 1] < 3.0 * calibration.temperature)
+        .map(|place| ids(study, &fits[*place]))
+        .take(MOST_EQUIVALENT)
+        .collect()
+}
+
+/// Parameters with their 95 % intervals, taken in the search's coordinate so that they stay within their range.
+pub(crate) fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> BTreeMap<String, Estimate> {
+    let coordinates = coordinates(study, &fit.hypothesis);
+    let values = parameters(&fit.hypothesis);
+    let mut estimates = BTreeMap::new();
+    let mut place = 0;
+    for (index, of_effect) in &fit.hypothesis.effects {
+        let info = study.effects[*index].info();
+        for parameter in info.parameters.iter().take(of_effect.len()) {
+            let coordinate = coordinates[place];
+            let at = coordinate.of(values[place]);
+            let variance = fit.covariance.get((place, place)).copied().unwrap_or(f64::INFINITY);
+            let away = 1.96 * calibration.interval_factor * variance.max(0.0).sqrt();
+            let (a, b) = (coordinate.value(at - away), coordinate.value(at + away));
+            let name = if info.parameters.len() == 1 {
+                info.id.to_string()
+            } else {
+                format!("{}.{}", info.id, parameter.name)
+            };
+            let estimate = Estimate {
+                value: values[place],
+                low: a.min(b),
+                high: a.max(b),
+                unit: parameter.unit.to_string(),
+                neutral: parameter.neutral,
+                size: in_words::size(parameter, values[place]),
+            };
+            estimates.insert(name, estimate);
+            place += 1;
+        }
+    }
+    estimates
+}
+
+/// Share of the first among the causes that are open from which on it is settled.
+const SETTLED: f64 = 0.95;
+
+/// The causes that are still open, best first; `None` where the first is settled.
+pub(crate) fn rivals<'a>(weighed: &Weighed, fits: &'a [Fit]) -> Option<Rivals<'a>> {
+    let probabilities: Vec<f64> = weighed.candidates.iter().map(|candidate| candidate.probability).collect();
+    let total: f64 = probabilities.iter().sum();
+    (probabilities.len() > 1 && probabilities[0] < SETTLED * total)
+        .then(|| Rivals { fits: weighed.shown.iter().map(|place| &fits[*place]).collect(), probabilities })
+}

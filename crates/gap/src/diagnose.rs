@@ -93,7 +93,7 @@ const CHOSEN_AGAIN: usize = 3;
 const CLOSE: f64 = 10.0;
 /// Steps that it takes to see with which of them a cause begins.
 const LEAST_STEPS: usize = 6;
-/// Share of the null's misfit that a cause must remove to explain a gap in part.
+/// Share of the null's misfit that a cause must remove to explain a gap in part, also on steps that its fit did not see.
 const MOST: f64 = 0.5;
 
 /// Diagnoses a recording.
@@ -213,7 +213,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         let n = null.residual.len() as f64;
         let removed = 1.0 - (best.cost - n).max(0.0) / (null.cost - n).max(1.0);
         let smooth = 1.0 - left.smooth_excess.max(0.0) / left_by_null.smooth_excess.max(1.0);
-        let better = gap.worse.is_empty();
+        let better = gap.shrink > MOST;
         if removed > MOST && smooth > MOST && better {
             Verdict::PartlyExplained
         } else {

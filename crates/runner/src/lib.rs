@@ -12,6 +12,7 @@ mod guard;
 mod merge;
 mod observer;
 mod protection;
+mod reached;
 mod rig_watch;
 mod run;
 mod signal_watch;

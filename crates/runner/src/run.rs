@@ -4,13 +4,13 @@ use crate::guard::{Bench, Guard, Told, Trip};
 use crate::merge::append;
 use crate::observer::{ObserverError, RunObserver};
 use crate::protection::Protection;
+use crate::reached::Reached;
 use crate::source::{StepSource, StepSourceError};
 use crate::speed_control::SpeedControl;
 use mapper_core::{
-    Backend, BackendError, Channel, Clock, Event, EventKind, GuardName, PlanStep, Reaction, RigMode,
-    SampleBatch, Setpoints, Soak, StepKind, StepMarker,
+    Backend, BackendError, Clock, Event, EventKind, GuardName, PlanStep, Reaction, RigMode, SampleBatch,
+    Setpoints, Soak, StepMarker,
 };
-use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -18,8 +18,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const POLL_INTERVAL_S: f64 = 1.0;
 /// A change of P3 by this share, or of the valve by twice as much, is a jump: sensors have to follow.
 const JUMP_RATIO: f64 = 0.01;
-/// The speed at the end of a step is judged over so long, s, in steps that last at least three times that.
-const REACHED_S: f64 = 10.0;
 /// Longest time that a guard may hold the setpoints, s.
 const HOLD_MAX_S: f64 = 300.0;
 /// Pieces in which a step is approached again, and the time of each, s.
@@ -130,8 +128,7 @@ pub(crate) struct Run<'a, 'p> {
     pub(crate) sent: Option<Setpoints>,
     pub(crate) told: Told,
     sample_s: f64,
-    /// Times and speeds of the last seconds.
-    reached: VecDeque<(f64, f64)>,
+    reached: Reached,
     skipped: u32,
     /// The step that a guard has cut short, until its end is told.
     pub(crate) open: Option<StepMarker>,
@@ -162,7 +159,7 @@ impl Runner<'_> {
             sent: None,
             told: Told::default(),
             sample_s: if sample_s > 0.0 { sample_s.min(POLL_INTERVAL_S) } else { POLL_INTERVAL_S },
-            reached: VecDeque::new(),
+            reached: Reached::default(),
             skipped: 0,
             open: None,
         };
@@ -311,24 +308,8 @@ impl Run<'_, '_> {
 
     /// Whether the speed was reached, as far as the campaign cares.
     fn speed_is_reached(&mut self, step: &PlanStep) -> Result<(), Halt> {
-        let Some(band) = self.protection.speed else { return Ok(()) };
-        if step.dwell_s < 3.0 * REACHED_S || step.kind == StepKind::Approach || self.reached.is_empty() {
-            return Ok(());
-        }
-        let mean_rpm = self.reached.iter().map(|(_, rpm)| rpm).sum::<f64>() / self.reached.len() as f64;
-        let off_ratio = mean_rpm / step.to.speed_rpm - 1.0;
-        if off_ratio.abs() <= band.band_ratio {
-            return Ok(());
-        }
-        let reason = format!(
-            "the speed was not reached: {:.2} krpm asked for, {:.2} krpm in the last {REACHED_S:.0} s ({:+.1} %, at most {:.1} % \
-             allowed)",
-            step.to.speed_rpm / 1e3,
-            mean_rpm / 1e3,
-            100.0 * off_ratio,
-            100.0 * band.band_ratio
-        );
-        let trip = Trip { t_s: self.now_s, guard: GuardName::Speed, reaction: band.reaction, reason };
+        let missed = self.protection.speed.and_then(|band| self.reached.missed(band, step, self.now_s));
+        let Some(trip) = missed else { return Ok(()) };
         match trip.reaction {
             Reaction::Note | Reaction::Hold => self.act(&trip, "the run goes on"),
             Reaction::SmallerSteps | Reaction::SkipStep => Err(Halt::Cut(trip)),
@@ -424,7 +405,7 @@ impl Run<'_, '_> {
                     _ => return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, ..trip.clone() }, None)),
                 }
             }
-            self.keep_speeds(&batch);
+            self.reached.keep(&batch, self.now_s);
             let ends = self.with.steps.on_batch(&batch);
             let holding = trips.iter().any(|trip| trip.reaction == Reaction::Hold)
                 || (held_s > 0.0 && Bench::new(&mut self.with.guards).is_violated());
@@ -478,16 +459,6 @@ impl Run<'_, '_> {
                 self.now_s = if trips.is_empty() { end_s } else { self.now_s };
                 return Ok((whole.unwrap_or_default(), trips));
             }
-        }
-    }
-
-    fn keep_speeds(&mut self, batch: &SampleBatch) {
-        let Some(speeds) = batch.column(Channel::ShaftSpeed) else { return };
-        let rows = batch.t_s.iter().copied().zip(speeds.iter().copied());
-        self.reached.extend(rows.filter(|(_, speed)| speed.is_finite()));
-        let since_s = self.now_s - REACHED_S;
-        while self.reached.front().is_some_and(|(t_s, _)| *t_s < since_s) {
-            self.reached.pop_front();
         }
     }
 }

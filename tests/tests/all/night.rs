@@ -4,7 +4,7 @@
 use crate::interrupted::Running;
 use mapper_core::{Channel, EventKind};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_tests::{CampaignFile, Finished, SHORT_GRID, mapper, mapper_command, only_run};
+use mapper_tests::{BY_ITSELF, CampaignFile, Finished, SHORT_GRID, mapper, mapper_command, only_run};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -137,11 +137,15 @@ fn killed_at(campaign: &CampaignFile, bytes: u64) -> PathBuf {
 /// within four of its standard errors, since warm-up and lead-in draw other noise.
 #[test]
 fn a_killed_run_goes_on_and_has_each_point_once() {
-    let whole = done(run_of(&short(&[]), &[])).exits(0).json();
+    let campaign = || {
+        let slow: Vec<_> = BY_ITSELF.iter().copied().chain([("dwell: 120 s ", "dwell: 300 s ")]).collect();
+        short(&slow)
+    };
+    let whole = done(run_of(&campaign(), &[])).exits(0).json();
     let expected = points(&whole);
-    // The soak takes some 7 MB; each of the four steps 0.5 MB.
-    for bytes in [6_000_000, 7_000_000, 7_600_000, 8_200_000] {
-        let campaign = short(&[]);
+    // A minute of warm-up and four steps of five, some 1.1 MB each.
+    for bytes in [600_000, 1_900_000, 3_200_000] {
+        let campaign = campaign();
         let run = killed_at(&campaign, bytes);
         let before = run.join("recording.mcap").metadata().unwrap().len();
         let arguments = ["run".as_ref(), "--resume".as_ref(), run.as_os_str(), "--json".as_ref()];
@@ -167,7 +171,7 @@ fn a_killed_run_goes_on_and_has_each_point_once() {
 #[test]
 fn another_campaign_is_not_resumed() {
     let campaign = short(&[]);
-    let run = killed_at(&campaign, 6_000_000);
+    let run = killed_at(&campaign, 1_000_000);
     let other = short(&[("seed: 1 ", "seed: 2 ")]);
     let arguments = ["run".as_ref(), other.path.as_os_str(), "--resume".as_ref(), run.as_os_str()];
     let refused = done(with_states(&campaign, &arguments)).exits(4);

@@ -10,7 +10,7 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub(crate) struct SafeStateFile {
     /// How fast P3 goes down.
-    #[schemars(extend("x-min" = "1 kPa/s", "x-max" = "10 MPa/s"), example = &"100 kPa/s")]
+    #[schemars(extend("x-min" = "1 kPa/s", "x-max" = "10000 kPa/s"), example = &"100 kPa/s")]
     pressure_slew: Quantity<PressureRate>,
     /// Opening of the back-pressure valve on the way; 1 if none is given. A step that has more keeps it.
     #[schemars(range(min = 0.5, max = 2.5), example = 1.0)]

@@ -48,7 +48,10 @@ fn a_rig_that_trips_by_itself_ends_the_run_and_is_latched() {
     assert!(finished.stderr.contains("the rig has tripped by itself"), "{}", finished.stderr);
     let recording = only_run(&campaign.runs()).join("recording.mcap");
     let kinds = kinds(&recording);
-    assert_eq!(kinds[kinds.len() - 2..], [EventKind::GuardTripped, EventKind::SafeState]);
+    // On the way down the lab says that it is slower again.
+    let place = |kind| kinds.iter().position(|seen| *seen == kind);
+    let (tripped, safe) = (place(EventKind::GuardTripped), place(EventKind::SafeState));
+    assert!(tripped.is_some() && tripped < safe && safe == Some(kinds.len() - 1), "{kinds:?}");
     let report = read_recording(&recording, &ChannelMap::native(), &ReadOptions::default()).unwrap();
     let speed = &report.recording.series[&Channel::ShaftSpeed];
     let tripped_s =

@@ -52,7 +52,8 @@ fn guard(name: GuardName, channel: Channel, above: Option<f64>) -> SignalGuard {
         hysteresis: 0.0,
         dwell_s: 0.2,
         age_s: 3.0,
-        frozen_s: Some(20.0),
+        // P3 has no noise here, and may stand still.
+        frozen_s: (channel != Channel::P3).then_some(20.0),
         reaction: Reaction::Safe,
     }
 }

@@ -5,11 +5,13 @@ use crate::elements::backend::backend;
 use crate::elements::boundary::BoundaryFile;
 use crate::elements::drift::DriftFile;
 use crate::elements::grid::GridFile;
+use crate::elements::guards::{GuardedBy, GuardsFile};
 use crate::elements::identification::IdentificationFile;
 use crate::elements::limits::LimitsFile;
 use crate::elements::machine::MachineFile;
 use crate::elements::reference::ReferenceFile;
 use crate::elements::repeats::{RepeatsFile, repeats};
+use crate::elements::safe_state::SafeStateFile;
 use crate::elements::sensors::SensorsFile;
 use crate::elements::sequence::sequence;
 use crate::elements::speed_control::{SpeedControlFile, speed_control};
@@ -19,8 +21,8 @@ use crate::elements::tolerances::TolerancesElement;
 use crate::elements::zero::ZeroFile;
 use crate::units::{Fraction, Quantity};
 use mapper_core::{
-    Channel, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats, Soak,
-    SpeedControlSettings, SurgeSeek, Timing, VisitOrder,
+    Channel, GuardSet, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats,
+    SafeTrajectory, Soak, SpeedControlSettings, SurgeSeek, Timing, VisitOrder,
 };
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::line_points::LineRequest;
@@ -102,6 +104,12 @@ pub struct Campaign {
     pub seed: u64,
     /// What the run must never leave.
     pub limits: Limits,
+    /// The guards that the file declares; [`Campaign::guard_set`] has those that hold.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub guards: Option<GuardSet>,
+    /// The way into the safe state; `None`: the rig's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub safe_state: Option<SafeTrajectory>,
     /// State to which the results' corrected quantities refer.
     pub reference: ReferenceState,
     /// What is written.
@@ -110,6 +118,19 @@ pub struct Campaign {
     pub report: Report,
     /// Units shown to people.
     pub display: DisplayUnits,
+}
+
+impl Campaign {
+    /// The guards of a run: those declared, or one at each limit.
+    pub fn guard_set(&self) -> GuardSet {
+        let by = GuardedBy {
+            limits: &self.limits,
+            sensors: &self.sensors,
+            dwell_s: self.timing.dwell_s,
+            speed_is_held: self.speed_control.is_some(),
+        };
+        self.guards.clone().unwrap_or_else(|| GuardsFile::default().guards(&by))
+    }
 }
 
 /// A campaign: one machine, one grid of operating points, one night on the gas stand.
@@ -172,6 +193,10 @@ pub(crate) struct CampaignFile {
     seed: Option<u64>,
     /// What the run must never leave.
     limits: LimitsFile,
+    /// What ends a run, or a step, before harm is done; every limit is guarded without it.
+    guards: Option<GuardsFile>,
+    /// The way into the safe state; the rig's own if it is left out.
+    safe_state: Option<SafeStateFile>,
     /// State to which corrected flow and speed refer: SAE (298 K, 100 kPa), Garrett (545 degR, 13.95 psia), BorgWarner (293 K, 98.1 kPa), or `temperature` and `pressure`. SAE if none is given.
     #[schemars(example = &"SAE")]
     reference: Option<ReferenceFile>,
@@ -206,6 +231,14 @@ impl CampaignFile {
         let probe_diameter_m = sensors.get(&Channel::T2).map_or(0.0, |sensor| sensor.probe_diameter_m);
         let machine = self.machine.machine(probe_diameter_m, origin, files)?;
         let alpha_area_ratio = machine.params.compressor.alpha_area_ratio;
+        let speed_control = speed_control(self.speed_control);
+        let by = GuardedBy {
+            limits: &limits,
+            sensors: &sensors,
+            dwell_s: self.timing.dwell_s,
+            speed_is_held: speed_control.is_some(),
+        };
+        let guards = self.guards.map(|guards| guards.guards(&by));
         let campaign = Campaign {
             name: self.campaign,
             description: self.description,
@@ -226,10 +259,12 @@ impl CampaignFile {
             repeats: repeats(self.repeats),
             return_to_first: self.return_to_first.unwrap_or(true),
             on_drift: self.drift.map(|drift| drift.on_drift),
-            speed_control: speed_control(self.speed_control),
+            speed_control,
             surge_search: self.surge_search.map(SurgeSearchFile::seek),
             seed: self.seed.unwrap_or(USUAL_SEED),
             limits,
+            guards,
+            safe_state: self.safe_state.map(SafeStateFile::trajectory),
             reference,
             outputs: self.outputs,
             report: self.report,

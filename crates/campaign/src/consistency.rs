@@ -9,6 +9,7 @@ use mapper_yaml::{Node, Notes, Source};
 pub(crate) fn check(source: &Source, root: &Node, files: Files<'_>, notes: &mut Notes) {
     let mut check = Check { source, root, files, notes };
     elements::limits::check(&mut check);
+    elements::guards::check(&mut check);
     elements::window::check(&mut check);
     elements::order::check(&mut check);
     elements::repeats::check(&mut check);

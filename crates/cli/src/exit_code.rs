@@ -29,7 +29,7 @@ Exit codes:
   2    wrong arguments
   3    the campaign or another input file has mistakes (all are printed)
   4    there is no plan, or the plan given is stale
-  5    the rig failed or a guard tripped; the rig is safe, the recording is kept
+  5    the rig failed, a guard tripped, the rig is in use, latched or not guarded as it needs; the recording is kept
   6    the recording does not hold what identification needs
   7    a nightly run failed, or one of its figures left the band of the nights before
   130  stopped by the operator; the rig is safe, the recording is kept";

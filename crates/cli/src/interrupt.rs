@@ -1,11 +1,11 @@
-//! Ctrl-C: once to stop in good order, twice to stop at once.
+//! Ctrl-C and its like: to stop in good order.
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A flag that Ctrl-C (or SIGTERM) raises. The second one ends the process at once; what was flushed is kept.
+/// A flag that Ctrl-C raises. The second one ends the process at once: for commands that touch no rig.
 pub fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = flag.clone();
@@ -14,6 +14,53 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
             std::process::exit(Code::Interrupted as i32);
         }
     })
-    .map_err(|error| Failure::new(Code::Failure, format!("failed to watch for Ctrl-C: {error}")))?;
+    .map_err(failed)?;
     Ok(flag)
+}
+
+/// How a run is stopped.
+#[derive(Debug, Clone, Default)]
+pub struct RunStop {
+    /// At the end of the step: Ctrl-C once.
+    pub after_step: Arc<AtomicBool>,
+    /// Now: Ctrl-C twice, SIGTERM, SIGHUP. Nothing ends the process before the rig is safe.
+    pub now: Arc<AtomicBool>,
+}
+
+/// The flags that signals raise while a rig is run.
+#[cfg(unix)]
+pub fn run_stop() -> Result<RunStop, Failure> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+    let stop = RunStop::default();
+    let raised = stop.clone();
+    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).map_err(failed)?;
+    let watch = move || {
+        for signal in signals.forever() {
+            let again = raised.after_step.swap(true, Ordering::SeqCst);
+            if again || signal != SIGINT {
+                raised.now.store(true, Ordering::SeqCst);
+            }
+        }
+    };
+    std::thread::Builder::new().name("signals".to_owned()).spawn(watch).map_err(failed)?;
+    Ok(stop)
+}
+
+/// The flags that Ctrl-C raises while a rig is run.
+#[cfg(not(unix))]
+pub fn run_stop() -> Result<RunStop, Failure> {
+    let stop = RunStop::default();
+    let raised = stop.clone();
+    ctrlc::set_handler(move || {
+        if raised.after_step.swap(true, Ordering::SeqCst) {
+            raised.now.store(true, Ordering::SeqCst);
+        }
+    })
+    .map_err(failed)?;
+    Ok(stop)
+}
+
+fn failed(error: impl std::fmt::Display) -> Failure {
+    Failure::new(Code::Failure, format!("failed to watch for Ctrl-C: {error}"))
 }

@@ -12,7 +12,9 @@ mod output;
 mod progress;
 mod registry;
 mod results_text;
+mod rig_states;
 mod subcommands;
+mod wall;
 
 use clap::Parser;
 use std::process::ExitCode;

@@ -1,6 +1,6 @@
 //! The one seam between a real and a simulated gas stand.
 
-use crate::{Channel, SampleBatch, with_unit};
+use crate::{Channel, GuardName, SafeTrajectory, SampleBatch, with_unit};
 use serde::{Deserialize, Serialize};
 
 /// Whether gas flows.
@@ -41,6 +41,64 @@ pub struct RigDescription {
     pub sample_rate_hz: f64,
     /// Whether time is simulated: a simulated rig is never paced by the wall clock.
     pub simulated_time: bool,
+    /// Whether setpoints have an effect: not on a recording that is played back.
+    pub controls: bool,
+    /// Name of the one rig that this is, e.g. its address: no two runs may have it at once. `None` for a simulation, of
+    /// which each run has its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exclusive: Option<String>,
+    /// Guards that must be there, and end the run, before it is armed.
+    #[serde(default)]
+    pub needs_guarded: Vec<GuardName>,
+    /// Setpoints that it accepts; `None`: it says so only when they are sent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accepts: Option<SetpointRanges>,
+    /// Its own way into the safe state; a campaign may declare another.
+    #[serde(default)]
+    pub safe: SafeTrajectory,
+}
+
+/// Lowest and highest value of a setpoint.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SetpointRange {
+    /// Lowest, SI.
+    pub low: f64,
+    /// Highest, SI.
+    pub high: f64,
+}
+
+/// Setpoints that a rig accepts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SetpointRanges {
+    /// Turbine inlet total pressure, Pa.
+    pub p3_pa: SetpointRange,
+    /// Turbine inlet total temperature, K.
+    pub t3_k: SetpointRange,
+    /// Back-pressure valve opening, ratio.
+    pub valve_opening_ratio: SetpointRange,
+    /// Oil inlet temperature, K.
+    pub oil_temperature_k: SetpointRange,
+}
+
+impl SetpointRanges {
+    /// Refuses setpoints outside the ranges, and those that are not numbers.
+    ///
+    /// # Errors
+    /// [`BackendError::SetpointOutOfRange`] for the first one outside.
+    pub fn check(&self, setpoints: &Setpoints) -> Result<(), BackendError> {
+        for (quantity, value, unit, range) in [
+            ("P3", setpoints.p3_pa, "Pa", self.p3_pa),
+            ("T3", setpoints.t3_k, "K", self.t3_k),
+            ("valve opening", setpoints.valve_opening_ratio, "1", self.valve_opening_ratio),
+            ("T_oil", setpoints.oil_temperature_k, "K", self.oil_temperature_k),
+        ] {
+            let SetpointRange { low, high } = range;
+            if !(low..=high).contains(&value) {
+                return Err(BackendError::SetpointOutOfRange { quantity, value, unit, low, high });
+            }
+        }
+        Ok(())
+    }
 }
 
 /// A gas stand, real or simulated. It owns its time; all data are owned.
@@ -133,6 +191,14 @@ pub enum BackendError {
         t_s: f64,
         /// Why.
         source: BackendCause,
+    },
+    /// A call did not come back in its time.
+    #[error("the rig did not answer `{call}` within {limit_s} s")]
+    Deadline {
+        /// The call.
+        call: &'static str,
+        /// Time it had, s.
+        limit_s: f64,
     },
     /// The rig, or what stands for it, went away.
     #[error("the rig was lost at {t_s:.3} s: {source}")]

@@ -13,3 +13,78 @@ pub struct UnpacedClock;
 impl Clock for UnpacedClock {
     fn wait_until(&mut self, _t_s: f64) {}
 }
+
+/// A clock on the wall, and a way to wait for it: whoever starts the program has one.
+pub trait Wall {
+    /// Time since any fixed instant, s; never goes back.
+    fn now_s(&self) -> f64;
+
+    /// Returns after so long, s.
+    fn wait_s(&self, duration_s: f64);
+}
+
+/// Paces a run by a clock on the wall: in real time, or so many times faster.
+#[derive(Debug, Clone)]
+pub struct PacedClock<W> {
+    wall: W,
+    /// Run time over time on the wall, > 0.
+    speed_ratio: f64,
+    /// On the wall, when the run began.
+    start_s: Option<f64>,
+}
+
+impl<W: Wall> PacedClock<W> {
+    /// A clock that begins with the first wait. `speed_ratio`: run time over time on the wall, 1 for real time; what is not
+    /// above 0 is real time.
+    pub fn new(wall: W, speed_ratio: f64) -> Self {
+        let speed_ratio = if speed_ratio > 0.0 { speed_ratio } else { 1.0 };
+        PacedClock { wall, speed_ratio, start_s: None }
+    }
+}
+
+impl<W: Wall> Clock for PacedClock<W> {
+    fn wait_until(&mut self, t_s: f64) {
+        let now_s = self.wall.now_s();
+        let start_s = *self.start_s.get_or_insert(now_s);
+        let left_s = start_s + t_s / self.speed_ratio - now_s;
+        // What is late is not waited for: a slow disk delays one poll, not all that follow.
+        if left_s > 0.0 {
+            self.wall.wait_s(left_s);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    /// A wall that passes only while somebody waits.
+    struct Idle(Cell<f64>);
+
+    impl Wall for &Idle {
+        fn now_s(&self) -> f64 {
+            self.0.get()
+        }
+        fn wait_s(&self, duration_s: f64) {
+            self.0.set(self.0.get() + duration_s);
+        }
+    }
+
+    #[test]
+    fn a_paced_clock_waits_as_long_as_its_speed_says_and_catches_up() {
+        for (speed_ratio, expected_s) in [(1.0, 10.0), (4.0, 2.5), (f64::NAN, 10.0)] {
+            let wall = Idle(Cell::new(7.0));
+            let mut clock = PacedClock::new(&wall, speed_ratio);
+            (0..=10).for_each(|t_s| clock.wait_until(f64::from(t_s)));
+            assert!((wall.0.get() - 7.0 - expected_s).abs() < 1e-9, "{speed_ratio}");
+        }
+        let wall = Idle(Cell::new(0.0));
+        let mut clock = PacedClock::new(&wall, 1.0);
+        clock.wait_until(0.0);
+        // Something took 5 s: the run is late, and then in time again.
+        (&wall).wait_s(5.0);
+        [1.0, 2.0, 6.0].into_iter().for_each(|t_s| clock.wait_until(t_s));
+        assert!(((&wall).now_s() - 6.0).abs() < 1e-9);
+    }
+}

@@ -22,8 +22,16 @@ pub enum EventKind {
     SpeedNotReached,
     /// A guard of the runner tripped.
     GuardTripped,
+    /// A guard tripped that does not end the run: what was done stands in the message.
+    GuardActed,
+    /// The rig has tripped by itself: it no longer follows its setpoints.
+    RigTripped,
     /// The rig was put into its safe state.
     SafeState,
+    /// The safe state was not reached, or the rig is in doubt: no other run begins before that is acknowledged.
+    Latched,
+    /// The run goes on after it was broken off.
+    Resumed,
     /// The run was stopped by its operator.
     Interrupted,
     /// A remark for people.

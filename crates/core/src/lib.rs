@@ -16,6 +16,7 @@ mod common_errors;
 mod declared_uncertainty;
 mod event;
 mod fitted_map;
+mod guard;
 mod identified;
 mod inlet_convection;
 mod joined;
@@ -48,13 +49,18 @@ mod visit_order;
 mod window_rule;
 mod with_unit;
 
-pub use backend::{Backend, BackendCause, BackendError, RigDescription, RigMode, Setpoints};
+pub use backend::{
+    Backend, BackendCause, BackendError, RigDescription, RigMode, SetpointRange, SetpointRanges, Setpoints,
+};
 pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
-pub use clock::{Clock, UnpacedClock};
+pub use clock::{Clock, PacedClock, UnpacedClock, Wall};
 pub use common_errors::CommonErrors;
 pub use declared_uncertainty::{DeclaredUncertainty, NoiseColour};
 pub use event::{Event, EventKind};
 pub use fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
+pub use guard::{
+    GuardName, GuardSet, LargestChange, Reaction, SafeTrajectory, SignalGuard, SpeedBand, SurgeVariation,
+};
 pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
     standard_error_of,
@@ -79,7 +85,7 @@ pub use plausible::{Plausible, plausible};
 pub use recording::{Recording, RecordingError, Series};
 pub use redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};
 pub use reference_state::{NAMED_REFERENCES, NamedReference, ReferenceState, usual_references};
-pub use sample::{ChannelColumn, ElementColumn, SampleBatch, TruthColumn};
+pub use sample::{ChannelColumn, ElementColumn, Provenance, Quality, SampleBatch, TruthColumn};
 pub use settle_bands::SettleBands;
 pub use soak::Soak;
 pub use speed_response::{SpeedControlSettings, SpeedResponse};

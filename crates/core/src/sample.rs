@@ -21,6 +21,29 @@ pub struct ElementColumn {
     pub values: Vec<f64>,
 }
 
+/// How good a reading is, by the rig's own word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quality {
+    /// Good.
+    Good,
+    /// To be used with doubt; guards take it.
+    Uncertain,
+    /// No reading at all, whatever number stands there.
+    Bad,
+}
+
+/// Where the readings of a channel come from: beside the time at which they arrived.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// Which quantity.
+    pub channel: Channel,
+    /// When the source took each reading, s since arming; as long as the batch's `t_s`.
+    pub source_t_s: Vec<f64>,
+    /// How good each is; as long as the batch's `t_s`.
+    pub quality: Vec<Quality>,
+}
+
 /// What only a simulator knows; recorded under `/truth`, read by scoring alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TruthColumn {
@@ -45,6 +68,9 @@ pub struct SampleBatch {
     /// Each sensor of the channels that have several; empty where none has.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub elements: Vec<ElementColumn>,
+    /// Channels whose readings are not all good, or not taken when they arrived; others need none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub provenance: Vec<Provenance>,
     /// Truth of a simulated rig; empty for a real one.
     pub truth: Vec<TruthColumn>,
     /// Events since the last poll.
@@ -55,6 +81,11 @@ impl SampleBatch {
     /// The values of one channel, if the rig has it.
     pub fn column(&self, channel: Channel) -> Option<&[f64]> {
         self.columns.iter().find(|column| column.channel == channel).map(|c| c.values.as_slice())
+    }
+
+    /// Where the readings of one channel come from; `None`: each was good, and taken when it arrived.
+    pub fn provenance_of(&self, channel: Channel) -> Option<&Provenance> {
+        self.provenance.iter().find(|provenance| provenance.channel == channel)
     }
 
     /// The latest value of one channel, if there is any.

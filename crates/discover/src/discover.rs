@@ -58,7 +58,7 @@ pub fn discover(
     let library = library();
     let everywhere = Selection::all(study);
     let mut training = everywhere.clone();
-    for step in &diagnosed.diagnosis.gap.held_out_steps {
+    for step in held_out_steps(diagnosed) {
         training.steps[*step] = false;
     }
     let nothing = Base::nothing(study, linearised);
@@ -91,6 +91,15 @@ pub fn discover(
         laws,
         forces: forces.into_iter().take(FORCES).map(told_force).collect(),
         places: Some(places),
+    }
+}
+
+/// The steps that no law sees while it is chosen: the first fold. To search once more for each fold would take three times as
+/// long.
+fn held_out_steps(diagnosed: &Diagnosed) -> &[usize] {
+    match diagnosed.diagnosis.gap.folds.as_slice() {
+        [first, _, ..] => first,
+        _ => &[],
     }
 }
 
@@ -237,8 +246,7 @@ fn propose(
     let Ok(before) = fit(&bench.study, linearised, &study.nothing(), training, Effort::default()) else {
         return Vec::new();
     };
-    let held_out = &diagnosed.diagnosis.gap.held_out_steps;
-    let shrink = shrink(study, &before, &trained.fit, held_out);
+    let shrink = shrink(study, &before, &trained.fit, held_out_steps(diagnosed));
     if shrink < LEAST_SHRINK || found.stability < LEAST_STABILITY {
         return Vec::new();
     }

@@ -29,6 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     .map(|c| ChannelColumn { channel: CHANNELS[c].channel, values: column(c) })
                     .collect(),
                 elements: Vec::new(),
+                provenance: Vec::new(),
                 truth: (0..12)
                     .map(|c| TruthColumn {
                         name: format!("state_{c}_k"),

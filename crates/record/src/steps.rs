@@ -37,6 +37,7 @@ pub(crate) struct StepMessage {
 enum Phase {
     Start,
     End,
+    Abandoned,
 }
 
 /// Steps from their markers. A step without an end ends where the next one starts, or with the last sample.
@@ -64,6 +65,12 @@ pub(crate) fn steps_from_markers(
                     p3_pa: message.p3_pa.unwrap_or(f64::NAN),
                     valve_opening_ratio: message.valve.unwrap_or(f64::NAN),
                 });
+            }
+            Phase::Abandoned => {
+                if open && steps.last().is_some_and(|step| step.index == message.index) {
+                    steps.pop();
+                    open = false;
+                }
             }
             Phase::End => {
                 let of_open = |step: &&mut StepMarker| open && step.index == message.index;

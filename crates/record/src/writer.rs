@@ -19,6 +19,8 @@ pub enum StepPhase {
     Start,
     /// The step is over; the marker's `end_s` counts.
     End,
+    /// The step was cut short, and does not count; the marker's `end_s` counts.
+    Abandoned,
 }
 
 /// A topic of numeric fields as it is being written. Batch after batch has the same ones: making schemas again for
@@ -160,6 +162,7 @@ impl RecordingWriter {
         let (t_s, phase) = match phase {
             StepPhase::Start => (step.start_s, "start"),
             StepPhase::End => (step.end_s, "end"),
+            StepPhase::Abandoned => (step.end_s, "abandoned"),
         };
         let log_time = self.advance(t_s)?;
         self.line.clear();

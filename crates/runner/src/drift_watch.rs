@@ -206,6 +206,10 @@ impl StepSource for DriftWatch<'_> {
         Ok(())
     }
 
+    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        self.inner.skipped(marker)
+    }
+
     fn take_notes(&mut self) -> Vec<String> {
         let mut notes = std::mem::take(&mut self.notes);
         notes.extend(self.inner.take_notes());

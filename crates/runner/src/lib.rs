@@ -4,20 +4,37 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod batch_watch;
+mod deadline;
 mod drift_watch;
+mod first_look;
 mod guard;
+mod merge;
 mod observer;
+mod protection;
+mod reached;
+mod rig_watch;
 mod run;
+mod signal_watch;
 mod soak;
 mod source;
 mod speed_control;
 mod surge_search;
+mod surge_watch;
+mod way_out;
 
+pub use batch_watch::BatchWatch;
+pub use deadline::Deadlined;
 pub use drift_watch::DriftWatch;
-pub use guard::{Guard, LimitGuard, SilenceGuard, SurgeGuard, Trip};
+pub use first_look::FirstLook;
+pub use guard::{Guard, Told, Trip};
 pub use observer::{ObserverError, RunObserver};
+pub use protection::Protection;
+pub use rig_watch::RigWatch;
 pub use run::{RunEnd, RunError, Runner};
+pub use signal_watch::SignalWatch;
 pub use soak::Soaked;
 pub use source::{PlanSteps, StepSource, StepSourceError};
 pub use speed_control::{ResponseAt, SpeedControl, SpeedControlLimits};
 pub use surge_search::{Held, Hold, SurgeSearch};
+pub use surge_watch::SurgeWatch;

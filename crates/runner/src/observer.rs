@@ -51,6 +51,14 @@ pub trait RunObserver {
         Ok(())
     }
 
+    /// A guard has cut a step short: it does not count.
+    ///
+    /// # Errors
+    /// [`ObserverError`].
+    fn on_step_abandoned(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
+        Ok(())
+    }
+
     /// A step has ended; its `end_s` is the real one.
     ///
     /// # Errors
@@ -76,6 +84,10 @@ impl RunObserver for Vec<&mut dyn RunObserver> {
 
     fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
         self.iter_mut().try_for_each(|observer| observer.on_event(event))
+    }
+
+    fn on_step_abandoned(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.iter_mut().try_for_each(|observer| observer.on_step_abandoned(marker))
     }
 
     fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {

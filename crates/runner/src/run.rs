@@ -1,18 +1,30 @@
-//! The run itself: warm-up, steps, cool-down, and the way out when something is wrong.
+//! The run itself: soak, warm-up, steps, cool-down.
 
-use crate::guard::{Guard, Trip};
+use crate::guard::{Bench, Guard, Told, Trip};
+use crate::merge::append;
 use crate::observer::{ObserverError, RunObserver};
+use crate::protection::Protection;
+use crate::reached::Reached;
 use crate::source::{StepSource, StepSourceError};
 use crate::speed_control::SpeedControl;
 use mapper_core::{
-    Backend, BackendError, Clock, Event, EventKind, PlanStep, RigMode, Setpoints, Soak, StepMarker,
+    Backend, BackendError, Clock, Event, EventKind, GuardName, PlanStep, Reaction, RigMode, SampleBatch,
+    Setpoints, Soak, StepMarker,
 };
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// How often the backend is asked for samples, s of run time.
+/// How often observers and steps see samples, s of run time.
 const POLL_INTERVAL_S: f64 = 1.0;
-/// How long the rig is still watched after it was made safe, s: the recording shows that it got there.
-const SAFE_WATCH_S: f64 = 5.0;
+/// A change of P3 by this share, or of the valve by twice as much, is a jump: sensors have to follow.
+const JUMP_RATIO: f64 = 0.01;
+/// Longest time that a guard may hold the setpoints, s.
+const HOLD_MAX_S: f64 = 300.0;
+/// Pieces in which a step is approached again, and the time of each, s.
+const SMALLER_STEPS: u32 = 4;
+const SMALLER_STEP_S: f64 = 10.0;
+/// Steps in a row that guards may leave out; one more ends the run.
+const SKIPPED_MAX: u32 = 3;
 
 /// How a run ended without a fault of the program.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +52,37 @@ pub enum RunError {
     /// What yields the steps failed.
     #[error("{0}")]
     Source(#[from] StepSourceError),
+    /// The program itself failed.
+    #[error(
+        "the program failed on the way ({message}); the rig is safe. Please report this as a fault of the program"
+    )]
+    Panicked {
+        /// What it said.
+        message: String,
+    },
+    /// The rig did not confirm its safe state.
+    #[error(
+        "THE RIG DID NOT CONFIRM ITS SAFE STATE: {source}. Cut its air by hand. The run had ended because: {why}"
+    )]
+    NotSafe {
+        /// Why the run had ended.
+        why: String,
+        /// What the rig answered.
+        source: BackendError,
+    },
+}
+
+impl RunError {
+    /// Whether nobody knows in which state the rig is.
+    pub fn leaves_doubt(&self) -> bool {
+        match self {
+            RunError::NotSafe { .. } | RunError::Panicked { .. } => true,
+            RunError::Backend(error) => {
+                matches!(error, BackendError::Lost { .. } | BackendError::Deadline { .. })
+            }
+            RunError::Observer(_) | RunError::Source(_) => false,
+        }
+    }
 }
 
 /// Steps, a rig and everything around them.
@@ -50,7 +93,7 @@ pub struct Runner<'a> {
     pub backend: &'a mut dyn Backend,
     /// Paces the polls; see [`mapper_core::UnpacedClock`].
     pub clock: &'a mut dyn Clock,
-    /// What may end the run.
+    /// What may end a step or the run.
     pub guards: Vec<Box<dyn Guard>>,
     /// Who looks on.
     pub observer: &'a mut dyn RunObserver,
@@ -61,9 +104,12 @@ pub struct Runner<'a> {
 }
 
 /// Why the way forward ended.
-enum Halt {
+pub(crate) enum Halt {
     Interrupted,
-    Tripped(Trip),
+    /// With what was read up to then and nobody has seen yet: the rig comes first.
+    Tripped(Trip, Option<Box<SampleBatch>>),
+    /// A guard that ends the step alone.
+    Cut(Trip),
     Failed(RunError),
 }
 
@@ -73,192 +119,347 @@ impl<E: Into<RunError>> From<E> for Halt {
     }
 }
 
+/// A run that is under way.
+pub(crate) struct Run<'a, 'p> {
+    pub(crate) with: Runner<'a>,
+    pub(crate) protection: &'p Protection<'p>,
+    pub(crate) now_s: f64,
+    /// The last setpoints.
+    pub(crate) sent: Option<Setpoints>,
+    pub(crate) told: Told,
+    sample_s: f64,
+    reached: Reached,
+    skipped: u32,
+    /// The step that a guard has cut short, until its end is told.
+    pub(crate) open: Option<StepMarker>,
+}
+
 impl Runner<'_> {
+    /// Runs all steps from arming to disarming, with nothing around them but the guards.
+    ///
+    /// # Errors
+    /// As [`Runner::run_under`].
+    pub fn run(self) -> Result<RunEnd, RunError> {
+        self.run_under(&Protection::default())
+    }
+
     /// Runs all steps from arming to disarming.
     ///
-    /// Whatever ends it, the rig has been told to become safe and has been disarmed when this returns.
+    /// Whatever ends it, a panic included, the rig has been told to become safe and has been disarmed when this returns.
     ///
     /// # Errors
     /// [`RunError`] where the rig or an observer failed.
-    pub fn run(mut self) -> Result<RunEnd, RunError> {
+    pub fn run_under(self, protection: &Protection<'_>) -> Result<RunEnd, RunError> {
         self.backend.arm()?;
-        let mut now_s = 0.0;
-        let end = match self.forward(&mut now_s) {
-            Ok(()) => Ok(RunEnd::Completed),
-            Err(halt) => self.way_out(halt, now_s),
+        let sample_s = 1.0 / self.backend.describe().sample_rate_hz;
+        let mut run = Run {
+            with: self,
+            protection,
+            now_s: 0.0,
+            sent: None,
+            told: Told::default(),
+            sample_s: if sample_s > 0.0 { sample_s.min(POLL_INTERVAL_S) } else { POLL_INTERVAL_S },
+            reached: Reached::default(),
+            skipped: 0,
+            open: None,
         };
-        let disarmed = self.backend.disarm();
+        // What a panic leaves half done is not used again but for making the rig safe.
+        let end = match catch_unwind(AssertUnwindSafe(|| run.forward())) {
+            Ok(Ok(())) => Ok(RunEnd::Completed),
+            Ok(Err(halt)) => run.way_out(halt),
+            Err(panic) => run.way_out(Halt::Failed(RunError::Panicked { message: words_of(&*panic) })),
+        };
+        let disarmed = catch_unwind(AssertUnwindSafe(|| run.with.backend.disarm()));
         let end = end?;
-        disarmed?;
+        match disarmed {
+            Ok(disarmed) => disarmed?,
+            Err(panic) => return Err(RunError::Panicked { message: words_of(&*panic) }),
+        }
         Ok(end)
     }
+}
 
-    fn forward(&mut self, now_s: &mut f64) -> Result<(), Halt> {
-        self.observer.on_start(&self.backend.describe())?;
-        let mut next = self.steps.next_step()?;
-        self.pass_notes(*now_s)?;
+/// What a panic said.
+pub(crate) fn words_of(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "a panic".to_owned())
+}
+
+impl Run<'_, '_> {
+    fn forward(&mut self) -> Result<(), Halt> {
+        self.with.observer.on_start(&self.with.backend.describe())?;
+        let mut next = self.with.steps.next_step()?;
+        self.pass_notes()?;
         if let Some(first) = &next {
-            if let Some(soak) = self.steps.soak() {
-                self.rest(first, soak, now_s)?;
+            if let Some(soak) = self.with.steps.soak() {
+                self.rest(first, soak)?;
             }
-            let warm_s = *now_s + self.steps.warm_up_s();
-            if warm_s > *now_s {
-                let mut told = self.begin(first, *now_s);
-                self.backend.set(&told)?;
-                self.watch(now_s, warm_s, false, Some(&mut told))?;
+            let warm_s = self.now_s + self.with.steps.warm_up_s();
+            if warm_s > self.now_s {
+                let told = self.begin(first);
+                self.send(told)?;
+                self.watch(warm_s, false, true)?;
                 // The first step itself tells whether its speed was reached.
-                let _ = self.speed.as_mut().map(|speed| speed.end(*now_s));
+                let now_s = self.now_s;
+                let _ = self.with.speed.as_mut().map(|speed| speed.end(now_s));
             }
         }
         while let Some(step) = next {
-            let mut told = self.begin(&step, *now_s);
+            self.step(&step)?;
+            if self.protection.stop_after_step.load(Ordering::Relaxed) {
+                return Err(Halt::Interrupted);
+            }
+            next = self.with.steps.next_step()?;
+            self.pass_notes()?;
+        }
+        self.with.backend.make_safe()?;
+        (self.sent, self.told) = (None, Told::default());
+        let end_s = self.now_s + self.with.steps.cool_down_s();
+        self.watch(end_s, false, false)
+    }
+
+    /// One step, from its jump to its end, and again where a guard says so.
+    fn step(&mut self, step: &PlanStep) -> Result<(), Halt> {
+        let before = self.sent;
+        let mut again = false;
+        loop {
+            let told = self.begin(step);
+            if again && let Some(before) = before {
+                self.approach(before, told)?;
+            }
             let mut marker = StepMarker {
                 index: step.index,
                 kind: step.kind,
-                start_s: *now_s,
-                end_s: *now_s + step.dwell_s,
+                start_s: self.now_s,
+                end_s: self.now_s + step.dwell_s,
                 from: step.from,
                 to: Some(step.to),
                 p3_pa: told.p3_pa,
-                valve_opening_ratio: step.to.valve_opening_ratio,
+                valve_opening_ratio: told.valve_opening_ratio,
             };
-            self.backend.set(&told)?;
-            self.observer.on_step_start(&marker)?;
-            let watched = self.watch(now_s, marker.end_s, true, Some(&mut told));
-            if watched.is_ok() {
-                self.end(*now_s)?;
+            self.send(told)?;
+            (self.told.step_since_s, self.told.aim) = (Some(self.now_s), Some(step.to));
+            self.reached.clear();
+            self.with.observer.on_step_start(&marker)?;
+            let watched = self.watch(marker.end_s, true, true);
+            let watched = watched.and_then(|()| {
+                self.end()?;
+                self.speed_is_reached(step)
+            });
+            (self.told.step_since_s, self.told.aim) = (None, None);
+            marker.end_s = self.now_s;
+            let trip = match watched {
+                Err(Halt::Cut(trip)) => trip,
+                Err(halt @ Halt::Tripped(..)) => {
+                    // The rig comes first: the way out ends the step, behind its samples.
+                    self.open = Some(marker);
+                    return Err(halt);
+                }
+                ended => {
+                    // What ended the step early outranks a marker that could not be written.
+                    let told = self.with.observer.on_step_end(&marker);
+                    ended?;
+                    told?;
+                    self.with.steps.after_step(&marker)?;
+                    self.skipped = 0;
+                    return Ok(());
+                }
+            };
+            self.with.observer.on_step_abandoned(&marker)?;
+            let (goes_again, what) = match trip.reaction {
+                Reaction::SmallerSteps if !again && before.is_some() => {
+                    (true, "the step is approached again")
+                }
+                _ => (false, "the step is left out"),
+            };
+            self.act(&trip, what)?;
+            if !goes_again {
+                self.skipped += 1;
+                if self.skipped > SKIPPED_MAX {
+                    let reason =
+                        format!("{} steps in a row were left out; the last: {}", self.skipped, trip.reason);
+                    return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, reason, ..trip }, None));
+                }
+                self.with.steps.skipped(&marker)?;
+                return Ok(());
             }
-            marker.end_s = *now_s;
-            // What ended the step early outranks a marker that could not be written.
-            let told = self.observer.on_step_end(&marker);
-            watched?;
-            told?;
-            self.steps.after_step(&marker)?;
-            next = self.steps.next_step()?;
-            self.pass_notes(*now_s)?;
+            again = true;
         }
-        self.backend.make_safe()?;
-        let end_s = *now_s + self.steps.cool_down_s();
-        self.watch(now_s, end_s, false, None)
+    }
+
+    /// Goes back to `before`, then towards `to` in pieces.
+    fn approach(&mut self, before: Setpoints, to: Setpoints) -> Result<(), Halt> {
+        for piece in 0..SMALLER_STEPS {
+            let share = f64::from(piece) / f64::from(SMALLER_STEPS);
+            let between = |from: f64, to: f64| from + share * (to - from);
+            self.send(Setpoints {
+                p3_pa: between(before.p3_pa, to.p3_pa),
+                valve_opening_ratio: between(before.valve_opening_ratio, to.valve_opening_ratio),
+                ..to
+            })?;
+            match self.watch(self.now_s + SMALLER_STEP_S, true, false) {
+                // The same guard again: the step itself will say so.
+                Ok(()) | Err(Halt::Cut(_)) => {}
+                halt => return halt,
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the speed was reached, as far as the campaign cares.
+    fn speed_is_reached(&mut self, step: &PlanStep) -> Result<(), Halt> {
+        let missed = self.protection.speed.and_then(|band| self.reached.missed(band, step, self.now_s));
+        let Some(trip) = missed else { return Ok(()) };
+        match trip.reaction {
+            Reaction::Note | Reaction::Hold => self.act(&trip, "the run goes on"),
+            Reaction::SmallerSteps | Reaction::SkipStep => Err(Halt::Cut(trip)),
+            Reaction::Safe | Reaction::Latch => Err(Halt::Tripped(trip, None)),
+        }
     }
 
     /// What the rig is told at the start of a step.
-    fn begin(&mut self, step: &PlanStep, now_s: f64) -> Setpoints {
-        let p3_pa = self.speed.as_mut().map_or(step.p3_pa, |speed| speed.begin(step, now_s));
+    fn begin(&mut self, step: &PlanStep) -> Setpoints {
+        let now_s = self.now_s;
+        let p3_pa = self.with.speed.as_mut().map_or(step.p3_pa, |speed| speed.begin(step, now_s));
         Setpoints { p3_pa, ..setpoints(step) }
     }
 
+    /// Tells the rig, and keeps what guards need to know of it.
+    pub(crate) fn send(&mut self, setpoints: Setpoints) -> Result<(), BackendError> {
+        self.with.backend.set(&setpoints)?;
+        let running = setpoints.mode == RigMode::Running;
+        let jumps = self.sent.is_some_and(|before| {
+            let change = |from: f64, to: f64| (to - from).abs() / from.abs();
+            change(before.p3_pa, setpoints.p3_pa) > JUMP_RATIO
+                || change(before.valve_opening_ratio, setpoints.valve_opening_ratio) > 2.0 * JUMP_RATIO
+        });
+        if jumps && running && self.told.running {
+            self.told.jumped_s = Some(self.now_s);
+        } else if !running {
+            self.told.jumped_s = None;
+        }
+        (self.told.running, self.sent) = (running, Some(setpoints));
+        Ok(())
+    }
+
     /// Tells of a step whose speed was not reached.
-    fn end(&mut self, now_s: f64) -> Result<(), ObserverError> {
-        let event = self.speed.as_mut().and_then(|speed| speed.end(now_s));
-        event.map_or(Ok(()), |event| self.observer.on_event(&event))
+    fn end(&mut self) -> Result<(), ObserverError> {
+        let now_s = self.now_s;
+        let event = self.with.speed.as_mut().and_then(|speed| speed.end(now_s));
+        event.map_or(Ok(()), |event| self.with.observer.on_event(&event))
+    }
+
+    /// Tells of a guard that does not end the run.
+    fn act(&mut self, trip: &Trip, what: &str) -> Result<(), Halt> {
+        let message = format!("guard `{}`: {}; {what}", trip.guard, trip.reason);
+        let t_s = trip.t_s.max(self.now_s);
+        Ok(self.with.observer.on_event(&Event { t_s, kind: EventKind::GuardActed, message })?)
     }
 
     /// Keeps the machine at rest for as long as the soak asks; events mark both ends.
-    fn rest(&mut self, first: &PlanStep, soak: Soak, now_s: &mut f64) -> Result<(), Halt> {
-        let at_rest = Setpoints {
+    fn rest(&mut self, first: &PlanStep, soak: Soak) -> Result<(), Halt> {
+        self.send(Setpoints {
             mode: RigMode::Standstill,
             oil_temperature_k: soak.oil_temperature_k,
             ..setpoints(first)
-        };
-        self.backend.set(&at_rest)?;
+        })?;
         let message =
             format!("soak for {:.0} s: air off, oil at {:.2} K", soak.duration_s, soak.oil_temperature_k);
-        self.observer.on_event(&Event { t_s: *now_s, kind: EventKind::SoakStarted, message })?;
-        let end_s = *now_s + soak.duration_s;
-        self.watch(now_s, end_s, false, None)?;
+        let (t_s, kind) = (self.now_s, EventKind::SoakStarted);
+        self.with.observer.on_event(&Event { t_s, kind, message })?;
+        self.watch(self.now_s + soak.duration_s, false, false)?;
         let message = "the soak is over, air on".to_owned();
-        self.observer.on_event(&Event { t_s: *now_s, kind: EventKind::SoakEnded, message })?;
+        let (t_s, kind) = (self.now_s, EventKind::SoakEnded);
+        self.with.observer.on_event(&Event { t_s, kind, message })?;
         Ok(())
     }
 
     /// Hands the source's notes to the observer.
-    fn pass_notes(&mut self, t_s: f64) -> Result<(), ObserverError> {
-        let mut notes = self.steps.take_notes().into_iter();
-        notes.try_for_each(|message| self.observer.on_event(&Event { t_s, kind: EventKind::Note, message }))
+    pub(crate) fn pass_notes(&mut self) -> Result<(), ObserverError> {
+        let (t_s, kind) = (self.now_s, EventKind::Note);
+        let mut notes = self.with.steps.take_notes().into_iter();
+        notes.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))
     }
 
-    /// Lets the rig run to `until_s` under the eyes of guards, observer and source, which may end a step early. `told` is what
-    /// the rig was told last, where its speed may be held.
-    fn watch(
-        &mut self,
-        now_s: &mut f64,
-        until_s: f64,
-        may_end_early: bool,
-        mut told: Option<&mut Setpoints>,
-    ) -> Result<(), Halt> {
-        while *now_s < until_s {
-            if self.stop.load(Ordering::Relaxed) {
+    /// Lets the rig run to `until_s` under the eyes of guards, observer and source. In a step the source may end it early,
+    /// and a guard may hold or cut it; outside of steps what would cut one ends the run.
+    fn watch(&mut self, mut until_s: f64, in_step: bool, hold_speed: bool) -> Result<(), Halt> {
+        let mut held_s = 0.0;
+        while self.now_s < until_s {
+            let stop_now = !in_step && self.protection.stop_after_step.load(Ordering::Relaxed);
+            if stop_now || self.with.stop.load(Ordering::Relaxed) {
                 return Err(Halt::Interrupted);
             }
-            let next_s = (*now_s + POLL_INTERVAL_S).min(until_s);
-            self.clock.wait_until(next_s);
-            let batch = self.backend.poll(next_s)?;
-            *now_s = next_s;
-            let trip = self.guards.iter_mut().find_map(|guard| guard.check(&batch));
-            self.observer.on_batch(&batch)?;
-            if let Some(trip) = trip {
-                return Err(Halt::Tripped(trip));
+            let (batch, trips) = self.acquire(until_s)?;
+            if let Some(trip) = trips.iter().find(|trip| trip.reaction.ends_the_run()) {
+                return Err(Halt::Tripped(trip.clone(), Some(Box::new(batch))));
             }
-            let ends = self.steps.on_batch(&batch);
-            if ends && may_end_early {
+            self.with.observer.on_batch(&batch)?;
+            for trip in &trips {
+                match trip.reaction {
+                    Reaction::Note => self.act(trip, "the run goes on")?,
+                    Reaction::Hold if held_s < HOLD_MAX_S => self.act(trip, "the setpoints are held")?,
+                    Reaction::SmallerSteps | Reaction::SkipStep if in_step => {
+                        return Err(Halt::Cut(trip.clone()));
+                    }
+                    _ => return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, ..trip.clone() }, None)),
+                }
+            }
+            self.reached.keep(&batch, self.now_s);
+            let ends = self.with.steps.on_batch(&batch);
+            let holding = trips.iter().any(|trip| trip.reaction == Reaction::Hold)
+                || (held_s > 0.0 && Bench::new(&mut self.with.guards).is_violated());
+            if holding {
+                let last_s =
+                    batch.t_s.first().zip(batch.t_s.last()).map_or(0.0, |(first, last)| last - first);
+                let more_s = last_s.max(self.sample_s);
+                (held_s, until_s) = (held_s + more_s, until_s + more_s);
+                if held_s >= HOLD_MAX_S {
+                    let reason = format!(
+                        "a guard has held the setpoints for {HOLD_MAX_S:.0} s, and is still violated"
+                    );
+                    let (guard, reaction) = (GuardName::Signals, Reaction::Safe);
+                    return Err(Halt::Tripped(Trip { t_s: self.now_s, guard, reaction, reason }, None));
+                }
+                continue;
+            }
+            held_s = 0.0;
+            if ends && in_step {
                 break;
             }
-            if let (Some(speed), Some(told)) = (&mut self.speed, &mut told) {
+            if hold_speed && let (Some(speed), Some(sent)) = (&mut self.with.speed, self.sent) {
                 let (p3_pa, event) = speed.on_batch(&batch);
-                event.map_or(Ok(()), |event| self.observer.on_event(&event))?;
+                event.map_or(Ok(()), |event| self.with.observer.on_event(&event))?;
                 // At the end of a step the next one has the say.
-                if let Some(p3_pa) = p3_pa.filter(|_| *now_s < until_s) {
-                    told.p3_pa = p3_pa;
-                    self.backend.set(told)?;
+                if let Some(p3_pa) = p3_pa.filter(|_| self.now_s < until_s) {
+                    self.send(Setpoints { p3_pa, ..sent })?;
                 }
             }
         }
         Ok(())
     }
 
-    /// Safe state first, then the records of why.
-    fn way_out(&mut self, halt: Halt, now_s: f64) -> Result<RunEnd, RunError> {
-        let safe = self.backend.make_safe();
-        let (end, kind, message) = match halt {
-            Halt::Interrupted => (
-                Ok(RunEnd::Interrupted { t_s: now_s }),
-                EventKind::Interrupted,
-                "stopped by the operator".to_owned(),
-            ),
-            Halt::Tripped(trip) => {
-                let reason = trip.reason.clone();
-                (Ok(RunEnd::Tripped(trip)), EventKind::GuardTripped, reason)
+    /// Samples of a second, or up to `until_s`, or up to the sample at which a guard trips.
+    fn acquire(&mut self, until_s: f64) -> Result<(SampleBatch, Vec<Trip>), BackendError> {
+        let end_s = (self.now_s + POLL_INTERVAL_S).min(until_s);
+        let mut whole: Option<SampleBatch> = None;
+        loop {
+            let alert = self.protection.each_sample || Bench::new(&mut self.with.guards).is_alert();
+            let next_s = if alert { (self.now_s + self.sample_s).min(end_s) } else { end_s };
+            self.with.clock.wait_until(next_s);
+            let batch = self.with.backend.poll(next_s)?;
+            self.now_s = next_s;
+            let trips = Bench::new(&mut self.with.guards).look(&batch, next_s, &self.told);
+            match &mut whole {
+                None => whole = Some(batch),
+                Some(whole) => append(whole, batch),
             }
-            Halt::Failed(error) => {
-                let message = error.to_string();
-                (Err(error), EventKind::Note, message)
+            // Sums of sample times end a little before the second does.
+            if !trips.is_empty() || end_s - self.now_s < 1e-9 * end_s.abs() {
+                self.now_s = if trips.is_empty() { end_s } else { self.now_s };
+                return Ok((whole.unwrap_or_default(), trips));
             }
-        };
-        // The error that ended the run outranks any that telling of it may meet.
-        let told = self.tell_the_end(now_s, kind, message, safe.is_ok());
-        let end = end?;
-        safe?;
-        told?;
-        Ok(end)
-    }
-
-    fn tell_the_end(
-        &mut self,
-        now_s: f64,
-        kind: EventKind,
-        message: String,
-        safe: bool,
-    ) -> Result<(), RunError> {
-        self.observer.on_event(&Event { t_s: now_s, kind, message })?;
-        self.pass_notes(now_s)?;
-        if safe {
-            let message = "air off, valve open".to_owned();
-            self.observer.on_event(&Event { t_s: now_s, kind: EventKind::SafeState, message })?;
-            let batch = self.backend.poll(now_s + SAFE_WATCH_S)?;
-            self.observer.on_batch(&batch)?;
         }
-        Ok(())
     }
 }
 

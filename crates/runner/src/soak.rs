@@ -42,6 +42,10 @@ impl StepSource for Soaked<'_> {
         self.inner.after_step(marker)
     }
 
+    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        self.inner.skipped(marker)
+    }
+
     fn take_notes(&mut self) -> Vec<String> {
         self.inner.take_notes()
     }

@@ -49,6 +49,14 @@ pub trait StepSource {
         Ok(())
     }
 
+    /// A guard has left the step out; the marker holds where it was cut short.
+    ///
+    /// # Errors
+    /// [`StepSourceError`] ends the run in its safe state.
+    fn skipped(&mut self, _marker: &StepMarker) -> Result<(), StepSourceError> {
+        Ok(())
+    }
+
     /// Notes for the recording since the last call. None by default.
     fn take_notes(&mut self) -> Vec<String> {
         Vec::new()

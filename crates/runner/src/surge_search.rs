@@ -327,6 +327,20 @@ impl StepSource for SurgeSearch<'_> {
         Ok(())
     }
 
+    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        match &mut self.approach {
+            None => self.inner.skipped(marker),
+            // The valve opens: a guard has the say over how far a line is followed.
+            Some(approach) => {
+                approach.stage = match approach.stage {
+                    Stage::Look(_) | Stage::Arrive => Stage::Return,
+                    _ => Stage::Over,
+                };
+                Ok(())
+            }
+        }
+    }
+
     fn take_notes(&mut self) -> Vec<String> {
         let mut notes = std::mem::take(&mut self.notes);
         notes.extend(self.inner.take_notes());

@@ -1,14 +1,17 @@
 //! Runs on the virtual lab: the way through, and each way out.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod faults;
+
 use mapper_backends::virtual_lab::{LabSettings, VirtualLab};
 use mapper_core::{
-    Backend, BackendError, Channel, Event, EventKind, MadeFrom, OperatingPoint, Plan, PlanFigures, PlanStep,
-    Predicted, RigDescription, SampleBatch, Setpoints, StepKind, StepMarker, UnpacedClock,
+    Backend, BackendError, Channel, Event, EventKind, GuardName, MadeFrom, OperatingPoint, Plan, PlanFigures,
+    PlanStep, Predicted, Reaction, RigDescription, SampleBatch, Setpoints, SignalGuard, StepKind, StepMarker,
+    UnpacedClock,
 };
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
-use mapper_runner::{Guard, LimitGuard, ObserverError, PlanSteps, RunEnd, RunError, RunObserver, Runner};
+use mapper_runner::{Guard, ObserverError, PlanSteps, RunEnd, RunError, RunObserver, Runner, SignalWatch};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Two steps of 20 s after 10 s of warm-up and before 5 s of cool-down.
@@ -53,12 +56,16 @@ fn plan() -> Plan {
     }
 }
 
+/// Times and speeds.
+type Recorded = Vec<(f64, f64)>;
+
 #[derive(Default)]
 struct Notebook {
-    samples: Vec<(f64, f64)>,
+    samples: Recorded,
     events: Vec<EventKind>,
     starts: Vec<StepMarker>,
     ends: Vec<StepMarker>,
+    abandoned: Vec<StepMarker>,
     /// Raised when this much run time was seen.
     stop_at_s: Option<(f64, &'static AtomicBool)>,
     /// Writing fails from this run time on.
@@ -72,9 +79,9 @@ impl RunObserver for Notebook {
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
-        let speeds = batch.column(Channel::ShaftSpeed).unwrap();
+        let Some(speeds) = batch.column(Channel::ShaftSpeed) else { return Ok(()) };
         self.samples.extend(batch.t_s.iter().copied().zip(speeds.iter().copied()));
-        let now_s = self.samples.last().unwrap().0;
+        let now_s = self.samples.last().map_or(0.0, |sample| sample.0);
         if let Some((stop_s, stop)) = self.stop_at_s {
             stop.store(now_s >= stop_s, Ordering::Relaxed);
         }
@@ -88,6 +95,11 @@ impl RunObserver for Notebook {
 
     fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
         self.events.push(event.kind);
+        Ok(())
+    }
+
+    fn on_step_abandoned(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.abandoned.push(*marker);
         Ok(())
     }
 
@@ -166,7 +178,18 @@ fn a_plan_is_run_in_time_and_without_gaps() {
 #[test]
 fn a_tripped_guard_makes_the_rig_safe_and_says_so() {
     let mut notebook = Notebook::default();
-    let guard = LimitGuard::new(Channel::ShaftSpeed, 80e3);
+    let guard = SignalWatch::new(SignalGuard {
+        name: GuardName::Overspeed,
+        channel: Channel::ShaftSpeed,
+        above: Some(80e3),
+        below: None,
+        change: None,
+        hysteresis: 0.0,
+        dwell_s: 0.2,
+        age_s: 3.0,
+        frozen_s: None,
+        reaction: Reaction::Safe,
+    });
     let end = run(&mut notebook, vec![Box::new(guard)], &AtomicBool::new(false)).unwrap();
     let RunEnd::Tripped(trip) = end else { panic!("{end:?}") };
     assert!((30.0..32.0).contains(&trip.t_s), "{trip:?}");

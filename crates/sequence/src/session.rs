@@ -14,15 +14,17 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) type Thrown = Box<EvalAltResult>;
 
 /// Steps of a sequence at most.
-const STEP_LIMIT: usize = 20_000;
-/// Longest step, s: a day.
-const DWELL_LIMIT_S: f64 = 86_400.0;
-/// Longest sequence, s: four weeks.
-const DURATION_LIMIT_S: f64 = 28.0 * 86_400.0;
+const STEP_LIMIT: usize = 2_000;
+/// Longest step, s: four hours. Its samples are kept until it is identified.
+const DWELL_LIMIT_S: f64 = 14_400.0;
+/// Longest sequence, s: three days, which the rehearsal has to simulate.
+const DURATION_LIMIT_S: f64 = 3.0 * 86_400.0;
 /// Points that are judged without a step that goes there, at most: so many and some for each point of the grid. Each takes
 /// the time of some thousand operations.
 const CHECK_LIMIT: usize = 2_000;
 const CHECKS_OF_POINT: usize = 10;
+/// Points that the planner is given at once, at most; in total twice as many. As many as the grid in any case.
+const ORDER_LIMIT: usize = 100;
 /// Notes that are kept, and characters of each.
 const NOTE_LIMIT: usize = 1000;
 const NOTE_LENGTH_LIMIT: usize = 500;
@@ -113,7 +115,14 @@ impl Session {
 
     /// The planner's order of a set.
     pub fn order(&mut self, points: &[OperatingPoint]) -> Result<Vec<OperatingPoint>, Thrown> {
-        let limit = 1000 + 4 * self.request.points.len();
+        // Searching an order takes longer than in proportion: a set larger than any grid is refused by itself.
+        let largest = ORDER_LIMIT.max(self.request.points.len());
+        if points.len() > largest {
+            let message =
+                format!("the planner orders at most {largest} points at once, not {}", points.len());
+            return Err(throw(message, "order the grid, or a part of it"));
+        }
+        let limit = 2 * largest;
         self.ordered += points.len();
         if self.ordered > limit {
             let message = format!("the planner has been asked to order more than {limit} points in total");
@@ -148,7 +157,7 @@ impl Session {
             return Err(throw(message, "give a time such as \"120 s\" or \"10 min\""));
         }
         if start_s + dwell_s > DURATION_LIMIT_S {
-            return Err(throw("the sequence would last longer than four weeks".into(), "end it earlier"));
+            return Err(throw("the sequence would last longer than three days".into(), "end it earlier"));
         }
         let target = self.check(to)?;
         let from = self.results.last().map(|result| result.target);

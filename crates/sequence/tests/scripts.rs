@@ -275,6 +275,8 @@ fn hostile_scripts_end_with_an_error() {
         ("throw;", "stopped itself"),
         ("throw \"\\u001b[2J\";", "?[2J"),
         ("loop { order(grid()); }", "more than"),
+        ("let a = []; for i in 0..101 { a.push(grid()[0]); }\norder(a);", "at most 100 points"),
+        ("dwell(\"5 h\"); jump(grid()[0]);", "at most 14400 s"),
         ("loop { reachable(point(\"250 krpm\", 1.0)); }", "checked"),
     ] {
         let error = error_of(text);

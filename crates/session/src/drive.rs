@@ -2,12 +2,12 @@
 
 use crate::guards::guards;
 use mapper_campaign::Campaign;
-use mapper_core::{Backend, Channel, PlanStep, UnpacedClock};
+use mapper_core::{Backend, Channel, Clock, PlanStep, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::speed_response::speed_response;
 use mapper_runner::{
-    RunEnd, RunError, RunObserver, Runner, Soaked, SpeedControl, SpeedControlLimits, StepSource,
+    Protection, RunEnd, RunError, RunObserver, Runner, Soaked, SpeedControl, SpeedControlLimits, StepSource,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -24,7 +24,38 @@ pub fn drive(
     observer: &mut dyn RunObserver,
     stop: &AtomicBool,
 ) -> Result<RunEnd, RunError> {
-    let guards = guards(campaign, &backend.describe().channels);
+    let pace = Pace { clock: &mut UnpacedClock, each_sample: false, stop, stop_after_step: &NEVER };
+    drive_paced(campaign, model, steps, backend, observer, pace)
+}
+
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+/// How fast a run goes, and how it is stopped.
+pub struct Pace<'a> {
+    /// Waits for the rig.
+    pub clock: &'a mut dyn Clock,
+    /// Asks for each sample by itself: of a rig whose time is not simulated, or is paced.
+    pub each_sample: bool,
+    /// Set from outside to stop at once.
+    pub stop: &'a AtomicBool,
+    /// Set from outside to stop at the end of the step.
+    pub stop_after_step: &'a AtomicBool,
+}
+
+/// As [`drive`], at a pace.
+///
+/// # Errors
+/// As [`drive`].
+pub fn drive_paced(
+    campaign: &Campaign,
+    model: &Model,
+    steps: &mut dyn StepSource,
+    backend: &mut dyn Backend,
+    observer: &mut dyn RunObserver,
+    pace: Pace<'_>,
+) -> Result<RunEnd, RunError> {
+    let rig = backend.describe();
+    let guards = guards(campaign, &rig);
     let mut soaked;
     let steps: &mut dyn StepSource = match campaign.zero {
         None => steps,
@@ -33,17 +64,23 @@ pub fn drive(
             &mut soaked
         }
     };
-    // Every backend so far has simulated time.
+    let protection = Protection {
+        safe: campaign.safe_state.unwrap_or(rig.safe),
+        p3_min_pa: campaign.limits.p3_min_pa,
+        speed: campaign.guard_set().speed.filter(|_| rig.controls),
+        stop_after_step: pace.stop_after_step,
+        each_sample: pace.each_sample || !rig.simulated_time,
+    };
     Runner {
         steps,
         speed: speed_control(campaign, model),
         backend,
-        clock: &mut UnpacedClock,
+        clock: pace.clock,
         guards,
         observer,
-        stop,
+        stop: pace.stop,
     }
-    .run()
+    .run_under(&protection)
 }
 
 /// So many declared standard deviations P3 may read too high.

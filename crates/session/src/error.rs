@@ -112,6 +112,78 @@ pub enum SessionError {
     /// A backend could not be made: its name or its settings are wrong.
     #[error(transparent)]
     Backend(BackendError),
+    /// A stored plan that no plan may be like.
+    #[error("{}: {why}; make it again with `mapper plan CAMPAIGN --out FILE`", .path.display())]
+    WrongPlan {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
+    /// A run that cannot go on.
+    #[error("{} cannot be resumed: {why}", .run.display())]
+    NotResumable {
+        /// Its directory.
+        run: PathBuf,
+        /// Why.
+        why: String,
+    },
+    /// Another runner has the rig.
+    #[error("the rig `{rig}` is in use by {owner}; wait for its end, or stop it there")]
+    RigInUse {
+        /// The rig.
+        rig: String,
+        /// Who has it.
+        owner: String,
+    },
+    /// A runner died with the rig in its hands.
+    #[error(
+        "the rig `{rig}` was left by {owner}, which ended without making it safe. Look at the rig; then go on with \
+         `mapper run --resume {}`, or clear it with `mapper rig acknowledge {rig}`", .run.display()
+    )]
+    RigAbandoned {
+        /// The rig.
+        rig: String,
+        /// The run it was left by.
+        run: PathBuf,
+        /// Who left it.
+        owner: String,
+    },
+    /// A rig that nobody has looked at since it was in doubt.
+    #[error(
+        "the rig `{rig}` is latched since the run {}: {reason}. Look at the rig; then clear it with `mapper rig acknowledge {rig}`",
+        .run.display()
+    )]
+    RigLatched {
+        /// The rig.
+        rig: String,
+        /// Why.
+        reason: String,
+        /// The run.
+        run: PathBuf,
+    },
+    /// The run cannot begin as things are.
+    #[error("the run was not begun: {0}")]
+    Preflight(String),
+    /// A rig that needs a guard that the campaign does not have.
+    #[error(
+        "backend `{backend}` must not be run without these guards: {guards}; give their limits in `limits:` or `guards:` of the \
+         campaign, with a reaction that ends the run"
+    )]
+    Unguarded {
+        /// The backend.
+        backend: String,
+        /// What is missing.
+        guards: String,
+    },
+    /// A guard over a channel that the rig does not deliver.
+    #[error("backend `{backend}` does not deliver what is to be guarded: {channels}")]
+    GuardBlind {
+        /// The backend.
+        backend: String,
+        /// Channels and their guards.
+        channels: String,
+    },
     /// A run could not go on; the rig is safe.
     #[error("{source}\nThe recording up to then is {}.", .recording.display())]
     Run {
@@ -304,15 +376,24 @@ impl SessionError {
             | E::Drift(DriftError::NoRun)
             | E::Export(ExportError::NeedsFit { .. })
             | E::Script(_) => ErrorKind::BadInput,
+            E::Unguarded { .. }
+            | E::GuardBlind { .. }
+            | E::RigInUse { .. }
+            | E::RigAbandoned { .. }
+            | E::RigLatched { .. }
+            | E::Preflight(_) => ErrorKind::Rig,
             E::Plan(_)
             | E::NotAPlan { .. }
             | E::StalePlan { .. }
+            | E::WrongPlan { .. }
+            | E::NotResumable { .. }
             | E::RehearsalTripped { .. }
             | E::NoSteps { .. } => ErrorKind::NoPlan,
             E::Run { source, .. } => match source {
                 RunError::Backend(_) => ErrorKind::Rig,
                 RunError::Source(_) => ErrorKind::BadInput,
-                RunError::Observer(_) => ErrorKind::Failure,
+                RunError::Observer(_) | RunError::Panicked { .. } => ErrorKind::Failure,
+                RunError::NotSafe { .. } => ErrorKind::Rig,
             },
             // Only reading fails for reasons that are not the recording's.
             E::Record(RecordError::Read { .. } | RecordError::Exists { .. } | RecordError::Create { .. })

@@ -22,8 +22,3 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
 pub fn json_text(value: &impl Serialize) -> Result<String, SessionError> {
     Ok(serde_json::to_string_pretty(value)? + "\n")
 }
-
-/// Text of a file.
-pub(crate) fn read_text(path: &Path) -> Result<String, SessionError> {
-    std::fs::read_to_string(path).map_err(SessionError::file("read", path))
-}

@@ -1,37 +1,64 @@
-//! What ends a run before harm is done, and what watches its repeats.
+//! What ends a step or a run before harm is done, and what watches its repeats.
 
+use crate::SessionError;
 use crate::declared::declared;
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, SURGE_ALLOWED_S};
+use mapper_core::{GuardName, RigDescription};
 use mapper_record::ChannelMap;
-use mapper_runner::{DriftWatch, Guard, LimitGuard, SilenceGuard, StepSource, SurgeGuard};
+use mapper_runner::{
+    BatchWatch, DriftWatch, FirstLook, Guard, RigWatch, SignalWatch, StepSource, SurgeWatch,
+};
 
-/// Silence of a guarded channel longer than this ends a run, s.
-const SILENCE_ALLOWED_S: f64 = 3.0;
-
-/// What ends a run of this campaign before harm is done.
-pub fn guards(campaign: &Campaign, delivered: &[Channel]) -> Vec<Box<dyn Guard>> {
-    let limits = &campaign.limits;
-    let above = [
-        (Channel::ShaftSpeed, Some(limits.speed_max_rpm)),
-        (Channel::P3, Some(limits.p3_max_pa)),
-        (Channel::T2, limits.t2_max_k),
-        (Channel::T3, limits.t3_max_k),
-    ];
-    let mut guards: Vec<Box<dyn Guard>> = above
-        .into_iter()
-        .filter_map(|(channel, limit)| Some(Box::new(LimitGuard::new(channel, limit?)) as Box<dyn Guard>))
-        .collect();
-    let watched = [Channel::ShaftSpeed, Channel::P2, Channel::T2]
-        .into_iter()
-        .filter(|channel| delivered.contains(channel))
-        .collect();
-    guards.push(Box::new(SilenceGuard::new(watched, SILENCE_ALLOWED_S)));
-    guards.push(Box::new(SurgeGuard::new(SURGE_ALLOWED_S)));
+/// The guards of a run of this campaign on this rig. A signal that nobody has declared a guard for, and that the rig does not
+/// deliver, is left out; one that is declared, or that the rig needs, is not: it trips.
+pub fn guards(campaign: &Campaign, rig: &RigDescription) -> Vec<Box<dyn Guard>> {
+    let set = campaign.guard_set();
+    let mut guards: Vec<Box<dyn Guard>> = vec![Box::new(BatchWatch::default())];
+    for spec in set.signals {
+        let wanted = campaign.guards.is_some() || rig.needs_guarded.contains(&spec.name);
+        if wanted || rig.channels.contains(&spec.channel) {
+            guards.push(Box::new(SignalWatch::new(spec)));
+        }
+    }
+    guards.extend(set.surge.map(|spec| Box::new(SurgeWatch::new(spec)) as Box<dyn Guard>));
+    if rig.controls {
+        guards.push(Box::new(RigWatch::default()));
+        guards.push(Box::new(FirstLook::new(rig.channels.clone())));
+    }
     guards
 }
 
-/// Watches the repeats of a run, where the campaign says what to do about drift.
-pub fn drift_watch<'a>(campaign: &Campaign, steps: &'a mut dyn StepSource) -> Option<DriftWatch<'a>> {
-    Some(DriftWatch::new(steps, campaign.on_drift?, declared(campaign, &ChannelMap::native())))
+/// Refuses a rig without a guard that it calls necessary, or without the channel that the guard looks at.
+///
+/// # Errors
+/// [`SessionError::Unguarded`] with every guard that is missing, [`SessionError::GuardBlind`] with the channels.
+pub fn check_guards(campaign: &Campaign, rig: &RigDescription) -> Result<(), SessionError> {
+    let set = campaign.guard_set();
+    let missing: Vec<GuardName> =
+        rig.needs_guarded.iter().copied().filter(|name| !set.ends_on(*name)).collect();
+    if !missing.is_empty() {
+        let names = missing.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        return Err(SessionError::Unguarded { backend: rig.backend.clone(), guards: names });
+    }
+    let wanted = |name: &GuardName| campaign.guards.is_some() || rig.needs_guarded.contains(name);
+    let blind = set.signals.iter().filter(|spec| wanted(&spec.name) && !rig.channels.contains(&spec.channel));
+    let blind: Vec<String> = blind.map(|spec| format!("{} (guard `{}`)", spec.channel, spec.name)).collect();
+    match blind.is_empty() {
+        true => Ok(()),
+        false => Err(SessionError::GuardBlind { backend: rig.backend.clone(), channels: blind.join(", ") }),
+    }
+}
+
+/// Watches the repeats of a run, where the campaign says what to do about drift; gives the steps back where it does not.
+///
+/// # Errors
+/// The steps: no fault, nobody asked for a watch.
+pub fn drift_watch<'a>(
+    campaign: &Campaign,
+    steps: &'a mut dyn StepSource,
+) -> Result<DriftWatch<'a>, &'a mut dyn StepSource> {
+    match campaign.on_drift {
+        Some(on_drift) => Ok(DriftWatch::new(steps, on_drift, declared(campaign, &ChannelMap::native()))),
+        None => Err(steps),
+    }
 }

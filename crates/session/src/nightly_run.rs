@@ -79,7 +79,7 @@ impl NightlyRun {
         let end =
             drive(&self.campaign, &self.model, &mut steps, backend.as_mut(), &mut recorder, session.stop)
                 .map_err(|source| SessionError::Run { source, recording: recording.to_owned() })?;
-        recorder.finish()?;
+        recorder.finish("")?;
         Ok(end)
     }
 }

@@ -2,42 +2,105 @@
 
 use crate::SessionEvent;
 use crate::event::OnEvent;
-use mapper_core::{Event, RigDescription, SampleBatch, StepMarker};
+use crate::journal::{Entry, Journal};
+use mapper_core::{Event, EventKind, RigDescription, SampleBatch, StepMarker};
 use mapper_record::{RecordError, RecordingWriter, StepPhase};
 use mapper_runner::{ObserverError, RunObserver};
+use std::fs::File;
 
-/// Writes everything into the run's recording.
+/// Writes everything into the run's recording, and into its journal what is safely there.
 pub(crate) struct Recorder {
     writer: RecordingWriter,
+    journal: Option<Journal>,
+    /// Written, and not known to be flushed: with the time up to which samples were flushed then, s.
+    pending: Vec<(Entry, Option<f64>)>,
+    /// The recording once more, to send it through to the disk: where a rig outlives a computer.
+    through: Option<File>,
+    /// End of the step that is under way, as planned, s.
+    planned_end_s: f64,
 }
 
 impl Recorder {
     pub(crate) fn new(writer: RecordingWriter) -> Self {
-        Recorder { writer }
+        Recorder { writer, journal: None, pending: Vec::new(), through: None, planned_end_s: 0.0 }
     }
 
-    /// Ends the file.
-    pub(crate) fn finish(self) -> Result<(), RecordError> {
-        self.writer.finish()
+    /// Keeps a journal, and sends all through to the disk where `through` is given.
+    pub(crate) fn with_journal(self, journal: Journal, through: Option<File>) -> Self {
+        Recorder { journal: Some(journal), through, ..self }
+    }
+
+    fn keep(&mut self, entry: Entry) {
+        if self.journal.is_some() {
+            self.pending.push((entry, self.writer.saved_until_s()));
+        }
+    }
+
+    /// Writes what has been flushed since it was written into the journal.
+    fn journal_what_is_saved(&mut self) -> Result<(), ObserverError> {
+        let saved_s = self.writer.saved_until_s();
+        if let Some(file) = &self.through {
+            file.sync_data().map_err(ObserverError::of)?;
+        }
+        let Some(journal) = &mut self.journal else { return Ok(()) };
+        let done = self.pending.partition_point(|(_, before_s)| *before_s != saved_s);
+        for (entry, _) in self.pending.drain(..done) {
+            journal.write(&entry).map_err(ObserverError::of)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the end of the run into the journal.
+    fn journal_the_end(journal: Option<Journal>, pending: Vec<(Entry, Option<f64>)>, end: &str) {
+        let Some(mut journal) = journal else { return };
+        let entries = pending.into_iter().map(|(entry, _)| entry).chain([Entry::Ended(end.to_owned())]);
+        for entry in entries {
+            // The recording is whole; a journal that lacks its end costs a step at most.
+            if journal.write(&entry).is_err() {
+                break;
+            }
+        }
+    }
+
+    /// Ends the file. `end`: how the run ended, for the journal.
+    pub(crate) fn finish(self, end: &str) -> Result<(), RecordError> {
+        self.writer.finish()?;
+        Recorder::journal_the_end(self.journal, self.pending, end);
+        Ok(())
     }
 }
 
 impl RunObserver for Recorder {
     fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.planned_end_s = marker.end_s;
         self.writer.write_step(marker, StepPhase::Start).map_err(ObserverError::of)
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
         // The batch's own events are written with it.
-        self.writer.write_batch(batch).map_err(ObserverError::of)
+        self.writer.write_batch(batch).map_err(ObserverError::of)?;
+        self.journal_what_is_saved()
     }
 
     fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
-        self.writer.write_event(event).map_err(ObserverError::of)
+        self.writer.write_event(event).map_err(ObserverError::of)?;
+        if event.kind == EventKind::SoakEnded {
+            self.keep(Entry::Soaked);
+        }
+        Ok(())
+    }
+
+    fn on_step_abandoned(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.writer.write_step(marker, StepPhase::Abandoned).map_err(ObserverError::of)
     }
 
     fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::of)
+        self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::of)?;
+        // A step that was cut short does not hold.
+        if marker.end_s >= self.planned_end_s - 1.0 {
+            self.keep(Entry::StepSaved(marker.index));
+        }
+        Ok(())
     }
 }
 

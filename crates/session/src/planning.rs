@@ -1,15 +1,13 @@
-//! From a campaign to its plan, and a stored plan held against it.
+//! From a campaign to its plan.
 
 use crate::SessionError;
 use crate::declared::identification;
-use crate::files::read_text;
 use crate::predicted_method::{Dynamic, Joint};
 use mapper_campaign::Campaign;
 use mapper_core::{JointSettings, Method, Plan};
 use mapper_identify::{ZeroSettings, expected_after_zero};
 use mapper_physics::model::Model;
 use mapper_planner::{PlanRequest, PredictedMethod, make_plan};
-use std::path::Path;
 
 /// The nominal model of a campaign.
 ///
@@ -73,29 +71,5 @@ fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
         Method::Joint if config.joint != JointSettings::all_off() => Some(Box::new(Joint::of(config))),
         Method::Dynamic | Method::Joint => Some(Box::new(Dynamic::of(config))),
         Method::Steady | Method::Imported => None,
-    }
-}
-
-/// A plan from a file, refused where what it was made from has changed; `made` is the plan made again.
-///
-/// # Errors
-/// [`SessionError::StalePlan`] with what has changed; [`SessionError::NotAPlan`] and [`SessionError::File`] where the
-/// file does not hold a plan.
-pub fn stored_plan(path: &Path, made: &Plan) -> Result<Plan, SessionError> {
-    let stored: Plan = serde_json::from_str(&read_text(path)?)
-        .map_err(|source| SessionError::NotAPlan { path: path.to_owned(), source })?;
-    let (then, now) = (&stored.made_from, &made.made_from);
-    let changed: Vec<&str> = [
-        ("the campaign", then.campaign_sha256 != now.campaign_sha256),
-        ("the nominal model", then.model_sha256 != now.model_sha256),
-        ("the sequence script", then.script_sha256 != now.script_sha256),
-    ]
-    .into_iter()
-    .filter_map(|(what, changed)| changed.then_some(what))
-    .collect();
-    if changed.is_empty() {
-        Ok(stored)
-    } else {
-        Err(SessionError::StalePlan { path: path.to_owned(), changed })
     }
 }

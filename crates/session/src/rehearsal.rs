@@ -95,6 +95,10 @@ impl StepSource for Rehearsing {
         Ok(())
     }
 
+    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        self.steps.skipped(marker)
+    }
+
     fn take_notes(&mut self) -> Vec<String> {
         let notes = self.steps.take_notes();
         self.notes.extend(notes.iter().cloned());

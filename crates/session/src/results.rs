@@ -17,7 +17,7 @@ use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::{ReportSource, RunReport, SurgeReport, instant, run_report};
 use serde::Serialize;
 use serde_json::json;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Everything that came of a run, with the files it was written to; written as JSON, the one object that a run prints.
@@ -101,6 +101,13 @@ impl Told {
     }
 }
 
+/// One recording of a run.
+pub(crate) struct RunPart {
+    pub(crate) recording: PathBuf,
+    /// Steps of it that hold; `None`: all.
+    pub(crate) saved: Option<BTreeSet<usize>>,
+}
+
 impl Session<'_> {
     /// Reads the recording of a run back, identifies, assembles, exports and reports, all into `directory`.
     ///
@@ -114,12 +121,21 @@ impl Session<'_> {
         outcome: &str,
         started_ns: u64,
         directory: &Path,
-        recording: &Path,
+        parts: &[RunPart],
     ) -> Result<Results, SessionError> {
-        let read = read_recording(recording, &ChannelMap::native(), &ReadOptions::default())?;
-        let remarks: Vec<String> = read.warnings.iter().map(ToString::to_string).collect();
-        let recorded = Recorded::of(recording.to_owned(), read, Some(campaign.clone()));
-        let identified = self.identify(vec![recorded], &ChannelMap::native(), None)?;
+        let (mut together, mut remarks) = (Vec::new(), Vec::new());
+        for part in parts {
+            let mut read = read_recording(&part.recording, &ChannelMap::native(), &ReadOptions::default())?;
+            remarks.extend(read.warnings.iter().map(ToString::to_string));
+            if let Some(saved) = &part.saved {
+                read.recording.steps.retain(|step| saved.contains(&step.index));
+            }
+            together.push(Recorded::of(part.recording.clone(), read, Some(campaign.clone())));
+        }
+        let mut files = parts.iter().map(|part| part.recording.clone());
+        let recording = files.next().ok_or(SessionError::NoRecording)?;
+        let further: Vec<PathBuf> = files.collect();
+        let identified = self.identify(together, &ChannelMap::native(), None)?;
         let told = Told {
             campaign: Some(campaign.clone()),
             plan: Some(plan.clone()),
@@ -128,7 +144,7 @@ impl Session<'_> {
             tested_at: instant(started_ns),
             sources: Vec::new(),
         };
-        self.written(&told, identified, (recording.to_owned(), Vec::new()), remarks, directory)
+        self.written(&told, identified, (recording, further), remarks, directory)
     }
 
     /// Identifies recordings and leaves what a run leaves, points, map and report, in `directory`, which is made where it is

@@ -1,23 +1,32 @@
 //! A whole run: plan, drive the rig, record, identify, assemble, report.
 
-use crate::drive::{drive, soak_s};
+use crate::drive::{Pace, drive_paced, soak_s};
 use crate::files::{json_text, write_new};
-use crate::guards::drift_watch;
+use crate::guards::{check_guards, drift_watch};
+use crate::journal::{Entry, Identity, Journal};
 use crate::observers::{Recorder, Teller};
-use crate::planning::{nominal_model, plan, stored_plan};
+use crate::planning::{nominal_model, plan};
+use crate::preflight::{check_room, check_setpoints};
 use crate::rehearsal::rehearse;
-use crate::results::Results;
+use crate::results::{Results, RunPart};
+use crate::resume::{BrokenOff, MissingSteps};
+use crate::rig_state::{Claim, Latch, Owner, RigStates};
 use crate::scripted_steps::ScriptedSteps;
+use crate::stored_plan::stored_plan;
 use crate::surge::{hold_near_surge, remark_surge_search};
 use crate::{Session, SessionError, run_directory};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
-use mapper_core::{Backend, Plan, RigDescription};
+use mapper_core::{Backend, Clock, Plan, Reaction, RigDescription, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
-use mapper_runner::{PlanSteps, RunEnd, RunError, RunObserver, StepSource, SurgeSearch};
+use mapper_runner::{Deadlined, PlanSteps, RunEnd, RunError, RunObserver, StepSource, SurgeSearch};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Time that a rig has for each call.
+const DEADLINE: Duration = Duration::from_secs(2);
 
 /// Name and version of the program, as recordings carry it.
 pub const PROGRAM: &str = concat!("mapper ", env!("CARGO_PKG_VERSION"));
@@ -36,12 +45,25 @@ pub struct RunRequest<'a> {
     pub started_ns: u64,
     /// The same in the name of the run's directory, e.g. `20261122T101500Z`.
     pub started_name: &'a str,
+    /// Directory of the locks and latches of rigs; `.rigs` in `parent` if none is given.
+    pub rig_states: Option<&'a Path>,
+    /// Goes on with this run.
+    pub resume: Option<BrokenOff>,
 }
 
 impl<'a> RunRequest<'a> {
     /// A run on a simulated rig, whose time begins at 0: its directory is `<parent>/<campaign>-run`.
     pub fn new(campaign: &'a Campaign, campaign_text: &'a str, parent: &'a Path) -> Self {
-        RunRequest { campaign, campaign_text, plan: None, parent, started_ns: 0, started_name: "run" }
+        RunRequest {
+            campaign,
+            campaign_text,
+            plan: None,
+            parent,
+            started_ns: 0,
+            started_name: "run",
+            rig_states: None,
+            resume: None,
+        }
     }
 }
 
@@ -111,15 +133,22 @@ impl<'s> Session<'s> {
             Some(source) => rehearse(self, campaign, &model, source)?.plan,
         };
         remark_surge_search(campaign, &model, &mut made);
-        let plan = match request.plan {
+        let kept = request.resume.as_ref().map(|broken_off| broken_off.directory.join(run_directory::PLAN));
+        let plan = match request.plan.or(kept.as_deref()) {
             None => made.clone(),
-            Some(path) => stored_plan(path, &made)?,
+            Some(path) => stored_plan(path, &made, campaign)?,
         };
         let scripted = match &campaign.sequence {
             Some(source) if request.plan.is_none() => Some(ScriptedSteps::new(campaign, &model, source)?),
             _ => None,
         };
         let backend = self.registry.make_backend(campaign, &model)?;
+        let rig = backend.describe();
+        check_guards(campaign, &rig)?;
+        check_setpoints(&plan, &rig)?;
+        if let Some(broken_off) = &request.resume {
+            broken_off.check(campaign, &plan, &Identity::of(campaign, &plan, &rig)?)?;
+        }
         Ok(PreparedRun { request, model, made, plan, scripted, backend })
     }
 
@@ -148,47 +177,131 @@ impl PreparedRun<'_> {
         self.backend.describe()
     }
 
-    /// Drives the rig, records, identifies, reports.
+    /// Drives the rig as fast as it goes, records, identifies, reports.
     ///
     /// # Errors
-    /// Where the run's files cannot be made. What ends the run itself is its outcome, not an error.
-    pub fn run(mut self, session: &Session<'_>) -> Result<RunOutcome, SessionError> {
+    /// As [`PreparedRun::run_paced`].
+    pub fn run(self, session: &Session<'_>) -> Result<RunOutcome, SessionError> {
+        self.run_paced(session, &mut UnpacedClock, false)
+    }
+
+    /// Drives the rig by a clock, records, identifies, reports. `each_sample`: asks the rig for each sample by itself.
+    ///
+    /// # Errors
+    /// Where the rig is not to be had, or the run's files cannot be made. What ends the run itself is its outcome, not an error.
+    pub fn run_paced(
+        mut self,
+        session: &Session<'_>,
+        clock: &mut dyn Clock,
+        each_sample: bool,
+    ) -> Result<RunOutcome, SessionError> {
+        let campaign = self.request.campaign;
+        let rig = self.rig();
+        if !rig.simulated_time {
+            self.backend = Box::new(Deadlined::new(self.backend, DEADLINE).map_err(SessionError::Backend)?);
+        }
+        let mut claim = self.claim(&rig)?;
+        let (directory, plan_json) = (self.directory()?, json_text(&self.plan)?);
+        if let Some(claim) = &mut claim {
+            claim.sign(&owner(&directory, self.request.started_name))?;
+        }
+        check_room(&directory, soak_s(campaign) + self.plan.duration_s(), &rig)?;
+        let mut parts = self.parts_before(&directory);
+        let name = match parts.len() {
+            0 => run_directory::RECORDING.to_owned(),
+            before => format!("recording-{}.mcap", before + 1),
+        };
+        let recording = directory.join(&name);
+        let writer = RecordingWriter::create(&recording, &self.header(plan_json))?;
+        let path = directory.join(run_directory::JOURNAL);
+        let mut journal =
+            Journal::open(&path, !rig.simulated_time).map_err(SessionError::file("write", &path))?;
+        let identity = Identity::of(campaign, &self.plan, &rig)?;
+        journal
+            .write(&Entry::Part { identity, recording: name })
+            .map_err(SessionError::file("write", &path))?;
+        // A rig in real time outlives this computer: what is recorded goes through to the disk.
+        let through = if rig.simulated_time { None } else { std::fs::File::open(&recording).ok() };
+        let recorder = Recorder::new(writer).with_journal(journal, through);
+        let pace = Pace { clock, each_sample, stop: session.stop, stop_after_step: session.stop_after_step };
+        let (end, finished, doubt) = self.drive_and_record(session, recorder, pace);
+        give_back(claim, doubt, &directory)?;
+        // A run that failed has its own reason; one that did not must have a whole file.
+        if !matches!(end, Ended::Failed(_) | Ended::Interrupted { .. } | Ended::Tripped { .. }) {
+            finished?;
+        }
+        parts.push(RunPart { recording: recording.clone(), saved: None });
+        let results_directory = results_directory(&directory, parts.len())?;
+        let executed = self.executed(&directory);
+        let results = executed.and_then(|plan| {
+            let started_ns = self.request.started_ns;
+            session.results(campaign, &plan, &sentence(&end), started_ns, &results_directory, &parts)
+        });
+        Ok(RunOutcome { directory, recording, end, results })
+    }
+
+    /// The rig, where it is one that can be had but once.
+    fn claim(&self, rig: &RigDescription) -> Result<Option<Claim>, SessionError> {
+        let Some(name) = &rig.exclusive else { return Ok(None) };
+        let usual = self.request.parent.join(".rigs");
+        let states = RigStates::new(self.request.rig_states.unwrap_or(&usual));
+        let resumes = self.request.resume.as_ref().map(|broken_off| broken_off.directory.as_path());
+        states.claim(name, resumes).map(Some)
+    }
+
+    /// The directory of the run: a new one with what the run is made from, or that of the run that goes on.
+    fn directory(&self) -> Result<PathBuf, SessionError> {
+        if let Some(broken_off) = &self.request.resume {
+            return Ok(broken_off.directory.clone());
+        }
         let campaign = self.request.campaign;
         let directory =
             run_directory::create(self.request.parent, &campaign.name, self.request.started_name)?;
-        let plan_json = json_text(&self.plan)?;
         write_new(&directory.join(run_directory::CAMPAIGN), self.request.campaign_text.as_bytes())?;
-        write_new(&directory.join(run_directory::PLAN), plan_json.as_bytes())?;
+        write_new(&directory.join(run_directory::PLAN), json_text(&self.plan)?.as_bytes())?;
         if let MapSource::Table { named, text, .. } = &campaign.machine.map {
             run_directory::keep_beside(&directory, named, text)?;
         }
         if let Some(source) = &campaign.sequence {
             write_new(&directory.join(run_directory::SEQUENCE), source.text.as_bytes())?;
         }
-        let recording = directory.join(run_directory::RECORDING);
-        let writer = RecordingWriter::create(&recording, &self.header(plan_json))?;
-        let (end, finished) = self.drive_and_record(session, Recorder::new(writer));
-        // A run that failed has its own reason; one that did not must have a whole file.
-        if !matches!(end, Ended::Failed(_) | Ended::Interrupted { .. } | Ended::Tripped { .. }) {
-            finished?;
-        }
-        let executed = self.executed(&directory);
-        let results = executed.and_then(|plan| {
-            session.results(campaign, &plan, &sentence(&end), self.request.started_ns, &directory, &recording)
-        });
-        Ok(RunOutcome { directory, recording, end, results })
+        Ok(directory)
+    }
+
+    /// The recordings of a run that goes on.
+    fn parts_before(&self, directory: &Path) -> Vec<RunPart> {
+        let parts = self.request.resume.iter().flat_map(|broken_off| &broken_off.parts);
+        parts
+            .map(|part| RunPart {
+                recording: directory.join(&part.recording),
+                saved: Some(part.saved.clone()),
+            })
+            .collect()
     }
 
     fn drive_and_record(
         &mut self,
         session: &Session<'_>,
         mut recorder: Recorder,
-    ) -> (Ended, Result<(), SessionError>) {
-        let campaign = self.request.campaign;
+        pace: Pace<'_>,
+    ) -> (Ended, Result<(), SessionError>, Option<String>) {
         let mut planned = PlanSteps::new(&self.plan);
-        let steps: &mut dyn StepSource = match &mut self.scripted {
-            Some(scripted) => scripted,
-            None => &mut planned,
+        let mut missing;
+        // What was measured at rest holds for the whole run.
+        let without_soak;
+        let mut campaign = self.request.campaign;
+        let steps: &mut dyn StepSource = match (&mut self.scripted, &self.request.resume) {
+            (Some(scripted), _) => scripted,
+            (None, Some(broken_off)) => {
+                let said = broken_off.said(campaign, &self.plan);
+                if broken_off.soaked() {
+                    without_soak = Campaign { zero: None, ..campaign.clone() };
+                    campaign = &without_soak;
+                }
+                missing = MissingSteps::new(&self.plan, &broken_off.saved(), said);
+                &mut missing
+            }
+            (None, None) => &mut planned,
         };
         let hold = |point| hold_near_surge(campaign, &self.model, point);
         let mut search;
@@ -205,15 +318,15 @@ impl PreparedRun<'_> {
             duration_s: soak_s(campaign) + self.plan.duration_s(),
         };
         let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut teller];
-        let (end, drifted) = if campaign.on_drift.is_some()
-            && let Some(mut watch) = drift_watch(campaign, steps)
-        {
-            let end =
-                drive(campaign, &self.model, &mut watch, self.backend.as_mut(), &mut observers, session.stop);
-            (end, watch.ended_by_drift().map(str::to_owned))
-        } else {
-            (drive(campaign, &self.model, steps, self.backend.as_mut(), &mut observers, session.stop), None)
+        let (model, backend) = (&self.model, self.backend.as_mut());
+        let (end, drifted) = match drift_watch(campaign, steps) {
+            Ok(mut watch) => {
+                let end = drive_paced(campaign, model, &mut watch, backend, &mut observers, pace);
+                (end, watch.ended_by_drift().map(str::to_owned))
+            }
+            Err(steps) => (drive_paced(campaign, model, steps, backend, &mut observers, pace), None),
         };
+        let doubt = doubt(&end);
         let end = match (end, drifted) {
             (Ok(RunEnd::Completed), None) => Ended::Completed,
             (Ok(RunEnd::Completed), Some(reason)) => Ended::Drifted { reason },
@@ -221,7 +334,8 @@ impl PreparedRun<'_> {
             (Ok(RunEnd::Tripped(trip)), _) => Ended::Tripped { t_s: trip.t_s, reason: trip.reason },
             (Err(error), _) => Ended::Failed(error),
         };
-        (end, recorder.finish().map_err(SessionError::from))
+        let finished = recorder.finish(&sentence(&end)).map_err(SessionError::from);
+        (end, finished, doubt)
     }
 
     /// The plan as it was run; a script's steps are written beside it.
@@ -243,6 +357,44 @@ impl PreparedRun<'_> {
             campaign_yaml: Some(self.request.campaign_text.as_bytes().to_vec()),
         }
     }
+}
+
+/// Why nobody knows in which state the rig is, or has to look at it before the next run.
+fn doubt(end: &Result<RunEnd, RunError>) -> Option<String> {
+    match end {
+        Ok(RunEnd::Tripped(trip)) if trip.reaction == Reaction::Latch => Some(trip.reason.clone()),
+        Err(error) if error.leaves_doubt() => Some(error.to_string()),
+        _ => None,
+    }
+}
+
+/// Gives the rig back, latched where it is in doubt.
+fn give_back(claim: Option<Claim>, doubt: Option<String>, run: &Path) -> Result<(), SessionError> {
+    let Some(claim) = claim else { return Ok(()) };
+    if let Some(reason) = doubt {
+        claim.latch(&Latch { reason, run: run.to_owned() })?;
+    }
+    claim.release()
+}
+
+fn owner(run: &Path, started: &str) -> Owner {
+    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    Owner {
+        process: std::process::id(),
+        host: host.trim().to_owned(),
+        run: std::path::absolute(run).unwrap_or_else(|_| run.to_owned()),
+        started: started.to_owned(),
+    }
+}
+
+/// Where results go: nothing is written over.
+fn results_directory(run: &Path, parts: usize) -> Result<PathBuf, SessionError> {
+    if !run.join(run_directory::POINTS).exists() && !run.join(run_directory::REPORT).exists() {
+        return Ok(run.to_owned());
+    }
+    let directory = run.join(format!("results-{parts}"));
+    std::fs::create_dir_all(&directory).map_err(SessionError::file("create", &directory))?;
+    Ok(directory)
 }
 
 /// How a run ended, in a sentence for its report.

@@ -17,6 +17,8 @@ pub const CAMPAIGN: &str = "campaign.yaml";
 pub const SEQUENCE: &str = "sequence.rhai";
 /// Identified points.
 pub const POINTS: &str = "points.json";
+/// What of the run is safely recorded.
+pub const JOURNAL: &str = "journal.jsonl";
 /// The test report.
 pub const REPORT: &str = "report.md";
 

@@ -115,6 +115,20 @@ impl StepSource for ScriptedSteps {
         Ok(())
     }
 
+    /// The script learns that there is no result.
+    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        let Some(step) = self.now.take() else { return Ok(()) };
+        self.finished = Some(StepResult {
+            number: step.index + 1,
+            target: step.to,
+            from: step.from,
+            start_s: marker.start_s,
+            end_s: marker.end_s,
+            identified: None,
+        });
+        Ok(())
+    }
+
     fn take_notes(&mut self) -> Vec<String> {
         self.script.take_notes()
     }

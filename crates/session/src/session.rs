@@ -13,6 +13,8 @@ pub struct Session<'a> {
     pub on_event: OnEvent<'a>,
     /// Set from outside to stop at the next sample; the rig is brought into its safe state.
     pub stop: &'a AtomicBool,
+    /// Set from outside to stop a run at the end of its step.
+    pub stop_after_step: &'a AtomicBool,
 }
 
 /// Nobody stops a session that was opened without a flag.
@@ -21,7 +23,7 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 impl<'a> Session<'a> {
     /// A session that nobody looks at and nobody stops.
     pub fn new(registry: &'a Registry) -> Self {
-        Session { registry, on_event: &|_| {}, stop: &NEVER }
+        Session { registry, on_event: &|_| {}, stop: &NEVER, stop_after_step: &NEVER }
     }
 
     /// Tells whoever looks on.

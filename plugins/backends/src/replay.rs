@@ -3,7 +3,7 @@
 use crate::setpoint_limits;
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Element, ElementColumn, Event, EventKind, Group,
-    Recording, RigDescription, RigMode, SampleBatch, Series, Setpoints,
+    Recording, RigDescription, RigMode, SafeTrajectory, SampleBatch, Series, Setpoints,
 };
 use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::nominal_rig::NominalRig;
@@ -164,6 +164,11 @@ impl Backend for ReplayBackend {
             channels: self.columns.iter().map(|column| column.channel).collect(),
             sample_rate_hz: sample_rate_hz(&self.t_s),
             simulated_time: true,
+            controls: false,
+            exclusive: None,
+            needs_guarded: Vec::new(),
+            accepts: Some(setpoint_limits::ACCEPTED),
+            safe: SafeTrajectory::default(),
         }
     }
 
@@ -176,7 +181,7 @@ impl Backend for ReplayBackend {
     }
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
-        setpoint_limits::check(setpoints)?;
+        setpoint_limits::ACCEPTED.check(setpoints)?;
         self.need_armed("set")?;
         self.pending = Some(*setpoints);
         Ok(())
@@ -219,6 +224,7 @@ impl Backend for ReplayBackend {
                     values: column.values[start..end].to_vec(),
                 })
                 .collect(),
+            provenance: Vec::new(),
             truth: Vec::new(),
             events,
         })

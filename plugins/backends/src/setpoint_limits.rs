@@ -1,21 +1,11 @@
 //! Setpoints that mean something on a gas stand of turbochargers: what lies outside is a mistake of whoever sends it.
 
-use mapper_core::{BackendError, Setpoints};
+use mapper_core::{SetpointRange, SetpointRanges};
 
-/// Refuses setpoints outside the limits, and those that are not numbers.
-///
-/// # Errors
-/// [`BackendError::SetpointOutOfRange`] for the first one outside.
-pub(crate) fn check(setpoints: &Setpoints) -> Result<(), BackendError> {
-    for (quantity, value, unit, low, high) in [
-        ("P3", setpoints.p3_pa, "Pa", 50e3, 2e6),
-        ("T3", setpoints.t3_k, "K", 250.0, 1400.0),
-        ("valve opening", setpoints.valve_opening_ratio, "1", 0.05, 2.5),
-        ("T_oil", setpoints.oil_temperature_k, "K", 250.0, 450.0),
-    ] {
-        if !(low..=high).contains(&value) {
-            return Err(BackendError::SetpointOutOfRange { quantity, value, unit, low, high });
-        }
-    }
-    Ok(())
-}
+/// What the backends here accept.
+pub(crate) const ACCEPTED: SetpointRanges = SetpointRanges {
+    p3_pa: SetpointRange { low: 50e3, high: 2e6 },
+    t3_k: SetpointRange { low: 250.0, high: 1400.0 },
+    valve_opening_ratio: SetpointRange { low: 0.05, high: 2.5 },
+    oil_temperature_k: SetpointRange { low: 250.0, high: 450.0 },
+};

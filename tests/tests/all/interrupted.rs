@@ -25,7 +25,7 @@ const SOME_STEPS_BYTES: u64 = 20_000_000;
 const LONGEST_SILENCE: Duration = Duration::from_secs(120);
 
 /// A run that is killed where the test ends before it does.
-struct Running {
+pub(crate) struct Running {
     child: Option<Child>,
     runs: PathBuf,
     /// Ends the news where it is dropped.
@@ -35,6 +35,11 @@ struct Running {
 
 impl Running {
     fn start(campaign: &CampaignFile) -> Self {
+        Running::start_with(campaign, &[])
+    }
+
+    /// Starts a run with further options, with locks and latches of its own.
+    pub(crate) fn start_with(campaign: &CampaignFile, more: &[&str]) -> Self {
         // Watched before it starts, so that no news is missed.
         let (tell, news) = channel();
         let mut watcher = notify::recommended_watcher(tell).unwrap();
@@ -42,6 +47,8 @@ impl Running {
         let child = mapper_command(["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref()])
             .arg("--out")
             .arg(campaign.runs())
+            .args(more)
+            .env("MAPPER_STATE_DIR", campaign.directory().join("states"))
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -50,7 +57,7 @@ impl Running {
     }
 
     /// Waits until the recording has grown to `bytes`; the run must still be going on.
-    fn recorded(&mut self, bytes: u64) -> PathBuf {
+    pub(crate) fn recorded(&mut self, bytes: u64) -> PathBuf {
         loop {
             self.news.recv_timeout(LONGEST_SILENCE).expect("the recording grows").unwrap();
             let ended = self.child.as_mut().unwrap().try_wait().unwrap();
@@ -65,19 +72,26 @@ impl Running {
         }
     }
 
-    fn interrupt(&self) {
-        let id = self.child.as_ref().unwrap().id().to_string();
-        assert!(Command::new("sh").args(["-c", "kill -INT \"$1\"", "sh", &id]).status().unwrap().success());
+    /// Number of the process.
+    pub(crate) fn id(&self) -> u32 {
+        self.child.as_ref().unwrap().id()
     }
 
-    fn kill(mut self) {
+    /// Sends a signal, e.g. `INT`.
+    pub(crate) fn signal(&self, name: &str) {
+        let id = self.id().to_string();
+        let status = Command::new("sh").args(["-c", "kill -\"$1\" \"$2\"", "sh", name, &id]).status();
+        assert!(status.unwrap().success());
+    }
+
+    pub(crate) fn kill(mut self) {
         let mut child = self.child.take().unwrap();
         child.kill().unwrap();
         let status = child.wait().unwrap();
         assert_eq!(status.code(), None, "the run ended by itself: {status}");
     }
 
-    fn finished(mut self) -> Finished {
+    pub(crate) fn finished(mut self) -> Finished {
         self.child.take().unwrap().wait_with_output().unwrap().into()
     }
 }
@@ -138,7 +152,7 @@ fn one_interrupt_makes_the_rig_safe_and_keeps_what_is_done() {
     let campaign = CampaignFile::shipped_with(LONG);
     let mut running = Running::start(&campaign);
     let recording = running.recorded(SOME_STEPS_BYTES);
-    running.interrupt();
+    running.signal("INT");
     let finished = running.finished().exits(130);
     assert!(finished.stderr.contains("stopped by the operator"), "{}", finished.stderr);
     let result = finished.json();

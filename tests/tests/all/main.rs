@@ -16,6 +16,7 @@ mod interrupted;
 mod logs;
 mod maps;
 mod mistakes;
+mod night;
 mod nightly;
 mod pages;
 mod pipes;

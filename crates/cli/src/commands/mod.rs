@@ -8,6 +8,8 @@ subcommands! { Command:
     schema::Schema,
     plan::Plan,
     run::Run,
+    rig::Rig,
+    backend::Backend,
     identify::Identify,
     report::Report,
     transient::Transient,

@@ -41,7 +41,7 @@ impl Nightly {
         let mut history = History::open(&path).map_err(SessionError::from)?;
         let (registry, stop, progress) = (registry::registry(), interrupt::stop_flag()?, Progress::new());
         let on_event = |event: &_| progress.show(event);
-        let session = Session { registry: &registry, on_event: &on_event, stop: &stop };
+        let session = Session { on_event: &on_event, stop: &stop, ..Session::new(&registry) };
         let started = jiff::Timestamp::now();
         let runs = session.night(&prepared, self.jobs);
         progress.clear();

@@ -4,12 +4,15 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::results_text::results_text;
-use crate::{interrupt, output, registry};
+use crate::wall::SystemWall;
+use crate::{interrupt, output, registry, rig_states};
 use clap::Args;
 use mapper_campaign::Campaign;
-use mapper_core::Verdict;
+use mapper_core::{PacedClock, Verdict};
 use mapper_report::plan_text;
-use mapper_session::{Ended, PreparedRun, RunOutcome, RunRequest, Session, SessionError, soak_s};
+use mapper_session::{
+    BrokenOff, Ended, PreparedRun, RunOutcome, RunRequest, Session, SessionError, run_directory, soak_s,
+};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -17,7 +20,11 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 pub struct Run {
     /// Campaign file (YAML)
-    pub campaign: PathBuf,
+    #[arg(required_unless_present = "resume")]
+    pub campaign: Option<PathBuf>,
+    /// Go on with a run that was broken off, from its directory; refused when machine, campaign, plan or backend are others
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["plan", "out", "dry_run"])]
+    pub resume: Option<PathBuf>,
     /// Run this stored plan instead of making one; refused when campaign or model have changed since
     #[arg(long, value_name = "FILE")]
     pub plan: Option<PathBuf>,
@@ -27,6 +34,9 @@ pub struct Run {
     /// Directory for the run's own directory, instead of the campaign's `outputs.directory`
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Run the rig's time by the clock: 1 is real time, 10 ten times as fast; as fast as it goes if it is left out and the rig is simulated
+    #[arg(long, value_name = "FACTOR", hide_short_help = true)]
+    pub pace: Option<f64>,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -35,15 +45,27 @@ pub struct Run {
 impl Run {
     /// Plans, runs, records, identifies, assembles, reports.
     pub fn run(&self) -> Result<(), Failure> {
-        let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
-        let campaign_text = std::fs::read_to_string(&self.campaign).map_err(|error| {
-            Failure::new(Code::Failure, format!("failed to read {}: {error}", self.campaign.display()))
+        let kept = self.resume.as_ref().map(|run| run.join(run_directory::CAMPAIGN));
+        let Some(file) = self.campaign.clone().or(kept) else { return Ok(()) };
+        let campaign = mapper_campaign::load(&file).map_err(Failure::of_campaign)?;
+        let campaign_text = std::fs::read_to_string(&file).map_err(|error| {
+            Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display()))
         })?;
+        let resume = self.resume.as_deref().map(BrokenOff::read).transpose()?;
+        if self.pace.is_some_and(|pace| !(pace.is_finite() && pace > 0.0)) {
+            return Err(Failure::new(Code::BadInput, "--pace takes a number above 0"));
+        }
         let parent = self.out.clone().unwrap_or_else(|| PathBuf::from(&campaign.outputs.directory));
         let started = jiff::Timestamp::now();
-        let (registry, stop, progress) = (registry::registry(), interrupt::stop_flag()?, Progress::new());
+        let (registry, stop, progress) = (registry::registry(), interrupt::run_stop()?, Progress::new());
+        let states = rig_states::directory(None);
         let on_event = |event: &_| progress.show(event);
-        let session = Session { registry: &registry, on_event: &on_event, stop: &stop };
+        let session = Session {
+            registry: &registry,
+            on_event: &on_event,
+            stop: &stop.now,
+            stop_after_step: &stop.after_step,
+        };
         let request = RunRequest {
             campaign: &campaign,
             campaign_text: &campaign_text,
@@ -51,13 +73,19 @@ impl Run {
             parent: &parent,
             started_ns: u64::try_from(started.as_nanosecond()).unwrap_or(0),
             started_name: &started.strftime("%Y%m%dT%H%M%SZ").to_string(),
+            rig_states: Some(&states),
+            resume,
         };
-        let prepared =
-            session.prepare(request).map_err(|error| Failure::in_campaign(error, &self.campaign))?;
+        let prepared = session.prepare(request).map_err(|error| Failure::in_campaign(error, &file))?;
         if self.dry_run {
             return self.dry(&campaign, &prepared, &parent);
         }
-        let outcome = prepared.run(&session)?;
+        let outcome = match self.pace.or((!prepared.rig().simulated_time).then_some(1.0)) {
+            Some(pace) => {
+                prepared.run_paced(&session, &mut PacedClock::new(SystemWall::new(), pace), true)?
+            }
+            None => prepared.run(&session)?,
+        };
         progress.clear();
         self.tell(&campaign, outcome)
     }

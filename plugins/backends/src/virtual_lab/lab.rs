@@ -10,8 +10,8 @@ use super::sensor::Sensor;
 use super::settings::{LabSettings, Start};
 use crate::setpoint_limits;
 use mapper_core::{
-    Backend, BackendError, CHANNELS, Channel, Event, EventKind, RigDescription, RigMode, SampleBatch,
-    Setpoints,
+    Backend, BackendError, CHANNELS, Channel, Event, EventKind, GuardName, RigDescription, RigMode,
+    SafeTrajectory, SampleBatch, Setpoints,
 };
 use mapper_physics::inputs::Inputs;
 use mapper_physics::instruments::ChannelFollower;
@@ -98,6 +98,12 @@ impl Backend for VirtualLab {
             channels: channels(),
             sample_rate_hz: self.settings.sample_rate_hz,
             simulated_time: true,
+            controls: true,
+            exclusive: self.settings.rig.clone(),
+            needs_guarded: vec![GuardName::Overspeed, GuardName::TurbineInletPressure],
+            accepts: Some(setpoint_limits::ACCEPTED),
+            // As fast as a usual air supply closes.
+            safe: SafeTrajectory { p3_slew_pa_s: Some(100e3), valve_opening_ratio: 1.0, within_s: 20.0 },
         }
     }
 
@@ -153,7 +159,7 @@ impl Backend for VirtualLab {
     }
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
-        setpoint_limits::check(setpoints)?;
+        setpoint_limits::ACCEPTED.check(setpoints)?;
         let (settings, armed) = self.armed("set")?;
         armed.commands = Some(*setpoints);
         armed.wanted = if armed.tripped { RigMode::Standstill } else { setpoints.mode };
@@ -399,5 +405,9 @@ impl Armed {
             self.inputs.p3.set(now_s, self.inputs.cell.p4_pa * LOWEST_EXPANSION_RATIO);
         }
         self.pending_events.push(Event { t_s, kind, message });
+        if crossing == Crossing::OverspeedEntered {
+            let message = "the rig has tripped by itself: overspeed".to_owned();
+            self.pending_events.push(Event { t_s, kind: EventKind::RigTripped, message });
+        }
     }
 }

@@ -121,6 +121,7 @@ impl SampleCollector {
             first_sequence: self.first_sequence,
             columns: columns.map(|(row, values)| ChannelColumn { channel: row.channel, values }).collect(),
             elements: self.elements,
+            provenance: Vec::new(),
             truth: self.truth.finish(),
             t_s: self.t_s,
             events,

@@ -33,6 +33,8 @@ pub struct LabSettings {
     pub weather: Weather,
     /// T1, P1, P4 and ambient temperature hold throughout but for the weather; the other values are the state at arming.
     pub cell: BoundaryConditions,
+    /// Name of the rig that this lab stands for, which no two runs may have at once; `None`: each run has its own.
+    pub rig: Option<String>,
     /// Sample rate, Hz.
     pub sample_rate_hz: f64,
     /// State at arming.
@@ -82,6 +84,7 @@ impl LabSettings {
             instruments: Instruments::default(),
             weather: Weather::default(),
             cell,
+            rig: None,
             sample_rate_hz: 10.0,
             start: Start::Settled,
             p3_actuator: at_once,

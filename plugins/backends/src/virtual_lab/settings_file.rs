@@ -28,6 +28,8 @@ use std::collections::BTreeMap;
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct SettingsFile {
+    /// Name of the rig that the lab stands for, so that locks and latches can be rehearsed; none where left out.
+    rig: Option<String>,
     /// Samples per second; 10 Hz where left out.
     sample_rate: Option<Quantity<Frequency>>,
     /// `standstill` (cold, the default) or `settled` (long at the first setpoints).
@@ -226,6 +228,7 @@ pub fn read_settings(
             WeatherName::Wandering => Weather::drawn(nominal.seed),
         },
         cell: nominal.boundary,
+        rig: file.rig.clone(),
         sample_rate_hz,
         start: match file.start {
             StartName::Standstill => Start::Standstill,

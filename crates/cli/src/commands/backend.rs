@@ -1,0 +1,105 @@
+//! `mapper backend`.
+
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::{output, registry};
+use clap::{Args, Subcommand};
+use mapper_conformance::{Candidate, RULES};
+use mapper_core::{RigMode, Setpoints};
+use mapper_session::nominal_model;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// List the backends, or hold one against the rules that every backend keeps
+#[derive(Debug, Args)]
+pub struct Backend {
+    /// What to do.
+    #[command(subcommand)]
+    command: BackendCommand,
+    /// Print one JSON object on standard output
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+/// What to do with backends.
+#[derive(Debug, Subcommand)]
+enum BackendCommand {
+    /// List the backends that campaigns may name
+    List,
+    /// Hold the backend of a campaign against every rule of the seam. It is armed, told setpoints and made safe: never on a rig with a machine
+    Check {
+        /// Name of the backend
+        name: String,
+        /// Campaign whose machine, limits and backend settings are used
+        #[arg(long, value_name = "FILE")]
+        campaign: PathBuf,
+    },
+}
+
+impl Backend {
+    /// Lists or checks.
+    pub fn run(&self) -> Result<(), Failure> {
+        match &self.command {
+            BackendCommand::List => self.list(),
+            BackendCommand::Check { name, campaign } => self.check(name, campaign),
+        }
+    }
+
+    fn list(&self) -> Result<(), Failure> {
+        let backends = registry::registry().backends;
+        if self.json {
+            let all: Vec<_> = backends
+                .iter()
+                .map(|plugin| json!({"name": plugin.name, "summary": plugin.summary}))
+                .collect();
+            return output::print_json(&json!({ "backends": all }));
+        }
+        let lines = backends.iter().map(|plugin| format!("{:12} {}\n", plugin.name, plugin.summary));
+        output::print(&lines.collect::<String>())
+    }
+
+    fn check(&self, name: &str, path: &std::path::Path) -> Result<(), Failure> {
+        let mut campaign = mapper_campaign::load(path).map_err(Failure::of_campaign)?;
+        if campaign.backend.name != name {
+            campaign.backend =
+                mapper_campaign::campaign::BackendChoice { name: name.to_owned(), settings: json!({}) };
+        }
+        let (registry, model) = (registry::registry(), nominal_model(&campaign)?);
+        // Mistakes in the settings are told as those of a campaign.
+        registry.make_backend(&campaign, &model).map_err(|error| Failure::in_campaign(error, path))?;
+        let make = || match registry.make_backend(&campaign, &model) {
+            Ok(backend) => Ok(backend),
+            Err(mapper_session::SessionError::Backend(error)) => Err(error),
+            Err(error) => Err(mapper_core::BackendError::Lost { t_s: 0.0, source: Box::new(error) }),
+        };
+        let limits = &campaign.limits;
+        let setpoints = Setpoints {
+            mode: RigMode::Running,
+            // A slow machine, whatever it is.
+            p3_pa: limits.p3_min_pa + 0.1 * (limits.p3_max_pa - limits.p3_min_pa),
+            t3_k: campaign.boundary.t3_k,
+            valve_opening_ratio: 1.0,
+            oil_temperature_k: campaign.boundary.oil_temperature_k,
+        };
+        let candidate = Candidate { name, make: &make, setpoints, lasts_s: None };
+        let found: Vec<(&str, Result<(), String>)> =
+            RULES.iter().map(|(rule, check)| (*rule, check(&candidate))).collect();
+        let broken = found.iter().filter(|(_, kept)| kept.is_err()).count();
+        if self.json {
+            let rules = found.iter().map(
+                |(rule, kept)| json!({"rule": rule, "kept": kept.is_ok(), "found": kept.as_ref().err()}),
+            );
+            output::print_json(&json!({"backend": name, "rules": rules.collect::<Vec<_>>()}))?;
+        } else {
+            let lines = found.iter().map(|(rule, kept)| match kept {
+                Ok(()) => format!("kept    {rule}\n"),
+                Err(found) => format!("BROKEN  {rule}: {found}\n"),
+            });
+            output::print(&lines.collect::<String>())?;
+        }
+        match broken {
+            0 => Ok(()),
+            _ => Err(Failure::new(Code::Rig, format!("`{name}` breaks {broken} of {} rules", RULES.len()))),
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! `mapper rig`.
+
+use crate::failure::Failure;
+use crate::{output, rig_states};
+use clap::{Args, Subcommand};
+use mapper_session::{RigStates, RigStatus};
+use std::path::PathBuf;
+
+/// Look at the lock and the latch of a rig, and acknowledge that it is safe to be run again
+#[derive(Debug, Args)]
+pub struct Rig {
+    /// What to do.
+    #[command(subcommand)]
+    command: RigCommand,
+    /// Directory of the locks and latches; that of the user if none is given
+    #[arg(long, value_name = "DIR", global = true)]
+    pub states: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+/// What to do with a rig.
+#[derive(Debug, Subcommand)]
+enum RigCommand {
+    /// Say who has the rig, and why it is latched
+    Status {
+        /// Name of the rig, as its backend says it
+        rig: String,
+    },
+    /// Say that somebody has looked at the rig: the next run may begin
+    Acknowledge {
+        /// Name of the rig, as its backend says it
+        rig: String,
+    },
+}
+
+impl Rig {
+    /// Tells or clears the state of a rig.
+    pub fn run(&self) -> Result<(), Failure> {
+        let states = RigStates::new(&rig_states::directory(self.states.as_deref()));
+        let (status, cleared) = match &self.command {
+            RigCommand::Status { rig } => (states.status(rig)?, false),
+            RigCommand::Acknowledge { rig } => (states.acknowledge(rig)?, true),
+        };
+        if self.json {
+            return output::print_json(&status);
+        }
+        output::print(&text(&status, cleared))
+    }
+}
+
+fn text(status: &RigStatus, cleared: bool) -> String {
+    let mut lines = Vec::new();
+    match (&status.owner, status.in_use) {
+        (Some(owner), true) => lines.push(format!("in use by {owner}")),
+        (Some(owner), false) => lines.push(format!("left by {owner}, which ended without making it safe")),
+        (None, _) => lines.push("nobody has it".to_owned()),
+    }
+    if let Some(latch) = &status.latch {
+        lines.push(format!("latched since the run {}: {}", latch.run.display(), latch.reason));
+    }
+    if cleared {
+        lines.push("acknowledged: the next run may begin".to_owned());
+    }
+    lines.iter().map(|line| format!("{}: {line}\n", status.rig)).collect()
+}

@@ -1,0 +1,26 @@
+//! The clock on the wall, for runs in real time.
+
+use mapper_core::Wall;
+use std::time::{Duration, Instant};
+
+/// The computer's monotonic clock.
+pub struct SystemWall(Instant);
+
+impl SystemWall {
+    /// Begins now.
+    pub fn new() -> Self {
+        SystemWall(Instant::now())
+    }
+}
+
+impl Wall for SystemWall {
+    fn now_s(&self) -> f64 {
+        self.0.elapsed().as_secs_f64()
+    }
+
+    fn wait_s(&self, duration_s: f64) {
+        if let Ok(duration) = Duration::try_from_secs_f64(duration_s) {
+            std::thread::sleep(duration);
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! A backend that misbehaves on demand.
+
+use mapper_core::{
+    Backend, BackendError, Channel, Event, EventKind, Provenance, Quality, RigDescription, RigMode,
+    SampleBatch, Setpoints,
+};
+
+/// What goes wrong, from its time on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Fault {
+    /// A sensor reads the same to the last bit.
+    Frozen(Channel),
+    /// A sensor reads NaN.
+    Nan(Channel),
+    /// A sensor reads this.
+    Reads(Channel, f64),
+    /// A channel is gone.
+    Absent(Channel),
+    /// A sensor's readings are bad by the rig's own word.
+    Bad(Channel),
+    /// A sensor's readings are as old as this fault.
+    Old(Channel),
+    /// No samples for so long, s; the connection is alive. They are gone.
+    Mute(f64),
+    /// Samples that are held back for so long, s, and come together then.
+    Late(f64),
+    /// A batch comes twice.
+    Doubled,
+    /// Samples of a batch in the wrong order.
+    Reordered,
+    /// Times go back by so much, s.
+    Backward(f64),
+    /// A column has fewer values than there are times.
+    Torn(Channel),
+    /// Setpoints are refused.
+    Refuses,
+    /// Setpoints are taken and not followed.
+    Ignores,
+    /// The rig cuts its air by itself; whether it says so.
+    Trips {
+        /// By an event.
+        says_so: bool,
+    },
+    /// The connection is lost for good.
+    Lost,
+    /// A call panics.
+    Panics,
+    /// Becoming safe fails so many times.
+    NotSafe(usize),
+}
+
+/// A fault of the kit, as a backend's own error.
+#[derive(Debug)]
+struct Demanded(&'static str);
+
+impl std::fmt::Display for Demanded {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.0)
+    }
+}
+
+impl std::error::Error for Demanded {}
+
+/// Another backend, with faults that begin at their times.
+pub struct Misbehaving<B> {
+    inner: B,
+    /// Begin, s of run time, and what.
+    faults: Vec<(f64, Fault)>,
+    now_s: f64,
+    /// The last readings before a sensor froze.
+    held: Vec<(Channel, f64)>,
+    /// What is held back.
+    back: Vec<SampleBatch>,
+    tripped: bool,
+    /// Every safe command that arrived, with the run time of the last poll, s.
+    pub safe_at_s: Vec<f64>,
+    /// Every setpoint that arrived, with the same.
+    pub told: Vec<(f64, Setpoints)>,
+}
+
+impl<B: Backend> Misbehaving<B> {
+    /// `inner` with these faults.
+    pub fn new(inner: B, faults: Vec<(f64, Fault)>) -> Self {
+        Misbehaving {
+            inner,
+            faults,
+            now_s: 0.0,
+            held: Vec::new(),
+            back: Vec::new(),
+            tripped: false,
+            safe_at_s: Vec::new(),
+            told: Vec::new(),
+        }
+    }
+
+    fn active(&self) -> Vec<(f64, Fault)> {
+        self.faults.iter().filter(|(begin_s, _)| *begin_s <= self.now_s).cloned().collect()
+    }
+
+    fn lost(&self) -> BackendError {
+        BackendError::Lost { t_s: self.now_s, source: Box::new(Demanded("the connection is gone")) }
+    }
+
+    /// What a sensor fault makes of a batch.
+    fn on_sensor(&mut self, begin_s: f64, fault: &Fault, batch: &mut SampleBatch) {
+        let (Fault::Frozen(channel)
+        | Fault::Nan(channel)
+        | Fault::Reads(channel, _)
+        | Fault::Absent(channel)
+        | Fault::Bad(channel)
+        | Fault::Old(channel)
+        | Fault::Torn(channel)) = fault
+        else {
+            return;
+        };
+        let samples = batch.t_s.len();
+        match fault {
+            Fault::Absent(_) => batch.columns.retain(|column| column.channel != *channel),
+            Fault::Bad(_) | Fault::Old(_) => batch.provenance.push(Provenance {
+                channel: *channel,
+                source_t_s: if *fault == Fault::Old(*channel) {
+                    vec![begin_s; samples]
+                } else {
+                    batch.t_s.clone()
+                },
+                quality: vec![
+                    if *fault == Fault::Bad(*channel) { Quality::Bad } else { Quality::Good };
+                    samples
+                ],
+            }),
+            _ => {
+                let Some(column) = batch.columns.iter_mut().find(|column| column.channel == *channel) else {
+                    return;
+                };
+                let value = match fault {
+                    Fault::Nan(_) => f64::NAN,
+                    Fault::Reads(_, value) => *value,
+                    Fault::Frozen(_) => match self.held.iter().find(|(held, _)| held == channel) {
+                        Some((_, value)) => *value,
+                        None => {
+                            let value = column.values.first().copied().unwrap_or(f64::NAN);
+                            self.held.push((*channel, value));
+                            value
+                        }
+                    },
+                    _ => {
+                        column.values.pop();
+                        return;
+                    }
+                };
+                column.values.iter_mut().for_each(|reading| *reading = value);
+            }
+        }
+    }
+
+    /// What a fault of the stream makes of a batch. A fault of one batch alone is over with it.
+    fn on_stream(&mut self, begin_s: f64, fault: &Fault, batch: SampleBatch) -> SampleBatch {
+        match fault {
+            Fault::Mute(duration_s) if self.now_s < begin_s + duration_s => SampleBatch::default(),
+            Fault::Late(duration_s) if self.now_s < begin_s + duration_s => {
+                self.back.push(batch);
+                SampleBatch::default()
+            }
+            Fault::Late(_) if !self.back.is_empty() => {
+                let mut all = std::mem::take(&mut self.back).into_iter().chain([batch]);
+                let mut whole = all.next().unwrap_or_default();
+                for more in all {
+                    whole.t_s.extend(more.t_s);
+                    for (column, further) in whole.columns.iter_mut().zip(more.columns) {
+                        column.values.extend(further.values);
+                    }
+                    for (column, further) in whole.truth.iter_mut().zip(more.truth) {
+                        column.values.extend(further.values);
+                    }
+                    whole.events.extend(more.events);
+                }
+                whole
+            }
+            Fault::Reordered => {
+                let mut batch = batch;
+                batch.t_s.reverse();
+                batch
+            }
+            Fault::Backward(by_s) => {
+                let mut batch = batch;
+                batch.t_s.iter_mut().for_each(|t_s| *t_s -= by_s);
+                batch
+            }
+            _ => batch,
+        }
+    }
+}
+
+impl<B: Backend> Backend for Misbehaving<B> {
+    fn describe(&self) -> RigDescription {
+        self.inner.describe()
+    }
+
+    fn arm(&mut self) -> Result<(), BackendError> {
+        self.now_s = 0.0;
+        self.inner.arm()
+    }
+
+    fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
+        self.told.push((self.now_s, *setpoints));
+        for (_, fault) in self.active() {
+            match fault {
+                Fault::Lost => return Err(self.lost()),
+                Fault::Refuses => {
+                    let (quantity, value, unit) = ("P3", setpoints.p3_pa, "Pa");
+                    return Err(BackendError::SetpointOutOfRange {
+                        quantity,
+                        value,
+                        unit,
+                        low: 0.0,
+                        high: 1.0,
+                    });
+                }
+                Fault::Ignores => return Ok(()),
+                Fault::Trips { .. } => {
+                    return self.inner.set(&Setpoints { mode: RigMode::Standstill, ..*setpoints });
+                }
+                _ => {}
+            }
+        }
+        self.inner.set(setpoints)
+    }
+
+    #[allow(clippy::panic, reason = "a panic on demand is what it is for")]
+    fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+        for (_, fault) in self.active() {
+            match fault {
+                Fault::Lost => return Err(self.lost()),
+                Fault::Panics => panic!("a backend that panics on demand"),
+                Fault::Trips { .. } if !self.tripped => self.inner.make_safe()?,
+                _ => {}
+            }
+        }
+        let mut batch = self.inner.poll(until_s)?;
+        self.now_s = self.now_s.max(until_s);
+        for (begin_s, fault) in self.active() {
+            if let Fault::Trips { says_so } = fault {
+                if says_so && !self.tripped {
+                    let message = "the rig has tripped by itself: emergency stop".to_owned();
+                    batch.events.push(Event { t_s: self.now_s, kind: EventKind::RigTripped, message });
+                }
+                self.tripped = true;
+            }
+            self.on_sensor(begin_s, &fault, &mut batch);
+            batch = self.on_stream(begin_s, &fault, batch);
+            if fault == Fault::Doubled && batch.first_sequence > 0 {
+                // As if the one before had come again.
+                batch.first_sequence -= 1;
+            }
+        }
+        Ok(batch)
+    }
+
+    fn make_safe(&mut self) -> Result<(), BackendError> {
+        for (_, fault) in &mut self.faults {
+            if let Fault::NotSafe(left) = fault
+                && *left > 0
+            {
+                *left -= 1;
+                return Err(BackendError::Lost {
+                    t_s: self.now_s,
+                    source: Box::new(Demanded("the valve of the air supply does not answer")),
+                });
+            }
+        }
+        if self.active().iter().any(|(_, fault)| *fault == Fault::Lost) {
+            return Err(self.lost());
+        }
+        self.safe_at_s.push(self.now_s);
+        self.inner.make_safe()
+    }
+
+    fn disarm(&mut self) -> Result<(), BackendError> {
+        self.inner.disarm()
+    }
+}

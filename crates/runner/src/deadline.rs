@@ -1,0 +1,175 @@
+//! A backend whose calls come back in their time, whatever the rig does: each is made on a thread of its own.
+
+use crate::run::words_of;
+use mapper_core::{Backend, BackendError, RigDescription, SampleBatch, Setpoints};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::Duration;
+
+/// A call, as it crosses to the thread of the rig.
+enum Call {
+    Arm,
+    Set(Setpoints),
+    Poll(f64),
+    MakeSafe,
+    Disarm,
+}
+
+/// Number of the call, and what came of it.
+type Answer = (u64, Result<Option<SampleBatch>, BackendError>);
+
+/// Another backend behind deadlines. A call that has not come back is not made again: what follows waits behind it, and fails by
+/// its own deadline until the rig answers. Answers that come too late are thrown away, and the samples in them are missed.
+pub struct Deadlined {
+    description: RigDescription,
+    calls: Sender<(u64, Call)>,
+    answers: Receiver<Answer>,
+    number: u64,
+    limit: Duration,
+}
+
+/// The rig's thread is gone.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Gone(String);
+
+impl Deadlined {
+    /// `backend` with so much time for each call.
+    ///
+    /// # Errors
+    /// [`BackendError::Lost`] where no thread can be started.
+    pub fn new(mut backend: Box<dyn Backend>, limit: Duration) -> Result<Self, BackendError> {
+        let description = backend.describe();
+        let (calls, to_do) = channel::<(u64, Call)>();
+        let (tell, answers) = channel::<Answer>();
+        // Detached on purpose: a call that hangs must not keep the program from ending.
+        std::thread::Builder::new()
+            .name("rig".to_owned())
+            .spawn(move || {
+                for (number, call) in to_do {
+                    let answer = catch_unwind(AssertUnwindSafe(|| match call {
+                        Call::Arm => backend.arm().map(|()| None),
+                        Call::Set(setpoints) => backend.set(&setpoints).map(|()| None),
+                        Call::Poll(until_s) => backend.poll(until_s).map(Some),
+                        Call::MakeSafe => backend.make_safe().map(|()| None),
+                        Call::Disarm => backend.disarm().map(|()| None),
+                    }));
+                    let answer = answer.unwrap_or_else(|panic| {
+                        let source = Box::new(Gone(format!("the backend panicked: {}", words_of(&*panic))));
+                        Err(BackendError::Lost { t_s: 0.0, source })
+                    });
+                    if tell.send((number, answer)).is_err() {
+                        break;
+                    }
+                }
+            })
+            .map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
+        Ok(Deadlined { description, calls, answers, number: 0, limit })
+    }
+
+    fn call(&mut self, name: &'static str, call: Call) -> Result<Option<SampleBatch>, BackendError> {
+        self.number += 1;
+        let gone = || {
+            let source = Box::new(Gone("its thread has ended".to_owned()));
+            BackendError::Lost { t_s: 0.0, source }
+        };
+        self.calls.send((self.number, call)).map_err(|_| gone())?;
+        loop {
+            match self.answers.recv_timeout(self.limit) {
+                // An answer to a call that was given up.
+                Ok((number, _)) if number < self.number => {}
+                Ok((_, answer)) => return answer,
+                Err(RecvTimeoutError::Timeout) => {
+                    return Err(BackendError::Deadline { call: name, limit_s: self.limit.as_secs_f64() });
+                }
+                Err(RecvTimeoutError::Disconnected) => return Err(gone()),
+            }
+        }
+    }
+}
+
+impl Backend for Deadlined {
+    fn describe(&self) -> RigDescription {
+        self.description.clone()
+    }
+
+    fn arm(&mut self) -> Result<(), BackendError> {
+        self.call("arm", Call::Arm).map(drop)
+    }
+
+    fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
+        self.call("set", Call::Set(*setpoints)).map(drop)
+    }
+
+    fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+        self.call("poll", Call::Poll(until_s)).map(Option::unwrap_or_default)
+    }
+
+    fn make_safe(&mut self) -> Result<(), BackendError> {
+        self.call("make_safe", Call::MakeSafe).map(drop)
+    }
+
+    fn disarm(&mut self) -> Result<(), BackendError> {
+        self.call("disarm", Call::Disarm).map(drop)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{Channel, SafeTrajectory};
+    use std::sync::Mutex;
+
+    /// Answers nothing to a poll before it is told to go on.
+    struct Hangs(Mutex<Receiver<()>>);
+
+    impl Backend for Hangs {
+        fn describe(&self) -> RigDescription {
+            RigDescription {
+                backend: "hangs".to_owned(),
+                version: "1".to_owned(),
+                channels: vec![Channel::T2],
+                sample_rate_hz: 10.0,
+                simulated_time: false,
+                controls: true,
+                exclusive: None,
+                needs_guarded: Vec::new(),
+                accepts: None,
+                safe: SafeTrajectory::default(),
+            }
+        }
+        fn arm(&mut self) -> Result<(), BackendError> {
+            Ok(())
+        }
+        fn set(&mut self, _: &Setpoints) -> Result<(), BackendError> {
+            Ok(())
+        }
+        fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+            self.0.lock().unwrap().recv().unwrap();
+            Ok(SampleBatch { t_s: vec![until_s], ..SampleBatch::default() })
+        }
+        fn make_safe(&mut self) -> Result<(), BackendError> {
+            Ok(())
+        }
+        fn disarm(&mut self) -> Result<(), BackendError> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_rig_that_hangs_is_given_up_and_late_answers_are_not_mixed_up() {
+        let (go, going) = channel();
+        let mut rig = Deadlined::new(Box::new(Hangs(Mutex::new(going))), Duration::from_millis(20)).unwrap();
+        rig.arm().unwrap();
+        go.send(()).unwrap();
+        assert_eq!(rig.poll(1.0).unwrap().t_s, [1.0]);
+        assert!(matches!(rig.poll(2.0), Err(BackendError::Deadline { call: "poll", .. })));
+        // It hangs still: nothing comes through, in bounded time.
+        assert!(matches!(rig.make_safe(), Err(BackendError::Deadline { call: "make_safe", .. })));
+        go.send(()).unwrap();
+        go.send(()).unwrap();
+        // Whenever it is back, an answer is that to the call that was made.
+        let answer = (0..1000).find_map(|_| rig.poll(3.0).ok().inspect(|_| go.send(()).unwrap_or(())));
+        assert_eq!(answer.unwrap().t_s, [3.0]);
+    }
+}

@@ -1,0 +1,299 @@
+//! The guard over one channel: value, change, age, quality, and whether it moves at all.
+
+use crate::guard::{Guard, Told, Trip};
+use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, readable};
+use std::collections::VecDeque;
+
+/// A violation that goes on after it has tripped trips again after so long, s.
+const AGAIN_S: f64 = 10.0;
+/// So near a bound, as a share of it, the rig is asked sample by sample.
+const NEAR_RATIO: f64 = 0.03;
+/// Time over which the slope is taken, s.
+const SLOPE_S: f64 = 0.5;
+/// Readings of which a change is made are at least so far apart, as a share of its time: no rig is too fast for memory.
+const CHANGE_RESOLUTION_RATIO: f64 = 1e-3;
+
+/// See [`SignalGuard`].
+#[derive(Debug, Clone)]
+pub struct SignalWatch {
+    spec: SignalGuard,
+    /// Time of the last good reading, by its source, s.
+    last_good_s: Option<f64>,
+    /// First time that anything was looked at, s: age counts from there.
+    first_look_s: Option<f64>,
+    last_value: Option<f64>,
+    /// Time and value of a reading some half a second ago, and the change since over its time, unit of the channel per second.
+    anchor: Option<(f64, f64)>,
+    slope_per_s: f64,
+    /// Since when the value has been beyond a bound, s.
+    beyond_since_s: Option<f64>,
+    /// Not before this time does a violation that goes on trip again, s.
+    quiet_until_s: Option<f64>,
+    /// Times and readings of the change's window.
+    recent: VecDeque<(f64, f64)>,
+    /// Since when the reading has been the same to the bit, s.
+    same_since_s: Option<f64>,
+}
+
+impl SignalWatch {
+    /// A guard by its specification.
+    pub fn new(spec: SignalGuard) -> Self {
+        SignalWatch {
+            spec,
+            last_good_s: None,
+            first_look_s: None,
+            last_value: None,
+            anchor: None,
+            slope_per_s: 0.0,
+            beyond_since_s: None,
+            quiet_until_s: None,
+            recent: VecDeque::new(),
+            same_since_s: None,
+        }
+    }
+
+    fn trip(&mut self, t_s: f64, reaction: Reaction, what: &str) -> Option<Trip> {
+        if self.quiet_until_s.is_some_and(|quiet_s| t_s < quiet_s) {
+            return None;
+        }
+        self.quiet_until_s = Some(t_s + AGAIN_S);
+        let channel = self.spec.channel;
+        let reason = format!("{} ({channel}) {what}", channel.info().description);
+        Some(Trip { t_s, guard: self.spec.name, reaction, reason })
+    }
+
+    /// The bound that a value is beyond, in words.
+    fn beyond(&self, value: f64, running: bool, slack: f64) -> Option<String> {
+        let unit = self.spec.channel.unit();
+        match (self.spec.above, self.spec.below) {
+            (Some(high), _) if value > high - slack => {
+                Some(format!("is {}, above its limit of {}", readable(value, unit), readable(high, unit)))
+            }
+            (_, Some(low)) if running && value < low + slack => {
+                Some(format!("is {}, below its limit of {}", readable(value, unit), readable(low, unit)))
+            }
+            _ => None,
+        }
+    }
+
+    fn one(&mut self, t_s: f64, value: f64, told: &Told) -> Option<Trip> {
+        // Over a single sample it would be noise.
+        match self.anchor {
+            Some((then_s, then)) if t_s - then_s >= SLOPE_S => {
+                self.slope_per_s = (value - then) / (t_s - then_s);
+                self.anchor = Some((t_s, value));
+            }
+            Some(_) => {}
+            None => self.anchor = Some((t_s, value)),
+        }
+        self.last_good_s = Some(t_s);
+        let same = self.last_value.is_some_and(|before| before.to_bits() == value.to_bits());
+        self.same_since_s = if same { self.same_since_s.or(Some(t_s)) } else { Some(t_s) };
+        self.last_value = Some(value);
+        // Hysteresis: once beyond, it has to come back by more than it went over.
+        let slack = if self.beyond_since_s.is_some() { self.spec.hysteresis } else { 0.0 };
+        if let Some(what) = self.beyond(value, told.running, slack) {
+            let since_s = *self.beyond_since_s.get_or_insert(t_s);
+            // A millionth of a second is what sums of sample times are off.
+            if t_s - since_s >= self.spec.dwell_s - 1e-6 {
+                return self.trip(t_s, self.spec.reaction, &what);
+            }
+        } else {
+            self.beyond_since_s = None;
+        }
+        self.changed(t_s, value).or_else(|| self.frozen(t_s, told))
+    }
+
+    /// A change beyond the largest one.
+    fn changed(&mut self, t_s: f64, value: f64) -> Option<Trip> {
+        let largest = self.spec.change?;
+        while self.recent.front().is_some_and(|(then_s, _)| t_s - then_s > largest.within_s) {
+            self.recent.pop_front();
+        }
+        let (low, high) = self
+            .recent
+            .iter()
+            .fold((value, value), |(low, high), (_, then)| (low.min(*then), high.max(*then)));
+        let apart_s = CHANGE_RESOLUTION_RATIO * largest.within_s;
+        if self.recent.back().is_none_or(|(then_s, _)| t_s - then_s >= apart_s) {
+            self.recent.push_back((t_s, value));
+        }
+        let change = (value - low).max(high - value);
+        if change <= largest.change {
+            return None;
+        }
+        let unit = self.spec.channel.unit();
+        let what = format!(
+            "has changed by {change:.1} {unit} within {:.0} s, more than the {:.1} {unit} allowed",
+            largest.within_s, largest.change
+        );
+        self.trip(t_s, self.spec.reaction, &what)
+    }
+
+    /// A reading that has not moved although the setpoints have.
+    fn frozen(&mut self, t_s: f64, told: &Told) -> Option<Trip> {
+        let (frozen_s, same_s, jumped_s) = (self.spec.frozen_s?, self.same_since_s?, told.jumped_s?);
+        let since_jump_s = t_s - jumped_s;
+        // It has to have been the same since before the jump.
+        if !told.running || since_jump_s < frozen_s || same_s > jumped_s {
+            return None;
+        }
+        let value = readable(self.last_value?, self.spec.channel.unit());
+        let what = format!(
+            "is frozen: {value} to the last bit since {same_s:.1} s, though the setpoints jumped at {jumped_s:.1} s"
+        );
+        self.trip(t_s, self.spec.reaction.max(Reaction::Safe), &what)
+    }
+}
+
+impl Guard for SignalWatch {
+    fn look(&mut self, batch: &SampleBatch, now_s: f64, told: &Told) -> Option<Trip> {
+        let first_s = *self.first_look_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
+        if let Some(values) = batch.column(self.spec.channel) {
+            let provenance = batch.provenance_of(self.spec.channel);
+            let mut found: Option<Trip> = None;
+            for (index, (t_s, value)) in batch.t_s.iter().zip(values).enumerate() {
+                let bad = provenance.is_some_and(|from| from.quality.get(index) == Some(&Quality::Bad));
+                // What a source took long ago, or has not taken anew, is as old as it says.
+                let source_s = provenance.and_then(|from| from.source_t_s.get(index)).copied();
+                let taken_s = source_s.map_or(*t_s, |source_s| source_s.min(*t_s));
+                let new = self.last_good_s.is_none_or(|last_s| taken_s > last_s);
+                if value.is_finite() && taken_s.is_finite() && !bad && new {
+                    let trip = self.one(taken_s, *value, told);
+                    found = found.or(trip);
+                }
+            }
+            if found.is_some() {
+                return found;
+            }
+        }
+        // Silence counts from the first look on, whether samples come or not.
+        let since_s = self.last_good_s.unwrap_or(first_s);
+        if now_s - since_s > self.spec.age_s {
+            let what = format!("has given no good reading since {since_s:.1} s");
+            return self.trip(now_s, self.spec.reaction.max(Reaction::Safe), &what);
+        }
+        None
+    }
+
+    fn is_violated(&self) -> bool {
+        self.beyond_since_s.is_some()
+    }
+
+    fn is_alert(&self) -> bool {
+        let Some(value) = self.last_value else { return false };
+        // Where it will be in a second, and how far away a bound is worth a closer look.
+        let soon = value + self.slope_per_s.max(0.0);
+        self.beyond_since_s.is_some()
+            || self.spec.above.is_some_and(|high| value.max(soon) > high - NEAR_RATIO * high.abs())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{Channel, ChannelColumn, GuardName, LargestChange, Provenance};
+
+    fn spec() -> SignalGuard {
+        SignalGuard {
+            name: GuardName::CompressorOutletTemperature,
+            channel: Channel::T2,
+            above: Some(400.0),
+            below: None,
+            change: None,
+            hysteresis: 2.0,
+            dwell_s: 0.2,
+            age_s: 0.5,
+            frozen_s: None,
+            reaction: Reaction::Hold,
+        }
+    }
+
+    fn batch(first: u64, values: &[f64]) -> SampleBatch {
+        SampleBatch {
+            first_sequence: first,
+            t_s: (0..values.len()).map(|i| (first + i as u64) as f64 * 0.1).collect(),
+            columns: vec![ChannelColumn { channel: Channel::T2, values: values.to_vec() }],
+            ..SampleBatch::default()
+        }
+    }
+
+    fn look(guard: &mut SignalWatch, batch: &SampleBatch, now_s: f64) -> Option<Trip> {
+        guard.look(batch, now_s, &Told { running: true, ..Told::default() })
+    }
+
+    #[test]
+    fn one_noisy_sample_does_not_trip_but_a_dwell_across_batches_does_and_nan_does_not_reset_it() {
+        let mut guard = SignalWatch::new(SignalGuard { hysteresis: 0.0, ..spec() });
+        assert_eq!(look(&mut guard, &batch(0, &[401.0, 399.0, 401.0, f64::NAN]), 0.3), None);
+        assert!(guard.is_violated() && guard.is_alert());
+        let trip = look(&mut guard, &batch(4, &[401.5]), 0.4).unwrap();
+        assert_eq!((trip.t_s, trip.reaction), (0.4, Reaction::Hold));
+        assert!(trip.reason.contains("401.5 K") && trip.reason.contains("400.0 K"), "{}", trip.reason);
+        // It has been said.
+        assert_eq!(look(&mut guard, &batch(5, &[401.5; 5]), 0.9), None);
+    }
+
+    #[test]
+    fn hysteresis_keeps_a_flapping_value_one_violation() {
+        let mut guard = SignalWatch::new(SignalGuard { dwell_s: 0.0, ..spec() });
+        let trips: Vec<Trip> = (0..50)
+            .filter_map(|i| {
+                let value = if i % 2 == 0 { 400.5 } else { 399.5 };
+                look(&mut guard, &batch(i, &[value]), i as f64 * 0.1)
+            })
+            .collect();
+        assert_eq!(trips.len(), 1, "{trips:?}");
+        assert!(guard.is_violated());
+        look(&mut guard, &batch(50, &[397.0]), 5.0);
+        assert!(!guard.is_violated());
+    }
+
+    #[test]
+    fn silence_nan_bad_quality_and_old_sources_are_trips_that_end_the_run() {
+        let nothing = SampleBatch::default();
+        let good = batch(0, &[300.0; 2]);
+        let bad = |source_s: f64, quality| SampleBatch {
+            provenance: vec![Provenance {
+                channel: Channel::T2,
+                source_t_s: vec![source_s; 10],
+                quality: vec![quality; 10],
+            }],
+            ..batch(2, &[300.0; 10])
+        };
+        for (what, later) in [
+            ("an empty batch", nothing.clone()),
+            ("NaN", batch(2, &[f64::NAN; 10])),
+            ("no column", SampleBatch { columns: Vec::new(), ..batch(2, &[300.0; 10]) }),
+            ("bad quality", bad(1.0, Quality::Bad)),
+            ("an old source", bad(0.1, Quality::Good)),
+        ] {
+            let mut guard = SignalWatch::new(spec());
+            assert_eq!(look(&mut guard, &good, 0.1), None, "{what}");
+            let trip = look(&mut guard, &later, 1.1).unwrap_or_else(|| panic!("{what}"));
+            assert_eq!(trip.reaction, Reaction::Safe, "{what}");
+            assert!(trip.reason.contains("no good reading since 0.1 s"), "{what}: {}", trip.reason);
+        }
+        // One that never said anything.
+        let mut guard = SignalWatch::new(spec());
+        assert_eq!(look(&mut guard, &nothing, 0.0), None);
+        assert!(look(&mut guard, &nothing, 0.6).is_some());
+    }
+
+    #[test]
+    fn a_change_and_a_frozen_reading_are_seen() {
+        let change = Some(LargestChange { change: 5.0, within_s: 1.0 });
+        let mut guard = SignalWatch::new(SignalGuard { above: None, change, ..spec() });
+        assert_eq!(look(&mut guard, &batch(0, &[300.0, 301.0, 302.0, 303.0]), 0.3), None);
+        assert!(look(&mut guard, &batch(4, &[306.0]), 0.4).unwrap().reason.contains("6.0 K within 1 s"));
+        let mut guard = SignalWatch::new(SignalGuard { frozen_s: Some(2.0), ..spec() });
+        let told = |jumped_s| Told { running: true, jumped_s: Some(jumped_s), ..Told::default() };
+        // Still without a jump; moved after one; not moved.
+        assert_eq!(guard.look(&batch(0, &[300.0; 100]), 9.9, &told(9.5)), None);
+        let mut moved = guard.clone();
+        assert_eq!(moved.look(&batch(100, &[300.1; 30]), 12.9, &told(9.5)), None);
+        let trip = guard.look(&batch(100, &[300.0; 30]), 12.9, &told(9.5)).unwrap();
+        assert_eq!(trip.reaction, Reaction::Safe);
+        assert!((trip.t_s - 11.5).abs() < 0.11 && trip.reason.contains("frozen"), "{trip:?}");
+    }
+}

@@ -1,0 +1,166 @@
+//! The guard against surge, by what flow and pressures do: no rig says by itself that it surges.
+//!
+//! In deep surge flow and pressure swing at some hertz; before it they swing irregularly and ever more. Looked at each tenth of a
+//! second, both are folded into noise of the same size. What counts is the median size of the second difference of three
+//! looks: it knows nothing of level and slope, and a jump of the operating point is in a few of them alone.
+
+use crate::guard::{Guard, Told, Trip};
+use mapper_core::{Channel, GuardName, SampleBatch, SurgeVariation};
+use mapper_numerics::statistics::median;
+use std::collections::VecDeque;
+
+/// Time between two looks, s.
+const LOOK_S: f64 = 0.1;
+/// Looks that are held against each other: two seconds.
+const LOOKS: usize = 20;
+/// Median size of a second difference of independent normal noise over its standard deviation: 0.6745 sqrt(6).
+const SECOND_DIFFERENCE: f64 = 1.652;
+
+/// See [`SurgeVariation`].
+#[derive(Debug, Clone)]
+pub struct SurgeWatch {
+    spec: SurgeVariation,
+    next_look_s: f64,
+    /// Flow, P2 and P1 of the last looks.
+    looks: VecDeque<[f64; 3]>,
+    since_s: Option<f64>,
+    last_s: f64,
+    said: bool,
+}
+
+impl SurgeWatch {
+    /// A guard by its specification.
+    pub fn new(spec: SurgeVariation) -> Self {
+        SurgeWatch {
+            spec,
+            next_look_s: f64::NEG_INFINITY,
+            looks: VecDeque::new(),
+            since_s: None,
+            last_s: 0.0,
+            said: false,
+        }
+    }
+
+    /// Standard deviation of one of the three over its mean; 0 where it cannot be said.
+    fn variation_ratio(&self, which: usize) -> f64 {
+        let values: Vec<f64> =
+            self.looks.iter().map(|look| look[which]).filter(|value| value.is_finite()).collect();
+        if values.len() < LOOKS / 2 {
+            return 0.0;
+        }
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let second = values.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]).abs());
+        let typical = median(second.collect::<Vec<f64>>().iter()).unwrap_or(0.0) / SECOND_DIFFERENCE;
+        if mean.abs() > 0.0 { typical / mean.abs() } else { 0.0 }
+    }
+
+    fn surges(&self) -> Option<(f64, f64)> {
+        let flow = self.variation_ratio(0);
+        if flow <= self.spec.flow_ratio {
+            return None;
+        }
+        let pressure = self.variation_ratio(1).max(self.variation_ratio(2));
+        (pressure > self.spec.pressure_ratio).then_some((flow, pressure))
+    }
+}
+
+impl Guard for SurgeWatch {
+    fn look(&mut self, batch: &SampleBatch, _: f64, told: &Told) -> Option<Trip> {
+        if !told.running {
+            self.looks.clear();
+            (self.since_s, self.said) = (None, false);
+            return None;
+        }
+        let columns =
+            [Channel::CompressorFlow, Channel::P2, Channel::P1].map(|channel| batch.column(channel));
+        for (index, t_s) in batch.t_s.iter().enumerate() {
+            if *t_s < self.next_look_s - 1e-6 {
+                continue;
+            }
+            (self.next_look_s, self.last_s) = (t_s + LOOK_S, *t_s);
+            let look = columns.map(|column| column.and_then(|values| values.get(index)).copied());
+            self.looks.push_back(look.map(|value| value.unwrap_or(f64::NAN)));
+            if self.looks.len() > LOOKS {
+                self.looks.pop_front();
+            }
+            let Some((flow, pressure)) = self.surges() else {
+                (self.since_s, self.said) = (None, false);
+                continue;
+            };
+            let since_s = *self.since_s.get_or_insert(*t_s);
+            if t_s - since_s > self.spec.dwell_s && !self.said {
+                self.said = true;
+                return Some(Trip {
+                    t_s: *t_s,
+                    guard: GuardName::Surge,
+                    reaction: self.spec.reaction,
+                    reason: format!(
+                        "the compressor surges: its flow has varied by {:.1} % and its pressures by {:.1} % since {since_s:.1} s, \
+                         longer than the {:.1} s allowed",
+                        100.0 * flow,
+                        100.0 * pressure,
+                        self.spec.dwell_s
+                    ),
+                });
+            }
+        }
+        None
+    }
+
+    fn is_violated(&self) -> bool {
+        self.since_s.is_some()
+    }
+
+    fn is_alert(&self) -> bool {
+        // A jump may touch the line: only what goes on is worth a closer look.
+        self.since_s.is_some_and(|since_s| self.last_s - since_s > self.spec.dwell_s - 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{ChannelColumn, Reaction};
+
+    const SPEC: SurgeVariation =
+        SurgeVariation { flow_ratio: 0.05, pressure_ratio: 0.01, dwell_s: 5.0, reaction: Reaction::Safe };
+
+    /// Flow of 0.05 kg/s and P2 of 150 kPa at 100 Hz with these relative courses; when it trips, s.
+    fn trips_at_s(flow: impl Fn(f64) -> f64, p2: impl Fn(f64) -> f64) -> Option<f64> {
+        let mut guard = SurgeWatch::new(SPEC);
+        let told = Told { running: true, ..Told::default() };
+        (0..60).find_map(|second| {
+            let t_s: Vec<f64> = (0..100).map(|i| f64::from(second) + 0.01 * f64::from(i)).collect();
+            let column = |channel, mean: f64, course: &dyn Fn(f64) -> f64| ChannelColumn {
+                channel,
+                values: t_s.iter().map(|t| mean * (1.0 + course(*t))).collect(),
+            };
+            let columns = vec![column(Channel::CompressorFlow, 0.05, &flow), column(Channel::P2, 150e3, &p2)];
+            let batch = SampleBatch { columns, t_s: t_s.clone(), ..SampleBatch::default() };
+            guard.look(&batch, t_s[99], &told).map(|trip| trip.t_s)
+        })
+    }
+
+    /// A surge cycle of 7.3 Hz, 8 % of the flow and 1.6 % of P2, from 10 s on: it has to be seen within the two seconds of the
+    /// looks after the dwell, unless its frequency lies
+    /// within some 2 Hz of a multiple of the 10 Hz of the looks, where folding makes it slow.
+    #[test]
+    fn a_surge_cycle_trips_after_its_dwell() {
+        for hertz in [3.7, 4.3, 7.3, 16.9] {
+            let swing = |t: f64| if t < 10.0 { 0.0 } else { (std::f64::consts::TAU * hertz * t).sin() };
+            let t_s = trips_at_s(|t| 0.08 * swing(t), |t| 0.016 * swing(t)).unwrap_or(f64::NAN);
+            assert!((15.0..17.5).contains(&t_s), "{hertz} Hz: {t_s} s");
+        }
+    }
+
+    #[test]
+    fn jumps_ramps_and_flow_noise_alone_do_not_trip() {
+        let swing = |t: f64| (std::f64::consts::TAU * 7.3 * t).sin();
+        // The operating point jumps by half each ten seconds.
+        let jump = |t: f64| if (t / 10.0) as i64 % 2 == 0 { 0.0 } else { 0.5 };
+        assert_eq!(trips_at_s(jump, jump), None);
+        assert_eq!(trips_at_s(|t| 0.02 * t, |t| 0.02 * t), None);
+        assert_eq!(trips_at_s(|t| 0.2 * swing(t), |_| 0.0), None, "a noisy flow meter");
+        assert_eq!(trips_at_s(|_| 0.0, |t| 0.05 * swing(t)), None, "a pulsating line");
+    }
+}

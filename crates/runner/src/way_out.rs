@@ -1,0 +1,160 @@
+//! The way out when something is wrong: the safe state first, then the records of why.
+
+use crate::guard::Told;
+use crate::run::{Halt, Run, RunEnd, RunError, words_of};
+use mapper_core::{BackendError, Event, EventKind, GuardName, RigMode, SampleBatch, Setpoints};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Time between two setpoints on the way down, s.
+const STEP_S: f64 = 0.1;
+/// How long the rig is still watched after it was made safe, s: the recording shows that it got there.
+const WATCH_S: f64 = 5.0;
+/// A heater that is told this does not heat, K.
+const HEATER_OFF_K: f64 = 293.15;
+/// How often a rig is asked to become safe before it counts as lost.
+const TRIES: usize = 3;
+/// Largest opening of a valve.
+const VALVE_MAX_RATIO: f64 = mapper_core::OperatingPoint::OPENING_MAX_RATIO;
+
+/// The panic of a backend as an answer of it.
+#[derive(Debug, thiserror::Error)]
+#[error("the backend failed: {0}")]
+struct Panicked(String);
+
+impl Run<'_, '_> {
+    /// Makes the rig safe, then tells why. Nothing interrupts it, and it takes a bounded time.
+    pub(crate) fn way_out(&mut self, halt: Halt) -> Result<RunEnd, RunError> {
+        // The first command leaves before anything is written: a disk may be slow.
+        let begun = self.first_command();
+        // A step that did not reach its speed does not count, however long it lasted.
+        let counts = !matches!(&halt, Halt::Tripped(trip, _) if trip.guard == GuardName::Speed);
+        let (end, kind, message, unseen) = match halt {
+            Halt::Interrupted => (
+                Ok(RunEnd::Interrupted { t_s: self.now_s }),
+                EventKind::Interrupted,
+                "stopped by the operator".to_owned(),
+                None,
+            ),
+            Halt::Tripped(trip, unseen) => {
+                let reason = trip.reason.clone();
+                (Ok(RunEnd::Tripped(trip)), EventKind::GuardTripped, reason, unseen)
+            }
+            Halt::Cut(trip) => {
+                let reason = trip.reason.clone();
+                (Ok(RunEnd::Tripped(trip)), EventKind::GuardTripped, reason, None)
+            }
+            Halt::Failed(error) => {
+                let message = error.to_string();
+                (Err(error), EventKind::Note, message, None)
+            }
+        };
+        // The error that ended the run outranks any that telling of it may meet.
+        let told = self.tell_why(unseen.as_deref(), counts, kind, &message);
+        let safe = self.down(begun).and_then(|()| self.cut_air());
+        let told = told.and_then(|()| self.tell_safe(safe.as_ref().err()));
+        match (end, safe) {
+            (Err(error), Err(source)) => Err(RunError::NotSafe { why: error.to_string(), source }),
+            (Ok(_), Err(source)) => Err(RunError::NotSafe { why: message, source }),
+            (Err(error), Ok(())) => Err(error),
+            (Ok(end), Ok(())) => {
+                told?;
+                Ok(end)
+            }
+        }
+    }
+
+    fn tell_why(
+        &mut self,
+        unseen: Option<&SampleBatch>,
+        counts: bool,
+        kind: EventKind,
+        message: &str,
+    ) -> Result<(), RunError> {
+        if let Some(batch) = unseen {
+            self.with.observer.on_batch(batch)?;
+        }
+        match self.open.take() {
+            Some(marker) if counts => self.with.observer.on_step_end(&marker)?,
+            Some(marker) => self.with.observer.on_step_abandoned(&marker)?,
+            None => {}
+        }
+        self.with.observer.on_event(&Event { t_s: self.now_s, kind, message: message.to_owned() })?;
+        Ok(self.pass_notes()?)
+    }
+
+    fn tell_safe(&mut self, failed: Option<&BackendError>) -> Result<(), RunError> {
+        let t_s = self.now_s;
+        if let Some(error) = failed {
+            let message = format!("the rig did not confirm its safe state: {error}");
+            return Ok(self.with.observer.on_event(&Event { t_s, kind: EventKind::Latched, message })?);
+        }
+        let message = "air off, valve open".to_owned();
+        self.with.observer.on_event(&Event { t_s, kind: EventKind::SafeState, message })?;
+        self.with.clock.wait_until(t_s + WATCH_S);
+        // It is safe already: a backend that panics here spoils the last seconds of the recording alone.
+        match catch_unwind(AssertUnwindSafe(|| self.with.backend.poll(t_s + WATCH_S))) {
+            Ok(batch) => Ok(self.with.observer.on_batch(&batch?)?),
+            Err(_) => Ok(()),
+        }
+    }
+
+    /// Setpoints on the way down after `after_s` of it; `None` where the air is to be cut.
+    fn on_the_way(&self, from: &Setpoints, after_s: f64) -> Option<Setpoints> {
+        let safe = &self.protection.safe;
+        let p3_pa = from.p3_pa - safe.p3_slew_pa_s? * after_s;
+        let goes_on = from.mode == RigMode::Running && after_s <= safe.within_s;
+        (goes_on && p3_pa > self.protection.p3_min_pa).then_some(Setpoints {
+            p3_pa,
+            t3_k: HEATER_OFF_K,
+            valve_opening_ratio: from.valve_opening_ratio.max(safe.valve_opening_ratio).min(VALVE_MAX_RATIO),
+            ..*from
+        })
+    }
+
+    /// The first command of the way. What it started from, where it goes on.
+    fn first_command(&mut self) -> Option<Setpoints> {
+        let from = self.sent?;
+        self.told = Told::default();
+        let first = self.on_the_way(&from, STEP_S)?;
+        let sent = catch_unwind(AssertUnwindSafe(|| self.with.backend.set(&first)));
+        matches!(sent, Ok(Ok(()))).then_some(from)
+    }
+
+    /// Takes P3 down. Where anything fails on the way, the air is cut at once.
+    fn down(&mut self, from: Option<Setpoints>) -> Result<(), BackendError> {
+        let Some(from) = from else { return Ok(()) };
+        let steps = (self.protection.safe.within_s / STEP_S).ceil().clamp(0.0, 1e5) as usize;
+        let mut recorded = true;
+        for step in 1..=steps {
+            let next_s = self.now_s + STEP_S;
+            let polled = catch_unwind(AssertUnwindSafe(|| {
+                self.with.clock.wait_until(next_s);
+                self.with.backend.poll(next_s)
+            }));
+            let Ok(Ok(batch)) = polled else { break };
+            self.now_s = next_s;
+            recorded = recorded && self.with.observer.on_batch(&batch).is_ok();
+            let Some(next) = self.on_the_way(&from, STEP_S * (step + 1) as f64) else { break };
+            let sent = catch_unwind(AssertUnwindSafe(|| self.with.backend.set(&next)));
+            if !matches!(sent, Ok(Ok(()))) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Air off, as often as it takes, within reason.
+    fn cut_air(&mut self) -> Result<(), BackendError> {
+        let mut last = Ok(());
+        for _ in 0..TRIES {
+            last = catch_unwind(AssertUnwindSafe(|| self.with.backend.make_safe())).unwrap_or_else(|panic| {
+                let source = Box::new(Panicked(words_of(&*panic)));
+                Err(BackendError::Lost { t_s: self.now_s, source })
+            });
+            if last.is_ok() {
+                break;
+            }
+        }
+        last
+    }
+}

@@ -1,0 +1,287 @@
+//! Every fault that a rig may have, on the virtual lab behind a backend that misbehaves on demand: what the run makes of it, and
+//! that the rig ends safe.
+
+use super::{Notebook, Recorded, plan};
+use mapper_backends::virtual_lab::{LabSettings, SensorErrors, VirtualLab};
+use mapper_conformance::{Fault, Misbehaving};
+use mapper_core::{
+    Channel, EventKind, GuardName, GuardSet, Plan, Reaction, SafeTrajectory, SignalGuard, SpeedBand,
+    SurgeVariation, UnpacedClock,
+};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_runner::{
+    BatchWatch, Guard, PlanSteps, Protection, RigWatch, RunEnd, RunError, Runner, SignalWatch, SurgeWatch,
+};
+use std::sync::atomic::AtomicBool;
+
+/// A fault in the middle of the second step, s.
+const FAULT_S: f64 = 70.0;
+
+/// Two steps of a minute after 10 s of warm-up.
+fn minutes() -> Plan {
+    let mut plan = plan();
+    for (index, step) in plan.steps.iter_mut().enumerate() {
+        (step.dwell_s, step.start_s) = (60.0, 10.0 + 60.0 * index as f64);
+    }
+    plan
+}
+
+fn lab() -> VirtualLab {
+    let noise = |white_sigma| SensorErrors {
+        white_sigma,
+        coloured_sigma: 0.0,
+        coloured_time_constant_s: 1.0,
+        offset: 0.0,
+        gain_ratio: 0.0,
+    };
+    let sensors = [(Channel::ShaftSpeed, noise(30.0)), (Channel::P2, noise(60.0)), (Channel::T2, noise(0.1))];
+    VirtualLab::new(LabSettings {
+        sensors: sensors.into(),
+        ..LabSettings::ideal(Model::nominal(), BoundaryConditions::default())
+    })
+}
+
+fn guard(name: GuardName, channel: Channel, above: Option<f64>) -> SignalGuard {
+    SignalGuard {
+        name,
+        channel,
+        above,
+        below: None,
+        change: None,
+        hysteresis: 0.0,
+        dwell_s: 0.2,
+        age_s: 3.0,
+        // P3 has no noise here, and may stand still.
+        frozen_s: (channel != Channel::P3).then_some(20.0),
+        reaction: Reaction::Safe,
+    }
+}
+
+/// What a campaign guards without a word.
+fn usual() -> GuardSet {
+    GuardSet {
+        signals: vec![
+            guard(GuardName::Overspeed, Channel::ShaftSpeed, Some(180e3)),
+            guard(GuardName::TurbineInletPressure, Channel::P3, Some(400e3)),
+            guard(GuardName::CompressorOutletTemperature, Channel::T2, Some(573.15)),
+            guard(GuardName::Signals, Channel::P2, None),
+        ],
+        surge: Some(SurgeVariation {
+            flow_ratio: 0.05,
+            pressure_ratio: 0.01,
+            dwell_s: 5.0,
+            reaction: Reaction::Safe,
+        }),
+        speed: Some(SpeedBand { band_ratio: 0.05, reaction: Reaction::Safe }),
+    }
+}
+
+struct Night {
+    end: Result<RunEnd, RunError>,
+    notebook: Notebook,
+    rig: Misbehaving<VirtualLab>,
+}
+
+fn night(faults: &[(f64, Fault)], set: &GuardSet) -> Night {
+    let plan = minutes();
+    let mut rig = Misbehaving::new(lab(), faults.to_vec());
+    let mut notebook = Notebook::default();
+    let mut guards: Vec<Box<dyn Guard>> =
+        vec![Box::new(BatchWatch::default()), Box::new(RigWatch::default())];
+    guards.extend(set.signals.iter().map(|spec| Box::new(SignalWatch::new(*spec)) as Box<dyn Guard>));
+    guards.extend(set.surge.map(|spec| Box::new(SurgeWatch::new(spec)) as Box<dyn Guard>));
+    let protection = Protection {
+        safe: SafeTrajectory { p3_slew_pa_s: Some(50e3), valve_opening_ratio: 1.0, within_s: 20.0 },
+        p3_min_pa: 110e3,
+        speed: set.speed,
+        ..Protection::default()
+    };
+    let end = Runner {
+        steps: &mut PlanSteps::new(&plan),
+        backend: &mut rig,
+        clock: &mut UnpacedClock,
+        guards,
+        observer: &mut notebook,
+        speed: None,
+        stop: &AtomicBool::new(false),
+    }
+    .run_under(&protection);
+    Night { end, notebook, rig }
+}
+
+#[test]
+fn without_a_fault_no_guard_has_anything_to_say() {
+    let night = night(&[], &usual());
+    assert_eq!(night.end.unwrap(), RunEnd::Completed);
+    assert_eq!(night.notebook.events, []);
+    assert_eq!(night.rig.safe_at_s, [130.0], "made safe once, at its end");
+}
+
+/// Each trips with its words within its time, the rig is made safe, and the events say so in order. The longest times are a
+/// frozen sensor's, seen 20 s after the jump before it (at 70 s) was not followed, and those of the speed, judged at the end.
+#[test]
+fn every_fault_of_a_rig_ends_the_run_in_the_safe_state() {
+    use Channel::{P2, P3, ShaftSpeed, T2};
+    for (fault, words, at_most_s) in [
+        (Fault::Nan(ShaftSpeed), "(N) has given no good reading", FAULT_S + 4.0),
+        (Fault::Absent(T2), "(T2) has given no good reading", FAULT_S + 4.0),
+        (Fault::Bad(P3), "(P3) has given no good reading", FAULT_S + 4.0),
+        (Fault::Old(P2), "(P2) has given no good reading", FAULT_S + 4.0),
+        (Fault::Mute(1e9), "has given no good reading", FAULT_S + 4.0),
+        (Fault::Late(6.0), "has given no good reading", FAULT_S + 4.0),
+        (Fault::Reads(ShaftSpeed, 181e3), "(N) is 181", FAULT_S + 1.5),
+        (Fault::Reads(P3, 401e3), "(P3) is 401", FAULT_S + 1.5),
+        (Fault::Reads(T2, 600.0), "(T2) is", FAULT_S + 1.5),
+        (Fault::Doubled, "came twice", FAULT_S + 1.5),
+        (Fault::Reordered, "time runs backward", FAULT_S + 1.5),
+        (Fault::Backward(100.0), "time runs backward", FAULT_S + 1.5),
+        (Fault::Torn(T2), "values for", FAULT_S + 1.5),
+        (Fault::Trips { says_so: true }, "tripped by itself", FAULT_S + 1.5),
+        (Fault::Trips { says_so: false }, "no longer drives it", 130.0),
+        (Fault::Ignores, "asked for", 130.0),
+    ] {
+        // Setpoints are ignored from before the jump on.
+        let begin_s = if fault == Fault::Ignores { 60.0 } else { FAULT_S };
+        let night = night(&[(begin_s, fault.clone())], &usual());
+        let end = night.end.unwrap_or_else(|error| panic!("{fault:?}: {error}"));
+        let RunEnd::Tripped(trip) = end else { panic!("{fault:?}: {end:?}") };
+        assert!(trip.reason.contains(words), "{fault:?}: {}", trip.reason);
+        // A fault is in the whole batch of its second.
+        assert!((begin_s - 1.0..=at_most_s).contains(&trip.t_s), "{fault:?}: at {} s", trip.t_s);
+        assert!(!night.rig.safe_at_s.is_empty(), "{fault:?}: the air is still on");
+        let kinds = &night.notebook.events;
+        let place = |kind| kinds.iter().position(|seen| *seen == kind);
+        assert!(place(EventKind::GuardTripped) < place(EventKind::SafeState), "{fault:?}: {kinds:?}");
+    }
+}
+
+/// A sensor that froze before the jump at 70 s has to be seen by 20 s after it, with a second of polling.
+#[test]
+fn a_frozen_sensor_is_seen_after_the_next_jump() {
+    for channel in [Channel::P2, Channel::T2, Channel::ShaftSpeed] {
+        let night = night(&[(40.0, Fault::Frozen(channel))], &usual());
+        let RunEnd::Tripped(trip) = night.end.unwrap() else { panic!("{channel}") };
+        assert!(trip.reason.contains("frozen"), "{}", trip.reason);
+        assert!((90.0..91.5).contains(&trip.t_s), "{channel}: {}", trip.t_s);
+    }
+}
+
+#[test]
+fn a_link_that_is_gone_for_a_second_is_lost_samples_and_one_that_waits_is_nothing() {
+    // The samples of that second are gone, which the numbers of those behind them show.
+    let night_without = night(&[(FAULT_S, Fault::Mute(1.5))], &usual());
+    let RunEnd::Tripped(trip) = night_without.end.unwrap() else { panic!("not seen") };
+    assert!(trip.reason.contains("samples were lost"), "{}", trip.reason);
+    // Held back and handed over whole, nothing is lost.
+    let held = night(&[(FAULT_S, Fault::Late(1.5))], &usual());
+    assert_eq!(held.end.unwrap(), RunEnd::Completed);
+    assert_eq!(held.notebook.samples.len(), 1351);
+}
+
+#[test]
+fn refused_setpoints_and_a_panic_end_safe_and_a_lost_rig_is_in_doubt() {
+    let refused = night(&[(60.0, Fault::Refuses)], &usual());
+    let error = refused.end.unwrap_err();
+    assert!(error.to_string().contains("outside what the rig can do") && !error.leaves_doubt(), "{error}");
+    assert!(!refused.rig.safe_at_s.is_empty());
+    let panicked = night(&[(FAULT_S, Fault::Panics)], &usual());
+    let error = panicked.end.unwrap_err();
+    assert!(matches!(error, RunError::Panicked { .. }) && error.leaves_doubt(), "{error}");
+    assert!(!panicked.rig.safe_at_s.is_empty(), "a panic cuts the air too");
+    let lost = night(&[(FAULT_S, Fault::Lost)], &usual());
+    let error = lost.end.unwrap_err();
+    assert!(matches!(error, RunError::NotSafe { .. }) && error.leaves_doubt(), "{error}");
+    assert!(error.to_string().contains("Cut its air by hand"), "{error}");
+    assert!(lost.notebook.events.contains(&EventKind::Latched));
+}
+
+#[test]
+fn becoming_safe_is_tried_again_and_then_said_loudly() {
+    let nan = (FAULT_S, Fault::Nan(Channel::T2));
+    let twice = night(&[nan.clone(), (0.0, Fault::NotSafe(2))], &usual());
+    assert!(matches!(twice.end, Ok(RunEnd::Tripped(_))));
+    assert_eq!(twice.rig.safe_at_s.len(), 1);
+    let never = night(&[nan, (0.0, Fault::NotSafe(usize::MAX))], &usual());
+    let error = never.end.unwrap_err();
+    assert!(matches!(error, RunError::NotSafe { .. }) && error.leaves_doubt(), "{error}");
+    assert!(error.to_string().contains("(T2) has given no good reading"), "{error}");
+}
+
+/// P3 falls by 50 kPa/s from where it was, each tenth of a second, with the valve open and the heater off, and the air is cut at
+/// the lowest P3.
+#[test]
+fn the_way_down_is_the_declared_one() {
+    let night = night(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &usual());
+    let RunEnd::Tripped(trip) = night.end.unwrap() else { panic!("not seen") };
+    let way: Vec<_> = night.rig.told.iter().filter(|(_, told)| told.t3_k < 300.0).collect();
+    let before = night.rig.told.iter().rev().find(|(_, told)| told.t3_k > 300.0).unwrap().1;
+    let expected = ((before.p3_pa - 110e3) / 5e3).floor() as usize;
+    assert_eq!(way.len(), expected, "from {} Pa", before.p3_pa);
+    // The first command leaves with the poll that has the violation: a simulated rig's, of a second.
+    assert!(way[0].0 - trip.t_s < 1.01, "{} s after {} s", way[0].0, trip.t_s);
+    for (step, (_, told)) in way.iter().enumerate() {
+        assert!((told.p3_pa - (before.p3_pa - 5e3 * (step + 1) as f64)).abs() < 1e-6);
+        assert!(told.valve_opening_ratio >= 1.0 && told.valve_opening_ratio >= before.valve_opening_ratio);
+    }
+    assert!(night.rig.safe_at_s[0] - trip.t_s < 20.0);
+}
+
+#[test]
+fn two_guards_at_once_and_the_graver_has_the_say() {
+    let mut set = usual();
+    set.signals[2].reaction = Reaction::Note;
+    set.signals[0].reaction = Reaction::Latch;
+    let faults =
+        [(FAULT_S, Fault::Reads(Channel::T2, 600.0)), (FAULT_S, Fault::Reads(Channel::ShaftSpeed, 2e5))];
+    let RunEnd::Tripped(trip) = night(&faults, &set).end.unwrap() else { panic!("not seen") };
+    assert_eq!((trip.guard, trip.reaction), (GuardName::Overspeed, Reaction::Latch));
+}
+
+/// What each mild reaction does about a T2 that is too high in the second step: everything the rig measures stays as it is.
+#[test]
+fn mild_reactions_do_what_they_say() {
+    let with = |reaction: Reaction, faults: &[(f64, Fault)]| {
+        let mut set = usual();
+        set.signals[2].reaction = reaction;
+        night(faults, &set)
+    };
+    let high = [(FAULT_S + 5.0, Fault::Reads(Channel::T2, 600.0))];
+    let noted = with(Reaction::Note, &high);
+    assert_eq!(noted.end.unwrap(), RunEnd::Completed);
+    assert!(noted.notebook.events.iter().all(|kind| *kind == EventKind::GuardActed));
+    // Said when it begins, and each ten seconds it goes on.
+    assert!((5..=7).contains(&noted.notebook.events.len()), "{:?}", noted.notebook.events);
+    assert_eq!(noted.notebook.ends.len(), 2);
+
+    let skipped = with(Reaction::SkipStep, &high);
+    assert_eq!(skipped.end.unwrap(), RunEnd::Completed);
+    assert_eq!((skipped.notebook.ends.len(), skipped.notebook.abandoned.len()), (1, 1));
+
+    let again = with(Reaction::SmallerSteps, &high);
+    assert_eq!(again.end.unwrap(), RunEnd::Completed);
+    assert_eq!((again.notebook.starts.len(), again.notebook.abandoned.len()), (3, 2));
+    let told: Vec<f64> = again.rig.told.iter().map(|(_, told)| told.p3_pa).collect();
+    let (low_pa, high_pa) = (told[0], told[2]);
+    for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
+        let piece_pa = low_pa + share * (high_pa - low_pa);
+        assert!(told[3..].iter().any(|p3_pa| (p3_pa - piece_pa).abs() < 1e-6), "{share}: {told:?}");
+    }
+
+    // Held for as long as may be, then it ends.
+    let held = with(Reaction::Hold, &high);
+    let RunEnd::Tripped(trip) = held.end.unwrap() else { panic!("held for ever") };
+    assert!(trip.reason.contains("has held the setpoints for 300 s"), "{}", trip.reason);
+    assert!(trip.t_s < 130.0 + 320.0);
+}
+
+#[test]
+fn what_is_recorded_of_a_fault_is_whole() {
+    let night = night(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &usual());
+    let times: Vec<f64> = night.notebook.samples.iter().map(|(t_s, _)| *t_s).collect();
+    assert!(times.is_sorted_by(|a, b| a < b));
+    // Ten a second, through the violation and the way down.
+    let gaps = times.windows(2).map(|two| two[1] - two[0]);
+    assert!(gaps.into_iter().all(|gap_s| (gap_s - 0.1).abs() < 1e-6));
+    let _: &Recorded = &night.notebook.samples;
+}

@@ -1,0 +1,227 @@
+//! The journal of a run: what it is of, and which steps are safely in the recording. One line of JSON each, so that the last may
+//! be torn and all before it hold.
+
+use crate::SessionError;
+use mapper_campaign::Campaign;
+use mapper_core::{Plan, RigDescription};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Write};
+use std::path::Path;
+
+/// Largest journal that is read, bytes: some hundred thousand steps.
+const READ_MAX: u64 = 16 << 20;
+
+/// What has to be the same for a run to go on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Name of the machine.
+    pub machine: String,
+    /// Its serial number.
+    pub serial_number: Option<String>,
+    /// Hash of the campaign.
+    pub campaign_sha256: String,
+    /// Hash of the nominal model.
+    pub model_sha256: String,
+    /// Hash of the plan.
+    pub plan_sha256: String,
+    /// The backend, and the rig behind it.
+    pub backend: String,
+    /// Hash of the backend's settings.
+    pub settings_sha256: String,
+}
+
+impl Identity {
+    /// Of a run.
+    ///
+    /// # Errors
+    /// [`SessionError::Json`] where the plan cannot be written as JSON.
+    pub fn of(campaign: &Campaign, plan: &Plan, rig: &RigDescription) -> Result<Self, SessionError> {
+        let hash = |text: &str| mapper_planner::sha256_hex(text);
+        let behind = rig.exclusive.as_deref().map(|name| format!(" ({name})")).unwrap_or_default();
+        Ok(Identity {
+            machine: campaign.machine.name.clone(),
+            serial_number: campaign.machine.serial_number.clone(),
+            campaign_sha256: plan.made_from.campaign_sha256.clone(),
+            model_sha256: plan.made_from.model_sha256.clone(),
+            plan_sha256: hash(&serde_json::to_string(plan)?),
+            backend: format!("{} {}{behind}", rig.backend, rig.version),
+            settings_sha256: hash(&campaign.backend.settings.to_string()),
+        })
+    }
+
+    /// What differs, in words.
+    pub fn differences(&self, now: &Identity) -> Vec<&'static str> {
+        [
+            ("the machine", self.machine != now.machine || self.serial_number != now.serial_number),
+            ("the campaign", self.campaign_sha256 != now.campaign_sha256),
+            ("the nominal model", self.model_sha256 != now.model_sha256),
+            ("the plan", self.plan_sha256 != now.plan_sha256),
+            ("the backend", self.backend != now.backend || self.settings_sha256 != now.settings_sha256),
+        ]
+        .into_iter()
+        .filter_map(|(what, differs)| differs.then_some(what))
+        .collect()
+    }
+}
+
+/// One line.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Entry {
+    /// A part of the run begins, with its recording.
+    Part {
+        /// What it is of.
+        identity: Identity,
+        /// Name of its recording, in the directory of the run.
+        recording: String,
+    },
+    /// The soak is over, and in the recording.
+    Soaked,
+    /// A step is over, and in the recording: its index in the plan.
+    StepSaved(usize),
+    /// The run is over, in words.
+    Ended(String),
+}
+
+/// A journal that is being written.
+#[derive(Debug)]
+pub struct Journal {
+    file: File,
+    /// Whether each line goes through to the disk: for rigs that outlive a computer.
+    synced: bool,
+}
+
+impl Journal {
+    /// Opens the journal of a run, at its end.
+    ///
+    /// # Errors
+    /// As the system says.
+    pub fn open(path: &Path, synced: bool) -> std::io::Result<Self> {
+        let mut file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
+        let mut text = Vec::new();
+        (&mut file).take(READ_MAX).read_to_end(&mut text)?;
+        // A line that a kill has torn ends here.
+        if text.last().is_some_and(|last| *last != b'\n') {
+            file.write_all(b"\n")?;
+        }
+        Ok(Journal { file, synced })
+    }
+
+    /// Writes one line.
+    ///
+    /// # Errors
+    /// As the system says.
+    pub fn write(&mut self, entry: &Entry) -> std::io::Result<()> {
+        let mut line = serde_json::to_vec(entry)?;
+        line.push(b'\n');
+        self.file.write_all(&line)?;
+        if self.synced { self.file.sync_data() } else { Ok(()) }
+    }
+}
+
+/// A part of a run, as its journal has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JournalPart {
+    /// What it is of.
+    pub identity: Identity,
+    /// Name of its recording.
+    pub recording: String,
+    /// Whether its soak is in the recording.
+    pub soaked: bool,
+    /// Steps that are in the recording.
+    pub saved: BTreeSet<usize>,
+}
+
+/// The parts of a run. Lines that cannot be read are passed over: a step that is not known to be saved is run again.
+///
+/// # Errors
+/// As the system says.
+pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(READ_MAX).read_to_end(&mut bytes)?;
+    let mut parts: Vec<JournalPart> = Vec::new();
+    for line in bytes.split(|byte| *byte == b'\n') {
+        match (serde_json::from_slice::<Entry>(line), parts.last_mut()) {
+            (Ok(Entry::Part { identity, recording }), _) => {
+                parts.push(JournalPart { identity, recording, soaked: false, saved: BTreeSet::new() });
+            }
+            (Ok(Entry::Soaked), Some(part)) => part.soaked = true,
+            (Ok(Entry::StepSaved(index)), Some(part)) => {
+                part.saved.insert(index);
+            }
+            _ => {}
+        }
+    }
+    Ok(parts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(recording: &str) -> Entry {
+        let text = || "x".to_owned();
+        Entry::Part {
+            identity: Identity {
+                machine: text(),
+                serial_number: None,
+                campaign_sha256: text(),
+                model_sha256: text(),
+                plan_sha256: text(),
+                backend: text(),
+                settings_sha256: text(),
+            },
+            recording: recording.to_owned(),
+        }
+    }
+
+    /// Cut at every byte: what is read is what was written whole, and the journal can be written on.
+    #[test]
+    fn a_journal_cut_anywhere_holds_what_was_written_before() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("journal");
+        let mut journal = Journal::open(&path, false).unwrap();
+        let entries = [
+            part("a"),
+            Entry::Soaked,
+            Entry::StepSaved(0),
+            Entry::StepSaved(1),
+            part("b"),
+            Entry::StepSaved(2),
+        ];
+        let mut ends = vec![0];
+        for entry in &entries {
+            journal.write(entry).unwrap();
+            ends.push(std::fs::metadata(&path).unwrap().len() as usize);
+        }
+        let whole = std::fs::read(&path).unwrap();
+        for cut in 0..=whole.len() {
+            std::fs::write(&path, &whole[..cut]).unwrap();
+            let parts = read_journal(&path).unwrap();
+            // A line counts without its end too: it is whole.
+            let written = ends.iter().filter(|end| **end > 0 && **end <= cut + 1).count();
+            let saved: usize = parts.iter().map(|part| part.saved.len() + usize::from(part.soaked) + 1).sum();
+            assert_eq!(saved, written, "cut at {cut}");
+            Journal::open(&path, false).unwrap().write(&part("c")).unwrap();
+            let more = read_journal(&path).unwrap();
+            assert_eq!(more.last().unwrap().recording, "c");
+            assert_eq!(more.len(), parts.len() + 1);
+        }
+    }
+
+    #[test]
+    fn anything_else_is_no_journal_and_no_panic() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("journal");
+        for bytes in [
+            &b"\xff\xfe\x00"[..],
+            b"{}\n[]\n\"step_saved\"",
+            b"{\"step_saved\": -1}\n{\"step_saved\": 1e400}",
+        ] {
+            std::fs::write(&path, bytes).unwrap();
+            assert_eq!(read_journal(&path).unwrap(), []);
+        }
+    }
+}

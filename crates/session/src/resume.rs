@@ -1,0 +1,144 @@
+//! A run that goes on after it was broken off: what of it holds, and what has to be done again.
+
+use crate::journal::{Identity, JournalPart, read_journal};
+use crate::{SessionError, run_directory};
+use mapper_campaign::Campaign;
+use mapper_core::{Plan, PlanStep, SampleBatch, StepKind, StepMarker};
+use mapper_runner::{StepSource, StepSourceError};
+use std::collections::{BTreeSet, VecDeque};
+use std::path::{Path, PathBuf};
+
+/// What is known of a run that was broken off.
+#[derive(Debug, Clone)]
+pub struct BrokenOff {
+    /// Its directory.
+    pub directory: PathBuf,
+    pub(crate) parts: Vec<JournalPart>,
+}
+
+impl BrokenOff {
+    /// Reads the journal of a run's directory.
+    ///
+    /// # Errors
+    /// [`SessionError::NotResumable`] where there is none.
+    pub fn read(directory: &Path) -> Result<Self, SessionError> {
+        let why = |why: String| SessionError::NotResumable { run: directory.to_owned(), why };
+        let path = directory.join(run_directory::JOURNAL);
+        let parts =
+            read_journal(&path).map_err(|error| why(format!("its journal cannot be read: {error}")))?;
+        if parts.is_empty() {
+            return Err(why("its journal holds no run".to_owned()));
+        }
+        Ok(BrokenOff { directory: directory.to_owned(), parts })
+    }
+
+    /// Steps of the plan that are in one of the recordings.
+    pub fn saved(&self) -> BTreeSet<usize> {
+        self.parts.iter().flat_map(|part| part.saved.iter().copied()).collect()
+    }
+
+    /// Whether one of the recordings has the soak.
+    pub fn soaked(&self) -> bool {
+        self.parts.iter().any(|part| part.soaked)
+    }
+
+    /// Refuses what is not the same run, and what cannot go on from its middle.
+    ///
+    /// # Errors
+    /// [`SessionError::NotResumable`] with what differs or why.
+    pub(crate) fn check(&self, campaign: &Campaign, plan: &Plan, now: &Identity) -> Result<(), SessionError> {
+        let why = |why: String| Err(SessionError::NotResumable { run: self.directory.clone(), why });
+        for part in &self.parts {
+            let differences = part.identity.differences(now);
+            if !differences.is_empty() {
+                return why(format!("{} changed since", differences.join(" and ")));
+            }
+        }
+        for (key, set) in [
+            ("sequence", campaign.sequence.is_some()),
+            ("surge_search", campaign.surge_search.is_some()),
+            ("drift", campaign.on_drift.is_some()),
+        ] {
+            if set {
+                return why(format!(
+                    "its campaign has `{key}`, whose steps depend on all that was measured before; identify what there is, and run it again"
+                ));
+            }
+        }
+        let saved = self.saved();
+        if plan.steps.iter().all(|step| saved.contains(&step.index)) {
+            return why("all of its steps are there; `mapper identify` gives the map".to_owned());
+        }
+        Ok(())
+    }
+
+    /// What is done again and why, in a sentence.
+    pub(crate) fn said(&self, campaign: &Campaign, plan: &Plan) -> String {
+        let saved = self.saved();
+        let soak = match (campaign.zero.is_some(), self.soaked()) {
+            (false, _) => "without a soak, as before",
+            (true, true) => "the soak is not repeated: what sensors read at rest holds for the run",
+            (true, false) => "the soak is repeated: the recording does not have it whole",
+        };
+        format!(
+            "resumed: {} of {} steps hold; {soak}; nobody knows how far the housings have cooled, so they are warmed up again and the step before the first \
+             missing one is made once more",
+            plan.steps.iter().filter(|step| saved.contains(&step.index)).count(),
+            plan.steps.len()
+        )
+    }
+}
+
+/// The steps of a plan that are missing, each after the step that the plan has before it.
+pub(crate) struct MissingSteps<'a> {
+    plan: &'a Plan,
+    next: VecDeque<PlanStep>,
+    notes: Vec<String>,
+}
+
+impl<'a> MissingSteps<'a> {
+    pub(crate) fn new(plan: &'a Plan, saved: &BTreeSet<usize>, said: String) -> Self {
+        let mut next: VecDeque<PlanStep> = VecDeque::new();
+        for (place, step) in plan.steps.iter().enumerate() {
+            if saved.contains(&step.index) {
+                continue;
+            }
+            // Where the rig does not come from where the plan has it come from, it is brought there.
+            let comes_from = place.checked_sub(1).and_then(|before| plan.steps.get(before));
+            if let Some(before) = comes_from
+                && next.back().is_none_or(|last| last.index != before.index)
+            {
+                let index = plan.steps.len() + next.len();
+                next.push_back(PlanStep { index, kind: StepKind::Repeat, from: None, ..before.clone() });
+            }
+            next.push_back(step.clone());
+        }
+        MissingSteps { plan, next, notes: vec![said] }
+    }
+}
+
+impl StepSource for MissingSteps<'_> {
+    fn warm_up_s(&self) -> f64 {
+        self.plan.warm_up_s
+    }
+
+    fn cool_down_s(&self) -> f64 {
+        self.plan.cool_down_s
+    }
+
+    fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
+        Ok(self.next.pop_front())
+    }
+
+    fn on_batch(&mut self, _: &SampleBatch) -> bool {
+        false
+    }
+
+    fn after_step(&mut self, _: &StepMarker) -> Result<(), StepSourceError> {
+        Ok(())
+    }
+
+    fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+}

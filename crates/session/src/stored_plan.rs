@@ -1,0 +1,101 @@
+//! A plan from a file, which anybody may have written: held against what it was made from, and against all that a plan may ask for.
+
+use crate::SessionError;
+use mapper_campaign::Campaign;
+use mapper_core::{OperatingPoint, Plan, PlanStep};
+use std::io::Read;
+use std::path::Path;
+
+/// Largest plan file that is read, bytes.
+const FILE_MAX_BYTES: u64 = 32 << 20;
+/// Steps at most.
+const STEPS_MAX: usize = 20_000;
+/// Longest step, warm-up or cool-down, s: a day, as in campaigns.
+const STEP_MAX_S: f64 = 86_400.0;
+/// Longest run, s: two weeks.
+const RUN_MAX_S: f64 = 14.0 * 86_400.0;
+/// A plan's own numbers went through a file: so far they may lie beyond a limit, ratio.
+const ROUNDING_RATIO: f64 = 1e-9;
+
+/// A plan from a file, refused where what it was made from has changed; `made` is the plan made again.
+///
+/// # Errors
+/// [`SessionError::StalePlan`] with what has changed; [`SessionError::NotAPlan`] and [`SessionError::File`] where the
+/// file does not hold a plan; [`SessionError::WrongPlan`] where it asks for what no plan may ask for.
+pub fn stored_plan(path: &Path, made: &Plan, campaign: &Campaign) -> Result<Plan, SessionError> {
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(SessionError::file("read", path))?;
+    file.take(FILE_MAX_BYTES + 1).read_to_end(&mut bytes).map_err(SessionError::file("read", path))?;
+    let wrong = |why: String| SessionError::WrongPlan { path: path.to_owned(), why };
+    if bytes.len() as u64 > FILE_MAX_BYTES {
+        return Err(wrong(format!("it has more than the {FILE_MAX_BYTES} bytes that are read")));
+    }
+    let stored: Plan = serde_json::from_slice(&bytes)
+        .map_err(|source| SessionError::NotAPlan { path: path.to_owned(), source })?;
+    let (then, now) = (&stored.made_from, &made.made_from);
+    let changed: Vec<&str> = [
+        ("the campaign", then.campaign_sha256 != now.campaign_sha256),
+        ("the nominal model", then.model_sha256 != now.model_sha256),
+        ("the sequence script", then.script_sha256 != now.script_sha256),
+    ]
+    .into_iter()
+    .filter_map(|(what, changed)| changed.then_some(what))
+    .collect();
+    if !changed.is_empty() {
+        return Err(SessionError::StalePlan { path: path.to_owned(), changed });
+    }
+    match objection(&stored, campaign) {
+        None => Ok(stored),
+        Some(why) => Err(wrong(why)),
+    }
+}
+
+/// What is wrong with a plan, in words.
+fn objection(plan: &Plan, campaign: &Campaign) -> Option<String> {
+    if plan.steps.is_empty() || plan.steps.len() > STEPS_MAX {
+        return Some(format!("it has {} steps; a plan has 1 to {STEPS_MAX}", plan.steps.len()));
+    }
+    for (what, duration_s) in [("warm-up", plan.warm_up_s), ("cool-down", plan.cool_down_s)] {
+        if !(0.0..=STEP_MAX_S).contains(&duration_s) {
+            return Some(format!("its {what} lasts {duration_s} s; at most {STEP_MAX_S} s are allowed"));
+        }
+    }
+    let first = plan.steps.iter().enumerate().find_map(|(place, step)| {
+        let why = of_step(place, step, campaign)?;
+        Some(format!("step {} {why}", place + 1))
+    });
+    first.or_else(|| {
+        let duration_s = plan.duration_s();
+        (duration_s > RUN_MAX_S)
+            .then(|| format!("it lasts {duration_s:.0} s; at most {RUN_MAX_S} s are allowed"))
+    })
+}
+
+fn of_step(place: usize, step: &PlanStep, campaign: &Campaign) -> Option<String> {
+    if step.index != place {
+        return Some(format!("says that it is step {}", step.index.saturating_add(1)));
+    }
+    let limits = &campaign.limits;
+    let coldest_k = 250.0;
+    let hottest_k = limits.t3_max_k.unwrap_or(1400.0);
+    let openings = 0.05..=OperatingPoint::OPENING_MAX_RATIO;
+    for (what, value, low, high, unit) in [
+        ("dwell", step.dwell_s, f64::MIN_POSITIVE, STEP_MAX_S, "s"),
+        ("speed", step.to.speed_rpm, f64::MIN_POSITIVE, limits.speed_max_rpm, "rpm"),
+        ("valve opening", step.to.valve_opening_ratio, *openings.start(), *openings.end(), ""),
+        ("P3", step.p3_pa, limits.p3_min_pa, limits.p3_max_pa, "Pa"),
+        ("T3", step.t3_k, coldest_k, hottest_k, "K"),
+        ("T_oil", step.oil_temperature_k, coldest_k, 450.0, "K"),
+        ("start", step.start_s, 0.0, RUN_MAX_S, "s"),
+    ] {
+        let (lowest, highest) = (low * (1.0 - ROUNDING_RATIO), high * (1.0 + ROUNDING_RATIO));
+        if !(lowest..=highest).contains(&value) {
+            return Some(format!("asks for {what} = {value} {unit}, outside {low} to {high} {unit}"));
+        }
+    }
+    let from = step.from.is_some_and(|from| {
+        !(0.0..=limits.speed_max_rpm * (1.0 + ROUNDING_RATIO)).contains(&from.speed_rpm)
+            || !(0.0..=OperatingPoint::OPENING_MAX_RATIO).contains(&from.valve_opening_ratio)
+    });
+    from.then(|| "comes from a point beyond the limits".to_owned())
+}

@@ -99,8 +99,7 @@ impl Bench {
     /// effect.
     pub fn alone(&self, catalogue: &Study, candidate: &Candidate) -> (Study, Fit) {
         let mut own = catalogue.clone();
-        let law = own.effects.len();
-        own.effects.push(self.study.effects[candidate.effect].clone());
+        let law = own.add(self.study.effects[candidate.effect].clone());
         let mut fit = candidate.fit.clone();
         for (index, _) in &mut fit.hypothesis.effects {
             *index = if *index == candidate.effect { law } else { *index };
@@ -117,8 +116,7 @@ impl Bench {
             .zip(&choice.coefficients)
             .map(|(p, steps)| (steps * p.typical_step).clamp(0.9 * p.low, 0.9 * p.high))
             .collect();
-        let effect = self.study.effects.len();
-        self.study.effects.push(Arc::new(law));
+        let effect = self.study.add(Arc::new(law));
         let mut start = base.clone();
         start.effects.push((effect, values));
         (choice.clone(), effect, start)

@@ -72,10 +72,10 @@ impl<'a> Base<'a> {
         let mut own = self.study.clone();
         let first = own.effects.len();
         let runs = runs(terms);
-        own.effects.extend(runs.iter().map(|run| {
+        for run in &runs {
             let together = run.iter().map(|place| terms[*place].clone()).collect();
-            Arc::new(LawEffect::new(together)) as _
-        }));
+            own.add(Arc::new(LawEffect::new(together)));
+        }
         let places: Vec<usize> = (0..runs.len()).collect();
         let changes = parallel::map(&places, |place| {
             let mut there = self.hypothesis.clone();

@@ -122,7 +122,7 @@ fn a_force_comes_back_in_its_step() {
         role: Role::Other,
         positive: false,
     };
-    planted.effects.push(Arc::new(LawEffect::new(vec![term])));
+    planted.add(Arc::new(LawEffect::new(vec![term])));
     let nothing = planted.nothing();
     let with = planted.predict(&Hypothesis { effects: vec![(0, vec![60.0])], ..nothing.clone() }).unwrap();
     let without = planted.predict(&nothing).unwrap();
@@ -157,7 +157,7 @@ fn every_term_can_be_written_and_its_script_does_the_same() {
         };
         let of = |effect: Arc<dyn Effect>| {
             let mut own = study.clone();
-            own.effects = vec![effect];
+            own.add(effect);
             let values = vec![0.5 * term.step];
             own.predict(&Hypothesis { effects: vec![(0, values)], ..own.nothing() }).unwrap().values
         };

@@ -259,6 +259,13 @@ impl Study {
         }
     }
 
+    /// Adds an effect that is in no catalogue and there throughout. Gives its index.
+    pub fn add(&mut self, effect: Arc<dyn Effect>) -> usize {
+        self.effects.push(effect);
+        self.courses.push(Course::Throughout);
+        self.effects.len() - 1
+    }
+
     /// Adds a candidate: an effect of the catalogue that begins with a step. Gives its index.
     pub fn add_late(&mut self, effect: usize, course: Course) -> usize {
         let known = (self.catalogue..self.effects.len())

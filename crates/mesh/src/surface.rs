@@ -71,7 +71,7 @@ pub fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f64)) -> 
     points
 }
 
-/// [`surge_to_choke`] with the map's own spans.
+/// The points of a line from surge to choke side, by flow and falling pressure ratio together in shares of the map's spans.
 pub fn ordered<'a>(map: &CompressorMap, line: &'a SpeedLine) -> Vec<&'a MapPoint> {
     surge_to_choke(line, spans(map).unwrap_or((1.0, 1.0)))
 }

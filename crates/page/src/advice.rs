@@ -1,6 +1,6 @@
 //! The verdict of a run in a sentence, and what to do first.
 
-use crate::page::RunPage;
+use crate::run_page::RunPage;
 use mapper_core::Verdict;
 use mapper_report::{RunReport, disagreement_text, doubts};
 

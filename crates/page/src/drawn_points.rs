@@ -1,6 +1,6 @@
 //! Points as the script draws them, in the units that are shown.
 
-use crate::page::RunPage;
+use crate::run_page::RunPage;
 use mapper_campaign::units::Kind;
 use mapper_core::{IdentifiedPoint, standard_error_of};
 use mapper_report::{Display, step_name, verdict_word};

@@ -1,7 +1,7 @@
 //! What was read in each step, thinned for the eye.
 
 use crate::drawn_map::rounded;
-use crate::page::RunPage;
+use crate::run_page::RunPage;
 use mapper_campaign::units::Kind;
 use mapper_core::{Channel, Dimension, Recording, StepMarker};
 use mapper_identify::T2Course;

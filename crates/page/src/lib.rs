@@ -11,8 +11,10 @@ mod drawn_map;
 mod drawn_points;
 mod drawn_steps;
 mod page;
+mod run_page;
 mod sections;
 mod shell;
 mod table;
 
-pub use page::{OtherRun, RunPage, run_page};
+pub use page::run_page;
+pub use run_page::{OtherRun, RunPage};

@@ -174,7 +174,7 @@ fn no_step_leaves_the_limits() {
         (r#"jump(point("10 krpm", 1.0))"#, "below `limits.turbine_inlet_pressure.min` = 120 kPa"),
         (r#"settle(point("250 krpm", 1.0), "60 s")"#, "above the speed limit, `limits.speed` = 180 krpm"),
         (r#"jump(point("110 krpm", 0.2))"#, "beyond the surge line"),
-        (r#"jump(point("110 krpm", 1.0), "25 h")"#, "86400 s"),
+        (r#"jump(point("110 krpm", 1.0), "25 h")"#, "14400 s"),
         (r#"jump(point("110 krpm", 1.0), "-5 s")"#, "more than 0 s"),
         (r#"jump(point("110", 1.0))"#, "lacks its unit"),
         ("repeat(1)", "no result of step 1"),

@@ -2,8 +2,8 @@
 
 use crate::files::{json_text, write_new};
 use crate::identified::{Identified, SoughtSurge};
+use crate::program::PROGRAM;
 use crate::recorded::Recorded;
-use crate::run::PROGRAM;
 use crate::{Registry, Session, SessionError, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
 use mapper_campaign::Campaign;

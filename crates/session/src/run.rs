@@ -7,6 +7,7 @@ use crate::journal::{Entry, Identity, Journal};
 use crate::observers::{Recorder, Teller};
 use crate::planning::{nominal_model, plan};
 use crate::preflight::{check_room, check_setpoints};
+use crate::program::PROGRAM;
 use crate::rehearsal::rehearse;
 use crate::results::{Results, RunPart};
 use crate::resume::{BrokenOff, MissingSteps};
@@ -27,9 +28,6 @@ use std::time::Duration;
 
 /// Time that a rig has for each call.
 const DEADLINE: Duration = Duration::from_secs(2);
-
-/// Name and version of the program, as recordings carry it.
-pub const PROGRAM: &str = concat!("mapper ", env!("CARGO_PKG_VERSION"));
 
 /// What to run.
 pub struct RunRequest<'a> {

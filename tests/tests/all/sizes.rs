@@ -8,7 +8,7 @@ const MEDIAN_LINES: usize = 120;
 /// No file has more, unless its first comment says why.
 const LONGEST_LINES: usize = 500;
 /// All of the program's own crate, tests included: what decides anything lies below it.
-const CLI_LINES: usize = 2_500;
+const CLI_LINES: usize = 3_000;
 /// Files that are longer without saying why: to be emptied.
 const KNOWN: &[&str] = &[];
 

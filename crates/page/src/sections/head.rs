@@ -1,7 +1,7 @@
 //! Verdict and what to do first.
 
 use crate::advice::{first_things, is_clean, verdict};
-use crate::page::RunPage;
+use crate::run_page::RunPage;
 use maud::{Markup, html};
 
 pub(crate) fn head(page: &RunPage<'_>) -> Markup {

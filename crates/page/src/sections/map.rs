@@ -1,6 +1,6 @@
 //! The interactive map.
 
-use crate::page::RunPage;
+use crate::run_page::RunPage;
 use maud::{Markup, html};
 
 /// Layers that can be switched: name in the script, name for people, whether it is on at first.

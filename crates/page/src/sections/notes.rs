@@ -1,6 +1,6 @@
 //! Zero, drift, surge, sensors, events, doubts: what happened beside the map.
 
-use crate::page::RunPage;
+use crate::run_page::RunPage;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_report::{Display, doubts, repeated_jumps_text, score_text, surge_text, zero_text};
 use maud::{Markup, html};

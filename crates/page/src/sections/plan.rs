@@ -1,6 +1,6 @@
 //! The plan as it was flown, beside what was expected.
 
-use crate::page::RunPage;
+use crate::run_page::RunPage;
 use crate::table::{Cell, Row, data_table};
 use mapper_core::{PlanStep, standard_error_of};
 use mapper_report::{Display, duration, number, percent};

@@ -1,6 +1,6 @@
 //! The points by speed line, as test reports list them.
 
-use crate::page::RunPage;
+use crate::run_page::RunPage;
 use crate::table::{Cell, Row, data_table};
 use mapper_core::{Channel, IdentifiedPoint, Recording, StepMarker, Verdict};
 use mapper_report::{Display, number, percent, shared_errors_text, step_name, verdict_word};

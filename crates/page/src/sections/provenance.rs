@@ -1,6 +1,6 @@
 //! Conditions, instruments, and what the numbers were made from.
 
-use crate::page::RunPage;
+use crate::run_page::RunPage;
 use crate::table::facts;
 use mapper_report::{duration, head_rows};
 use maud::{Markup, html};

@@ -1,6 +1,6 @@
 //! The transient of one point.
 
-use crate::page::RunPage;
+use crate::run_page::RunPage;
 use mapper_report::{Display, step_name};
 use maud::{Markup, html};
 

@@ -28,6 +28,10 @@ pub const NAME: &str = "virtual_lab";
 /// Shaft speed at which a starting machine enters the running model and a stopping one leaves it, rpm.
 const CRANKING_SPEED_RPM: f64 = 5_000.0;
 
+/// Pressure ratio below which surge is nothing that anybody would call so: on its way from rest the machine crosses the
+/// extrapolated surge line, with next to no pressure behind it that could turn the flow back.
+const LEAST_SURGE_RATIO: f64 = 1.01;
+
 /// What moves in the lab.
 #[derive(Debug)]
 enum Machine {
@@ -378,6 +382,10 @@ impl Armed {
     /// Turns a crossing into an event; beyond the trip speed the lab cuts its own air, at `now_s`.
     fn report(&mut self, settings: &LabSettings, event: ModelEvent, now_s: f64) {
         let ModelEvent { t_s, crossing, speed_rpm, pressure_ratio } = event;
+        let of_surge = matches!(crossing, Crossing::SurgeEntered | Crossing::SurgeLeft);
+        if of_surge && pressure_ratio < LEAST_SURGE_RATIO {
+            return;
+        }
         let (kind, message) = match crossing {
             Crossing::SurgeEntered => (
                 EventKind::SurgeEntered,

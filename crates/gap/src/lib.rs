@@ -4,6 +4,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod actuators;
+mod added;
 pub mod additions;
 pub mod adequacy;
 pub mod another_machine;

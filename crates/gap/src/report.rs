@@ -279,3 +279,8 @@ pub enum Next {
         reason: String,
     },
 }
+
+/// The law that is more probable than not; `None` where none is.
+pub fn law_found(diagnosis: &Diagnosis) -> Option<&Law> {
+    diagnosis.laws.first().filter(|law| law.probability > 0.5)
+}

@@ -2,7 +2,7 @@
 
 use crate::number::four_figures;
 use mapper_core::with_unit;
-use mapper_gap::report::{Candidate, Diagnosis, Estimate, Next, PointGap, SmallestSeen, Verdict};
+use mapper_gap::report::{Candidate, Diagnosis, Estimate, Next, PointGap, SmallestSeen, Verdict, law_found};
 
 /// Causes shown.
 const CAUSES: usize = 5;
@@ -127,10 +127,13 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
             let verb = if first.effects.len() == 1 { "explains" } else { "explain" };
             format!("{} {verb} the gap", named(first))
         }
-        _ => format!(
-            "a cause outside the catalogue is the most probable ({:.1} %)",
-            100.0 * diagnosis.probability_outside
-        ),
+        _ => {
+            let outside = format!(
+                "a cause outside the catalogue is the most probable ({:.1} %)",
+                100.0 * diagnosis.probability_outside
+            );
+            law_found(diagnosis).map_or_else(|| outside.clone(), |law| format!("{outside}: {}", law.sentence))
+        }
     }
 }
 

@@ -15,7 +15,7 @@ use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
 use mapper_gap::next::look_beside;
 use mapper_gap::outlook::{Alike, AllowedJump};
 use mapper_gap::problem::Problem;
-use mapper_gap::report::{Diagnosis, Next, Verdict};
+use mapper_gap::report::{Diagnosis, Next, Verdict, law_found};
 use mapper_gap::study::Study;
 use mapper_gap::twin::{Expected, Found, Held, forecast_steps, hold};
 use mapper_gap::usable::usable;
@@ -86,6 +86,13 @@ impl Session<'_> {
             if matches!(diagnosis.next, Some(Next::Sensor { .. })) {
                 diagnosis.next = Some(look_beside(&diagnosis.r#where));
             }
+        }
+        let with_a_law = law_found(diagnosis).is_some();
+        if let Some(Next::Sensor { reason, .. }) = &mut diagnosis.next
+            && with_a_law
+        {
+            "the law is to be confirmed: give it to the next diagnosis with --effect, and measure there"
+                .clone_into(reason);
         }
         // What was wrong with the file belongs to what is said about it.
         let warnings = recorded.read.warnings.iter().map(ToString::to_string);

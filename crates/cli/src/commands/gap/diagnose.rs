@@ -95,6 +95,10 @@ impl Diagnose {
 
 /// Writes the laws that can be written into `directory`; beside the page where only that was asked for.
 fn write_laws(laws: &mut [Law], directory: Option<&Path>, page: Option<&Path>) -> Result<(), Failure> {
+    if let Some(directory) = directory.filter(|_| laws.iter().any(|law| law.script.is_some())) {
+        std::fs::create_dir_all(directory)
+            .map_err(|error| Failure::new(Code::Failure, format!("{}: {error}", directory.display())))?;
+    }
     for (place, law) in laws.iter_mut().enumerate() {
         let Some(script) = &law.script else { continue };
         let file = match (directory, page) {

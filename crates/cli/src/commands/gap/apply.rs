@@ -53,7 +53,8 @@ impl Apply {
         let text = std::fs::read_to_string(&self.campaign)
             .map_err(|error| Failure::new(Code::Failure, format!("{}: {error}", self.campaign.display())))?;
         let found = found_in(&self.diagnosis)?;
-        let twin = Twin { found: &found, source: &self.diagnosis, p3_lag_s: campaign.tolerances.actuator_lag_s };
+        let twin =
+            Twin { found: &found, source: &self.diagnosis, p3_lag_s: campaign.tolerances.actuator_lag_s };
         let written = twin_campaign(&text, &twin, &registry::registry().effects)?;
         write_new(&self.out, written.as_bytes())?;
         mapper_campaign::load(&self.out).map_err(Failure::of_campaign)?;

@@ -17,8 +17,12 @@ pub(crate) const ORDERS: [VisitOrder; 5] = [
 /// that is spent on it. The error is that where nothing is as declared: no order is worth anything that holds only on the
 /// nominal machine. Infinite where no error was forecast.
 pub(crate) fn cost(plan: &Plan) -> f64 {
-    let figures = &plan.figures;
-    figures.open_rms_error_eta.map_or(f64::INFINITY, |rms| rms * rms * figures.minutes)
+    cost_of(plan.figures.open_rms_error_eta, plan.figures.minutes)
+}
+
+/// The same of an error, a fraction, and a time.
+pub(crate) fn cost_of(open_rms_error_eta: Option<f64>, minutes: f64) -> f64 {
+    open_rms_error_eta.map_or(f64::INFINITY, |rms| rms * rms * minutes)
 }
 
 /// How a plan is made under one order.

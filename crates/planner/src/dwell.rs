@@ -14,19 +14,20 @@ const AT_POINT_S: f64 = 10.0;
 const LATER_S: f64 = 2.0;
 /// Shortest step, s.
 const SHORTEST_S: f64 = 20.0;
-/// Forecasts that are made.
-const ROUNDS: usize = 5;
+/// Forecasts that are made where the time is to be found closely.
+pub(crate) const FORECASTS: usize = 5;
 /// The required error counts as reached up to this multiple of it.
 pub const REACHED_RATIO: f64 = 1.02;
 /// How the error falls with the time, if nothing better is known: a half by averaging, a half by the larger gradients.
 const FALL: f64 = -0.8;
 
-/// Goes through a route with steps that last until the points are certain enough, about `guess_s`; with the request's where
+/// Goes through a route with steps that last until the points are certain enough, about `guess_s`, found by that many forecasts at most; with the request's where
 /// no error is required, or each step is identified by itself.
 pub(crate) fn walk_until_certain(
     request: &PlanRequest<'_>,
     route: Route<'_>,
     guess_s: f64,
+    forecasts: usize,
 ) -> Result<Walk, PlanError> {
     let joint = request.method.is_some_and(|method| method.is_joint());
     let longest_s = request.timing.dwell_s;
@@ -37,7 +38,7 @@ pub(crate) fn walk_until_certain(
     let mut before: Option<(f64, f64)> = None;
     let mut time_s = guess_s.min(longest_s);
     let mut walked: Option<Walk> = None;
-    for _ in 0..ROUNDS {
+    for _ in 0..forecasts {
         let dwells_s = match &walked {
             Some(walked) => dwells_s(&walked.steps, route, time_s, longest_s),
             None => vec![time_s; route.visits.len()],

@@ -1,5 +1,6 @@
 //! A plan in a few numbers.
 
+use crate::request::PlanRequest;
 use mapper_core::{PlanFigures, PlanStep, Predicted};
 use mapper_numerics::statistics::rms;
 
@@ -32,4 +33,9 @@ pub(crate) fn figures(steps: &[PlanStep], minutes: f64) -> PlanFigures {
         worst_error_eta: largest(&mut errors.iter().copied()),
         minutes,
     }
+}
+
+/// How long a plan of these steps takes, warm-up and cool-down included, s.
+pub(crate) fn duration_s(request: &PlanRequest<'_>, steps: &[PlanStep]) -> f64 {
+    request.timing.warm_up_s + steps.iter().map(|step| step.dwell_s).sum::<f64>() + request.timing.cool_down_s
 }

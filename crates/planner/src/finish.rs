@@ -2,7 +2,7 @@
 
 use crate::bound::Optimistic;
 use crate::dwell::REACHED_RATIO;
-use crate::figures::{error_eta, figures, open_rms_error_eta};
+use crate::figures::{duration_s, error_eta, figures, open_rms_error_eta};
 use crate::fingerprint::made_from;
 use crate::housing::Housing;
 use crate::order::{Ordered, PROOF_TOLERANCE_RATIO};
@@ -23,10 +23,7 @@ pub(crate) fn finished(
         .zip(&steps)
         .find(|(visit, _)| Some(visit.index) == repeated.map(|jump| jump.to))
         .map(|(_, step)| step.to);
-    let duration_s = request.timing.warm_up_s
-        + steps.iter().map(|step| step.dwell_s).sum::<f64>()
-        + request.timing.cool_down_s;
-    let figures = figures(&steps, duration_s / 60.0);
+    let figures = figures(&steps, duration_s(request, &steps) / 60.0);
     // A bound holds for the points and their repeats, not for what is put behind them.
     let searched = !matches!(request.order, VisitOrder::Listed | VisitOrder::Greedy | VisitOrder::SpeedLines)
         && request.appended.is_none();

@@ -1,23 +1,25 @@
 //! From a request to a plan.
 
-use crate::best::{best, cost};
+use crate::best::{best, cost, cost_of};
+use crate::dwell::FORECASTS;
+use crate::figures::{duration_s, open_rms_error_eta};
 use crate::forecast::MOST_TOGETHER;
 use crate::reach::reachable;
 use crate::repeats::usual_jumps;
 use crate::request::{PlanError, PlanRequest};
-use crate::stage::{Made, Stage};
+use crate::stage::{Made, Sought, Stage};
 use mapper_core::{Jump, Plan, Repeats, VisitOrder};
 use mapper_numerics::statistics::mean;
 use mapper_physics::steady::SteadyState;
 
 /// Cost of another plan, over this one's, from which on it is worth a word.
 const BEATEN_RATIO: f64 = 0.95;
-/// Effort of a search that only leads to another, over the usual.
-const ROUGHLY_RATIO: f64 = 0.1;
-/// The same of one by what steps are worth: that is known to a few percent only.
-const INFORMED_RATIO: f64 = 0.3;
-/// How often what steps are worth is worked out again, about the order that was found.
-const SLOPES: usize = 2;
+/// Effort of a search that only leads to another, over the usual, and the forecasts that it may take.
+const ROUGHLY_RATIO: f64 = 0.03;
+const ROUGH_FORECASTS: usize = 3;
+/// The same of one by what steps are worth: that is known to a few percent only, and thirty times the effort, or what
+/// steps are worth worked out again about the order that was found, finds plans that cost some 3 % less (docs/performance.md).
+const INFORMED_RATIO: f64 = 0.1;
 /// Jumps tried for repeats where the request names none.
 const USUAL_JUMPS: usize = 3;
 /// Orders the points and forecasts every step.
@@ -101,38 +103,42 @@ fn plan_with(
     let stage = Stage::of(request, reached, repeats)?;
     let joint = request.method.is_some_and(|method| method.is_joint());
     let longest_s = request.timing.dwell_s;
-    let usual = (longest_s, request.effort);
+    let usual = Sought { dwell_s: longest_s, effort: request.effort, forecasts: FORECASTS };
     if !joint {
-        return Ok(stage.made(request.order, usual, None)?.plan);
+        return Ok(stage.plan(stage.made(request.order, usual, None)?));
     }
     let informed = request.order.needs_method();
     let first = if informed { VisitOrder::SumGradient } else { request.order };
     let chosen = request.required_sigma_eta.is_some() && first != VisitOrder::Listed;
     if !(informed || chosen) {
-        return Ok(stage.made(first, usual, None)?.plan);
+        return Ok(stage.plan(stage.made(first, usual, None)?));
     }
     // An order is sought for the dwells that it will have, and what steps are worth is known about a campaign: both come from
     // a rough first one.
-    let mut made = stage.made(first, (longest_s, ROUGHLY_RATIO * request.effort), None)?;
+    let rough = Sought { effort: ROUGHLY_RATIO * request.effort, forecasts: ROUGH_FORECASTS, ..usual };
+    let mut made = stage.made(first, rough, None)?;
     let dwell_s = |made: &Made| {
-        let dwells_s: Vec<f64> = made.plan.steps.iter().map(|step| step.dwell_s).collect();
+        let dwells_s: Vec<f64> = made.steps().iter().map(|step| step.dwell_s).collect();
         mean(&dwells_s).unwrap_or(longest_s)
     };
     if !informed {
-        made = stage.made(first, (dwell_s(&made), request.effort), None)?;
+        made = stage.made(first, Sought { dwell_s: dwell_s(&made), ..usual }, None)?;
+        return Ok(stage.plan(made));
     }
-    if let (true, Some(method)) = (informed, request.method) {
-        for _ in 0..SLOPES {
-            let rows: Vec<_> = made.rows.iter().take(MOST_TOGETHER).map(Vec::as_slice).collect();
-            let Some(worth) = method.worth_to(&rows) else { break };
-            let sought = (dwell_s(&made), INFORMED_RATIO * request.effort);
+    if let Some(method) = request.method {
+        let rows: Vec<_> = made.rows().iter().take(MOST_TOGETHER).map(Vec::as_slice).collect();
+        if let Some(worth) = method.worth_to(&rows) {
+            let effort = INFORMED_RATIO * request.effort;
+            let sought = Sought { dwell_s: dwell_s(&made), effort, ..usual };
             let other = stage.made(request.order, sought, Some(worth.as_ref()))?;
-            if cost(&other.plan).total_cmp(&cost(&made.plan)).is_ge() {
-                break;
+            let cost = |made: &Made| {
+                cost_of(open_rms_error_eta(made.steps()), duration_s(request, made.steps()) / 60.0)
+            };
+            if cost(&other) < cost(&made) {
+                made = other;
             }
-            made = other;
         }
-        made.plan.objective = request.order.name().to_owned();
     }
-    Ok(made.plan)
+    let plan = stage.plan(made);
+    Ok(Plan { objective: request.order.name().to_owned(), ..plan })
 }

@@ -6,10 +6,10 @@ use crate::housing::Housing;
 use crate::method::{ForecastRow, WorthOfStep};
 use crate::order::{Ordered, objective, order_on};
 use crate::reach::reachable;
-use crate::repeats::{RepeatedJump, append, plain, put_return, with_repeats};
+use crate::repeats::{RepeatedJump, Visit, append, plain, put_return, with_repeats};
 use crate::request::{PlanError, PlanRequest};
 use crate::walk::{Forbidden, Route, Walk};
-use mapper_core::{Jump, OperatingPoint, Plan, Repeats, Timing, VisitOrder};
+use mapper_core::{Jump, OperatingPoint, Plan, PlanStep, Repeats, Timing, VisitOrder};
 use mapper_physics::steady::SteadyState;
 
 /// How often jumps that turn out not to be allowed are taken out and the rest is ordered again.
@@ -27,10 +27,35 @@ pub(crate) struct Stage<'a> {
     appended: Option<(usize, usize)>,
 }
 
-/// A plan with the rows of its steps.
+/// How an order is sought.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sought {
+    /// For steps of about this length, s.
+    pub(crate) dwell_s: f64,
+    /// Effort of the search, 1 is normal.
+    pub(crate) effort: f64,
+    /// Forecasts that may be made to find how long the steps last.
+    pub(crate) forecasts: usize,
+}
+
+/// An order with its steps.
 pub(crate) struct Made {
-    pub(crate) plan: Plan,
-    pub(crate) rows: Vec<Vec<ForecastRow>>,
+    order: VisitOrder,
+    housing: Housing,
+    ordered: Ordered,
+    visits: Vec<Visit>,
+    walk: Walk,
+}
+
+impl Made {
+    pub(crate) fn steps(&self) -> &[PlanStep] {
+        &self.walk.steps
+    }
+
+    /// Each step from its jump to its end.
+    pub(crate) fn rows(&self) -> &[Vec<ForecastRow>] {
+        &self.walk.rows
+    }
 }
 
 impl<'a> Stage<'a> {
@@ -66,7 +91,7 @@ impl<'a> Stage<'a> {
     pub(crate) fn made(
         &self,
         order: VisitOrder,
-        (dwell_s, effort): (f64, f64),
+        Sought { dwell_s, effort, forecasts }: Sought,
         worth: Option<&dyn WorthOfStep>,
     ) -> Result<Made, PlanError> {
         let request = &PlanRequest { order, effort, ..self.request.clone() };
@@ -100,17 +125,15 @@ impl<'a> Stage<'a> {
                 visits: &visits,
                 repeated: self.repeated.map(|jump| jump.to),
             };
-            let walked = walk_until_certain(request, route, dwell_s)?;
-            if walked.forbidden.is_empty() {
-                let Walk { steps, rows, .. } = walked.thorough(request);
+            let walk = walk_until_certain(request, route, dwell_s, forecasts)?;
+            if walk.forbidden.is_empty() {
                 // What was searched, proven and bounded is an order with its way back.
                 let proven = ordered.proven && (returned || !request.return_to_first || given.len() < 2);
                 let ordered = Ordered { proven, ..ordered };
-                let plan = finished(request, &housing, &ordered, &visits, self.repeated, steps);
-                return Ok(Made { plan, rows });
+                return Ok(Made { order, housing, ordered, visits, walk });
             }
             let before = barred.len();
-            for Forbidden { from, to, reasons } in walked.forbidden {
+            for Forbidden { from, to, reasons } in walk.forbidden {
                 let text = format!("{} to {}: {reasons}", self.points[from], self.points[to]);
                 if !barred.contains(&text) {
                     barred.push(text);
@@ -124,5 +147,12 @@ impl<'a> Stage<'a> {
             }
         }
         Err(PlanError::NoAdmissibleOrder(barred))
+    }
+    /// The plan of what was made, with all that is forecast of it.
+    pub(crate) fn plan(&self, made: Made) -> Plan {
+        let Made { order, housing, ordered, visits, walk } = made;
+        let request = &PlanRequest { order, ..self.request.clone() };
+        let steps = walk.thorough(request).steps;
+        finished(request, &housing, &ordered, &visits, self.repeated, steps)
     }
 }

@@ -14,6 +14,7 @@ use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
 use crate::joint::surface::SurfaceScale;
 use mapper_core::{EstimateUncertainty, ReferenceState};
+use mapper_numerics::parallel;
 use mapper_numerics::statistics::median;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -162,8 +163,7 @@ pub(crate) fn smoothed(
         .map(|row| shared[*row].0.powi(2) / covariance.shared[(*row, *row)])
         .sum::<f64>()
         .sqrt();
-    let (eta, ln_h): (Vec<Judged>, Vec<Judged>) =
-        (etas.iter().map(&judge).collect(), ln_hs.iter().map(&judge).collect());
+    let (eta, ln_h) = (parallel::map(&etas, judge), parallel::map(&ln_hs, judge));
     let best = solved.iter().max_by(|a, b| a.weight.total_cmp(&b.weight));
     let common = [(&etas, &eta), (&ln_hs, &ln_h)].map(|(quantities, judged)| {
         let (covariance, own) = together(quantities, &etas, best);
@@ -212,10 +212,9 @@ fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'
     }
     loop {
         let sample: Vec<usize> = (0..used.len()).filter(|i| used[*i]).step_by(every).collect();
-        let evidence: Vec<f64> = choices
-            .iter()
-            .map(|choice| evidence(etas, coordinates, &sample, choice).unwrap_or(f64::NEG_INFINITY))
-            .collect();
+        let evidence = parallel::map(&choices, |choice| {
+            evidence(etas, coordinates, &sample, choice).unwrap_or(f64::NEG_INFINITY)
+        });
         let best = evidence.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if !best.is_finite() {
             return Vec::new();

@@ -9,6 +9,7 @@ use crate::joint::parameters::{
 use mapper_core::FoundInlet;
 use mapper_numerics::coloured_noise::WhiteningFilter;
 use mapper_numerics::least_squares::{Arrow, ArrowBlock, Damping, DampingRule, Reduced};
+use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 
 /// Maximum number of iterations: a good start needs about ten.
@@ -203,8 +204,10 @@ impl Problem<'_> {
         for index in fitted {
             wanted[*index] = true;
         }
-        for member in &self.members {
-            let (residual, columns) = self.residual(member, &self.shared, &member.local, Some(&wanted));
+        let evaluated = parallel::map(&self.members, |member| {
+            self.residual(member, &self.shared, &member.local, Some(&wanted))
+        });
+        for (member, (residual, columns)) in self.members.iter().zip(evaluated) {
             let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
             let mut block = ArrowBlock {
                 own: Matrix4::zeros(),
@@ -264,9 +267,9 @@ impl Problem<'_> {
     }
 
     fn cost(&self, shared: &SharedVector, locals: &[LocalVector]) -> f64 {
-        let members = self.members.iter().zip(locals).filter(|(member, _)| member.shares);
-        self.shared_cost(shared)
-            + members.map(|(member, local)| self.local_cost(member, shared, local)).sum::<f64>()
+        let sharing: Vec<_> = self.members.iter().zip(locals).filter(|(member, _)| member.shares).collect();
+        let costs = parallel::map(&sharing, |(member, local)| self.local_cost(member, shared, local));
+        self.shared_cost(shared) + costs.iter().sum::<f64>()
     }
 
     /// The sum of squares where the parameters stand.

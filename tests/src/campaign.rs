@@ -14,13 +14,13 @@ pub const SHORT_GRID: &[(&str, &str)] = &[
     ),
     ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.4]"),
     ("warm_up: 2 min ", "warm_up: 60 s "),
-    ("required_sigma_eta: 0.9 %\n", ""),
+    ("required_sigma_eta: 0.6 %\n", ""),
     ("seed: 1 ", "repeats: off\nreturn_to_first: false\nseed: 1 "),
 ];
 
 /// The two-parameter method of the paper, each step by itself, and no rest before the run.
 pub const BY_ITSELF: &[(&str, &str)] = &[
-    ("zero: {soak: 30 min, evenness: 0.03 K, pressure_evenness: 3 Pa}\n", ""),
+    ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
     ("method: joint ", "method: dynamic "),
 ];
 

@@ -29,13 +29,11 @@ pub enum BlindError {
         source: serde_json::Error,
     },
     /// A file is larger than any of its kind.
-    #[error("{} has {bytes} bytes; at most {limit} are read", path.display())]
+    #[error("{} has more than the {limit} bytes that are read", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Its size.
-        bytes: u64,
-        /// Largest size read.
+        /// Largest size read, bytes.
         limit: u64,
     },
     /// The answers are not those that were sealed.

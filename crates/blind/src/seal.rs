@@ -5,6 +5,7 @@ use crate::truth::Truth;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use std::io::Read;
 use std::path::Path;
 
 /// File of the answers, within the directory of the cases.
@@ -52,11 +53,13 @@ pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, what: &'static str) ->
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
-    let size = std::fs::metadata(path).map_err(BlindError::file(path))?.len();
-    if size > LARGEST_BYTES {
-        return Err(BlindError::TooLarge { path: path.to_owned(), bytes: size, limit: LARGEST_BYTES });
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(BlindError::file(path))?;
+    file.take(LARGEST_BYTES + 1).read_to_end(&mut bytes).map_err(BlindError::file(path))?;
+    if bytes.len() as u64 > LARGEST_BYTES {
+        return Err(BlindError::TooLarge { path: path.to_owned(), limit: LARGEST_BYTES });
     }
-    std::fs::read(path).map_err(BlindError::file(path))
+    Ok(bytes)
 }
 
 /// Opens the seal: the answers, if they are still those that were made.

@@ -26,7 +26,7 @@ pub use campaign::Campaign;
 pub use concern::Concern;
 pub use load::{
     CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
-    warnings,
+    read_text, warnings,
 };
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
 pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};

@@ -223,7 +223,12 @@ fn finish(
     notes.is_empty().then_some(campaign)
 }
 
-fn read_text(path: &Path) -> io::Result<String> {
+/// A file that a campaign names, or a campaign itself, as text.
+///
+/// # Errors
+/// What the system says; [`io::ErrorKind::FileTooLarge`] for a file beyond what is read, [`io::ErrorKind::InvalidData`] for one that
+/// is not UTF-8.
+pub fn read_text(path: &Path) -> io::Result<String> {
     String::from_utf8(mapper_yaml::read_limited(path, MAP_SIZE_LIMIT)?)
         .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8"))
 }

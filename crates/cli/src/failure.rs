@@ -57,7 +57,7 @@ impl Failure {
     /// An error of a session that has to do with a campaign file: a mistake in the backend's settings or in the formats of
     /// the map is shown in its text.
     pub fn in_campaign(error: SessionError, campaign: &Path) -> Self {
-        let Ok(text) = std::fs::read_to_string(campaign) else { return error.into() };
+        let Ok(text) = mapper_campaign::read_text(campaign) else { return error.into() };
         let findings = match &error {
             SessionError::Backend(BackendError::Settings { backend, path, source }) => {
                 mapper_campaign::backend_mistake(&text, campaign, backend, path, &source.to_string())

@@ -22,7 +22,7 @@ pub fn registry() -> Registry {
 
 /// A suspected effect, written in rhai.
 fn read_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
-    let text = std::fs::read_to_string(path).map_err(|source| SessionError::File {
+    let text = mapper_campaign::read_text(path).map_err(|source| SessionError::File {
         action: "read",
         path: path.to_owned(),
         source,

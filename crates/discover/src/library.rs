@@ -24,6 +24,9 @@ const FLOW_KG_S: f64 = 0.06;
 /// Scale of pressures, Pa.
 const PRESSURE_PA: f64 = 1e5;
 
+/// Powers of the speed with which something grows, and how that is said behind "growing with the speed".
+const GROWTHS: [(f64, &str); 3] = [(1.0, ""), (2.0, "'s square"), (3.0, "'s cube")];
+
 /// All terms.
 pub fn library() -> Vec<Term> {
     let mut all = Vec::new();
@@ -50,24 +53,10 @@ pub fn library() -> Vec<Term> {
             0.05,
             "radiation over {} between {} and the cell",
         ));
-        all.push(on(
-            power(Speed, SPEED_RAD_S, 1.0),
-            "W",
-            50.0,
-            "{} at 100 krpm, growing with the speed, to {}",
-        ));
-        all.push(on(
-            power(Speed, SPEED_RAD_S, 2.0),
-            "W",
-            50.0,
-            "{} at 100 krpm, growing with the speed's square, to {}",
-        ));
-        all.push(on(
-            power(Speed, SPEED_RAD_S, 3.0),
-            "W",
-            50.0,
-            "{} at 100 krpm, growing with the speed's cube, to {}",
-        ));
+        for (exponent, growing) in GROWTHS {
+            let words = format!("{{}} at 100 krpm, growing with the speed{growing}, to {{}}");
+            all.push(on(power(Speed, SPEED_RAD_S, exponent), "W", 50.0, &words));
+        }
         all.push(on(power(Flow, FLOW_KG_S, 1.0), "W", 50.0, "{} at 60 g/s, growing with the flow, to {}"));
     }
     for other in [Tt, T2] {
@@ -97,18 +86,10 @@ pub fn library() -> Vec<Term> {
     ));
     let shaft = |formula, unit, step, words: &str| alone(Balance::Shaft, formula, unit, step, words);
     all.push(shaft(Number(-1.0), "N m", 0.01, "a constant torque of {} against the shaft"));
-    all.push(shaft(
-        power(Speed, SPEED_RAD_S, 1.0),
-        "N m",
-        0.01,
-        "a torque of {} at 100 krpm, growing with the speed",
-    ));
-    all.push(shaft(
-        power(Speed, SPEED_RAD_S, 2.0),
-        "N m",
-        0.01,
-        "a torque of {} at 100 krpm, growing with the speed's square",
-    ));
+    for (exponent, growing) in &GROWTHS[..2] {
+        let words = format!("a torque of {{}} at 100 krpm, growing with the speed{growing}");
+        all.push(shaft(power(Speed, SPEED_RAD_S, *exponent), "N m", 0.01, &words));
+    }
     all.push(shaft(
         power(Speed, SPEED_RAD_S, -1.0),
         "N m",
@@ -161,18 +142,10 @@ pub fn library() -> Vec<Term> {
         for other in [Ambient, Oil, Bearing, Tt, Tc] {
             all.push(on(gas(other), "W/K", 0.5, &format!("{{}} from {} to {{}}", other.words())));
         }
-        all.push(on(
-            power(Speed, SPEED_RAD_S, 2.0),
-            "W",
-            50.0,
-            "{} at 100 krpm, growing with the speed's square, to {}",
-        ));
-        all.push(on(
-            power(Speed, SPEED_RAD_S, 3.0),
-            "W",
-            50.0,
-            "{} at 100 krpm, growing with the speed's cube, to {}",
-        ));
+        for (exponent, growing) in &GROWTHS[1..] {
+            let words = format!("{{}} at 100 krpm, growing with the speed{growing}, to {{}}");
+            all.push(on(power(Speed, SPEED_RAD_S, *exponent), "W", 50.0, &words));
+        }
         // What the gas gets, a housing loses.
         let seen = match balance {
             Balance::GasBefore => T1,

@@ -274,6 +274,14 @@ pub enum SessionError {
     /// A map cannot be written in a format.
     #[error(transparent)]
     Export(#[from] ExportError),
+    /// A file that is no diagnosis, or no forecast, or not the one that was sealed.
+    #[error("{}: {why}", .path.display())]
+    TwinFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
     /// A map file has mistakes.
     #[error("{}: {source}", .path.display())]
     Import {
@@ -404,7 +412,7 @@ impl SessionError {
             }
             E::LogOption(_) => ErrorKind::BadInput,
             E::Log(_) => ErrorKind::BadRecording,
-            E::Twin(_) => ErrorKind::BadInput,
+            E::Twin(_) | E::TwinFile { .. } => ErrorKind::BadInput,
             E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
                 ErrorKind::BadRecording
             }

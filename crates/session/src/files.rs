@@ -1,8 +1,8 @@
-//! New files: nothing that is there is ever replaced.
+//! Files: what is there is never replaced, and never more of it read than a limit.
 
 use crate::SessionError;
 use serde::Serialize;
-use std::io::Write;
+use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 
 /// Writes a file that is not there yet.
@@ -21,4 +21,42 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
 /// [`SessionError::Json`] where the value cannot be written as JSON.
 pub fn json_text(value: &impl Serialize) -> Result<String, SessionError> {
     Ok(serde_json::to_string_pretty(value)? + "\n")
+}
+
+/// Reads a file without ever holding much more than `limit_bytes`, whatever the file claims to be.
+///
+/// # Errors
+/// [`SessionError::File`] where it cannot be read, or is larger.
+pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, SessionError> {
+    let failed = SessionError::file("read", path);
+    let mut bytes = Vec::new();
+    let file = match std::fs::File::open(path) {
+        Ok(file) => file,
+        Err(error) => return Err(failed(error)),
+    };
+    match file.take(limit_bytes + 1).read_to_end(&mut bytes) {
+        Err(error) => Err(failed(error)),
+        Ok(_) if bytes.len() as u64 > limit_bytes => {
+            let larger = format!("it is larger than the {limit_bytes} bytes that are read");
+            Err(failed(std::io::Error::new(ErrorKind::FileTooLarge, larger)))
+        }
+        Ok(_) => Ok(bytes),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_more_is_read_than_allowed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        write_new(&path, b"12345").unwrap();
+        assert_eq!(read_at_most(&path, 5).unwrap(), b"12345");
+        for (path, limit_bytes) in [(path.as_path(), 4), (Path::new("/dev/zero"), 4096)] {
+            let error = read_at_most(path, limit_bytes).unwrap_err().to_string();
+            assert!(error.contains(&format!("larger than the {limit_bytes} bytes")), "{error}");
+        }
+    }
 }

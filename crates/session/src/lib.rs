@@ -19,7 +19,7 @@
 //! };
 //! let session = Session { on_event: &show, ..Session::new(&registry) };
 //! let file = Path::new("../../campaigns/grid18.yaml");
-//! let (campaign, text) = (mapper_campaign::load(file)?, std::fs::read_to_string(file)?);
+//! let (campaign, text) = (mapper_campaign::load(file)?, mapper_campaign::read_text(file)?);
 //! let runs = tempfile::tempdir()?;
 //! let results = session.run(RunRequest::new(&campaign, &text, runs.path()))?.results?;
 //! for scored in results.points.iter().filter(|scored| scored.point.eta.is_some()) {
@@ -70,6 +70,7 @@ mod stored_plan;
 mod surge;
 mod transient;
 mod twin_campaign;
+mod twin_files;
 
 pub use declared::identification;
 pub use drift::Drift;
@@ -98,3 +99,4 @@ pub use stored_plan::stored_plan;
 pub use surge::{SurgeForecast, remark_surge_search, surge_forecast};
 pub use transient::write_transient;
 pub use twin_campaign::{Twin, twin_campaign};
+pub use twin_files::{SealedForecast, found_in};

@@ -70,7 +70,7 @@ pub(crate) fn attached_campaign(read: &ReadReport, file: &Path) -> Result<Option
 
 /// A file named by the campaign of a recording. The sequence script, which nothing here needs, may be missing.
 fn read_beside(path: &Path) -> std::io::Result<String> {
-    let text = std::fs::read_to_string(path);
+    let text = mapper_campaign::read_text(path);
     if path.extension().is_some_and(|extension| extension == "rhai") {
         Ok(text.unwrap_or_default())
     } else {

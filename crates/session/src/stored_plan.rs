@@ -1,9 +1,9 @@
 //! A plan from a file, which anybody may have written: held against what it was made from, and against all that a plan may ask for.
 
 use crate::SessionError;
+use crate::files::read_at_most;
 use mapper_campaign::Campaign;
 use mapper_core::{OperatingPoint, Plan, PlanStep};
-use std::io::Read;
 use std::path::Path;
 
 /// Largest plan file that is read, bytes.
@@ -23,13 +23,8 @@ const ROUNDING_RATIO: f64 = 1e-9;
 /// [`SessionError::StalePlan`] with what has changed; [`SessionError::NotAPlan`] and [`SessionError::File`] where the
 /// file does not hold a plan; [`SessionError::WrongPlan`] where it asks for what no plan may ask for.
 pub fn stored_plan(path: &Path, made: &Plan, campaign: &Campaign) -> Result<Plan, SessionError> {
-    let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(SessionError::file("read", path))?;
-    file.take(FILE_MAX_BYTES + 1).read_to_end(&mut bytes).map_err(SessionError::file("read", path))?;
+    let bytes = read_at_most(path, FILE_MAX_BYTES)?;
     let wrong = |why: String| SessionError::WrongPlan { path: path.to_owned(), why };
-    if bytes.len() as u64 > FILE_MAX_BYTES {
-        return Err(wrong(format!("it has more than the {FILE_MAX_BYTES} bytes that are read")));
-    }
     let stored: Plan = serde_json::from_slice(&bytes)
         .map_err(|source| SessionError::NotAPlan { path: path.to_owned(), source })?;
     let (then, now) = (&stored.made_from, &made.made_from);

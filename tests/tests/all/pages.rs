@@ -79,7 +79,7 @@ const NINE_POINTS: &[(&str, &str)] = &[
     ),
     ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.0, 1.4]"),
     ("warm_up: 2 min ", "warm_up: 60 s "),
-    ("zero: {soak: 30 min, evenness: 0.03 K, pressure_evenness: 3 Pa}\n", ""),
+    ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
     ("operator: virtual\n", "operator: '</script><img src=x onerror=alert(1)>'\n"),
 ];
 

@@ -15,10 +15,10 @@ fn run(zero: &str, seed: u32, out: &Path) -> Value {
         ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.0]"),
         // Temperatures alone: no soak says anything of a flow meter.
         ("m_c:   {noise: 1.5e-4 kg/s, gain: 0.5 %}", "m_c:   {noise: 1.5e-4 kg/s}"),
-        ("zero: {soak: 30 min, evenness: 0.03 K, pressure_evenness: 3 Pa}\n", ""),
+        ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
         ("method: joint ", "joint: {alpha_area: fixed, probe: fixed, direction: fixed}\n  method: joint "),
         // The same steps with a zero and without.
-        ("required_sigma_eta: 0.9 %\n", ""),
+        ("required_sigma_eta: 0.6 %\n", ""),
         ("seed: 1 ", &seed),
     ]);
     let arguments =

@@ -49,7 +49,7 @@ impl LineErrors {
         let (nx, ny) = normal(&slope);
         let length = (slope[0].powi(2) + slope[1].powi(2)).max(1e-12);
         let place = shape.at(angle_rad);
-        let work_terms = shape.work_terms(place.flow, place.head);
+        let work_terms = shape.work_terms(place.flow_at_nominal_kg_s, place.head);
         let (mut across, mut eta) = (DVector::zeros(PARAMETERS), DVector::zeros(PARAMETERS));
         for q in 0..PARAMETERS {
             if q >= WORK {

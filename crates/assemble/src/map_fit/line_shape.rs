@@ -49,17 +49,20 @@ pub(crate) const ANGLE_RANGE: (f64, f64) = (-0.6, 0.8 * std::f64::consts::PI);
 /// Where flow coefficients lie: makes the work coefficient's terms of order 1.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FlowFrame {
-    /// Middle of all measured flows over speed.
-    pub middle: f64,
-    /// Half their range.
-    pub half: f64,
+    /// Middle of all measured flows over the speed ratio, kg/s.
+    pub middle_kg_s: f64,
+    /// Half their range, kg/s.
+    pub half_range_kg_s: f64,
 }
 
-/// A place on a line, similarity coordinates.
+/// A place on a line in similarity coordinates; the speed ratio is the speed over the fit's nominal one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
-    pub flow: f64,
+    /// Flow over the speed ratio, kg/s.
+    pub flow_at_nominal_kg_s: f64,
+    /// Isentropic head over the speed ratio's square; see `mapper_physics::similarity`.
     pub head: f64,
+    /// Work in the units of `head`.
     pub work: f64,
 }
 
@@ -118,12 +121,12 @@ impl LineShape {
         let head = self.choke_head + (self.zero_slope_head - self.choke_head) * y;
         let log_work: f64 =
             self.work_terms(flow, head).iter().zip(&self.work).map(|(term, c)| term * c).sum();
-        Place { flow, head, work: log_work.clamp(-8.0, 5.0).exp() }
+        Place { flow_at_nominal_kg_s: flow, head, work: log_work.clamp(-8.0, 5.0).exp() }
     }
 
     /// Derivatives of the logarithm of the work coefficient by its parameters, at a place of the line.
     pub(crate) fn work_terms(&self, flow: f64, head: f64) -> [f64; WORK_TERMS] {
-        let z = ((flow - self.frame.middle) / self.frame.half).clamp(-1.6, 1.6);
+        let z = ((flow - self.frame.middle_kg_s) / self.frame.half_range_kg_s).clamp(-1.6, 1.6);
         let y = (head - self.choke_head) / (self.zero_slope_head - self.choke_head);
         let drop = (1.0 - y).clamp(0.0, 1.0);
         [1.0, z, z * z, drop, drop * drop, z * z * z]
@@ -163,7 +166,7 @@ impl LineShape {
     pub(crate) fn physical(&self, angle_rad: f64, speed_ratio: f64) -> PhysicalPlace {
         let place = self.at(angle_rad);
         PhysicalPlace {
-            flow_kg_s: place.flow * speed_ratio,
+            flow_kg_s: place.flow_at_nominal_kg_s * speed_ratio,
             pressure_ratio: pressure_ratio_of_signed_head(place.head * speed_ratio * speed_ratio),
             eta: place.head / place.work,
         }
@@ -183,14 +186,14 @@ mod tests {
         ) {
             let mut p = [0.0; PARAMETERS];
             (p[ZERO_SLOPE_FLOW], p[CHOKE_HEAD], p[EXPONENTS[0]], p[EXPONENTS[1]]) = (ratio, choke, n, k);
-            let shape = LineShape::new(&p, FlowFrame { middle: 0.5, half: 0.5 });
+            let shape = LineShape::new(&p, FlowFrame { middle_kg_s: 0.5, half_range_kg_s: 0.5 });
             let walk: Vec<Place> = (0..=40).map(|i| shape.at(f64::from(i) / 40.0 * std::f64::consts::FRAC_PI_2)).collect();
             for pair in walk.windows(2) {
-                prop_assert!(pair[1].flow <= pair[0].flow + 1e-9 && pair[1].head >= pair[0].head - 1e-9);
+                prop_assert!(pair[1].flow_at_nominal_kg_s <= pair[0].flow_at_nominal_kg_s + 1e-9 && pair[1].head >= pair[0].head - 1e-9);
             }
             // The ellipse's equation itself.
             for place in &walk {
-                let x = (place.flow - shape.zero_slope_flow) / (shape.choke_flow - shape.zero_slope_flow);
+                let x = (place.flow_at_nominal_kg_s - shape.zero_slope_flow) / (shape.choke_flow - shape.zero_slope_flow);
                 let y = (place.head - shape.choke_head) / (shape.zero_slope_head - shape.choke_head);
                 prop_assert!((x.abs().powf(shape.exponents[0]) + y.abs().powf(shape.exponents[1]) - 1.0).abs() < 1e-9);
             }

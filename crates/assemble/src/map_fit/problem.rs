@@ -49,7 +49,7 @@ impl<'a> Problem<'a> {
         let flows: Vec<f64> = data.points.iter().map(Observation::flow).collect();
         let (low, high) = (quantile(&flows, 0.0).unwrap_or(0.0), quantile(&flows, 1.0).unwrap_or(1.0));
         let middle = median(&flows).unwrap_or(0.5);
-        let frame = FlowFrame { middle, half: (0.5 * (high - low)).max(1e-6 * high) };
+        let frame = FlowFrame { middle_kg_s: middle, half_range_kg_s: (0.5 * (high - low)).max(1e-6 * high) };
         let mut problem = Problem { data, frame, splines, rows, start: [0.0; PARAMETERS] };
         problem.start = problem.starting_level();
         problem
@@ -86,7 +86,7 @@ impl<'a> Problem<'a> {
             .iter()
             .filter_map(|p| {
                 let work = (p.head() / p.eta?.max(0.05)).max(1e-9).ln();
-                Some(((p.flow() - self.frame.middle) / self.frame.half, work))
+                Some(((p.flow() - self.frame.middle_kg_s) / self.frame.half_range_kg_s, work))
             })
             .collect();
         let terms = DMatrix::from_fn(with_eta.len(), 3, |i, j| with_eta[i].0.powi(j as i32));
@@ -167,7 +167,7 @@ impl<'a> Problem<'a> {
             let root = weights[i].map(f64::sqrt);
             let shape = LineShape::new(&parameters, self.frame);
             let here = shape.at(foot.angle_rad);
-            let work_terms = shape.work_terms(here.flow, here.head);
+            let work_terms = shape.work_terms(here.flow_at_nominal_kg_s, here.head);
             for q in 0..PARAMETERS {
                 let (x, y, eta) = if q >= WORK {
                     // Work moves nothing but efficiency.

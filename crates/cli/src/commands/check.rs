@@ -45,7 +45,7 @@ impl Check {
         let stop = interrupt::stop_flag()?;
         let session = Session { stop: &stop, ..Session::new(&registry) };
         let prospects = session.prospects(&campaign, &model)?;
-        let text = std::fs::read_to_string(&self.campaign).map_err(|error| {
+        let text = mapper_campaign::read_text(&self.campaign).map_err(|error| {
             Failure::new(Code::Failure, format!("failed to read {}: {error}", self.campaign.display()))
         })?;
         let warnings = mapper_campaign::warnings(&text, &self.campaign, &campaign, prospects.concerns);

@@ -48,7 +48,7 @@ impl Run {
         let kept = self.resume.as_ref().map(|run| run.join(run_directory::CAMPAIGN));
         let Some(file) = self.campaign.clone().or(kept) else { return Ok(()) };
         let campaign = mapper_campaign::load(&file).map_err(Failure::of_campaign)?;
-        let campaign_text = std::fs::read_to_string(&file).map_err(|error| {
+        let campaign_text = mapper_campaign::read_text(&file).map_err(|error| {
             Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display()))
         })?;
         let resume = self.resume.as_deref().map(BrokenOff::read).transpose()?;

@@ -1,17 +1,12 @@
 //! `mapper gap predict`: forecasts the next recording under seal, and says afterwards how that came out.
 
-use super::apply::found_in;
-use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::given::channel_map;
 use crate::{output, registry};
 use clap::Args;
-use mapper_gap::twin::{Expected, Found};
 use mapper_report::held_text;
-use mapper_session::{Recorded, Session, json_text, write_new};
-use serde::{Deserialize, Serialize};
+use mapper_session::{Recorded, SealedForecast, Session, found_in};
 use serde_json::json;
-use sha2::{Digest, Sha256};
 use std::path::PathBuf;
 
 /// Forecast the next recording from a diagnosis and seal the forecast; with --recording, say how it came out
@@ -42,18 +37,6 @@ pub struct Predict {
     pub json: bool,
 }
 
-/// A forecast as it is stored.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Forecast {
-    /// Name of the campaign.
-    campaign: String,
-    /// The machine as found, with its covariance.
-    found: Found,
-    /// The ends of the planned steps: value and half the width of the 95 % band.
-    steps: Vec<Expected>,
-}
-
 impl Predict {
     /// Makes a forecast, or holds one against a recording.
     pub fn run(&self) -> Result<(), Failure> {
@@ -62,15 +45,11 @@ impl Predict {
         let registry = registry::registry();
         let effects = registry.effects_with(&self.effects)?;
         let session = Session::new(&registry);
-        let bad =
-            |message: String| Failure::new(Code::BadInput, format!("{}: {message}", self.forecast.display()));
         if let Some(diagnosis) = &self.diagnosis {
             let found = found_in(diagnosis)?;
             let steps = session.forecast_twin(&campaign, &map, effects, &found)?;
-            let forecast = Forecast { campaign: campaign.name.clone(), found, steps };
-            let text = json_text(&forecast)?;
-            write_new(&self.forecast, text.as_bytes())?;
-            let (steps, seal) = (forecast.steps.len(), sha256(text.as_bytes()));
+            let forecast = SealedForecast { campaign: campaign.name.clone(), found, steps };
+            let (seal, steps) = (forecast.write(&self.forecast)?, forecast.steps.len());
             if self.json {
                 return output::print_json(
                     &json!({ "forecast": self.forecast, "steps": steps, "sha256": seal }),
@@ -81,18 +60,9 @@ impl Predict {
                 self.forecast.display()
             ));
         }
-        let Some(recording) = &self.recording else {
-            return Err(bad("nothing to hold it against".to_owned()));
-        };
-        let bytes = std::fs::read(&self.forecast).map_err(|error| bad(error.to_string()))?;
-        let seal = sha256(&bytes);
-        if let Some(wanted) = self.seal.as_ref().filter(|wanted| !wanted.eq_ignore_ascii_case(&seal)) {
-            return Err(bad(format!(
-                "its SHA-256 is {seal}, not {wanted}: it is not the forecast that was sealed"
-            )));
-        }
-        let forecast: Forecast =
-            serde_json::from_slice(&bytes).map_err(|error| bad(format!("not a forecast: {error}")))?;
+        // clap asks for a recording where there is no diagnosis.
+        let Some(recording) = &self.recording else { return Ok(()) };
+        let (forecast, seal) = SealedForecast::read(&self.forecast, self.seal.as_deref())?;
         let recorded = Recorded::read(&registry, recording, &map, Some(&campaign))?;
         let held = session.hold_twin(&recorded, &campaign, &map, effects, &forecast.found)?;
         if self.json {
@@ -100,8 +70,4 @@ impl Predict {
         }
         output::print(&held_text(&held, &seal))
     }
-}
-
-fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

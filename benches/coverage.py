@@ -20,8 +20,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from seeds import ROOT, ZERO, error_of, held, quantile, replaced, share, write_table
+from seeds import ROOT, error_of, held, quantile, replaced, share, write_table
 
+ZERO = "zero: {soak: 30 min, evenness: 0.03 K, pressure_evenness: 3 Pa}\n"
 CLASSES = ["nothing", "alpha_A", "probe", "alpha_A and probe"]
 
 

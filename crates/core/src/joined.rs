@@ -63,11 +63,12 @@ fn kind(step: &StepMarker, earlier: &[StepMarker]) -> StepKind {
         }
         _ => false,
     };
-    if step.kind != StepKind::Point || !earlier.iter().any(|other| at_the_point(&other)) {
+    // A repeat is there to compare: the point itself may come later, by another jump.
+    let mut there = earlier.iter().filter(|other| other.kind.measures()).filter(at_the_point).peekable();
+    if step.kind != StepKind::Point || there.peek().is_none() {
         return step.kind;
     }
-    let same_jump = |other: &StepMarker| other.from == step.from;
-    if earlier.iter().filter(at_the_point).any(same_jump) { StepKind::Repeat } else { StepKind::Return }
+    if there.any(|other| other.from == step.from) { StepKind::Repeat } else { StepKind::Return }
 }
 
 fn alike(a: f64, b: f64) -> bool {
@@ -113,6 +114,15 @@ mod tests {
             steps: steps.collect(),
             ..Recording::default()
         }
+    }
+
+    #[test]
+    fn a_repeat_leaves_its_point_to_be_measured() {
+        let mut first = recording(0.0, &[(None, at(5e4)), (at(5e4), at(9e4))]);
+        first.steps[1].kind = StepKind::Repeat;
+        let second = recording(700.0, &[(None, at(7e4)), (at(7e4), at(9e4))]);
+        let (whole, _) = joined(vec![first, second]);
+        assert_eq!(whole.steps[3].kind, StepKind::Point);
     }
 
     #[test]

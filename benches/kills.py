@@ -1,0 +1,133 @@
+"""What is left of a run that is killed at any moment, and whether the rest of it makes the same map.
+
+    cargo build --release
+    target/python-env/bin/python benches/kills.py --mapper target/release/mapper --kills 200
+
+Runs `campaigns/turbo_a.yaml`, kills it with SIGKILL at a random moment, goes on with `mapper run --resume` until it is through,
+and compares with the run that nobody killed: steps whose journal entry holds but whose samples are not in the recording, points
+that are there twice or not at all, and how far efficiencies lie apart, in their own standard errors. A resumed run warms up again and
+draws other noise: differences of about one standard error are noise.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import math
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from mcap.records import Channel, Message
+from mcap.stream_reader import StreamReader
+
+from seeds import ROOT, quantile
+
+
+def points_of(run):
+    return json.loads((run / "points.json").read_text())["points"]
+
+
+def key(point):
+    return point["target"]["speed_rpm"], point["target"]["valve"]
+
+
+def promised_and_lost(run):
+    """Steps that the journal calls saved and whose end the recording, cut as it is, does not hold."""
+    journal = run / "journal.jsonl"
+    lines = journal.read_text(errors="replace").split("\n")[:-1] if journal.exists() else []
+    promised = {entry["step_saved"] for entry in map(json.loads, lines) if isinstance(entry, dict) and "step_saved" in entry}
+    ended, topics = set(), {}
+    try:
+        with open(run / "recording.mcap", "rb") as file:
+            for record in StreamReader(file, record_size_limit=None).records:
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                elif isinstance(record, Message) and topics.get(record.channel_id) == "/step":
+                    step = json.loads(record.data)
+                    if step["phase"] == "end":
+                        ended.add(step["index"])
+    except Exception as error:  # The cut end of the file: what came before it was read.
+        print(f"the recording ends with: {error}", file=sys.stderr) if not topics else None
+    return len(promised - ended)
+
+
+def killed(mapper, folder, index, campaign, whole_s):
+    """One run, killed once, resumed; what is wrong with it."""
+    rng = random.Random(index)
+    out = folder / f"run-{index}"
+    environment = {**os.environ, "MAPPER_STATE_DIR": str(folder / f"state-{index}")}
+    at_s = rng.uniform(0.02, 1.0) * whole_s
+    process = subprocess.Popen(
+        [mapper, "run", str(campaign), "--out", str(out)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment
+    )
+    try:
+        process.wait(at_s)
+        return {"index": index, "what": "through"}
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    runs = list(out.glob("*/recording.mcap"))
+    if not runs:
+        return {"index": index, "what": "before the first sample"}
+    run = runs[0].parent
+    if (run / "points.json").exists():
+        return {"index": index, "what": "after the last sample"}
+    lost = promised_and_lost(run)
+    done = subprocess.run([mapper, "run", "--resume", str(run)], capture_output=True, text=True, env=environment)
+    if not (run / "points.json").exists():
+        return {"index": index, "what": "not resumed", "why": f"exit {done.returncode}: {done.stderr.strip()[-400:]}"}
+    return {"index": index, "what": "resumed", "points": points_of(run), "exit": done.returncode, "lost": lost}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--mapper", default="target/release/mapper")
+    parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--first", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=2)
+    arguments = parser.parse_args()
+    mapper = str(Path(arguments.mapper).resolve())
+    campaign = ROOT / "campaigns" / "turbo_a.yaml"
+    found = []
+    with tempfile.TemporaryDirectory() as scratch, concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+        folder = Path(scratch)
+        start = time.monotonic()
+        subprocess.run([mapper, "run", str(campaign), "--out", str(folder / "whole")], check=True, capture_output=True)
+        whole_s = time.monotonic() - start
+        whole = {key(p): p for p in points_of(next((folder / "whole").iterdir())) if p["kind"] == "point"}
+        seeds = range(arguments.first, arguments.first + arguments.kills)
+        for one in pool.map(lambda index: killed(mapper, folder, index, campaign, whole_s), seeds):
+            found.append(one)
+            if "why" in one:
+                print(one["index"], one["why"], file=sys.stderr, flush=True)
+    counts = {}
+    apart, wrong = [], 0
+    for one in found:
+        counts[one["what"]] = counts.get(one["what"], 0) + 1
+        if one["what"] != "resumed":
+            continue
+        points = [p for p in one["points"] if p["kind"] == "point"]
+        keys = [key(p) for p in points]
+        if sorted(keys) != sorted(whole) or one["exit"] != 0:
+            wrong += 1
+            print(one["index"], f"exit {one['exit']}, {len(keys)} points, {len(set(keys))} places", file=sys.stderr, flush=True)
+        for point in points:
+            other = whole.get(key(point))
+            if other and point["eta"] is not None and other["eta"] is not None:
+                sigma = math.hypot(point["eta_high"] - point["eta_low"], other["eta_high"] - other["eta_low"]) / (2 * 1.96)
+                apart.append(abs(point["eta"] - other["eta"]) / sigma)
+    print(", ".join(f"{what}: {count}" for what, count in sorted(counts.items())))
+    print(f"steps that the journal promised and the recording does not hold: {sum(one.get('lost', 0) for one in found)}")
+    print(f"of the resumed, with a point missing or twice or another exit code: {wrong}")
+    if apart:
+        print(f"efficiency beside the run nobody killed, in standard errors of the difference: median {quantile(apart, 0.5):.2f}, "
+              f"99 % {quantile(apart, 0.99):.2f}, worst {max(apart):.2f}")
+
+
+if __name__ == "__main__":
+    main()

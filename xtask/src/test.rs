@@ -13,20 +13,24 @@ use std::process::Command;
 /// preparations end it early.
 pub fn test() -> Result<(), Error> {
     let mut steps = Steps::default();
-    let mut python = None;
     steps.run("tools", machine::prepare);
-    if steps.all_well() {
-        steps.run("Python environment", || {
-            python = Some(python_env::prepare()?);
-            Ok(())
-        });
+    if !steps.all_well() {
+        return steps.finish();
     }
-    let Some(python) = python else { return steps.finish() };
-    let offered = Offered::with(python);
+    // Made beside the first steps: it waits for the network, they for the processor.
+    let making = std::thread::spawn(python_env::prepare);
     steps.run("formatting", || formatting(Mode::Check));
     steps.run("lints", || {
         run(cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"]))
     });
+    let mut python = None;
+    steps.run("Python environment", || {
+        let made = making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        python = Some(made?);
+        Ok(())
+    });
+    let Some(python) = python else { return steps.finish() };
+    let offered = Offered::with(python);
     let knows_licences = machine::has_deny();
     if knows_licences {
         steps.run("dependencies", || run(cargo(&["deny", "check", "bans", "licenses", "sources"])));

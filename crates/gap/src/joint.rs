@@ -4,6 +4,7 @@
 //! recording's best (mode `x_i`, precision `P_i`, priors `D` of the nuisances included; starts integrated out) the whole is
 //! `P = sum (P_i - D) + D`, `P x = sum P_i x_i`: what the recordings share is not counted as if each had measured it anew.
 
+use mapper_core::confidence_interval_95;
 use crate::calibration::Calibration;
 use crate::coordinate::{Coordinate, coordinates, parameters};
 use crate::diagnose::Diagnosed;
@@ -128,7 +129,7 @@ pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> V
             _ => Fate::ComesAndGoes,
         };
         let value = |x: f64, sigma: f64| {
-            let ends = [x - 1.96 * sigma, x + 1.96 * sigma].map(|x| at[k].value(x));
+            let ends = <[f64; 2]>::from(confidence_interval_95(x, sigma)).map(|x| at[k].value(x));
             Value { value: at[k].value(x), low: ends[0].min(ends[1]), high: ends[0].max(ends[1]) }
         };
         let info = study.effects[*index].info();

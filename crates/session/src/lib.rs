@@ -78,7 +78,7 @@ pub use drive::{Pace, drive, drive_paced, soak_s};
 pub use error::{ErrorKind, SessionError};
 pub use mapper_runner::Operator;
 pub use event::{OnEvent, SessionEvent};
-pub use files::{json_text, write_new};
+pub use files::{Existing, json_text, write_file, write_new};
 pub use gap::Gap;
 pub use identified::{Identified, SoughtSurge};
 pub use inspected::{Inspected, inspect_log};

@@ -1,11 +1,12 @@
 //! `mapper history`: what the nights gave.
 
 use crate::failure::Failure;
+use crate::output::Replace;
 use crate::output;
 use clap::Args;
 use mapper_history::{Filter, ListedRun, Metric};
 use mapper_report::{groups_text, history_svg, runs_text, time};
-use mapper_session::{SessionError, write_new};
+use mapper_session::{SessionError};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -37,6 +38,8 @@ pub struct History {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 fn figure(text: &str) -> Result<Metric, String> {
@@ -75,7 +78,7 @@ impl History {
         let runs = history.runs(&filter).map_err(SessionError::from)?;
         let figures: Vec<Metric> = if self.figure.is_empty() { SHOWN.to_vec() } else { self.figure.clone() };
         if let Some(path) = &self.svg {
-            write_new(path, history_svg(&runs, &figures).as_bytes())?;
+            self.replace.write(path, history_svg(&runs, &figures).as_bytes())?;
         }
         if self.json {
             let runs: Vec<serde_json::Value> = runs.iter().map(run_json).collect();

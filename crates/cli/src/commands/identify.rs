@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::given::{channel_map, given_campaign};
-use crate::results_text::results_text;
+use crate::shown::ShownArguments;
 use crate::{output, registry};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
@@ -10,6 +10,7 @@ use mapper_report::{
     disagreement_text, points_text, sensors_text, shared_errors_text, surge_text, thermal_text, zero_text,
 };
 use mapper_session::{Recorded, Session};
+use mapper_terminal::results_text;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -31,6 +32,8 @@ pub struct Identify {
     /// How to identify [default: the campaign's method, or joint]
     #[arg(long, value_enum)]
     pub method: Option<MethodArgument>,
+    #[command(flatten)]
+    pub shown: ShownArguments,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -55,7 +58,7 @@ impl Identify {
             let results = session.identify_into(recorded, &map, method, directory)?;
             return match self.json {
                 true => output::print_json(&results),
-                false => output::print(&results_text(&display, &results)),
+                false => output::print(&results_text(&display, &results, self.shown.shown())),
             };
         }
         let found = session.identify(recorded, &map, method)?;
@@ -82,7 +85,7 @@ impl Identify {
         let disagreement = disagreement_text(&found.points, &found.two_parameter, &display);
         let mut text: String = found.remarks.iter().map(|remark| format!("{remark}\n")).collect();
         text.push_str(&disagreement.unwrap_or_default());
-        text.push_str(&points_text(&found.points, &display));
+        text.push_str(&points_text(&found.points, &display, self.shown.truth));
         if let Some(shared) = shared_errors_text(found.points.iter().map(|scored| &scored.point), &display) {
             text.push_str(&format!("{shared}\n"));
         }

@@ -2,8 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::output;
-use crate::progress::Progress;
+use crate::{manner, output};
 use clap::Args;
 use mapper_reproduce::{FIGURES, FigureResult, picture_path};
 use serde_json::json;
@@ -23,8 +22,9 @@ pub struct Reproduce {
 impl Reproduce {
     /// Makes the page and its pictures, and says in a line per statement what came out.
     pub fn run(&self) -> Result<(), Failure> {
-        let progress = Progress::new();
+        let progress = manner::progress();
         let mut done = 0;
+        progress.pieces(0, FIGURES.len());
         let results = mapper_reproduce::reproduce(|_| {
             done += 1;
             progress.pieces(done, FIGURES.len());

@@ -1,10 +1,11 @@
 //! `mapper log inspect`: what a log holds, and the channel map that it suggests.
 
 use crate::failure::Failure;
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_report::log_text;
-use mapper_session::{Inspected, inspect_log, write_new};
+use mapper_session::{Inspected, inspect_log};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -22,6 +23,8 @@ pub struct Inspect {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 fn key_and_value(text: &str) -> Result<(String, String), String> {
@@ -35,7 +38,7 @@ impl Inspect {
         let registry = registry::registry();
         let found = inspect_log(&registry, &self.log, self.with.clone())?;
         if let Some(file) = &self.write_channels {
-            write_new(file, found.channel_map().as_bytes())?;
+            self.replace.write(file, found.channel_map().as_bytes())?;
         }
         if self.json {
             return output::print_json(&json_of(&found));

@@ -5,6 +5,7 @@ use crate::{manner, output};
 use mapper_blind::BlindError;
 use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
+use mapper_live::LiveError;
 use mapper_record::{ChannelMapError, RecordError};
 use mapper_session::{ErrorKind, SessionError};
 use serde_json::{Value, json};
@@ -72,6 +73,12 @@ impl Failure {
             _ => return error.into(),
         };
         Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
+    }
+
+    /// The live page cannot be had.
+    pub fn of_live(error: LiveError) -> Self {
+        let code = if matches!(error, LiveError::Address { .. }) { Code::BadInput } else { Code::Failure };
+        Failure::new(code, error)
     }
 
     /// Standard output was closed by its reader: a normal end of a pipe.

@@ -3,11 +3,12 @@
 use crate::run_page::RunPage;
 use mapper_campaign::units::Kind;
 use mapper_core::{IdentifiedPoint, half_width_95, standard_error_of};
+use mapper_identify::TwoParameter;
 use mapper_report::{Display, step_name, verdict_word};
 use serde::Serialize;
 
 /// One point. Efficiencies in %, half widths of 95 % intervals in points.
-#[derive(Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct DrawnPoint {
     step: usize,
     name: String,
@@ -47,19 +48,20 @@ pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPo
     points
         .map(|point| {
             let rounded = line_of(point.step).unwrap_or(point.speed_corrected_rpm);
-            DrawnPoint { line: display.speed(rounded), ..drawn(page, point, display) }
+            let two = page.report.two_parameter.iter().find(|two| two.step == point.step);
+            drawn_point(point, display.speed(rounded), two, display)
         })
         .collect()
 }
 
-fn drawn(page: &RunPage<'_>, point: &IdentifiedPoint, display: &Display) -> DrawnPoint {
+/// A point on a line; `two`: what the two-parameter method makes of it.
+pub(crate) fn drawn_point(point: &IdentifiedPoint, line: String, two: Option<&TwoParameter>, display: &Display) -> DrawnPoint {
     let percent = |value: Option<f64>| value.map(|value| 100.0 * value);
-    let two = page.report.two_parameter.iter().find(|two| two.step == point.step);
     let interval = point.eta_low.zip(point.eta_high).map(|(low, high)| standard_error_of(low, high));
     DrawnPoint {
         step: point.step,
         name: step_name(point),
-        line: String::new(),
+        line,
         speed: display.number(Kind::Speed, point.speed_corrected_rpm),
         flow: display.number(Kind::MassFlow, point.flow_corrected_kg_s),
         pr: point.pressure_ratio,

@@ -63,14 +63,22 @@ pub fn points_by_line_text(
             on_a_line.push(scored.point.step);
         }
     }
-    let others = points.iter().filter(|scored| scored.point.kind.measures() && !on_a_line.contains(&scored.point.step));
+    // A point that was visited again stands on the map once, by the surer visit.
+    let is_on_a_line = |scored: &ScoredPoint| {
+        let visits = points.iter().filter(|other| on_a_line.contains(&other.point.step));
+        let same = |other: &ScoredPoint| {
+            scored.point.target.zip(other.point.target).is_some_and(|(a, b)| a.is_same_place(&b))
+        };
+        on_a_line.contains(&scored.point.step) || visits.into_iter().any(same)
+    };
+    let others = points.iter().filter(|scored| scored.point.kind.measures() && !is_on_a_line(scored));
     let mut name = if on_a_line.is_empty() { String::new() } else { "no line".to_owned() };
     for scored in others {
         add(std::mem::take(&mut name), scored);
     }
     let rendered = table.to_string();
     let mut text = format!(
-        "Points by corrected speed, {}; corrected flow, {}; h, W/(m2 K); 95 % intervals.\n\n",
+        "Points by corrected speed in {}, corrected flow in {}, h in W/(m2 K).\n\n",
         display.units().speed,
         display.units().flow
     );

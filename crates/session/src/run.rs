@@ -92,6 +92,13 @@ pub struct RunOutcome {
     pub results: Result<Results, SessionError>,
 }
 
+impl RunOutcome {
+    /// How it ended, in a sentence.
+    pub fn sentence(&self) -> String {
+        sentence(&self.end)
+    }
+}
+
 /// How a run ended.
 #[derive(Debug)]
 pub enum Ended {

@@ -2,6 +2,7 @@
 
 use crate::bar_text::{run_words, short};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use mapper_core::StepMarker;
 use mapper_report::wrapped;
 use mapper_session::SessionEvent;
 use serde_json::json;
@@ -104,8 +105,7 @@ impl Progress {
             }
             SessionEvent::StepStarted(marker) => {
                 state.step = marker.index + 1;
-                let place = marker.to.map(|point| point.to_string()).unwrap_or_default();
-                self.bar.set_prefix(format!("{place}, {} at this point", short(marker.end_s - marker.start_s)));
+                self.bar.set_prefix(format!("{}, {} at this point", place(marker), short(marker.end_s - marker.start_s)));
             }
             SessionEvent::Told(event) => self.bar.println(event_line(event.t_s, &event.message)),
             SessionEvent::Progress { done_ratio, what } => {
@@ -137,18 +137,24 @@ impl Progress {
             return;
         }
         state.look = Some(look);
+        // A template that does not parse leaves the plain style.
+        if let Ok(style) = ProgressStyle::with_template(look) {
+            self.bar.set_style(style.progress_chars("=> "));
+        }
         self.bar.reset();
         match length {
             Some(length) => self.bar.set_length(length),
             None => self.bar.unset_length(),
         }
         self.bar.set_message("");
-        // A template that does not parse leaves the plain style.
-        if let Ok(style) = ProgressStyle::with_template(look) {
-            self.bar.set_style(style.progress_chars("=> "));
-        }
         self.bar.enable_steady_tick(TICK);
     }
+}
+
+/// Where a step goes: 110 krpm, opening 0.7.
+fn place(marker: &StepMarker) -> String {
+    let shown = marker.to.map(|point| point.shown());
+    shown.map_or_else(String::new, |(krpm, opening)| format!("{krpm} krpm, opening {opening}"))
 }
 
 fn event_line(t_s: f64, message: &str) -> String {
@@ -167,7 +173,7 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
             marker.start_s,
             marker.index + 1,
             state.steps.max(marker.index + 1),
-            marker.to.map(|point| point.to_string()).unwrap_or_default(),
+            place(marker),
             short(marker.end_s - marker.start_s)
         ),
         SessionEvent::Told(event) => event_line(event.t_s, &event.message),

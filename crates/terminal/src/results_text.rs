@@ -71,7 +71,10 @@ fn short(units: &DisplayUnits, results: &Results, shown: Shown) -> String {
     }
     let mut say = |sentence: &str| text.push_str(&wrapped(sentence, COLUMNS, 2));
     results.remarks.iter().for_each(|remark| say(remark));
-    say("`mapper identify RUN --full` shows what all points share, repeats, sensors and the zero; so does the page.");
+    say(&format!(
+        "+/- is half a 95 % interval. What all points share, repeats, sensors and the zero: the page, or `mapper identify {} --full`.",
+        results.run.display()
+    ));
     text
 }
 

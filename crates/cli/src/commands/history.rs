@@ -4,11 +4,10 @@ use crate::failure::Failure;
 use crate::output::Replace;
 use crate::output;
 use clap::Args;
-use mapper_history::{Filter, ListedRun, Metric};
-use mapper_report::{groups_text, history_svg, runs_text, time};
+use mapper_history::{Filter, Metric};
+use mapper_report::{groups_text, history_svg, runs_text};
 use mapper_session::{SessionError};
 use serde_json::json;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// List, filter and plot the results of the nightly runs
@@ -81,24 +80,9 @@ impl History {
             self.replace.write(path, history_svg(&runs, &figures).as_bytes())?;
         }
         if self.json {
-            let runs: Vec<serde_json::Value> = runs.iter().map(run_json).collect();
+            let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();
             return output::print_json(&json!({"history": self.db, "runs": runs}));
         }
         output::print(&if self.runs { runs_text(&runs, &figures) } else { groups_text(&runs, &figures) })
     }
-}
-
-fn run_json(listed: &ListedRun) -> serde_json::Value {
-    let ListedRun { night, run } = listed;
-    let figures: BTreeMap<&str, Option<f64>> =
-        Metric::ALL.into_iter().map(|figure| (figure.name(), run.figures.get(&figure).copied())).collect();
-    json!({
-        "night": {
-            "id": night.id, "name": night.name, "started": time(night.started_ms, "%Y-%m-%dT%H:%M:%SZ"),
-            "duration_s": night.duration_s, "program": night.program, "accepted": night.accepted, "moved": night.moved,
-        },
-        "campaign": run.key.campaign, "machine": run.key.machine, "method": run.key.method, "seed": run.key.seed,
-        "campaign_sha256": run.campaign_sha256, "model_sha256": run.model_sha256,
-        "failure": run.failure, "figures": figures,
-    })
 }

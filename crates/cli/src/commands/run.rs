@@ -8,13 +8,15 @@ use crate::{interrupt, manner, output, registry, rig_states};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
+use mapper_live::{Live, LiveRun};
 use mapper_report::plan_text;
 use mapper_session::{
-    BrokenOff, Ended, PreparedRun, RunOutcome, RunRequest, Session, SessionError, run_directory, soak_s,
+    BrokenOff, Ended, Operator, PreparedRun, RunOutcome, RunRequest, Session, SessionError, run_directory, soak_s,
 };
 use mapper_terminal::results_text;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 /// Run a campaign: plan, drive the rig, record, identify, assemble the map, report
 #[derive(Debug, Args)]
@@ -37,6 +39,9 @@ pub struct Run {
     /// Run the rig's time by the clock: 1 is real time, 10 ten times as fast; as fast as it goes if it is left out and the rig is simulated
     #[arg(long, value_name = "FACTOR", hide_short_help = true)]
     pub pace: Option<f64>,
+    /// Serve a live page with buttons to hold and to stop; from other machines by the token that is printed
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:7373")]
+    pub live: Option<String>,
     #[command(flatten)]
     pub shown: ShownArguments,
     /// End with one JSON object on standard output
@@ -62,8 +67,18 @@ impl Run {
         let (registry, stop, progress) = (registry::registry(), interrupt::run_stop()?, manner::progress());
         progress.begin("planning");
         let states = rig_states::directory(None);
-        let on_event = |event: &_| progress.show(event);
+        let mut live = self.live.as_deref().map(Live::open).transpose().map_err(Failure::of_live)?;
+        let told: OnceLock<&Live> = OnceLock::new();
+        let on_event = |event: &_| {
+            progress.show(event);
+            if let Some(live) = told.get() {
+                live.show(event);
+            }
+        };
+        let operator = Arc::new(Operator::default());
         let session = Session {
+            operator: live.is_some().then_some(&*operator),
+            estimates: live.is_some(),
             registry: &registry,
             on_event: &on_event,
             stop: &stop.now,
@@ -85,13 +100,30 @@ impl Run {
             progress.clear();
             return self.dry(&campaign, &prepared, &parent);
         }
-        let outcome = match self.pace.or((!prepared.rig().simulated_time).then_some(1.0)) {
+        let pace = self.pace.or((!prepared.rig().simulated_time).then_some(1.0));
+        if let Some(live) = &mut live {
+            live.begin(&LiveRun {
+                campaign: &campaign,
+                plan: prepared.plan(),
+                pace,
+                operator: operator.clone(),
+                after_step: stop.after_step.clone(),
+                now: stop.now.clone(),
+            })
+            .map_err(Failure::of_live)?;
+            output::warn(&format!("live page: {}\n", live.url()));
+            let _ = told.set(live);
+        }
+        let outcome = match pace {
             Some(pace) => {
                 prepared.run_paced(&session, &mut PacedClock::new(SystemWall::new(), pace), true)?
             }
             None => prepared.run(&session)?,
         };
         progress.clear();
+        if let Some(live) = told.get() {
+            live.end(&outcome.sentence(), outcome.results.as_ref().ok().map(|results| results.page.as_path()));
+        }
         self.tell(&campaign, outcome)
     }
 

@@ -6,12 +6,10 @@ use crate::output::Replace;
 use crate::given::channel_map;
 use crate::{manner, output, registry};
 use clap::Args;
-use mapper_drift::DriftReport;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::Diagnosed;
 use mapper_gap::joint::over_recordings;
 use mapper_gap::report::Law;
-use mapper_gap::twin::Found;
 use mapper_report::{gap_page, gap_text, headline, recordings_text, sensors_text, zero_text};
 use mapper_session::{Gap, Recorded, Session, SessionError, SessionEvent};
 use serde_json::{Value, json};
@@ -73,7 +71,7 @@ impl Diagnose {
             }
         }
         if let [(_, gap)] = &gaps[..] {
-            return if self.json { output::print_json(&gap_json(gap)?) } else { output::print(&text(gap)) };
+            return if self.json { output::print_json(&gap.json()?) } else { output::print(&text(gap)) };
         }
         let diagnosed: Vec<&Diagnosed> = gaps.iter().map(|(_, gap)| &gap.diagnosed).collect();
         let calibration = Calibration::shipped().map_err(SessionError::Calibration)?;
@@ -82,7 +80,7 @@ impl Diagnose {
             let each: Result<Vec<Value>, Failure> = gaps
                 .iter()
                 .map(|(path, gap)| {
-                    let mut value = gap_json(gap)?;
+                    let mut value = gap.json()?;
                     value["recording"] = json!(path);
                     Ok(value)
                 })
@@ -117,30 +115,4 @@ impl Diagnose {
 
 fn text(gap: &Gap) -> String {
     [gap_text(&gap.diagnosed.diagnosis), sensors_text(&gap.sensors), zero_text(&gap.zero)].concat()
-}
-
-fn gap_json(gap: &Gap) -> Result<Value, Failure> {
-    let mut value = serde_json::to_value(&gap.diagnosed.diagnosis).map_err(SessionError::from)?;
-    value["found"] = json!(Found::of(&gap.diagnosed));
-    value["drift"] = gap.drift.as_ref().map_or(Value::Null, drift_json);
-    value["zero"] = json!(gap.zero);
-    if !gap.sensors.is_empty() {
-        value["sensors"] = json!(gap.sensors);
-    }
-    Ok(value)
-}
-
-/// Verdict, cause, course and size of what drifted.
-fn drift_json(drift: &DriftReport) -> Value {
-    json!({
-        "verdict": drift.verdict,
-        "cause": drift.cause,
-        "probability": drift.probability,
-        "onset_s": drift.onset_s,
-        "size": drift.size,
-        "low": drift.low,
-        "high": drift.high,
-        "unit": drift.unit,
-        "reason": drift.reason,
-    })
 }

@@ -114,11 +114,11 @@ with sync_playwright() as playwright:
     since = time.time()
     points = lambda: page.locator("#points tr").count()
     # Rows that come while the page looks on: the program said that it had identified them at that time.
-    until(page, "document.querySelectorAll('#points tr').length >= 3")
+    until(page, f"document.querySelectorAll('#points tr').length >= {points() + 2}")
     seen = {int(step): at for step, at in page.evaluate("window.seen").items()}
     at = {event["step"]: when for when, event in events if event["event"] == "point_estimated"}
     result["seconds_to_be_seen"] = [max(0.0, seen[step] - at[step]) for step in seen if at.get(step, 0) > since]
-    until(page, "document.querySelectorAll('#map-plot .point').length >= 3")
+    until(page, "document.querySelectorAll('#map-plot .point').length >= 1")
     # The run is held, so that the step does not end while the rest is looked at.
     press(page, "hold")
     until(page, "document.querySelector('#where').textContent.startsWith('Held')")

@@ -65,7 +65,8 @@ pub fn keep(arguments: &MannerArguments, matches: &ArgMatches) {
         Form::Off => ProgressManner::Quiet,
     });
     let command = std::iter::successors(Some(matches), |of| of.subcommand().map(|(_, deeper)| deeper)).last();
-    let json = command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));
+    let json =
+        command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));
     let replaces = command.is_some_and(|of| of.try_contains_id("force").is_ok());
     // It is kept once: `main` alone calls this.
     let _ = SAID.set(Said { colour, progress, json, replaces });

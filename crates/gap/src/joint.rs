@@ -4,7 +4,6 @@
 //! recording's best (mode `x_i`, precision `P_i`, priors `D` of the nuisances included; starts integrated out) the whole is
 //! `P = sum (P_i - D) + D`, `P x = sum P_i x_i`: what the recordings share is not counted as if each had measured it anew.
 
-use mapper_core::confidence_interval_95;
 use crate::calibration::Calibration;
 use crate::coordinate::{Coordinate, coordinates, parameters};
 use crate::diagnose::Diagnosed;
@@ -14,6 +13,7 @@ use crate::nuisance::NuisanceKind;
 use crate::report::Verdict;
 use crate::selection::Selection;
 use crate::study::{EffectValues, Hypothesis, Study};
+use mapper_core::confidence_interval_95;
 use mapper_numerics::parallel;
 use mapper_observe::knob::Knob;
 use nalgebra::{DMatrix, DVector};

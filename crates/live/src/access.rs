@@ -44,7 +44,8 @@ impl Access {
     /// Whether the request has the token, where one is needed. Takes as long for a wrong one as for the right one.
     pub(crate) fn has_token(&self, request: &Request) -> bool {
         let Some(token) = &self.token else { return true };
-        let given = request.authorization.as_deref().and_then(|text| text.strip_prefix("Bearer ")).unwrap_or("");
+        let given =
+            request.authorization.as_deref().and_then(|text| text.strip_prefix("Bearer ")).unwrap_or("");
         let differs = given.len() ^ token.len();
         let differs = given.bytes().zip(token.bytes()).fold(differs, |d, (a, b)| d | usize::from(a ^ b));
         differs == 0
@@ -79,7 +80,9 @@ mod tests {
 
         let there = Access::new("192.0.2.7:7373".parse().unwrap(), Some("abc".to_owned()));
         assert!(!there.calls_by_name(&request("localhost:7373", None, None)));
-        for (given, right) in [("Bearer abc", true), ("Bearer abd", false), ("Bearer ab", false), ("abc", false)] {
+        for (given, right) in
+            [("Bearer abc", true), ("Bearer abd", false), ("Bearer ab", false), ("abc", false)]
+        {
             assert_eq!(there.has_token(&request("192.0.2.7:7373", None, Some(given))), right, "{given}");
         }
         assert!(!there.has_token(&request("192.0.2.7:7373", None, None)));

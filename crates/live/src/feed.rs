@@ -1,9 +1,7 @@
 //! From what the session tells to what browsers are shown.
 
 use crate::live::{Asked, LiveRun};
-use crate::state::{
-    EVENTS_MAX, Now, POINTS_MAX, Reading, State, Step, TRACE_ROWS, Told, Traced, Units,
-};
+use crate::state::{EVENTS_MAX, Now, POINTS_MAX, Reading, State, Step, TRACE_ROWS, Told, Traced, Units};
 use mapper_core::{Channel, PlanStep, SignalGuard, StepMarker};
 use mapper_page::{live_point, planned};
 use mapper_report::Display;
@@ -262,7 +260,8 @@ impl Kept {
         let (state, count) = (&self.state, self.longer_s.len() as f64);
         let to_come = state.steps.saturating_sub(self.begun) as f64;
         let mean_s = if count > 0.0 { self.longer_s.iter().sum::<f64>() / count } else { 0.0 };
-        let variance = self.longer_s.iter().map(|s| (s - mean_s).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        let variance =
+            self.longer_s.iter().map(|s| (s - mean_s).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
         // Every step to come has its own scatter, and all of them share the error of the mean.
         let sigma_s = (variance * to_come * (1.0 + to_come / count.max(1.0))).sqrt();
         let planned_s = match &state.now.step {

@@ -84,8 +84,7 @@ impl Live {
     /// # Errors
     /// [`LiveError`] where the address is none, or is taken.
     pub fn open(text: &str) -> Result<Live, LiveError> {
-        let address: SocketAddr =
-            text.parse().map_err(|_| LiveError::Address { text: text.to_owned() })?;
+        let address: SocketAddr = text.parse().map_err(|_| LiveError::Address { text: text.to_owned() })?;
         let listen = |source| LiveError::Listen { address, source };
         let listener = TcpListener::bind(address).map_err(listen)?;
         let address = listener.local_addr().map_err(listen)?;

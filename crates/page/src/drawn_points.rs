@@ -55,7 +55,12 @@ pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPo
 }
 
 /// A point on a line; `two`: what the two-parameter method makes of it.
-pub(crate) fn drawn_point(point: &IdentifiedPoint, line: String, two: Option<&TwoParameter>, display: &Display) -> DrawnPoint {
+pub(crate) fn drawn_point(
+    point: &IdentifiedPoint,
+    line: String,
+    two: Option<&TwoParameter>,
+    display: &Display,
+) -> DrawnPoint {
     let percent = |value: Option<f64>| value.map(|value| 100.0 * value);
     let interval = point.eta_low.zip(point.eta_high).map(|(low, high)| standard_error_of(low, high));
     DrawnPoint {

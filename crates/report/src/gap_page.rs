@@ -241,7 +241,8 @@ fn heat_cell(done: &Diagnosed, residual: &[f64], step: usize, output: usize) -> 
     // White at 1, red from 30 on, evenly in the logarithm.
     let heat = (rms.max(1.0).ln() / 30f64.ln()).clamp(0.0, 1.0);
     let fade = (255.0 * (1.0 - heat)) as u8;
-    let ink = if heat > 0.6 { "#fff" } else { "#222" };
+    // Both have a contrast above 4.5 there.
+    let ink = if heat > 0.75 { "#fff" } else { "#000" };
     let style = format!("color:{ink};background:rgb({},{fade},{fade})", 255 - (60.0 * heat) as u8);
     html! { td style=(style) { (format!("{rms:.1}")) } }
 }

@@ -6,8 +6,8 @@ use crate::number::{number, percent};
 use crate::paint::{Paint, paint_verdict};
 use crate::points::opening;
 use crate::table::with_heads;
-use crate::wrapped::wrapped;
 use crate::verdict_word;
+use crate::wrapped::wrapped;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{CompressorMap, IdentifiedPoint, Verdict};
 use mapper_record::score::ScoredPoint;
@@ -54,7 +54,8 @@ pub fn points_by_line_text(
     };
     let mut on_a_line = Vec::new();
     for line in lines {
-        let is_of = |scored: &&ScoredPoint| line.points.iter().any(|own| own.identified.step == scored.point.step);
+        let is_of =
+            |scored: &&ScoredPoint| line.points.iter().any(|own| own.identified.step == scored.point.step);
         let mut own: Vec<&ScoredPoint> = points.iter().filter(is_of).collect();
         own.sort_by(|a, b| a.point.flow_corrected_kg_s.total_cmp(&b.point.flow_corrected_kg_s));
         for (index, scored) in own.into_iter().enumerate() {
@@ -118,7 +119,10 @@ pub fn first_doubts_text(points: &[ScoredPoint]) -> String {
         .iter()
         .map(|scored| &scored.point)
         .filter(|point| point.verdict != Verdict::Good)
-        .map(|point| IdentifiedPoint { warnings: point.warnings.iter().take(1).cloned().collect(), ..point.clone() })
+        .map(|point| IdentifiedPoint {
+            warnings: point.warnings.iter().take(1).cloned().collect(),
+            ..point.clone()
+        })
         .collect();
     let said = doubts(first_only.iter());
     let named = |doubt: &Doubt<'_>| {

@@ -419,7 +419,8 @@ impl Run<'_, '_> {
                 }
             }
             self.pass_asked()?;
-            if self.protection.operator.is_some_and(Operator::holds) && operator_held_s < OPERATOR_HOLD_MAX_S {
+            if self.protection.operator.is_some_and(Operator::holds) && operator_held_s < OPERATOR_HOLD_MAX_S
+            {
                 let more_s = self.now_s - before_s;
                 (operator_held_s, until_s) = (operator_held_s + more_s, until_s + more_s);
             }

@@ -7,7 +7,8 @@ use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::speed_response::speed_response;
 use mapper_runner::{
-    Operator, Protection, RunEnd, RunError, RunObserver, Runner, Soaked, SpeedControl, SpeedControlLimits, StepSource,
+    Operator, Protection, RunEnd, RunError, RunObserver, Runner, Soaked, SpeedControl, SpeedControlLimits,
+    StepSource,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -24,7 +25,8 @@ pub fn drive(
     observer: &mut dyn RunObserver,
     stop: &AtomicBool,
 ) -> Result<RunEnd, RunError> {
-    let pace = Pace { clock: &mut UnpacedClock, each_sample: false, stop, stop_after_step: &NEVER, operator: None };
+    let pace =
+        Pace { clock: &mut UnpacedClock, each_sample: false, stop, stop_after_step: &NEVER, operator: None };
     drive_paced(campaign, model, steps, backend, observer, pace)
 }
 

@@ -2,7 +2,7 @@
 
 use crate::files::{json_text, write_new};
 use crate::identified::{Identified, SoughtSurge};
-use crate::program::PROGRAM;
+use crate::program::program_and_commit;
 use crate::recorded::Recorded;
 use crate::{Registry, Session, SessionError, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
@@ -333,7 +333,7 @@ fn page_of(
         courses: &courses,
         zero: &identified.zero,
         tested_at: told.tested_at.as_deref(),
-        program: PROGRAM,
+        program: &program_and_commit(),
         others,
     })?)
 }

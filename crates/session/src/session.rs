@@ -28,7 +28,14 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 impl<'a> Session<'a> {
     /// A session that nobody looks at and nobody stops.
     pub fn new(registry: &'a Registry) -> Self {
-        Session { registry, on_event: &|_| {}, stop: &NEVER, stop_after_step: &NEVER, operator: None, estimates: false }
+        Session {
+            registry,
+            on_event: &|_| {},
+            stop: &NEVER,
+            stop_after_step: &NEVER,
+            operator: None,
+            estimates: false,
+        }
     }
 
     /// Tells whoever looks on.

@@ -36,6 +36,9 @@ mod tests {
         assert!(run_words(0, 0, 7441.0, 7440.0, 0.0).starts_with("before step 1, 2 h 04 min of 2 h 04 min"));
         let longest = run_words(999, 999, 99.0 * 3600.0, 99.9 * 3600.0, 99.9 * 3600.0);
         assert!(longest.len() <= 78, "{longest}");
-        assert_eq!([9.94, 9.96, 99.4, 99.6, 3599.0].map(short), ["9.9 s", "10 s", "99 s", "2 min", "1 h 00 min"]);
+        assert_eq!(
+            [9.94, 9.96, 99.4, 99.6, 3599.0].map(short),
+            ["9.9 s", "10 s", "99 s", "2 min", "1 h 00 min"]
+        );
     }
 }

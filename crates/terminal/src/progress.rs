@@ -105,7 +105,11 @@ impl Progress {
             }
             SessionEvent::StepStarted(marker) => {
                 state.step = marker.index + 1;
-                self.bar.set_prefix(format!("{}, {} at this point", place(marker), short(marker.end_s - marker.start_s)));
+                self.bar.set_prefix(format!(
+                    "{}, {} at this point",
+                    place(marker),
+                    short(marker.end_s - marker.start_s)
+                ));
             }
             SessionEvent::Told(event) => self.bar.println(event_line(event.t_s, &event.message)),
             SessionEvent::Progress { done_ratio, what } => {
@@ -201,5 +205,9 @@ fn tell_program(event: &SessionEvent, state: &mut State) {
         }
         _ => {}
     }
-    eprintln!("{}", serde_json::to_value(event).unwrap_or_else(|error| json!({ "event": "error", "message": error.to_string() })));
+    eprintln!(
+        "{}",
+        serde_json::to_value(event)
+            .unwrap_or_else(|error| json!({ "event": "error", "message": error.to_string() }))
+    );
 }

@@ -4,8 +4,8 @@ use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::Verdict;
 use mapper_report::{
     Display, Paint, disagreement_text, first_doubts_text, paint_verdict, points_by_line_text, points_text,
-    repeated_jumps_text, score_text, sensors_text, shared_errors_text, surge_text, thermal_text, verdict_sentence,
-    wrapped, zero_text,
+    repeated_jumps_text, score_text, sensors_text, shared_errors_text, surge_text, thermal_text,
+    verdict_sentence, wrapped, zero_text,
 };
 use mapper_session::Results;
 use std::fmt::Write;
@@ -29,8 +29,12 @@ pub fn results_text(units: &DisplayUnits, results: &Results, shown: Shown) -> St
     // Writing to a String cannot fail.
     let mut text = if shown.full { full(units, results, shown) } else { short(units, results, shown) };
     let verdict = match () {
-        () if results.points.iter().any(|scored| scored.point.verdict == Verdict::Unusable) => Verdict::Unusable,
-        () if results.points.iter().any(|scored| scored.point.verdict == Verdict::Doubtful) => Verdict::Doubtful,
+        () if results.points.iter().any(|scored| scored.point.verdict == Verdict::Unusable) => {
+            Verdict::Unusable
+        }
+        () if results.points.iter().any(|scored| scored.point.verdict == Verdict::Doubtful) => {
+            Verdict::Doubtful
+        }
         () => Verdict::Good,
     };
     let words = verdict_sentence(results.points.iter().map(|scored| &scored.point));
@@ -79,8 +83,7 @@ fn short(units: &DisplayUnits, results: &Results, shown: Shown) -> String {
 }
 
 fn full(units: &DisplayUnits, results: &Results, shown: Shown) -> String {
-    let mut text =
-        disagreement_text(&results.points, &results.two_parameter, units).unwrap_or_default();
+    let mut text = disagreement_text(&results.points, &results.two_parameter, units).unwrap_or_default();
     text.push_str(&points_text(&results.points, units, shown.truth));
     let points = results.points.iter().map(|scored| &scored.point);
     if let Some(shared) = shared_errors_text(points, units) {

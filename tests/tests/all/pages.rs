@@ -167,10 +167,8 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
         "120".as_ref(),
     ]);
     let command = std::iter::once(run.get_program()).chain(run.get_args());
-    let seen = python(
-        "browse_live.py",
-        [chromium.as_ref(), pictures.path().as_os_str()].into_iter().chain(command),
-    );
+    let seen =
+        python("browse_live.py", [chromium.as_ref(), pictures.path().as_os_str()].into_iter().chain(command));
     for (what, status) in seen["refused"].as_object().unwrap() {
         assert!((403..=405).contains(&status.as_u64().unwrap()), "{what}: {status}");
     }
@@ -189,7 +187,11 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
         assert!(recorded.contains(&format!("operator, on the live page: {asked}")), "{recorded}");
     }
     assert!(seen["run"]["points"].as_u64().unwrap() >= 4, "{}", seen["run"]["points"]);
-    assert!(seen["connection"].as_str().unwrap().contains("Stopped by the operator"), "{}", seen["connection"]);
+    assert!(
+        seen["connection"].as_str().unwrap().contains("Stopped by the operator"),
+        "{}",
+        seen["connection"]
+    );
     assert_eq!([&seen["said"], &seen["serious"], &seen["elsewhere"]], [&serde_json::json!([]); 3]);
     for size in ["1400_light", "1400_dark", "390_light", "390_dark"] {
         assert_eq!(seen[format!("overflow_{size}")], 0, "{size}: the page is wider than the screen");

@@ -1,12 +1,12 @@
 //! `mapper history`: what the nights gave.
 
 use crate::failure::Failure;
-use crate::output::Replace;
 use crate::output;
+use crate::output::Replace;
 use clap::Args;
 use mapper_history::{Filter, Metric};
 use mapper_report::{groups_text, history_svg, runs_text};
-use mapper_session::{SessionError};
+use mapper_session::SessionError;
 use serde_json::json;
 use std::path::PathBuf;
 

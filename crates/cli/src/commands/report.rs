@@ -1,8 +1,8 @@
 //! `mapper report`: the page of a run, beside other runs.
 
 use crate::failure::Failure;
-use crate::output::Replace;
 use crate::given::{channel_map, given_campaign};
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_session::{Recorded, Session, SessionError};

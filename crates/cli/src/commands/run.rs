@@ -11,7 +11,8 @@ use mapper_core::{PacedClock, Verdict};
 use mapper_live::{Live, LiveRun};
 use mapper_report::plan_text;
 use mapper_session::{
-    BrokenOff, Ended, Operator, PreparedRun, RunOutcome, RunRequest, Session, SessionError, run_directory, soak_s,
+    BrokenOff, Ended, Operator, PreparedRun, RunOutcome, RunRequest, Session, SessionError, run_directory,
+    soak_s,
 };
 use mapper_terminal::results_text;
 use serde_json::json;
@@ -83,7 +84,6 @@ impl Run {
             on_event: &on_event,
             stop: &stop.now,
             stop_after_step: &stop.after_step,
-            ..Session::new(&registry)
         };
         let request = RunRequest {
             campaign: &campaign,
@@ -122,7 +122,10 @@ impl Run {
         };
         progress.clear();
         if let Some(live) = told.get() {
-            live.end(&outcome.sentence(), outcome.results.as_ref().ok().map(|results| results.page.as_path()));
+            live.end(
+                &outcome.sentence(),
+                outcome.results.as_ref().ok().map(|results| results.page.as_path()),
+            );
         }
         self.tell(&campaign, outcome)
     }
@@ -139,10 +142,9 @@ impl Run {
                 "no point is usable: the reasons stand above and in the report",
             )),
             Ended::Completed => None,
-            Ended::Drifted { reason } => Some(Failure::new(
-                Code::Rig,
-                format!("{reason}. The rig is safe and the recording is kept"),
-            )),
+            Ended::Drifted { reason } => {
+                Some(Failure::new(Code::Rig, format!("{reason}. The rig is safe and the recording is kept")))
+            }
             Ended::Interrupted { t_s } => Some(Failure::new(
                 Code::Interrupted,
                 format!("stopped by the operator at {t_s:.0} s; {kept}"),

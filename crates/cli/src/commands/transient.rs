@@ -1,8 +1,8 @@
 //! `mapper transient`: a log in which nothing rests.
 
 use crate::failure::Failure;
-use crate::output::Replace;
 use crate::given::{channel_map, given_campaign};
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_report::transient_text;

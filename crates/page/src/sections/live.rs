@@ -6,7 +6,11 @@ use maud::{Markup, html};
 const BUTTONS: [(&str, &str, &str); 4] = [
     ("hold", "Hold", "Stay at this step until somebody lets it go on?"),
     ("go-on", "Go on", "Let the held step end as planned?"),
-    ("stop", "Stop at the end of the step", "Stop the run at the end of this step, and identify what was measured?"),
+    (
+        "stop",
+        "Stop at the end of the step",
+        "Stop the run at the end of this step, and identify what was measured?",
+    ),
     ("safe", "Safe now", "Bring the rig into its safe state now? The step that is under way is lost."),
 ];
 

@@ -2,8 +2,8 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::output::Replace;
 use crate::given::channel_map;
+use crate::output::Replace;
 use crate::{manner, output, registry};
 use clap::Args;
 use mapper_gap::calibration::Calibration;

@@ -5,7 +5,7 @@ use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_report::log_text;
-use mapper_session::{inspect_log};
+use mapper_session::inspect_log;
 use std::path::PathBuf;
 
 /// Show every column of a log with unit, rate, range and gaps, and propose a channel map

@@ -1,8 +1,8 @@
 //! `mapper map convert`: a map in another format, at another reference state.
 
 use crate::failure::Failure;
-use crate::output::Replace;
 use crate::given::reference;
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_session::write_map_fitted_if_needed;

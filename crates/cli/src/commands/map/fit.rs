@@ -2,8 +2,8 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::output::Replace;
 use crate::given::reference;
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_assemble::{MapFitOptions, fit_map};

@@ -5,7 +5,7 @@ use crate::output::Replace;
 use crate::{manner, output, registry};
 use clap::Args;
 use mapper_blind::calibrate::{Observed, Plan, calibrate};
-use mapper_session::{json_text};
+use mapper_session::json_text;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};

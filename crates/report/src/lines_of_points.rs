@@ -9,7 +9,8 @@ use crate::table::with_heads;
 use crate::verdict_word;
 use crate::wrapped::wrapped;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{CompressorMap, IdentifiedPoint, Verdict};
+use mapper_core::{CompressorMap, IdentifiedPoint, SpeedLine, Verdict};
+use mapper_numerics::statistics::mean;
 use mapper_record::score::ScoredPoint;
 
 /// Columns of a terminal that nobody has made wider.
@@ -25,7 +26,6 @@ pub fn points_by_line_text(
     paint: Paint,
 ) -> String {
     let display = Display::new(units);
-    let lines = map.map_or(&[][..], |map| map.lines.as_slice());
     let truth = truth && points.iter().any(|scored| scored.truth.is_some());
     let mut heads = vec![
         display.units().speed.clone(),
@@ -53,13 +53,12 @@ pub fn points_by_line_text(
         verdicts.push(scored.point.verdict);
     };
     let mut on_a_line = Vec::new();
-    for line in lines {
-        let is_of =
-            |scored: &&ScoredPoint| line.points.iter().any(|own| own.identified.step == scored.point.step);
-        let mut own: Vec<&ScoredPoint> = points.iter().filter(is_of).collect();
+    for (speed_rpm, steps) in speed_lines(points, map) {
+        let mut own: Vec<&ScoredPoint> =
+            points.iter().filter(|scored| steps.contains(&scored.point.step)).collect();
         own.sort_by(|a, b| a.point.flow_corrected_kg_s.total_cmp(&b.point.flow_corrected_kg_s));
         for (index, scored) in own.into_iter().enumerate() {
-            let name = if index == 0 { display.speed(line.speed_corrected_rpm) } else { String::new() };
+            let name = if index == 0 { display.speed(speed_rpm) } else { String::new() };
             add(name, scored);
             on_a_line.push(scored.point.step);
         }
@@ -97,6 +96,24 @@ pub fn points_by_line_text(
         text.push('\n');
     }
     text
+}
+
+/// Corrected speed of each line, rpm, and the steps on it: those of the map, or else steps with one target speed.
+fn speed_lines(points: &[ScoredPoint], map: Option<&CompressorMap>) -> Vec<(f64, Vec<usize>)> {
+    if let Some(map) = map {
+        let steps = |line: &SpeedLine| line.points.iter().map(|point| point.identified.step).collect();
+        return map.lines.iter().map(|line| (line.speed_corrected_rpm, steps(line))).collect();
+    }
+    let measured = points.iter().map(|scored| &scored.point).filter(|point| point.kind.measures());
+    let mut targeted: Vec<(f64, &IdentifiedPoint)> =
+        measured.filter_map(|point| Some((point.target?.speed_rpm, point))).collect();
+    targeted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let groups = targeted.chunk_by(|a, b| a.0 == b.0);
+    let line = |group: &[(f64, &IdentifiedPoint)]| {
+        let speed_rpm = mean(group.iter().map(|(_, point)| point.speed_corrected_rpm)).unwrap_or(f64::NAN);
+        (speed_rpm, group.iter().map(|(_, point)| point.step).collect())
+    };
+    groups.map(line).collect()
 }
 
 fn row(display: &Display, point: &IdentifiedPoint) -> Vec<String> {

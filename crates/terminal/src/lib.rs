@@ -12,4 +12,4 @@ mod results_text;
 
 pub use colour::{ColourChoice, is_coloured};
 pub use progress::{Progress, ProgressManner};
-pub use results_text::{Shown, results_text};
+pub use results_text::{Shown, identified_text, results_text};

@@ -2,7 +2,7 @@
 
     python browse_live.py CHROMIUM FOLDER MAPPER run CAMPAIGN --out RUNS --pace 60
 
-Pictures of the page (390 and 1400 px wide, light and dark) are left in FOLDER.
+Pictures of the page (390 and 1400 px wide, light and dark) and of its head are left in FOLDER.
 """
 
 import atexit
@@ -128,6 +128,8 @@ with sync_playwright() as playwright:
         for scheme in ["light", "dark"]:
             other, small = opened(browser, width, height, scheme)
             small.screenshot(path=folder / f"live-{width}-{scheme}.png", full_page=True)
+            if (width, scheme) == (1400, "light"):
+                small.screenshot(path=folder / "live.png")
             for violation in Axe().run(small).response["violations"]:
                 if violation["impact"] in ("serious", "critical"):
                     serious.append(f"{width} {scheme}: {violation['id']}: {violation['nodes'][0]['html'][:200]}")

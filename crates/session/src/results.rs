@@ -246,7 +246,8 @@ impl Session<'_> {
         let report = directory.join(run_directory::REPORT);
         write_new(&report, run_report(&shown).as_bytes())?;
         let page = directory.join(run_directory::PAGE);
-        let page_text = page_of(told, &identified, &shown, compressor_map.as_ref(), &[], self.registry.commit)?;
+        let page_text =
+            page_of(told, &identified, &shown, compressor_map.as_ref(), &[], self.registry.commit)?;
         write_new(&page, page_text.as_bytes())?;
         let Identified { points, thermal, two_parameter, sensors, zero, score, surge, .. } = identified;
         Ok(Results {

@@ -8,8 +8,8 @@ use mapper_observe::FusedChannel;
 use mapper_record::score::{ScoredPoint, summarise};
 use mapper_report::{
     Display, Paint, disagreement_text, first_doubts_text, paint_verdict, points_by_line_text, points_text,
-    repeated_jumps_text, score_text, sensors_text, shared_errors_text, surge_text, thermal_text, verdict_sentence,
-    wrapped, zero_text,
+    repeated_jumps_text, score_text, sensors_text, shared_errors_text, surge_text, thermal_text,
+    verdict_sentence, wrapped, zero_text,
 };
 use mapper_session::{Identified, Results, SoughtSurge};
 use std::fmt::Write;

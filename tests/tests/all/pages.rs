@@ -157,14 +157,14 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
     };
     let campaign = CampaignFile::shipped_with(NINE_POINTS);
     let (pictures, runs) = (scratch(), campaign.runs());
-    // Two seconds a step: long enough to press a button within one.
+    // Two seconds a step, however slow this machine is: long enough to press a button within one.
     let run = mapper_command([
         "run".as_ref(),
         campaign.path.as_os_str(),
         "--out".as_ref(),
         runs.as_os_str(),
         "--pace".as_ref(),
-        "120".as_ref(),
+        "60".as_ref(),
     ]);
     let command = std::iter::once(run.get_program()).chain(run.get_args());
     let seen =

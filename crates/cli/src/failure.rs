@@ -1,12 +1,14 @@
 //! Why a command ended early, with what to print and what to return.
 
 use crate::exit_code::Code;
+use crate::{manner, output};
 use mapper_blind::BlindError;
 use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
+use mapper_live::LiveError;
 use mapper_record::{ChannelMapError, RecordError};
 use mapper_session::{ErrorKind, SessionError};
-use std::io::IsTerminal;
+use serde_json::{Value, json};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -15,6 +17,8 @@ use std::process::ExitCode;
 pub struct Failure {
     code: Code,
     message: String,
+    /// Mistakes of a file, for programs.
+    findings: Option<Value>,
     manner: Manner,
 }
 
@@ -34,7 +38,7 @@ enum Manner {
 impl Failure {
     /// A failure with a message that completes "mapper: ".
     pub fn new(code: Code, message: impl std::fmt::Display) -> Self {
-        Failure { code, message: message.to_string(), manner: Manner::Sentence }
+        Failure { code, message: message.to_string(), findings: None, manner: Manner::Sentence }
     }
 
     /// All mistakes of a campaign, or that it cannot be read.
@@ -49,7 +53,8 @@ impl Failure {
     fn of_findings(findings: &Findings) -> Self {
         Failure {
             code: Code::BadInput,
-            message: findings.render(std::io::stderr().is_terminal()),
+            message: findings.render(manner::warns_in_colour()),
+            findings: Some(json!(findings.list)),
             manner: Manner::Rendered,
         }
     }
@@ -70,6 +75,12 @@ impl Failure {
         Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
     }
 
+    /// The live page cannot be had.
+    pub fn of_live(error: LiveError) -> Self {
+        let code = if matches!(error, LiveError::Address { .. }) { Code::BadInput } else { Code::Failure };
+        Failure::new(code, error)
+    }
+
     /// Standard output was closed by its reader: a normal end of a pipe.
     pub fn closed_pipe() -> Self {
         Failure { manner: Manner::ClosedPipe, ..Failure::new(Code::Failure, "") }
@@ -80,7 +91,7 @@ impl Failure {
         Failure { manner: Manner::Told, ..Failure::new(code, "") }
     }
 
-    /// Prints the message and gives the exit code.
+    /// Prints the message, with `--json` as an object where none was printed yet, and gives the exit code.
     #[allow(clippy::print_stderr)]
     pub fn report(&self) -> ExitCode {
         match self.manner {
@@ -89,8 +100,35 @@ impl Failure {
             Manner::Rendered => eprint!("{}", self.message),
             Manner::Sentence => eprintln!("mapper: {}", self.message),
         }
+        if manner::json() && !output::has_told() {
+            // A reader that has gone away is told nothing.
+            let _ = output::print_json(&self.json());
+        }
         ExitCode::from(self.code as u8)
     }
+
+    /// Code, message, and what to do: what stands behind the message's last semicolon, or with the first mistake.
+    pub fn json(&self) -> Value {
+        let first = self.findings.as_ref().and_then(|findings| findings.get(0));
+        let (message, help) = match first {
+            Some(first) => (first["message"].clone(), first["remedy"].clone()),
+            None => (json!(self.message), json!(self.message.rsplit_once("; ").map(|(_, help)| help))),
+        };
+        let mut value = json!({ "code": self.code as u8, "message": message, "help": help });
+        if let Some(findings) = &self.findings {
+            value["findings"] = findings.clone();
+        }
+        value
+    }
+}
+
+/// Arguments that could not be read, as an object on standard output and as usual on standard error.
+pub fn wrong_arguments(error: &clap::Error) -> ExitCode {
+    let _ = error.print();
+    let text = error.to_string();
+    let mut parts = text.trim_start_matches("error: ").splitn(2, "\n\n").map(str::trim);
+    let _ = output::print_json(&json!({ "code": 2, "message": parts.next(), "help": parts.next() }));
+    ExitCode::from(2)
 }
 
 impl From<SessionError> for Failure {
@@ -104,6 +142,9 @@ impl From<SessionError> for Failure {
             ErrorKind::Interrupted => Code::Interrupted,
         };
         match error {
+            SessionError::Exists { .. } if manner::replaces() => {
+                Failure::new(code, format!("{error}, or replace it with `--force`"))
+            }
             SessionError::Campaign(error) => Failure::of_campaign(error),
             SessionError::Nightly(NightlyError::Mistakes(findings))
             | SessionError::ChannelMap(ChannelMapError::Mistakes(findings))

@@ -8,29 +8,43 @@ mod exit_code;
 mod failure;
 mod given;
 mod interrupt;
+mod manner;
 mod output;
-mod progress;
 mod registry;
-mod results_text;
 mod rig_states;
+mod shown;
 mod subcommands;
 mod wall;
 
-use clap::Parser;
+use clap::{CommandFactory, FromArgMatches, Parser};
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 /// From a campaign file to a complete turbocharger-compressor map, efficiency and heat transfer included.
 #[derive(Debug, Parser)]
 #[command(name = "mapper", version, after_help = exit_code::HELP, arg_required_else_help = true)]
 struct Arguments {
+    #[command(flatten)]
+    manner: manner::MannerArguments,
     /// What to do.
     #[command(subcommand)]
     command: commands::Command,
 }
 
 fn main() -> ExitCode {
-    match Arguments::parse().command.run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
+    let raw: Vec<OsString> = std::env::args_os().collect();
+    let (json, colour) = manner::of_raw(&raw);
+    let read = Arguments::command().color(colour).try_get_matches_from(raw);
+    let read = read.and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, matches)));
+    match read {
+        Ok((arguments, matches)) => {
+            manner::keep(&arguments.manner, &matches);
+            match arguments.command.run() {
+                Ok(()) => ExitCode::SUCCESS,
+                Err(failure) => failure.report(),
+            }
+        }
+        Err(error) if error.use_stderr() && json => failure::wrong_arguments(&error),
+        Err(error) => error.exit(),
     }
 }

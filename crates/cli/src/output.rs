@@ -2,8 +2,35 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
+use clap::Args;
+use mapper_session::{Existing, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether the one JSON object has been printed.
+static TOLD: AtomicBool = AtomicBool::new(false);
+
+/// Of a command that writes files.
+#[derive(Debug, Args)]
+pub struct Replace {
+    /// Replace files that are there already
+    #[arg(long)]
+    pub force: bool,
+}
+
+impl Replace {
+    /// What becomes of a file that is there.
+    pub fn existing(&self) -> Existing {
+        if self.force { Existing::Replaced } else { Existing::Kept }
+    }
+
+    /// Writes a file.
+    pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
+        write_file(path, bytes, self.existing())
+    }
+}
 
 /// Writes text to standard output. A closed pipe ends the command quietly.
 pub fn print(text: &str) -> Result<(), Failure> {
@@ -22,5 +49,12 @@ pub fn warn(text: &str) {
 
 /// Writes one JSON object and a line end to standard output.
 pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
-    print(&mapper_session::json_text(value)?)
+    print(&mapper_session::json_text(value)?)?;
+    TOLD.store(true, Ordering::Relaxed);
+    Ok(())
+}
+
+/// Whether a JSON object was printed: there is room for one.
+pub fn has_told() -> bool {
+    TOLD.load(Ordering::Relaxed)
 }

@@ -17,6 +17,7 @@ pub fn registry() -> Registry {
         read_effect,
         formats: FORMATS,
         logs: LOG_FORMATS,
+        commit: env!("MAPPER_COMMIT"),
     }
 }
 

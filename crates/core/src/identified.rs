@@ -90,7 +90,13 @@ const Z_975: f64 = 1.959_963_984_540_054;
 
 /// The 95 % interval of a normally distributed estimate: value -/+ 1.96 standard errors.
 pub fn confidence_interval_95(value: f64, standard_error: f64) -> (f64, f64) {
-    (value - Z_975 * standard_error, value + Z_975 * standard_error)
+    let half = half_width_95(standard_error);
+    (value - half, value + half)
+}
+
+/// Half the width of the 95 % interval of a normally distributed estimate, in the unit of its standard error.
+pub fn half_width_95(standard_error: f64) -> f64 {
+    Z_975 * standard_error
 }
 
 /// The standard error whose 95 % interval this is: the reverse of [`confidence_interval_95`].

@@ -63,7 +63,7 @@ pub use guard::{
 };
 pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
-    standard_error_of,
+    half_width_95, standard_error_of,
 };
 pub use inlet_convection::InletConvection;
 pub use joined::{StepOrigin, joined};

@@ -13,6 +13,7 @@ use crate::nuisance::NuisanceKind;
 use crate::report::Verdict;
 use crate::selection::Selection;
 use crate::study::{EffectValues, Hypothesis, Study};
+use mapper_core::confidence_interval_95;
 use mapper_numerics::parallel;
 use mapper_observe::knob::Knob;
 use nalgebra::{DMatrix, DVector};
@@ -128,7 +129,7 @@ pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> V
             _ => Fate::ComesAndGoes,
         };
         let value = |x: f64, sigma: f64| {
-            let ends = [x - 1.96 * sigma, x + 1.96 * sigma].map(|x| at[k].value(x));
+            let ends = <[f64; 2]>::from(confidence_interval_95(x, sigma)).map(|x| at[k].value(x));
             Value { value: at[k].value(x), low: ends[0].min(ends[1]), high: ends[0].max(ends[1]) }
         };
         let info = study.effects[*index].info();

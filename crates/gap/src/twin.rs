@@ -8,7 +8,7 @@ use crate::outlook::{Alike, imagined_steps};
 use crate::report::Verdict;
 use crate::study::{Hypothesis, Study};
 use crate::whiten::{Linearised, dot};
-use mapper_core::StepMarker;
+use mapper_core::{StepMarker, half_width_95};
 use mapper_observe::knob::Knob;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -186,9 +186,6 @@ pub struct Held {
     pub channels: BTreeMap<String, HeldChannel>,
 }
 
-/// Half the width of a 95 % band, sigmas.
-const BAND_SIGMAS: f64 = 1.96;
-
 /// Holds a twin against a recording that it has not seen: driven by what was recorded of the inputs, nothing fitted. Values are
 /// means over the blocks of a step with the noise's memory taken out; the band of each is the noise and what the twin is not
 /// sure of.
@@ -210,7 +207,7 @@ pub fn hold(study: &Study, found: &Found) -> Result<Held, TwinError> {
     let inside: Vec<f64> = residual
         .iter()
         .enumerate()
-        .map(|(row, r)| f64::from(u8::from(r.abs() < BAND_SIGMAS * spread(row).sqrt())))
+        .map(|(row, r)| f64::from(u8::from(r.abs() < half_width_95(spread(row).sqrt()))))
         .collect();
     let mut channels = BTreeMap::new();
     for (output, channel) in OUTPUTS.iter().enumerate() {
@@ -298,7 +295,7 @@ fn forecast(study: &Study, found: &Found) -> Result<Vec<Expected>, TwinError> {
         let noise = study.declared.noise_sigma(OUTPUTS[group.output]);
         let sigma = ((covariance.clone() * &j).dot(&j).max(0.0) + noise * noise).sqrt();
         let channel = OUTPUTS[group.output].symbol().to_owned();
-        expected[group.step].channels.insert(channel, [here.values[row], BAND_SIGMAS * sigma]);
+        expected[group.step].channels.insert(channel, [here.values[row], half_width_95(sigma)]);
     }
     Ok(expected)
 }

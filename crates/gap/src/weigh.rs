@@ -9,6 +9,7 @@ use crate::in_words;
 use crate::next::Rivals;
 use crate::report::{Candidate, Estimate, Onset};
 use crate::study::Study;
+use mapper_core::half_width_95;
 use std::collections::BTreeMap;
 
 /// Scores turned into probabilities.
@@ -171,7 +172,7 @@ pub(crate) fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> 
             let coordinate = coordinates[place];
             let at = coordinate.of(values[place]);
             let variance = fit.covariance.get((place, place)).copied().unwrap_or(f64::INFINITY);
-            let away = 1.96 * calibration.interval_factor * variance.max(0.0).sqrt();
+            let away = half_width_95(calibration.interval_factor * variance.max(0.0).sqrt());
             let (a, b) = (coordinate.value(at - away), coordinate.value(at + away));
             let name = if info.parameters.len() == 1 {
                 info.id.to_string()

@@ -10,7 +10,7 @@ const short = d3.format(".3~g");
 const widthOf = element => Math.max(280, Math.min(720, element.clientWidth || 600));
 
 // Colours of speed lines from slow to fast: viridis, whose ends are cut where they vanish on white and on black.
-const lineNames = [...new Set(page.points.map(p => p.line))].sort((a, b) => a - b);
+let lineNames = page.lines ?? [...new Set(page.points.map(p => p.line))].sort((a, b) => a - b);
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const lineColour = name => {
   const at = lineNames.length < 2 ? 0.5 : lineNames.indexOf(name) / (lineNames.length - 1);

@@ -84,7 +84,8 @@ function clickable(plot, data) {
 
 function drawMap() {
   const element = byId("map-plot"), data = drawnPoints();
-  const all = [...data.map(p => [p.flow, p.pr]), ...page.map.lines.filter(l => l.measured).flatMap(l => l.nodes.filter(n => !n.out).map(n => [n.flow, n.pr]))];
+  const ahead = page.planned ?? [];
+  const all = [...ahead.map(p => [p.flow, p.pr]), ...data.map(p => [p.flow, p.pr]), ...page.map.lines.filter(l => l.measured).flatMap(l => l.nodes.filter(n => !n.out).map(n => [n.flow, n.pr]))];
   const padded = ([low, high]) => [low - 0.04 * (high - low), high + 0.04 * (high - low)];
   const home = { x: padded(d3.extent(all, d => d[0])), y: padded(d3.extent(all, d => d[1])) };
   const view = zoomed.map ?? home;
@@ -95,7 +96,7 @@ function drawMap() {
   const plot = Plot.plot({
     width, height, marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
     x: { domain: view.x, label: `corrected flow, ${page.units.flow}` }, y: { domain: view.y, label: "total pressure ratio P2/P1" },
-    marks: [...mapMarks(), ...intervals, ...pointMarks(data, "pr")],
+    marks: [...mapMarks(), Plot.dot(ahead, { x: "flow", y: "pr", r: 3, stroke: style("--soft"), clip: true }), ...intervals, ...pointMarks(data, "pr")],
   });
   clickable(plot, data);
   const x = plot.scale("x"), y = plot.scale("y");
@@ -140,7 +141,7 @@ function drawEta() {
   marks.push(...pointMarks(data, "eta"));
   const plot = Plot.plot({
     width, height, marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
-    x: { label: `corrected flow, ${page.units.flow}`, nice: true }, y: { domain: low == null ? undefined : [Math.max(0, low - 2), high + 2], label: "efficiency, %" }, marks,
+    x: { label: `corrected flow, ${page.units.flow}`, nice: true, inset: 8 }, y: { domain: low == null ? undefined : [Math.max(0, low - 2), high + 2], label: "efficiency, %" }, marks,
   });
   clickable(plot, data);
   put(element, plot, `Efficiency over corrected flow of ${data.length} points, between ${shown(low, 1)} and ${shown(high, 1)} %.`);

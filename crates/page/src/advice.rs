@@ -4,21 +4,6 @@ use crate::run_page::RunPage;
 use mapper_core::Verdict;
 use mapper_report::{RunReport, disagreement_text, doubts};
 
-/// How many points are worth what, in a sentence.
-pub(crate) fn verdict(report: &RunReport<'_>) -> String {
-    let count = |verdict| report.points.iter().filter(|scored| scored.point.verdict == verdict).count();
-    let (good, all) = (count(Verdict::Good), report.points.len());
-    match (all, good) {
-        (0, _) => "No point was identified.".to_owned(),
-        (all, good) if all == good => format!("All {all} points are good."),
-        (all, good) => format!(
-            "{good} of {all} points are good, {} doubtful, {} unusable.",
-            count(Verdict::Doubtful),
-            count(Verdict::Unusable)
-        ),
-    }
-}
-
 /// Whether the map can be handed on as it is.
 pub(crate) fn is_clean(page: &RunPage<'_>) -> bool {
     let report = page.report;

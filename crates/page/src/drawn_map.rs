@@ -2,7 +2,7 @@
 
 use mapper_campaign::units::Kind;
 use mapper_chart::{StructuredGrid, contour_lines};
-use mapper_core::{CompressorMap, FittedNode};
+use mapper_core::{CompressorMap, FittedNode, half_width_95};
 use mapper_mesh::{contour_levels, efficiency_surface, fitted_surface, speed_curve};
 use mapper_report::Display;
 use serde::Serialize;
@@ -59,14 +59,14 @@ pub(crate) fn drawn_map(map: &CompressorMap, display: &Display) -> DrawnMap {
         flow: flow(node.flow_corrected_kg_s),
         pr: rounded(node.pressure_ratio),
         eta: Some(rounded(100.0 * node.eta)),
-        half: Some(rounded(196.0 * node.eta_standard_error)),
+        half: Some(rounded(100.0 * half_width_95(node.eta_standard_error))),
         out: node.extrapolated,
     };
     let sought = map.surge.iter().map(|mark| DrawnMark {
         flow: flow(mark.flow_corrected_kg_s),
-        flow_half: 1.96 * display.number(Kind::MassFlow, mark.flow_total_standard_error_kg_s()),
+        flow_half: half_width_95(display.number(Kind::MassFlow, mark.flow_total_standard_error_kg_s())),
         pr: rounded(mark.pressure_ratio),
-        pr_half: 1.96 * mark.pressure_ratio_standard_error,
+        pr_half: half_width_95(mark.pressure_ratio_standard_error),
     });
     match &map.fitted {
         Some(fitted) => DrawnMap {

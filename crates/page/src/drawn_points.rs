@@ -2,12 +2,13 @@
 
 use crate::run_page::RunPage;
 use mapper_campaign::units::Kind;
-use mapper_core::{IdentifiedPoint, standard_error_of};
+use mapper_core::{IdentifiedPoint, half_width_95, standard_error_of};
+use mapper_identify::TwoParameter;
 use mapper_report::{Display, step_name, verdict_word};
 use serde::Serialize;
 
 /// One point. Efficiencies in %, half widths of 95 % intervals in points.
-#[derive(Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct DrawnPoint {
     step: usize,
     name: String,
@@ -36,8 +37,6 @@ pub(crate) struct DrawnPoint {
     said: Vec<String>,
 }
 
-const HALF_WIDTH_95: f64 = 1.96;
-
 /// All points, repeats included.
 pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPoint> {
     let line_of = |step: usize| {
@@ -49,31 +48,36 @@ pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPo
     points
         .map(|point| {
             let rounded = line_of(point.step).unwrap_or(point.speed_corrected_rpm);
-            DrawnPoint { line: display.speed(rounded), ..drawn(page, point, display) }
+            let two = page.report.two_parameter.iter().find(|two| two.step == point.step);
+            drawn_point(point, display.speed(rounded), two, display)
         })
         .collect()
 }
 
-fn drawn(page: &RunPage<'_>, point: &IdentifiedPoint, display: &Display) -> DrawnPoint {
+/// A point on a line; `two`: what the two-parameter method makes of it.
+pub(crate) fn drawn_point(
+    point: &IdentifiedPoint,
+    line: String,
+    two: Option<&TwoParameter>,
+    display: &Display,
+) -> DrawnPoint {
     let percent = |value: Option<f64>| value.map(|value| 100.0 * value);
-    let two = page.report.two_parameter.iter().find(|two| two.step == point.step);
     let interval = point.eta_low.zip(point.eta_high).map(|(low, high)| standard_error_of(low, high));
     DrawnPoint {
         step: point.step,
         name: step_name(point),
-        line: String::new(),
+        line,
         speed: display.number(Kind::Speed, point.speed_corrected_rpm),
         flow: display.number(Kind::MassFlow, point.flow_corrected_kg_s),
         pr: point.pressure_ratio,
-        flow_half: HALF_WIDTH_95
-            * point.common.flow_corrected_standard_error_ratio
+        flow_half: half_width_95(point.common.flow_corrected_standard_error_ratio)
             * display.number(Kind::MassFlow, point.flow_corrected_kg_s),
-        pr_half: HALF_WIDTH_95 * point.common.pressure_ratio_standard_error,
+        pr_half: half_width_95(point.common.pressure_ratio_standard_error),
         eta: percent(point.eta),
         eta_low: percent(point.eta_low),
         eta_high: percent(point.eta_high),
-        eta_common: interval.map(|_| 100.0 * HALF_WIDTH_95 * point.common.eta_standard_error()),
-        eta_own: percent(point.eta_own_standard_error()).map(|own| HALF_WIDTH_95 * own),
+        eta_common: interval.map(|_| 100.0 * half_width_95(point.common.eta_standard_error())),
+        eta_own: percent(point.eta_own_standard_error()).map(half_width_95),
         h: point.h_w_m2k,
         h_low: point.h_low_w_m2k,
         h_high: point.h_high_w_m2k,

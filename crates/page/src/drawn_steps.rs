@@ -3,8 +3,9 @@
 use crate::drawn_map::rounded;
 use crate::run_page::RunPage;
 use mapper_campaign::units::Kind;
-use mapper_core::{Channel, Dimension, Recording, StepMarker};
+use mapper_core::{Channel, Recording, StepMarker};
 use mapper_identify::T2Course;
+use mapper_numerics::statistics::{mean, rms};
 use mapper_report::Display;
 use serde::Serialize;
 
@@ -78,10 +79,10 @@ fn drawn_step(recording: &Recording, marker: &StepMarker, display: &Display) -> 
         let series = recording.series.get(channel)?;
         let values = (0..ROWS).map(|row| {
             let start_s = marker.start_s + row as f64 * width_s;
-            mean_of(series.slice(start_s, start_s + width_s).1)
-                .map(|value| rounded(display.number(kind_of(*channel), value)))
+            finite_mean(series.slice(start_s, start_s + width_s).1)
+                .map(|value| rounded(display.reading(*channel, value)))
         });
-        Some(DrawnChannel { name, unit: unit_of(*channel, display), values: values.collect() })
+        Some(DrawnChannel { name, unit: display.unit_of(*channel).to_owned(), values: values.collect() })
     });
     DrawnStep {
         step: marker.index,
@@ -96,11 +97,11 @@ fn drawn_model(course: &T2Course, marker: &StepMarker, display: &Display) -> Dra
     let rows = course.t_s.len().min(ROWS);
     let bin = |row: usize| row * course.t_s.len() / rows.max(1)..(row + 1) * course.t_s.len() / rows.max(1);
     let column = |values: &[f64]| -> Vec<f64> {
-        (0..rows).map(|row| values.get(bin(row)).and_then(mean_of).unwrap_or(f64::NAN)).collect()
+        (0..rows).map(|row| values.get(bin(row)).and_then(finite_mean).unwrap_or(f64::NAN)).collect()
     };
     let left_k: Vec<f64> =
         course.read_k.iter().zip(&course.model_k).map(|(read, model)| read - model).collect();
-    let rms_k = (left_k.iter().map(|left| left * left).sum::<f64>() / left_k.len().max(1) as f64).sqrt();
+    let rms_k = rms(&left_k).unwrap_or(0.0);
     DrawnModel {
         t: column(&course.t_s).into_iter().map(|t_s| rounded(t_s - marker.start_s)).collect(),
         t2: column(&course.model_k)
@@ -113,29 +114,6 @@ fn drawn_model(course: &T2Course, marker: &StepMarker, display: &Display) -> Dra
     }
 }
 
-fn mean_of(values: &[f64]) -> Option<f64> {
-    (!values.is_empty())
-        .then(|| values.iter().sum::<f64>() / values.len() as f64)
-        .filter(|mean| mean.is_finite())
-}
-
-fn kind_of(channel: Channel) -> Kind {
-    match channel.info().dimension {
-        Dimension::RotationalSpeed => Kind::Speed,
-        Dimension::MassFlow => Kind::MassFlow,
-        Dimension::Pressure => Kind::Pressure,
-        Dimension::Temperature => Kind::Temperature,
-        Dimension::Ratio => Kind::Fraction,
-    }
-}
-
-fn unit_of(channel: Channel, display: &Display) -> String {
-    let units = display.units();
-    match kind_of(channel) {
-        Kind::Speed => units.speed.clone(),
-        Kind::MassFlow => units.flow.clone(),
-        Kind::Pressure => units.pressure.clone(),
-        Kind::Temperature => units.temperature.clone(),
-        _ => String::new(),
-    }
+fn finite_mean(values: &[f64]) -> Option<f64> {
+    mean(values).filter(|mean| mean.is_finite())
 }

@@ -10,11 +10,13 @@ mod advice;
 mod drawn_map;
 mod drawn_points;
 mod drawn_steps;
+mod live_page;
 mod page;
 mod run_page;
 mod sections;
 mod shell;
 mod table;
 
+pub use live_page::{LivePoint, Planned, live_page, live_point, planned};
 pub use page::run_page;
 pub use run_page::{OtherRun, RunPage};

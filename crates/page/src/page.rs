@@ -5,7 +5,7 @@ use crate::drawn_points::{DrawnPoint, drawn_points};
 use crate::drawn_steps::{DrawnStep, drawn_steps};
 use crate::run_page::RunPage;
 use crate::sections;
-use crate::shell::shell;
+use crate::shell::{Purpose, shell};
 use mapper_report::Display;
 use maud::html;
 use serde::Serialize;
@@ -67,5 +67,5 @@ pub fn run_page(page: &RunPage<'_>) -> Result<String, serde_json::Error> {
             (sections::provenance::provenance(page))
         }
     };
-    shell(&format!("Compressor map of {}", report.machine), &drawn, &body)
+    shell(&format!("Compressor map of {}", report.machine), Purpose::Kept, &drawn, &body)
 }

@@ -7,26 +7,55 @@ const STYLE: &str = include_str!("../assets/page.css");
 /// d3 7.9.2 and Observable Plot 0.6.17 (ISC), as their npm packages have them: `assets/SHA256SUMS`.
 const D3: &str = include_str!("../assets/d3.min.js");
 const PLOT: &str = include_str!("../assets/plot.umd.min.js");
-/// What the page's own script is made of, in this order.
-const SCRIPTS: [&str; 4] = [
-    include_str!("../assets/common.js"),
-    include_str!("../assets/map.js"),
-    include_str!("../assets/steps.js"),
-    include_str!("../assets/tables.js"),
-];
+const COMMON: &str = include_str!("../assets/common.js");
+const MAP: &str = include_str!("../assets/map.js");
+const STEPS: &str = include_str!("../assets/steps.js");
+const TABLES: &str = include_str!("../assets/tables.js");
+const LIVE: &str = include_str!("../assets/live.js");
+
+/// What a page is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// To be kept: it works from disk and asks nobody.
+    Kept,
+    /// To be looked at while a run goes on: it asks the program that it comes from, and nobody else.
+    Live,
+}
+
+impl Purpose {
+    /// What the page's own script is made of, in this order.
+    fn scripts(self) -> &'static [&'static str] {
+        match self {
+            Purpose::Kept => &[COMMON, MAP, STEPS, TABLES],
+            Purpose::Live => &[COMMON, MAP, LIVE],
+        }
+    }
+
+    fn policy(self) -> String {
+        match self {
+            Purpose::Kept => POLICY.to_owned(),
+            Purpose::Live => format!("{POLICY}; connect-src 'self'"),
+        }
+    }
+}
 
 /// Nothing from outside, nothing to outside.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; \
                       base-uri 'none'; form-action 'none'";
 
 /// The whole page; `data` is what its script draws.
-pub(crate) fn shell(title: &str, data: &impl Serialize, body: &Markup) -> Result<String, serde_json::Error> {
+pub(crate) fn shell(
+    title: &str,
+    purpose: Purpose,
+    data: &impl Serialize,
+    body: &Markup,
+) -> Result<String, serde_json::Error> {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta http-equiv="Content-Security-Policy" content=(purpose.policy());
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 title { (title) }
@@ -35,7 +64,7 @@ pub(crate) fn shell(title: &str, data: &impl Serialize, body: &Markup) -> Result
             body {
                 (body)
                 script type="application/json" id="data" { (PreEscaped(json_in_html(data)?)) }
-                @for script in [D3, PLOT].into_iter().chain(SCRIPTS) {
+                @for script in [D3, PLOT].iter().chain(purpose.scripts()) {
                     script { (PreEscaped(script)) }
                 }
             }
@@ -73,7 +102,7 @@ mod tests {
     #[test]
     fn hostile_names_stay_text() {
         let hostile = "</script><script>alert(1)</script>";
-        let page = shell(hostile, &[hostile], &html! { h1 { (hostile) } }).unwrap();
+        let page = shell(hostile, Purpose::Kept, &[hostile], &html! { h1 { (hostile) } }).unwrap();
         assert!(!page.contains("<script>alert"), "markup of a name got into the page");
         let data = page.split("id=\"data\">").nth(1).unwrap().split("</script>").next().unwrap();
         assert_eq!(serde_json::from_str::<Vec<String>>(data).unwrap(), [hostile]);

@@ -2,7 +2,8 @@
 
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_campaign::units::Kind;
-use mapper_core::OperatingPoint;
+use mapper_core::{Channel, OperatingPoint};
+use mapper_logs::units::kind_of;
 
 /// Values as the campaign wants them shown.
 #[derive(Debug, Clone)]
@@ -31,6 +32,22 @@ impl Display {
             _ => return inside,
         };
         Self::in_unit(kind, symbol, inside)
+    }
+
+    /// A reading of a channel in the unit that is shown, for drawing.
+    pub fn reading(&self, channel: Channel, inside: f64) -> f64 {
+        self.number(kind_of(channel), inside)
+    }
+
+    /// The unit in which readings of a channel are shown; empty for a ratio.
+    pub fn unit_of(&self, channel: Channel) -> &str {
+        match kind_of(channel) {
+            Kind::Speed => &self.units.speed,
+            Kind::MassFlow => &self.units.flow,
+            Kind::Pressure => &self.units.pressure,
+            Kind::Temperature => &self.units.temperature,
+            _ => "",
+        }
     }
 
     fn in_unit(kind: Kind, symbol: &str, inside: f64) -> f64 {

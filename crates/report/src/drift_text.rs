@@ -1,6 +1,7 @@
 //! What is said of drift, for people.
 
 use crate::{number, table};
+use mapper_core::half_width_95;
 use mapper_drift::{Cause, DriftReport, RateOrStep, RepeatGroup};
 use std::fmt::Write;
 
@@ -62,9 +63,9 @@ fn group_table(group: &RepeatGroup) -> comfy_table::Table {
         let mut row = vec![
             format!("{:.0}", visit.t_s),
             number::number(visit.eta.map(|eta| 100.0 * eta), 2),
-            number::number(visit.sigma_eta.map(|sigma| 196.0 * sigma), 2),
+            number::number(visit.sigma_eta.map(|sigma| 100.0 * half_width_95(sigma)), 2),
             number::number(visit.h_w_m2k, 0),
-            number::number(visit.sigma_h_w_m2k.map(|sigma| 1.96 * sigma), 0),
+            number::number(visit.sigma_h_w_m2k.map(half_width_95), 0),
         ];
         row.extend(symbols.iter().map(|symbol| {
             // Against the first visit, what the boundary conditions do taken out.

@@ -8,15 +8,36 @@ use mapper_core::Channel;
 use mapper_gap::diagnose::Diagnosed;
 use mapper_gap::nuisance::OUTPUTS;
 use mapper_gap::study::Study;
+use mapper_numerics::statistics::mean;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = "\
-body{font:15px/1.5 sans-serif;max-width:1100px;margin:2em auto;color:#222}
-table{border-collapse:collapse}td,th{padding:.2em .6em;text-align:right}
-td:first-child,th:first-child,td.left{text-align:left}
-.bar{background:#4477aa;height:1em;display:inline-block}
-svg{max-width:100%;height:auto}
-pre{background:#f4f4f4;padding:1em;overflow:auto;white-space:pre-wrap}";
+:root{--ink:#1b1f24;--soft:#545d68;--line:#d0d7de;--ground:#fff;--card:#f6f8fa;--bar:#4477aa}\
+@media (prefers-color-scheme:dark){:root{--ink:#e6edf3;--soft:#a9b4c0;--line:#3d444d;--ground:#0d1117;--card:#161b22;--bar:#79b8ff}\
+svg{background:#fff;border-radius:.4rem}}\
+*{box-sizing:border-box}\
+body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:0 auto;padding:1rem;color:var(--ink);background:var(--ground)}\
+h1{font-size:1.5rem;line-height:1.3}h2{font-size:1.2rem;margin:2rem 0 .5rem}\
+h1,p{overflow-wrap:anywhere;max-width:65rem}p{color:var(--soft)}\
+.scroll{overflow-x:auto;margin:0 0 1rem}\
+:focus-visible{outline:3px solid var(--bar)}\
+table{border-collapse:collapse;font-size:.88rem;font-variant-numeric:tabular-nums}\
+td,th{padding:.2em .6em;text-align:right;white-space:nowrap;border-bottom:1px solid var(--line)}\
+th{color:var(--soft)}\
+td:first-child,th:first-child,td.left{text-align:left}\
+td:first-child,th:first-child{position:sticky;left:0;background:var(--ground)}\
+.bar{background:var(--bar);height:1em;display:inline-block}\
+svg{max-width:100%;height:auto}\
+pre{background:var(--card);padding:1em;overflow:auto;white-space:pre-wrap}\
+@media print{:root{--ink:#000;--soft:#333;--line:#999;--ground:#fff;--card:#fff}.scroll{overflow:visible}table{font-size:7pt}}";
+
+/// Nothing from outside, nothing to outside.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
+
+/// A table that may be wider than the screen: it scrolls by itself, by keyboard too.
+fn wide(name: &str, table: &Markup) -> Markup {
+    html! { div.scroll tabindex="0" role="region" aria-label=(name) { (table) } }
+}
 
 /// The page.
 pub fn gap_page(title: &str, done: &Diagnosed) -> String {
@@ -26,14 +47,18 @@ pub fn gap_page(title: &str, done: &Diagnosed) -> String {
         html lang="en" {
             head {
                 meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "gap diagnosis" }
+                meta name="color-scheme" content="light dark";
+                title { "Gap diagnosis of " (title) }
                 style { (PreEscaped(STYLE)) }
             }
             body {
+                main {
                 h1 { (headline(diagnosis)) }
                 p { (title) }
-                @for law in &diagnosis.laws {
+                // The law that stands in the headline is not said again.
+                @for law in diagnosis.laws.iter().filter(|law| !headline(diagnosis).contains(&law.sentence)) {
                     p { "A law for what is missing in " (law.submodel) ": " b { (law.sentence) } }
                 }
                 h2 { "Which" }
@@ -59,6 +84,7 @@ pub fn gap_page(title: &str, done: &Diagnosed) -> String {
                 }
                 h2 { "In words" }
                 pre { (gap_text(diagnosis)) }
+                }
             }
         }
     };
@@ -73,7 +99,9 @@ fn causes(done: &Diagnosed) -> Markup {
         ("nothing beyond tolerance".to_owned(), diagnosis.probability_none),
         ("a cause outside the catalogue".to_owned(), diagnosis.probability_outside),
     ]);
-    html! {
+    let mut rows: Vec<(String, f64)> = rows.collect();
+    rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let table = html! {
         table {
             tr { th { "cause" } th { "probability" } th {} }
             @for (name, probability) in rows {
@@ -86,12 +114,13 @@ fn causes(done: &Diagnosed) -> Markup {
                 }
             }
         }
-    }
+    };
+    wide("causes and their probabilities", &table)
 }
 
 /// What each balance lacks at the end of each step, if it alone lacks something.
 fn forces(done: &Diagnosed) -> Markup {
-    html! {
+    let table = html! {
         table {
             tr {
                 th { "balance" }
@@ -108,12 +137,13 @@ fn forces(done: &Diagnosed) -> Markup {
                 }
             }
         }
-    }
+    };
+    wide("missing forces by balance and step", &table)
 }
 
 /// The parts of the machine in order of their share of the gap.
 fn places(done: &Diagnosed) -> Markup {
-    html! {
+    let table = html! {
         table {
             tr { @for head in ["part", "share", "sigma", "channel", "phase", "region"] { th { (head) } } }
             @for place in &done.diagnosis.r#where {
@@ -127,7 +157,8 @@ fn places(done: &Diagnosed) -> Markup {
                 }
             }
         }
-    }
+    };
+    wide("where the gap lies", &table)
 }
 
 /// Classes of residuals in the map of where: up to so many sigma, colour and name.
@@ -173,19 +204,19 @@ fn map_of_where(done: &Diagnosed) -> String {
 /// Flow in g/s and pressure ratio as measured in the last 10 s of a step.
 fn place_on_map(study: &Study, step: usize) -> Option<(f64, f64)> {
     let end_s = study.steps[step].marker.end_s;
-    let mean = |channel: Channel| {
+    let read = |channel: Channel| {
         let values = &study.table.column(channel)?[study.table.range(end_s - 10.0, end_s)];
         let values: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
-        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+        mean(&values)
     };
-    let p1_pa = mean(Channel::P1).unwrap_or(study.declared.nominal.p1_pa);
-    Some((1e3 * mean(Channel::CompressorFlow)?, mean(Channel::P2)? / p1_pa))
+    let p1_pa = read(Channel::P1).unwrap_or(study.declared.nominal.p1_pa);
+    Some((1e3 * read(Channel::CompressorFlow)?, read(Channel::P2)? / p1_pa))
 }
 
 /// Root mean square of the whitened residual of each step and channel, as a table of colours with its numbers.
 fn heat_map(done: &Diagnosed, residual: &[f64]) -> Markup {
     let steps = done.study.steps.len();
-    html! {
+    let table = html! {
         table {
             tr {
                 th { "channel" }
@@ -198,7 +229,8 @@ fn heat_map(done: &Diagnosed, residual: &[f64]) -> Markup {
                 }
             }
         }
-    }
+    };
+    wide("residuals by channel and step", &table)
 }
 
 fn heat_cell(done: &Diagnosed, residual: &[f64], step: usize, output: usize) -> Markup {
@@ -209,7 +241,8 @@ fn heat_cell(done: &Diagnosed, residual: &[f64], step: usize, output: usize) -> 
     // White at 1, red from 30 on, evenly in the logarithm.
     let heat = (rms.max(1.0).ln() / 30f64.ln()).clamp(0.0, 1.0);
     let fade = (255.0 * (1.0 - heat)) as u8;
-    let ink = if heat > 0.6 { "#fff" } else { "#222" };
+    // Both have a contrast above 4.5 there.
+    let ink = if heat > 0.75 { "#fff" } else { "#000" };
     let style = format!("color:{ink};background:rgb({},{fade},{fade})", 255 - (60.0 * heat) as u8);
     html! { td style=(style) { (format!("{rms:.1}")) } }
 }

@@ -17,9 +17,28 @@ const COLOURS: [Colour; 8] = [
 const MOVED: Colour = Colour(0xC6, 0x28, 0x28);
 const MS_PER_DAY: f64 = 86_400_000.0;
 
+/// Dates under an axis: so many at most.
+const DATES_MAX: i64 = 6;
+
+/// Midnights from the first night to the last, days after the first night and as people write them, evenly apart.
+fn dates(first_ms: i64, last_ms: i64) -> Vec<(f64, String)> {
+    let day_ms = MS_PER_DAY as i64;
+    let (first, last) = (first_ms.div_euclid(day_ms), last_ms.div_euclid(day_ms));
+    let step = (last - first) / DATES_MAX + 1;
+    let days = (0..=DATES_MAX).map(|i| first + i * step).take_while(|day| *day <= last);
+    let format = if last - first > 360 { "%Y-%m-%d" } else { "%d %b" };
+    days.map(|day| {
+        ((day * day_ms - first_ms) as f64 / MS_PER_DAY, crate::history_text::time(day * day_ms, format))
+    })
+    // The first night's own midnight lies before the axis.
+    .map(|(place, text)| (place.max(0.0), text))
+    .collect()
+}
+
 /// All figures as one SVG.
 pub fn history_svg(runs: &[ListedRun], figures: &[Metric]) -> String {
     let first_ms = runs.iter().map(|listed| listed.night.started_ms).min().unwrap_or_default();
+    let last_ms = runs.iter().map(|listed| listed.night.started_ms).max().unwrap_or_default();
     let day = |ms: i64| (ms - first_ms) as f64 / MS_PER_DAY;
     let lines: BTreeSet<(&str, &str)> = runs
         .iter()
@@ -34,9 +53,11 @@ pub fn history_svg(runs: &[ListedRun], figures: &[Metric]) -> String {
     ));
     for figure in figures {
         let (unit, factor) = figure.shown_unit();
-        let mut panel =
-            Panel::new(Axis::new("days since the first night"), Axis::new(format!("{figure}, {unit}")))
-                .title(figure.name());
+        let mut panel = Panel::new(
+            Axis::new("night (UTC)").ticks(dates(first_ms, last_ms)),
+            Axis::new(format!("{figure}, {unit}")),
+        )
+        .title(figure.name());
         let mut rings = Vec::new();
         for ((campaign, method), colour) in lines.iter().zip(COLOURS.iter().cycle()) {
             let mut nights: BTreeMap<(i64, i64), (bool, Vec<f64>)> = BTreeMap::new();
@@ -66,4 +87,23 @@ pub fn history_svg(runs: &[ListedRun], figures: &[Metric]) -> String {
         picture = picture.panel(panel);
     }
     picture.to_svg()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates_are_midnights_in_order_and_few() {
+        let noon_ms = 20_000 * 86_400_000 + 43_200_000;
+        let of = |days: i64| dates(noon_ms, noon_ms + days * 86_400_000);
+        assert_eq!(of(0), [(0.0, "04 Oct".to_owned())]);
+        assert_eq!(of(2)[1..], [(0.5, "05 Oct".to_owned()), (1.5, "06 Oct".to_owned())]);
+        for days in [0, 1, 5, 6, 7, 100, 10_000] {
+            let dates = of(days);
+            assert!((1..=DATES_MAX as usize + 1).contains(&dates.len()), "{days}: {}", dates.len());
+            assert!(dates.windows(2).all(|pair| pair[0].0 < pair[1].0), "{days}");
+        }
+        assert!(of(10_000)[0].1.starts_with("2024-"), "a year where there are several");
+    }
 }

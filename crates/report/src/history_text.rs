@@ -84,3 +84,19 @@ pub fn runs_text(runs: &[ListedRun], figures: &[Metric]) -> String {
     }
     format!("{table}\n\n{failures}{} runs.\n", runs.len())
 }
+
+/// One run of a night for a program.
+pub fn listed_run_json(listed: &ListedRun) -> serde_json::Value {
+    let ListedRun { night, run } = listed;
+    let figures: BTreeMap<&str, Option<f64>> =
+        Metric::ALL.into_iter().map(|figure| (figure.name(), run.figures.get(&figure).copied())).collect();
+    serde_json::json!({
+        "night": {
+            "id": night.id, "name": night.name, "started": time(night.started_ms, "%Y-%m-%dT%H:%M:%SZ"),
+            "duration_s": night.duration_s, "program": night.program, "accepted": night.accepted, "moved": night.moved,
+        },
+        "campaign": run.key.campaign, "machine": run.key.machine, "method": run.key.method, "seed": run.key.seed,
+        "campaign_sha256": run.campaign_sha256, "model_sha256": run.model_sha256,
+        "failure": run.failure, "figures": figures,
+    })
+}

@@ -4,7 +4,23 @@ use crate::display::Display;
 use crate::number::{number, percent};
 use mapper_campaign::Campaign;
 use mapper_planner::JumpForecast;
+use serde_json::json;
 use std::fmt::Write;
+
+/// The same for a program, SI.
+pub fn jump_json(jump: &JumpForecast) -> serde_json::Value {
+    json!({
+        "from": jump.from,
+        "to": jump.to,
+        "predicted": jump.predicted,
+        "p3_change_pa": jump.p3_change_pa,
+        "longest_surge_s": jump.longest_surge_s,
+        "highest_speed_rpm": jump.highest_speed_rpm,
+        "highest_t2_k": jump.highest_t2_k,
+        "allowed": jump.rejections.is_empty(),
+        "rejections": jump.rejections.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    })
+}
 
 /// What the jump gives from the steady state of its first point, and each reason against it.
 pub fn jump_text(campaign: &Campaign, jump: &JumpForecast) -> String {

@@ -4,7 +4,7 @@ use mapper_assemble::{ComparedPlace, MapComparison};
 use mapper_chart::{
     Axis, Figure, Line, LineEnd, Marker, Panel, Rule, RuleAt, Scatter, ScatterPoint, palette,
 };
-use mapper_core::CompressorMap;
+use mapper_core::{CompressorMap, half_width_95};
 
 /// Every how many places the second panel draws an error bar.
 const BAR_EVERY: usize = 5;
@@ -86,7 +86,7 @@ fn eta_panel(comparison: &MapComparison) -> Panel {
             .iter()
             .enumerate()
             .map(|(place, p)| {
-                let (y, half) = (100.0 * p.eta_difference, 196.0 * p.eta_standard_error);
+                let (y, half) = (100.0 * p.eta_difference, 100.0 * half_width_95(p.eta_standard_error));
                 // Bars vary slowly along a line: a few of them, on another place of each line, stay legible.
                 let y_interval = (place % BAR_EVERY == index % BAR_EVERY).then_some((y - half, y + half));
                 ScatterPoint { x: p.flow_corrected_kg_s, y, x_interval: None, y_interval }

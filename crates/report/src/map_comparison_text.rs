@@ -3,6 +3,7 @@
 use crate::number::number;
 use crate::table;
 use mapper_assemble::{ComparedLine, ComparedPlace, MapComparison};
+use mapper_core::half_width_95;
 use std::fmt::Write;
 
 /// A row for each line and sentences below.
@@ -32,9 +33,9 @@ pub fn map_comparison_text(comparison: &MapComparison) -> String {
             number(mean(|p| p.flow_difference_kg_s), 5),
             number(mean(|p| p.pressure_ratio_difference), 4),
             number(mean(|p| 100.0 * p.distance_ratio), 2),
-            number(mean(|p| 196.0 * p.distance_standard_error_ratio), 2),
+            number(mean(|p| 100.0 * half_width_95(p.distance_standard_error_ratio)), 2),
             number(mean(|p| 100.0 * p.eta_difference), 2),
-            number(mean(|p| 196.0 * p.eta_standard_error), 2),
+            number(mean(|p| 100.0 * half_width_95(p.eta_standard_error)), 2),
             number(share(ComparedPlace::line_differs), 0),
             number(share(ComparedPlace::eta_differs), 0),
         ]);

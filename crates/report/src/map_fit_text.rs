@@ -2,7 +2,7 @@
 
 use crate::number::number;
 use crate::table;
-use mapper_core::{CompressorMap, FittedLine, FittedMap, LeftOutLine};
+use mapper_core::{CompressorMap, FittedLine, FittedMap, LeftOutLine, half_width_95};
 use std::fmt::Write;
 
 /// A row for each line and sentences below.
@@ -32,7 +32,7 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
             number(surge.map(|n| n.pressure_ratio), 3),
             number(choke_flow(line), 4),
             number(best.map(|n| 100.0 * n.eta), 1),
-            number(best.map(|n| 196.0 * n.eta_standard_error), 1),
+            number(best.map(|n| 100.0 * half_width_95(n.eta_standard_error)), 1),
             number(left_out.map(|l| 100.0 * l.distance_ratio), 2),
             number(left_out.and_then(|l| l.eta).map(|eta| 100.0 * eta), 2),
             match (line.measured, line.nodes.iter().all(|n| n.extrapolated)) {

@@ -10,8 +10,9 @@ use mapper_record::score::{ScoreSummary, ScoredPoint};
 use std::fmt::Write;
 
 /// Identified points as a table, their doubts below, and how far they are from the truth where it is known.
-pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits) -> String {
-    let mut text = format!("{}\n\n", points_table(points, units));
+/// `truth`: whether to say the latter.
+pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) -> String {
+    let mut text = format!("{}\n\n", points_table(points, units, truth));
     let doubted = points.iter().map(|scored| &scored.point).filter(|point| point.verdict != Verdict::Good);
     for doubt in doubts(doubted) {
         let _ = writeln!(text, "{}: {}", doubt.steps(), doubt.message);
@@ -25,7 +26,7 @@ pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits) -> String {
         count(Verdict::Doubtful),
         count(Verdict::Unusable),
     );
-    if let Some(score) = mapper_record::score::summarise(points) {
+    if let Some(score) = mapper_record::score::summarise(points).filter(|_| truth) {
         text.push_str(&score_text(&score));
     }
     text
@@ -62,9 +63,9 @@ pub(crate) fn opening(ratio: f64) -> String {
     if ratio.is_finite() { ratio.to_string() } else { "-".to_owned() }
 }
 
-fn points_table(points: &[ScoredPoint], units: &DisplayUnits) -> comfy_table::Table {
+fn points_table(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) -> comfy_table::Table {
     let display = Display::new(units);
-    let with_truth = points.iter().any(|scored| scored.truth.is_some());
+    let with_truth = truth && points.iter().any(|scored| scored.truth.is_some());
     let mut heads = vec![
         "step".to_owned(),
         display.speed_head("speed"),

@@ -39,3 +39,19 @@ value, in points (1 point = 0.01); ranges run over the valve openings.
 Errata of the paper followed here: eq. 2 lacks T1' on its right side; the nRMSE of the heat-transfer coefficient is 3.2 %
 (section 5.1, conclusion 2), not the abstract's 1 %; table 1's \"110000 to 50000\" means target 50 krpm from 110 krpm.
 ";
+
+/// One figure for a program.
+pub fn figure_json(result: &FigureResult) -> serde_json::Value {
+    serde_json::json!({
+        "figure": result.number,
+        "title": result.title,
+        "picture": picture_path(result),
+        "statements": result.statements.iter().map(|statement| serde_json::json!({
+            "paper": statement.paper,
+            "here": statement.here,
+            "verdict": statement.verdict.to_string(),
+        })).collect::<Vec<_>>(),
+        "head": result.table.head,
+        "rows": result.table.rows,
+    })
+}

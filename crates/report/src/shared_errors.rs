@@ -2,7 +2,7 @@
 
 use crate::display::Display;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{IdentifiedPoint, Verdict};
+use mapper_core::{IdentifiedPoint, Verdict, half_width_95};
 use mapper_numerics::statistics::median;
 
 /// Says it for the slowest speed and for the rest, since offsets weigh by one over the square of the speed; `None` where no
@@ -26,7 +26,7 @@ pub fn shared_errors_text<'a>(
             median(points.iter().filter_map(|point| value(point))).map(|x| 100.0 * x)
         };
         let all = half(|point| Some(0.5 * (point.eta_high? - point.eta_low?)))?;
-        let common = half(|point| Some(1.96 * point.common.eta_standard_error()))?;
+        let common = half(|point| Some(half_width_95(point.common.eta_standard_error())))?;
         Some(format!("{common:.2} of +/- {all:.2} points"))
     };
     let first = format!("{} at {} {}", of(&slow)?, display.speed(slowest_rpm), units.speed);

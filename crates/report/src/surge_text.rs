@@ -4,7 +4,7 @@ use crate::display::Display;
 use crate::markdown::{self, Align};
 use crate::number::{number, percent};
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{SurgeFoundBy, SurgeMark};
+use mapper_core::{SurgeFoundBy, SurgeMark, half_width_95};
 use mapper_record::score::ScoredMark;
 use std::fmt::Write;
 
@@ -32,9 +32,9 @@ pub fn surge_text(marks: &[ScoredMark], remarks: &[String], surges: usize, units
             let mut row = vec![
                 display.speed(mark.speed_corrected_rpm),
                 display.flow(flow_kg_s),
-                percent(Some(1.96 * mark.flow_total_standard_error_kg_s() / flow_kg_s), 1),
+                percent(Some(half_width_95(mark.flow_total_standard_error_kg_s()) / flow_kg_s), 1),
                 number(Some(mark.pressure_ratio), 3),
-                number(Some(1.96 * mark.pressure_ratio_standard_error), 3),
+                number(Some(half_width_95(mark.pressure_ratio_standard_error)), 3),
                 percent(Some(mark.closest_flow_corrected_kg_s / flow_kg_s - 1.0), 1),
                 mark.steps.to_string(),
                 found_by(mark).to_owned(),

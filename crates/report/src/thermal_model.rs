@@ -1,13 +1,13 @@
 //! What the points of a campaign share, for people.
 
-use mapper_core::{FoundInlet, InletConvection, Origin, SharedValue, ThermalModel};
+use mapper_core::{FoundInlet, InletConvection, Origin, SharedValue, ThermalModel, half_width_95};
 use std::fmt::Write;
 
 /// The thermal model as lines of text, one for each number.
 pub fn thermal_text(thermal: &ThermalModel) -> String {
     let mut text = String::from("\nshared by all points (+/- 95 %):\n");
     let mut line = |name: &str, value: &SharedValue, scale: f64, unit: &str, decimals: usize| {
-        let half = 1.96 * scale * value.uncertainty.combined_standard_error();
+        let half = half_width_95(scale * value.uncertainty.combined_standard_error());
         let _ = match (value.value, value.origin) {
             (Some(number), Origin::Assumed) => {
                 writeln!(text, "  {name:<34} {:.decimals$} {unit} (assumed)", scale * number)

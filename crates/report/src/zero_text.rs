@@ -1,5 +1,6 @@
 //! The isothermal zero, for people.
 
+use mapper_core::half_width_95;
 use mapper_identify::ZeroOutcome;
 use std::fmt::Write;
 
@@ -16,7 +17,7 @@ pub fn zero_text(zero: &ZeroOutcome) -> String {
                 zero.start_s, zero.end_s
             );
             for (channel, offset) in &zero.offsets {
-                let half = 1.96 * zero.left_sigma.get(channel).copied().unwrap_or(f64::NAN);
+                let half = half_width_95(zero.left_sigma.get(channel).copied().unwrap_or(f64::NAN));
                 // Writing to a String cannot fail.
                 let _ = writeln!(text, "  {channel:<6} {offset:+.2} +/- {half:.2} {}", channel.unit());
             }

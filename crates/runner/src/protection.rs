@@ -1,5 +1,6 @@
 //! What stands around a run besides its guards: the way into the safe state, the band of the speed, the pace of looking.
 
+use crate::operator::Operator;
 use mapper_core::{SafeTrajectory, SpeedBand};
 use std::sync::atomic::AtomicBool;
 
@@ -16,6 +17,8 @@ pub struct Protection<'a> {
     pub stop_after_step: &'a AtomicBool,
     /// Asks the rig for each sample by itself. A simulated rig is asked so only while a guard is alert.
     pub each_sample: bool,
+    /// What the operator asks for besides; `None`: nobody can.
+    pub operator: Option<&'a Operator>,
 }
 
 static NEVER: AtomicBool = AtomicBool::new(false);
@@ -28,6 +31,7 @@ impl Default for Protection<'_> {
             speed: None,
             stop_after_step: &NEVER,
             each_sample: false,
+            operator: None,
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::guard::{Bench, Guard, Told, Trip};
 use crate::merge::append;
 use crate::observer::{ObserverError, RunObserver};
+use crate::operator::Operator;
 use crate::protection::Protection;
 use crate::reached::Reached;
 use crate::source::{StepSource, StepSourceError};
@@ -20,6 +21,8 @@ const POLL_INTERVAL_S: f64 = 1.0;
 const JUMP_RATIO: f64 = 0.01;
 /// Longest time that a guard may hold the setpoints, s.
 const HOLD_MAX_S: f64 = 300.0;
+/// Longest time that the operator may hold a step, s: an operator who has gone home does not hold a rig for ever.
+const OPERATOR_HOLD_MAX_S: f64 = 4.0 * 3600.0;
 /// Pieces in which a step is approached again, and the time of each, s.
 const SMALLER_STEPS: u32 = 4;
 const SMALLER_STEP_S: f64 = 10.0;
@@ -378,18 +381,28 @@ impl Run<'_, '_> {
     pub(crate) fn pass_notes(&mut self) -> Result<(), ObserverError> {
         let (t_s, kind) = (self.now_s, EventKind::Note);
         let mut notes = self.with.steps.take_notes().into_iter();
-        notes.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))
+        notes.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))?;
+        self.pass_asked()
+    }
+
+    /// Records what the operator has asked for.
+    fn pass_asked(&mut self) -> Result<(), ObserverError> {
+        let Some(operator) = self.protection.operator else { return Ok(()) };
+        let (t_s, kind) = (self.now_s, EventKind::Note);
+        let mut said = operator.take_said().into_iter();
+        said.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))
     }
 
     /// Lets the rig run to `until_s` under the eyes of guards, observer and source. In a step the source may end it early,
     /// and a guard may hold or cut it; outside of steps what would cut one ends the run.
     fn watch(&mut self, mut until_s: f64, in_step: bool, hold_speed: bool) -> Result<(), Halt> {
-        let mut held_s = 0.0;
+        let (mut held_s, mut operator_held_s) = (0.0, 0.0);
         while self.now_s < until_s {
             let stop_now = !in_step && self.protection.stop_after_step.load(Ordering::Relaxed);
             if stop_now || self.with.stop.load(Ordering::Relaxed) {
                 return Err(Halt::Interrupted);
             }
+            let before_s = self.now_s;
             let (batch, trips) = self.acquire(until_s)?;
             if let Some(trip) = trips.iter().find(|trip| trip.reaction.ends_the_run()) {
                 return Err(Halt::Tripped(trip.clone(), Some(Box::new(batch))));
@@ -404,6 +417,12 @@ impl Run<'_, '_> {
                     }
                     _ => return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, ..trip.clone() }, None)),
                 }
+            }
+            self.pass_asked()?;
+            if self.protection.operator.is_some_and(Operator::holds) && operator_held_s < OPERATOR_HOLD_MAX_S
+            {
+                let more_s = self.now_s - before_s;
+                (operator_held_s, until_s) = (operator_held_s + more_s, until_s + more_s);
             }
             self.reached.keep(&batch, self.now_s);
             let ends = self.with.steps.on_batch(&batch);

@@ -11,7 +11,9 @@ use mapper_core::{
 };
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
-use mapper_runner::{Guard, ObserverError, PlanSteps, RunEnd, RunError, RunObserver, Runner, SignalWatch};
+use mapper_runner::{
+    Guard, ObserverError, Operator, PlanSteps, Protection, RunEnd, RunError, RunObserver, Runner, SignalWatch,
+};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Two steps of 20 s after 10 s of warm-up and before 5 s of cool-down.
@@ -214,4 +216,58 @@ fn a_recorder_that_fails_ends_the_run_with_its_own_words() {
     let mut notebook = Notebook { fail_at_s: Some(15.0), ..Notebook::default() };
     let error = run(&mut notebook, Vec::new(), &AtomicBool::new(false)).unwrap_err();
     assert_eq!(error.to_string(), "the disk is full");
+}
+
+/// Holds the first step as soon as it has begun, and lets it go on at a time.
+struct HoldsFirst<'a> {
+    operator: &'a Operator,
+    until_s: f64,
+    notebook: Notebook,
+}
+
+impl RunObserver for HoldsFirst<'_> {
+    fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        if marker.index == 0 {
+            self.operator.hold();
+        }
+        self.notebook.on_step_start(marker)
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        if self.operator.holds() && batch.t_s.last().is_some_and(|t_s| *t_s >= self.until_s) {
+            self.operator.go_on();
+            self.operator.say("let go on".to_owned());
+        }
+        self.notebook.on_batch(batch)
+    }
+
+    fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
+        self.notebook.on_event(event)
+    }
+
+    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.notebook.on_step_end(marker)
+    }
+}
+
+#[test]
+fn a_held_step_lasts_until_it_is_let_go_on() {
+    let (plan, operator, mut rig) = (plan(), Operator::default(), Watched::new());
+    let mut holds = HoldsFirst { operator: &operator, until_s: 60.0, notebook: Notebook::default() };
+    let runner = Runner {
+        steps: &mut PlanSteps::new(&plan),
+        backend: &mut rig,
+        clock: &mut UnpacedClock,
+        guards: Vec::new(),
+        observer: &mut holds,
+        speed: None,
+        stop: &AtomicBool::new(false),
+    };
+    let end = runner.run_under(&Protection { operator: Some(&operator), ..Protection::default() }).unwrap();
+    assert_eq!(end, RunEnd::Completed);
+    // It begins at 10 s, is held until the second that ends at 60 s, and has its 20 s besides; the next one is as planned.
+    let [first, second] = holds.notebook.ends[..] else { panic!("{:?}", holds.notebook.ends) };
+    assert!((first.end_s - 10.0 - 20.0 - 50.0).abs() <= 1.0, "{first:?}");
+    assert!((second.end_s - second.start_s - 20.0).abs() < 1e-9, "{second:?}");
+    assert_eq!(holds.notebook.events, [EventKind::Note], "what was asked for is recorded");
 }

@@ -7,7 +7,8 @@ use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::speed_response::speed_response;
 use mapper_runner::{
-    Protection, RunEnd, RunError, RunObserver, Runner, Soaked, SpeedControl, SpeedControlLimits, StepSource,
+    Operator, Protection, RunEnd, RunError, RunObserver, Runner, Soaked, SpeedControl, SpeedControlLimits,
+    StepSource,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -24,7 +25,8 @@ pub fn drive(
     observer: &mut dyn RunObserver,
     stop: &AtomicBool,
 ) -> Result<RunEnd, RunError> {
-    let pace = Pace { clock: &mut UnpacedClock, each_sample: false, stop, stop_after_step: &NEVER };
+    let pace =
+        Pace { clock: &mut UnpacedClock, each_sample: false, stop, stop_after_step: &NEVER, operator: None };
     drive_paced(campaign, model, steps, backend, observer, pace)
 }
 
@@ -40,6 +42,8 @@ pub struct Pace<'a> {
     pub stop: &'a AtomicBool,
     /// Set from outside to stop at the end of the step.
     pub stop_after_step: &'a AtomicBool,
+    /// What the operator asks for besides.
+    pub operator: Option<&'a Operator>,
 }
 
 /// As [`drive`], at a pace.
@@ -70,6 +74,7 @@ pub fn drive_paced(
         speed: campaign.guard_set().speed.filter(|_| rig.controls),
         stop_after_step: pace.stop_after_step,
         each_sample: pace.each_sample || !rig.simulated_time,
+        operator: pace.operator,
     };
     Runner {
         steps,

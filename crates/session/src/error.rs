@@ -324,6 +324,12 @@ pub enum SessionError {
         /// Why.
         source: mapper_assemble::MapFitError,
     },
+    /// A file is there already.
+    #[error("{} is there already and is kept; choose another name", .path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file or directory could not be read, written or made.
     #[error("failed to {action} {}: {source}", .path.display())]
     File {
@@ -352,7 +358,10 @@ impl SessionError {
     /// A file that could not be read, written or created.
     pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
-        move |source| SessionError::File { action, path, source }
+        move |source| match source.kind() {
+            io::ErrorKind::AlreadyExists => SessionError::Exists { path },
+            _ => SessionError::File { action, path, source },
+        }
     }
 
     /// What kind of trouble it is.
@@ -422,6 +431,7 @@ impl SessionError {
             | E::History(_)
             | E::Export(_)
             | E::File { .. }
+            | E::Exists { .. }
             | E::TooManyRuns { .. }
             | E::Json(_) => ErrorKind::Failure,
             E::Interrupted => ErrorKind::Interrupted,

@@ -1,9 +1,11 @@
 //! What happens while a session works, as data for whoever looks on.
 
-use mapper_core::{Event, IdentifiedPoint, RigDescription, StepMarker};
+use mapper_core::{Channel, Event, IdentifiedPoint, RigDescription, StepMarker};
+use serde::Serialize;
 
 /// Something that happened.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
 pub enum SessionEvent {
     /// A run begins on this rig.
     RunStarted {
@@ -25,6 +27,16 @@ pub enum SessionEvent {
     StepEnded(StepMarker),
     /// The rig or the runner has something to tell: a guard that tripped, surge, a stop, the safe state, a note.
     Told(Event),
+    /// The last good reading of each channel.
+    Readings {
+        /// Run time, s.
+        t_s: f64,
+        /// SI.
+        values: Vec<(Channel, f64)>,
+    },
+    /// A step that has just ended, identified by itself: before the zero is subtracted and before all steps are identified
+    /// together.
+    PointEstimated(Box<IdentifiedPoint>),
     /// A point was identified.
     PointIdentified(Box<IdentifiedPoint>),
     /// Long work that has no steps has come so far.

@@ -27,6 +27,7 @@ use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use mapper_planner::PlanRequest;
 use mapper_record::ChannelMap;
+use serde_json::{Value, json};
 use std::slice;
 use std::sync::Arc;
 
@@ -40,6 +41,38 @@ pub struct Gap {
     pub sensors: Vec<FusedChannel>,
     /// What came of the isothermal zero.
     pub zero: ZeroOutcome,
+}
+
+impl Gap {
+    /// For a program: the diagnosis, what was found in it, drift and zero.
+    ///
+    /// # Errors
+    /// [`SessionError::Json`]: none in practice.
+    pub fn json(&self) -> Result<Value, SessionError> {
+        let mut value = serde_json::to_value(&self.diagnosed.diagnosis)?;
+        value["found"] = json!(Found::of(&self.diagnosed));
+        value["drift"] = self.drift.as_ref().map_or(Value::Null, drift_json);
+        value["zero"] = json!(self.zero);
+        if !self.sensors.is_empty() {
+            value["sensors"] = json!(self.sensors);
+        }
+        Ok(value)
+    }
+}
+
+/// Verdict, cause, course and size of what drifted.
+fn drift_json(drift: &DriftReport) -> Value {
+    json!({
+        "verdict": drift.verdict,
+        "cause": drift.cause,
+        "probability": drift.probability,
+        "onset_s": drift.onset_s,
+        "size": drift.size,
+        "low": drift.low,
+        "high": drift.high,
+        "unit": drift.unit,
+        "reason": drift.reason,
+    })
 }
 
 impl Session<'_> {

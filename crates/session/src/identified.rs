@@ -13,9 +13,10 @@ use mapper_observe::FusedChannel;
 use mapper_record::ChannelMap;
 use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use mapper_surge::SurgeMarks;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What a recording gives.
 #[derive(Debug)]
@@ -56,6 +57,28 @@ pub struct SoughtSurge {
 }
 
 impl Identified {
+    /// For a program. `recording`: the first file; `warnings`: what was wrong with the files.
+    pub fn json(&self, recording: Option<&Path>, warnings: &[String]) -> Value {
+        let mut value = json!({
+            "recording": recording,
+            "reference": self.config.reference,
+            "points": self.points,
+            "thermal": self.thermal,
+            "two_parameter": self.two_parameter,
+            "zero": self.zero,
+            "score": self.score,
+            "recording_warnings": warnings,
+            "remarks": self.remarks,
+        });
+        if !self.sensors.is_empty() {
+            value["sensors"] = json!(self.sensors);
+        }
+        if let Some(surge) = &self.surge {
+            value["surge"] = json!(surge);
+        }
+        value
+    }
+
     /// The points without their truth.
     pub fn points_alone(&self) -> impl Iterator<Item = &IdentifiedPoint> {
         self.points.iter().map(|scored| &scored.point)

@@ -3,6 +3,7 @@
 use crate::{Registry, SessionError};
 use mapper_logs::proposal::{Proposal, channel_map_text, propose};
 use mapper_logs::{Layout, LogFile, LogOptions, Survey, survey};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// What a log holds, and the channel map that it suggests.
@@ -43,6 +44,38 @@ pub fn inspect_log(
 }
 
 impl Inspected {
+    /// For a program; absent numbers are null.
+    pub fn json(&self) -> Value {
+        let columns = self.layout.columns.iter().zip(&self.survey.columns).map(|(column, data)| {
+            json!({
+                "name": column.name,
+                "header": column.header,
+                "unit": column.unit,
+                "description": column.description,
+                "group": column.group,
+                "count": data.count,
+                "missing": data.missing,
+                "min": data.min,
+                "max": data.max,
+            })
+        });
+        json!({
+            "log": self.path,
+            "format": self.format,
+            "findings": self.layout.findings,
+            "start_time_ns": self.layout.start_time_ns,
+            "groups": self.layout.groups.iter().zip(&self.survey.groups).map(|(group, data)| {
+                let mut value = json!(data);
+                value["name"] = json!(group.name);
+                value["clock"] = json!(group.clock);
+                value
+            }).collect::<Vec<_>>(),
+            "columns": columns.collect::<Vec<_>>(),
+            "proposal": self.proposal,
+            "channel_map": self.channel_map(),
+        })
+    }
+
     /// The suggestion as the text of a channel map.
     pub fn channel_map(&self) -> String {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();

@@ -1,6 +1,6 @@
 //! Map files: reading and writing by format.
 
-use crate::files::write_new;
+use crate::files::{Existing, write_file};
 use crate::{Registry, SessionError};
 use mapper_assemble::{MapFitOptions, fit_map};
 use mapper_campaign::Campaign;
@@ -73,15 +73,20 @@ impl Registry {
     }
 }
 
-/// Writes a map into a new file.
+/// Writes a map into a file.
 ///
 /// # Errors
-/// [`SessionError::Export`] where the format cannot hold the map, [`SessionError::File`].
-pub fn write_map(path: &Path, format: &MapFormat, map: &CompressorMap) -> Result<(), SessionError> {
-    write_new(path, &format.write(map)?)
+/// [`SessionError::Export`] where the format cannot hold the map, and as [`write_file`].
+pub fn write_map(
+    path: &Path,
+    format: &MapFormat,
+    map: &CompressorMap,
+    existing: Existing,
+) -> Result<(), SessionError> {
+    write_file(path, &format.write(map)?, existing)
 }
 
-/// Writes a map into a new file; a format that is a table over the whole map gets a fitted one. Returns the map written, and
+/// Writes a map into a file; a format that is a table over the whole map gets a fitted one. Returns the map written, and
 /// whether it was fitted for this.
 ///
 /// # Errors
@@ -90,6 +95,7 @@ pub fn write_map_fitted_if_needed(
     path: &Path,
     format: &MapFormat,
     map: CompressorMap,
+    existing: Existing,
 ) -> Result<(CompressorMap, bool), SessionError> {
     let needs_fit = map.fitted.is_none() && matches!(format.write(&map), Err(ExportError::NeedsFit { .. }));
     let map = if needs_fit {
@@ -98,6 +104,6 @@ pub fn write_map_fitted_if_needed(
     } else {
         map
     };
-    write_map(path, format, &map)?;
+    write_map(path, format, &map, existing)?;
     Ok((map, needs_fit))
 }

@@ -89,6 +89,7 @@ impl Session<'_> {
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
         let jobs = jobs.unwrap_or(cores).clamp(1, runs.len().max(1));
         let done = AtomicUsize::new(0);
+        self.tell(SessionEvent::PiecesDone { done: 0, of: runs.len() });
         parallel::try_map_on(jobs, runs, |index, run| {
             let row = self.nightly_run(run, &scratch.path().join(index.to_string()))?;
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;

@@ -131,6 +131,10 @@ impl RunObserver for Teller<'_> {
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
         if let Some(t_s) = batch.t_s.last() {
             (self.on_event)(&SessionEvent::RigTime { t_s: *t_s });
+            let last = |values: &[f64]| values.iter().rev().find(|value| value.is_finite()).copied();
+            let values =
+                batch.columns.iter().filter_map(|column| Some((column.channel, last(&column.values)?)));
+            (self.on_event)(&SessionEvent::Readings { t_s: *t_s, values: values.collect() });
         }
         batch.events.iter().try_for_each(|event| self.on_event(event))
     }

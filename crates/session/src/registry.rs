@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// Reads a suspected effect from a file.
 pub type ReadEffect = fn(&Path) -> Result<Arc<dyn Effect>, SessionError>;
 
-/// Every plug-in of a session.
+/// Every plug-in of a session, and what the program is that opens it.
 #[derive(Clone)]
 pub struct Registry {
     /// Rigs, real and simulated.
@@ -27,6 +27,8 @@ pub struct Registry {
     pub formats: MapFormats,
     /// Formats of logs that other programs wrote.
     pub logs: LogFormats,
+    /// Commit that the program was built from; empty where nobody knows it.
+    pub commit: &'static str,
 }
 
 impl Default for Registry {
@@ -38,6 +40,7 @@ impl Default for Registry {
             read_effect: no_effect,
             formats: MapFormats(&[]),
             logs: LogFormats::default(),
+            commit: "",
         }
     }
 }

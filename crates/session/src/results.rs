@@ -2,7 +2,7 @@
 
 use crate::files::{json_text, write_new};
 use crate::identified::{Identified, SoughtSurge};
-use crate::program::PROGRAM;
+use crate::program::program_and_commit;
 use crate::recorded::Recorded;
 use crate::{Registry, Session, SessionError, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
@@ -209,7 +209,7 @@ impl Session<'_> {
             other_maps.iter().map(|(name, map)| OtherRun { name: name.clone(), map }).collect();
         let repeats = identified.repeats();
         let report = run_report_of(&told, &identified, &remarks, &repeats, false);
-        page_of(&told, &identified, &report, map.as_ref(), &others)
+        page_of(&told, &identified, &report, map.as_ref(), &others, self.registry.commit)
     }
 
     /// The files of what was identified.
@@ -246,7 +246,8 @@ impl Session<'_> {
         let report = directory.join(run_directory::REPORT);
         write_new(&report, run_report(&shown).as_bytes())?;
         let page = directory.join(run_directory::PAGE);
-        let page_text = page_of(told, &identified, &shown, compressor_map.as_ref(), &[])?;
+        let page_text =
+            page_of(told, &identified, &shown, compressor_map.as_ref(), &[], self.registry.commit)?;
         write_new(&page, page_text.as_bytes())?;
         let Identified { points, thermal, two_parameter, sensors, zero, score, surge, .. } = identified;
         Ok(Results {
@@ -323,6 +324,7 @@ fn page_of(
     report: &RunReport<'_>,
     map: Option<&CompressorMap>,
     others: &[OtherRun<'_>],
+    commit: &str,
 ) -> Result<String, SessionError> {
     let course = |point: &IdentifiedPoint| t2_course(&identified.recording, point, &identified.config);
     let courses: Vec<T2Course> = identified.points_alone().filter_map(course).collect();
@@ -333,7 +335,7 @@ fn page_of(
         courses: &courses,
         zero: &identified.zero,
         tested_at: told.tested_at.as_deref(),
-        program: PROGRAM,
+        program: &program_and_commit(commit),
         others,
     })?)
 }

@@ -1,6 +1,8 @@
 //! A whole run: plan, drive the rig, record, identify, assemble, report.
 
+use crate::declared::identification;
 use crate::drive::{Pace, drive_paced, soak_s};
+use crate::estimates::Estimates;
 use crate::files::{json_text, write_new};
 use crate::guards::{check_guards, drift_watch};
 use crate::journal::{Entry, Identity, Journal};
@@ -15,7 +17,7 @@ use crate::rig_state::{Claim, Latch, Owner, RigStates};
 use crate::scripted_steps::ScriptedSteps;
 use crate::stored_plan::stored_plan;
 use crate::surge::{hold_near_surge, remark_surge_search};
-use crate::{Session, SessionError, run_directory};
+use crate::{Session, SessionError, SessionEvent, run_directory};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
 use mapper_core::{Backend, Clock, Plan, Reaction, RigDescription, UnpacedClock};
@@ -88,6 +90,13 @@ pub struct RunOutcome {
     pub end: Ended,
     /// What was identified, or why nothing was.
     pub results: Result<Results, SessionError>,
+}
+
+impl RunOutcome {
+    /// How it ended, in a sentence.
+    pub fn sentence(&self) -> String {
+        sentence(&self.end)
+    }
 }
 
 /// How a run ended.
@@ -221,7 +230,13 @@ impl PreparedRun<'_> {
         // A rig in real time outlives this computer: what is recorded goes through to the disk.
         let through = if rig.simulated_time { None } else { std::fs::File::open(&recording).ok() };
         let recorder = Recorder::new(writer).with_journal(journal, through);
-        let pace = Pace { clock, each_sample, stop: session.stop, stop_after_step: session.stop_after_step };
+        let pace = Pace {
+            clock,
+            each_sample,
+            stop: session.stop,
+            stop_after_step: session.stop_after_step,
+            operator: session.operator,
+        };
         let (end, finished, doubt) = self.drive_and_record(session, recorder, pace);
         give_back(claim, doubt, &directory)?;
         // A run that failed has its own reason; one that did not must have a whole file.
@@ -231,6 +246,8 @@ impl PreparedRun<'_> {
         parts.push(RunPart { recording: recording.clone(), saved: None });
         let results_directory = results_directory(&directory, parts.len())?;
         let executed = self.executed(&directory);
+        let what = format!("identifying {} steps", self.plan.steps.len());
+        session.tell(SessionEvent::Progress { done_ratio: 0.0, what });
         let results = executed.and_then(|plan| {
             let started_ns = self.request.started_ns;
             session.results(campaign, &plan, &sentence(&end), started_ns, &results_directory, &parts)
@@ -315,15 +332,20 @@ impl PreparedRun<'_> {
             steps: self.plan.steps.len(),
             duration_s: soak_s(campaign) + self.plan.duration_s(),
         };
-        let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut teller];
         let (model, backend) = (&self.model, self.backend.as_mut());
-        let (end, drifted) = match drift_watch(campaign, steps) {
-            Ok(mut watch) => {
-                let end = drive_paced(campaign, model, &mut watch, backend, &mut observers, pace);
-                (end, watch.ended_by_drift().map(str::to_owned))
+        let (end, drifted) = std::thread::scope(|scope| {
+            let begin = || Estimates::begin(scope, identification(campaign), session.on_event);
+            let mut estimates = session.estimates.then(begin);
+            let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut teller];
+            observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
+            match drift_watch(campaign, steps) {
+                Ok(mut watch) => {
+                    let end = drive_paced(campaign, model, &mut watch, backend, &mut observers, pace);
+                    (end, watch.ended_by_drift().map(str::to_owned))
+                }
+                Err(steps) => (drive_paced(campaign, model, steps, backend, &mut observers, pace), None),
             }
-            Err(steps) => (drive_paced(campaign, model, steps, backend, &mut observers, pace), None),
-        };
+        });
         let doubt = doubt(&end);
         let end = match (end, drifted) {
             (Ok(RunEnd::Completed), None) => Ended::Completed,

@@ -2,6 +2,7 @@
 
 use crate::SessionError;
 use crate::declared::identification;
+use crate::estimates::{keep, two_last_steps};
 use crate::planning::plan;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
@@ -49,14 +50,6 @@ impl ScriptedSteps {
     pub fn executed(&self, base: &Plan) -> Plan {
         with_steps(base.clone(), self.done.clone())
     }
-
-    fn forget_before(&mut self, start_s: f64) {
-        for series in self.recent.series.values_mut() {
-            let kept = series.t_s.partition_point(|t_s| *t_s < start_s);
-            series.t_s.drain(..kept);
-            series.values.drain(..kept);
-        }
-    }
 }
 
 impl StepSource for ScriptedSteps {
@@ -80,26 +73,13 @@ impl StepSource for ScriptedSteps {
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> bool {
-        for column in &batch.columns {
-            let series = self.recent.series.entry(column.channel).or_default();
-            // As a recording is read back: what the sensor did not give is not there.
-            for (t_s, value) in batch.t_s.iter().zip(&column.values).filter(|(_, value)| value.is_finite()) {
-                series.t_s.push(*t_s);
-                series.values.push(*value);
-            }
-        }
+        keep(&mut self.recent, batch);
         self.settling.as_mut().is_some_and(|watch| watch.has_settled(batch))
     }
 
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(mut step) = self.now.take() else { return Ok(()) };
-        if self.recent.steps.len() > 1 {
-            self.recent.steps.remove(0);
-        }
-        if let Some(before) = self.recent.steps.first().copied() {
-            self.forget_before(before.start_s);
-        }
-        self.recent.steps.push(*marker);
+        two_last_steps(&mut self.recent, marker);
         let identified = identify_each(&self.recent, &self.config).map_err(source_error)?.pop();
         self.finished = Some(StepResult {
             number: step.index + 1,
@@ -135,7 +115,7 @@ impl StepSource for ScriptedSteps {
 }
 
 /// Each step by itself. What is assumed of alpha_A is left out of the standard errors: no further visit would improve it.
-fn single_steps(config: IdentifyConfig) -> IdentifyConfig {
+pub(crate) fn single_steps(config: IdentifyConfig) -> IdentifyConfig {
     let method = match config.method {
         Method::Joint => Method::Dynamic,
         method => method,

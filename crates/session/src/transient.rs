@@ -1,6 +1,6 @@
 //! The compressor side of a log without steps.
 
-use crate::files::{json_text, write_new};
+use crate::files::{Existing, json_text, write_file};
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError};
 use mapper_core::ExportError;
@@ -35,11 +35,12 @@ impl Session<'_> {
 /// Writes text, JSON and pictures of an outcome into a directory, which is made where it is missing; gives the files.
 ///
 /// # Errors
-/// [`SessionError::File`] where a file is there already or cannot be written.
+/// As [`write_file`].
 pub fn write_transient(
     outcome: &DrivenOutcome,
     machine: &str,
     directory: &Path,
+    existing: Existing,
 ) -> Result<Vec<PathBuf>, SessionError> {
     let figure = transient_figure(machine, outcome);
     let png = figure.to_png(2.0).map_err(ExportError::failed("png"))?;
@@ -54,7 +55,7 @@ pub fn write_transient(
     let mut files = Vec::new();
     for (name, bytes) in &contents {
         let path = directory.join(name);
-        write_new(&path, bytes)?;
+        write_file(&path, bytes, existing)?;
         files.push(path);
     }
     Ok(files)

@@ -41,11 +41,14 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Words, pages and pictures made from data.
     ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "assemble", "gap", "drift", "driven", "history", "logs", "record", "reproduce", "sequence"]),
     // The page of a run, for a browser.
-    ("mapper-page",      &["core", "chart", "mesh", "campaign", "assemble", "identify", "observe", "record", "report"]),
+    ("mapper-page",      &["core", "chart", "mesh", "campaign", "assemble", "identify", "numerics", "observe", "record", "report"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
     ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics"]),
+    // What a terminal, a pipe or another program sees; what a browser sees while a run goes on.
+    ("mapper-terminal",  &["core", "campaign", "assemble", "identify", "observe", "record", "report", "session"]),
+    ("mapper-live",      &["core", "campaign", "page", "report", "session"]),
     // The program names the plug-ins; nothing sees the program.
-    ("mapper-cli",       &["core", "physics", "campaign", "conformance", "planner", "record", "drift", "gap", "discover", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "backends", "blind", "effects", "formats"]),
+    ("mapper-cli",       &["core", "physics", "campaign", "conformance", "planner", "record", "drift", "gap", "discover", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "terminal", "live", "backends", "blind", "effects", "formats"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

@@ -30,6 +30,7 @@ mod sizes;
 mod sources;
 mod speed_lines;
 mod surge;
+mod terminal;
 mod together;
 mod transient;
 mod zero;

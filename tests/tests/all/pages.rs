@@ -1,6 +1,6 @@
 //! Pages that the program writes, in a browser.
 
-use mapper_tests::{CampaignFile, mapper, only_run, python, repository, scratch};
+use mapper_tests::{CampaignFile, mapper, mapper_command, only_run, python, repository, scratch};
 use std::process::Command;
 
 /// A rig with a probe that conducts along its stem, four points of it.
@@ -144,6 +144,58 @@ fn the_page_of_a_run_is_read_as_people_do() {
     assert!(column("sorted_up").is_sorted() && column("sorted_down").iter().rev().is_sorted());
     // The print is a PDF.
     assert!(std::fs::read(pictures.path().join("report.pdf")).unwrap().starts_with(b"%PDF"));
+}
+
+#[test]
+#[cfg_attr(
+    not(all(with_chromium, with_python)),
+    ignore = "needs Chromium and Python: run `cargo xtask test`"
+)]
+fn a_run_is_looked_at_and_stopped_through_its_live_page() {
+    let Some(chromium) = option_env!("MAPPER_TEST_CHROMIUM") else {
+        panic!("needs Chromium: run `cargo xtask test`")
+    };
+    let campaign = CampaignFile::shipped_with(NINE_POINTS);
+    let (pictures, runs) = (scratch(), campaign.runs());
+    // Two seconds a step, however slow this machine is: long enough to press a button within one.
+    let run = mapper_command([
+        "run".as_ref(),
+        campaign.path.as_os_str(),
+        "--out".as_ref(),
+        runs.as_os_str(),
+        "--pace".as_ref(),
+        "60".as_ref(),
+    ]);
+    let command = std::iter::once(run.get_program()).chain(run.get_args());
+    let seen =
+        python("browse_live.py", [chromium.as_ref(), pictures.path().as_os_str()].into_iter().chain(command));
+    for (what, status) in seen["refused"].as_object().unwrap() {
+        assert!((403..=405).contains(&status.as_u64().unwrap()), "{what}: {status}");
+    }
+    // From the instant at which the program has identified a point to the row on the screen.
+    let seconds = seen["seconds_to_be_seen"].as_array().unwrap();
+    assert!(!seconds.is_empty() && seconds.iter().all(|s| s.as_f64().unwrap() < 1.0), "{seconds:?}");
+    // A held step lasts; what was seen outlives a reload and a program that was silent.
+    assert_eq!(seen["held_at"], seen["still_held_at"]);
+    assert_eq!(seen["points_before_reload"], seen["points_after_reload"]);
+    assert_eq!(seen["points_before_reload"], seen["points_after_loss"]);
+    assert!(seen["said_alone"].as_str().unwrap().contains("the run goes on"), "{}", seen["said_alone"]);
+    // The button has stopped the run at the end of a step, and is recorded with the other two.
+    assert_eq!(seen["exit"], 130);
+    let recorded = seen["recorded"].to_string();
+    for asked in ["the step is held", "the step goes on", "the run stops at the end of the step"] {
+        assert!(recorded.contains(&format!("operator, on the live page: {asked}")), "{recorded}");
+    }
+    assert!(seen["run"]["points"].as_u64().unwrap() >= 4, "{}", seen["run"]["points"]);
+    assert!(
+        seen["connection"].as_str().unwrap().contains("Stopped by the operator"),
+        "{}",
+        seen["connection"]
+    );
+    assert_eq!([&seen["said"], &seen["serious"], &seen["elsewhere"]], [&serde_json::json!([]); 3]);
+    for size in ["1400_light", "1400_dark", "390_light", "390_dark"] {
+        assert_eq!(seen[format!("overflow_{size}")], 0, "{size}: the page is wider than the screen");
+    }
 }
 
 #[test]

@@ -2,13 +2,12 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{interrupt, output, registry};
+use crate::{interrupt, manner, output, registry};
 use clap::Args;
 use mapper_campaign::CampaignError;
 use mapper_report::{declared_sensors_text, duration, lines_text};
 use mapper_session::{Session, nominal_model};
 use serde_json::json;
-use std::io::IsTerminal;
 use std::path::PathBuf;
 
 /// Check a campaign file and print all its mistakes, each with its line and a remedy
@@ -27,8 +26,9 @@ impl Check {
         let campaign = match mapper_campaign::load(&self.campaign) {
             Ok(campaign) => campaign,
             Err(CampaignError::Mistakes(findings)) if self.json => {
-                let mistakes =
-                    json!({"campaign": null, "findings": findings.list, "omitted": findings.omitted});
+                let omitted = findings.omitted;
+                let mut mistakes = Failure::of_campaign(CampaignError::Mistakes(findings)).json();
+                (mistakes["campaign"], mistakes["omitted"]) = (json!(null), json!(omitted));
                 output::print_json(&mistakes)?;
                 return Err(Failure::told(Code::BadInput));
             }
@@ -65,7 +65,7 @@ impl Check {
             }));
         }
         if warnings.count() > 0 {
-            output::warn(&warnings.render(std::io::stderr().is_terminal()));
+            output::warn(&warnings.render(manner::warns_in_colour()));
         }
         let forecast = match &campaign.sequence {
             Some(_) => " by its script on the nominal machine",

@@ -3,11 +3,12 @@
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::given::channel_map;
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_report::{corrected_csv, drift_text, sensors_text, zero_text};
-use mapper_session::{Recorded, Session, SessionError, write_new};
+use mapper_session::{Recorded, Session, SessionError};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -29,6 +30,8 @@ pub struct Drift {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 impl Drift {
@@ -49,7 +52,7 @@ impl Drift {
         if let Some(path) = &self.corrected {
             let corrected =
                 corrected_csv(&drift.report).map_err(|error| Failure::new(Code::Failure, error))?;
-            write_new(path, &corrected)?;
+            self.replace.write(path, &corrected)?;
         }
         let warnings = recorded.iter().flat_map(|recorded| &recorded.read.warnings);
         let warnings: Vec<String> = warnings.map(ToString::to_string).collect();

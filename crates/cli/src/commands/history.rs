@@ -2,12 +2,12 @@
 
 use crate::failure::Failure;
 use crate::output;
+use crate::output::Replace;
 use clap::Args;
-use mapper_history::{Filter, ListedRun, Metric};
-use mapper_report::{groups_text, history_svg, runs_text, time};
-use mapper_session::{SessionError, write_new};
+use mapper_history::{Filter, Metric};
+use mapper_report::{groups_text, history_svg, runs_text};
+use mapper_session::SessionError;
 use serde_json::json;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// List, filter and plot the results of the nightly runs
@@ -37,6 +37,8 @@ pub struct History {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 fn figure(text: &str) -> Result<Metric, String> {
@@ -75,27 +77,12 @@ impl History {
         let runs = history.runs(&filter).map_err(SessionError::from)?;
         let figures: Vec<Metric> = if self.figure.is_empty() { SHOWN.to_vec() } else { self.figure.clone() };
         if let Some(path) = &self.svg {
-            write_new(path, history_svg(&runs, &figures).as_bytes())?;
+            self.replace.write(path, history_svg(&runs, &figures).as_bytes())?;
         }
         if self.json {
-            let runs: Vec<serde_json::Value> = runs.iter().map(run_json).collect();
+            let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();
             return output::print_json(&json!({"history": self.db, "runs": runs}));
         }
         output::print(&if self.runs { runs_text(&runs, &figures) } else { groups_text(&runs, &figures) })
     }
-}
-
-fn run_json(listed: &ListedRun) -> serde_json::Value {
-    let ListedRun { night, run } = listed;
-    let figures: BTreeMap<&str, Option<f64>> =
-        Metric::ALL.into_iter().map(|figure| (figure.name(), run.figures.get(&figure).copied())).collect();
-    json!({
-        "night": {
-            "id": night.id, "name": night.name, "started": time(night.started_ms, "%Y-%m-%dT%H:%M:%SZ"),
-            "duration_s": night.duration_s, "program": night.program, "accepted": night.accepted, "moved": night.moved,
-        },
-        "campaign": run.key.campaign, "machine": run.key.machine, "method": run.key.method, "seed": run.key.seed,
-        "campaign_sha256": run.campaign_sha256, "model_sha256": run.model_sha256,
-        "failure": run.failure, "figures": figures,
-    })
 }

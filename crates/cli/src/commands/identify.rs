@@ -2,16 +2,13 @@
 
 use crate::failure::Failure;
 use crate::given::{channel_map, given_campaign};
-use crate::results_text::results_text;
+use crate::shown::ShownArguments;
 use crate::{output, registry};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
-use mapper_report::{
-    disagreement_text, points_text, sensors_text, shared_errors_text, surge_text, thermal_text, zero_text,
-};
 use mapper_session::{Recorded, Session};
-use serde_json::json;
-use std::path::PathBuf;
+use mapper_terminal::{identified_text, results_text};
+use std::path::{Path, PathBuf};
 
 /// Identify efficiency and heat transfer from run directories, MCAP recordings or logs of other programs
 #[derive(Debug, Args)]
@@ -31,6 +28,8 @@ pub struct Identify {
     /// How to identify [default: the campaign's method, or joint]
     #[arg(long, value_enum)]
     pub method: Option<MethodArgument>,
+    #[command(flatten)]
+    pub shown: ShownArguments,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -55,50 +54,15 @@ impl Identify {
             let results = session.identify_into(recorded, &map, method, directory)?;
             return match self.json {
                 true => output::print_json(&results),
-                false => output::print(&results_text(&display, &results)),
+                false => output::print(&results_text(&display, &results, self.shown.shown())),
             };
         }
         let found = session.identify(recorded, &map, method)?;
-        if self.json {
-            let mut value = json!({
-                "recording": path,
-                "reference": found.config.reference,
-                "points": found.points,
-                "thermal": found.thermal,
-                "two_parameter": found.two_parameter,
-                "zero": found.zero,
-                "score": found.score,
-                "recording_warnings": warnings,
-                "remarks": found.remarks,
-            });
-            if !found.sensors.is_empty() {
-                value["sensors"] = json!(found.sensors);
-            }
-            if let Some(surge) = &found.surge {
-                value["surge"] = json!(surge);
-            }
-            return output::print_json(&value);
+        let named = path.as_deref().map(Path::display).map(|path| path.to_string()).unwrap_or_default();
+        match self.json {
+            true => output::print_json(&found.json(path.as_deref(), &warnings)),
+            false => output::print(&identified_text(&display, &found, &named, &warnings, self.shown.shown())),
         }
-        let disagreement = disagreement_text(&found.points, &found.two_parameter, &display);
-        let mut text: String = found.remarks.iter().map(|remark| format!("{remark}\n")).collect();
-        text.push_str(&disagreement.unwrap_or_default());
-        text.push_str(&points_text(&found.points, &display));
-        if let Some(shared) = shared_errors_text(found.points.iter().map(|scored| &scored.point), &display) {
-            text.push_str(&format!("{shared}\n"));
-        }
-        if let Some(thermal) = &found.thermal {
-            text.push_str(&thermal_text(thermal));
-        }
-        text.push_str(&sensors_text(&found.sensors));
-        text.push_str(&zero_text(&found.zero));
-        if let Some(surge) = &found.surge {
-            text.push('\n');
-            text.push_str(&surge_text(&surge.marks, &surge.remarks, surge.surges, &display));
-        }
-        for warning in &warnings {
-            text.push_str(&format!("recording: {warning}\n"));
-        }
-        output::print(&text)
     }
 }
 

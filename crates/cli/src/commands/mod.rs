@@ -20,4 +20,6 @@ subcommands! { Command:
     history::History,
     reproduce::Reproduce,
     map::Map,
+    completions::Completions,
+    man::Man,
 }

@@ -2,6 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
+use crate::output::Replace;
 use crate::{interrupt, output, registry};
 use clap::Args;
 use mapper_campaign::Campaign;
@@ -10,10 +11,10 @@ use mapper_campaign::units::{Kind, parse};
 use mapper_core::{OperatingPoint, Plan as StepPlan};
 use mapper_physics::model::Model;
 use mapper_planner::PlanRequest;
-use mapper_report::{comparison_json, comparison_text, jump_text, plan_svg, plan_text};
+use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
 use mapper_session::{
     Rehearsal, Session, SessionError, json_text, nominal_model, rehearse, remark_surge_search,
-    with_plan_request, write_new,
+    with_plan_request,
 };
 use std::path::PathBuf;
 
@@ -43,6 +44,8 @@ pub struct Plan {
     /// Effort of the search: 1 is normal, 100 takes a hundred times as long
     #[arg(long, value_name = "FACTOR", hide_short_help = true)]
     pub effort: Option<f64>,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 /// A point as `speed@opening`; the speed carries its unit.
@@ -72,7 +75,10 @@ impl Plan {
             let jump = with_plan_request(&campaign, &model, |request| {
                 mapper_planner::explain_jump(request, *from, *to).map_err(SessionError::from)
             })?;
-            return output::print(&jump_text(&campaign, &jump));
+            return match self.json {
+                true => output::print_json(&jump_json(&jump)),
+                false => output::print(&jump_text(&campaign, &jump)),
+            };
         }
         let (mut plan, comparison) = with_plan_request(&campaign, &model, |request| {
             let appended = match self.append.as_slice() {
@@ -88,7 +94,7 @@ impl Plan {
         remark_surge_search(&campaign, &model, &mut plan);
         self.store(&plan)?;
         if let (Some(path), Some(comparison)) = (&self.svg, &comparison) {
-            write_new(path, plan_svg(&campaign, &model, &plan, comparison).as_bytes())?;
+            self.replace.write(path, plan_svg(&campaign, &model, &plan, comparison).as_bytes())?;
         }
         if self.json {
             let mut value = serde_json::to_value(&plan).map_err(SessionError::from)?;
@@ -138,6 +144,6 @@ impl Plan {
 
     fn store(&self, plan: &StepPlan) -> Result<(), Failure> {
         let Some(path) = &self.out else { return Ok(()) };
-        Ok(write_new(path, json_text(plan)?.as_bytes())?)
+        Ok(self.replace.write(path, json_text(plan)?.as_bytes())?)
     }
 }

@@ -2,9 +2,10 @@
 
 use crate::failure::Failure;
 use crate::given::{channel_map, given_campaign};
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
-use mapper_session::{Recorded, Session, SessionError, write_new};
+use mapper_session::{Recorded, Session, SessionError};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -14,7 +15,7 @@ pub struct Report {
     /// Run directory, MCAP file or log of another program; further ones are drawn beside it
     #[arg(required = true, value_name = "RUN")]
     pub runs: Vec<PathBuf>,
-    /// Write the page here; an existing file is not replaced
+    /// Write the page here
     #[arg(short, long, value_name = "FILE")]
     pub out: PathBuf,
     /// Channel map: where recordings made by another program hold the rig's channels (YAML)
@@ -26,6 +27,8 @@ pub struct Report {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 impl Report {
@@ -39,7 +42,7 @@ impl Report {
         let others = recorded.split_off(1.min(recorded.len()));
         let shown = recorded.pop().ok_or(SessionError::NoRecording)?;
         let page = Session::new(&registry).page(shown, others, &map)?;
-        write_new(&self.out, page.as_bytes())?;
+        self.replace.write(&self.out, page.as_bytes())?;
         match self.json {
             true => output::print_json(&json!({ "page": self.out })),
             false => output::print(&format!("page       {}\n", self.out.display())),

@@ -2,10 +2,9 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::output;
-use crate::progress::Progress;
+use crate::{manner, output};
 use clap::Args;
-use mapper_reproduce::{FIGURES, FigureResult, picture_path};
+use mapper_reproduce::{FIGURES, picture_path};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -23,8 +22,9 @@ pub struct Reproduce {
 impl Reproduce {
     /// Makes the page and its pictures, and says in a line per statement what came out.
     pub fn run(&self) -> Result<(), Failure> {
-        let progress = Progress::new();
+        let progress = manner::progress();
         let mut done = 0;
+        progress.pieces(0, FIGURES.len());
         let results = mapper_reproduce::reproduce(|_| {
             done += 1;
             progress.pieces(done, FIGURES.len());
@@ -37,7 +37,7 @@ impl Reproduce {
         let page = self.out.join("reproduction.md");
         write(&page, mapper_report::reproduction_page(&results).as_bytes())?;
         if self.json {
-            let figures: Vec<serde_json::Value> = results.iter().map(figure_json).collect();
+            let figures: Vec<serde_json::Value> = results.iter().map(mapper_report::figure_json).collect();
             return output::print_json(&json!({"page": page, "figures": figures}));
         }
         let mut text = String::new();
@@ -54,21 +54,6 @@ impl Reproduce {
         }
         output::print(&format!("{text}\n{}\n", page.display()))
     }
-}
-
-fn figure_json(result: &FigureResult) -> serde_json::Value {
-    json!({
-        "figure": result.number,
-        "title": result.title,
-        "picture": picture_path(result),
-        "statements": result.statements.iter().map(|statement| json!({
-            "paper": statement.paper,
-            "here": statement.here,
-            "verdict": statement.verdict.to_string(),
-        })).collect::<Vec<_>>(),
-        "head": result.table.head,
-        "rows": result.table.rows,
-    })
 }
 
 /// Writes a file of the reproduction; one of the same name is replaced, it is made of nothing but this program.

@@ -2,19 +2,22 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::progress::Progress;
-use crate::results_text::results_text;
+use crate::shown::ShownArguments;
 use crate::wall::SystemWall;
-use crate::{interrupt, output, registry, rig_states};
+use crate::{interrupt, manner, output, registry, rig_states};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
+use mapper_live::{Live, LiveRun};
 use mapper_report::plan_text;
 use mapper_session::{
-    BrokenOff, Ended, PreparedRun, RunOutcome, RunRequest, Session, SessionError, run_directory, soak_s,
+    BrokenOff, Ended, Operator, PreparedRun, RunOutcome, RunRequest, Session, SessionError, run_directory,
+    soak_s,
 };
+use mapper_terminal::results_text;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 /// Run a campaign: plan, drive the rig, record, identify, assemble the map, report
 #[derive(Debug, Args)]
@@ -37,6 +40,11 @@ pub struct Run {
     /// Run the rig's time by the clock: 1 is real time, 10 ten times as fast; as fast as it goes if it is left out and the rig is simulated
     #[arg(long, value_name = "FACTOR", hide_short_help = true)]
     pub pace: Option<f64>,
+    /// Serve a live page with buttons to hold and to stop; from other machines by the token that is printed
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:7373")]
+    pub live: Option<String>,
+    #[command(flatten)]
+    pub shown: ShownArguments,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -57,10 +65,21 @@ impl Run {
         }
         let parent = self.out.clone().unwrap_or_else(|| PathBuf::from(&campaign.outputs.directory));
         let started = jiff::Timestamp::now();
-        let (registry, stop, progress) = (registry::registry(), interrupt::run_stop()?, Progress::new());
+        let (registry, stop, progress) = (registry::registry(), interrupt::run_stop()?, manner::progress());
+        progress.begin("planning");
         let states = rig_states::directory(None);
-        let on_event = |event: &_| progress.show(event);
+        let mut live = self.live.as_deref().map(Live::open).transpose().map_err(Failure::of_live)?;
+        let told: OnceLock<&Live> = OnceLock::new();
+        let on_event = |event: &_| {
+            progress.show(event);
+            if let Some(live) = told.get() {
+                live.show(event);
+            }
+        };
+        let operator = Arc::new(Operator::default());
         let session = Session {
+            operator: live.is_some().then_some(&*operator),
+            estimates: live.is_some(),
             registry: &registry,
             on_event: &on_event,
             stop: &stop.now,
@@ -78,15 +97,36 @@ impl Run {
         };
         let prepared = session.prepare(request).map_err(|error| Failure::in_campaign(error, &file))?;
         if self.dry_run {
+            progress.clear();
             return self.dry(&campaign, &prepared, &parent);
         }
-        let outcome = match self.pace.or((!prepared.rig().simulated_time).then_some(1.0)) {
+        let pace = self.pace.or((!prepared.rig().simulated_time).then_some(1.0));
+        if let Some(live) = &mut live {
+            live.begin(&LiveRun {
+                campaign: &campaign,
+                plan: prepared.plan(),
+                pace,
+                operator: operator.clone(),
+                after_step: stop.after_step.clone(),
+                now: stop.now.clone(),
+            })
+            .map_err(Failure::of_live)?;
+            output::warn(&format!("live page: {}\n", live.url()));
+            let _ = told.set(live);
+        }
+        let outcome = match pace {
             Some(pace) => {
                 prepared.run_paced(&session, &mut PacedClock::new(SystemWall::new(), pace), true)?
             }
             None => prepared.run(&session)?,
         };
         progress.clear();
+        if let Some(live) = told.get() {
+            live.end(
+                &outcome.sentence(),
+                outcome.results.as_ref().ok().map(|results| results.page.as_path()),
+            );
+        }
         self.tell(&campaign, outcome)
     }
 
@@ -95,35 +135,47 @@ impl Run {
         let unusable = results.as_ref().is_ok_and(|results| {
             results.points.iter().all(|scored| scored.point.verdict == Verdict::Unusable)
         });
-        match results {
-            Ok(results) if self.json => output::print_json(&results)?,
-            Ok(results) => output::print(&results_text(&campaign.display, &results))?,
-            Err(error) if matches!(end, Ended::Completed | Ended::Drifted { .. }) => return Err(error.into()),
-            // Stopped before there was anything to identify: why it was stopped is what counts.
-            Err(_) if self.json => {
-                output::print_json(
-                    &json!({"run": directory, "recording": recording, "points": [], "map": {}}),
-                )?;
-            }
-            Err(_) => {}
-        }
         let kept = "the rig is safe and the recording is kept";
-        let (code, why) = match end {
-            Ended::Completed if unusable => (
+        let failure = match end {
+            Ended::Completed if unusable => Some(Failure::new(
                 Code::BadRecording,
-                "no point is usable: the reasons stand above and in the report".to_owned(),
-            ),
-            Ended::Completed => return Ok(()),
+                "no point is usable: the reasons stand above and in the report",
+            )),
+            Ended::Completed => None,
             Ended::Drifted { reason } => {
-                (Code::Rig, format!("{reason}. The rig is safe and the recording is kept"))
+                Some(Failure::new(Code::Rig, format!("{reason}. The rig is safe and the recording is kept")))
             }
-            Ended::Interrupted { t_s } => {
-                (Code::Interrupted, format!("stopped by the operator at {t_s:.0} s; {kept}"))
+            Ended::Interrupted { t_s } => Some(Failure::new(
+                Code::Interrupted,
+                format!("stopped by the operator at {t_s:.0} s; {kept}"),
+            )),
+            Ended::Tripped { t_s, reason } => {
+                Some(Failure::new(Code::Rig, format!("stopped at {t_s:.1} s: {reason}; {kept}")))
             }
-            Ended::Tripped { t_s, reason } => (Code::Rig, format!("stopped at {t_s:.1} s: {reason}; {kept}")),
-            Ended::Failed(source) => return Err(SessionError::Run { source, recording }.into()),
+            Ended::Failed(source) => {
+                let recording = recording.clone();
+                Some(SessionError::Run { source, recording }.into())
+            }
         };
-        Err(Failure::new(code, why))
+        match (results, &failure) {
+            (Err(error), None) => return Err(error.into()),
+            (Ok(results), _) if !self.json => {
+                output::print(&results_text(&campaign.display, &results, self.shown.shown()))?;
+            }
+            // Stopped before there was anything to identify: why it was stopped is what counts.
+            (Err(_), Some(_)) if !self.json => {}
+            (results, failure) => {
+                let mut value = match results {
+                    Ok(results) => serde_json::to_value(&results).map_err(SessionError::from)?,
+                    Err(_) => json!({"run": directory, "recording": recording, "points": [], "map": {}}),
+                };
+                if let Some(failure) = failure {
+                    value["failure"] = failure.json();
+                }
+                output::print_json(&value)?;
+            }
+        }
+        failure.map_or(Ok(()), Err)
     }
 
     fn dry(&self, campaign: &Campaign, prepared: &PreparedRun<'_>, parent: &Path) -> Result<(), Failure> {

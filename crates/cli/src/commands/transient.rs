@@ -2,6 +2,7 @@
 
 use crate::failure::Failure;
 use crate::given::{channel_map, given_campaign};
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_report::transient_text;
@@ -22,12 +23,14 @@ pub struct Transient {
     /// Fit what lies before this time of the log and predict the rest, e.g. "13.2 s" [default: fit everything]
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub fit_until: Option<f64>,
-    /// Leave text, JSON and pictures in this directory; existing files are not replaced
+    /// Leave text, JSON and pictures in this directory
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 /// A time with its unit, s.
@@ -46,7 +49,7 @@ impl Transient {
         let outcome = Session::new(&registry).transient(&recorded, self.fit_until)?;
         let machine = recorded.campaign.as_ref().map_or("", |campaign| &campaign.machine.name);
         let files = match &self.out {
-            Some(directory) => write_transient(&outcome, machine, directory)?,
+            Some(directory) => write_transient(&outcome, machine, directory, self.replace.existing())?,
             None => Vec::new(),
         };
         if self.json {

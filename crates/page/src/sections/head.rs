@@ -1,7 +1,8 @@
 //! Verdict and what to do first.
 
-use crate::advice::{first_things, is_clean, verdict};
+use crate::advice::{first_things, is_clean};
 use crate::run_page::RunPage;
+use mapper_report::verdict_sentence;
 use maud::{Markup, html};
 
 pub(crate) fn head(page: &RunPage<'_>) -> Markup {
@@ -17,7 +18,7 @@ pub(crate) fn head(page: &RunPage<'_>) -> Markup {
                 "Efficiency is isentropic, total to total; corrected to " (report.reference) "; method " (report.method) "."
             }
             section.verdict.clean[clean] aria-labelledby="verdict" {
-                h2 #verdict { (verdict(report)) }
+                h2 #verdict { (verdict_sentence(report.points.iter().map(|scored| &scored.point))) }
                 @if things.is_empty() && clean {
                     p { "Nothing needs attention before the map is used." }
                 }

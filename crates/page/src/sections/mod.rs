@@ -1,6 +1,7 @@
 //! The sections of the page, in its order.
 
 pub(crate) mod head;
+pub(crate) mod live;
 pub(crate) mod map;
 pub(crate) mod notes;
 pub(crate) mod plan;

@@ -2,13 +2,13 @@
 
 use crate::run_page::RunPage;
 use crate::table::{Cell, Row, data_table};
-use mapper_core::{Channel, IdentifiedPoint, Recording, StepMarker, Verdict};
+use mapper_core::{Channel, IdentifiedPoint, Recording, StepMarker, Verdict, half_width_95};
+use mapper_numerics::statistics::mean;
 use mapper_report::{Display, number, percent, shared_errors_text, step_name, verdict_word};
 use maud::{Markup, html};
 
 /// The last seconds of a step, over which readings are averaged for the table.
 const END_S: f64 = 2.0;
-const HALF_WIDTH_95: f64 = 1.96;
 
 pub(crate) fn points(page: &RunPage<'_>, display: &Display) -> Markup {
     let report = page.report;
@@ -75,8 +75,8 @@ fn row(page: &RunPage<'_>, display: &Display, point: &IdentifiedPoint) -> Row {
     let half = |low: Option<f64>, high: Option<f64>| low.zip(high).map(|(low, high)| 0.5 * (high - low));
     let optional = |text: String, value: Option<f64>| Cell::number(text, value.unwrap_or(f64::NAN));
     let flow_half_kg_s =
-        HALF_WIDTH_95 * point.common.flow_corrected_standard_error_ratio * point.flow_corrected_kg_s;
-    let pr_half = HALF_WIDTH_95 * point.common.pressure_ratio_standard_error;
+        half_width_95(point.common.flow_corrected_standard_error_ratio) * point.flow_corrected_kg_s;
+    let pr_half = half_width_95(point.common.pressure_ratio_standard_error);
     let (eta_half, h_half) =
         (half(point.eta_low, point.eta_high), half(point.h_low_w_m2k, point.h_high_w_m2k));
     // A half width of 0 says that nobody declared the sensor, not that it is perfect.
@@ -120,6 +120,5 @@ fn class_of(verdict: Verdict) -> &'static str {
 fn at_end(recording: &Recording, marker: &StepMarker, channel: Channel) -> Option<f64> {
     let start_s = (marker.end_s - END_S).max(marker.start_s);
     let values = recording.series.get(&channel)?.slice(start_s, marker.end_s).1;
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    mean.is_finite().then_some(mean)
+    mean(values).filter(|mean| mean.is_finite())
 }

@@ -3,19 +3,17 @@
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::given::channel_map;
-use crate::progress::Progress;
-use crate::{output, registry};
+use crate::output::Replace;
+use crate::{manner, output, registry};
 use clap::Args;
-use mapper_drift::DriftReport;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::Diagnosed;
 use mapper_gap::joint::over_recordings;
 use mapper_gap::report::Law;
-use mapper_gap::twin::Found;
 use mapper_report::{gap_page, gap_text, headline, recordings_text, sensors_text, zero_text};
-use mapper_session::{Gap, Recorded, Session, SessionError, SessionEvent, write_new};
+use mapper_session::{Gap, Recorded, Session, SessionError, SessionEvent};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Say where a recording departs from the nominal model, which effect causes it, how far that closes the gap, what to do next
 #[derive(Debug, Args)]
@@ -40,6 +38,8 @@ pub struct Diagnose {
     /// Also write an HTML page with pictures to this new file
     #[arg(long, value_name = "OUT")]
     pub html: Option<PathBuf>,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 impl Diagnose {
@@ -55,7 +55,7 @@ impl Diagnose {
         }
         let mut gaps = Vec::with_capacity(self.recordings.len());
         for recording in &self.recordings {
-            let progress = Progress::new();
+            let progress = manner::progress();
             progress.show(&SessionEvent::Progress { done_ratio: 0.0, what: "reading".to_owned() });
             let recorded = Recorded::read(&registry, recording, &map, Some(&campaign))?;
             let on_event = |event: &_| progress.show(event);
@@ -65,13 +65,13 @@ impl Diagnose {
             gaps.push((recorded.path.display().to_string(), gap));
         }
         if let [(title, gap)] = &mut gaps[..] {
-            write_laws(&mut gap.diagnosed.diagnosis.laws, self.laws.as_deref(), self.html.as_deref())?;
+            self.write_laws(&mut gap.diagnosed.diagnosis.laws)?;
             if let Some(file) = &self.html {
-                write_new(file, gap_page(title, &gap.diagnosed).as_bytes())?;
+                self.replace.write(file, gap_page(title, &gap.diagnosed).as_bytes())?;
             }
         }
         if let [(_, gap)] = &gaps[..] {
-            return if self.json { output::print_json(&gap_json(gap)?) } else { output::print(&text(gap)) };
+            return if self.json { output::print_json(&gap.json()?) } else { output::print(&text(gap)) };
         }
         let diagnosed: Vec<&Diagnosed> = gaps.iter().map(|(_, gap)| &gap.diagnosed).collect();
         let calibration = Calibration::shipped().map_err(SessionError::Calibration)?;
@@ -80,7 +80,7 @@ impl Diagnose {
             let each: Result<Vec<Value>, Failure> = gaps
                 .iter()
                 .map(|(path, gap)| {
-                    let mut value = gap_json(gap)?;
+                    let mut value = gap.json()?;
                     value["recording"] = json!(path);
                     Ok(value)
                 })
@@ -91,53 +91,28 @@ impl Diagnose {
             gaps.iter().map(|(path, gap)| (path.clone(), headline(&gap.diagnosed.diagnosis))).collect();
         output::print(&recordings_text(&heads, &over))
     }
-}
 
-/// Writes the laws that can be written into `directory`; beside the page where only that was asked for.
-fn write_laws(laws: &mut [Law], directory: Option<&Path>, page: Option<&Path>) -> Result<(), Failure> {
-    if let Some(directory) = directory.filter(|_| laws.iter().any(|law| law.script.is_some())) {
-        std::fs::create_dir_all(directory)
-            .map_err(|error| Failure::new(Code::Failure, format!("{}: {error}", directory.display())))?;
+    /// Writes the laws that can be written into `directory`; beside the page where only that was asked for.
+    fn write_laws(&self, laws: &mut [Law]) -> Result<(), Failure> {
+        let (directory, page) = (self.laws.as_deref(), self.html.as_deref());
+        if let Some(directory) = directory.filter(|_| laws.iter().any(|law| law.script.is_some())) {
+            std::fs::create_dir_all(directory)
+                .map_err(|error| Failure::new(Code::Failure, format!("{}: {error}", directory.display())))?;
+        }
+        for (place, law) in laws.iter_mut().enumerate() {
+            let Some(script) = &law.script else { continue };
+            let file = match (directory, page) {
+                (Some(directory), _) => directory.join(format!("law_{}.rhai", place + 1)),
+                (None, Some(page)) => page.with_extension(format!("law_{}.rhai", place + 1)),
+                (None, None) => continue,
+            };
+            self.replace.write(&file, script.as_bytes())?;
+            law.rhai = Some(file.display().to_string());
+        }
+        Ok(())
     }
-    for (place, law) in laws.iter_mut().enumerate() {
-        let Some(script) = &law.script else { continue };
-        let file = match (directory, page) {
-            (Some(directory), _) => directory.join(format!("law_{}.rhai", place + 1)),
-            (None, Some(page)) => page.with_extension(format!("law_{}.rhai", place + 1)),
-            (None, None) => continue,
-        };
-        write_new(&file, script.as_bytes())?;
-        law.rhai = Some(file.display().to_string());
-    }
-    Ok(())
 }
 
 fn text(gap: &Gap) -> String {
     [gap_text(&gap.diagnosed.diagnosis), sensors_text(&gap.sensors), zero_text(&gap.zero)].concat()
-}
-
-fn gap_json(gap: &Gap) -> Result<Value, Failure> {
-    let mut value = serde_json::to_value(&gap.diagnosed.diagnosis).map_err(SessionError::from)?;
-    value["found"] = json!(Found::of(&gap.diagnosed));
-    value["drift"] = gap.drift.as_ref().map_or(Value::Null, drift_json);
-    value["zero"] = json!(gap.zero);
-    if !gap.sensors.is_empty() {
-        value["sensors"] = json!(gap.sensors);
-    }
-    Ok(value)
-}
-
-/// Verdict, cause, course and size of what drifted.
-fn drift_json(drift: &DriftReport) -> Value {
-    json!({
-        "verdict": drift.verdict,
-        "cause": drift.cause,
-        "probability": drift.probability,
-        "onset_s": drift.onset_s,
-        "size": drift.size,
-        "low": drift.low,
-        "high": drift.high,
-        "unit": drift.unit,
-        "reason": drift.reason,
-    })
 }

@@ -1,11 +1,11 @@
 //! `mapper log inspect`: what a log holds, and the channel map that it suggests.
 
 use crate::failure::Failure;
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_report::log_text;
-use mapper_session::{Inspected, inspect_log, write_new};
-use serde_json::{Value, json};
+use mapper_session::inspect_log;
 use std::path::PathBuf;
 
 /// Show every column of a log with unit, rate, range and gaps, and propose a channel map
@@ -22,6 +22,8 @@ pub struct Inspect {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 fn key_and_value(text: &str) -> Result<(String, String), String> {
@@ -35,10 +37,10 @@ impl Inspect {
         let registry = registry::registry();
         let found = inspect_log(&registry, &self.log, self.with.clone())?;
         if let Some(file) = &self.write_channels {
-            write_new(file, found.channel_map().as_bytes())?;
+            self.replace.write(file, found.channel_map().as_bytes())?;
         }
         if self.json {
-            return output::print_json(&json_of(&found));
+            return output::print_json(&found.json());
         }
         let mut text = log_text(found.format, &found.layout, &found.survey, &found.proposal);
         match &self.write_channels {
@@ -47,36 +49,4 @@ impl Inspect {
         }
         output::print(&text)
     }
-}
-
-/// Absent numbers are null.
-fn json_of(found: &Inspected) -> Value {
-    let columns = found.layout.columns.iter().zip(&found.survey.columns).map(|(column, data)| {
-        json!({
-            "name": column.name,
-            "header": column.header,
-            "unit": column.unit,
-            "description": column.description,
-            "group": column.group,
-            "count": data.count,
-            "missing": data.missing,
-            "min": data.min,
-            "max": data.max,
-        })
-    });
-    json!({
-        "log": found.path,
-        "format": found.format,
-        "findings": found.layout.findings,
-        "start_time_ns": found.layout.start_time_ns,
-        "groups": found.layout.groups.iter().zip(&found.survey.groups).map(|(group, data)| {
-            let mut value = json!(data);
-            value["name"] = json!(group.name);
-            value["clock"] = json!(group.clock);
-            value
-        }).collect::<Vec<_>>(),
-        "columns": columns.collect::<Vec<_>>(),
-        "proposal": found.proposal,
-        "channel_map": found.channel_map(),
-    })
 }

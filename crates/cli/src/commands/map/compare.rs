@@ -3,10 +3,10 @@
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::given::reference;
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_report::{map_comparison_figure, map_comparison_text};
-use mapper_session::write_new;
 use std::path::PathBuf;
 
 /// Show where two maps differ, in units and against their uncertainty
@@ -28,6 +28,8 @@ pub struct Compare {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 impl Compare {
@@ -50,7 +52,7 @@ impl Compare {
             } else {
                 figure.to_svg().into_bytes()
             };
-            write_new(path, &bytes)?;
+            self.replace.write(path, &bytes)?;
         }
         if self.json {
             return output::print_json(&comparison);

@@ -2,6 +2,7 @@
 
 use crate::failure::Failure;
 use crate::given::reference;
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_session::write_map_fitted_if_needed;
@@ -27,6 +28,8 @@ pub struct Convert {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 impl Convert {
@@ -39,7 +42,7 @@ impl Convert {
         if let Some(reference) = to_reference {
             map = map.at_reference(reference);
         }
-        let (map, fitted_here) = write_map_fitted_if_needed(&self.out, format, map)?;
+        let (map, fitted_here) = write_map_fitted_if_needed(&self.out, format, map, self.replace.existing())?;
         let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
         if self.json {
             return output::print_json(&json!({

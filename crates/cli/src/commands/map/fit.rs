@@ -3,6 +3,7 @@
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::given::reference;
+use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
 use mapper_assemble::{MapFitOptions, fit_map};
@@ -37,6 +38,8 @@ pub struct Fit {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 impl Fit {
@@ -56,7 +59,7 @@ impl Fit {
         let map = fit_map(map, &options)
             .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", self.map.display())))?;
         if let Some((path, format)) = format {
-            write_map(path, format, &map)?;
+            write_map(path, format, &map, self.replace.existing())?;
         }
         if self.json {
             return output::print_json(&json!({

@@ -1,11 +1,12 @@
 //! `mapper gap blind calibrate`.
 
 use crate::failure::Failure;
-use crate::progress::Progress;
-use crate::{output, registry};
+use crate::output::Replace;
+use crate::{manner, output, registry};
 use clap::Args;
 use mapper_blind::calibrate::{Observed, Plan, calibrate};
-use mapper_session::{json_text, write_new};
+use mapper_session::json_text;
+use serde_json::json;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -30,6 +31,11 @@ pub struct Calibrate {
     /// Also write the result of each case to this new file (JSON)
     #[arg(long, value_name = "FILE")]
     pub observed: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
 }
 
 impl Calibrate {
@@ -44,16 +50,20 @@ impl Calibrate {
             plan.nulls,
             plan.others
         );
-        let (progress, done) = (Progress::new(), AtomicUsize::new(0));
+        let (progress, done) = (manner::progress(), AtomicUsize::new(0));
+        progress.pieces(0, plan.nulls + plan.others);
         let tell = |_: &Observed| {
             progress.pieces(done.fetch_add(1, Ordering::Relaxed) + 1, plan.nulls + plan.others)
         };
         let found = calibrate(&campaign, &registry::registry().effects, &plan, made_by, &tell);
         progress.clear();
         let (calibration, observed) = found?;
-        write_new(&self.out, json_text(&calibration)?.as_bytes())?;
+        self.replace.write(&self.out, json_text(&calibration)?.as_bytes())?;
         if let Some(file) = &self.observed {
-            write_new(file, json_text(&observed)?.as_bytes())?;
+            self.replace.write(file, json_text(&observed)?.as_bytes())?;
+        }
+        if self.json {
+            return output::print_json(&json!({ "calibration": self.out, "diagnoses": observed.len() }));
         }
         output::print(&format!("calibration from {} diagnoses in {}\n", observed.len(), self.out.display()))
     }

@@ -1,8 +1,7 @@
 //! `mapper gap blind make`.
 
 use crate::failure::Failure;
-use crate::progress::Progress;
-use crate::{output, registry};
+use crate::{manner, output, registry};
 use clap::{Args, ValueEnum};
 use mapper_blind::{CaseKind, Draw, OutsideUse};
 use serde_json::json;
@@ -77,7 +76,8 @@ impl Make {
             sigma_range: [self.least_sigma, self.most_sigma],
             ..Draw::new(self.seed, self.cases, outside)
         };
-        let progress = Progress::new();
+        let progress = manner::progress();
+        progress.pieces(0, self.cases);
         let done = |done| progress.pieces(done, self.cases);
         let made = mapper_blind::make(&campaign, &registry::registry().effects, &draw, &self.out, &done);
         progress.clear();

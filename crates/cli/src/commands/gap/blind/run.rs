@@ -2,11 +2,11 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::output;
-use crate::progress::Progress;
+use crate::{manner, output};
 use clap::Args;
 use mapper_blind::{MANIFEST_NAME, Manifest};
 use mapper_session::write_new;
+use serde_json::json;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
@@ -18,6 +18,9 @@ pub struct Run {
     /// Campaign given to the diagnosis (YAML)
     #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
     pub campaign: PathBuf,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
 }
 
 impl Run {
@@ -26,7 +29,8 @@ impl Run {
         let failure = |message: String| Failure::new(Code::Failure, message);
         let manifest = Manifest::read(&self.directory.join(MANIFEST_NAME))?;
         let program = std::env::current_exe().map_err(|error| failure(error.to_string()))?;
-        let progress = Progress::new();
+        let progress = manner::progress();
+        progress.pieces(0, manifest.cases.len());
         let mut failed = Vec::new();
         let names = manifest.cases.iter().filter(|name| !name.contains(['/', '\\']));
         for (index, name) in names.enumerate() {
@@ -53,6 +57,9 @@ impl Run {
         }
         progress.clear();
         if failed.is_empty() {
+            if self.json {
+                return output::print_json(&json!({ "cases": manifest.cases, "directory": self.directory }));
+            }
             let (cases, directory) = (manifest.cases.len(), self.directory.display());
             return output::print(&format!("{cases} diagnoses in {directory}\n"));
         }

@@ -1,0 +1,22 @@
+//! `mapper completions`.
+
+use crate::failure::Failure;
+use crate::{Arguments, output};
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+
+/// Print completions for a shell, e.g. `mapper completions bash > /etc/bash_completion.d/mapper`
+#[derive(Debug, Args)]
+pub struct Completions {
+    /// The shell
+    pub shell: Shell,
+}
+
+impl Completions {
+    /// Prints the script.
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut Arguments::command(), "mapper", &mut script);
+        output::print(&String::from_utf8_lossy(&script))
+    }
+}

@@ -1,0 +1,33 @@
+//! `mapper man`.
+
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::{Arguments, output};
+use clap::{Args, CommandFactory};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Write a manual page for the program and for each command; pages of the same names are replaced
+#[derive(Debug, Args)]
+pub struct Man {
+    /// Directory for the pages, e.g. ~/.local/share/man/man1
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Man {
+    /// Writes the pages.
+    pub fn run(&self) -> Result<(), Failure> {
+        let failed =
+            |error| Failure::new(Code::Failure, format!("failed to write {}: {error}", self.out.display()));
+        std::fs::create_dir_all(&self.out).map_err(failed)?;
+        clap_mangen::generate_to(Arguments::command(), &self.out).map_err(failed)?;
+        match self.json {
+            true => output::print_json(&json!({ "directory": self.out })),
+            false => output::print(&format!("manual pages in {}\n", self.out.display())),
+        }
+    }
+}

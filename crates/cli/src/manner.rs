@@ -1,0 +1,120 @@
+//! How the program speaks: colours, progress, JSON. Said once on the command line, for all commands.
+
+use clap::{ArgMatches, Args, ValueEnum};
+use mapper_report::Paint;
+use mapper_terminal::{ColourChoice, Progress, ProgressManner, is_coloured};
+use std::ffi::OsString;
+use std::io::IsTerminal;
+use std::sync::OnceLock;
+
+/// Options of every command.
+#[derive(Debug, Args)]
+pub struct MannerArguments {
+    /// When to colour
+    #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t = When::Auto, help_heading = "Manner")]
+    color: When,
+    /// Progress on standard error [default: a bar on a terminal, lines in a pipe, none with --json]
+    #[arg(long, global = true, value_enum, value_name = "FORM", help_heading = "Manner")]
+    progress: Option<Form>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum When {
+    /// On a terminal, unless NO_COLOR is set
+    Auto,
+    Always,
+    Never,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Form {
+    Bar,
+    /// A line per step
+    Lines,
+    /// A JSON object per line
+    Json,
+    Off,
+}
+
+/// What was said.
+#[derive(Debug, Clone, Copy, Default)]
+struct Said {
+    colour: ColourChoice,
+    progress: Option<ProgressManner>,
+    json: bool,
+    replaces: bool,
+}
+
+static SAID: OnceLock<Said> = OnceLock::new();
+
+fn said() -> Said {
+    SAID.get().copied().unwrap_or_default()
+}
+
+/// Keeps what was said, for all that is printed later.
+pub fn keep(arguments: &MannerArguments, matches: &ArgMatches) {
+    let colour = match arguments.color {
+        When::Auto => ColourChoice::Auto,
+        When::Always => ColourChoice::Always,
+        When::Never => ColourChoice::Never,
+    };
+    let progress = arguments.progress.map(|form| match form {
+        Form::Bar => ProgressManner::Bar,
+        Form::Lines => ProgressManner::Lines,
+        Form::Json => ProgressManner::Json,
+        Form::Off => ProgressManner::Quiet,
+    });
+    let command = std::iter::successors(Some(matches), |of| of.subcommand().map(|(_, deeper)| deeper)).last();
+    let json =
+        command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));
+    let replaces = command.is_some_and(|of| of.try_contains_id("force").is_ok());
+    // It is kept once: `main` alone calls this.
+    let _ = SAID.set(Said { colour, progress, json, replaces });
+}
+
+/// Whether arguments that could not be read ask for JSON and for no colours.
+pub fn of_raw(arguments: &[OsString]) -> (bool, clap::ColorChoice) {
+    let given = |words: &[&str]| arguments.windows(words.len()).any(|window| window == words);
+    let never = given(&["--color", "never"]) || given(&["--color=never"]);
+    let always = given(&["--color", "always"]) || given(&["--color=always"]);
+    let colour = match (never, always) {
+        (true, _) => clap::ColorChoice::Never,
+        (_, true) => clap::ColorChoice::Always,
+        _ => clap::ColorChoice::Auto,
+    };
+    (given(&["--json"]), colour)
+}
+
+/// Whether results are one JSON object.
+pub fn json() -> bool {
+    said().json
+}
+
+/// Whether the command can replace files that are there.
+pub fn replaces() -> bool {
+    said().replaces
+}
+
+/// Colours of standard output.
+pub fn paint() -> Paint {
+    if coloured(std::io::stdout().is_terminal()) { Paint::Coloured } else { Paint::Plain }
+}
+
+/// Whether standard error is coloured.
+pub fn warns_in_colour() -> bool {
+    coloured(std::io::stderr().is_terminal())
+}
+
+fn coloured(terminal: bool) -> bool {
+    is_coloured(said().colour, terminal, std::env::var_os("NO_COLOR").as_deref())
+}
+
+/// Who is told how far it is.
+pub fn progress() -> Progress {
+    let usual = match (std::io::stderr().is_terminal(), json()) {
+        (true, _) => ProgressManner::Bar,
+        (false, true) => ProgressManner::Quiet,
+        (false, false) => ProgressManner::Lines,
+    };
+    Progress::new(said().progress.unwrap_or(usual))
+}

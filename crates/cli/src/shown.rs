@@ -1,0 +1,23 @@
+//! How much of identified points is shown.
+
+use crate::manner;
+use clap::Args;
+use mapper_terminal::Shown;
+
+/// Of a command that prints identified points.
+#[derive(Debug, Args)]
+pub struct ShownArguments {
+    /// Show everything: wide tables, what all points share, repeats, sensors, the zero
+    #[arg(long)]
+    pub full: bool,
+    /// Show the simulator's truth beside the points
+    #[arg(long)]
+    pub truth: bool,
+}
+
+impl ShownArguments {
+    /// With the colours of standard output.
+    pub fn shown(&self) -> Shown {
+        Shown { full: self.full, truth: self.truth, paint: manner::paint() }
+    }
+}

@@ -1,0 +1,279 @@
+//! From what the session tells to what browsers are shown.
+
+use crate::live::{Asked, LiveRun};
+use crate::state::{EVENTS_MAX, Now, POINTS_MAX, Reading, State, Step, TRACE_ROWS, Told, Traced, Units};
+use mapper_core::{Channel, PlanStep, SignalGuard, StepMarker};
+use mapper_page::{live_point, planned};
+use mapper_report::Display;
+use mapper_session::{Operator, SessionEvent, soak_s};
+use serde_json::{Value, json};
+use std::collections::VecDeque;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// Browsers are told what changes every second at most this often.
+const TICK: Duration = Duration::from_millis(200);
+/// Channels whose last minutes are drawn.
+const TRACED: [Channel; 6] =
+    [Channel::T2, Channel::Tc, Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P2, Channel::P3];
+
+/// Keeps the state, and says what of it is new.
+pub(crate) struct Feed {
+    kept: Mutex<Kept>,
+    display: Display,
+    guards: Vec<SignalGuard>,
+    plan: Vec<PlanStep>,
+    operator: Arc<Operator>,
+    after_step: Arc<AtomicBool>,
+}
+
+struct Kept {
+    state: State,
+    /// Rows that browsers have not been told.
+    unsent: VecDeque<Vec<Option<f64>>>,
+    ticked: Option<Instant>,
+    /// How much longer each step took than planned, s.
+    longer_s: Vec<f64>,
+    /// Steps that have begun.
+    begun: usize,
+    soak_s: f64,
+    /// Rig time that is planned after the step that is under way, s.
+    after_s: f64,
+}
+
+impl Feed {
+    pub(crate) fn new(run: &LiveRun<'_>) -> Self {
+        let display = Display::new(&run.campaign.display);
+        let soak_s = soak_s(run.campaign);
+        let units = display.units();
+        let mut speeds_rpm: Vec<f64> = run.plan.steps.iter().map(|step| step.to.speed_rpm).collect();
+        speeds_rpm.sort_by(f64::total_cmp);
+        let mut lines: Vec<String> = speeds_rpm.iter().map(|rpm| display.speed(*rpm)).collect();
+        lines.dedup();
+        let state = State {
+            machine: run.campaign.machine.name.clone(),
+            campaign: run.campaign.name.clone(),
+            units: Units {
+                flow: units.flow.clone(),
+                speed: units.speed.clone(),
+                temperature: units.temperature.clone(),
+            },
+            lines,
+            planned: planned(run.campaign, run.plan, &display),
+            steps: run.plan.steps.len(),
+            duration_s: soak_s + run.plan.duration_s(),
+            pace: run.pace,
+            traced: TRACED
+                .map(|channel| Traced {
+                    name: channel.symbol().to_owned(),
+                    unit: display.unit_of(channel).to_owned(),
+                })
+                .to_vec(),
+            rows: VecDeque::new(),
+            points: Vec::new(),
+            events: VecDeque::new(),
+            now: Now { phase: "planned".to_owned(), ..Now::default() },
+            outcome: None,
+            page: None,
+        };
+        let kept = Kept {
+            state,
+            unsent: VecDeque::new(),
+            ticked: None,
+            longer_s: Vec::new(),
+            begun: 0,
+            soak_s,
+            after_s: 0.0,
+        };
+        Feed {
+            kept: Mutex::new(kept),
+            display,
+            guards: run.campaign.guard_set().signals,
+            plan: run.plan.steps.clone(),
+            operator: run.operator.clone(),
+            after_step: run.after_step.clone(),
+        }
+    }
+
+    /// The whole state.
+    pub(crate) fn snapshot(&self) -> Arc<str> {
+        let Ok(mut kept) = self.kept.lock() else { return Arc::from("{}") };
+        self.say_what_is_asked(&mut kept.state);
+        message("snapshot", json!(kept.state))
+    }
+
+    /// Takes an event in; messages for those who look on.
+    pub(crate) fn take(&self, event: &SessionEvent) -> Vec<Arc<str>> {
+        let Ok(mut kept) = self.kept.lock() else { return Vec::new() };
+        let kept = &mut *kept;
+        match event {
+            SessionEvent::RunStarted { steps, duration_s, .. } => {
+                (kept.state.steps, kept.state.duration_s) = (*steps, *duration_s);
+                kept.state.now.phase = match kept.soak_s > 0.0 {
+                    true => "at rest, for the zero of the sensors".to_owned(),
+                    false => "warming up at the first point".to_owned(),
+                };
+                vec![self.tick(kept)]
+            }
+            SessionEvent::RigTime { t_s } => {
+                kept.state.now.t_s = *t_s;
+                if kept.begun == 0 && kept.soak_s > 0.0 && *t_s > kept.soak_s {
+                    kept.state.now.phase = "warming up at the first point".to_owned();
+                }
+                (kept.state.now.left_s, kept.state.now.left_half_s) = kept.left_s();
+                Vec::new()
+            }
+            SessionEvent::Readings { t_s, values } => {
+                self.readings(&mut kept.state.now.readings, values);
+                let shown = |channel: &Channel| {
+                    let found = values.iter().find(|(other, _)| other == channel);
+                    found.map(|(_, value)| self.display.reading(*channel, *value))
+                };
+                let row: Vec<Option<f64>> =
+                    std::iter::once(Some(*t_s)).chain(TRACED.iter().map(shown)).collect();
+                for rows in [&mut kept.state.rows, &mut kept.unsent] {
+                    rows.push_back(row.clone());
+                    while rows.len() > TRACE_ROWS {
+                        rows.pop_front();
+                    }
+                }
+                match kept.ticked.is_none_or(|at| at.elapsed() >= TICK) {
+                    true => vec![self.tick(kept)],
+                    false => Vec::new(),
+                }
+            }
+            SessionEvent::StepStarted(marker) => {
+                self.step(kept, marker);
+                vec![self.tick(kept)]
+            }
+            SessionEvent::StepEnded(marker) => {
+                let planned_s = self.plan.get(marker.index).map(|step| step.dwell_s);
+                kept.longer_s.extend(planned_s.map(|planned_s| marker.end_s - marker.start_s - planned_s));
+                Vec::new()
+            }
+            SessionEvent::Told(event) => {
+                let told = Told { t_s: event.t_s, message: event.message.clone() };
+                let new = message("told", json!(told));
+                kept.state.events.push_back(told);
+                while kept.state.events.len() > EVENTS_MAX {
+                    kept.state.events.pop_front();
+                }
+                vec![new, self.tick(kept)]
+            }
+            SessionEvent::PointEstimated(point) => {
+                let shown = live_point(point, &self.display);
+                let new = message("point", json!(shown));
+                if kept.state.points.len() < POINTS_MAX {
+                    kept.state.points.push(shown);
+                }
+                vec![new]
+            }
+            SessionEvent::Progress { what, .. } => {
+                (kept.state.now.phase, kept.state.now.step) = (what.clone(), None);
+                vec![self.tick(kept)]
+            }
+            SessionEvent::PointIdentified(_) | SessionEvent::PiecesDone { .. } => Vec::new(),
+        }
+    }
+
+    /// A button was pressed: what is shown of it before the run has seen it.
+    pub(crate) fn asked(&self, asked: Asked) {
+        if let Ok(mut kept) = self.kept.lock() {
+            let now = &mut kept.state.now;
+            match asked {
+                Asked::Hold => now.holds = true,
+                Asked::GoOn => now.holds = false,
+                Asked::StopAfterStep | Asked::SafeNow => now.stops = true,
+            }
+        }
+    }
+
+    /// The run is over.
+    pub(crate) fn ended(&self, outcome: &str, page: Option<&Path>) -> Arc<str> {
+        let Ok(mut kept) = self.kept.lock() else { return Arc::from("{}") };
+        kept.state.outcome = Some(outcome.to_owned());
+        kept.state.page = page.map(|page| page.display().to_string());
+        let said = json!({ "outcome": kept.state.outcome, "page": kept.state.page });
+        message("end", said)
+    }
+
+    fn step(&self, kept: &mut Kept, marker: &StepMarker) {
+        let forecast = self.plan.get(marker.index);
+        kept.begun = marker.index + 1;
+        if let Some(forecast) = forecast {
+            kept.after_s = kept.state.duration_s - kept.soak_s - forecast.start_s - forecast.dwell_s;
+        }
+        let place = marker.to.map(|to| {
+            let (_, opening) = to.shown();
+            format!("{} {}, opening {opening}", self.display.speed(to.speed_rpm), self.display.units().speed)
+        });
+        kept.state.now.phase = "step".to_owned();
+        kept.state.now.step = Some(Step {
+            number: marker.index + 1,
+            place: place.unwrap_or_default(),
+            start_s: marker.start_s,
+            end_s: marker.end_s,
+            settle_s: forecast.and_then(|step| step.predicted.settle_s),
+        });
+    }
+
+    fn readings(&self, shown: &mut Vec<Reading>, values: &[(Channel, f64)]) {
+        *shown = values
+            .iter()
+            .filter(|(channel, _)| channel.info().group != mapper_core::Group::Command)
+            .map(|(channel, value)| {
+                let guard = self.guards.iter().find(|guard| guard.channel == *channel);
+                let bound = |of: fn(&SignalGuard) -> Option<f64>| {
+                    guard.and_then(of).map(|inside| self.display.reading(*channel, inside))
+                };
+                Reading {
+                    symbol: channel.symbol(),
+                    what: channel.info().description,
+                    unit: self.display.unit_of(*channel).to_owned(),
+                    value: self.display.reading(*channel, *value),
+                    low: bound(|guard| guard.below),
+                    high: bound(|guard| guard.above),
+                }
+            })
+            .collect();
+    }
+
+    fn say_what_is_asked(&self, state: &mut State) {
+        state.now.holds = self.operator.holds();
+        state.now.stops = self.after_step.load(Ordering::SeqCst);
+    }
+
+    fn tick(&self, kept: &mut Kept) -> Arc<str> {
+        self.say_what_is_asked(&mut kept.state);
+        kept.ticked = Some(Instant::now());
+        let rows: Vec<Vec<Option<f64>>> = kept.unsent.drain(..).collect();
+        message("tick", json!({ "now": kept.state.now, "rows": rows }))
+    }
+}
+
+impl Kept {
+    /// Rig time to the end, s, and half the width of its 95 % interval: steps still to come last as much longer than planned as
+    /// those before did.
+    fn left_s(&self) -> (f64, f64) {
+        let (state, count) = (&self.state, self.longer_s.len() as f64);
+        let to_come = state.steps.saturating_sub(self.begun) as f64;
+        let mean_s = if count > 0.0 { self.longer_s.iter().sum::<f64>() / count } else { 0.0 };
+        let variance =
+            self.longer_s.iter().map(|s| (s - mean_s).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        // Every step to come has its own scatter, and all of them share the error of the mean.
+        let sigma_s = (variance * to_come * (1.0 + to_come / count.max(1.0))).sqrt();
+        let planned_s = match &state.now.step {
+            Some(step) => (step.end_s - state.now.t_s).max(0.0) + self.after_s,
+            None => state.duration_s - state.now.t_s,
+        };
+        ((planned_s + mean_s * to_come).max(0.0), mapper_core::half_width_95(sigma_s))
+    }
+}
+
+fn message(kind: &str, mut data: Value) -> Arc<str> {
+    data["type"] = kind.into();
+    // Written on one line: a line end would end the event.
+    Arc::from(data.to_string())
+}

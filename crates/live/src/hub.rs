@@ -1,0 +1,71 @@
+//! Whoever looks on, each with a short queue.
+
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex};
+
+/// Messages that wait for one browser; one that lags further behind is left, and begins again with the whole state.
+const WAITING_MAX: usize = 64;
+/// Browsers that may look on at once.
+const CLIENTS_MAX: usize = 16;
+
+/// Passes messages on to all who look on, and never waits for any of them.
+#[derive(Debug, Default)]
+pub(crate) struct Hub {
+    clients: Mutex<Vec<SyncSender<Arc<str>>>>,
+}
+
+impl Hub {
+    /// One more, who begins with `first`; `None` where there are too many already.
+    pub(crate) fn join(&self, first: Arc<str>) -> Option<Receiver<Arc<str>>> {
+        let mut clients = self.clients.lock().ok()?;
+        if clients.len() >= CLIENTS_MAX {
+            return None;
+        }
+        let (send, receive) = sync_channel(WAITING_MAX);
+        send.try_send(first).ok()?;
+        clients.push(send);
+        Some(receive)
+    }
+
+    /// Passes a message on; who has gone or lags behind is left.
+    pub(crate) fn publish(&self, message: &Arc<str>) {
+        if let Ok(mut clients) = self.clients.lock() {
+            clients.retain(|client| client.try_send(message.clone()).is_ok());
+        }
+    }
+
+    /// Leaves everybody once they have had what waits for them.
+    pub(crate) fn close(&self) {
+        if let Ok(mut clients) = self.clients.lock() {
+            clients.clear();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_lags_behind_is_left_and_the_others_get_everything() {
+        let hub = Hub::default();
+        let (slow, quick) = (hub.join("first".into()).unwrap(), hub.join("first".into()).unwrap());
+        for number in 0..200 {
+            hub.publish(&number.to_string().into());
+            let expected = if number == 0 { "first".to_owned() } else { (number - 1).to_string() };
+            assert_eq!(&*quick.recv().unwrap(), expected);
+        }
+        // The slow one has what fitted into its queue, and then the end.
+        assert_eq!(slow.iter().count(), WAITING_MAX);
+    }
+
+    #[test]
+    fn there_is_room_for_so_many() {
+        let hub = Hub::default();
+        let all: Vec<_> = std::iter::from_fn(|| hub.join("".into())).take(100).collect();
+        assert_eq!(all.len(), CLIENTS_MAX);
+        drop(all);
+        hub.publish(&"".into());
+        assert!(hub.join("".into()).is_some(), "who has gone makes room");
+    }
+}

@@ -1,0 +1,178 @@
+//! The page of a run: opened before it, told while it goes on, closed after it.
+
+use crate::access::Access;
+use crate::feed::Feed;
+use crate::hub::Hub;
+use crate::server::{Served, serve};
+use mapper_campaign::Campaign;
+use mapper_core::Plan;
+use mapper_page::live_page;
+use mapper_session::{Operator, SessionEvent};
+use std::net::{SocketAddr, TcpListener};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+/// Browsers get so long for the last message.
+const FAREWELL: Duration = Duration::from_secs(1);
+
+/// Why there is no live page.
+#[derive(Debug, thiserror::Error)]
+pub enum LiveError {
+    /// It is not an address.
+    #[error("`{text}` is not an address; write e.g. 127.0.0.1:7373, or 0.0.0.0:7373 for other machines too")]
+    Address {
+        /// What was given.
+        text: String,
+    },
+    /// The address is not to be had.
+    #[error("the live page cannot be served at {address}: {source}; choose another with `--live=ADDRESS`")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// There is nothing to make a token from.
+    #[error("the system gives no random numbers for a token: {0}")]
+    Token(getrandom::Error),
+    /// The page could not be made: a fault of the program.
+    #[error("failed to write the live page: {0}")]
+    Page(#[from] serde_json::Error),
+}
+
+/// What a button asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asked {
+    /// Stay at this step.
+    Hold,
+    /// Let it end.
+    GoOn,
+    /// Stop the run at the end of the step.
+    StopAfterStep,
+    /// Into the safe state, now.
+    SafeNow,
+}
+
+/// What is run, and how it is stopped.
+pub struct LiveRun<'a> {
+    /// The campaign.
+    pub campaign: &'a Campaign,
+    /// The plan.
+    pub plan: &'a Plan,
+    /// The rig's time over time on the wall; `None`: as fast as it goes.
+    pub pace: Option<f64>,
+    /// What the runner looks at.
+    pub operator: Arc<Operator>,
+    /// Stops at the end of the step.
+    pub after_step: Arc<AtomicBool>,
+    /// Stops now.
+    pub now: Arc<AtomicBool>,
+}
+
+/// The page of a run that goes on.
+pub struct Live {
+    listener: Option<TcpListener>,
+    address: SocketAddr,
+    token: Option<String>,
+    begun: OnceLock<(Arc<Feed>, Arc<Served>)>,
+}
+
+impl Live {
+    /// Takes an address, e.g. `127.0.0.1:7373`. Another machine's browsers need the token that this makes.
+    ///
+    /// # Errors
+    /// [`LiveError`] where the address is none, or is taken.
+    pub fn open(text: &str) -> Result<Live, LiveError> {
+        let address: SocketAddr = text.parse().map_err(|_| LiveError::Address { text: text.to_owned() })?;
+        let listen = |source| LiveError::Listen { address, source };
+        let listener = TcpListener::bind(address).map_err(listen)?;
+        let address = listener.local_addr().map_err(listen)?;
+        let token = if address.ip().is_loopback() { None } else { Some(token()?) };
+        Ok(Live { listener: Some(listener), address, token, begun: OnceLock::new() })
+    }
+
+    /// Where the page is, with the token behind `#`, which a browser keeps for itself.
+    pub fn url(&self) -> String {
+        match &self.token {
+            None => format!("http://{}/", self.address),
+            Some(token) => format!("http://{}/#token={token}", self.address),
+        }
+    }
+
+    /// Begins to serve.
+    ///
+    /// # Errors
+    /// [`LiveError::Page`]: none in practice.
+    pub fn begin(&mut self, run: &LiveRun<'_>) -> Result<(), LiveError> {
+        let Some(listener) = self.listener.take() else { return Ok(()) };
+        let feed = Arc::new(Feed::new(run));
+        let of_snapshot = feed.clone();
+        let (operator, after_step, now) = (run.operator.clone(), run.after_step.clone(), run.now.clone());
+        let of_ask = feed.clone();
+        let served = Arc::new(Served {
+            page: live_page()?,
+            access: Access::new(self.address, self.token.clone()),
+            hub: Hub::default(),
+            snapshot: Box::new(move || of_snapshot.snapshot()),
+            ask: Box::new(move |asked| {
+                let what = match asked {
+                    Asked::Hold => {
+                        operator.hold();
+                        "the step is held"
+                    }
+                    Asked::GoOn => {
+                        operator.go_on();
+                        "the step goes on"
+                    }
+                    Asked::StopAfterStep => {
+                        after_step.store(true, Ordering::SeqCst);
+                        "the run stops at the end of the step"
+                    }
+                    Asked::SafeNow => {
+                        after_step.store(true, Ordering::SeqCst);
+                        now.store(true, Ordering::SeqCst);
+                        "the rig goes into its safe state now"
+                    }
+                };
+                operator.say(format!("operator, on the live page: {what}"));
+                of_ask.asked(asked);
+            }),
+            open: AtomicUsize::new(0),
+        });
+        let for_thread = served.clone();
+        let _ = std::thread::Builder::new()
+            .name("live".to_owned())
+            .spawn(move || serve(&listener, &for_thread))
+            .map_err(|source| LiveError::Listen { address: self.address, source })?;
+        // It is begun once: the listener has just been taken.
+        let _ = self.begun.set((feed, served));
+        Ok(())
+    }
+
+    /// Passes on what the session tells. Never waits for a browser.
+    pub fn show(&self, event: &SessionEvent) {
+        let Some((feed, served)) = self.begun.get() else { return };
+        for message in feed.take(event) {
+            served.hub.publish(&message);
+        }
+    }
+
+    /// Says how it ended and where the page of the run is, and gives browsers a moment to hear it.
+    pub fn end(&self, outcome: &str, page: Option<&std::path::Path>) {
+        let Some((feed, served)) = self.begun.get() else { return };
+        served.hub.publish(&feed.ended(outcome, page));
+        served.hub.close();
+        let until = Instant::now() + FAREWELL;
+        while served.open.load(Ordering::SeqCst) > 0 && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+/// 128 bits that nobody guesses.
+fn token() -> Result<String, LiveError> {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes).map_err(LiveError::Token)?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}

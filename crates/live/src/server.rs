@@ -1,0 +1,124 @@
+//! The server: a thread for each of few connections, one request each.
+
+use crate::access::Access;
+use crate::hub::Hub;
+use crate::live::Asked;
+use crate::request::{Request, read_request};
+use std::io::Write;
+use std::net::{TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Duration;
+
+/// Connections at once; further ones are closed.
+const CONNECTIONS_MAX: usize = 32;
+/// Longest time that a browser may keep one read or write waiting.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// A stream that has nothing to say says so this often: a browser that hears nothing for longer connects again.
+const HEARTBEAT: Duration = Duration::from_secs(2);
+const HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
+                       X-Frame-Options: DENY\r\nConnection: close\r\n";
+
+/// What is served.
+pub(crate) struct Served {
+    pub(crate) page: String,
+    pub(crate) access: Access,
+    pub(crate) hub: Hub,
+    /// The whole state as a message.
+    pub(crate) snapshot: Box<dyn Fn() -> Arc<str> + Send + Sync>,
+    /// Does what a button asks for.
+    pub(crate) ask: Box<dyn Fn(Asked) + Send + Sync>,
+    /// Connections that are open.
+    pub(crate) open: AtomicUsize,
+}
+
+/// Answers until the process ends.
+pub(crate) fn serve(listener: &TcpListener, served: &Arc<Served>) {
+    for stream in listener.incoming().filter_map(Result::ok) {
+        let served = served.clone();
+        if served.open.fetch_add(1, Ordering::SeqCst) >= CONNECTIONS_MAX {
+            served.open.fetch_sub(1, Ordering::SeqCst);
+            continue;
+        }
+        let counted = served.clone();
+        let answered = std::thread::Builder::new().name("live".to_owned()).spawn(move || {
+            // A browser that goes away ends its own connection.
+            let _ = answer(stream, &served);
+            served.open.fetch_sub(1, Ordering::SeqCst);
+        });
+        if answered.is_err() {
+            counted.open.fetch_sub(1, Ordering::SeqCst);
+        }
+    }
+}
+
+fn answer(mut stream: TcpStream, served: &Served) -> std::io::Result<()> {
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_nodelay(true)?;
+    let Some(request) = read_request(&mut stream) else { return plain(&mut stream, "400 Bad Request") };
+    let access = &served.access;
+    if !access.calls_by_name(&request) || access.is_of_another_page(&request) {
+        return plain(&mut stream, "403 Forbidden");
+    }
+    match (request.method.as_str(), request.path.as_str()) {
+        // Without data of the run: it is read before anybody can show a token.
+        ("GET", "/") => page(&mut stream, &served.page),
+        ("GET", "/events") if !access.has_token(&request) => plain(&mut stream, "401 Unauthorized"),
+        ("GET", "/events") => events(&mut stream, served),
+        ("POST", path) => match asked(path) {
+            None => plain(&mut stream, "404 Not Found"),
+            Some(_) if !may_ask(access, &request) => plain(&mut stream, "403 Forbidden"),
+            Some(asked) => {
+                (served.ask)(asked);
+                plain(&mut stream, "204 No Content")
+            }
+        },
+        ("GET", _) => plain(&mut stream, "404 Not Found"),
+        _ => plain(&mut stream, "405 Method Not Allowed"),
+    }
+}
+
+fn may_ask(access: &Access, request: &Request) -> bool {
+    access.is_of_own_page(request) && access.has_token(request)
+}
+
+fn asked(path: &str) -> Option<Asked> {
+    match path {
+        "/ask/hold" => Some(Asked::Hold),
+        "/ask/go-on" => Some(Asked::GoOn),
+        "/ask/stop" => Some(Asked::StopAfterStep),
+        "/ask/safe" => Some(Asked::SafeNow),
+        _ => None,
+    }
+}
+
+fn plain(stream: &mut TcpStream, status: &str) -> std::io::Result<()> {
+    write!(stream, "HTTP/1.1 {status}\r\n{HEADERS}Content-Length: 0\r\n\r\n")
+}
+
+fn page(stream: &mut TcpStream, page: &str) -> std::io::Result<()> {
+    let length = page.len();
+    write!(
+        stream,
+        "HTTP/1.1 200 OK\r\n{HEADERS}Content-Security-Policy: frame-ancestors 'none'\r\n\
+         Content-Type: text/html; charset=utf-8\r\nContent-Length: {length}\r\n\r\n"
+    )?;
+    stream.write_all(page.as_bytes())
+}
+
+/// The whole state, then every message, until one side goes away.
+fn events(stream: &mut TcpStream, served: &Served) -> std::io::Result<()> {
+    let Some(messages) = served.hub.join((served.snapshot)()) else {
+        return plain(stream, "503 Service Unavailable");
+    };
+    write!(stream, "HTTP/1.1 200 OK\r\n{HEADERS}Content-Type: text/event-stream\r\n\r\n")?;
+    loop {
+        match messages.recv_timeout(HEARTBEAT) {
+            Ok(message) => write!(stream, "data: {message}\n\n")?,
+            Err(RecvTimeoutError::Timeout) => write!(stream, ":\n\n")?,
+            Err(RecvTimeoutError::Disconnected) => return Ok(()),
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! What a browser is shown, bounded whatever the run does.
+
+use mapper_page::{LivePoint, Planned};
+use serde::Serialize;
+use std::collections::VecDeque;
+
+/// Seconds of the rig's time whose readings are kept.
+pub(crate) const TRACE_ROWS: usize = 300;
+/// Events that are kept, the latest.
+pub(crate) const EVENTS_MAX: usize = 200;
+/// Points that are kept: more than a night has.
+pub(crate) const POINTS_MAX: usize = 2000;
+
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct State {
+    pub(crate) machine: String,
+    pub(crate) campaign: String,
+    pub(crate) units: Units,
+    /// Names of the speed lines, slow to fast.
+    pub(crate) lines: Vec<String>,
+    /// Where points are expected on the map.
+    pub(crate) planned: Vec<Planned>,
+    pub(crate) steps: usize,
+    /// Rig time planned, s.
+    pub(crate) duration_s: f64,
+    pub(crate) pace: Option<f64>,
+    /// Names and units of the columns of `rows`.
+    pub(crate) traced: Vec<Traced>,
+    /// Run time, s, and readings.
+    pub(crate) rows: VecDeque<Vec<Option<f64>>>,
+    pub(crate) points: Vec<LivePoint>,
+    pub(crate) events: VecDeque<Told>,
+    pub(crate) now: Now,
+    pub(crate) outcome: Option<String>,
+    pub(crate) page: Option<String>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Units {
+    pub(crate) flow: String,
+    pub(crate) speed: String,
+    pub(crate) temperature: String,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Traced {
+    pub(crate) name: String,
+    pub(crate) unit: String,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Told {
+    pub(crate) t_s: f64,
+    pub(crate) message: String,
+}
+
+/// What changes every second.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(crate) struct Now {
+    pub(crate) t_s: f64,
+    /// What is done, in words.
+    pub(crate) phase: String,
+    pub(crate) step: Option<Step>,
+    /// Rig time to the end and half the width of its 95 % interval, s.
+    pub(crate) left_s: f64,
+    pub(crate) left_half_s: f64,
+    pub(crate) holds: bool,
+    pub(crate) stops: bool,
+    pub(crate) readings: Vec<Reading>,
+}
+
+/// The step that is under way.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Step {
+    /// From 1.
+    pub(crate) number: usize,
+    pub(crate) place: String,
+    pub(crate) start_s: f64,
+    pub(crate) end_s: f64,
+    /// When it is expected to have settled, s after its start.
+    pub(crate) settle_s: Option<f64>,
+}
+
+/// A channel, as it reads and as it may.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Reading {
+    pub(crate) symbol: &'static str,
+    pub(crate) what: &'static str,
+    pub(crate) unit: String,
+    pub(crate) value: f64,
+    pub(crate) low: Option<f64>,
+    pub(crate) high: Option<f64>,
+}

@@ -1,0 +1,74 @@
+//! The page of a run that goes on: the same map, fed by the program while it runs.
+
+use crate::drawn_map::DrawnMap;
+use crate::drawn_points::{DrawnPoint, drawn_point};
+use crate::sections::live;
+use crate::shell::{Purpose, shell};
+use mapper_campaign::Campaign;
+use mapper_campaign::units::Kind;
+use mapper_core::{IdentifiedPoint, Plan};
+use mapper_report::Display;
+use serde::Serialize;
+
+/// What the script begins with, before it has heard anything.
+#[derive(Serialize)]
+struct Empty {
+    units: EmptyUnits,
+    points: [(); 0],
+    map: DrawnMap,
+    others: [(); 0],
+    lines: [(); 0],
+    planned: [(); 0],
+}
+
+#[derive(Serialize)]
+struct EmptyUnits {
+    flow: &'static str,
+    speed: &'static str,
+}
+
+/// A point as the page's script takes it.
+#[derive(Debug, Clone, Serialize)]
+#[serde(transparent)]
+pub struct LivePoint(DrawnPoint);
+
+/// Where a point is expected on the map, in the units that are shown.
+#[derive(Debug, Clone, Serialize)]
+pub struct Planned {
+    flow: f64,
+    pr: f64,
+}
+
+/// The page, without any data of a run: those come later, to whoever may have them.
+///
+/// # Errors
+/// None in practice: JSON of numbers and strings can always be written.
+pub fn live_page() -> Result<String, serde_json::Error> {
+    let empty = Empty {
+        units: EmptyUnits { flow: "", speed: "" },
+        points: [],
+        map: DrawnMap::default(),
+        others: [],
+        lines: [],
+        planned: [],
+    };
+    shell("A run of mapper, live", Purpose::Live, &empty, &live::live())
+}
+
+/// A point that was identified by itself, on the line of its target.
+pub fn live_point(point: &IdentifiedPoint, display: &Display) -> LivePoint {
+    let speed_rpm = point.target.map_or(point.speed_rpm, |target| target.speed_rpm);
+    LivePoint(drawn_point(point, display.speed(speed_rpm), None, display))
+}
+
+/// Where the plan expects its points.
+pub fn planned(campaign: &Campaign, plan: &Plan, display: &Display) -> Vec<Planned> {
+    let (t1_k, p1_pa) = (campaign.boundary.t1_k, campaign.boundary.p1_pa);
+    let steps = plan.steps.iter().filter(|step| step.kind.measures());
+    steps
+        .map(|step| {
+            let flow_kg_s = campaign.reference.corrected_flow_kg_s(step.predicted.flow_kg_s, t1_k, p1_pa);
+            Planned { flow: display.number(Kind::MassFlow, flow_kg_s), pr: step.predicted.pressure_ratio }
+        })
+        .collect()
+}

@@ -1,0 +1,93 @@
+//! The parts of the live page; its script fills them.
+
+use maud::{Markup, html};
+
+/// Buttons: request, words, what the operator is asked before it is sent.
+const BUTTONS: [(&str, &str, &str); 4] = [
+    ("hold", "Hold", "Stay at this step until somebody lets it go on?"),
+    ("go-on", "Go on", "Let the held step end as planned?"),
+    (
+        "stop",
+        "Stop at the end of the step",
+        "Stop the run at the end of this step, and identify what was measured?",
+    ),
+    ("safe", "Safe now", "Bring the rig into its safe state now? The step that is under way is lost."),
+];
+
+pub(crate) fn live() -> Markup {
+    html! {
+        header {
+            h1 #title { "Run" }
+            p #connection role="status" { "Connecting." }
+        }
+        main {
+            section.verdict #now aria-labelledby="phase" {
+                h2 #phase { "-" }
+                progress #bar max="1" value="0" aria-label="share of the planned rig time" {}
+                p #where {}
+                p #left {}
+                div.buttons {
+                    @for (ask, words, question) in BUTTONS {
+                        button type="button" data-ask=(ask) data-question=(question) disabled { (words) }
+                    }
+                }
+            }
+            dialog #sure aria-labelledby="question" {
+                p #question {}
+                div.buttons {
+                    button type="button" #yes { "Yes" }
+                    button type="button" #no { "No" }
+                }
+            }
+            section aria-labelledby="map-head" {
+                h2 #map-head { "Map so far" }
+                p { "Rings are where points are expected. Each point is identified by itself as soon as its step has ended, before the zero is \
+                     subtracted; at the end all are identified together, and the intervals shrink." }
+                fieldset.layers.screen {
+                    legend { "Show" }
+                    @for (name, words) in [("intervals", "95 % intervals"), ("repeats", "repeats")] {
+                        label { input type="checkbox" name="layer" value=(name) checked[name == "intervals"]; " " (words) }
+                    }
+                    button type="button" id="whole" { "whole map" }
+                }
+                div.plots {
+                    figure { div #map-plot {} figcaption { "Pressure ratio over corrected flow." } }
+                    figure { div #eta-plot {} figcaption { "Efficiency over corrected flow." } }
+                }
+            }
+            section aria-labelledby="traces-head" {
+                h2 #traces-head { "The last minutes" }
+                div.plots #traces {}
+            }
+            section aria-labelledby="readings-head" {
+                h2 #readings-head { "Readings and their limits" }
+                div.scroll tabindex="0" role="region" aria-label="Readings and their limits" {
+                    table.data.words {
+                        thead { tr { @for head in ["channel", "reads", "unit", "lowest", "highest", "state", "what it is"] { th scope="col" { (head) } } } }
+                        tbody #readings {}
+                    }
+                }
+            }
+            section aria-labelledby="points-head" {
+                h2 #points-head { "Points so far" }
+                div.scroll tabindex="0" role="region" aria-label="Points so far" {
+                    table.data {
+                        thead {
+                            tr {
+                                th scope="col" { "step" }
+                                th scope="col" #speed-head { "speed" }
+                                th scope="col" #flow-head { "flow" }
+                                @for head in ["PR", "eta %", "+/-", "h W/(m2 K)", "verdict"] { th scope="col" { (head) } }
+                            }
+                        }
+                        tbody #points {}
+                    }
+                }
+            }
+            section aria-labelledby="events-head" {
+                h2 #events-head { "Events" }
+                ol #events reversed {}
+            }
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! Colours of a terminal, for verdicts.
+
+use mapper_core::Verdict;
+
+/// Whether words are coloured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Paint {
+    /// As they are.
+    #[default]
+    Plain,
+    /// By ANSI escapes, in the terminal's own colours.
+    Coloured,
+}
+
+/// Words in the colour of a verdict: green, yellow, red.
+pub fn paint_verdict(verdict: Verdict, words: &str, paint: Paint) -> String {
+    let code = match verdict {
+        Verdict::Good => 32,
+        Verdict::Doubtful => 33,
+        Verdict::Unusable => 31,
+    };
+    match paint {
+        Paint::Plain => words.to_owned(),
+        Paint::Coloured => format!("\u{1b}[{code}m{words}\u{1b}[0m"),
+    }
+}

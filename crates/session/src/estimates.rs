@@ -1,0 +1,79 @@
+//! Each step identified by itself as soon as it has ended: what whoever looks on sees before all are identified together.
+
+use crate::SessionEvent;
+use crate::event::OnEvent;
+use crate::scripted_steps::single_steps;
+use mapper_core::{Recording, SampleBatch, StepMarker};
+use mapper_identify::{IdentifyConfig, identify_each};
+use mapper_runner::{ObserverError, RunObserver};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread::Scope;
+
+/// Steps that wait to be identified; a run that is faster than that loses estimates, and no time.
+const WAITING_MAX: usize = 4;
+
+/// Keeps the last two steps, and hands them to a thread of its own: identifying never delays the rig.
+pub(crate) struct Estimates {
+    recent: Recording,
+    to_thread: SyncSender<Recording>,
+}
+
+impl Estimates {
+    /// Begins; the thread ends with the value.
+    pub(crate) fn begin<'scope, 'env>(
+        scope: &'scope Scope<'scope, 'env>,
+        config: IdentifyConfig,
+        on_event: OnEvent<'env>,
+    ) -> Self {
+        let (to_thread, steps) = sync_channel::<Recording>(WAITING_MAX);
+        let config = single_steps(config);
+        scope.spawn(move || {
+            while let Ok(recording) = steps.recv() {
+                let points = identify_each(&recording, &config).unwrap_or_default();
+                if let Some(Ok(point)) = points.into_iter().last() {
+                    on_event(&SessionEvent::PointEstimated(Box::new(point)));
+                }
+            }
+        });
+        Estimates { recent: Recording::default(), to_thread }
+    }
+}
+
+impl RunObserver for Estimates {
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        keep(&mut self.recent, batch);
+        Ok(())
+    }
+
+    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        two_last_steps(&mut self.recent, marker);
+        let _ = self.to_thread.try_send(self.recent.clone());
+        Ok(())
+    }
+}
+
+/// Puts samples behind a recording, as they are read back: what a sensor did not give is not there.
+pub(crate) fn keep(recent: &mut Recording, batch: &SampleBatch) {
+    for column in &batch.columns {
+        let series = recent.series.entry(column.channel).or_default();
+        for (t_s, value) in batch.t_s.iter().zip(&column.values).filter(|(_, value)| value.is_finite()) {
+            series.t_s.push(*t_s);
+            series.values.push(*value);
+        }
+    }
+}
+
+/// Adds a step that has ended, and forgets what lies before the one before it: all that identifying the last one needs.
+pub(crate) fn two_last_steps(recent: &mut Recording, marker: &StepMarker) {
+    if recent.steps.len() > 1 {
+        recent.steps.remove(0);
+    }
+    if let Some(before) = recent.steps.first().copied() {
+        for series in recent.series.values_mut() {
+            let kept = series.t_s.partition_point(|t_s| *t_s < before.start_s);
+            series.t_s.drain(..kept);
+            series.values.drain(..kept);
+        }
+    }
+    recent.steps.push(*marker);
+}

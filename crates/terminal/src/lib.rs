@@ -1,0 +1,15 @@
+//! What a terminal, a pipe or another program sees: progress while work goes on, and what a run has given when it is done.
+//!
+//! Progress goes to standard error and never into results: a bar where somebody sits, a line per step in a pipe, JSON lines for
+//! a program.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod bar_text;
+mod colour;
+mod progress;
+mod results_text;
+
+pub use colour::{ColourChoice, is_coloured};
+pub use progress::{Progress, ProgressManner};
+pub use results_text::{Shown, identified_text, results_text};

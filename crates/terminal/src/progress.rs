@@ -1,0 +1,213 @@
+//! Progress on standard error: a bar, lines, or JSON.
+
+use crate::bar_text::{run_words, short};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use mapper_core::StepMarker;
+use mapper_report::wrapped;
+use mapper_session::SessionEvent;
+use serde_json::json;
+use std::sync::Mutex;
+use std::time::Duration;
+
+/// How often the clock of a bar is drawn.
+const TICK: Duration = Duration::from_millis(250);
+/// Columns that a warning may take.
+const COLUMNS: usize = 80;
+/// A program is told the rig's time so often in a run.
+const RIG_TIMES: f64 = 200.0;
+/// Above the bar what is done now, below it how far that is.
+const RUN_BAR: &str = "{prefix}\n[{bar:14}] {msg}";
+const PIECES_BAR: &str = "[{bar:30}] {pos} of {len}, {elapsed} so far{msg}";
+const WORK_BAR: &str = "[{bar:30}] {percent:>3} %, {elapsed} so far  {wide_msg}";
+const SPINNER: &str = "{spinner} {wide_msg} {elapsed}";
+
+/// Who looks on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProgressManner {
+    /// Somebody at a terminal.
+    Bar,
+    /// Somebody who reads a file later: a line per step.
+    Lines,
+    /// A program: JSON lines.
+    Json,
+    /// Nobody.
+    Quiet,
+}
+
+/// Shows what a session tells. It may be told from many threads.
+pub struct Progress {
+    manner: ProgressManner,
+    bar: ProgressBar,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    /// Look of the bar as it is.
+    look: Option<&'static str>,
+    /// What was said last, in a pipe.
+    said: String,
+    steps: usize,
+    /// Number of the step that is under way, from 1.
+    step: usize,
+    duration_s: f64,
+    /// The rig's time that a program was told last, s.
+    told_s: f64,
+}
+
+impl Progress {
+    /// Nothing is shown before the first event.
+    pub fn new(manner: ProgressManner) -> Self {
+        let target = match manner {
+            ProgressManner::Bar => ProgressDrawTarget::stderr(),
+            _ => ProgressDrawTarget::hidden(),
+        };
+        Progress { manner, bar: ProgressBar::with_draw_target(None, target), state: Mutex::default() }
+    }
+
+    /// Shows an event.
+    pub fn show(&self, event: &SessionEvent) {
+        let Ok(mut state) = self.state.lock() else { return };
+        match self.manner {
+            ProgressManner::Quiet => {}
+            ProgressManner::Json => tell_program(event, &mut state),
+            ProgressManner::Lines => say_lines(event, &mut state),
+            ProgressManner::Bar => self.draw(event, &mut state),
+        }
+    }
+
+    /// Says what is begun before there is anything to count.
+    pub fn begin(&self, what: &str) {
+        self.show(&SessionEvent::Progress { done_ratio: 0.0, what: what.to_owned() });
+    }
+
+    /// Shows how many of many pieces of work are done.
+    pub fn pieces(&self, done: usize, of: usize) {
+        self.show(&SessionEvent::PiecesDone { done, of });
+    }
+
+    /// Takes the bar away.
+    pub fn clear(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    fn draw(&self, event: &SessionEvent, state: &mut State) {
+        match event {
+            SessionEvent::RunStarted { steps, duration_s, .. } => {
+                (state.steps, state.duration_s, state.step) = (*steps, *duration_s, 0);
+                self.look(state, RUN_BAR, Some(duration_s.ceil() as u64));
+                self.bar.set_prefix("at rest, then warming up");
+            }
+            SessionEvent::RigTime { t_s } => {
+                self.bar.set_position(*t_s as u64);
+                let left_s = self.bar.eta().as_secs_f64();
+                self.bar.set_message(run_words(state.step, state.steps, *t_s, state.duration_s, left_s));
+            }
+            SessionEvent::StepStarted(marker) => {
+                state.step = marker.index + 1;
+                self.bar.set_prefix(format!(
+                    "{}, {} at this point",
+                    place(marker),
+                    short(marker.end_s - marker.start_s)
+                ));
+            }
+            SessionEvent::Told(event) => self.bar.println(event_line(event.t_s, &event.message)),
+            SessionEvent::Progress { done_ratio, what } => {
+                if *done_ratio > 0.0 || state.look == Some(WORK_BAR) {
+                    self.look(state, WORK_BAR, Some(1000));
+                    self.bar.set_position((1000.0 * done_ratio) as u64);
+                } else {
+                    self.look(state, SPINNER, None);
+                }
+                self.bar.set_message(what.clone());
+            }
+            SessionEvent::PiecesDone { done, of } => {
+                self.look(state, PIECES_BAR, Some(*of as u64));
+                self.bar.set_position(*done as u64);
+                if *done > 0 {
+                    self.bar.set_message(format!(", {} left", short(self.bar.eta().as_secs_f64())));
+                }
+            }
+            SessionEvent::StepEnded(_)
+            | SessionEvent::Readings { .. }
+            | SessionEvent::PointEstimated(_)
+            | SessionEvent::PointIdentified(_) => {}
+        }
+    }
+
+    /// Gives the bar its look and its length where they are not so yet; its clock shows that work goes on.
+    fn look(&self, state: &mut State, look: &'static str, length: Option<u64>) {
+        if state.look == Some(look) {
+            return;
+        }
+        state.look = Some(look);
+        // A template that does not parse leaves the plain style.
+        if let Ok(style) = ProgressStyle::with_template(look) {
+            self.bar.set_style(style.progress_chars("=> "));
+        }
+        self.bar.reset();
+        match length {
+            Some(length) => self.bar.set_length(length),
+            None => self.bar.unset_length(),
+        }
+        self.bar.set_message("");
+        self.bar.enable_steady_tick(TICK);
+    }
+}
+
+/// Where a step goes: 110 krpm, opening 0.7.
+fn place(marker: &StepMarker) -> String {
+    let shown = marker.to.map(|point| point.shown());
+    shown.map_or_else(String::new, |(krpm, opening)| format!("{krpm} krpm, opening {opening}"))
+}
+
+fn event_line(t_s: f64, message: &str) -> String {
+    wrapped(&format!("{t_s:8.1} s  {message}"), COLUMNS, 12).trim_end().to_owned()
+}
+
+#[allow(clippy::print_stderr, reason = "beside the results")]
+fn say_lines(event: &SessionEvent, state: &mut State) {
+    let line = match event {
+        SessionEvent::RunStarted { steps, duration_s, .. } => {
+            state.steps = *steps;
+            format!("{steps} steps in {} of rig time", short(*duration_s))
+        }
+        SessionEvent::StepStarted(marker) => format!(
+            "{:8.1} s  step {} of {}, {}, for {}",
+            marker.start_s,
+            marker.index + 1,
+            state.steps.max(marker.index + 1),
+            place(marker),
+            short(marker.end_s - marker.start_s)
+        ),
+        SessionEvent::Told(event) => event_line(event.t_s, &event.message),
+        SessionEvent::Progress { what, .. } if *what != state.said => what.clone(),
+        SessionEvent::PiecesDone { done, of } => format!("{done} of {of}"),
+        _ => return,
+    };
+    if let SessionEvent::Progress { what, .. } = event {
+        state.said.clone_from(what);
+    }
+    eprintln!("{line}");
+}
+
+/// One JSON object a line: the event as the session has it. Readings are for a live page, and the rig's time is told now and then.
+#[allow(clippy::print_stderr, reason = "beside the results")]
+fn tell_program(event: &SessionEvent, state: &mut State) {
+    match event {
+        SessionEvent::Readings { .. } => return,
+        SessionEvent::RunStarted { duration_s, .. } => state.duration_s = *duration_s,
+        SessionEvent::RigTime { t_s } => {
+            if *t_s < state.told_s + state.duration_s / RIG_TIMES {
+                return;
+            }
+            state.told_s = *t_s;
+        }
+        _ => {}
+    }
+    eprintln!(
+        "{}",
+        serde_json::to_value(event)
+            .unwrap_or_else(|error| json!({ "event": "error", "message": error.to_string() }))
+    );
+}

@@ -1,0 +1,87 @@
+//! What people and programs are told while a run goes on, when it is done, and when it fails.
+
+use mapper_tests::{BY_ITSELF, CampaignFile, SHIPPED, SHORT_GRID, mapper, mapper_command, only_run, scratch};
+use serde_json::Value;
+
+#[test]
+fn a_run_into_a_pipe_says_a_line_per_step_and_ends_in_eighty_columns() {
+    let campaign = CampaignFile::shipped_with(&[SHORT_GRID, BY_ITSELF].concat());
+    let run = |more: &[&str]| {
+        let out = scratch();
+        let mut command = mapper_command(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref()]);
+        let finished = command.arg(out.path()).args(more).output().unwrap();
+        mapper_tests::Finished::from(finished).exits(0)
+    };
+    let quiet = run(&[]);
+    let steps = quiet.stderr.lines().filter(|line| line.contains("  step ")).count();
+    assert_eq!(steps, 4, "{}", quiet.stderr);
+    let (table, files) = quiet.stdout.split_once("\nmap  ").unwrap();
+    assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");
+    assert!(!quiet.stdout.contains('\u{1b}') && !quiet.stderr.contains('\u{1b}'), "{}", quiet.stdout);
+    assert!(!table.contains("truth") && files.contains("report.html"), "{}", quiet.stdout);
+    // One row a point, fastest line last.
+    let rows: Vec<&str> = table.lines().skip(3).take_while(|line| !line.is_empty()).collect();
+    assert_eq!(rows.len(), 4, "{table}");
+
+    let told = run(&["--progress", "json", "--truth", "--full", "--color", "always"]);
+    assert!(told.stdout.contains("\u{1b}[3") && told.stdout.contains("true eta"), "{}", told.stdout);
+    let events: Vec<Value> = told.stderr.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let of = |name: &str| events.iter().filter(|event| event["event"] == name).count();
+    assert_eq!(
+        [of("run_started"), of("step_started"), of("step_ended"), of("point_identified")],
+        [1, 4, 4, 4]
+    );
+}
+
+#[test]
+fn a_failure_is_one_object_too() {
+    let failed = |arguments: &[&str], code: i32| {
+        let finished = mapper(arguments.iter().chain(&["--json"])).exits(code);
+        let value = finished.json();
+        assert_eq!(value["code"], code, "{value}");
+        assert!(!value["message"].as_str().unwrap().is_empty() && !finished.stderr.is_empty(), "{value}");
+        value
+    };
+    failed(&["check", "no/such.yaml"], 1);
+    let wrong = failed(&["plan", SHIPPED, "--no-such-option"], 2);
+    assert!(wrong["message"].as_str().unwrap().contains("--no-such-option"), "{wrong}");
+    let campaign = CampaignFile::shipped_with(&[("seed: 1 ", "sed: 1 ")]);
+    let path = campaign.path.to_str().unwrap();
+    for command in ["check", "plan", "run"] {
+        let mistakes = failed(&[command, path], 3);
+        assert_eq!(mistakes["findings"][0]["kind"], "unknown_key", "{mistakes}");
+        assert!(mistakes["help"].as_str().unwrap().contains("seed"), "{mistakes}");
+    }
+    failed(&["run", SHIPPED, "--live=nowhere"], 3);
+}
+
+#[test]
+fn a_file_that_is_there_is_named_and_replaced_only_by_force() {
+    let folder = scratch();
+    let file = folder.path().join("plan.json");
+    let plan = |more: &[&str]| {
+        let arguments = ["plan", "campaigns/grid18.yaml", "--out", file.to_str().unwrap()];
+        mapper(arguments.iter().chain(more))
+    };
+    std::fs::write(&file, "kept").unwrap();
+    let refused = plan(&["--json"]).exits(1);
+    assert!(refused.stderr.contains("plan.json") && refused.stderr.contains("--force"), "{}", refused.stderr);
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
+    plan(&["--force"]).exits(0);
+    assert!(std::fs::read_to_string(&file).unwrap().contains("\"steps\""));
+    assert_eq!(only_run(folder.path()), file, "nothing else is left");
+}
+
+#[test]
+fn a_jump_is_explained_to_programs_and_commands_are_completed() {
+    let why = mapper(["plan", SHIPPED, "--why", "110krpm@0.5", "50krpm@0.7", "--json"]).exits(0).json();
+    assert_eq!(why["allowed"], why["rejections"].as_array().unwrap().is_empty());
+    for shell in ["bash", "zsh", "fish"] {
+        let script = mapper(["completions", shell]).exits(0).stdout;
+        assert!(script.contains("diagnose") && script.contains("resume"), "{shell}");
+    }
+    let pages = scratch();
+    mapper(["man", "--out", pages.path().to_str().unwrap()]).exits(0);
+    let page = std::fs::read_to_string(pages.path().join("mapper-run.1")).unwrap();
+    assert!(page.starts_with(".ie") || page.contains(".TH mapper-run"), "{page}");
+}

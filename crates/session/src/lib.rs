@@ -33,11 +33,13 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod certainty;
 mod declared;
 mod drift;
 mod drive;
 mod error;
 mod event;
+mod executed;
 mod files;
 mod fusing;
 mod gap;
@@ -50,6 +52,7 @@ mod nightly;
 mod nightly_row;
 mod nightly_run;
 mod observers;
+mod planned;
 mod planning;
 mod predicted_method;
 mod preflight;
@@ -71,6 +74,7 @@ mod surge;
 mod transient;
 mod twin_campaign;
 
+pub use certainty::retimed;
 pub use declared::identification;
 pub use drift::Drift;
 pub use drive::{Pace, drive, drive_paced, soak_s};
@@ -82,7 +86,8 @@ pub use identified::{Identified, SoughtSurge};
 pub use inspected::{Inspected, inspect_log};
 pub use map_file::{write_map, write_map_fitted_if_needed};
 pub use nightly::PreparedNight;
-pub use planning::{nominal_model, plan, with_plan_request};
+pub use planned::plan;
+pub use planning::{nominal_model, with_plan_request};
 pub use program::PROGRAM;
 pub use prospects::Prospects;
 pub use recorded::{Recorded, channel_map};

@@ -2,7 +2,7 @@
 
 use crate::SessionError;
 use crate::declared::identification;
-use crate::planning::plan;
+use crate::planned::plan;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
 use mapper_core::{Method, Plan, PlanStep, Recording, SampleBatch, StepMarker};

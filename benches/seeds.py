@@ -33,7 +33,10 @@ METHODS = {
     "joint after the zero": ("turbo_a", "joint", "evenness: 0.03 K, pressure_evenness: 3 Pa"),
 }
 # Rows that are made where they are asked for.
-FURTHER = {"joint after an even zero": ("turbo_a", "joint", "evenness: 0.01 K, pressure_evenness: 1 Pa")}
+FURTHER = {
+    "joint after an even zero": ("turbo_a", "joint", "evenness: 0.01 K, pressure_evenness: 1 Pa"),
+    "joint after the zero until certain": ("turbo_a", "joint", "evenness: 0.03 K, pressure_evenness: 3 Pa"),
+}
 MACHINES = ["turbo_a", "bent map", "other housing"]
 
 
@@ -85,6 +88,8 @@ def campaign(folder, machine, method, seed):
     text = "\n".join(kept)
     assumed = "\n  alpha_area: 0       # what identification"
     text = replaced(text, assumed, f"\nidentification:\n  method: {identification}{assumed}")
+    if method.endswith("until certain"):
+        text = replaced(text, "\n  dwell: 120 s ", "\n  ends: when_certain\n  dwell: 120 s ")
     text += f"\nseed: {seed}\n"
     if zero:
         text += f"\nzero: {{soak: {SOAK_MIN:.0f} min, {zero}}}\n"

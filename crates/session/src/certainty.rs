@@ -20,6 +20,8 @@ use mapper_runner::{Certainty, DwellBounds};
 
 /// How far apart the dwells lie that are tried, s, and most of them for a step.
 const APART_S: f64 = 2.0;
+/// Last part of a step by which it is judged what its seconds tell, s: over less, noise has the say.
+const LAST_S: f64 = 6.0;
 const MOST_TRIED: f64 = 60.0;
 /// How often dwells and the errors that they are forecast to give are brought together.
 const ROUNDS: usize = 3;
@@ -189,19 +191,19 @@ impl DwellPrices {
     /// The dwells that a step may have, the shortest in which it comes to rest first.
     fn dwells_of(&self, planned: &Planned) -> Vec<Dwell> {
         let at = |dwell_s: f64| self.information.of_forecast(&planned.forecast(dwell_s), &self.forecast_config);
-        let of = |dwell_s: f64, apart_s: f64| {
-            let (before, tells) = (at(dwell_s - apart_s)?, at(dwell_s)?);
-            let rate = (self.information.worth(&tells) - self.information.worth(&before)) / apart_s;
+        let of = |dwell_s: f64| {
+            let (before, tells) = (at(dwell_s - LAST_S)?, at(dwell_s)?);
+            let rate = (self.information.worth(&tells) - self.information.worth(&before)) / LAST_S;
             Some(Dwell { dwell_s, tells, rate })
         };
         if lasts_as_planned(&planned.step) {
-            return of(planned.step.dwell_s, APART_S).into_iter().collect();
+            return of(planned.step.dwell_s).into_iter().collect();
         }
         let longest_s = self.longest_s;
         let shortest_s = rested_dwell_s(&planned.step, SHORTEST_S.min(longest_s), longest_s);
         let apart_s = APART_S.max((longest_s - shortest_s) / MOST_TRIED);
         let tried = (0..).map(|i| shortest_s + f64::from(i) * apart_s).take_while(|s| *s <= longest_s + 1e-6);
-        tried.filter_map(|dwell_s| of(dwell_s, apart_s)).collect()
+        tried.filter_map(of).collect()
     }
 
     /// Error of the points that are measured, rms, fraction. One entry for each step; `None` tells nothing.
@@ -298,8 +300,8 @@ impl Certainty for DwellPrices {
         self.looks.clear();
         self.now?;
         (!lasts_as_planned(step)).then_some(DwellBounds {
-            // One look before the first that counts: what seconds tell is a difference.
-            first_look_s: (SHORTEST_S.min(self.longest_s) - APART_S).max(0.0),
+            // What seconds tell is a difference between looks.
+            first_look_s: (SHORTEST_S.min(self.longest_s) - LAST_S).max(0.0),
             apart_s: APART_S.max(self.longest_s / MOST_TRIED),
             longest_s: self.longest_s,
         })
@@ -311,7 +313,8 @@ impl Certainty for DwellPrices {
         let after_s = marker.end_s - marker.start_s;
         let so_far = self.information.of_readings(readings, &planned.forecast(after_s))?;
         let worth = self.information.worth(&so_far.tells);
-        let before = self.looks.last().copied();
+        let last = |look: &&(f64, f64)| look.0 <= after_s - LAST_S + 1e-6;
+        let before = self.looks.iter().rev().find(last).copied();
         self.looks.push((after_s, worth));
         let (before_s, before) = before?;
         let rate = (worth - before) / (after_s - before_s);

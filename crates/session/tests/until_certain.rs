@@ -21,7 +21,8 @@ fn small() -> Campaign {
             "speeds: [50 krpm, 80 krpm, 110 krpm, 140 krpm]",
         ),
         ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.5, 1.0]"),
-        ("required_sigma_eta: 0.9 %", "required_sigma_eta: 1.5 %"),
+        // Eight points know the shared numbers badly: 120 s at each reach 4 points.
+        ("required_sigma_eta: 0.9 %", "required_sigma_eta: 5 %"),
         ("  dwell: 120 s ", "  ends: when_certain\n  dwell: 120 s "),
     ])
 }

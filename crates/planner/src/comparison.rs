@@ -227,6 +227,9 @@ mod tests {
         assert_eq!(compared(&orders[1].1).beaten_by().map(|(name, _)| name.as_str()), Some("information"));
         // What is better by less than a forecast knows is not better.
         assert_eq!(compared(&way(500.0, 0.009, 30.2)).beaten_by(), None);
-        assert_eq!(compared(&WayOfMapping { open_rms_error_eta: None, ..way(0.0, 0.0, 90.0) }).beaten_by(), None);
+        assert_eq!(
+            compared(&WayOfMapping { open_rms_error_eta: None, ..way(0.0, 0.0, 90.0) }).beaten_by(),
+            None
+        );
     }
 }

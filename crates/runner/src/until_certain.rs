@@ -62,7 +62,9 @@ impl<'a> UntilCertain<'a> {
     /// Keeps what was read since the jump, and looks at it where it is time to.
     fn read(&mut self, batch: &SampleBatch) {
         // Steps that others put in between are none of these.
-        let Some(marker) = self.readings.steps.first().copied().filter(|_| self.now.is_some()) else { return };
+        let Some(marker) = self.readings.steps.first().copied().filter(|_| self.now.is_some()) else {
+            return;
+        };
         for column in &batch.columns {
             let series = self.readings.series.entry(column.channel).or_default();
             series.t_s.extend_from_slice(&batch.t_s);

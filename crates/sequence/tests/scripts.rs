@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
-    CommonErrors, DwellEnd, IdentifiedPoint, Limits, Method, OperatingPoint, SettleBands, StepKind, Timing, Verdict,
-    WindowRule,
+    CommonErrors, DwellEnd, IdentifiedPoint, Limits, Method, OperatingPoint, SettleBands, StepKind, Timing,
+    Verdict, WindowRule,
 };
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;

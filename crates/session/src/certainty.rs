@@ -190,7 +190,8 @@ impl DwellPrices {
 
     /// The dwells that a step may have, the shortest in which it comes to rest first.
     fn dwells_of(&self, planned: &Planned) -> Vec<Dwell> {
-        let at = |dwell_s: f64| self.information.of_forecast(&planned.forecast(dwell_s), &self.forecast_config);
+        let at =
+            |dwell_s: f64| self.information.of_forecast(&planned.forecast(dwell_s), &self.forecast_config);
         let of = |dwell_s: f64| {
             let (before, tells) = (at(dwell_s - LAST_S)?, at(dwell_s)?);
             let rate = (self.information.worth(&tells) - self.information.worth(&before)) / LAST_S;
@@ -223,9 +224,8 @@ impl DwellPrices {
     /// The highest price at which the required error is reached where the steps to come have these dwells to choose from; the
     /// lowest of all where it is not.
     fn highest(&self, tables: &[Vec<Dwell>]) -> f64 {
-        let reaches = |price: f64| {
-            self.error(&self.told_at(tables, price)).is_some_and(|error| error <= self.target)
-        };
+        let reaches =
+            |price: f64| self.error(&self.told_at(tables, price)).is_some_and(|error| error <= self.target);
         let (mut low, mut high) = (PRICES.0.ln(), PRICES.1.ln());
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
@@ -295,7 +295,9 @@ fn chosen(dwells: &[Dwell], price: f64) -> Option<&Dwell> {
 
 impl Certainty for DwellPrices {
     fn bounds(&mut self, step: &PlanStep) -> Option<DwellBounds> {
-        let open = |planned: &Planned| planned.told.is_none() && planned.step.to == step.to && planned.step.kind == step.kind;
+        let open = |planned: &Planned| {
+            planned.told.is_none() && planned.step.to == step.to && planned.step.kind == step.kind
+        };
         self.now = self.steps.iter().position(open);
         self.looks.clear();
         self.now?;

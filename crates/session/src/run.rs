@@ -24,7 +24,9 @@ use mapper_campaign::campaign::MapSource;
 use mapper_core::{Backend, Clock, Plan, Reaction, RigDescription, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
-use mapper_runner::{Deadlined, PlanSteps, RunEnd, RunError, RunObserver, StepSource, SurgeSearch, UntilCertain};
+use mapper_runner::{
+    Deadlined, PlanSteps, RunEnd, RunError, RunObserver, StepSource, SurgeSearch, UntilCertain,
+};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -154,7 +156,16 @@ impl<'s> Session<'s> {
         if let Some(broken_off) = &request.resume {
             broken_off.check(campaign, &plan, &Identity::of(campaign, &plan, &rig)?)?;
         }
-        Ok(PreparedRun { request, model, made, plan, scripted, backend, prices, steps_made: StepsMade::default() })
+        Ok(PreparedRun {
+            request,
+            model,
+            made,
+            plan,
+            scripted,
+            backend,
+            prices,
+            steps_made: StepsMade::default(),
+        })
     }
 
     /// Prepares and runs.

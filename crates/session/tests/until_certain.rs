@@ -55,7 +55,8 @@ fn a_run_keeps_its_bounds_says_why_each_step_ended_and_is_the_same_again() {
         let folder = tempfile::tempdir().unwrap();
         let outcome = session.run(RunRequest::new(&campaign, "", folder.path())).unwrap();
         let bytes = std::fs::read(&outcome.recording).unwrap();
-        let read = read_recording(&outcome.recording, &ChannelMap::native(), &ReadOptions::default()).unwrap();
+        let read =
+            read_recording(&outcome.recording, &ChannelMap::native(), &ReadOptions::default()).unwrap();
         let executed = std::fs::read(outcome.directory.join("executed_plan.json")).unwrap();
         (bytes, read.recording, serde_json::from_slice::<Plan>(&executed).unwrap())
     };
@@ -73,7 +74,9 @@ fn a_run_keeps_its_bounds_says_why_each_step_ended_and_is_the_same_again() {
         }
     }
     let told = |event: &&mapper_core::Event| {
-        event.kind == EventKind::Note && event.message.contains("is left after") && event.message.contains("points")
+        event.kind == EventKind::Note
+            && event.message.contains("is left after")
+            && event.message.contains("points")
     };
     assert_eq!(recording.events.iter().filter(told).count(), ended);
     assert!(ended > 0, "no step ended before its longest time");

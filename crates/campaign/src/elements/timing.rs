@@ -39,8 +39,14 @@ pub(crate) fn check(check: &mut Check<'_>) {
     }
     let method = check.text(&steps!["identification", "method"]);
     if let Some(other) = method.filter(|method| *method != "joint") {
-        let message = format!("what is known while a step goes on is that of `joint`, and the method is `{other}`");
-        check.note(FindingKind::Conflict, &path, message, "write `identification.method: joint`, or `ends: planned`");
+        let message =
+            format!("what is known while a step goes on is that of `joint`, and the method is `{other}`");
+        check.note(
+            FindingKind::Conflict,
+            &path,
+            message,
+            "write `identification.method: joint`, or `ends: planned`",
+        );
     } else if check.get(&steps!["sequence"]).is_some() {
         let message = "a sequence script ends its steps itself".to_owned();
         check.note(FindingKind::Conflict, &path, message, "leave `ends` or `sequence` out");

@@ -119,8 +119,7 @@ impl CampaignInformation {
 
     /// Scatter of T2 from sample to sample over what is declared.
     fn noise_ratio(&self, samples: &Samples) -> f64 {
-        let declared_k =
-            self.config.declared.get(&Channel::T2).map_or(0.0, |declared| declared.noise_sigma);
+        let declared_k = self.config.declared.get(&Channel::T2).map_or(0.0, |declared| declared.noise_sigma);
         let differences = samples.t2_k.windows(3).map(|three| three[0] - 2.0 * three[1] + three[2]);
         let found_k = robust_sigma(differences).unwrap_or(0.0) / SECOND_DIFFERENCE;
         if declared_k > 0.0 { found_k / declared_k } else { 1.0 }

@@ -106,6 +106,14 @@ fn orders_and_repeats_fit_the_rest() {
         "the error that it has to reach",
         "required_sigma_eta",
     );
+    one(
+        "timing: {dwell: 120 s}",
+        "timing: {dwell: 120 s, ends: when_certain}",
+        Kind::MissingKey,
+        "when_certain",
+        "the error that is to be reached",
+        "required_sigma_eta",
+    );
     let (text, _) = with(
         "campaign: short\n",
         "campaign: short\nrepeats: {jump: {from: {speed: 90 krpm, opening: 0.7}, to: {speed: 90000 rpm, opening: 0.7}}}\n",

@@ -94,7 +94,7 @@ pub use surge::{SurgeFoundBy, SurgeMark, SurgeSeek};
 pub use thermal_model::{
     ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
 };
-pub use timing::Timing;
+pub use timing::{DwellEnd, Timing};
 pub use visit_order::VisitOrder;
 pub use window_rule::WindowRule;
 pub use with_unit::{readable, temperature, with_unit};

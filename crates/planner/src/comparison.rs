@@ -49,7 +49,41 @@ pub struct Comparison {
     pub orders: Vec<(String, WayOfMapping)>,
 }
 
+impl WayOfMapping {
+    /// What is made small: gradients (with the sign turned), open error, minutes; `None` where one of them was not forecast.
+    fn costs(&self) -> Option<[f64; 3]> {
+        Some([-self.sum_gradient_k?, self.open_rms_error_eta?, self.minutes])
+    }
+}
+
+/// Figures that differ by less than this share are alike: what is forecast is known no better.
+const CLEARLY_RATIO: f64 = 0.02;
+
+/// Whether one way is nowhere worse than another, and somewhere clearly better.
+fn beats(one: &[f64], other: &[f64]) -> bool {
+    let by = || one.iter().zip(other).map(|(one, other)| (other - one) / other.abs());
+    by().all(|by| by >= -CLEARLY_RATIO) && by().any(|by| by > CLEARLY_RATIO)
+}
+
 impl Comparison {
+    /// The orders that no other beats in gradients, open error and minutes at once, the largest gradients first.
+    pub fn front(&self) -> Vec<&str> {
+        let known = || self.orders.iter().filter_map(|(name, way)| Some((name.as_str(), way.costs()?)));
+        let mut front: Vec<(&str, [f64; 3])> =
+            known().filter(|(_, costs)| !known().any(|(_, other)| beats(&other, costs))).collect();
+        front.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
+        front.into_iter().map(|(name, _)| name).collect()
+    }
+
+    /// An order that is forecast to err less than the plan and to take no longer, or to take less time and err no more; the best
+    /// one for the time it takes.
+    pub fn beaten_by(&self) -> Option<&(String, WayOfMapping)> {
+        let [_, error, minutes] = self.proposed.costs()?;
+        self.orders.iter().find(|(_, way)| {
+            way.costs().is_some_and(|[_, other, others]| beats(&[other, others], &[error, minutes]))
+        })
+    }
+
     /// The way of an order, by its name in campaigns.
     pub fn of_order(&self, name: &str) -> Option<&WayOfMapping> {
         self.orders.iter().find(|(other, _)| other == name).map(|(_, way)| way)
@@ -156,4 +190,46 @@ fn conventional(
         rms_error_eta: rms(&errors),
         open_rms_error_eta: None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn way(sum_gradient_k: f64, open: f64, minutes: f64) -> WayOfMapping {
+        WayOfMapping {
+            order: Vec::new(),
+            minutes,
+            sum_gradient_k: Some(sum_gradient_k),
+            worst_error_eta: None,
+            rms_error_eta: None,
+            open_rms_error_eta: Some(open),
+        }
+    }
+
+    #[test]
+    fn the_front_has_what_nothing_beats_and_a_beaten_plan_is_told() {
+        let orders = [
+            ("information", way(500.0, 0.009, 30.0)),
+            ("sum_gradient", way(1000.0, 0.009, 40.0)),
+            // Its error is smaller by less than a forecast knows.
+            ("greedy", way(900.0, 0.00899, 45.0)),
+            ("speed_lines", way(400.0, 0.009, 70.0)),
+        ];
+        let compared = |proposed: &WayOfMapping| Comparison {
+            proposed: proposed.clone(),
+            conventional: way(0.0, 0.02, 120.0),
+            orders: orders.iter().map(|(name, way)| ((*name).to_owned(), way.clone())).collect(),
+        };
+        assert_eq!(compared(&orders[0].1).front(), ["sum_gradient", "information"]);
+        assert_eq!(compared(&orders[0].1).beaten_by(), None);
+        // Larger gradients are no use of their own: what a plan is for is the error in its time.
+        assert_eq!(compared(&orders[1].1).beaten_by().map(|(name, _)| name.as_str()), Some("information"));
+        // What is better by less than a forecast knows is not better.
+        assert_eq!(compared(&way(500.0, 0.009, 30.2)).beaten_by(), None);
+        assert_eq!(
+            compared(&WayOfMapping { open_rms_error_eta: None, ..way(0.0, 0.0, 90.0) }).beaten_by(),
+            None
+        );
+    }
 }

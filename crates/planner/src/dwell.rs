@@ -12,8 +12,8 @@ use mapper_core::{PlanStep, StepKind, WindowRule};
 /// Time at the settled point, s, however certain it is before, and how much later than forecast the rig may settle.
 const AT_POINT_S: f64 = 10.0;
 const LATER_S: f64 = 2.0;
-/// Shortest step, s.
-const SHORTEST_S: f64 = 20.0;
+/// Shortest step whose dwell is chosen, s.
+pub const SHORTEST_S: f64 = 20.0;
 /// Forecasts that are made where the time is to be found closely.
 pub(crate) const FORECASTS: usize = 5;
 /// The required error counts as reached up to this multiple of it.
@@ -66,7 +66,7 @@ pub(crate) fn walk_until_certain(
 
 /// The dwell of each step, s; repeats compare when they last equally long.
 fn dwells_s(steps: &[PlanStep], route: Route<'_>, time_s: f64, longest_s: f64) -> Vec<f64> {
-    let mut dwells_s: Vec<f64> = steps.iter().map(|step| dwell_s(step, time_s, longest_s)).collect();
+    let mut dwells_s: Vec<f64> = steps.iter().map(|step| rested_dwell_s(step, time_s, longest_s)).collect();
     let is_repeat =
         |i: &usize| steps[*i].kind == StepKind::Repeat && Some(route.visits[*i].index) == route.repeated;
     let repeats: Vec<usize> = (0..steps.len()).filter(is_repeat).collect();
@@ -75,8 +75,8 @@ fn dwells_s(steps: &[PlanStep], route: Route<'_>, time_s: f64, longest_s: f64) -
     dwells_s
 }
 
-/// `time_s`, or what the step needs to have settled in good time before its end.
-fn dwell_s(step: &PlanStep, time_s: f64, longest_s: f64) -> f64 {
+/// `time_s`, or what the step needs to have settled in good time before its end, by its forecast, s.
+pub fn rested_dwell_s(step: &PlanStep, time_s: f64, longest_s: f64) -> f64 {
     let Some(settle_s) = step.predicted.settle_s else { return longest_s };
     let rests = |dwell_s: &f64| {
         let rest_s = WindowRule::rest_at_end_s(*dwell_s).max(AT_POINT_S - LATER_S);

@@ -30,6 +30,8 @@ pub fn comparison_json(comparison: &Comparison) -> Value {
         "proposed": entry(&comparison.proposed),
         "conventional": entry(&comparison.conventional),
         "orders": orders,
+        "front": comparison.front(),
+        "beaten_by": comparison.beaten_by().map(|(name, _)| name),
     })
 }
 
@@ -59,5 +61,24 @@ pub fn comparison_text(comparison: &Comparison) -> String {
         text,
         "Orders: the best for the time it takes first. Open: where alpha_A, probe and direction factor have to be found. Conventional: T2 and housing must drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is that of heat transfer and of the same offsets."
     );
+    let front = comparison.front();
+    if front.len() > 1 {
+        let _ = writeln!(
+            text,
+            "No other order beats these in gradients, open error and minutes at once, the largest gradients first: {}.",
+            front.join(", ")
+        );
+    }
+    if let Some((name, way)) = comparison.beaten_by() {
+        let proposed = &comparison.proposed;
+        let _ = writeln!(
+            text,
+            "`order: {name}` is forecast to do better than this plan: open {} points in {:.0} min, against {} in {:.0} min.",
+            percent(way.open_rms_error_eta, 2),
+            way.minutes,
+            percent(proposed.open_rms_error_eta, 2),
+            proposed.minutes
+        );
+    }
     text
 }

@@ -147,6 +147,10 @@ impl StepSource for DriftWatch<'_> {
         Ok(next)
     }
 
+    fn begins(&mut self, marker: &StepMarker) {
+        self.inner.begins(marker);
+    }
+
     fn on_batch(&mut self, batch: &SampleBatch) -> bool {
         for (index, t_s) in batch.t_s.iter().enumerate() {
             let value = |channel| batch.column(channel).and_then(|values| values.get(index)).copied();

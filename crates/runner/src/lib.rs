@@ -22,6 +22,7 @@ mod source;
 mod speed_control;
 mod surge_search;
 mod surge_watch;
+mod until_certain;
 mod way_out;
 
 pub use batch_watch::BatchWatch;
@@ -40,3 +41,4 @@ pub use source::{PlanSteps, StepSource, StepSourceError};
 pub use speed_control::{ResponseAt, SpeedControl, SpeedControlLimits};
 pub use surge_search::{Held, Hold, SurgeSearch};
 pub use surge_watch::SurgeWatch;
+pub use until_certain::{Certainty, DwellBounds, UntilCertain};

@@ -244,6 +244,7 @@ impl Run<'_, '_> {
             (self.told.step_since_s, self.told.aim) = (Some(self.now_s), Some(step.to));
             self.reached.clear();
             self.with.observer.on_step_start(&marker)?;
+            self.with.steps.begins(&marker);
             let watched = self.watch(marker.end_s, true, true);
             let watched = watched.and_then(|()| {
                 self.end()?;

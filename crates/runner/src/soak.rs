@@ -34,6 +34,10 @@ impl StepSource for Soaked<'_> {
         Ok(next.map(|step| PlanStep { start_s: step.start_s + self.soak.duration_s, ..step }))
     }
 
+    fn begins(&mut self, marker: &StepMarker) {
+        self.inner.begins(marker);
+    }
+
     fn on_batch(&mut self, batch: &SampleBatch) -> bool {
         self.inner.on_batch(batch)
     }

@@ -36,6 +36,9 @@ pub trait StepSource {
     /// [`StepSourceError`] ends the run in its safe state.
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError>;
 
+    /// The step that was handed out last begins with its jump; again where a guard has it made again. Nothing by default.
+    fn begins(&mut self, _marker: &StepMarker) {}
+
     /// Looks at new samples, warm-up included; true ends the current step before its time. Never does by default.
     fn on_batch(&mut self, _batch: &SampleBatch) -> bool {
         false

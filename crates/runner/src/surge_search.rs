@@ -308,6 +308,12 @@ impl StepSource for SurgeSearch<'_> {
         Ok(next)
     }
 
+    fn begins(&mut self, marker: &StepMarker) {
+        if self.approach.is_none() {
+            self.inner.begins(marker);
+        }
+    }
+
     fn on_batch(&mut self, batch: &SampleBatch) -> bool {
         match &mut self.approach {
             None => self.inner.on_batch(batch),

@@ -2,7 +2,8 @@
 
 use crate::declared::identification_with;
 use crate::fusing::{Fused, fused, recordings};
-use crate::planning::{nominal_model, plan, with_plan_request};
+use crate::planned::plan;
+use crate::planning::{nominal_model, with_plan_request};
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;

@@ -33,12 +33,14 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod certainty;
 mod declared;
 mod drift;
 mod drive;
 mod error;
 mod estimates;
 mod event;
+mod executed;
 mod files;
 mod fusing;
 mod gap;
@@ -51,6 +53,7 @@ mod nightly;
 mod nightly_row;
 mod nightly_run;
 mod observers;
+mod planned;
 mod planning;
 mod predicted_method;
 mod preflight;
@@ -73,6 +76,7 @@ mod transient;
 mod twin_campaign;
 mod twin_files;
 
+pub use certainty::retimed;
 pub use declared::identification;
 pub use drift::Drift;
 pub use drive::{Pace, drive, drive_paced, soak_s};
@@ -85,7 +89,8 @@ pub use inspected::{Inspected, inspect_log};
 pub use map_file::{write_map, write_map_fitted_if_needed};
 pub use mapper_runner::Operator;
 pub use nightly::PreparedNight;
-pub use planning::{nominal_model, plan, with_plan_request};
+pub use planned::plan;
+pub use planning::{nominal_model, with_plan_request};
 pub use program::PROGRAM;
 pub use prospects::Prospects;
 pub use recorded::{Recorded, channel_map};

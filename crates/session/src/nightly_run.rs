@@ -6,7 +6,7 @@ use crate::nightly_row::{figures, point_rows};
 use crate::observers::Recorder;
 use crate::program::PROGRAM;
 use crate::recorded::Recorded;
-use crate::{ErrorKind, Session, SessionError, planning, run_directory};
+use crate::{ErrorKind, Session, SessionError, planned, run_directory};
 use mapper_campaign::Campaign;
 use mapper_core::Plan;
 use mapper_history::{RunKey, RunRow};
@@ -46,7 +46,7 @@ impl NightlyRun {
     }
 
     fn fill(&self, row: &mut RunRow, session: &Session<'_>, directory: &Path) -> Result<(), SessionError> {
-        let plan = planning::plan(&self.campaign, &self.model)?;
+        let plan = planned::plan(&self.campaign, &self.model)?;
         row.campaign_sha256 = plan.made_from.campaign_sha256.clone();
         row.model_sha256 = plan.made_from.model_sha256.clone();
         let recording = directory.join(run_directory::RECORDING);

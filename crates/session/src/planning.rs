@@ -1,13 +1,13 @@
-//! From a campaign to its plan.
+//! What the plan of a campaign is made from.
 
 use crate::SessionError;
 use crate::declared::identification;
 use crate::predicted_method::{Dynamic, Joint};
 use mapper_campaign::Campaign;
-use mapper_core::{JointSettings, Method, Plan};
-use mapper_identify::{ZeroSettings, expected_after_zero};
+use mapper_core::{JointSettings, Method};
+use mapper_identify::{IdentifyConfig, ZeroSettings, expected_after_zero};
 use mapper_physics::model::Model;
-use mapper_planner::{PlanRequest, PredictedMethod, make_plan};
+use mapper_planner::{PlanRequest, PredictedMethod};
 
 /// The nominal model of a campaign.
 ///
@@ -15,14 +15,6 @@ use mapper_planner::{PlanRequest, PredictedMethod, make_plan};
 /// [`SessionError::Model`] where the map cannot be read; a checked campaign has none of that.
 pub fn nominal_model(campaign: &Campaign) -> Result<Model, SessionError> {
     Ok(mapper_campaign::nominal_model(campaign)?)
-}
-
-/// The plan of a campaign with a grid.
-///
-/// # Errors
-/// [`SessionError::Plan`] where points cannot be reached or no order is allowed.
-pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
-    with_plan_request(campaign, model, |request| Ok(make_plan(request)?))
 }
 
 /// Does something with what the plan of a campaign is made from.
@@ -62,14 +54,19 @@ pub fn with_plan_request<T, E: From<SessionError>>(
 /// The campaign's method as the planner sees it, after the zero that the campaign asks for; `None` for a method that waits
 /// until nothing moves.
 fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
-    let config = identification(campaign);
-    let config = match campaign.zero {
-        Some(soak) => expected_after_zero(config, &ZeroSettings::from(soak), soak.duration_s),
-        None => config,
-    };
+    let config = identification_after_zero(campaign);
     match campaign.identification.method {
         Method::Joint if config.joint != JointSettings::all_off() => Some(Box::new(Joint::of(config))),
         Method::Dynamic | Method::Joint => Some(Box::new(Dynamic::of(config))),
         Method::Steady | Method::Imported => None,
+    }
+}
+
+/// How the campaign's recording will be identified, as far as it is known before its zero.
+pub(crate) fn identification_after_zero(campaign: &Campaign) -> IdentifyConfig {
+    let config = identification(campaign);
+    match campaign.zero {
+        Some(soak) => expected_after_zero(config, &ZeroSettings::from(soak), soak.duration_s),
+        None => config,
     }
 }

@@ -105,7 +105,7 @@ fn result(found: Expected) -> MethodResult {
     }
 }
 
-fn expected_row(row: &ForecastRow) -> ExpectedRow {
+pub(crate) fn expected_row(row: &ForecastRow) -> ExpectedRow {
     ExpectedRow {
         t_s: row.t_s,
         speed_rpm: row.speed_rpm,

@@ -1,7 +1,7 @@
 //! What is known of a campaign before it is run: how long it takes, and what of it will come to nothing.
 
 use crate::drive::soak_s;
-use crate::planning::plan;
+use crate::planned::plan;
 use crate::rehearsal::rehearse;
 use crate::{Session, SessionError};
 use mapper_campaign::{Campaign, Concern};

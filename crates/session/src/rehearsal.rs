@@ -1,7 +1,7 @@
 //! A sequence script rehearsed on the nominal machine: what fails there never touches the rig.
 
 use crate::drive::drive;
-use crate::planning::plan;
+use crate::planned::plan;
 use crate::scripted_steps::ScriptedSteps;
 use crate::{Session, SessionError};
 use mapper_campaign::Campaign;

@@ -58,6 +58,7 @@ impl BrokenOff {
             ("sequence", campaign.sequence.is_some()),
             ("surge_search", campaign.surge_search.is_some()),
             ("drift", campaign.on_drift.is_some()),
+            ("timing.ends", !campaign.timing.ends.is_planned()),
         ] {
             if set {
                 return why(format!(

@@ -1,13 +1,16 @@
 //! A whole run: plan, drive the rig, record, identify, assemble, report.
 
+use crate::certainty::DwellPrices;
 use crate::declared::identification;
 use crate::drive::{Pace, drive_paced, soak_s};
 use crate::estimates::Estimates;
+use crate::executed::StepsMade;
 use crate::files::{json_text, write_new};
 use crate::guards::{check_guards, drift_watch};
 use crate::journal::{Entry, Identity, Journal};
 use crate::observers::{Recorder, Teller};
-use crate::planning::{nominal_model, plan};
+use crate::planned::plan;
+use crate::planning::nominal_model;
 use crate::preflight::{check_room, check_setpoints};
 use crate::program::PROGRAM;
 use crate::rehearsal::rehearse;
@@ -23,7 +26,9 @@ use mapper_campaign::campaign::MapSource;
 use mapper_core::{Backend, Clock, Plan, Reaction, RigDescription, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
-use mapper_runner::{Deadlined, PlanSteps, RunEnd, RunError, RunObserver, StepSource, SurgeSearch};
+use mapper_runner::{
+    Deadlined, PlanSteps, RunEnd, RunError, RunObserver, StepSource, SurgeSearch, UntilCertain,
+};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -77,6 +82,9 @@ pub struct PreparedRun<'a> {
     plan: Plan,
     scripted: Option<ScriptedSteps>,
     backend: Box<dyn Backend>,
+    /// What ends the steps, where it is not the plan.
+    prices: Option<DwellPrices>,
+    steps_made: StepsMade,
 }
 
 /// How a run ended. Whatever ended it, the rig is safe and what was recorded is kept.
@@ -149,6 +157,7 @@ impl<'s> Session<'s> {
             Some(source) if request.plan.is_none() => Some(ScriptedSteps::new(campaign, &model, source)?),
             _ => None,
         };
+        let prices = DwellPrices::of(campaign, &model, &plan)?;
         let backend = self.registry.make_backend(campaign, &model)?;
         let rig = backend.describe();
         check_guards(campaign, &rig)?;
@@ -156,7 +165,16 @@ impl<'s> Session<'s> {
         if let Some(broken_off) = &request.resume {
             broken_off.check(campaign, &plan, &Identity::of(campaign, &plan, &rig)?)?;
         }
-        Ok(PreparedRun { request, model, made, plan, scripted, backend })
+        Ok(PreparedRun {
+            request,
+            model,
+            made,
+            plan,
+            scripted,
+            backend,
+            prices,
+            steps_made: StepsMade::default(),
+        })
     }
 
     /// Prepares and runs.
@@ -318,6 +336,14 @@ impl PreparedRun<'_> {
             }
             (None, None) => &mut planned,
         };
+        let mut certain;
+        let steps: &mut dyn StepSource = match &mut self.prices {
+            None => steps,
+            Some(prices) => {
+                certain = UntilCertain::new(steps, prices);
+                &mut certain
+            }
+        };
         let hold = |point| hold_near_surge(campaign, &self.model, point);
         let mut search;
         let steps: &mut dyn StepSource = match campaign.surge_search {
@@ -336,7 +362,7 @@ impl PreparedRun<'_> {
         let (end, drifted) = std::thread::scope(|scope| {
             let begin = || Estimates::begin(scope, identification(campaign), session.on_event);
             let mut estimates = session.estimates.then(begin);
-            let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut teller];
+            let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut teller, &mut self.steps_made];
             observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
             match drift_watch(campaign, steps) {
                 Ok(mut watch) => {
@@ -358,10 +384,13 @@ impl PreparedRun<'_> {
         (end, finished, doubt)
     }
 
-    /// The plan as it was run; a script's steps are written beside it.
-    fn executed(&mut self, directory: &Path) -> Result<Plan, SessionError> {
-        let Some(steps) = &self.scripted else { return Ok(self.plan.clone()) };
-        let executed = steps.executed(&self.made);
+    /// The plan as it was run; where it was not all known before, it is written beside it.
+    fn executed(&self, directory: &Path) -> Result<Plan, SessionError> {
+        let executed = match (&self.scripted, &self.prices) {
+            (Some(steps), _) => steps.executed(&self.made),
+            (None, Some(_)) => self.steps_made.plan(&self.plan),
+            (None, None) => return Ok(self.plan.clone()),
+        };
         write_new(&directory.join(run_directory::EXECUTED), json_text(&executed)?.as_bytes())?;
         Ok(executed)
     }

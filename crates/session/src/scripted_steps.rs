@@ -3,7 +3,7 @@
 use crate::SessionError;
 use crate::declared::identification;
 use crate::estimates::{keep, two_last_steps};
-use crate::planning::plan;
+use crate::planned::plan;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
 use mapper_core::{Method, Plan, PlanStep, Recording, SampleBatch, StepMarker};

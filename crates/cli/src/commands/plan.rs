@@ -13,7 +13,7 @@ use mapper_physics::model::Model;
 use mapper_planner::PlanRequest;
 use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
 use mapper_session::{
-    Rehearsal, Session, SessionError, json_text, nominal_model, rehearse, remark_surge_search,
+    Rehearsal, Session, SessionError, json_text, nominal_model, rehearse, remark_surge_search, retimed,
     with_plan_request,
 };
 use std::path::PathBuf;
@@ -87,6 +87,7 @@ impl Plan {
             };
             let effort = self.effort.unwrap_or(request.effort);
             let plan = mapper_planner::make_plan(&PlanRequest { effort, appended, ..request.clone() })?;
+            let plan = retimed(&campaign, request, plan)?;
             let compared = self.compare || self.svg.is_some();
             let comparison = compared.then(|| mapper_planner::compare(request, &plan)).transpose()?;
             Ok::<_, SessionError>((plan, comparison))

@@ -28,7 +28,7 @@ use mapper_physics::air;
 /// operating point settles. Where noise could pass for a slow probe the seconds right after the jump are needed, which
 /// tell the two apart by tens of kelvin; without noise they only show where the surface is none.
 pub(crate) const START_S: f64 = 3.0;
-const START_WITH_NOISE_S: f64 = 1.5;
+pub(crate) const START_WITH_NOISE_S: f64 = 1.5;
 /// Minimum spread of the points' efficiencies about the surface: maps are not polynomials.
 const LEAST_SURFACE_SIGMA: f64 = 3e-3;
 /// Share of what the surface moves a prediction by that is wrong: surfaces through a few points bend otherwise than maps.

@@ -6,17 +6,18 @@
 //! the slope each step counts for itself: that makes orders comparable step by step.
 
 use crate::IdentifyConfig;
+use crate::dynamic::Estimate;
 use crate::joint::expected::{ExpectedStep, condensed, expected_problem};
 use crate::joint::explained::Explained;
 use crate::joint::model::Setting;
 use crate::joint::parameters::{LN_DEVIATION, Prior, SHARED, SharedVector};
 use crate::joint::parsimony::NO_EXTRA;
 use crate::joint::rows::StepRows;
-use crate::joint::solve::Problem;
+use crate::joint::solve::{Fisher, Problem};
 use crate::joint::start;
 use crate::joint::surface::SurfaceScale;
 use mapper_numerics::statistics::mean;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// A planned campaign, and what more information would be worth to it.
 #[derive(Debug)]
@@ -75,9 +76,23 @@ impl StepWorth {
     /// What a step is worth, fraction^2: by how much it makes all points more certain, less the variance of its own point. The
     /// sum over the steps of a campaign differs from minus the sum of its variances by what the slope does not know.
     pub fn of(&self, step: &ExpectedStep<'_>) -> Option<f64> {
-        let rows = [condensed(0, step, &self.config)?];
-        let mut member =
-            start::member(&rows[0], Some(&step.estimate()), &self.scale, self.mean_eta, &self.config);
+        let rows = condensed(0, step, &self.config)?;
+        let fisher = self.fisher(&[rows], &step.estimate())?;
+        let (own, answer) = fisher.steps.first()?;
+        let worth = self.of_information(&fisher.information, *own, answer);
+        worth.is_finite().then_some(worth)
+    }
+
+    /// The same of a step that brings this information; `own`: the variance of its efficiency if all that is shared were known,
+    /// which answers to what is shared by `answer`.
+    pub(crate) fn of_information(&self, information: &DMatrix<f64>, own: f64, answer: &DVector<f64>) -> f64 {
+        let variance = own + answer.dot(&(&self.covariance * answer));
+        self.slope.dot(information) - variance
+    }
+
+    /// What one step tells, where the campaign's shared numbers stand. `about`: where its own ones do.
+    pub(crate) fn fisher(&self, rows: &[StepRows; 1], about: &Estimate) -> Option<Fisher> {
+        let mut member = start::member(&rows[0], Some(about), &self.scale, self.mean_eta, &self.config);
         if self.setting.with_law {
             member.priors[LN_DEVIATION].sigma = self.law_sigma;
         }
@@ -95,11 +110,12 @@ impl StepWorth {
             inlet_sought: false,
             inlet: None,
         };
-        start::weigh(&mut problem, &rows, &self.config);
-        let fisher = problem.fisher()?;
-        let (own, answer) = fisher.steps.first()?;
-        let variance = own + answer.dot(&(&self.covariance * answer));
-        let worth = self.slope.dot(&fisher.information) - variance;
-        worth.is_finite().then_some(worth)
+        start::weigh(&mut problem, rows, &self.config);
+        problem.fisher()
+    }
+
+    /// What is known beforehand of the numbers that [`StepWorth::fisher`] speaks of: one over the variance of each.
+    pub(crate) fn known_beforehand(&self, unknown: &[usize]) -> Vec<f64> {
+        unknown.iter().map(|index| self.priors[*index].weight()).collect()
     }
 }

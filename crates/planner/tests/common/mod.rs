@@ -1,6 +1,6 @@
 //! The grid of docs/planner.md, a request, and a housing with one time constant per point.
 
-use mapper_core::{Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
+use mapper_core::{DwellEnd, Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
@@ -26,7 +26,7 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
         follow_outlet: FollowOutlet::default(),
         points,
         order,
-        timing: Timing { warm_up_s: 3600.0, dwell_s: 120.0, cool_down_s: 0.0 },
+        timing: Timing { warm_up_s: 3600.0, dwell_s: 120.0, cool_down_s: 0.0, ends: DwellEnd::Planned },
         window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 },
         settle_bands: SettleBands::default(),
         limits: Limits {

@@ -1,0 +1,343 @@
+//! When a step has told enough: what more time there would tell of all points, against what the time tells elsewhere.
+//!
+//! Each second at a point makes all points more certain, by less the longer the machine is there. There is one price, the
+//! least that a second has to tell, at which the steps that were made and those that are still to come reach the required error
+//! together; a step ends when its seconds tell less. Before the run the price follows from the forecast, and each step that has
+//! told more or less than was forecast moves it.
+
+use crate::SessionError;
+use crate::planning::{identification_after_zero, with_plan_request};
+use crate::predicted_method::expected_row;
+use mapper_campaign::Campaign;
+use mapper_core::{DwellEnd, Plan, PlanStep, Recording, StepKind, StepMarker};
+use mapper_identify::{
+    CampaignInformation, ExpectedRow, ExpectedStep, IdentifyConfig, PressureTap, StepInformation,
+};
+use mapper_physics::forecast::ForecastRow;
+use mapper_physics::model::Model;
+use mapper_planner::{PlanRequest, REACHED_RATIO, SHORTEST_S, forecast_longer, rested_dwell_s, with_dwells};
+use mapper_runner::{Certainty, DwellBounds};
+
+/// How far apart the dwells lie that are tried, s, and most of them for a step.
+const APART_S: f64 = 2.0;
+/// Last part of a step by which it is judged what its seconds tell, s: over less, noise has the say.
+const LAST_S: f64 = 6.0;
+const MOST_TRIED: f64 = 60.0;
+/// How often dwells and the errors that they are forecast to give are brought together.
+const ROUNDS: usize = 3;
+/// Halvings of the logarithm of the price, and the prices between which it is sought, fraction^2/s.
+const HALVINGS: usize = 40;
+const PRICES: (f64, f64) = (1e-16, 1.0);
+/// Noise over the declared one with which the shortest and the longest run are forecast.
+const LESS_NOISE_RATIO: f64 = 0.8;
+const MORE_NOISE_RATIO: f64 = 1.2;
+/// More time of which an event tells what it would give, s.
+const MORE_S: f64 = 10.0;
+
+/// A dwell that a step may have.
+#[derive(Debug, Clone)]
+struct Dwell {
+    dwell_s: f64,
+    tells: StepInformation,
+    /// What each of its last seconds tells, fraction^2/s.
+    rate: f64,
+}
+
+/// A step of the plan.
+#[derive(Debug)]
+struct Planned {
+    step: PlanStep,
+    rows: Vec<ForecastRow>,
+    expected: Vec<ExpectedRow>,
+    /// What it told, once it is over; what is skipped told nothing.
+    told: Option<Option<StepInformation>>,
+}
+
+impl Planned {
+    /// The step as forecast, with this dwell.
+    fn forecast(&self, dwell_s: f64) -> ExpectedStep<'_> {
+        let count = self.expected.partition_point(|row| row.t_s <= dwell_s + 1e-6);
+        let (eta, h_w_m2k) = match count.checked_sub(1).and_then(|last| self.rows.get(last)) {
+            Some(end) => (end.efficiency, end.h_w_m2k),
+            None => (0.0, 0.0),
+        };
+        ExpectedStep { rows: &self.expected[..count], eta, h_w_m2k }
+    }
+}
+
+/// The price of a second, and all that it follows from.
+#[derive(Debug)]
+pub(crate) struct DwellPrices {
+    information: CampaignInformation,
+    forecast_config: IdentifyConfig,
+    steps: Vec<Planned>,
+    /// For each step the dwells that it may have; one alone for a step that lasts as planned.
+    tables: Vec<Vec<Dwell>>,
+    longest_s: f64,
+    /// Error of all points, rms, that is to be reached, without what the map's smoothness says, fraction.
+    target: f64,
+    price: f64,
+    /// The step under way, and what it told at the looks so far: time, s, and worth.
+    now: Option<usize>,
+    looks: Vec<(f64, f64)>,
+}
+
+/// The plan with the dwells that its steps are expected to have, where they end when enough is known; unchanged where they do
+/// not, or where nothing can be forecast.
+///
+/// # Errors
+/// [`SessionError`] where the forecast fails.
+pub fn retimed(campaign: &Campaign, request: &PlanRequest<'_>, plan: Plan) -> Result<Plan, SessionError> {
+    let Some(required) = wanted(campaign) else { return Ok(plan) };
+    let (mut plan, mut between) = (plan, None);
+    for _ in 0..ROUNDS {
+        let Some(prices) = DwellPrices::about(campaign, request, &plan, required)? else { break };
+        between = Some([LESS_NOISE_RATIO, MORE_NOISE_RATIO].map(|ratio| prices.with_noise(ratio)));
+        plan = with_dwells(request, &plan, &prices.dwells_s(prices.price))?;
+        if plan.figures.open_rms_error_eta.is_some_and(|error| error <= REACHED_RATIO * required) {
+            break;
+        }
+    }
+    plan.remarks.extend(between.map(|between| remark(campaign, &plan, between)));
+    Ok(plan)
+}
+
+/// The error to be reached, where steps end when it is.
+fn wanted(campaign: &Campaign) -> Option<f64> {
+    let certain = campaign.timing.ends == DwellEnd::WhenCertain && campaign.sequence.is_none();
+    campaign.required_sigma_eta.filter(|_| certain)
+}
+
+fn remark(campaign: &Campaign, plan: &Plan, [low_s, high_s]: [f64; 2]) -> String {
+    let around_s = plan.warm_up_s + plan.cool_down_s;
+    let minutes = |steps_s: f64| (around_s + steps_s) / 60.0;
+    let most_s = plan.steps.iter().map(|step| longest_s(step, campaign)).sum::<f64>();
+    format!(
+        "each step ends when its readings have told enough: forecast {:.0} min, between {:.0} and {:.0} min where noise is a fifth less or \
+         more than declared, and never more than {:.0} min",
+        minutes(plan.steps.iter().map(|step| step.dwell_s).sum()),
+        minutes(low_s),
+        minutes(high_s),
+        minutes(most_s)
+    )
+}
+
+/// Longest time of a step, s.
+fn longest_s(step: &PlanStep, campaign: &Campaign) -> f64 {
+    if lasts_as_planned(step) { step.dwell_s } else { campaign.timing.dwell_s.max(step.dwell_s) }
+}
+
+/// Repeats compare when they last equally long.
+fn lasts_as_planned(step: &PlanStep) -> bool {
+    step.kind == StepKind::Repeat
+}
+
+impl DwellPrices {
+    /// For a plan of a campaign whose steps end when enough is known; `None` where they do not, or nothing can be forecast.
+    ///
+    /// # Errors
+    /// [`SessionError`] where the forecast fails.
+    pub(crate) fn of(campaign: &Campaign, model: &Model, plan: &Plan) -> Result<Option<Self>, SessionError> {
+        let Some(required) = wanted(campaign) else { return Ok(None) };
+        with_plan_request(campaign, model, |request| DwellPrices::about(campaign, request, plan, required))
+    }
+
+    fn about(
+        campaign: &Campaign,
+        request: &PlanRequest<'_>,
+        plan: &Plan,
+        required: f64,
+    ) -> Result<Option<Self>, SessionError> {
+        let longest_s = campaign.timing.dwell_s;
+        let config = identification_after_zero(campaign);
+        let total = PressureTap::Total;
+        let forecast_config = IdentifyConfig { inlet_tap: total, outlet_tap: total, ..config.clone() };
+        let rows = forecast_longer(request, plan, longest_s)?;
+        let planned = |(step, rows): (&PlanStep, Vec<ForecastRow>)| Planned {
+            step: step.clone(),
+            expected: rows.iter().map(expected_row).collect(),
+            rows,
+            told: None,
+        };
+        let steps: Vec<Planned> = plan.steps.iter().zip(rows).map(planned).collect();
+        let expected: Vec<ExpectedStep<'_>> =
+            steps.iter().map(|planned| planned.forecast(planned.step.dwell_s)).collect();
+        let about = CampaignInformation::about(&expected, &forecast_config, &config);
+        let Some((information, open)) = about.zip(plan.figures.open_rms_error_eta) else { return Ok(None) };
+        let as_planned: Vec<Option<StepInformation>> =
+            expected.iter().map(|step| information.of_forecast(step, &forecast_config)).collect();
+        drop(expected);
+        let (target, price) = (required, PRICES.0);
+        let mut prices = DwellPrices {
+            information,
+            forecast_config,
+            steps,
+            tables: Vec::new(),
+            longest_s,
+            target,
+            price,
+            now: None,
+            looks: Vec::new(),
+        };
+        let told: Vec<Option<&StepInformation>> = as_planned.iter().map(Option::as_ref).collect();
+        let Some(linear) = prices.error(&told) else { return Ok(None) };
+        // What smoothness says, and the method's own bias, are known of the plan as it stands.
+        prices.target = required * linear / open;
+        prices.tables = prices.steps.iter().map(|planned| prices.dwells_of(planned)).collect();
+        prices.settle();
+        Ok(Some(prices))
+    }
+
+    /// The dwells that a step may have, the shortest in which it comes to rest first.
+    fn dwells_of(&self, planned: &Planned) -> Vec<Dwell> {
+        let at =
+            |dwell_s: f64| self.information.of_forecast(&planned.forecast(dwell_s), &self.forecast_config);
+        let of = |dwell_s: f64| {
+            let (before, tells) = (at(dwell_s - LAST_S)?, at(dwell_s)?);
+            let rate = (self.information.worth(&tells) - self.information.worth(&before)) / LAST_S;
+            Some(Dwell { dwell_s, tells, rate })
+        };
+        if lasts_as_planned(&planned.step) {
+            return of(planned.step.dwell_s).into_iter().collect();
+        }
+        let longest_s = self.longest_s;
+        let shortest_s = rested_dwell_s(&planned.step, SHORTEST_S.min(longest_s), longest_s);
+        let apart_s = APART_S.max((longest_s - shortest_s) / MOST_TRIED);
+        let tried = (0..).map(|i| shortest_s + f64::from(i) * apart_s).take_while(|s| *s <= longest_s + 1e-6);
+        tried.filter_map(of).collect()
+    }
+
+    /// Error of the points that are measured, rms, fraction. One entry for each step; `None` tells nothing.
+    fn error(&self, told: &[Option<&StepInformation>]) -> Option<f64> {
+        let known = self.information.together(told.iter().copied().flatten())?;
+        let measured = self.steps.iter().zip(told).filter(|(planned, _)| planned.step.kind.measures());
+        let squares: Vec<f64> =
+            measured.filter_map(|(_, told)| Some(known.sigma_eta((*told)?).powi(2))).collect();
+        (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+    }
+
+    /// The dwells at a price, s.
+    fn dwells_s(&self, price: f64) -> Vec<f64> {
+        self.times_s(&self.tables, price).collect()
+    }
+
+    /// The highest price at which the required error is reached where the steps to come have these dwells to choose from; the
+    /// lowest of all where it is not.
+    fn highest(&self, tables: &[Vec<Dwell>]) -> f64 {
+        let reaches =
+            |price: f64| self.error(&self.told_at(tables, price)).is_some_and(|error| error <= self.target);
+        let (mut low, mut high) = (PRICES.0.ln(), PRICES.1.ln());
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if reaches(middle.exp()) { low = middle } else { high = middle }
+        }
+        low.exp()
+    }
+
+    /// What each step has told, or is to tell with these dwells at a price.
+    fn told_at<'a>(&'a self, tables: &'a [Vec<Dwell>], price: f64) -> Vec<Option<&'a StepInformation>> {
+        let of = |(planned, dwells): (&'a Planned, &'a Vec<Dwell>)| match &planned.told {
+            Some(told) => told.as_ref(),
+            None => chosen(dwells, price).map(|dwell| &dwell.tells),
+        };
+        self.steps.iter().zip(tables).map(of).collect()
+    }
+
+    fn settle(&mut self) {
+        self.price = self.highest(&self.tables);
+    }
+
+    /// Time of all steps together where noise is so many times the declared one, s.
+    fn with_noise(&self, ratio: f64) -> f64 {
+        let noisy = |dwell: &Dwell| Dwell {
+            dwell_s: dwell.dwell_s,
+            tells: dwell.tells.with_noise(ratio),
+            rate: dwell.rate / (ratio * ratio),
+        };
+        let tables: Vec<Vec<Dwell>> =
+            self.tables.iter().map(|dwells| dwells.iter().map(noisy).collect()).collect();
+        self.times_s(&tables, self.highest(&tables)).sum()
+    }
+
+    /// The dwell of each step at a price, s.
+    fn times_s(&self, tables: &[Vec<Dwell>], price: f64) -> impl Iterator<Item = f64> {
+        let of = move |(dwells, planned): (&Vec<Dwell>, &Planned)| {
+            chosen(dwells, price).map_or(planned.step.dwell_s, |dwell| dwell.dwell_s)
+        };
+        tables.iter().zip(&self.steps).map(of)
+    }
+
+    /// Why a step ends, with what is known and what more time would give.
+    fn reason(&self, now: usize, tells: &StepInformation, after_s: f64, rate: f64) -> Option<String> {
+        let mut told = self.told_at(&self.tables, self.price);
+        told[now] = Some(tells);
+        let own = self.information.together(told.iter().copied().flatten())?.sigma_eta(tells);
+        let error = self.error(&told)?;
+        let points = self.steps.iter().filter(|planned| planned.step.kind.measures()).count() as f64;
+        let lowers = |rate: f64| 1e2 * MORE_S * rate / (2.0 * points * error);
+        Some(format!(
+            "{} is left after {after_s:.0} s of at most {:.0} s: its efficiency is known to {:.2} points, all points to {:.2} (rms, steps \
+             to come as forecast; open); {MORE_S:.0} s more would take {:.4} points off that, and elsewhere {:.4}",
+            self.steps[now].step.to,
+            self.longest_s,
+            1e2 * own,
+            1e2 * error,
+            lowers(rate.max(0.0)),
+            lowers(self.price)
+        ))
+    }
+}
+
+/// The first dwell whose last seconds tell no more than they cost, or the longest.
+fn chosen(dwells: &[Dwell], price: f64) -> Option<&Dwell> {
+    dwells.iter().find(|dwell| dwell.rate <= price).or(dwells.last())
+}
+
+impl Certainty for DwellPrices {
+    fn bounds(&mut self, step: &PlanStep) -> Option<DwellBounds> {
+        let open = |planned: &Planned| {
+            planned.told.is_none() && planned.step.to == step.to && planned.step.kind == step.kind
+        };
+        self.now = self.steps.iter().position(open);
+        self.looks.clear();
+        self.now?;
+        (!lasts_as_planned(step)).then_some(DwellBounds {
+            // What seconds tell is a difference between looks.
+            first_look_s: (SHORTEST_S.min(self.longest_s) - LAST_S).max(0.0),
+            apart_s: APART_S.max(self.longest_s / MOST_TRIED),
+            longest_s: self.longest_s,
+        })
+    }
+
+    fn look(&mut self, readings: &Recording, marker: &StepMarker) -> Option<String> {
+        let now = self.now?;
+        let planned = self.steps.get(now)?;
+        let after_s = marker.end_s - marker.start_s;
+        let so_far = self.information.of_readings(readings, &planned.forecast(after_s))?;
+        let worth = self.information.worth(&so_far.tells);
+        let last = |look: &&(f64, f64)| look.0 <= after_s - LAST_S + 1e-6;
+        let before = self.looks.iter().rev().find(last).copied();
+        self.looks.push((after_s, worth));
+        let (before_s, before) = before?;
+        let rate = (worth - before) / (after_s - before_s);
+        if !(so_far.rests && after_s >= SHORTEST_S && rate <= self.price) {
+            return None;
+        }
+        self.reason(now, &so_far.tells, after_s, rate)
+    }
+
+    fn ended(&mut self, readings: &Recording, marker: &StepMarker) {
+        let Some(now) = self.now.take() else { return };
+        let planned = &self.steps[now];
+        let forecast = planned.forecast(marker.end_s - marker.start_s);
+        let told = self.information.of_readings(readings, &forecast).map(|so_far| so_far.tells);
+        self.steps[now].told = Some(told);
+        self.settle();
+    }
+
+    fn left_out(&mut self) {
+        let Some(now) = self.now.take() else { return };
+        self.steps[now].told = Some(None);
+        self.settle();
+    }
+}

@@ -1,6 +1,6 @@
 //! How the program speaks: colours, progress, JSON. Said once on the command line, for all commands.
 
-use clap::{ArgMatches, Args, ColorChoice, ValueEnum};
+use clap::{ArgMatches, Args, ColorChoice};
 use mapper_report::Paint;
 use mapper_terminal::{ColourChoice, Progress, ProgressManner, is_coloured};
 use std::ffi::OsString;
@@ -14,18 +14,8 @@ pub struct MannerArguments {
     #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t, help_heading = "Manner")]
     color: ColorChoice,
     /// Progress on standard error [default: a bar on a terminal, lines in a pipe, none with --json]
-    #[arg(long, global = true, value_enum, value_name = "FORM", help_heading = "Manner")]
-    progress: Option<Form>,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Form {
-    Bar,
-    /// A line per step
-    Lines,
-    /// A JSON object per line
-    Json,
-    Off,
+    #[arg(long, global = true, value_parser = ProgressManner::NAMES, value_name = "FORM", help_heading = "Manner")]
+    progress: Option<String>,
 }
 
 /// What was said.
@@ -53,12 +43,7 @@ pub fn keep(arguments: &MannerArguments, matches: &ArgMatches) {
         ColorChoice::Always => ColourChoice::Always,
         ColorChoice::Never => ColourChoice::Never,
     };
-    let progress = arguments.progress.map(|form| match form {
-        Form::Bar => ProgressManner::Bar,
-        Form::Lines => ProgressManner::Lines,
-        Form::Json => ProgressManner::Json,
-        Form::Off => ProgressManner::Quiet,
-    });
+    let progress = arguments.progress.as_deref().map(ProgressManner::named);
     let command = std::iter::successors(Some(matches), |of| of.subcommand().map(|(_, deeper)| deeper)).last();
     let json =
         command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));

@@ -19,7 +19,6 @@ pub struct Man {
 }
 
 impl Man {
-    /// Writes the pages.
     pub fn run(&self) -> Result<(), Failure> {
         let failed =
             |error| Failure::new(Code::Failure, format!("failed to write {}: {error}", self.out.display()));

@@ -1,7 +1,7 @@
 //! Why a command ended early, with what to print and what to return.
 
 use crate::exit_code::Code;
-use crate::{manner, output};
+use crate::manner;
 use mapper_blind::BlindError;
 use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
@@ -91,20 +91,16 @@ impl Failure {
         Failure { manner: Manner::Told, ..Failure::new(code, "") }
     }
 
-    /// Prints the message, with `--json` as an object where none was printed yet, and gives the exit code.
+    /// Prints the message to standard error and gives the exit code; `None` where nobody is left to tell: a normal end.
     #[allow(clippy::print_stderr)]
-    pub fn report(&self) -> ExitCode {
+    pub fn say(&self) -> Option<ExitCode> {
         match self.manner {
-            Manner::ClosedPipe => return ExitCode::SUCCESS,
+            Manner::ClosedPipe => return None,
             Manner::Told => {}
             Manner::Rendered => eprint!("{}", self.message),
             Manner::Sentence => eprintln!("mapper: {}", self.message),
         }
-        if manner::json() && !output::has_told() {
-            // A reader that has gone away is told nothing.
-            let _ = output::print_json(&self.json());
-        }
-        ExitCode::from(self.code as u8)
+        Some(ExitCode::from(self.code as u8))
     }
 
     /// Code, message, and what to do: what stands behind the message's last semicolon, or with the first mistake.
@@ -120,15 +116,6 @@ impl Failure {
         }
         value
     }
-}
-
-/// Arguments that could not be read, as an object on standard output and as usual on standard error.
-pub fn wrong_arguments(error: &clap::Error) -> ExitCode {
-    let _ = error.print();
-    let text = error.to_string();
-    let mut parts = text.trim_start_matches("error: ").splitn(2, "\n\n").map(str::trim);
-    let _ = output::print_json(&json!({ "code": 2, "message": parts.next(), "help": parts.next() }));
-    ExitCode::from(2)
 }
 
 impl From<SessionError> for Failure {

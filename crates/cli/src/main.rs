@@ -4,6 +4,7 @@
 //! `registry` alone names plug-ins.
 
 mod commands;
+mod ending;
 mod exit_code;
 mod failure;
 mod given;
@@ -39,12 +40,13 @@ fn main() -> ExitCode {
     match read {
         Ok((arguments, matches)) => {
             manner::keep(&arguments.manner, &matches);
+            manner::keep_commands(Arguments::command);
             match arguments.command.run() {
                 Ok(()) => ExitCode::SUCCESS,
-                Err(failure) => failure.report(),
+                Err(failure) => ending::failed(&failure),
             }
         }
-        Err(error) if error.use_stderr() && json => failure::wrong_arguments(&error),
+        Err(error) if error.use_stderr() && json => ending::wrong_arguments(&error),
         Err(error) => error.exit(),
     }
 }

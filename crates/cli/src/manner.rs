@@ -1,6 +1,6 @@
 //! How the program speaks: colours, progress, JSON. Said once on the command line, for all commands.
 
-use clap::{ArgMatches, Args, ValueEnum};
+use clap::{ArgMatches, Args, ColorChoice};
 use mapper_report::Paint;
 use mapper_terminal::{ColourChoice, Progress, ProgressManner, is_coloured};
 use std::ffi::OsString;
@@ -10,30 +10,12 @@ use std::sync::OnceLock;
 /// Options of every command.
 #[derive(Debug, Args)]
 pub struct MannerArguments {
-    /// When to colour
-    #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t = When::Auto, help_heading = "Manner")]
-    color: When,
+    /// When to colour; `auto`: on a terminal, unless NO_COLOR is set
+    #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t, help_heading = "Manner")]
+    color: ColorChoice,
     /// Progress on standard error [default: a bar on a terminal, lines in a pipe, none with --json]
-    #[arg(long, global = true, value_enum, value_name = "FORM", help_heading = "Manner")]
-    progress: Option<Form>,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum When {
-    /// On a terminal, unless NO_COLOR is set
-    Auto,
-    Always,
-    Never,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Form {
-    Bar,
-    /// A line per step
-    Lines,
-    /// A JSON object per line
-    Json,
-    Off,
+    #[arg(long, global = true, value_parser = ProgressManner::NAMES, value_name = "FORM", help_heading = "Manner")]
+    progress: Option<String>,
 }
 
 /// What was said.
@@ -45,6 +27,9 @@ struct Said {
     replaces: bool,
 }
 
+/// All commands with their options, as `main` has them.
+static COMMANDS: OnceLock<fn() -> clap::Command> = OnceLock::new();
+
 static SAID: OnceLock<Said> = OnceLock::new();
 
 fn said() -> Said {
@@ -54,16 +39,11 @@ fn said() -> Said {
 /// Keeps what was said, for all that is printed later.
 pub fn keep(arguments: &MannerArguments, matches: &ArgMatches) {
     let colour = match arguments.color {
-        When::Auto => ColourChoice::Auto,
-        When::Always => ColourChoice::Always,
-        When::Never => ColourChoice::Never,
+        ColorChoice::Auto => ColourChoice::Auto,
+        ColorChoice::Always => ColourChoice::Always,
+        ColorChoice::Never => ColourChoice::Never,
     };
-    let progress = arguments.progress.map(|form| match form {
-        Form::Bar => ProgressManner::Bar,
-        Form::Lines => ProgressManner::Lines,
-        Form::Json => ProgressManner::Json,
-        Form::Off => ProgressManner::Quiet,
-    });
+    let progress = arguments.progress.as_deref().map(ProgressManner::named);
     let command = std::iter::successors(Some(matches), |of| of.subcommand().map(|(_, deeper)| deeper)).last();
     let json =
         command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));
@@ -73,16 +53,26 @@ pub fn keep(arguments: &MannerArguments, matches: &ArgMatches) {
 }
 
 /// Whether arguments that could not be read ask for JSON and for no colours.
-pub fn of_raw(arguments: &[OsString]) -> (bool, clap::ColorChoice) {
+pub fn of_raw(arguments: &[OsString]) -> (bool, ColorChoice) {
     let given = |words: &[&str]| arguments.windows(words.len()).any(|window| window == words);
     let never = given(&["--color", "never"]) || given(&["--color=never"]);
     let always = given(&["--color", "always"]) || given(&["--color=always"]);
     let colour = match (never, always) {
-        (true, _) => clap::ColorChoice::Never,
-        (_, true) => clap::ColorChoice::Always,
-        _ => clap::ColorChoice::Auto,
+        (true, _) => ColorChoice::Never,
+        (_, true) => ColorChoice::Always,
+        _ => ColorChoice::Auto,
     };
     (given(&["--json"]), colour)
+}
+
+/// Keeps how all commands are listed, for completions and manual pages.
+pub fn keep_commands(commands: fn() -> clap::Command) {
+    let _ = COMMANDS.set(commands);
+}
+
+/// All commands with their options.
+pub fn commands() -> clap::Command {
+    COMMANDS.get().map_or_else(|| clap::Command::new("mapper"), |commands| commands())
 }
 
 /// Whether results are one JSON object.

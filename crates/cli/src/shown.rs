@@ -16,7 +16,6 @@ pub struct ShownArguments {
 }
 
 impl ShownArguments {
-    /// With the colours of standard output.
     pub fn shown(&self) -> Shown {
         Shown { full: self.full, truth: self.truth, paint: manner::paint() }
     }

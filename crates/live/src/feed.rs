@@ -1,6 +1,7 @@
 //! From what the session tells to what browsers are shown.
 
-use crate::live::{Asked, LiveRun};
+use crate::asked::Asked;
+use crate::live_run::LiveRun;
 use crate::state::{EVENTS_MAX, Now, POINTS_MAX, Reading, State, Step, TRACE_ROWS, Told, Traced, Units};
 use mapper_core::{Channel, PlanStep, SignalGuard, StepMarker};
 use mapper_page::{live_point, planned};

@@ -7,11 +7,15 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod access;
+mod asked;
 mod feed;
 mod hub;
 mod live;
+mod live_run;
 mod request;
 mod server;
 mod state;
 
-pub use live::{Asked, Live, LiveError, LiveRun};
+pub use asked::Asked;
+pub use live::{Live, LiveError};
+pub use live_run::LiveRun;

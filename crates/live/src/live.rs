@@ -1,15 +1,15 @@
 //! The page of a run: opened before it, told while it goes on, closed after it.
 
 use crate::access::Access;
+use crate::asked::Asked;
 use crate::feed::Feed;
 use crate::hub::Hub;
+use crate::live_run::LiveRun;
 use crate::server::{Served, serve};
-use mapper_campaign::Campaign;
-use mapper_core::Plan;
 use mapper_page::live_page;
-use mapper_session::{Operator, SessionEvent};
+use mapper_session::SessionEvent;
 use std::net::{SocketAddr, TcpListener};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -39,35 +39,6 @@ pub enum LiveError {
     /// The page could not be made: a fault of the program.
     #[error("failed to write the live page: {0}")]
     Page(#[from] serde_json::Error),
-}
-
-/// What a button asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asked {
-    /// Stay at this step.
-    Hold,
-    /// Let it end.
-    GoOn,
-    /// Stop the run at the end of the step.
-    StopAfterStep,
-    /// Into the safe state, now.
-    SafeNow,
-}
-
-/// What is run, and how it is stopped.
-pub struct LiveRun<'a> {
-    /// The campaign.
-    pub campaign: &'a Campaign,
-    /// The plan.
-    pub plan: &'a Plan,
-    /// The rig's time over time on the wall; `None`: as fast as it goes.
-    pub pace: Option<f64>,
-    /// What the runner looks at.
-    pub operator: Arc<Operator>,
-    /// Stops at the end of the step.
-    pub after_step: Arc<AtomicBool>,
-    /// Stops now.
-    pub now: Arc<AtomicBool>,
 }
 
 /// The page of a run that goes on.

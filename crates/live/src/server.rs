@@ -1,8 +1,8 @@
 //! The server: a thread for each of few connections, one request each.
 
 use crate::access::Access;
+use crate::asked::Asked;
 use crate::hub::Hub;
-use crate::live::Asked;
 use crate::request::{Request, read_request};
 use std::io::Write;
 use std::net::{TcpListener, TcpStream};

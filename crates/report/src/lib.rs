@@ -69,12 +69,14 @@ pub use log_text::log_text;
 pub use map_comparison_picture::map_comparison_figure;
 pub use map_comparison_text::map_comparison_text;
 pub use map_fit_text::map_fit_text;
+/// A point beside its truth, where that is known.
+pub use mapper_record::score::ScoredPoint;
 pub use night_text::night_text;
 pub use number::{number, percent};
 pub use paint::{Paint, paint_verdict};
 pub use plan_picture::plan_svg;
 pub use plan_text::plan_text;
-pub use points::{points_text, score_text, step_name, verdict_word};
+pub use points::{points_text, score_text, step_name, truth_text, verdict_word};
 pub use recordings_text::recordings_text;
 pub use repeated_jumps::repeated_jumps_text;
 pub use reproduction_page::{figure_json, reproduction_page};

@@ -32,6 +32,11 @@ pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) ->
     text
 }
 
+/// How far the points are from what the simulator knows; `None` where nobody knows.
+pub fn truth_text(points: &[ScoredPoint]) -> Option<String> {
+    mapper_record::score::summarise(points).map(|score| score_text(&score))
+}
+
 /// How far the points are from what the simulator knows.
 pub fn score_text(score: &ScoreSummary) -> String {
     let mut text = format!(

@@ -2,8 +2,7 @@
 
 use crate::SessionEvent;
 use crate::event::OnEvent;
-use crate::scripted_steps::single_steps;
-use mapper_core::{Recording, SampleBatch, StepMarker};
+use mapper_core::{Method, Recording, SampleBatch, StepMarker};
 use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_runner::{ObserverError, RunObserver};
 use std::sync::mpsc::{SyncSender, sync_channel};
@@ -76,4 +75,13 @@ pub(crate) fn two_last_steps(recent: &mut Recording, marker: &StepMarker) {
         }
     }
     recent.steps.push(*marker);
+}
+
+/// Each step by itself. What is assumed of alpha_A is left out of the standard errors: no further visit would improve it.
+pub(crate) fn single_steps(config: IdentifyConfig) -> IdentifyConfig {
+    let method = match config.method {
+        Method::Joint => Method::Dynamic,
+        method => method,
+    };
+    IdentifyConfig { method, alpha_area_sigma_ratio: 0.0, ..config }
 }

@@ -2,11 +2,11 @@
 
 use crate::SessionError;
 use crate::declared::identification;
-use crate::estimates::{keep, two_last_steps};
+use crate::estimates::{keep, single_steps, two_last_steps};
 use crate::planned::plan;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
-use mapper_core::{Method, Plan, PlanStep, Recording, SampleBatch, StepMarker};
+use mapper_core::{Plan, PlanStep, Recording, SampleBatch, StepMarker};
 use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_physics::model::Model;
 use mapper_runner::{StepSource, StepSourceError};
@@ -112,15 +112,6 @@ impl StepSource for ScriptedSteps {
     fn take_notes(&mut self) -> Vec<String> {
         self.script.take_notes()
     }
-}
-
-/// Each step by itself. What is assumed of alpha_A is left out of the standard errors: no further visit would improve it.
-pub(crate) fn single_steps(config: IdentifyConfig) -> IdentifyConfig {
-    let method = match config.method {
-        Method::Joint => Method::Dynamic,
-        method => method,
-    };
-    IdentifyConfig { method, alpha_area_sigma_ratio: 0.0, ..config }
 }
 
 fn source_error(error: impl std::error::Error + Send + Sync + 'static) -> StepSourceError {

@@ -34,6 +34,21 @@ pub enum ProgressManner {
     Quiet,
 }
 
+impl ProgressManner {
+    /// As they are written on the command line.
+    pub const NAMES: [&str; 4] = ["bar", "lines", "json", "off"];
+
+    /// The one of this name; nobody is told under any other.
+    pub fn named(name: &str) -> Self {
+        match name {
+            "bar" => ProgressManner::Bar,
+            "lines" => ProgressManner::Lines,
+            "json" => ProgressManner::Json,
+            _ => ProgressManner::Quiet,
+        }
+    }
+}
+
 /// Shows what a session tells. It may be told from many threads.
 pub struct Progress {
     manner: ProgressManner,

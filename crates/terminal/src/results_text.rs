@@ -5,10 +5,9 @@ use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{CompressorMap, ThermalModel, Verdict};
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_observe::FusedChannel;
-use mapper_record::score::{ScoredPoint, summarise};
 use mapper_report::{
-    Display, Paint, disagreement_text, first_doubts_text, paint_verdict, points_by_line_text, points_text,
-    repeated_jumps_text, score_text, sensors_text, shared_errors_text, surge_text, thermal_text,
+    Display, Paint, ScoredPoint, disagreement_text, first_doubts_text, paint_verdict, points_by_line_text,
+    points_text, repeated_jumps_text, sensors_text, shared_errors_text, surge_text, thermal_text, truth_text,
     verdict_sentence, wrapped, zero_text,
 };
 use mapper_session::{Identified, Results, SoughtSurge};
@@ -116,8 +115,8 @@ fn short(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
     text.push_str(&points_by_line_text(found.points, found.map, units, shown.truth, shown.paint));
     text.push('\n');
     text.push_str(&first_doubts_text(found.points));
-    if let Some(score) = summarise(found.points).filter(|_| shown.truth) {
-        text.push_str(&wrapped(&score_text(&score), COLUMNS, 2));
+    if let Some(truth) = truth_text(found.points).filter(|_| shown.truth) {
+        text.push_str(&wrapped(&truth, COLUMNS, 2));
     }
     if let Some(surge) = found.surge {
         text.push_str(&surge_text(&surge.marks, &surge.remarks, surge.surges, units));

@@ -45,7 +45,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // The application: everything between arguments and words. Plug-ins are handed in.
     ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics"]),
     // What a terminal, a pipe or another program sees; what a browser sees while a run goes on.
-    ("mapper-terminal",  &["core", "campaign", "assemble", "identify", "observe", "record", "report", "session"]),
+    ("mapper-terminal",  &["core", "campaign", "assemble", "identify", "observe", "report", "session"]),
     ("mapper-live",      &["core", "campaign", "page", "report", "session"]),
     // The program names the plug-ins; nothing sees the program.
     ("mapper-cli",       &["core", "physics", "campaign", "conformance", "planner", "record", "drift", "gap", "discover", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "terminal", "live", "backends", "blind", "effects", "formats"]),

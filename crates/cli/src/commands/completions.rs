@@ -1,8 +1,8 @@
 //! `mapper completions`.
 
 use crate::failure::Failure;
-use crate::{Arguments, output};
-use clap::{Args, CommandFactory};
+use crate::{manner, output};
+use clap::Args;
 use clap_complete::Shell;
 
 /// Print completions for a shell, e.g. `mapper completions bash > /etc/bash_completion.d/mapper`
@@ -13,10 +13,9 @@ pub struct Completions {
 }
 
 impl Completions {
-    /// Prints the script.
     pub fn run(&self) -> Result<(), Failure> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut Arguments::command(), "mapper", &mut script);
+        clap_complete::generate(self.shell, &mut manner::commands(), "mapper", &mut script);
         output::print(&String::from_utf8_lossy(&script))
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{Arguments, output};
-use clap::{Args, CommandFactory};
+use crate::{manner, output};
+use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -19,12 +19,11 @@ pub struct Man {
 }
 
 impl Man {
-    /// Writes the pages.
     pub fn run(&self) -> Result<(), Failure> {
         let failed =
             |error| Failure::new(Code::Failure, format!("failed to write {}: {error}", self.out.display()));
         std::fs::create_dir_all(&self.out).map_err(failed)?;
-        clap_mangen::generate_to(Arguments::command(), &self.out).map_err(failed)?;
+        clap_mangen::generate_to(manner::commands(), &self.out).map_err(failed)?;
         match self.json {
             true => output::print_json(&json!({ "directory": self.out })),
             false => output::print(&format!("manual pages in {}\n", self.out.display())),

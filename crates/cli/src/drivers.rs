@@ -8,6 +8,7 @@ use serde_json::Value;
 /// Drivers that come with the source and are built by themselves: name, what for, the line that builds it.
 pub const KNOWN: &[(&str, &str, &str)] = &[
     ("lab", "the virtual lab behind the protocol, to rehearse on", "cargo build --release -p mapper-backend-lab"),
+    ("modbus", "a PLC that speaks Modbus TCP, docs/rig.md", "cargo build --release -p mapper-backend-modbus"),
 ];
 
 /// Where drivers are looked for: beside this program, then on `PATH`.

@@ -7,7 +7,7 @@ use mapper_protocol::{
 use std::io::Read;
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -20,16 +20,21 @@ const LAST_WORDS_BYTES: usize = 2_000;
 /// What comes from a driver.
 type Came = Result<Message, DriverError>;
 
-/// Sends, from any thread.
+/// Sends, from any thread, as the driver writes itself: JSON until it has said anything, which everybody reads.
 #[derive(Clone)]
-pub(crate) struct Outlet(SyncSender<Vec<u8>>);
+pub(crate) struct Outlet {
+    to_write: SyncSender<Vec<u8>>,
+    packed: Arc<AtomicBool>,
+}
 
 impl Outlet {
     /// Sends without waiting.
     pub(crate) fn send(&self, message: &Message) -> Result<(), DriverError> {
-        let body = encode(message, Encoding::MessagePack)
+        let packed = self.packed.load(Ordering::Relaxed);
+        let encoding = if packed { Encoding::MessagePack } else { Encoding::Json };
+        let body = encode(message, encoding)
             .map_err(|error| DriverError::Garbage(error.to_string()))?;
-        self.0.try_send(body).map_err(|error| match error {
+        self.to_write.try_send(body).map_err(|error| match error {
             TrySendError::Full(_) => DriverError::Deaf,
             TrySendError::Disconnected(_) => DriverError::Ended(String::new()),
         })
@@ -64,7 +69,8 @@ impl Link {
         let (send, to_write) = sync_channel(WAITING);
         let (tell, inlet) = sync_channel(WAITING);
         let last_words = Arc::new(Mutex::new(Vec::new()));
-        let (limit, words) = (frame_limit.clone(), last_words.clone());
+        let packed = Arc::new(AtomicBool::new(false));
+        let (limit, words, its) = (frame_limit.clone(), last_words.clone(), packed.clone());
         // None of them is waited for: each ends with its pipe.
         std::thread::Builder::new()
             .name("to driver".to_owned())
@@ -72,7 +78,7 @@ impl Link {
             .and_then(|_| {
                 std::thread::Builder::new()
                     .name("from driver".to_owned())
-                    .spawn(move || read_all(stdout, &tell))
+                    .spawn(move || read_all(stdout, &tell, &its))
             })
             .and_then(|_| {
                 std::thread::Builder::new()
@@ -80,7 +86,7 @@ impl Link {
                     .spawn(move || listen(stderr, &words))
             })
             .map_err(not_started)?;
-        Ok(Link { child, outlet: Some(Outlet(send)), inlet, frame_limit, last_words })
+        Ok(Link { child, outlet: Some(Outlet { to_write: send, packed }), inlet, frame_limit, last_words })
     }
 
     /// Where to send.
@@ -137,10 +143,13 @@ fn write_all(mut stdin: ChildStdin, to_write: &Receiver<Vec<u8>>, limit: &Atomic
     }
 }
 
-fn read_all(mut stdout: ChildStdout, tell: &SyncSender<Came>) {
+fn read_all(mut stdout: ChildStdout, tell: &SyncSender<Came>, packed: &AtomicBool) {
     loop {
         let came = match read_frame(&mut stdout, FRAME_LIMIT_BYTES) {
-            Ok(Some(body)) => decode(&body),
+            Ok(Some(body)) => {
+                packed.store(Encoding::of(&body) == Encoding::MessagePack, Ordering::Relaxed);
+                decode(&body)
+            }
             Ok(None) => break,
             Err(error) => Err(error),
         };

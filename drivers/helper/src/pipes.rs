@@ -5,7 +5,7 @@ use crate::server::Server;
 use mapper_protocol::{Encoding, FRAME_LIMIT_BYTES, Message, decode, encode, read_frame, write_frame};
 use std::io::Read;
 use std::process::ExitCode;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 /// Messages that wait for a host that does not read: some seconds of samples. Samples beyond are dropped, which the host sees.
@@ -15,7 +15,7 @@ const LONGEST_S: f64 = 3600.0;
 
 /// What happens to a driver.
 enum Came {
-    Message(Message, Encoding),
+    Message(Message),
     /// The host is gone, or talks what nobody understands.
     Closed,
     /// A signal asks it to end.
@@ -33,31 +33,27 @@ pub fn serve(name: &'static str, version: &'static str, open: impl Open + 'stati
     }
     let Ok(outlet) = writer() else { return ExitCode::FAILURE };
     let mut server = Server::new(name, version, session(), Box::new(open));
-    let mut encoding = Encoding::default();
     while !server.is_over() {
         // What has come while the rig was busy has come in time.
         while let Ok(came) = news.try_recv() {
-            heed(&mut server, &mut encoding, came, now_s());
+            heed(&mut server, came, now_s());
         }
         let next_s = server.tick(now_s());
-        send(&mut server, &outlet, encoding);
+        send(&mut server, &outlet);
         if server.is_over() {
             break;
         }
         if let Some(came) = wait(&news, next_s) {
-            heed(&mut server, &mut encoding, came, now_s());
+            heed(&mut server, came, now_s());
         }
-        send(&mut server, &outlet, encoding);
+        send(&mut server, &outlet);
     }
     ExitCode::SUCCESS
 }
 
-fn heed(server: &mut Server, encoding: &mut Encoding, came: Came, now_s: f64) {
+fn heed(server: &mut Server, came: Came, now_s: f64) {
     match came {
-        Came::Message(message, its) => {
-            *encoding = its;
-            server.take(now_s, message);
-        }
+        Came::Message(message) => server.take(now_s, message),
         Came::Closed | Came::Terminate => server.leave(now_s),
     }
 }
@@ -78,14 +74,13 @@ fn wait(news: &Receiver<Came>, next_s: Option<f64>) -> Option<Came> {
 }
 
 /// What goes out waits in a queue: a host that has stopped must not stop the driver.
-fn send(server: &mut Server, outlet: &SyncSender<Vec<u8>>, encoding: Encoding) {
+fn send(server: &mut Server, outlet: &SyncSender<Vec<u8>>) {
     let limit = server.frame_limit_bytes() as usize;
     for message in std::mem::take(&mut server.out) {
-        let Ok(body) = encode(&message, encoding) else { continue };
-        if body.len() <= limit
-            && let Err(TrySendError::Full(_)) = outlet.try_send(body)
-        {
-            // It will be missed: by its number, or by the deadline of who asked.
+        let Ok(body) = encode(&message, Encoding::MessagePack) else { continue };
+        if body.len() <= limit {
+            // Where it finds no place it will be missed: by its number, or by the deadline of who asked.
+            let _ = outlet.try_send(body);
         }
     }
 }
@@ -107,7 +102,7 @@ fn listen(mut stdin: impl Read + Send + 'static, tell: SyncSender<Came>) -> std:
     let read = move || {
         while let Ok(Some(body)) = read_frame(&mut stdin, FRAME_LIMIT_BYTES) {
             let Ok(message) = decode(&body) else { break };
-            if tell.send(Came::Message(message, Encoding::of(&body))).is_err() {
+            if tell.send(Came::Message(message)).is_err() {
                 return;
             }
         }

@@ -16,12 +16,15 @@ const SETPOINTS: Setpoints = Setpoints {
     oil_temperature_k: 323.15,
 };
 
-/// Nothing here is waited for in a good answer; short, since faults are waited out.
-const SHORT: Patience = Patience {
-    hello: Duration::from_millis(300),
-    call: Duration::from_millis(300),
-    ..PATIENCE
-};
+/// As in a run, but for what is waited out.
+fn patience(fault: &str) -> Patience {
+    let short = Duration::from_millis(300);
+    match fault {
+        "mute" | "deaf" => Patience { hello: short, ..PATIENCE },
+        "hangs" => Patience { call: short, ..PATIENCE },
+        _ => PATIENCE,
+    }
+}
 
 /// The driver of examples/misbehaving.rs under the name of its fault.
 fn program(fault: &str) -> PathBuf {
@@ -37,7 +40,7 @@ fn program(fault: &str) -> PathBuf {
 }
 
 fn start(fault: &str) -> Result<Driver, BackendError> {
-    Driver::of_program(&program(fault), fault, &Value::Null, SHORT)
+    Driver::of_program(&program(fault), fault, &Value::Null, patience(fault))
 }
 
 /// A driver that has measured for a second.

@@ -73,11 +73,13 @@ fn the_rig_in_python_keeps_every_rule_and_gives_the_points_of_the_same_model() {
     let (found, expected) = (run(&campaign), run(&short("  virtual_lab: {offsets: none}")));
     let (found, expected) = (found["points"].as_array().unwrap(), expected["points"].as_array().unwrap());
     assert_eq!(found.len(), 4);
-    for (found, expected) in found.iter().zip(expected) {
-        let of = |point: &Value, key: &str| point[key].as_f64().unwrap();
-        // Both intervals hold the efficiency of the one model of docs/physics.md: they overlap.
-        assert!(of(found, "eta_low") < of(expected, "eta_high"), "{found}\n{expected}");
-        assert!(of(expected, "eta_low") < of(found, "eta_high"), "{found}\n{expected}");
+    let eta = |point: &Value| point["eta"].as_f64();
+    let both = found.iter().zip(expected).filter_map(|(found, expected)| Some((eta(found)?, eta(expected)?)));
+    let both: Vec<_> = both.collect();
+    assert!(both.len() >= 3, "{found:?}");
+    for (found, expected) in both {
+        // One model, docs/physics.md, written twice: noise moves a step by some tenths of a percent.
+        assert!((found - expected).abs() < 0.01, "{found} and {expected}");
     }
 }
 
@@ -169,4 +171,33 @@ fn a_runner_that_stands_still_loses_its_lease() {
     flew_its_way(&text);
     running.kill();
     told(&file, |text| text.contains("disarm"));
+}
+
+/// What docs/rig.md shows, at another port.
+fn behind_modbus(port: &str) -> CampaignFile {
+    let guide = std::fs::read_to_string(repository().join("docs/rig.md")).unwrap();
+    let (_, after) = guide.split_once("```yaml\nbackend:\n").unwrap();
+    let (backend, _) = after.split_once("\n```").unwrap();
+    assert!(backend.contains("address: 127.0.0.1:5020"));
+    short(&backend.replace(":5020", &format!(":{port}")))
+}
+
+/// Behind a server that shares no code with the driver, with the settings of the guide, in real time.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_rig_behind_modbus_keeps_every_rule() {
+    use std::io::BufRead;
+    let mut server = Command::new(option_env!("MAPPER_TEST_PYTHON").unwrap_or("python3"))
+        .arg(repository().join("tests/python/modbus_rig.py"))
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut port = String::new();
+    std::io::BufReader::new(server.stdout.take().unwrap()).read_line(&mut port).unwrap();
+    check("modbus", &behind_modbus(port.trim()));
+    // It ends with its input.
+    drop(server.stdin.take());
+    assert!(server.wait().unwrap().success());
 }

@@ -136,8 +136,8 @@ impl Driver {
         let settings = Configure { settings: settings.clone() };
         driver.ask("configure", &settings, patience.slow)?;
         let answer = driver.ask("describe", &json!({}), patience.slow)?;
-        let described: Described = serde_json::from_value(answer)
-            .map_err(|error| wrong(DriverError::Garbage(error.to_string())))?;
+        let described: Described =
+            serde_json::from_value(answer).map_err(|error| wrong(DriverError::Garbage(error.to_string())))?;
         let rig = description(&described.description, name, &version).map_err(|error| wrong(error.into()))?;
         driver.description = Some(rig);
         Ok(driver)

@@ -58,7 +58,9 @@ pub enum DriverError {
     #[error("{0}")]
     Said(String),
     /// A secret in the campaign.
-    #[error("a secret does not belong into a campaign; write `{{env: NAME}}` and put it into the environment variable NAME")]
+    #[error(
+        "a secret does not belong into a campaign; write `{{env: NAME}}` and put it into the environment variable NAME"
+    )]
     Secret,
     /// A variable that is not set.
     #[error("the environment variable {0} is not set")]

@@ -49,7 +49,8 @@ impl Places {
                 let Some(name) = file.to_str().and_then(|file| file.strip_prefix(PREFIX)) else { continue };
                 let name = name.strip_suffix(std::env::consts::EXE_SUFFIX).unwrap_or(name);
                 let there = found.iter().any(|found| found.name == name);
-                if !there && file_name(name).is_some_and(|whole| *whole == *file) && is_program(&entry.path()) {
+                if !there && file_name(name).is_some_and(|whole| *whole == *file) && is_program(&entry.path())
+                {
                     found.push(Found { name: name.to_owned(), program: entry.path() });
                 }
             }

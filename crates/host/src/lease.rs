@@ -17,7 +17,11 @@ pub(crate) struct Lease {
 impl Lease {
     /// A lease of this session. `silence`: without a call for so long it is not renewed, because who should look at the rig
     /// does not; `None`: of a simulation, which may wait.
-    pub(crate) fn new(outlet: Outlet, session: String, silence: Option<Duration>) -> Result<Lease, BackendError> {
+    pub(crate) fn new(
+        outlet: Outlet,
+        session: String,
+        silence: Option<Duration>,
+    ) -> Result<Lease, BackendError> {
         let called = Arc::new(Mutex::new(Instant::now()));
         let (held, dropped) = channel();
         let last = called.clone();

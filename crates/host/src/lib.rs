@@ -13,4 +13,4 @@ mod secrets;
 
 pub use driver::{Driver, PATIENCE, Patience};
 pub use error::DriverError;
-pub use find::{Found, Places, PREFIX};
+pub use find::{Found, PREFIX, Places};

@@ -32,8 +32,7 @@ impl Outlet {
     pub(crate) fn send(&self, message: &Message) -> Result<(), DriverError> {
         let packed = self.packed.load(Ordering::Relaxed);
         let encoding = if packed { Encoding::MessagePack } else { Encoding::Json };
-        let body = encode(message, encoding)
-            .map_err(|error| DriverError::Garbage(error.to_string()))?;
+        let body = encode(message, encoding).map_err(|error| DriverError::Garbage(error.to_string()))?;
         self.to_write.try_send(body).map_err(|error| match error {
             TrySendError::Full(_) => DriverError::Deaf,
             TrySendError::Disconnected(_) => DriverError::Ended(String::new()),

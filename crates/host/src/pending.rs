@@ -82,7 +82,8 @@ impl Pending {
             }
         }
         self.next += whole.t_s.len() as u64;
-        let (now, later) = std::mem::take(&mut self.events).into_iter().partition(|e: &Event| e.t_s <= until_s);
+        let (now, later) =
+            std::mem::take(&mut self.events).into_iter().partition(|e: &Event| e.t_s <= until_s);
         (whole.events, self.events) = (now, later);
         whole
     }

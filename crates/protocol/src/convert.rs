@@ -2,7 +2,8 @@
 
 use crate::message::{ChannelDescription, Description, Mode, Ranges, SafeWay, Setpoints};
 use mapper_core::{
-    Channel, GuardName, RigDescription, RigMode, SafeTrajectory, SetpointRange, SetpointRanges, UnknownChannel,
+    Channel, GuardName, RigDescription, RigMode, SafeTrajectory, SetpointRange, SetpointRanges,
+    UnknownChannel,
 };
 use std::collections::BTreeSet;
 

@@ -101,9 +101,7 @@ pub fn write_frame(stream: &mut impl Write, body: &[u8], limit_bytes: u32) -> Re
 /// [`FrameError::Content`] where it cannot be written, which no message of this crate causes.
 pub fn encode(message: &Message, encoding: Encoding) -> Result<Vec<u8>, FrameError> {
     match encoding {
-        Encoding::Json => {
-            serde_json::to_vec(message).map_err(|error| FrameError::Content(error.to_string()))
-        }
+        Encoding::Json => serde_json::to_vec(message).map_err(|error| FrameError::Content(error.to_string())),
         Encoding::MessagePack => {
             rmp_serde::to_vec_named(message).map_err(|error| FrameError::Content(error.to_string()))
         }

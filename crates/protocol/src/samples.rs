@@ -153,9 +153,8 @@ pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, Unu
         right(&column.name, column.values.len())?;
         truth.push(TruthColumn { name: column.name, unit: column.unit, values: filled(column.values) });
     }
-    let kind = |word: String| {
-        serde_json::from_value(serde_json::Value::String(word)).unwrap_or(EventKind::Note)
-    };
+    let kind =
+        |word: String| serde_json::from_value(serde_json::Value::String(word)).unwrap_or(EventKind::Note);
     let event = |event: Happened| Event { t_s: event.t_s, kind: kind(event.kind), message: event.message };
     Ok(SampleBatch {
         first_sequence: samples.sequence,

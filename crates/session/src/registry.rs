@@ -59,7 +59,9 @@ impl Registry {
     /// [`SessionError::Backend`] where the name is unknown or the settings are wrong.
     pub fn make_backend(&self, campaign: &Campaign, model: &Model) -> Result<Box<dyn Backend>, SessionError> {
         let wanted = &campaign.backend;
-        if let Some(driver) = self.driver.filter(|_| !self.backends.iter().any(|plugin| plugin.name == wanted.name)) {
+        if let Some(driver) =
+            self.driver.filter(|_| !self.backends.iter().any(|plugin| plugin.name == wanted.name))
+        {
             return driver(&wanted.name, &wanted.settings).map_err(SessionError::Backend);
         }
         let nominal = nominal_rig(campaign, model, &self.effects);

@@ -39,7 +39,12 @@ impl Descent {
     }
 
     /// Tells the rig what is due at this run time, s. True when the way is over: the rig was made safe, or would not be.
-    pub(crate) fn fly(&self, rig: &mut dyn Backend, safe: &SafeTrajectory, now_s: f64) -> (bool, Result<(), String>) {
+    pub(crate) fn fly(
+        &self,
+        rig: &mut dyn Backend,
+        safe: &SafeTrajectory,
+        now_s: f64,
+    ) -> (bool, Result<(), String>) {
         if let Some(setpoints) = self.setpoints(safe, now_s) {
             let told = catch_unwind(AssertUnwindSafe(|| rig.set(&setpoints)));
             if matches!(told, Ok(Ok(()))) {

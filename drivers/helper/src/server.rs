@@ -180,7 +180,10 @@ impl Server {
         let limit = self.frame_limit_bytes;
         let (rig, description, armed) = self.held()?;
         if !description.simulated_time {
-            return Err(Failure::new(Code::UnknownMethod, "this rig is in real time: its samples come by themselves"));
+            return Err(Failure::new(
+                Code::UnknownMethod,
+                "this rig is in real time: its samples come by themselves",
+            ));
         }
         let batch = guarded(|| rig.poll(until_s))?;
         armed.polled_s = armed.polled_s.max(until_s);
@@ -312,6 +315,8 @@ fn write(value: &impl serde::Serialize) -> Result<Value, Failure> {
 fn guarded<T>(call: impl FnOnce() -> Result<T, BackendError>) -> Result<T, Failure> {
     match catch_unwind(AssertUnwindSafe(call)) {
         Ok(answer) => answer.map_err(|error| error_on_the_wire(&error)),
-        Err(_) => Err(Failure::new(Code::Lost, "the driver failed; its own words stand on its standard error")),
+        Err(_) => {
+            Err(Failure::new(Code::Lost, "the driver failed; its own words stand on its standard error"))
+        }
     }
 }

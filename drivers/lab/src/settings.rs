@@ -28,7 +28,9 @@ struct Settings {
 /// Why there is no lab.
 #[derive(Debug, thiserror::Error)]
 enum LabError {
-    #[error("write {{campaign: FILE}}, a campaign whose machine the lab is; also: real_time: true, told: FILE. {0}")]
+    #[error(
+        "write {{campaign: FILE}}, a campaign whose machine the lab is; also: real_time: true, told: FILE. {0}"
+    )]
     Form(serde_json::Error),
     #[error("{0}")]
     Campaign(String),
@@ -45,12 +47,10 @@ pub(crate) fn open(settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
     };
     let settings = Settings::deserialize(settings).map_err(|error| wrong("", LabError::Form(error)))?;
     let of_campaign = |words: String| wrong("campaign", LabError::Campaign(words));
-    let campaign = mapper_campaign::load(&settings.campaign).map_err(|error| of_campaign(error.to_string()))?;
-    let registry = Registry {
-        backends: BACKENDS.to_vec(),
-        effects: mapper_effects::catalogue(),
-        ..Registry::default()
-    };
+    let campaign =
+        mapper_campaign::load(&settings.campaign).map_err(|error| of_campaign(error.to_string()))?;
+    let registry =
+        Registry { backends: BACKENDS.to_vec(), effects: mapper_effects::catalogue(), ..Registry::default() };
     let model = nominal_model(&campaign).map_err(|error| of_campaign(error.to_string()))?;
     let lab = registry.make_backend(&campaign, &model).map_err(|error| of_campaign(error.to_string()))?;
     let lab: Box<dyn Backend> = if settings.real_time { Box::new(RealTime(lab)) } else { lab };

@@ -37,7 +37,9 @@ impl Backend for Told {
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
         let Setpoints { mode, p3_pa, t3_k, valve_opening_ratio, .. } = setpoints;
         let air = if *mode == RigMode::Running { "on" } else { "off" };
-        self.write(&format!("set air {air}, P3 {p3_pa:.0} Pa, T3 {t3_k:.0} K, valve {valve_opening_ratio:.2}"));
+        self.write(&format!(
+            "set air {air}, P3 {p3_pa:.0} Pa, T3 {t3_k:.0} K, valve {valve_opening_ratio:.2}"
+        ));
         self.inner.set(setpoints)
     }
 

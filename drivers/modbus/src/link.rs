@@ -59,10 +59,11 @@ impl Link {
     /// Reads registers.
     pub(crate) fn read(&mut self, table: Table, block: Block) -> Result<Vec<u16>, LinkError> {
         let Block { start, count } = block;
-        let registers = self.call(format!("registers {start} to {}", start + (count - 1)), async |link| match table {
-            Table::Holding => link.read_holding_registers(start, count).await,
-            Table::Input => link.read_input_registers(start, count).await,
-        })?;
+        let registers =
+            self.call(format!("registers {start} to {}", start + (count - 1)), async |link| match table {
+                Table::Holding => link.read_holding_registers(start, count).await,
+                Table::Input => link.read_input_registers(start, count).await,
+            })?;
         if registers.len() == usize::from(count) {
             return Ok(registers);
         }

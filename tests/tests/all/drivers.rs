@@ -2,7 +2,9 @@
 #![cfg(unix)]
 
 use crate::interrupted::Running;
-use mapper_tests::{BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_drivers, mapper_command, repository};
+use mapper_tests::{
+    BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_drivers, mapper_command, repository,
+};
 use notify::{RecursiveMode, Watcher};
 use serde_json::Value;
 use std::path::Path;
@@ -38,7 +40,8 @@ fn done(mut command: Command) -> Finished {
 
 fn run(campaign: &CampaignFile) -> Value {
     let runs = campaign.runs();
-    let arguments = ["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref(), "--out".as_ref(), runs.as_os_str()];
+    let arguments =
+        ["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref(), "--out".as_ref(), runs.as_os_str()];
     done(with_drivers(&arguments)).exits(0).json()
 }
 

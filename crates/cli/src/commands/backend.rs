@@ -53,13 +53,16 @@ impl Backend {
             let summary = known.map_or("driver", |(_, summary, _)| summary);
             json!({"name": found.name, "summary": summary, "program": found.program})
         };
-        let absent = drivers::KNOWN.iter().filter(|(name, ..)| !found.iter().any(|found| found.name == *name));
+        let absent =
+            drivers::KNOWN.iter().filter(|(name, ..)| !found.iter().any(|found| found.name == *name));
         let built_in = registry::registry().backends;
         let all: Vec<Value> = built_in
             .iter()
             .map(|plugin| json!({"name": plugin.name, "summary": plugin.summary}))
             .chain(found.iter().map(driver))
-            .chain(absent.map(|(name, summary, line)| json!({"name": name, "summary": summary, "build": line})))
+            .chain(
+                absent.map(|(name, summary, line)| json!({"name": name, "summary": summary, "build": line})),
+            )
             .collect();
         if self.json {
             return output::print_json(&json!({ "backends": all }));
@@ -71,7 +74,11 @@ impl Backend {
                 (_, Some(line)) => format!("; not found, built by: {line}"),
                 _ => String::new(),
             };
-            format!("{:12} {}{place}\n", word("name").unwrap_or_default(), word("summary").unwrap_or_default())
+            format!(
+                "{:12} {}{place}\n",
+                word("name").unwrap_or_default(),
+                word("summary").unwrap_or_default()
+            )
         };
         output::print(&all.iter().map(line).collect::<String>())
     }

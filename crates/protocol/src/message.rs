@@ -37,10 +37,10 @@ impl Message {
     }
 
     /// The answer to a request.
-    pub fn answer(id: u64, answer: Result<Value, Failure>) -> Message {
+    pub fn answer(id: u64, answer: Result<Value, Box<Failure>>) -> Message {
         let (result, error) = match answer {
             Ok(result) => (Some(result), None),
-            Err(error) => (None, Some(error)),
+            Err(error) => (None, Some(*error)),
         };
         Message { id: Some(id), result, error, ..Message::default() }
     }

@@ -15,7 +15,7 @@ const LONGEST_S: f64 = 3600.0;
 
 /// What happens to a driver.
 enum Came {
-    Message(Message),
+    Message(Box<Message>),
     /// The host is gone, or talks what nobody understands.
     Closed,
     /// A signal asks it to end.
@@ -53,7 +53,7 @@ pub fn serve(name: &'static str, version: &'static str, open: impl Open + 'stati
 
 fn heed(server: &mut Server, came: Came, now_s: f64) {
     match came {
-        Came::Message(message) => server.take(now_s, message),
+        Came::Message(message) => server.take(now_s, *message),
         Came::Closed | Came::Terminate => server.leave(now_s),
     }
 }
@@ -102,7 +102,7 @@ fn listen(mut stdin: impl Read + Send + 'static, tell: SyncSender<Came>) -> std:
     let read = move || {
         while let Ok(Some(body)) = read_frame(&mut stdin, FRAME_LIMIT_BYTES) {
             let Ok(message) = decode(&body) else { break };
-            if tell.send(Came::Message(message)).is_err() {
+            if tell.send(Came::Message(Box::new(message))).is_err() {
                 return;
             }
         }

@@ -11,6 +11,13 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+/// Why a request is refused.
+type Refusal = Box<Failure>;
+
+fn refused(code: Code, message: impl Into<String>) -> Refusal {
+    Box::new(Failure::new(code, message))
+}
+
 /// Makes the rig.
 pub(crate) type Opened = Box<dyn FnOnce(&Value) -> Result<Box<dyn Backend>, BackendError>>;
 
@@ -81,8 +88,8 @@ impl Server {
         let (Some(id), Some(method)) = (message.id, message.method) else { return };
         let answer = match method.as_str() {
             "hello" => self.hello(&message.params),
-            _ if !self.greeted => Err(Failure::new(Code::OutOfOrder, "hello comes first")),
-            _ if !known => Err(Failure::new(Code::Refused, "the session is another one")),
+            _ if !self.greeted => Err(refused(Code::OutOfOrder, "hello comes first")),
+            _ if !known => Err(refused(Code::Refused, "the session is another one")),
             "configure" => self.configure(&message.params),
             "describe" => self.describe(),
             "arm" => self.arm(now_s),
@@ -90,17 +97,17 @@ impl Server {
             "poll" => self.poll(&message.params),
             "make_safe" => self.make_safe(),
             "disarm" => self.disarm(),
-            other => Err(Failure::new(Code::UnknownMethod, format!("there is no method `{other}`"))),
+            other => Err(refused(Code::UnknownMethod, format!("there is no method `{other}`"))),
         };
         self.out.push(Message::answer(id, answer));
     }
 
-    fn hello(&mut self, params: &Value) -> Result<Value, Failure> {
+    fn hello(&mut self, params: &Value) -> Result<Value, Refusal> {
         let theirs: Hello = read(params)?;
         if theirs.magic != MAGIC || theirs.protocol.major != VERSION.major {
             let (major, minor) = (VERSION.major, VERSION.minor);
             let message = format!("this driver speaks version {major}.{minor} of the protocol {MAGIC}");
-            return Err(Failure::new(Code::Refused, message));
+            return Err(refused(Code::Refused, message));
         }
         self.greeted = true;
         self.frame_limit_bytes = theirs.frame_limit_bytes.max(mapper_protocol::FIRST_FRAME_LIMIT_BYTES);
@@ -114,10 +121,10 @@ impl Server {
         write(&Welcome { hello, session: self.session.clone() })
     }
 
-    fn configure(&mut self, params: &Value) -> Result<Value, Failure> {
+    fn configure(&mut self, params: &Value) -> Result<Value, Refusal> {
         let Configure { settings } = read(params)?;
         let Some(open) = self.open.take() else {
-            return Err(Failure::new(Code::OutOfOrder, "the settings have come already"));
+            return Err(refused(Code::OutOfOrder, "the settings have come already"));
         };
         let rig = guarded(|| open(&settings))?;
         let description = rig.describe();
@@ -125,19 +132,19 @@ impl Server {
         Ok(json!({}))
     }
 
-    fn describe(&self) -> Result<Value, Failure> {
+    fn describe(&self) -> Result<Value, Refusal> {
         let Some((_, rig)) = &self.rig else { return Err(no_settings()) };
         let description = description_on_the_wire(rig);
-        let text = serde_json::to_vec(&description)
-            .map_err(|error| Failure::new(Code::Failed, error.to_string()))?;
+        let text =
+            serde_json::to_vec(&description).map_err(|error| refused(Code::Failed, error.to_string()))?;
         let identity = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
         write(&Described { description, identity })
     }
 
-    fn arm(&mut self, now_s: f64) -> Result<Value, Failure> {
+    fn arm(&mut self, now_s: f64) -> Result<Value, Refusal> {
         let Some((rig, _)) = &mut self.rig else { return Err(no_settings()) };
         if self.armed.is_some() {
-            return Err(Failure::new(Code::OutOfOrder, "the rig is armed"));
+            return Err(refused(Code::OutOfOrder, "the rig is armed"));
         }
         guarded(|| rig.arm())?;
         self.armed = Some(Armed {
@@ -153,34 +160,34 @@ impl Server {
     }
 
     /// The rig, where it is held and nothing is wrong.
-    fn held(&mut self) -> Result<(&mut dyn Backend, &RigDescription, &mut Armed), Failure> {
+    fn held(&mut self) -> Result<(&mut dyn Backend, &RigDescription, &mut Armed), Refusal> {
         let (Some((rig, description)), Some(armed)) = (&mut self.rig, &mut self.armed) else {
-            return Err(Failure::new(Code::OutOfOrder, "the rig is not armed"));
+            return Err(refused(Code::OutOfOrder, "the rig is not armed"));
         };
         Ok((rig.as_mut(), description, armed))
     }
 
-    fn set(&mut self, params: &Value) -> Result<Value, Failure> {
+    fn set(&mut self, params: &Value) -> Result<Value, Refusal> {
         let wanted = setpoints(&read(params)?);
         let (rig, description, armed) = self.held()?;
         if armed.ended || armed.descent.is_some() {
             let message = "the lease had ended and the rig was made safe; disarm it and arm it again";
-            return Err(Failure::new(Code::LeaseEnded, message));
+            return Err(refused(Code::LeaseEnded, message));
         }
         if let Some(accepts) = &description.accepts {
-            accepts.check(&wanted).map_err(|error| error_on_the_wire(&error))?;
+            accepts.check(&wanted).map_err(|error| Box::new(error_on_the_wire(&error)))?;
         }
         guarded(|| rig.set(&wanted))?;
         armed.told = Some(wanted);
         Ok(json!({}))
     }
 
-    fn poll(&mut self, params: &Value) -> Result<Value, Failure> {
+    fn poll(&mut self, params: &Value) -> Result<Value, Refusal> {
         let Poll { until_s } = read(params)?;
         let limit = self.frame_limit_bytes;
         let (rig, description, armed) = self.held()?;
         if !description.simulated_time {
-            return Err(Failure::new(
+            return Err(refused(
                 Code::UnknownMethod,
                 "this rig is in real time: its samples come by themselves",
             ));
@@ -194,14 +201,14 @@ impl Server {
         write(&LastSample { next_sequence })
     }
 
-    fn make_safe(&mut self) -> Result<Value, Failure> {
+    fn make_safe(&mut self) -> Result<Value, Refusal> {
         let (rig, _, armed) = self.held()?;
         guarded(|| rig.make_safe())?;
         (armed.descent, armed.told) = (None, None);
         Ok(json!({}))
     }
 
-    fn disarm(&mut self) -> Result<Value, Failure> {
+    fn disarm(&mut self) -> Result<Value, Refusal> {
         let (rig, ..) = self.held()?;
         guarded(|| rig.disarm())?;
         self.armed = None;
@@ -254,7 +261,7 @@ impl Server {
                     }
                     Err(failure) if waits && failure.code == Code::OutOfOrder => {}
                     Err(failure) => {
-                        let params = write(&failure).unwrap_or_default();
+                        let params = write(failure.as_ref()).unwrap_or_default();
                         self.out.push(Message::note("lost", params));
                     }
                 }
@@ -299,24 +306,181 @@ impl Server {
     }
 }
 
-fn no_settings() -> Failure {
-    Failure::new(Code::OutOfOrder, "the settings have not come")
+fn no_settings() -> Refusal {
+    refused(Code::OutOfOrder, "the settings have not come")
 }
 
-fn read<T: DeserializeOwned>(params: &Value) -> Result<T, Failure> {
-    T::deserialize(params).map_err(|error| Failure::new(Code::Params, error.to_string()))
+fn read<T: DeserializeOwned>(params: &Value) -> Result<T, Refusal> {
+    T::deserialize(params).map_err(|error| refused(Code::Params, error.to_string()))
 }
 
-fn write(value: &impl serde::Serialize) -> Result<Value, Failure> {
-    serde_json::to_value(value).map_err(|error| Failure::new(Code::Failed, error.to_string()))
+fn write(value: &impl serde::Serialize) -> Result<Value, Refusal> {
+    serde_json::to_value(value).map_err(|error| refused(Code::Failed, error.to_string()))
 }
 
 /// A call of the author's code: its errors and panics as refusals.
-fn guarded<T>(call: impl FnOnce() -> Result<T, BackendError>) -> Result<T, Failure> {
+fn guarded<T>(call: impl FnOnce() -> Result<T, BackendError>) -> Result<T, Refusal> {
     match catch_unwind(AssertUnwindSafe(call)) {
-        Ok(answer) => answer.map_err(|error| error_on_the_wire(&error)),
-        Err(_) => {
-            Err(Failure::new(Code::Lost, "the driver failed; its own words stand on its standard error"))
+        Ok(answer) => answer.map_err(|error| Box::new(error_on_the_wire(&error))),
+        Err(_) => Err(refused(Code::Lost, "the driver failed; its own words stand on its standard error")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{Channel, ChannelColumn, RigMode, SafeTrajectory, SampleBatch};
+    use std::sync::{Arc, Mutex};
+
+    type Log = Arc<Mutex<Vec<String>>>;
+
+    /// Writes down what it is told.
+    struct Told {
+        log: Log,
+        simulated_time: bool,
+        samples: u64,
+        /// So many setpoints are taken before it panics.
+        takes: usize,
+    }
+
+    impl Told {
+        fn write(&self, words: String) -> Result<(), BackendError> {
+            self.log.lock().unwrap().push(words);
+            Ok(())
         }
+    }
+
+    impl Backend for Told {
+        fn describe(&self) -> RigDescription {
+            RigDescription {
+                backend: "told".to_owned(),
+                version: "1".to_owned(),
+                channels: vec![Channel::T2],
+                sample_rate_hz: 10.0,
+                simulated_time: self.simulated_time,
+                controls: true,
+                exclusive: None,
+                needs_guarded: Vec::new(),
+                accepts: None,
+                safe: SafeTrajectory { p3_slew_pa_s: Some(100e3), valve_opening_ratio: 1.5, within_s: 5.0 },
+            }
+        }
+        fn arm(&mut self) -> Result<(), BackendError> {
+            Ok(())
+        }
+        fn set(&mut self, to: &Setpoints) -> Result<(), BackendError> {
+            self.takes = self.takes.checked_sub(1).expect("as the test wants it");
+            self.write(format!("{:.0} {:.0} {:.1}", to.p3_pa, to.t3_k, to.valve_opening_ratio))
+        }
+        fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+            self.samples += 1;
+            let columns = vec![ChannelColumn { channel: Channel::T2, values: vec![300.0] }];
+            let t_s = vec![until_s];
+            Ok(SampleBatch { first_sequence: self.samples - 1, t_s, columns, ..SampleBatch::default() })
+        }
+        fn make_safe(&mut self) -> Result<(), BackendError> {
+            self.write("safe".to_owned())
+        }
+        fn disarm(&mut self) -> Result<(), BackendError> {
+            Ok(())
+        }
+    }
+
+    /// A driver that is armed since 0 s and told 150 kPa; what its rig is told after that.
+    fn flying(simulated_time: bool, takes: usize) -> (Server, Log) {
+        let log = Log::default();
+        let rig = Told { log: log.clone(), simulated_time, samples: 0, takes };
+        let open: Opened = Box::new(|_| Ok(Box::new(rig)));
+        let mut server = Server::new("told", "1", "s".to_owned(), open);
+        let hello = json!({"magic": MAGIC, "protocol": VERSION, "name": "x", "version": "1", "frame_limit_bytes": 100_000});
+        let told = setpoints_on_the_wire();
+        for (method, params) in
+            [("hello", hello), ("configure", json!({})), ("arm", json!({})), ("set", told)]
+        {
+            ask(&mut server, 0.0, method, params);
+        }
+        log.lock().unwrap().clear();
+        server.out.clear();
+        (server, log)
+    }
+
+    fn setpoints_on_the_wire() -> Value {
+        let told = Setpoints {
+            mode: RigMode::Running,
+            p3_pa: 150e3,
+            t3_k: 773.15,
+            valve_opening_ratio: 0.7,
+            oil_temperature_k: 323.15,
+        };
+        serde_json::to_value(mapper_protocol::setpoints_on_the_wire(&told)).unwrap()
+    }
+
+    fn ask(server: &mut Server, now_s: f64, method: &str, params: Value) -> Option<Failure> {
+        let (id, session, method) = (Some(1), Some("s".to_owned()), Some(method.to_owned()));
+        server.take(now_s, Message { id, session, method, params, ..Message::default() });
+        server.out.pop().and_then(|answer| answer.error)
+    }
+
+    /// From 150 kPa at 100 kPa/s, above the atmosphere's 105 kPa, with the heater off and the valve open; then the air.
+    const WAY: [&str; 5] = ["140000 293 1.5", "130000 293 1.5", "120000 293 1.5", "110000 293 1.5", "safe"];
+
+    #[test]
+    fn a_lease_that_ends_makes_the_rig_safe_and_one_that_is_renewed_does_not() {
+        let (mut server, log) = flying(false, 100);
+        let lease = Message { session: Some("s".to_owned()), ..Message::note("lease", Value::Null) };
+        for tenth in 0..100 {
+            let now_s = f64::from(tenth) / 10.0;
+            if tenth % 5 == 0 && tenth < 60 {
+                server.take(now_s, lease.clone());
+            }
+            server.tick(now_s);
+            // Renewed for the last time at 5.5 s.
+            assert!(log.lock().unwrap().is_empty() || now_s >= 7.5, "at {now_s} s");
+        }
+        assert_eq!(*log.lock().unwrap(), WAY);
+        let refused = ask(&mut server, 10.0, "set", setpoints_on_the_wire()).unwrap();
+        assert_eq!(refused.code, Code::LeaseEnded);
+        assert!(ask(&mut server, 10.0, "disarm", json!({})).is_none());
+        assert!(ask(&mut server, 10.0, "arm", json!({})).is_none());
+        assert!(ask(&mut server, 10.0, "set", setpoints_on_the_wire()).is_none());
+    }
+
+    /// By another session no lease is renewed, and nothing is set.
+    #[test]
+    fn a_stranger_is_refused() {
+        let (mut server, log) = flying(false, 100);
+        let stranger = Message {
+            id: Some(9),
+            session: Some("t".to_owned()),
+            ..Message::note("set", setpoints_on_the_wire())
+        };
+        server.take(1.9, stranger);
+        assert_eq!(server.out.pop().unwrap().error.unwrap().code, Code::Refused);
+        server.tick(2.0);
+        assert_eq!(log.lock().unwrap()[0], WAY[0]);
+    }
+
+    #[test]
+    fn a_driver_that_is_left_makes_its_rig_safe_and_ends() {
+        for simulated_time in [false, true] {
+            let (mut server, log) = flying(simulated_time, 100);
+            server.leave(1.0);
+            for tenth in 10..40 {
+                server.tick(f64::from(tenth) / 10.0);
+            }
+            assert!(server.is_over());
+            assert_eq!(log.lock().unwrap()[..WAY.len()], WAY, "{simulated_time}");
+        }
+    }
+
+    /// A rig that panics at its second setpoint of the way: its air is cut at once.
+    #[test]
+    fn a_way_that_fails_is_cut_short() {
+        let (mut server, log) = flying(false, 2);
+        server.leave(1.0);
+        server.tick(1.0);
+        server.tick(1.1);
+        assert_eq!(log.lock().unwrap()[..2], [WAY[0], "safe"]);
+        assert!(server.is_over());
     }
 }

@@ -17,22 +17,36 @@ fn binary() -> &'static Path {
         if let Some(built) = std::env::var_os("MAPPER_TEST_PROGRAM") {
             return built.into();
         }
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let mut command = Command::new(cargo);
-        command.args(["build", "--package", "mapper-cli", "--bin", "mapper"]);
-        command.arg("--message-format=json-render-diagnostics").current_dir(repository());
-        // Optimised where the tests are.
-        if !cfg!(debug_assertions) {
-            command.arg("--release");
-        }
-        let output = command.output().expect("cargo can be started");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8_lossy(&output.stdout)
+        build(&["--package", "mapper-cli", "--bin", "mapper"])
             .lines()
             .filter_map(|line| serde_json::from_str::<Value>(line).ok())
             .find_map(|message| Some(PathBuf::from(message["executable"].as_str()?)))
             .expect("cargo names the program it built")
     })
+}
+
+fn build(what: &[&str]) -> String {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut command = Command::new(cargo);
+    command.arg("build").args(what);
+    command.arg("--message-format=json-render-diagnostics").current_dir(repository());
+    // Optimised where the tests are.
+    if !cfg!(debug_assertions) {
+        command.arg("--release");
+    }
+    let output = command.output().expect("cargo can be started");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Builds the drivers, which then lie beside the program; `cargo xtask test` has built them with everything else.
+pub fn build_drivers() {
+    static BUILT: OnceLock<()> = OnceLock::new();
+    BUILT.get_or_init(|| {
+        if std::env::var_os("MAPPER_TEST_PROGRAM").is_none() {
+            build(&["--package", "mapper-backend-lab", "--package", "mapper-backend-modbus"]);
+        }
+    });
 }
 
 /// The program with arguments, to be started in the root of the repository; standard input is closed.

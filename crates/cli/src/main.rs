@@ -4,6 +4,7 @@
 //! `registry` alone names plug-ins.
 
 mod commands;
+mod drivers;
 mod ending;
 mod exit_code;
 mod failure;

@@ -1,5 +1,6 @@
 //! The one place that names plug-ins.
 
+use crate::drivers;
 use mapper_backends::BACKENDS;
 use mapper_effects::ScriptEffect;
 use mapper_formats::FORMATS;
@@ -13,6 +14,7 @@ use std::sync::Arc;
 pub fn registry() -> Registry {
     Registry {
         backends: BACKENDS.to_vec(),
+        driver: Some(drivers::driver),
         effects: mapper_effects::catalogue(),
         read_effect,
         formats: FORMATS,

@@ -94,7 +94,7 @@ pub use planning::{nominal_model, with_plan_request};
 pub use program::PROGRAM;
 pub use prospects::Prospects;
 pub use recorded::{Recorded, channel_map};
-pub use registry::{ReadEffect, Registry};
+pub use registry::{MakeDriver, ReadEffect, Registry};
 pub use rehearsal::{Rehearsal, rehearse};
 pub use results::Results;
 pub use resume::BrokenOff;

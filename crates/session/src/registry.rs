@@ -2,7 +2,7 @@
 
 use crate::SessionError;
 use mapper_campaign::Campaign;
-use mapper_core::{Backend, MapFormats};
+use mapper_core::{Backend, BackendError, MapFormats};
 use mapper_logs::LogFormats;
 use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::effect::Effect;
@@ -14,11 +14,16 @@ use std::sync::Arc;
 /// Reads a suspected effect from a file.
 pub type ReadEffect = fn(&Path) -> Result<Arc<dyn Effect>, SessionError>;
 
+/// Makes a backend that is no plug-in, a driver, from its name and its settings.
+pub type MakeDriver = fn(&str, &serde_json::Value) -> Result<Box<dyn Backend>, BackendError>;
+
 /// Every plug-in of a session, and what the program is that opens it.
 #[derive(Clone)]
 pub struct Registry {
     /// Rigs, real and simulated.
     pub backends: Vec<BackendPlugin>,
+    /// How a backend is made that is none of them; `None`: there are no others.
+    pub driver: Option<MakeDriver>,
     /// The catalogue of effects.
     pub effects: Vec<Arc<dyn Effect>>,
     /// How a suspected effect is read from a file.
@@ -36,6 +41,7 @@ impl Default for Registry {
     fn default() -> Self {
         Registry {
             backends: Vec::new(),
+            driver: None,
             effects: Vec::new(),
             read_effect: no_effect,
             formats: MapFormats(&[]),
@@ -50,12 +56,17 @@ fn no_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
 }
 
 impl Registry {
-    /// The backend that a campaign asks for.
+    /// The backend that a campaign asks for: a plug-in, or a driver of that name.
     ///
     /// # Errors
     /// [`SessionError::Backend`] where the name is unknown or the settings are wrong.
     pub fn make_backend(&self, campaign: &Campaign, model: &Model) -> Result<Box<dyn Backend>, SessionError> {
         let wanted = &campaign.backend;
+        if let Some(driver) =
+            self.driver.filter(|_| !self.backends.iter().any(|plugin| plugin.name == wanted.name))
+        {
+            return driver(&wanted.name, &wanted.settings).map_err(SessionError::Backend);
+        }
         let nominal = nominal_rig(campaign, model, &self.effects);
         BackendPlugin::make_by_name(&self.backends, &wanted.name, &nominal, &wanted.settings)
             .map_err(SessionError::Backend)

@@ -18,6 +18,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-surge",     &["core", "numerics", "physics"]),
     ("mapper-conformance", &["core"]),
     ("mapper-runner",    &["core", "numerics", "surge"]),
+    ("mapper-protocol",  &["core"]),
+    ("mapper-host",      &["core", "protocol"]),
     ("mapper-sequence",  &["core", "numerics", "physics", "yaml"]),
     ("mapper-logs",      &["core", "yaml"]),
     ("mapper-record",    &["core", "logs", "numerics", "yaml"]),
@@ -48,7 +50,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-terminal",  &["core", "campaign", "assemble", "identify", "observe", "report", "session"]),
     ("mapper-live",      &["core", "campaign", "page", "report", "session"]),
     // The program names the plug-ins; nothing sees the program.
-    ("mapper-cli",       &["core", "physics", "campaign", "conformance", "planner", "record", "drift", "gap", "discover", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "terminal", "live", "backends", "blind", "effects", "formats"]),
+    ("mapper-cli",       &["core", "physics", "campaign", "conformance", "host", "planner", "record", "drift", "gap", "discover", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "terminal", "live", "backends", "blind", "effects", "formats"]),
+    // Drivers are programs of their own: what they share, and whatever each needs for its rig.
+    ("mapper-driver",    &["core", "protocol"]),
+    ("mapper-backend-lab", &["core", "campaign", "session", "backends", "effects", "driver"]),
+    ("mapper-backend-modbus", &["core", "yaml", "driver"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

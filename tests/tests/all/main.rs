@@ -10,6 +10,7 @@ mod doomed;
 mod drift;
 mod drift_refusals;
 mod drift_watched;
+mod drivers;
 mod full_disk;
 mod help;
 mod interrupted;

@@ -2,12 +2,13 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{output, registry};
+use crate::{drivers, output, registry};
 use clap::{Args, Subcommand};
 use mapper_conformance::{Candidate, RULES};
 use mapper_core::{RigMode, Setpoints};
+use mapper_host::Found;
 use mapper_session::nominal_model;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// List the backends, or hold one against the rules that every backend keeps
@@ -46,16 +47,40 @@ impl Backend {
     }
 
     fn list(&self) -> Result<(), Failure> {
-        let backends = registry::registry().backends;
+        let found = drivers::places().all();
+        let driver = |found: &Found| {
+            let known = drivers::KNOWN.iter().find(|(name, ..)| *name == found.name);
+            let summary = known.map_or("driver", |(_, summary, _)| summary);
+            json!({"name": found.name, "summary": summary, "program": found.program})
+        };
+        let absent =
+            drivers::KNOWN.iter().filter(|(name, ..)| !found.iter().any(|found| found.name == *name));
+        let built_in = registry::registry().backends;
+        let all: Vec<Value> = built_in
+            .iter()
+            .map(|plugin| json!({"name": plugin.name, "summary": plugin.summary}))
+            .chain(found.iter().map(driver))
+            .chain(
+                absent.map(|(name, summary, line)| json!({"name": name, "summary": summary, "build": line})),
+            )
+            .collect();
         if self.json {
-            let all: Vec<_> = backends
-                .iter()
-                .map(|plugin| json!({"name": plugin.name, "summary": plugin.summary}))
-                .collect();
             return output::print_json(&json!({ "backends": all }));
         }
-        let lines = backends.iter().map(|plugin| format!("{:12} {}\n", plugin.name, plugin.summary));
-        output::print(&lines.collect::<String>())
+        let line = |one: &Value| {
+            let word = |key: &str| one[key].as_str();
+            let place = match (word("program"), word("build")) {
+                (Some(program), _) => format!("; {program}"),
+                (_, Some(line)) => format!("; not found, built by: {line}"),
+                _ => String::new(),
+            };
+            format!(
+                "{:12} {}{place}\n",
+                word("name").unwrap_or_default(),
+                word("summary").unwrap_or_default()
+            )
+        };
+        output::print(&all.iter().map(line).collect::<String>())
     }
 
     fn check(&self, name: &str, path: &std::path::Path) -> Result<(), Failure> {

@@ -1,0 +1,241 @@
+//! Samples that have come and nobody has asked for yet.
+
+use mapper_core::{
+    Channel, ChannelColumn, ElementColumn, Event, EventKind, Provenance, Quality, SampleBatch, TruthColumn,
+};
+use mapper_protocol::Unusable;
+use std::collections::VecDeque;
+
+/// Most values that wait, of all columns: three hours of 19 channels at 10 Hz, 32 MB.
+const MOST_VALUES: usize = 4_000_000;
+/// Most events that wait.
+const MOST_EVENTS: usize = 10_000;
+/// Events beyond which a driver's remarks are left out.
+const MOST_NOTES: usize = 100;
+
+/// Batches in the order they came, checked: one follows the other.
+#[derive(Default)]
+pub(crate) struct Pending {
+    batches: VecDeque<SampleBatch>,
+    events: Vec<Event>,
+    /// Number of the next sample to come, and of the next one to hand out.
+    expected: u64,
+    next: u64,
+    last_s: Option<f64>,
+    values: usize,
+}
+
+impl Pending {
+    /// Takes what has come.
+    ///
+    /// # Errors
+    /// [`Unusable`] for samples that do not follow those before, or that are too many.
+    pub(crate) fn push(&mut self, mut batch: SampleBatch) -> Result<(), Unusable> {
+        self.events.append(&mut batch.events);
+        if self.events.len() > MOST_EVENTS {
+            return Err(Unusable::TooMany);
+        }
+        let Some(first_s) = batch.t_s.first().copied() else { return Ok(()) };
+        if batch.first_sequence != self.expected {
+            return Err(Unusable::Sequence { expected: self.expected, found: batch.first_sequence });
+        }
+        if let Some(before_s) = self.last_s.filter(|last_s| first_s <= *last_s) {
+            return Err(Unusable::Time { before_s, t_s: first_s });
+        }
+        self.values += batch.t_s.len() * width(&batch);
+        if self.values > MOST_VALUES {
+            return Err(Unusable::TooMany);
+        }
+        self.expected += batch.t_s.len() as u64;
+        self.last_s = batch.t_s.last().copied();
+        self.batches.push_back(batch);
+        Ok(())
+    }
+
+    /// A remark at this run time, s, for the next batch; no more than a few are kept.
+    pub(crate) fn note(&mut self, t_s: f64, words: &str) {
+        if self.events.len() < MOST_NOTES {
+            self.events.push(Event { t_s, kind: EventKind::Note, message: words.to_owned() });
+        }
+    }
+
+    /// Whether a sample has come from `t_s` or later.
+    pub(crate) fn reaches(&self, t_s: f64) -> bool {
+        self.last_s.is_some_and(|last_s| last_s >= t_s)
+    }
+
+    /// Everything up to `until_s`, with a column for each of `channels`: NaN where there is no reading.
+    pub(crate) fn take(&mut self, until_s: f64, channels: &[Channel]) -> SampleBatch {
+        let mut whole = SampleBatch {
+            first_sequence: self.next,
+            columns: channels.iter().map(|c| ChannelColumn { channel: *c, values: Vec::new() }).collect(),
+            ..SampleBatch::default()
+        };
+        while let Some(mut batch) = self.batches.pop_front() {
+            let due = batch.t_s.partition_point(|t_s| *t_s <= until_s);
+            self.values = self.values.saturating_sub(due * width(&batch));
+            let later = split(&mut batch, due);
+            append(&mut whole, batch);
+            if !later.t_s.is_empty() {
+                self.batches.push_front(later);
+                break;
+            }
+        }
+        self.next += whole.t_s.len() as u64;
+        let (now, later) =
+            std::mem::take(&mut self.events).into_iter().partition(|e: &Event| e.t_s <= until_s);
+        (whole.events, self.events) = (now, later);
+        whole
+    }
+}
+
+fn width(batch: &SampleBatch) -> usize {
+    1 + batch.columns.len() + batch.elements.len() + batch.truth.len() + 2 * batch.provenance.len()
+}
+
+/// What comes after the first `at` samples. All columns are of one length: they were read that way.
+fn split(batch: &mut SampleBatch, at: usize) -> SampleBatch {
+    fn cut<T>(values: &mut Vec<T>, at: usize) -> Vec<T> {
+        values.split_off(at.min(values.len()))
+    }
+    SampleBatch {
+        first_sequence: batch.first_sequence + at as u64,
+        t_s: cut(&mut batch.t_s, at),
+        columns: batch
+            .columns
+            .iter_mut()
+            .map(|one| ChannelColumn { channel: one.channel, values: cut(&mut one.values, at) })
+            .collect(),
+        elements: batch
+            .elements
+            .iter_mut()
+            .map(|one| ElementColumn { element: one.element, values: cut(&mut one.values, at) })
+            .collect(),
+        provenance: batch
+            .provenance
+            .iter_mut()
+            .map(|one| Provenance {
+                channel: one.channel,
+                source_t_s: cut(&mut one.source_t_s, at),
+                quality: cut(&mut one.quality, at),
+            })
+            .collect(),
+        truth: batch
+            .truth
+            .iter_mut()
+            .map(|one| TruthColumn {
+                name: one.name.clone(),
+                unit: one.unit.clone(),
+                values: cut(&mut one.values, at),
+            })
+            .collect(),
+        events: Vec::new(),
+    }
+}
+
+fn append(whole: &mut SampleBatch, part: SampleBatch) {
+    let (before, after) = (whole.t_s.len(), whole.t_s.len() + part.t_s.len());
+    for column in part.columns {
+        if let Some(there) = whole.columns.iter_mut().find(|there| there.channel == column.channel) {
+            there.values.extend(column.values);
+        }
+    }
+    for column in part.elements {
+        match whole.elements.iter_mut().find(|there| there.element == column.element) {
+            Some(there) => there.values.extend(column.values),
+            None => {
+                let mut values = vec![f64::NAN; before];
+                values.extend(column.values);
+                whole.elements.push(ElementColumn { element: column.element, values });
+            }
+        }
+    }
+    for column in part.truth {
+        match whole.truth.iter_mut().find(|there| there.name == column.name) {
+            Some(there) => there.values.extend(column.values),
+            None => {
+                let mut values = vec![f64::NAN; before];
+                values.extend(column.values);
+                whole.truth.push(TruthColumn { values, ..column });
+            }
+        }
+    }
+    for from in part.provenance {
+        match whole.provenance.iter_mut().find(|there| there.channel == from.channel) {
+            Some(there) => {
+                there.source_t_s.extend(from.source_t_s);
+                there.quality.extend(from.quality);
+            }
+            None => {
+                let mut source_t_s = whole.t_s.clone();
+                let mut quality = vec![Quality::Good; before];
+                source_t_s.extend(from.source_t_s);
+                quality.extend(from.quality);
+                whole.provenance.push(Provenance { channel: from.channel, source_t_s, quality });
+            }
+        }
+    }
+    whole.t_s.extend(&part.t_s);
+    // A column that this part lacks.
+    whole.columns.iter_mut().for_each(|one| one.values.resize(after, f64::NAN));
+    whole.elements.iter_mut().for_each(|one| one.values.resize(after, f64::NAN));
+    whole.truth.iter_mut().for_each(|one| one.values.resize(after, f64::NAN));
+    for from in &mut whole.provenance {
+        let known = from.source_t_s.len().min(after);
+        from.source_t_s.extend(&whole.t_s[known..]);
+        from.quality.resize(after, Quality::Good);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn batch(first_sequence: u64, t_s: &[f64], channels: &[Channel]) -> SampleBatch {
+        let column = |channel: &Channel| ChannelColumn { channel: *channel, values: t_s.to_vec() };
+        SampleBatch {
+            first_sequence,
+            t_s: t_s.to_vec(),
+            columns: channels.iter().map(column).collect(),
+            ..SampleBatch::default()
+        }
+    }
+
+    #[test]
+    fn what_comes_twice_late_or_backward_is_refused_and_what_was_good_stays() {
+        use Channel::{T1, T2};
+        let mut pending = Pending::default();
+        pending.push(batch(0, &[0.0, 0.1], &[T1, T2])).unwrap();
+        let again = pending.push(batch(0, &[0.0, 0.1], &[T1, T2]));
+        assert_eq!(again, Err(Unusable::Sequence { expected: 2, found: 0 }));
+        let missing = pending.push(batch(3, &[0.3], &[T1, T2]));
+        assert_eq!(missing, Err(Unusable::Sequence { expected: 2, found: 3 }));
+        let backward = pending.push(batch(2, &[0.05], &[T1, T2]));
+        assert_eq!(backward, Err(Unusable::Time { before_s: 0.1, t_s: 0.05 }));
+        let mut worse = batch(2, &[0.2, 0.3], &[T1]);
+        worse.provenance =
+            vec![Provenance { channel: T1, source_t_s: vec![0.1, 0.1], quality: vec![Quality::Bad; 2] }];
+        pending.push(worse).unwrap();
+        assert!(pending.reaches(0.3) && !pending.reaches(0.31));
+        let whole = pending.take(0.25, &[T1, T2]);
+        assert_eq!((whole.first_sequence, &whole.t_s[..]), (0, &[0.0, 0.1, 0.2][..]));
+        assert_eq!(whole.column(T1), Some(&[0.0, 0.1, 0.2][..]));
+        assert!(whole.column(T2).unwrap()[2].is_nan());
+        let from = whole.provenance_of(T1).unwrap();
+        assert_eq!(from.source_t_s, [0.0, 0.1, 0.1]);
+        assert_eq!(from.quality, [Quality::Good, Quality::Good, Quality::Bad]);
+        let rest = pending.take(9.0, &[T1, T2]);
+        assert_eq!((rest.first_sequence, &rest.t_s[..]), (3, &[0.3][..]));
+    }
+
+    #[test]
+    fn no_more_is_kept_than_anybody_may_ask_for() {
+        let mut pending = Pending::default();
+        let t_s: Vec<f64> = (0..100_000).map(f64::from).collect();
+        let flood = (0..50).try_for_each(|i| {
+            let later: Vec<f64> = t_s.iter().map(|t_s| t_s + f64::from(i) * 1e5).collect();
+            pending.push(batch(i as u64 * 100_000, &later, &[Channel::T1]))
+        });
+        assert_eq!(flood, Err(Unusable::TooMany));
+    }
+}

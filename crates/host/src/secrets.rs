@@ -1,0 +1,95 @@
+//! Secrets stand in the environment, and nowhere else.
+
+use crate::error::DriverError;
+use serde_json::Value;
+
+/// Keys whose values are secret, wherever they contain one of these.
+const SECRET: [&str; 5] = ["password", "passphrase", "secret", "token", "private_key_text"];
+/// What stands in place of a secret.
+const HIDDEN: &str = "[secret]";
+/// Deepest nesting of settings that is looked into: YAML is read less deep.
+const DEEPEST: usize = 64;
+
+/// Values of the environment that settings name.
+#[derive(Default)]
+pub(crate) struct Secrets(Vec<String>);
+
+impl Secrets {
+    /// What `settings` name; `variable` gives the value of an environment variable.
+    ///
+    /// # Errors
+    /// The key path and [`DriverError::Secret`] where a secret stands in the settings, [`DriverError::NotSet`] for an absent
+    /// variable.
+    pub(crate) fn of(
+        settings: &Value,
+        variable: &dyn Fn(&str) -> Option<String>,
+    ) -> Result<Secrets, (String, DriverError)> {
+        let mut secrets = Secrets::default();
+        secrets.look(settings, &mut Vec::new(), variable)?;
+        Ok(secrets)
+    }
+
+    fn look(
+        &mut self,
+        value: &Value,
+        path: &mut Vec<String>,
+        variable: &dyn Fn(&str) -> Option<String>,
+    ) -> Result<(), (String, DriverError)> {
+        if let Some(name) = environment(value) {
+            match variable(name) {
+                Some(secret) if !secret.is_empty() => self.0.push(secret),
+                _ => return Err((path.join("."), DriverError::NotSet(name.to_owned()))),
+            }
+            return Ok(());
+        }
+        let key = path.last().map(|key| key.to_ascii_lowercase()).unwrap_or_default();
+        if SECRET.iter().any(|secret| key.contains(secret)) && !value.is_null() {
+            return Err((path.join("."), DriverError::Secret));
+        }
+        if path.len() >= DEEPEST {
+            return Ok(());
+        }
+        let inside: Vec<(String, &Value)> = match value {
+            Value::Object(map) => map.iter().map(|(key, value)| (key.clone(), value)).collect(),
+            Value::Array(list) => list.iter().enumerate().map(|(i, value)| (i.to_string(), value)).collect(),
+            _ => Vec::new(),
+        };
+        for (key, value) in inside {
+            path.push(key);
+            self.look(value, path, variable)?;
+            path.pop();
+        }
+        Ok(())
+    }
+
+    /// A driver's words without them.
+    pub(crate) fn hide(&self, text: &str) -> String {
+        self.0.iter().fold(text.to_owned(), |text, secret| text.replace(secret.as_str(), HIDDEN))
+    }
+}
+
+/// The variable that `{env: NAME}` names.
+fn environment(value: &Value) -> Option<&str> {
+    let map = value.as_object().filter(|map| map.len() == 1)?;
+    map.get("env")?.as_str()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn secrets_come_from_the_environment_alone_and_are_hidden() {
+        let variable = |name: &str| (name == "PLC").then(|| "hunter2".to_owned());
+        let read = |settings: Value| Secrets::of(&settings, &variable);
+        let secrets = read(json!({"user": "lab", "security": {"password": {"env": "PLC"}}})).ok().unwrap();
+        assert_eq!(secrets.hide("login of lab with hunter2 failed"), "login of lab with [secret] failed");
+        let (path, error) = read(json!({"security": [{"Password": "hunter2"}]})).err().unwrap();
+        assert_eq!(path, "security.0.Password");
+        assert!(!error.to_string().contains("hunter2"));
+        let (path, error) = read(json!({"token": {"env": "NOT_THERE"}})).err().unwrap();
+        assert_eq!((path.as_str(), error.to_string().contains("NOT_THERE")), ("token", true));
+        assert!(read(json!({"password": null, "host": "x"})).is_ok());
+    }
+}

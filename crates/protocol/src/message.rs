@@ -1,0 +1,280 @@
+//! What is said. SI units; the unit of a number stands in its name. Fields that are not known are ignored.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// One message: a request (`id` and `method`), its answer (`id` and `result` or `error`), or a note (`method` alone).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Message {
+    /// Number of a request and of its answer, counted up by who asks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub id: Option<u64>,
+    /// The session, as the driver named it in its hello; in every message of the host after that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub session: Option<String>,
+    /// Time after which the host no longer waits for the answer, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deadline_s: Option<f64>,
+    /// What is asked for or noted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method: Option<String>,
+    /// What it is about.
+    #[serde(default, skip_serializing_if = "Value::is_null")]
+    pub params: Value,
+    /// A good answer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub result: Option<Value>,
+    /// A refusal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<Failure>,
+}
+
+impl Message {
+    /// A note, to which there is no answer.
+    pub fn note(method: &str, params: Value) -> Message {
+        Message { method: Some(method.to_owned()), params, ..Message::default() }
+    }
+
+    /// The answer to a request.
+    pub fn answer(id: u64, answer: Result<Value, Box<Failure>>) -> Message {
+        let (result, error) = match answer {
+            Ok(result) => (Some(result), None),
+            Err(error) => (None, Some(*error)),
+        };
+        Message { id: Some(id), result, error, ..Message::default() }
+    }
+}
+
+/// Why a request was refused.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Failure {
+    /// Kind of the failure.
+    pub code: Code,
+    /// One sentence for people: what is wrong, with value and unit, and what to do. No secrets.
+    pub message: String,
+    /// `settings`: key path below the driver's settings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<String>,
+    /// `setpoint_out_of_range`: which setpoint, by its key in `set`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub setpoint: Option<String>,
+    /// `setpoint_out_of_range`: what was asked for, SI.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// `setpoint_out_of_range`: lowest that is accepted, SI.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub low: Option<f64>,
+    /// `setpoint_out_of_range`: highest that is accepted, SI.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub high: Option<f64>,
+    /// `lost` and `simulation`: run time at which it happened, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub t_s: Option<f64>,
+}
+
+impl Failure {
+    /// A failure that is told in words alone.
+    pub fn new(code: Code, message: impl Into<String>) -> Failure {
+        Failure {
+            code,
+            message: message.into(),
+            path: None,
+            setpoint: None,
+            value: None,
+            low: None,
+            high: None,
+            t_s: None,
+        }
+    }
+}
+
+/// Kind of a failure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Code {
+    /// The request does not fit the state of the rig.
+    OutOfOrder,
+    /// A setpoint outside of what the rig can do; nothing was changed.
+    SetpointOutOfRange,
+    /// The settings are wrong.
+    Settings,
+    /// A simulation could not go on.
+    Simulation,
+    /// The rig went away.
+    Lost,
+    /// The driver has no such method.
+    UnknownMethod,
+    /// The parameters are not those of the method.
+    Params,
+    /// The version of the protocol, or the session, is another.
+    Refused,
+    /// The lease had ended: the rig has been made safe; disarm and arm again.
+    LeaseEnded,
+    /// Anything else.
+    #[serde(other)]
+    Failed,
+}
+
+/// A version of the protocol.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Version {
+    /// Another one is refused.
+    pub major: u32,
+    /// A higher one has more fields, which are ignored.
+    pub minor: u32,
+}
+
+/// `hello`: the first request.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Hello {
+    /// `mapper-backend`.
+    pub magic: String,
+    /// Version of the protocol.
+    pub protocol: Version,
+    /// Name of the program.
+    pub name: String,
+    /// Version of the program.
+    pub version: String,
+    /// Largest frame that it takes, bytes.
+    pub frame_limit_bytes: u32,
+}
+
+/// Answer to `hello`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Welcome {
+    /// The driver's own hello: its name is the name that campaigns write.
+    #[serde(flatten)]
+    pub hello: Hello,
+    /// Name of this session: any text that no other session of this driver has had.
+    pub session: String,
+}
+
+/// `configure`: what the campaign writes below the driver's name. The rig is not touched.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Configure {
+    /// The settings; `null` where the campaign has none. A secret is `{env: NAME}`, the name of an environment variable.
+    #[serde(default)]
+    pub settings: Value,
+}
+
+/// Answer to `describe`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Described {
+    /// The rig.
+    pub description: Description,
+    /// Any text that changes with the description; the helpers take SHA-256.
+    pub identity: String,
+}
+
+/// What a rig says of itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Description {
+    /// What it measures.
+    pub channels: Vec<ChannelDescription>,
+    /// Samples per second, Hz, > 0.
+    pub sample_rate_hz: f64,
+    /// Whether time is simulated: samples come on `poll` then, else by themselves.
+    pub simulated_time: bool,
+    /// Whether setpoints have an effect.
+    #[serde(default = "yes")]
+    pub controls: bool,
+    /// Name of the one rig that this is; no two runs may have it at once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exclusive: Option<String>,
+    /// Guards that the run must have, by their keys in campaigns.
+    #[serde(default)]
+    pub needs_guarded: Vec<String>,
+    /// Setpoints that it accepts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accepts: Option<Ranges>,
+    /// Its way into the safe state.
+    pub safe: SafeWay,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// A channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ChannelDescription {
+    /// Symbol, e.g. `T2`.
+    pub name: String,
+    /// Unit: the one of the channel, in SI, e.g. `K`.
+    pub unit: String,
+    /// How many sensors measure it; 1 if not said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensors: Option<usize>,
+}
+
+/// Lowest and highest of each setpoint, SI.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Ranges {
+    /// Turbine inlet total pressure, Pa.
+    pub p3_pa: (f64, f64),
+    /// Turbine inlet total temperature, K.
+    pub t3_k: (f64, f64),
+    /// Opening of the back-pressure valve, ratio.
+    pub valve_opening_ratio: (f64, f64),
+    /// Oil inlet temperature, K.
+    pub oil_temperature_k: (f64, f64),
+}
+
+/// The way into the safe state: valve open and heater off at once, P3 down at a slew, air off.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SafeWay {
+    /// How fast P3 is taken down, Pa/s; `null`: the air is cut at once.
+    #[serde(default)]
+    pub p3_slew_pa_s: Option<f64>,
+    /// Opening of the valve on the way, ratio.
+    pub valve_opening_ratio: f64,
+    /// Longest time of the way, s.
+    pub within_s: f64,
+}
+
+/// Whether gas flows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// Air off, shaft at rest.
+    Standstill,
+    /// Air on.
+    Running,
+}
+
+/// `set`: everything that the rig is told, effective at once.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Setpoints {
+    /// Air.
+    pub mode: Mode,
+    /// Turbine inlet total pressure, Pa.
+    pub p3_pa: f64,
+    /// Turbine inlet total temperature, K.
+    pub t3_k: f64,
+    /// Opening of the back-pressure valve, ratio.
+    pub valve_opening_ratio: f64,
+    /// Oil inlet temperature, K.
+    pub oil_temperature_k: f64,
+}
+
+/// `poll`: lets simulated time go on. The samples come as notes before the answer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Poll {
+    /// Until this time since arming, s.
+    pub until_s: f64,
+}
+
+/// Answer to `poll`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct LastSample {
+    /// Sequence number of the next sample: how many have been sent since arming.
+    pub next_sequence: u64,
+}
+
+/// `note`: a remark of the driver for people.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Note {
+    /// One sentence.
+    pub message: String,
+}

@@ -1,0 +1,132 @@
+//! Standard input and output, signals, and the clock.
+
+use crate::Open;
+use crate::server::Server;
+use mapper_protocol::{Encoding, FRAME_LIMIT_BYTES, Message, decode, encode, read_frame, write_frame};
+use std::io::Read;
+use std::process::ExitCode;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::{Duration, Instant};
+
+/// Messages that wait for a host that does not read: some seconds of samples. Samples beyond are dropped, which the host sees.
+const WAITING: usize = 256;
+/// Longest wait, s.
+const LONGEST_S: f64 = 3600.0;
+
+/// What happens to a driver.
+enum Came {
+    Message(Box<Message>),
+    /// The host is gone, or talks what nobody understands.
+    Closed,
+    /// A signal asks it to end.
+    Terminate,
+}
+
+/// Serves one host on standard input and output, until it is gone and the rig is safe. `name`: the file name of the program is
+/// `mapper-backend-NAME`.
+pub fn serve(name: &'static str, version: &'static str, open: impl Open + 'static) -> ExitCode {
+    let begun = Instant::now();
+    let now_s = || begun.elapsed().as_secs_f64();
+    let (tell, news) = sync_channel(WAITING);
+    if listen(std::io::stdin(), tell.clone()).and_then(|()| heed_signals(tell)).is_err() {
+        return ExitCode::FAILURE;
+    }
+    let Ok(outlet) = writer() else { return ExitCode::FAILURE };
+    let mut server = Server::new(name, version, session(), Box::new(open));
+    while !server.is_over() {
+        // What has come while the rig was busy has come in time.
+        while let Ok(came) = news.try_recv() {
+            heed(&mut server, came, now_s());
+        }
+        let next_s = server.tick(now_s());
+        send(&mut server, &outlet);
+        if server.is_over() {
+            break;
+        }
+        if let Some(came) = wait(&news, next_s) {
+            heed(&mut server, came, now_s());
+        }
+        send(&mut server, &outlet);
+    }
+    ExitCode::SUCCESS
+}
+
+fn heed(server: &mut Server, came: Came, now_s: f64) {
+    match came {
+        Came::Message(message) => server.take(now_s, *message),
+        Came::Closed | Came::Terminate => server.leave(now_s),
+    }
+}
+
+/// A name that no other session of this driver has: its process and when it began.
+fn session() -> String {
+    let since = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
+    format!("{}-{}", std::process::id(), since.as_nanos())
+}
+
+fn wait(news: &Receiver<Came>, next_s: Option<f64>) -> Option<Came> {
+    let within = Duration::from_secs_f64(next_s.unwrap_or(LONGEST_S).clamp(0.0, LONGEST_S));
+    match news.recv_timeout(within) {
+        Ok(came) => Some(came),
+        Err(RecvTimeoutError::Timeout) => None,
+        Err(RecvTimeoutError::Disconnected) => Some(Came::Closed),
+    }
+}
+
+/// What goes out waits in a queue: a host that has stopped must not stop the driver.
+fn send(server: &mut Server, outlet: &SyncSender<Vec<u8>>) {
+    let limit = server.frame_limit_bytes() as usize;
+    for message in std::mem::take(&mut server.out) {
+        let Ok(body) = encode(&message, Encoding::MessagePack) else { continue };
+        if body.len() <= limit {
+            // Where it finds no place it will be missed: by its number, or by the deadline of who asked.
+            let _ = outlet.try_send(body);
+        }
+    }
+}
+
+fn writer() -> std::io::Result<SyncSender<Vec<u8>>> {
+    let (send, to_write) = sync_channel::<Vec<u8>>(WAITING);
+    std::thread::Builder::new().name("to host".to_owned()).spawn(move || {
+        let mut stdout = std::io::stdout();
+        for body in to_write {
+            if write_frame(&mut stdout, &body, u32::MAX).is_err() {
+                break;
+            }
+        }
+    })?;
+    Ok(send)
+}
+
+fn listen(mut stdin: impl Read + Send + 'static, tell: SyncSender<Came>) -> std::io::Result<()> {
+    let read = move || {
+        while let Ok(Some(body)) = read_frame(&mut stdin, FRAME_LIMIT_BYTES) {
+            let Ok(message) = decode(&body) else { break };
+            if tell.send(Came::Message(Box::new(message))).is_err() {
+                return;
+            }
+        }
+        // Nobody is left to be told where this fails.
+        let _ = tell.send(Came::Closed);
+    };
+    std::thread::Builder::new().name("from host".to_owned()).spawn(read).map(drop)
+}
+
+#[cfg(unix)]
+fn heed_signals(tell: SyncSender<Came>) -> std::io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGHUP, SIGINT])?;
+    let heed = move || {
+        for _ in signals.forever() {
+            if tell.send(Came::Terminate).is_err() {
+                return;
+            }
+        }
+    };
+    std::thread::Builder::new().name("signals".to_owned()).spawn(heed).map(drop)
+}
+
+#[cfg(not(unix))]
+fn heed_signals(_: SyncSender<Came>) -> std::io::Result<()> {
+    Ok(())
+}

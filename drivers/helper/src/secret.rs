@@ -1,0 +1,26 @@
+//! Secrets stand in the environment; settings name the variable.
+
+use serde_json::Value;
+
+/// Why there is no secret.
+#[derive(Debug, thiserror::Error)]
+pub enum SecretError {
+    /// It stands in the settings.
+    #[error("write `{{env: NAME}}`, the name of an environment variable that holds it")]
+    Form,
+    /// The variable is not set.
+    #[error("the environment variable {0} is not set")]
+    NotSet(String),
+}
+
+/// The secret that a setting `{env: NAME}` names; `None` for `null`.
+///
+/// # Errors
+/// [`SecretError`], which never holds the secret.
+pub fn secret(setting: &Value) -> Result<Option<String>, SecretError> {
+    if setting.is_null() {
+        return Ok(None);
+    }
+    let name = setting.get("env").and_then(Value::as_str).ok_or(SecretError::Form)?;
+    std::env::var(name).map(Some).map_err(|_| SecretError::NotSet(name.to_owned()))
+}

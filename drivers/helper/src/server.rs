@@ -1,0 +1,486 @@
+//! What a driver does at each message and at each tick; time is an argument.
+
+use crate::descent::{Descent, STEP_S, make_safe};
+use mapper_core::{Backend, BackendError, RigDescription, Setpoints};
+use mapper_protocol::{
+    Code, Configure, Described, FRAME_LIMIT_BYTES, Failure, Hello, LEASE_S, LastSample, MAGIC, Message, Poll,
+    VERSION, Welcome, description_on_the_wire, error_on_the_wire, pieces, setpoints,
+};
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Why a request is refused.
+type Refusal = Box<Failure>;
+
+fn refused(code: Code, message: impl Into<String>) -> Refusal {
+    Box::new(Failure::new(code, message))
+}
+
+/// Makes the rig.
+pub(crate) type Opened = Box<dyn FnOnce(&Value) -> Result<Box<dyn Backend>, BackendError>>;
+
+/// A rig that is held.
+struct Armed {
+    /// On the driver's clock, s.
+    at_s: f64,
+    told: Option<Setpoints>,
+    /// Number of the next sample to poll for, in real time.
+    ticks: u64,
+    /// Run time of the last poll, s.
+    polled_s: f64,
+    /// Without a word until then the rig is made safe, s on the driver's clock.
+    lease_s: f64,
+    descent: Option<Descent>,
+    /// The lease had ended: nothing but giving back.
+    ended: bool,
+}
+
+/// A driver, from hello to the end.
+pub(crate) struct Server {
+    name: &'static str,
+    version: &'static str,
+    session: String,
+    open: Option<Opened>,
+    rig: Option<(Box<dyn Backend>, RigDescription)>,
+    armed: Option<Armed>,
+    greeted: bool,
+    frame_limit_bytes: u32,
+    /// Nobody is there any more: end when the rig is safe.
+    leaving: bool,
+    /// What goes out.
+    pub(crate) out: Vec<Message>,
+}
+
+impl Server {
+    pub(crate) fn new(name: &'static str, version: &'static str, session: String, open: Opened) -> Server {
+        Server {
+            name,
+            version,
+            session,
+            open: Some(open),
+            rig: None,
+            armed: None,
+            greeted: false,
+            frame_limit_bytes: mapper_protocol::FIRST_FRAME_LIMIT_BYTES,
+            leaving: false,
+            out: Vec::new(),
+        }
+    }
+
+    /// Largest frame that the other side takes, bytes.
+    pub(crate) fn frame_limit_bytes(&self) -> u32 {
+        self.frame_limit_bytes
+    }
+
+    /// Whether it is over: nobody is there, and the rig is safe.
+    pub(crate) fn is_over(&self) -> bool {
+        self.leaving && self.armed.is_none()
+    }
+
+    /// A message has come at this time of the driver's clock, s.
+    pub(crate) fn take(&mut self, now_s: f64, message: Message) {
+        let known = message.session.as_deref() == Some(&self.session);
+        if let (Some(armed), true) = (&mut self.armed, known) {
+            armed.lease_s = now_s + LEASE_S;
+        }
+        let (Some(id), Some(method)) = (message.id, message.method) else { return };
+        let answer = match method.as_str() {
+            "hello" => self.hello(&message.params),
+            _ if !self.greeted => Err(refused(Code::OutOfOrder, "hello comes first")),
+            _ if !known => Err(refused(Code::Refused, "the session is another one")),
+            "configure" => self.configure(&message.params),
+            "describe" => self.describe(),
+            "arm" => self.arm(now_s),
+            "set" => self.set(&message.params),
+            "poll" => self.poll(&message.params),
+            "make_safe" => self.make_safe(),
+            "disarm" => self.disarm(),
+            other => Err(refused(Code::UnknownMethod, format!("there is no method `{other}`"))),
+        };
+        self.out.push(Message::answer(id, answer));
+    }
+
+    fn hello(&mut self, params: &Value) -> Result<Value, Refusal> {
+        let theirs: Hello = read(params)?;
+        if theirs.magic != MAGIC || theirs.protocol.major != VERSION.major {
+            let (major, minor) = (VERSION.major, VERSION.minor);
+            let message = format!("this driver speaks version {major}.{minor} of the protocol {MAGIC}");
+            return Err(refused(Code::Refused, message));
+        }
+        self.greeted = true;
+        self.frame_limit_bytes = theirs.frame_limit_bytes.max(mapper_protocol::FIRST_FRAME_LIMIT_BYTES);
+        let hello = Hello {
+            magic: MAGIC.to_owned(),
+            protocol: VERSION,
+            name: self.name.to_owned(),
+            version: self.version.to_owned(),
+            frame_limit_bytes: FRAME_LIMIT_BYTES,
+        };
+        write(&Welcome { hello, session: self.session.clone() })
+    }
+
+    fn configure(&mut self, params: &Value) -> Result<Value, Refusal> {
+        let Configure { settings } = read(params)?;
+        let Some(open) = self.open.take() else {
+            return Err(refused(Code::OutOfOrder, "the settings have come already"));
+        };
+        let rig = guarded(|| open(&settings))?;
+        let description = rig.describe();
+        self.rig = Some((rig, description));
+        Ok(json!({}))
+    }
+
+    fn describe(&self) -> Result<Value, Refusal> {
+        let Some((_, rig)) = &self.rig else { return Err(no_settings()) };
+        let description = description_on_the_wire(rig);
+        let text =
+            serde_json::to_vec(&description).map_err(|error| refused(Code::Failed, error.to_string()))?;
+        let identity = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
+        write(&Described { description, identity })
+    }
+
+    fn arm(&mut self, now_s: f64) -> Result<Value, Refusal> {
+        let Some((rig, _)) = &mut self.rig else { return Err(no_settings()) };
+        if self.armed.is_some() {
+            return Err(refused(Code::OutOfOrder, "the rig is armed"));
+        }
+        guarded(|| rig.arm())?;
+        self.armed = Some(Armed {
+            at_s: now_s,
+            told: None,
+            ticks: 0,
+            polled_s: 0.0,
+            lease_s: now_s + LEASE_S,
+            descent: None,
+            ended: false,
+        });
+        Ok(json!({}))
+    }
+
+    /// The rig, where it is held and nothing is wrong.
+    fn held(&mut self) -> Result<(&mut dyn Backend, &RigDescription, &mut Armed), Refusal> {
+        let (Some((rig, description)), Some(armed)) = (&mut self.rig, &mut self.armed) else {
+            return Err(refused(Code::OutOfOrder, "the rig is not armed"));
+        };
+        Ok((rig.as_mut(), description, armed))
+    }
+
+    fn set(&mut self, params: &Value) -> Result<Value, Refusal> {
+        let wanted = setpoints(&read(params)?);
+        let (rig, description, armed) = self.held()?;
+        if armed.ended || armed.descent.is_some() {
+            let message = "the lease had ended and the rig was made safe; disarm it and arm it again";
+            return Err(refused(Code::LeaseEnded, message));
+        }
+        if let Some(accepts) = &description.accepts {
+            accepts.check(&wanted).map_err(|error| Box::new(error_on_the_wire(&error)))?;
+        }
+        guarded(|| rig.set(&wanted))?;
+        armed.told = Some(wanted);
+        Ok(json!({}))
+    }
+
+    fn poll(&mut self, params: &Value) -> Result<Value, Refusal> {
+        let Poll { until_s } = read(params)?;
+        let limit = self.frame_limit_bytes;
+        let (rig, description, armed) = self.held()?;
+        if !description.simulated_time {
+            return Err(refused(
+                Code::UnknownMethod,
+                "this rig is in real time: its samples come by themselves",
+            ));
+        }
+        let batch = guarded(|| rig.poll(until_s))?;
+        armed.polled_s = armed.polled_s.max(until_s);
+        let next_sequence = batch.first_sequence + batch.t_s.len() as u64;
+        for piece in pieces(&batch, limit) {
+            self.out.push(Message::note("samples", write(&piece)?));
+        }
+        write(&LastSample { next_sequence })
+    }
+
+    fn make_safe(&mut self) -> Result<Value, Refusal> {
+        let (rig, _, armed) = self.held()?;
+        guarded(|| rig.make_safe())?;
+        (armed.descent, armed.told) = (None, None);
+        Ok(json!({}))
+    }
+
+    fn disarm(&mut self) -> Result<Value, Refusal> {
+        let (rig, ..) = self.held()?;
+        guarded(|| rig.disarm())?;
+        self.armed = None;
+        Ok(json!({}))
+    }
+
+    /// Nobody is there any more: the rig becomes safe, then it is over.
+    pub(crate) fn leave(&mut self, now_s: f64) {
+        if !self.leaving {
+            self.leaving = true;
+            self.begin_descent(now_s);
+        }
+    }
+
+    fn begin_descent(&mut self, now_s: f64) {
+        let Ok((_, description, armed)) = self.held() else { return };
+        if armed.descent.is_none() && !armed.ended {
+            let t_s = if description.simulated_time { armed.polled_s } else { now_s - armed.at_s };
+            armed.descent = Some(Descent::new(armed.told, t_s));
+            armed.ended = true;
+        }
+    }
+
+    /// What is due at this time of the driver's clock, s. Returns when something is due next, s from now; `None`: nothing.
+    pub(crate) fn tick(&mut self, now_s: f64) -> Option<f64> {
+        let Some(armed) = &self.armed else { return None };
+        if now_s >= armed.lease_s && !armed.ended {
+            let message = "nothing was heard for the time of the lease; the rig flies its safe trajectory";
+            self.out.push(Message::note("note", json!({ "message": message })));
+            self.begin_descent(now_s);
+        }
+        let limit = self.frame_limit_bytes;
+        let Ok((rig, description, armed)) = self.held() else { return None };
+        let simulated = description.simulated_time;
+        let mut next_s = armed.lease_s - now_s;
+        if !simulated {
+            let period_s = 1.0 / description.sample_rate_hz;
+            let run_s = now_s - armed.at_s;
+            // The newest that is due; half a millionth of a period is rounding.
+            let due = (run_s / period_s + 5e-7).floor().max(0.0) as u64;
+            if due >= armed.ticks {
+                armed.ticks = due + 1;
+                // A rig may measure nothing before it was told anything.
+                let waits = armed.told.is_none() && !armed.ended;
+                match guarded(|| rig.poll(due as f64 * period_s)) {
+                    Ok(batch) => {
+                        let samples = pieces(&batch, limit);
+                        let notes = samples.iter().filter_map(|piece| write(piece).ok());
+                        self.out.extend(notes.map(|samples| Message::note("samples", samples)));
+                    }
+                    Err(failure) if waits && failure.code == Code::OutOfOrder => {}
+                    Err(failure) => {
+                        let params = write(failure.as_ref()).unwrap_or_default();
+                        self.out.push(Message::note("lost", params));
+                    }
+                }
+            }
+        }
+        let Ok((rig, description, armed)) = self.held() else { return None };
+        if !simulated {
+            next_s = next_s.min(armed.ticks as f64 / description.sample_rate_hz - (now_s - armed.at_s));
+        }
+        if let Some(descent) = armed.descent {
+            let t_s = if simulated { armed.polled_s } else { now_s - armed.at_s };
+            let (over, safe) = descent.fly(rig, &description.safe, t_s);
+            if simulated && !over {
+                armed.polled_s += STEP_S;
+                let until_s = armed.polled_s;
+                // Samples of a way that nobody looks at.
+                let _ = guarded(|| rig.poll(until_s));
+            }
+            next_s = if simulated { 0.0 } else { next_s.min(STEP_S) };
+            if over {
+                armed.descent = None;
+                if let Err(error) = safe {
+                    let message = format!("the rig did not confirm its safe state: {error}");
+                    self.out.push(Message::note("note", json!({ "message": message })));
+                }
+            }
+        }
+        if self.leaving {
+            self.give_back_when_safe();
+        }
+        Some(next_s.max(0.0))
+    }
+
+    fn give_back_when_safe(&mut self) {
+        let Ok((rig, _, armed)) = self.held() else { return };
+        if armed.descent.is_none() {
+            // Whatever has become of it: nobody can be told.
+            let _ = make_safe(rig);
+            let _ = guarded(|| rig.disarm());
+            self.armed = None;
+        }
+    }
+}
+
+fn no_settings() -> Refusal {
+    refused(Code::OutOfOrder, "the settings have not come")
+}
+
+fn read<T: DeserializeOwned>(params: &Value) -> Result<T, Refusal> {
+    T::deserialize(params).map_err(|error| refused(Code::Params, error.to_string()))
+}
+
+fn write(value: &impl serde::Serialize) -> Result<Value, Refusal> {
+    serde_json::to_value(value).map_err(|error| refused(Code::Failed, error.to_string()))
+}
+
+/// A call of the author's code: its errors and panics as refusals.
+fn guarded<T>(call: impl FnOnce() -> Result<T, BackendError>) -> Result<T, Refusal> {
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(answer) => answer.map_err(|error| Box::new(error_on_the_wire(&error))),
+        Err(_) => Err(refused(Code::Lost, "the driver failed; its own words stand on its standard error")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{Channel, ChannelColumn, RigMode, SafeTrajectory, SampleBatch};
+    use std::sync::{Arc, Mutex};
+
+    type Log = Arc<Mutex<Vec<String>>>;
+
+    /// Writes down what it is told.
+    struct Told {
+        log: Log,
+        simulated_time: bool,
+        samples: u64,
+        /// So many setpoints are taken before it panics.
+        takes: usize,
+    }
+
+    impl Told {
+        fn write(&self, words: String) -> Result<(), BackendError> {
+            self.log.lock().unwrap().push(words);
+            Ok(())
+        }
+    }
+
+    impl Backend for Told {
+        fn describe(&self) -> RigDescription {
+            RigDescription {
+                backend: "told".to_owned(),
+                version: "1".to_owned(),
+                channels: vec![Channel::T2],
+                sample_rate_hz: 10.0,
+                simulated_time: self.simulated_time,
+                controls: true,
+                exclusive: None,
+                needs_guarded: Vec::new(),
+                accepts: None,
+                safe: SafeTrajectory { p3_slew_pa_s: Some(100e3), valve_opening_ratio: 1.5, within_s: 5.0 },
+            }
+        }
+        fn arm(&mut self) -> Result<(), BackendError> {
+            Ok(())
+        }
+        fn set(&mut self, to: &Setpoints) -> Result<(), BackendError> {
+            self.takes = self.takes.checked_sub(1).expect("as the test wants it");
+            self.write(format!("{:.0} {:.0} {:.1}", to.p3_pa, to.t3_k, to.valve_opening_ratio))
+        }
+        fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+            self.samples += 1;
+            let columns = vec![ChannelColumn { channel: Channel::T2, values: vec![300.0] }];
+            let t_s = vec![until_s];
+            Ok(SampleBatch { first_sequence: self.samples - 1, t_s, columns, ..SampleBatch::default() })
+        }
+        fn make_safe(&mut self) -> Result<(), BackendError> {
+            self.write("safe".to_owned())
+        }
+        fn disarm(&mut self) -> Result<(), BackendError> {
+            Ok(())
+        }
+    }
+
+    /// A driver that is armed since 0 s and told 150 kPa; what its rig is told after that.
+    fn flying(simulated_time: bool, takes: usize) -> (Server, Log) {
+        let log = Log::default();
+        let rig = Told { log: log.clone(), simulated_time, samples: 0, takes };
+        let open: Opened = Box::new(|_| Ok(Box::new(rig)));
+        let mut server = Server::new("told", "1", "s".to_owned(), open);
+        let hello = json!({"magic": MAGIC, "protocol": VERSION, "name": "x", "version": "1", "frame_limit_bytes": 100_000});
+        let told = setpoints_on_the_wire();
+        for (method, params) in
+            [("hello", hello), ("configure", json!({})), ("arm", json!({})), ("set", told)]
+        {
+            ask(&mut server, 0.0, method, params);
+        }
+        log.lock().unwrap().clear();
+        server.out.clear();
+        (server, log)
+    }
+
+    fn setpoints_on_the_wire() -> Value {
+        let told = Setpoints {
+            mode: RigMode::Running,
+            p3_pa: 150e3,
+            t3_k: 773.15,
+            valve_opening_ratio: 0.7,
+            oil_temperature_k: 323.15,
+        };
+        serde_json::to_value(mapper_protocol::setpoints_on_the_wire(&told)).unwrap()
+    }
+
+    fn ask(server: &mut Server, now_s: f64, method: &str, params: Value) -> Option<Failure> {
+        let (id, session, method) = (Some(1), Some("s".to_owned()), Some(method.to_owned()));
+        server.take(now_s, Message { id, session, method, params, ..Message::default() });
+        server.out.pop().and_then(|answer| answer.error)
+    }
+
+    /// From 150 kPa at 100 kPa/s, above the atmosphere's 105 kPa, with the heater off and the valve open; then the air.
+    const WAY: [&str; 5] = ["140000 293 1.5", "130000 293 1.5", "120000 293 1.5", "110000 293 1.5", "safe"];
+
+    #[test]
+    fn a_lease_that_ends_makes_the_rig_safe_and_one_that_is_renewed_does_not() {
+        let (mut server, log) = flying(false, 100);
+        let lease = Message { session: Some("s".to_owned()), ..Message::note("lease", Value::Null) };
+        for tenth in 0..100 {
+            let now_s = f64::from(tenth) / 10.0;
+            if tenth % 5 == 0 && tenth < 60 {
+                server.take(now_s, lease.clone());
+            }
+            server.tick(now_s);
+            // Renewed for the last time at 5.5 s.
+            assert!(log.lock().unwrap().is_empty() || now_s >= 7.5, "at {now_s} s");
+        }
+        assert_eq!(*log.lock().unwrap(), WAY);
+        let refused = ask(&mut server, 10.0, "set", setpoints_on_the_wire()).unwrap();
+        assert_eq!(refused.code, Code::LeaseEnded);
+        assert!(ask(&mut server, 10.0, "disarm", json!({})).is_none());
+        assert!(ask(&mut server, 10.0, "arm", json!({})).is_none());
+        assert!(ask(&mut server, 10.0, "set", setpoints_on_the_wire()).is_none());
+    }
+
+    /// By another session no lease is renewed, and nothing is set.
+    #[test]
+    fn a_stranger_is_refused() {
+        let (mut server, log) = flying(false, 100);
+        let stranger = Message {
+            id: Some(9),
+            session: Some("t".to_owned()),
+            ..Message::note("set", setpoints_on_the_wire())
+        };
+        server.take(1.9, stranger);
+        assert_eq!(server.out.pop().unwrap().error.unwrap().code, Code::Refused);
+        server.tick(2.0);
+        assert_eq!(log.lock().unwrap()[0], WAY[0]);
+    }
+
+    #[test]
+    fn a_driver_that_is_left_makes_its_rig_safe_and_ends() {
+        for simulated_time in [false, true] {
+            let (mut server, log) = flying(simulated_time, 100);
+            server.leave(1.0);
+            for tenth in 10..40 {
+                server.tick(f64::from(tenth) / 10.0);
+            }
+            assert!(server.is_over());
+            assert_eq!(log.lock().unwrap()[..WAY.len()], WAY, "{simulated_time}");
+        }
+    }
+
+    /// A rig that panics at its second setpoint of the way: its air is cut at once.
+    #[test]
+    fn a_way_that_fails_is_cut_short() {
+        let (mut server, log) = flying(false, 2);
+        server.leave(1.0);
+        server.tick(1.0);
+        server.tick(1.1);
+        assert_eq!(log.lock().unwrap()[..2], [WAY[0], "safe"]);
+        assert!(server.is_over());
+    }
+}

@@ -1,0 +1,65 @@
+//! The settings of the driver, and the rig that they ask for.
+
+use crate::real_time::RealTime;
+use crate::told::Told;
+use mapper_backends::BACKENDS;
+use mapper_core::{Backend, BackendError};
+use mapper_session::{Registry, nominal_model};
+use serde::Deserialize;
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// Name of the driver.
+pub(crate) const NAME: &str = "lab";
+
+/// What a campaign writes below `lab`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Settings {
+    /// The campaign whose machine, sensors and built-in backend this is.
+    campaign: PathBuf,
+    /// Whether time passes as on the wall.
+    #[serde(default)]
+    real_time: bool,
+    /// A file that gets a line for each thing that the rig is told.
+    told: Option<PathBuf>,
+}
+
+/// Why there is no lab.
+#[derive(Debug, thiserror::Error)]
+enum LabError {
+    #[error(
+        "write {{campaign: FILE}}, a campaign whose machine the lab is; also: real_time: true, told: FILE. {0}"
+    )]
+    Form(serde_json::Error),
+    #[error("{0}")]
+    Campaign(String),
+    #[error("failed to write {}: {source}", path.display())]
+    Told { path: PathBuf, source: std::io::Error },
+}
+
+/// The lab of a campaign.
+pub(crate) fn open(settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
+    let wrong = |path: &str, error: LabError| BackendError::Settings {
+        backend: NAME.to_owned(),
+        path: path.to_owned(),
+        source: Box::new(error),
+    };
+    let settings = Settings::deserialize(settings).map_err(|error| wrong("", LabError::Form(error)))?;
+    let of_campaign = |words: String| wrong("campaign", LabError::Campaign(words));
+    let campaign =
+        mapper_campaign::load(&settings.campaign).map_err(|error| of_campaign(error.to_string()))?;
+    let registry =
+        Registry { backends: BACKENDS.to_vec(), effects: mapper_effects::catalogue(), ..Registry::default() };
+    let model = nominal_model(&campaign).map_err(|error| of_campaign(error.to_string()))?;
+    let lab = registry.make_backend(&campaign, &model).map_err(|error| of_campaign(error.to_string()))?;
+    let lab: Box<dyn Backend> = if settings.real_time { Box::new(RealTime(lab)) } else { lab };
+    match settings.told {
+        None => Ok(lab),
+        Some(path) => {
+            let file = std::fs::File::create(&path);
+            let file = file.map_err(|source| wrong("told", LabError::Told { path, source }))?;
+            Ok(Box::new(Told::new(lab, file)))
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Which registers are read together: fewer requests, each with its round trip.
+
+/// Most registers that one request may read.
+const MOST: u16 = 125;
+/// Registers that are read along with others though nobody wants them: cheaper than another request.
+const GAP: u16 = 8;
+
+/// Neighbouring registers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Block {
+    /// Address of the first one.
+    pub(crate) start: u16,
+    /// How many.
+    pub(crate) count: u16,
+}
+
+/// Blocks that cover all of these pieces, none of which is cut. A piece is at most 4 registers.
+pub(crate) fn blocks(pieces: &[Block]) -> Vec<Block> {
+    let mut pieces = pieces.to_vec();
+    pieces.sort_by_key(|piece| (piece.start, piece.count));
+    let mut blocks: Vec<Block> = Vec::new();
+    for piece in pieces {
+        let end = u32::from(piece.start) + u32::from(piece.count);
+        if let Some(last) = blocks.last_mut() {
+            let last_end = u32::from(last.start) + u32::from(last.count);
+            let together = end.max(last_end) - u32::from(last.start);
+            if u32::from(piece.start) <= last_end + u32::from(GAP) && together <= u32::from(MOST) {
+                last.count = u16::try_from(together).unwrap_or(MOST);
+                continue;
+            }
+        }
+        blocks.push(piece);
+    }
+    blocks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Each piece lies whole in a block, no block is longer than a request may be, and no register beyond the last is asked for.
+        #[test]
+        fn blocks_cover_all_pieces(starts in prop::collection::vec((0u16..65_532, 1u16..=4), 1..40)) {
+            let pieces: Vec<Block> = starts.iter().map(|(start, count)| Block { start: *start, count: *count }).collect();
+            let blocks = blocks(&pieces);
+            for block in &blocks {
+                prop_assert!(block.count <= MOST && u32::from(block.start) + u32::from(block.count) <= 65_536);
+            }
+            for piece in &pieces {
+                let whole = blocks.iter().any(|block| {
+                    block.start <= piece.start
+                        && u32::from(piece.start) + u32::from(piece.count)
+                            <= u32::from(block.start) + u32::from(block.count)
+                });
+                prop_assert!(whole, "{piece:?} in {blocks:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn neighbours_share_a_request_and_far_ones_do_not() {
+        let piece = |start| Block { start, count: 2 };
+        let found = blocks(&[piece(200), piece(0), piece(2), piece(10)]);
+        assert_eq!(found, [Block { start: 0, count: 12 }, Block { start: 200, count: 2 }]);
+    }
+}

@@ -1,0 +1,116 @@
+//! The connection to the controller. Every call has a deadline, and after a call that failed the connection is a new one: the answer
+//! to a request that timed out may still come, and this library would take it for the answer to the next
+//! (slowtec/tokio-modbus issue 324).
+
+use crate::blocks::Block;
+use std::future::Future;
+use std::net::SocketAddr;
+use std::time::Duration;
+use tokio::runtime::Runtime;
+use tokio::time::timeout;
+use tokio_modbus::client::{Context, tcp};
+use tokio_modbus::prelude::{Reader, Slave, Writer};
+
+/// Why a call failed.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum LinkError {
+    /// Too late.
+    #[error("{address} did not answer within {} ms", within.as_millis())]
+    Late { address: SocketAddr, within: Duration },
+    /// The connection failed.
+    #[error("{address}: {words}")]
+    Failed { address: SocketAddr, words: String },
+    /// The controller refuses.
+    #[error("{address} refuses {what}: {words}")]
+    Refused { address: SocketAddr, what: String, words: String },
+}
+
+/// Which registers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Table {
+    /// Holding registers, that can be written.
+    Holding,
+    /// Input registers.
+    Input,
+}
+
+/// A connection that is made when it is needed.
+pub(crate) struct Link {
+    runtime: Runtime,
+    address: SocketAddr,
+    unit: u8,
+    within: Duration,
+    connection: Option<Context>,
+}
+
+impl Link {
+    /// No connection is made yet.
+    pub(crate) fn new(address: SocketAddr, unit: u8, within: Duration) -> std::io::Result<Link> {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        Ok(Link { runtime, address, unit, within, connection: None })
+    }
+
+    /// Forgets the connection.
+    pub(crate) fn close(&mut self) {
+        self.connection = None;
+    }
+
+    /// Reads registers.
+    pub(crate) fn read(&mut self, table: Table, block: Block) -> Result<Vec<u16>, LinkError> {
+        let Block { start, count } = block;
+        let registers =
+            self.call(format!("registers {start} to {}", start + (count - 1)), async |link| match table {
+                Table::Holding => link.read_holding_registers(start, count).await,
+                Table::Input => link.read_input_registers(start, count).await,
+            })?;
+        if registers.len() == usize::from(count) {
+            return Ok(registers);
+        }
+        self.connection = None;
+        let words = format!("{} registers came where {count} were asked for", registers.len());
+        Err(LinkError::Failed { address: self.address, words })
+    }
+
+    /// Writes registers; tried once more on a new connection, since writing the same twice does no harm.
+    pub(crate) fn write(&mut self, start: u16, registers: &[u16]) -> Result<(), LinkError> {
+        let what = || format!("a value for register {start}");
+        match self.call(what(), async |link| link.write_multiple_registers(start, registers).await) {
+            Err(LinkError::Late { .. } | LinkError::Failed { .. }) => {
+                self.call(what(), async |link| link.write_multiple_registers(start, registers).await)
+            }
+            answer => answer,
+        }
+    }
+
+    fn call<T>(
+        &mut self,
+        what: String,
+        request: impl AsyncFnOnce(&mut Context) -> tokio_modbus::Result<T>,
+    ) -> Result<T, LinkError> {
+        let (address, within) = (self.address, self.within);
+        let late = LinkError::Late { address, within };
+        let mut connection = match self.connection.take() {
+            Some(connection) => connection,
+            None => {
+                let connect = tcp::connect_slave(address, Slave(self.unit));
+                let made = self.runtime.block_on(in_time(within, connect)).ok_or(late)?;
+                made.map_err(|error| LinkError::Failed { address, words: error.to_string() })?
+            }
+        };
+        let answer = self.runtime.block_on(in_time(within, request(&mut connection)));
+        match answer {
+            None => Err(LinkError::Late { address, within }),
+            Some(Err(error)) => Err(LinkError::Failed { address, words: error.to_string() }),
+            Some(Ok(answer)) => {
+                self.connection = Some(connection);
+                answer.map_err(|code| LinkError::Refused { address, what, words: code.to_string() })
+            }
+        }
+    }
+}
+
+/// `None` where it is too late. The timer begins inside of the runtime.
+async fn in_time<T>(within: Duration, work: impl Future<Output = T>) -> Option<T> {
+    timeout(within, work).await.ok()
+}

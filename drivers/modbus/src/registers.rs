@@ -1,0 +1,119 @@
+//! Numbers in registers of 16 bits.
+
+use serde::Deserialize;
+
+/// How a number stands in its registers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Form {
+    U16,
+    I16,
+    U32,
+    I32,
+    #[default]
+    F32,
+    F64,
+}
+
+/// Which word, or which byte of a word, comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Order {
+    /// The most significant one, as Modbus itself has it.
+    #[default]
+    Big,
+    /// The least significant one.
+    Little,
+}
+
+impl Form {
+    /// How many registers.
+    pub(crate) fn count(self) -> u16 {
+        match self {
+            Form::U16 | Form::I16 => 1,
+            Form::U32 | Form::I32 | Form::F32 => 2,
+            Form::F64 => 4,
+        }
+    }
+
+    /// The number in these registers; `None` where there are not so many. NaN where they hold no number.
+    pub(crate) fn number(self, registers: &[u16], words: Order, bytes: Order) -> Option<f64> {
+        let mut registers = registers.get(..usize::from(self.count()))?.to_vec();
+        if words == Order::Little {
+            registers.reverse();
+        }
+        let bits = registers.iter().fold(0u64, |bits, register| {
+            let register = if bytes == Order::Little { register.swap_bytes() } else { *register };
+            bits << 16 | u64::from(register)
+        });
+        // Each cast keeps the bits that there are.
+        Some(match self {
+            Form::U16 | Form::U32 => bits as f64,
+            Form::I16 => f64::from(bits as u16 as i16),
+            Form::I32 => f64::from(bits as u32 as i32),
+            Form::F32 => f64::from(f32::from_bits(bits as u32)),
+            Form::F64 => f64::from_bits(bits),
+        })
+    }
+
+    /// Registers that hold a number; `None` for one that does not fit.
+    pub(crate) fn registers(self, number: f64, words: Order, bytes: Order) -> Option<Vec<u16>> {
+        let whole = number.round();
+        let within = |low: f64, high: f64| (low..=high).contains(&whole);
+        let bits = match self {
+            Form::U16 if within(0.0, f64::from(u16::MAX)) => whole as u64,
+            Form::U32 if within(0.0, f64::from(u32::MAX)) => whole as u64,
+            Form::I16 if within(f64::from(i16::MIN), f64::from(i16::MAX)) => whole as i16 as u16 as u64,
+            Form::I32 if within(f64::from(i32::MIN), f64::from(i32::MAX)) => whole as i32 as u32 as u64,
+            Form::F32 if (number as f32).is_finite() => u64::from((number as f32).to_bits()),
+            Form::F64 if number.is_finite() => number.to_bits(),
+            _ => return None,
+        };
+        let mut registers: Vec<u16> =
+            (0..self.count()).rev().map(|place| (bits >> (16 * place)) as u16).collect();
+        if bytes == Order::Little {
+            registers.iter_mut().for_each(|register| *register = register.swap_bytes());
+        }
+        if words == Order::Little {
+            registers.reverse();
+        }
+        Some(registers)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// 123456.0 as a single is 0x47F12000 (IEEE 754); the four orders of manuals: ABCD, CDAB, BADC, DCBA.
+    #[test]
+    fn the_four_orders_of_manuals() {
+        for (words, bytes, registers) in [
+            (Order::Big, Order::Big, [0x47f1, 0x2000]),
+            (Order::Little, Order::Big, [0x2000, 0x47f1]),
+            (Order::Big, Order::Little, [0xf147, 0x0020]),
+            (Order::Little, Order::Little, [0x0020, 0xf147]),
+        ] {
+            assert_eq!(Form::F32.number(&registers, words, bytes), Some(123_456.0));
+            assert_eq!(Form::F32.registers(123_456.0, words, bytes).unwrap(), registers);
+        }
+        assert_eq!(Form::I16.number(&[0xffff], Order::Big, Order::Big), Some(-1.0));
+        assert_eq!(Form::I32.number(&[0xffff, 0xfffe], Order::Big, Order::Big), Some(-2.0));
+        assert_eq!(Form::F32.number(&[1], Order::Big, Order::Big), None);
+        assert!(Form::U16.registers(65_536.0, Order::Big, Order::Big).is_none());
+        assert!(Form::F32.registers(f64::NAN, Order::Big, Order::Big).is_none());
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_written_is_read(value in -30_000i16..30_000, little_words in any::<bool>(), little_bytes in any::<bool>()) {
+            let order = |little| if little { Order::Little } else { Order::Big };
+            let (words, bytes) = (order(little_words), order(little_bytes));
+            for form in [Form::I16, Form::I32, Form::F32, Form::F64] {
+                let registers = form.registers(f64::from(value), words, bytes).unwrap();
+                prop_assert_eq!(form.number(&registers, words, bytes), Some(f64::from(value)));
+            }
+        }
+    }
+}

@@ -1,0 +1,369 @@
+"""Drivers for mapper in Python: one file, the standard library alone. docs/protocol.md says what goes over the pipes.
+
+An author writes a class with the methods of Rig and calls serve(). Frames, hello, lease, and the safe trajectory when nobody is there any
+more (lease over, input closed, SIGTERM) are done here. A call that hangs keeps the rig from becoming safe: whatever a rig reads or writes
+needs a deadline of its own. Messages are JSON: their numbers are SI, and None is "no reading".
+"""
+
+import hashlib
+import json
+import os
+import queue
+import signal
+import struct
+import sys
+import threading
+import time
+
+MAGIC = "mapper-backend"
+VERSION = {"major": 1, "minor": 0}
+FRAME_LIMIT_BYTES = 1 << 20
+LEASE_S = 2.0
+STEP_S = 0.1  # between two setpoints on the way into the safe state
+HEATER_OFF_K = 293.15
+ATMOSPHERE_PA = 105e3
+TRIES = 3
+WAITING = 256  # messages for a host that does not read; samples beyond are dropped, which the host sees
+ROWS = 500  # samples in one message
+
+UNITS = {
+    "N": "rpm", "m_c": "kg/s", "P1": "Pa", "T1": "K", "P2": "Pa", "T2": "K", "Tc": "K", "m_t": "kg/s", "P3": "Pa", "T3": "K",
+    "P4": "Pa", "T4": "K", "Tt": "K", "T_oil": "K", "T_amb": "K", "P3_command": "Pa", "T3_command": "K", "valve_command": "1",
+    "T_oil_command": "K",
+}
+
+
+class Refused(Exception):
+    """A request that is refused: code of docs/protocol.md, one sentence, and what belongs to the code."""
+
+    def __init__(self, code, message, **more):
+        super().__init__(message)
+        self.failure = {"code": code, "message": message, **more}
+
+
+class Rig:
+    """What an author writes. Times are seconds since arming."""
+
+    def describe(self):
+        """A dict as `description` of docs/protocol.md; see description()."""
+        raise NotImplementedError
+
+    def arm(self):
+        """Takes the rig; time 0."""
+
+    def set(self, setpoints):
+        """New setpoints: mode, p3_pa, t3_k, valve_opening_ratio, oil_temperature_k. What is outside `accepts` never comes here."""
+        raise NotImplementedError
+
+    def poll(self, until_s):
+        """Samples since the last poll, up to until_s: (times, {channel: values}, [(t_s, kind, message)]). In real time it is called at the
+        rate of the rig, for the newest sample."""
+        raise NotImplementedError
+
+    def make_safe(self):
+        """Air off, valve open. At any time while armed, more than once."""
+        raise NotImplementedError
+
+    def disarm(self):
+        """Gives the rig back."""
+
+
+def description(channels, sample_rate_hz, simulated_time, accepts, safe, needs_guarded=(), exclusive=None):
+    """A description; channels by their symbols, accepts and safe as in docs/protocol.md."""
+    return {
+        "channels": [{"name": name, "unit": UNITS[name]} for name in channels],
+        "sample_rate_hz": sample_rate_hz, "simulated_time": simulated_time, "controls": True, "exclusive": exclusive,
+        "needs_guarded": list(needs_guarded), "accepts": accepts, "safe": safe,
+    }
+
+
+def secret(setting):
+    """The value of a setting {env: NAME}, from the environment."""
+    if setting is None:
+        return None
+    name = setting.get("env") if isinstance(setting, dict) else None
+    if not name or name not in os.environ:
+        raise Refused("settings", "write {env: NAME}, the name of an environment variable that is set")
+    return os.environ[name]
+
+
+def check(setpoints, accepts):
+    """Refuses setpoints outside of what the rig accepts, and those that are not numbers."""
+    for key in ("p3_pa", "t3_k", "valve_opening_ratio", "oil_temperature_k"):
+        value, (low, high) = setpoints.get(key), accepts[key]
+        if not isinstance(value, (int, float)) or not low <= value <= high:
+            number = value if isinstance(value, (int, float)) and value == value and abs(value) < 1e300 else None
+            raise Refused("setpoint_out_of_range", f"{key} is {value}; the rig takes {low} to {high}",
+                          setpoint=key, value=number, low=low, high=high)
+
+
+class Server:
+    """What a driver does at each message and at each tick; time is an argument."""
+
+    def __init__(self, name, version, open_rig):
+        self.name, self.version, self.open_rig = name, version, open_rig
+        self.session = f"{os.getpid()}-{time.time_ns()}"
+        self.rig = self.about = self.armed = None
+        self.greeted = self.leaving = False
+        self.out = []
+
+    def over(self):
+        return self.leaving and self.armed is None
+
+    def take(self, now_s, message):
+        known = message.get("session") == self.session
+        if self.armed and known:
+            self.armed["lease_s"] = now_s + LEASE_S
+        identity, method = message.get("id"), message.get("method")
+        if identity is None or method is None:
+            return
+        try:
+            if method != "hello" and not self.greeted:
+                raise Refused("out_of_order", "hello comes first")
+            if method != "hello" and not known:
+                raise Refused("refused", "the session is another one")
+            call = getattr(self, "on_" + str(method), None)
+            if call is None:
+                raise Refused("unknown_method", f"there is no method `{method}`")
+            self.out.append({"id": identity, "result": call(message.get("params") or {}, now_s)})
+        except Refused as refused:
+            self.out.append({"id": identity, "error": refused.failure})
+        except Exception as error:  # an author's mistake is an answer, not the end of the driver
+            self.out.append({"id": identity, "error": {"code": "lost", "message": f"the driver failed: {error!r}"}})
+
+    def on_hello(self, params, _):
+        if params.get("magic") != MAGIC or params.get("protocol", {}).get("major") != VERSION["major"]:
+            raise Refused("refused", f"this driver speaks version {VERSION['major']}.{VERSION['minor']} of the protocol {MAGIC}")
+        self.greeted = True
+        return {"magic": MAGIC, "protocol": VERSION, "name": self.name, "version": self.version,
+                "frame_limit_bytes": FRAME_LIMIT_BYTES, "session": self.session}
+
+    def on_configure(self, params, _):
+        if self.rig:
+            raise Refused("out_of_order", "the settings have come already")
+        self.rig = self.open_rig(params.get("settings"))
+        self.about = self.rig.describe()
+        return {}
+
+    def on_describe(self, _, __):
+        if not self.rig:
+            raise Refused("out_of_order", "the settings have not come")
+        text = json.dumps(self.about, sort_keys=True).encode()
+        return {"description": self.about, "identity": hashlib.sha256(text).hexdigest()}
+
+    def on_arm(self, _, now_s):
+        if not self.rig or self.armed:
+            raise Refused("out_of_order", "the rig is armed" if self.armed else "the settings have not come")
+        self.rig.arm()
+        self.armed = {"at_s": now_s, "told": None, "ticks": 0, "sequence": 0, "polled_s": 0.0, "lease_s": now_s + LEASE_S,
+                      "descent": None, "ended": False}
+        return {}
+
+    def held(self):
+        if not self.armed:
+            raise Refused("out_of_order", "the rig is not armed")
+        return self.armed
+
+    def on_set(self, params, _):
+        armed = self.held()
+        if armed["ended"]:
+            raise Refused("lease_ended", "the lease had ended and the rig was made safe; disarm it and arm it again")
+        if self.about["accepts"]:
+            check(params, self.about["accepts"])
+        self.rig.set(params)
+        armed["told"] = params
+        return {}
+
+    def on_poll(self, params, _):
+        armed, until_s = self.held(), params.get("until_s")
+        if not self.about["simulated_time"]:
+            raise Refused("unknown_method", "this rig is in real time: its samples come by themselves")
+        if not isinstance(until_s, (int, float)):
+            raise Refused("params", "until_s is not a number")
+        self.measure(until_s)
+        armed["polled_s"] = max(armed["polled_s"], until_s)
+        return {"next_sequence": armed["sequence"]}
+
+    def on_make_safe(self, _, __):
+        armed = self.held()
+        self.rig.make_safe()
+        armed["descent"] = armed["told"] = None
+        return {}
+
+    def on_disarm(self, _, __):
+        self.held()
+        self.rig.disarm()
+        self.armed = None
+        return {}
+
+    def measure(self, until_s):
+        """Polls the rig and sends what it gave, in pieces."""
+        times, columns, events = self.rig.poll(until_s)
+        for start in range(0, len(times), ROWS) if times else ([0] if events else []):
+            end = start + ROWS
+            last = end >= len(times)
+            samples = {
+                "stream": "rig", "sequence": self.armed["sequence"] + start, "t_s": times[start:end],
+                "columns": [{"channel": name, "values": values[start:end]} for name, values in columns.items()],
+            }
+            if last and events:
+                samples["events"] = [{"t_s": t_s, "kind": kind, "message": words} for t_s, kind, words in events]
+            self.out.append({"method": "samples", "params": samples})
+        self.armed["sequence"] += len(times)
+
+    def say(self, words):
+        self.out.append({"method": "note", "params": {"message": words}})
+
+    def leave(self, now_s):
+        """Nobody is there any more: the rig becomes safe, then it is over."""
+        if not self.leaving:
+            self.leaving = True
+            self.begin_descent(now_s)
+
+    def run_s(self, now_s):
+        return self.armed["polled_s"] if self.about["simulated_time"] else now_s - self.armed["at_s"]
+
+    def begin_descent(self, now_s):
+        armed = self.armed
+        if armed and not armed["ended"]:
+            armed["ended"] = True
+            armed["descent"] = (armed["told"], self.run_s(now_s))
+
+    def tick(self, now_s):
+        """What is due; gives the time until something is due next, s, or None."""
+        armed = self.armed
+        if not armed:
+            return None
+        if now_s >= armed["lease_s"] and not armed["ended"]:
+            self.say("nothing was heard for the time of the lease; the rig flies its safe trajectory")
+            self.begin_descent(now_s)
+        next_s = max(0.0, armed["lease_s"] - now_s) if not armed["ended"] else 1.0
+        if not self.about["simulated_time"]:
+            period_s = 1.0 / self.about["sample_rate_hz"]
+            due = max(0, int((now_s - armed["at_s"]) / period_s + 5e-7))
+            if due >= armed["ticks"]:
+                armed["ticks"] = due + 1
+                try:
+                    self.measure(due * period_s)
+                except Refused as refused:
+                    self.out.append({"method": "lost", "params": refused.failure})
+                except Exception as error:
+                    self.out.append({"method": "lost", "params": {"code": "lost", "message": f"the driver failed: {error!r}"}})
+            next_s = min(next_s, armed["ticks"] * period_s - (now_s - armed["at_s"]))
+        if armed["descent"]:
+            next_s = min(next_s, self.descend(now_s))
+        if self.leaving and not armed["descent"]:
+            self.cut_air()
+            try:
+                self.rig.disarm()
+            except Exception:
+                pass  # nobody can be told
+            self.armed = None
+        return max(0.0, next_s)
+
+    def descend(self, now_s):
+        """Valve open and heater off at once, P3 down at its slew, then the air off."""
+        told, begun_s = self.armed["descent"]
+        safe, simulated = self.about["safe"], self.about["simulated_time"]
+        after_s = self.run_s(now_s) - begun_s + STEP_S
+        slew_pa_s = safe.get("p3_slew_pa_s")
+        if told and told["mode"] == "running" and slew_pa_s and after_s <= safe["within_s"]:
+            p3_pa = told["p3_pa"] - slew_pa_s * after_s
+            opening = max(told["valve_opening_ratio"], safe["valve_opening_ratio"])
+            if p3_pa > ATMOSPHERE_PA:
+                try:
+                    self.rig.set({**told, "p3_pa": p3_pa, "t3_k": HEATER_OFF_K, "valve_opening_ratio": opening})
+                    if simulated:
+                        self.armed["polled_s"] += STEP_S
+                        self.rig.poll(self.armed["polled_s"])
+                    return 0.0 if simulated else STEP_S
+                except Exception:
+                    pass  # then at once
+        self.armed["descent"] = None
+        if not self.cut_air():
+            self.say("the rig did not confirm its safe state")
+        return 0.0
+
+    def cut_air(self):
+        for _ in range(TRIES):
+            try:
+                self.rig.make_safe()
+                return True
+            except Exception:
+                continue
+        return False
+
+
+def read_frame(stream):
+    """The next message; None at the end of the stream, or where it is not one."""
+    head = stream.read(4)
+    if len(head) < 4:
+        return None
+    (length,) = struct.unpack(">I", head)
+    if not 0 < length <= FRAME_LIMIT_BYTES:
+        return None
+    body = stream.read(length)
+    return body if len(body) == length else None
+
+
+def serve(name, version, open_rig):
+    """Serves one host on standard input and output. open_rig(settings) makes the Rig; the file of the driver is mapper-backend-NAME."""
+    news, to_write = queue.Queue(WAITING), queue.Queue(WAITING)
+    stdin, stdout = sys.stdin.buffer, sys.stdout.buffer
+    sys.stdout = sys.stderr  # a print() of the author must not get between the frames
+
+    def listen():
+        while True:
+            body = read_frame(stdin)
+            try:
+                message = json.loads(body) if body else None
+            except (ValueError, RecursionError):
+                message = None
+            news.put(message)
+            if message is None:
+                return
+
+    def tell():
+        try:
+            while True:
+                body = to_write.get()
+                stdout.write(struct.pack(">I", len(body)) + body)
+                stdout.flush()
+        except OSError:
+            return
+
+    for work in (listen, tell):
+        threading.Thread(target=work, daemon=True).start()
+    for number in (signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        signal.signal(number, lambda *_: threading.Thread(target=news.put, args=(None,), daemon=True).start())
+    server = Server(name, version, open_rig)
+
+    def heed(message):
+        if message is None:
+            server.leave(time.monotonic())
+        elif isinstance(message, dict):
+            server.take(time.monotonic(), message)
+
+    def send():
+        for message in server.out:
+            try:
+                to_write.put_nowait(json.dumps(message, allow_nan=False).encode())
+            except (queue.Full, ValueError):
+                pass  # it will be missed: by its number, or by the deadline of who asked
+        server.out.clear()
+
+    while not server.over():
+        try:
+            while True:  # what has come while the rig was busy has come in time
+                heed(news.get_nowait())
+        except queue.Empty:
+            pass
+        within_s = server.tick(time.monotonic())
+        send()
+        if server.over():
+            break
+        try:
+            heed(news.get(timeout=within_s))
+        except queue.Empty:
+            pass
+        send()

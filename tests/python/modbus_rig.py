@@ -1,0 +1,84 @@
+"""The small rig of drivers/python in real time behind pymodbus, a Modbus server that shares no code with the driver.
+
+Usage: modbus_rig.py [PORT]. Prints the port, then serves until standard input is closed. Holding registers: readings from 0 as singles (two
+registers each, in the order of CHANNELS), setpoints from 100, air 110, heartbeat 111, tripped 112. As a PLC has to, it cuts the air by
+itself where the heartbeat stands still.
+"""
+
+import asyncio
+import importlib.machinery
+import importlib.util
+import pathlib
+import struct
+import sys
+import time
+
+from pymodbus.server import ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+CHANNELS = ["N", "m_c", "P1", "T1", "P2", "T2", "Tc", "m_t", "P3", "T3", "P4", "T4", "Tt", "T_oil", "T_amb"]
+SETPOINTS = ["p3_pa", "t3_k", "valve_opening_ratio", "oil_temperature_k"]
+READ_HOLDING, WRITE_HOLDING = 3, 16
+ALL_DEVICES = 0
+WATCHDOG_S = 2.0
+
+root = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(root / "drivers/python"))
+loader = importlib.machinery.SourceFileLoader("rig", str(root / "drivers/python/mapper-backend-python_rig"))
+rig_module = importlib.util.module_from_spec(importlib.util.spec_from_loader("rig", loader))
+loader.exec_module(rig_module)
+
+
+def words(value):
+    return list(struct.unpack(">2H", struct.pack(">f", value)))
+
+
+def number(registers):
+    return struct.unpack(">f", struct.pack(">2H", *registers))[0]
+
+
+async def live(server):
+    """The rig follows its registers, and fills them."""
+
+    async def get(register, count):
+        return await server.async_getValues(1, READ_HOLDING, register, count)
+
+    async def put(register, values):
+        await server.async_setValues(1, WRITE_HOLDING, register, values)
+
+    rig = rig_module.PythonRig({"noise": 1})
+    rig.arm()
+    begun = time.monotonic()
+    beat, beaten = None, begun
+    while True:
+        now = time.monotonic()
+        values = [number(await get(100 + 2 * i, 2)) for i in range(4)]
+        air, heartbeat = await get(110, 2)
+        if heartbeat != beat:
+            beat, beaten = heartbeat, now
+        if now - beaten > WATCHDOG_S:
+            air = 0
+            await put(112, [1])
+        rig.set({"mode": "running" if air else "standstill", **dict(zip(SETPOINTS, values))})
+        times, columns, _ = rig.poll(now - begun)
+        if times:
+            await put(0, [word for name in CHANNELS for word in words(columns[name][-1])])
+        await asyncio.sleep(0.02)
+
+
+async def main():
+    registers = [0] * 200
+    for i, value in enumerate([110e3, 298.15, 1.0, 323.15]):
+        registers[100 + 2 * i : 102 + 2 * i] = words(value)
+    device = SimDevice(id=ALL_DEVICES, simdata=SimData(0, values=registers, datatype=DataType.REGISTERS))
+    address = ("127.0.0.1", int(sys.argv[1]) if len(sys.argv) > 1 else 0)
+    server = ModbusTcpServer(device, address=address)
+    await server.serve_forever(background=True)
+    living = asyncio.create_task(live(server))
+    print(server.transport.sockets[0].getsockname()[1], flush=True)
+    await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
+    living.cancel()
+    await server.shutdown()
+
+
+asyncio.run(main())

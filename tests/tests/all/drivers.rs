@@ -1,0 +1,206 @@
+//! Rigs behind drivers: programs of their own that speak docs/protocol.md.
+#![cfg(unix)]
+
+use crate::interrupted::Running;
+use mapper_tests::{
+    BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_drivers, mapper_command, repository,
+};
+use notify::{RecursiveMode, Watcher};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+use std::sync::mpsc::channel;
+use std::time::{Duration, Instant};
+
+/// The shipped campaign on four points, each step by itself, with another backend.
+fn short(backend: &str) -> CampaignFile {
+    let own = [("  virtual_lab: {}", backend)];
+    let replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).chain(&own).copied().collect();
+    CampaignFile::shipped_with(&replacements)
+}
+
+/// The lab of another campaign, behind its driver.
+fn lab(of: &CampaignFile, more: &str) -> CampaignFile {
+    short(&format!("  lab: {{campaign: {}{more}}}", of.path.display()))
+}
+
+/// `mapper` where the drivers in Python are on the path too.
+fn with_drivers(arguments: &[&std::ffi::OsStr]) -> Command {
+    build_drivers();
+    let mut command = mapper_command(arguments.iter().copied());
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let places = [repository().join("drivers/python")].into_iter().chain(std::env::split_paths(&path));
+    command.env("PATH", std::env::join_paths(places).unwrap()).env("PYTHONDONTWRITEBYTECODE", "1");
+    command
+}
+
+fn done(mut command: Command) -> Finished {
+    command.output().unwrap().into()
+}
+
+fn run(campaign: &CampaignFile) -> Value {
+    let runs = campaign.runs();
+    let arguments =
+        ["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref(), "--out".as_ref(), runs.as_os_str()];
+    done(with_drivers(&arguments)).exits(0).json()
+}
+
+fn check(name: &str, campaign: &CampaignFile) {
+    let arguments = ["backend", "check", name, "--campaign"].map(std::ffi::OsStr::new);
+    let arguments: Vec<_> = arguments.into_iter().chain([campaign.path.as_os_str()]).collect();
+    let finished = done(with_drivers(&arguments));
+    assert!(!finished.stdout.contains("BROKEN"), "{}", finished.stdout);
+    assert_eq!(finished.exits(0).stdout.lines().count(), 12);
+}
+
+/// One word of the campaign is another; the lab is the same, and so is every point to the last digit.
+#[test]
+fn the_lab_behind_its_driver_gives_the_points_of_the_lab() {
+    let built_in = short("  virtual_lab: {}");
+    let behind = lab(&built_in, "");
+    let (expected, found) = (run(&built_in), run(&behind));
+    assert_eq!(expected["points"].as_array().unwrap().len(), 4);
+    assert_eq!(found["points"], expected["points"]);
+}
+
+#[test]
+fn the_lab_behind_its_driver_keeps_every_rule() {
+    check("lab", &lab(&short("  virtual_lab: {}"), ""));
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python: run `cargo xtask test`")]
+fn the_rig_in_python_keeps_every_rule_and_gives_the_points_of_the_same_model() {
+    let campaign = short("  python_rig: {noise: 1}");
+    check("python_rig", &campaign);
+    let (found, expected) = (run(&campaign), run(&short("  virtual_lab: {offsets: none}")));
+    let (found, expected) = (found["points"].as_array().unwrap(), expected["points"].as_array().unwrap());
+    assert_eq!(found.len(), 4);
+    let eta = |point: &Value| point["eta"].as_f64();
+    let both = found.iter().zip(expected).filter_map(|(found, expected)| Some((eta(found)?, eta(expected)?)));
+    let both: Vec<_> = both.collect();
+    assert!(both.len() >= 3, "{found:?}");
+    for (found, expected) in both {
+        // One model, docs/physics.md, written twice: noise moves a step by some tenths of a percent.
+        assert!((found - expected).abs() < 0.01, "{found} and {expected}");
+    }
+}
+
+#[test]
+fn drivers_are_listed_with_where_they_are_or_the_line_that_builds_them() {
+    let list = done(with_drivers(&["backend", "list", "--json"].map(AsRef::as_ref))).exits(0).json();
+    let of = |name: &str| {
+        let all = list["backends"].as_array().unwrap();
+        all.iter().find(|one| one["name"] == name).unwrap_or_else(|| panic!("{name}: {list}")).clone()
+    };
+    assert!(of("virtual_lab")["program"].is_null());
+    assert!(of("lab")["program"].as_str().unwrap().ends_with("mapper-backend-lab"));
+    assert!(of("python_rig")["program"].as_str().unwrap().contains("drivers/python"));
+    // Alone in a directory, with nothing on the path.
+    let alone = mapper_tests::scratch();
+    let program = alone.path().join("mapper");
+    std::fs::copy(mapper_command([""; 0]).get_program(), &program).unwrap();
+    let output = Command::new(&program).args(["backend", "list"]).env("PATH", "").output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("cargo build --release -p mapper-backend-modbus"), "{text}");
+}
+
+#[test]
+fn a_driver_that_is_not_there_and_a_secret_in_a_campaign_are_mistakes_at_their_places() {
+    for (backend, words, never) in [
+        ("  no_such_rig: {x: 1}", "mapper-backend-no_such_rig", "\u{0}"),
+        ("  lab: {campaign: x.yaml, password: hunter2}", "{env: NAME}", "error: hunter2"),
+        ("  lab: {password: {env: MAPPER_TEST_NOT_SET}}", "MAPPER_TEST_NOT_SET is not set", "\u{0}"),
+        ("  lab: {real_time: true}", "campaign", "\u{0}"),
+    ] {
+        let campaign = short(backend);
+        let finished = done(with_drivers(&["check".as_ref(), campaign.path.as_os_str()])).exits(3);
+        assert!(finished.stderr.contains(words) && finished.stderr.contains('^'), "{}", finished.stderr);
+        assert!(!finished.stderr.contains(never), "{}", finished.stderr);
+    }
+}
+
+/// What the rig was told, as soon as `reached` holds of it; how long that took.
+fn told(file: &Path, reached: impl Fn(&str) -> bool) -> (String, Duration) {
+    let (tell, news) = channel();
+    let mut watcher = notify::recommended_watcher(tell).unwrap();
+    watcher.watch(file.parent().unwrap(), RecursiveMode::NonRecursive).unwrap();
+    let begun = Instant::now();
+    loop {
+        let text = std::fs::read_to_string(file).unwrap_or_default();
+        if reached(&text) {
+            return (text, begun.elapsed());
+        }
+        news.recv_timeout(Duration::from_secs(60)).expect("the rig is told something").unwrap();
+    }
+}
+
+/// A run on the lab in real time, with its gas on.
+fn flying() -> (Running, CampaignFile, CampaignFile, std::path::PathBuf) {
+    build_drivers();
+    let built_in = short("  virtual_lab: {}");
+    let file = built_in.directory().join("told.txt");
+    let campaign = lab(&built_in, &format!(", real_time: true, told: {}", file.display()));
+    let running = Running::start_with(&campaign, &[]);
+    told(&file, |text| text.contains("set air on"));
+    (running, campaign, built_in, file)
+}
+
+/// The way: the heater off with the first word, P3 down, then the air.
+fn flew_its_way(text: &str) {
+    let way: Vec<&str> = text.lines().skip_while(|line| !line.contains("T3 293 K")).collect();
+    let steps = way.iter().take_while(|line| line.contains("T3 293 K")).count();
+    assert!(steps > 2, "P3 goes down at its slew: {text}");
+    assert!(way[steps].contains("make safe"), "{text}");
+}
+
+/// Nobody is left to tell the rig anything. The driver does, at once: 2.5 s is what docs/safety.md promises.
+#[test]
+fn a_runner_that_is_killed_leaves_a_driver_that_makes_the_rig_safe() {
+    let (running, _campaign, _built_in, file) = flying();
+    running.kill();
+    let (_, began) = told(&file, |text| text.contains("T3 293 K"));
+    assert!(began < Duration::from_millis(2500), "{began:?}");
+    let (text, _) = told(&file, |text| text.contains("disarm"));
+    flew_its_way(&text);
+}
+
+/// A runner that stands still holds its pipes open: the lease ends.
+#[test]
+fn a_runner_that_stands_still_loses_its_lease() {
+    let (running, _campaign, _built_in, file) = flying();
+    running.signal("STOP");
+    let (text, _) = told(&file, |text| text.contains("make safe"));
+    flew_its_way(&text);
+    running.kill();
+    told(&file, |text| text.contains("disarm"));
+}
+
+/// What docs/rig.md shows, at another port.
+fn behind_modbus(port: &str) -> CampaignFile {
+    let guide = std::fs::read_to_string(repository().join("docs/rig.md")).unwrap();
+    let (_, after) = guide.split_once("```yaml\nbackend:\n").unwrap();
+    let (backend, _) = after.split_once("\n```").unwrap();
+    assert!(backend.contains("address: 127.0.0.1:5020"));
+    short(&backend.replace(":5020", &format!(":{port}")))
+}
+
+/// Behind a server that shares no code with the driver, with the settings of the guide, in real time.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_rig_behind_modbus_keeps_every_rule() {
+    use std::io::BufRead;
+    let mut server = Command::new(option_env!("MAPPER_TEST_PYTHON").unwrap_or("python3"))
+        .arg(repository().join("tests/python/modbus_rig.py"))
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut port = String::new();
+    std::io::BufReader::new(server.stdout.take().unwrap()).read_line(&mut port).unwrap();
+    check("modbus", &behind_modbus(port.trim()));
+    // It ends with its input.
+    drop(server.stdin.take());
+    assert!(server.wait().unwrap().success());
+}

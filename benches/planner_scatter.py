@@ -18,7 +18,7 @@ REPLACED = [
     ("speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]", "speeds: [50 krpm, 125 krpm, 80 krpm, 155 krpm]"),
     ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.5, 1.0, 2.0]"),
     ("order: information ", "repeats: off\norder: listed "),
-    ("required_sigma_eta: 0.6 %\n", ""),
+    ("required_sigma_eta: 0.5 %\n", ""),
     ("dwell: 120 s ", "dwell: 40 s "),
 ]
 

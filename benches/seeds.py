@@ -264,7 +264,7 @@ in the last row of a machine. The same 48 points of `campaigns/turbo_a.yaml` by
 - `joint`, all steps together, as the shipped campaign plans it: by what each step tells, as long as the required error takes;
 - `joint` after an isothermal zero: the same after a rest of 30 minutes before the warm-up, so that its sensors read alike. The
   soak is part of the minutes;
-- quick: `joint` after the zero with `required_sigma_eta: 0.9 %` instead of 0.6 %;
+- quick: `joint` after the zero with `required_sigma_eta: 0.9 %` instead of 0.5 %;
 - until certain: the same with `ends: when_certain`: each step ends as soon as what it still tells is worth less than its seconds;
 - after a less even rest: 0.03 K and 3 Pa, what half an hour in a room with a draught may leave, instead of a night in a closed cell.
 

@@ -29,11 +29,17 @@ pub fn forecast_longer(
     Ok(rows)
 }
 
-/// The plan with these dwells, s, in the same order, forecast anew.
+/// The plan with these dwells, s, in the same order, forecast anew; `as_declared`: with the errors of a machine that is as
+/// declared, else those are the open ones.
 ///
 /// # Errors
 /// [`PlanError::Forecast`] where a simulation fails.
-pub fn with_dwells(request: &PlanRequest<'_>, plan: &Plan, dwells_s: &[f64]) -> Result<Plan, PlanError> {
+pub fn with_dwells(
+    request: &PlanRequest<'_>,
+    plan: &Plan,
+    dwells_s: &[f64],
+    as_declared: bool,
+) -> Result<Plan, PlanError> {
     let mut retimed = plan.clone();
     let mut start_s = plan.warm_up_s;
     for (step, dwell_s) in retimed.steps.iter_mut().zip(dwells_s) {
@@ -47,7 +53,7 @@ pub fn with_dwells(request: &PlanRequest<'_>, plan: &Plan, dwells_s: &[f64]) -> 
         predicted.push(found.predicted);
         Ok(found)
     })?;
-    with_errors_together(request, &rows, predicted.iter_mut(), true);
+    with_errors_together(request, &rows, predicted.iter_mut(), as_declared);
     for (step, predicted) in retimed.steps.iter_mut().zip(predicted) {
         step.predicted = predicted;
     }

@@ -9,10 +9,11 @@ use crate::SessionError;
 use crate::planning::{identification_after_zero, with_plan_request};
 use crate::predicted_method::expected_row;
 use mapper_campaign::Campaign;
-use mapper_core::{DwellEnd, Plan, PlanStep, Recording, StepKind, StepMarker};
+use mapper_core::{DwellEnd, Method, Plan, PlanStep, Recording, StepKind, StepMarker};
 use mapper_identify::{
     CampaignInformation, ExpectedRow, ExpectedStep, IdentifyConfig, PressureTap, StepInformation,
 };
+use mapper_numerics::parallel;
 use mapper_physics::forecast::ForecastRow;
 use mapper_physics::model::Model;
 use mapper_planner::{PlanRequest, REACHED_RATIO, SHORTEST_S, forecast_longer, rested_dwell_s, with_dwells};
@@ -82,23 +83,28 @@ pub(crate) struct DwellPrices {
     looks: Vec<(f64, f64)>,
 }
 
-/// The plan with the dwells that its steps are expected to have, where they end when enough is known; unchanged where they do
-/// not, or where nothing can be forecast.
+/// The plan with dwells that reach the required error at one price of a second, whether its steps end as planned or when enough is
+/// known; unchanged where no error is required, or nothing can be forecast.
 ///
 /// # Errors
 /// [`SessionError`] where the forecast fails.
 pub fn retimed(campaign: &Campaign, request: &PlanRequest<'_>, plan: Plan) -> Result<Plan, SessionError> {
-    let Some(required) = wanted(campaign) else { return Ok(plan) };
+    let joint = campaign.identification.method == Method::Joint && campaign.sequence.is_none();
+    let Some(required) = campaign.required_sigma_eta.filter(|_| joint) else { return Ok(plan) };
     let (mut plan, mut between) = (plan, None);
     for _ in 0..ROUNDS {
         let Some(prices) = DwellPrices::about(campaign, request, &plan, required)? else { break };
         between = Some([LESS_NOISE_RATIO, MORE_NOISE_RATIO].map(|ratio| prices.with_noise(ratio)));
-        plan = with_dwells(request, &plan, &prices.dwells_s(prices.price))?;
+        plan = with_dwells(request, &plan, &prices.dwells_s(prices.price), false)?;
         if plan.figures.open_rms_error_eta.is_some_and(|error| error <= REACHED_RATIO * required) {
             break;
         }
     }
-    plan.remarks.extend(between.map(|between| remark(campaign, &plan, between)));
+    let dwells_s: Vec<f64> = plan.steps.iter().map(|step| step.dwell_s).collect();
+    plan = with_dwells(request, &plan, &dwells_s, true)?;
+    if wanted(campaign).is_some() {
+        plan.remarks.extend(between.map(|between| remark(campaign, &plan, between)));
+    }
     Ok(plan)
 }
 
@@ -164,8 +170,7 @@ impl DwellPrices {
             steps.iter().map(|planned| planned.forecast(planned.step.dwell_s)).collect();
         let about = CampaignInformation::about(&expected, &forecast_config, &config);
         let Some((information, open)) = about.zip(plan.figures.open_rms_error_eta) else { return Ok(None) };
-        let as_planned: Vec<Option<StepInformation>> =
-            expected.iter().map(|step| information.of_forecast(step, &forecast_config)).collect();
+        let as_planned = parallel::map(&expected, |step| information.of_forecast(step, &forecast_config));
         drop(expected);
         let (target, price) = (required, PRICES.0);
         let mut prices = DwellPrices {
@@ -183,28 +188,36 @@ impl DwellPrices {
         let Some(linear) = prices.error(&told) else { return Ok(None) };
         // What smoothness says, and the method's own bias, are known of the plan as it stands.
         prices.target = required * linear / open;
-        prices.tables = prices.steps.iter().map(|planned| prices.dwells_of(planned)).collect();
+        prices.tables = parallel::map(&prices.steps, |planned| prices.dwells_of(planned));
         prices.settle();
         Ok(Some(prices))
     }
 
     /// The dwells that a step may have, the shortest in which it comes to rest first.
     fn dwells_of(&self, planned: &Planned) -> Vec<Dwell> {
-        let at =
-            |dwell_s: f64| self.information.of_forecast(&planned.forecast(dwell_s), &self.forecast_config);
-        let of = |dwell_s: f64| {
-            let (before, tells) = (at(dwell_s - LAST_S)?, at(dwell_s)?);
-            let rate = (self.information.worth(&tells) - self.information.worth(&before)) / LAST_S;
-            Some(Dwell { dwell_s, tells, rate })
-        };
-        if lasts_as_planned(&planned.step) {
-            return of(planned.step.dwell_s).into_iter().collect();
-        }
         let longest_s = self.longest_s;
-        let shortest_s = rested_dwell_s(&planned.step, SHORTEST_S.min(longest_s), longest_s);
+        let as_planned = lasts_as_planned(&planned.step);
+        let shortest_s = if as_planned {
+            planned.step.dwell_s
+        } else {
+            rested_dwell_s(&planned.step, SHORTEST_S.min(longest_s), longest_s)
+        };
         let apart_s = APART_S.max((longest_s - shortest_s) / MOST_TRIED);
-        let tried = (0..).map(|i| shortest_s + f64::from(i) * apart_s).take_while(|s| *s <= longest_s + 1e-6);
-        tried.filter_map(of).collect()
+        let last_s = if as_planned { shortest_s } else { longest_s };
+        let back = (LAST_S / apart_s).ceil().max(1.0) as usize;
+        let first_s = shortest_s - back as f64 * apart_s;
+        let times_s = (0..).map(|i: u32| first_s + f64::from(i) * apart_s);
+        let tells: Vec<(f64, Option<StepInformation>)> = times_s
+            .take_while(|s| *s <= last_s + 1e-6)
+            .map(|s| (s, self.information.of_forecast(&planned.forecast(s), &self.forecast_config)))
+            .collect();
+        let of = |(before, now): (&(f64, Option<StepInformation>), &(f64, Option<StepInformation>))| {
+            let (earlier, tells) = (before.1.as_ref()?, now.1.clone()?);
+            let rate =
+                (self.information.worth(&tells) - self.information.worth(earlier)) / (now.0 - before.0);
+            Some(Dwell { dwell_s: now.0, tells, rate })
+        };
+        tells.iter().zip(tells.iter().skip(back)).filter_map(of).collect()
     }
 
     /// Error of the points that are measured, rms, fraction. One entry for each step; `None` tells nothing.

@@ -362,7 +362,8 @@ impl PreparedRun<'_> {
         let (end, drifted) = std::thread::scope(|scope| {
             let begin = || Estimates::begin(scope, identification(campaign), session.on_event);
             let mut estimates = session.estimates.then(begin);
-            let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut teller, &mut self.steps_made];
+            let mut observers: Vec<&mut dyn RunObserver> =
+                vec![&mut recorder, &mut teller, &mut self.steps_made];
             observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
             match drift_watch(campaign, steps) {
                 Ok(mut watch) => {

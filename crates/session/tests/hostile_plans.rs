@@ -25,7 +25,7 @@ fn small() -> Campaign {
         ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 2.0]"),
         ("method: joint ", "method: steady "),
         ("order: information ", "order: listed "),
-        ("required_sigma_eta: 0.6 %\n", ""),
+        ("required_sigma_eta: 0.5 %\n", ""),
         ("seed: 1  ", "repeats: off\nseed: 1  "),
     ])
 }

@@ -30,7 +30,7 @@ fn planned(campaign: &Campaign) -> Plan {
     plan(campaign, &nominal_model(campaign).unwrap()).unwrap()
 }
 
-const ANY_ERROR: (&str, &str) = ("required_sigma_eta: 0.6 %\n", "");
+const ANY_ERROR: (&str, &str) = ("required_sigma_eta: 0.5 %\n", "");
 
 /// The rms of the errors is the forecast's, within what the draws of what all points share know of it: of 18 a standard
 /// deviation to 17 %, three of which are half.

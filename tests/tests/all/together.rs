@@ -55,7 +55,7 @@ fn two_recordings_make_one_map() {
             (SPEEDS, speeds),
             (OPENINGS, few),
             ("order: information ", "order: listed "),
-            ("required_sigma_eta: 0.6 %\n", ""),
+            ("required_sigma_eta: 0.5 %\n", ""),
             ("dwell: 120 s ", "dwell: 60 s "),
         ])
     };

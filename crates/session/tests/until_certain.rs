@@ -9,8 +9,9 @@ use mapper_backends::virtual_lab;
 use mapper_campaign::Campaign;
 use mapper_core::{DwellEnd, EventKind, Plan, StepKind, Timing};
 use mapper_formats::FORMATS;
+use mapper_planner::make_plan;
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_session::{Registry, RunRequest, Session, nominal_model, plan};
+use mapper_session::{Registry, RunRequest, Session, SessionError, nominal_model, plan, with_plan_request};
 use shipped::campaign;
 
 /// Eight points with a repeated jump.
@@ -22,7 +23,7 @@ fn small() -> Campaign {
         ),
         ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.5, 1.0]"),
         // Eight points know the shared numbers badly: 120 s at each reach 4 points.
-        ("required_sigma_eta: 0.9 %", "required_sigma_eta: 5 %"),
+        ("required_sigma_eta: 0.5 %", "required_sigma_eta: 5 %"),
         ("  dwell: 120 s ", "  ends: when_certain\n  dwell: 120 s "),
     ])
 }
@@ -36,7 +37,13 @@ fn planned(campaign: &Campaign) -> Plan {
 fn priced_dwells_reach_the_required_error_in_no_more_time() {
     let certain = small();
     let timing = Timing { ends: DwellEnd::Planned, ..certain.timing };
-    let (priced, even) = (planned(&certain), planned(&Campaign { timing, ..certain.clone() }));
+    let model = nominal_model(&certain).unwrap();
+    // As the planner makes it, before the session prices its seconds.
+    let even =
+        with_plan_request(&certain, &model, |request| Ok::<_, SessionError>(make_plan(request)?)).unwrap();
+    let (priced, as_planned) = (planned(&certain), planned(&Campaign { timing, ..certain.clone() }));
+    let dwells_s = |plan: &Plan| plan.steps.iter().map(|step| step.dwell_s).collect::<Vec<_>>();
+    assert_eq!(dwells_s(&priced), dwells_s(&as_planned), "one forecast, whoever ends the steps");
     let required = certain.required_sigma_eta.unwrap();
     for plan in [&priced, &even] {
         // Both stop searching within 2 % of it; dwells are whole seconds.

@@ -207,17 +207,18 @@ impl DwellPrices {
         let back = (LAST_S / apart_s).ceil().max(1.0) as usize;
         let first_s = shortest_s - back as f64 * apart_s;
         let times_s = (0..).map(|i: u32| first_s + f64::from(i) * apart_s);
-        let tells: Vec<(f64, Option<StepInformation>)> = times_s
-            .take_while(|s| *s <= last_s + 1e-6)
-            .map(|s| (s, self.information.of_forecast(&planned.forecast(s), &self.forecast_config)))
+        let times_s: Vec<f64> = times_s.take_while(|s| *s <= last_s + 1e-6).collect();
+        let tells: Vec<Option<StepInformation>> = times_s
+            .iter()
+            .map(|s| self.information.of_forecast(&planned.forecast(*s), &self.forecast_config))
             .collect();
-        let of = |(before, now): (&(f64, Option<StepInformation>), &(f64, Option<StepInformation>))| {
-            let (earlier, tells) = (before.1.as_ref()?, now.1.clone()?);
-            let rate =
-                (self.information.worth(&tells) - self.information.worth(earlier)) / (now.0 - before.0);
-            Some(Dwell { dwell_s: now.0, tells, rate })
+        let of = |now: usize| {
+            let (earlier, tells) = (tells[now - back].as_ref()?, tells[now].clone()?);
+            let took_s = times_s[now] - times_s[now - back];
+            let rate = (self.information.worth(&tells) - self.information.worth(earlier)) / took_s;
+            Some(Dwell { dwell_s: times_s[now], tells, rate })
         };
-        tells.iter().zip(tells.iter().skip(back)).filter_map(of).collect()
+        (back..times_s.len()).filter_map(of).collect()
     }
 
     /// Error of the points that are measured, rms, fraction. One entry for each step; `None` tells nothing.

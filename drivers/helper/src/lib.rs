@@ -1,4 +1,4 @@
-//! What every driver needs: an author writes a [`Backend`](mapper_core::Backend) and calls [`serve`]; frames, hello, lease and the
+//! What every driver needs: an author writes a [`Backend`] and calls [`serve`]; frames, hello, lease and the
 //! safe trajectory when nobody is there any more are done here. docs/protocol.md says what goes over the pipes.
 //!
 //! ```no_run

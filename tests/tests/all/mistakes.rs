@@ -49,7 +49,11 @@ fn a_mistyped_campaign_is_not_run_and_all_its_mistakes_are_shown() {
     ]);
     let finished = finished.exits(3);
     all_are_shown(&campaign, &finished.stderr);
-    assert_eq!(finished.stdout, "");
+    let told = finished.json();
+    assert_eq!(
+        (told["code"].as_u64(), told["findings"].as_array().map(Vec::len)),
+        (Some(3), Some(MISTAKES.len()))
+    );
     assert!(!out.exists(), "a run directory was made for a campaign with mistakes");
 }
 

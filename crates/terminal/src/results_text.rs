@@ -121,6 +121,10 @@ fn short(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
     if let Some(surge) = found.surge {
         text.push_str(&surge_text(&surge.marks, &surge.remarks, surge.surges, units));
     }
+    // Sensors that all agree are no news.
+    for fused in found.sensors.iter().filter(|fused| !fused.left_out.is_empty()) {
+        text.push_str(&wrapped(&fused.to_string(), COLUMNS, 2));
+    }
     for remark in &found.remarks {
         text.push_str(&wrapped(remark, COLUMNS, 2));
     }

@@ -210,7 +210,7 @@ fn a_stored_plan_is_run_and_a_stale_one_refused() {
     let changed = CampaignFile::shipped_with(&replacements);
     let refused = run(&changed).exits(4);
     assert!(refused.stderr.contains("stale") && refused.stderr.contains("campaign"), "{}", refused.stderr);
-    assert_eq!(refused.stdout, "");
+    assert_eq!(refused.json()["code"], 4);
     assert!(!changed.runs().exists(), "a refused run made a directory");
 }
 

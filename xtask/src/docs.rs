@@ -108,7 +108,7 @@ struct Programs {
 /// being worked on has most of it already.
 fn build() -> Result<Programs, Error> {
     // The whole workspace is named so that libraries have the features that they have in the tests.
-    let arguments = ["build", "--quiet", "--workspace", "--tests", "--bin", "mapper"];
+    let arguments = ["build", "--quiet", "--workspace", "--all-features", "--tests", "--bin", "mapper"];
     let examples = ["--example", "sequence_docs"];
     run(command(workspace::cargo(), &[&arguments[..], &examples].concat()))?;
     let built = workspace::target_dir().join("debug");

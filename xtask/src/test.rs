@@ -21,7 +21,16 @@ pub fn test() -> Result<(), Error> {
     let making = std::thread::spawn(python_env::prepare);
     steps.run("formatting", || formatting(Mode::Check));
     steps.run("lints", || {
-        run(cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"]))
+        run(cargo(&[
+            "clippy",
+            "--workspace",
+            "--all-features",
+            "--all-targets",
+            "--quiet",
+            "--",
+            "-D",
+            "warnings",
+        ]))
     });
     let mut python = None;
     steps.run("Python environment", || {
@@ -36,14 +45,14 @@ pub fn test() -> Result<(), Error> {
         steps.run("dependencies", || run(cargo(&["deny", "check", "bans", "licenses", "sources"])));
     }
     steps.run("documentation", || {
-        let mut command = cargo(&["doc", "--no-deps", "--workspace", "--quiet"]);
+        let mut command = cargo(&["doc", "--no-deps", "--workspace", "--all-features", "--quiet"]);
         command.env("RUSTDOCFLAGS", "-D warnings");
         run(command)
     });
     steps.run("building", || {
         // The program in one go with all tests: alone it would have other features of some libraries, and they
         // would be built twice.
-        run(offered.to(cargo(&["build", "--workspace", "--bins", "--tests", "--quiet"])))
+        run(offered.to(cargo(&["build", "--workspace", "--all-features", "--bins", "--tests", "--quiet"])))
     });
     steps.run("tests", || tests(&offered));
     steps.run("generated documents", || docs::docs(docs::Mode::Check));

@@ -11,19 +11,20 @@ use std::process::{Command, Stdio};
 /// by `cargo test` where it is not. `profile` is one of `.config/nextest.toml`.
 pub fn tests(profile: &str) -> Command {
     if machine::has_nextest() {
-        let arguments = ["nextest", "run", "--workspace", "--no-fail-fast", "--profile", profile];
+        let arguments =
+            ["nextest", "run", "--workspace", "--all-features", "--no-fail-fast", "--profile", profile];
         step::command(workspace::cargo(), &[&arguments[..], &["--color", "never"]].concat())
     } else {
         step::command(
             workspace::cargo(),
-            &["test", "--workspace", "--no-fail-fast", "--lib", "--bins", "--tests"],
+            &["test", "--workspace", "--all-features", "--no-fail-fast", "--lib", "--bins", "--tests"],
         )
     }
 }
 
 /// The examples in the documentation.
 pub fn documentation_tests() -> Command {
-    step::command(workspace::cargo(), &["test", "--workspace", "--doc", "--no-fail-fast"])
+    step::command(workspace::cargo(), &["test", "--workspace", "--all-features", "--doc", "--no-fail-fast"])
 }
 
 /// Runs a command with its output shown, and counts the tests in it. `Ok(false)` where some failed.

@@ -87,9 +87,20 @@ const OTHERS: [(&[u8], &str); 8] = [
         b"\x89MCAP",
         "it is an MCAP recording, which `mapper identify` reads; topics and fields are named in a channel map",
     ),
-    (b"TDSm", "it is TDMS; export it as CSV or MDF 4"),
-    (b"PAR1", "it is Parquet; export it as CSV, e.g. with `polars.read_parquet(FILE).write_csv(NEW)`"),
-    (b"ARROW1", "it is Arrow; export it as CSV, e.g. with `polars.read_ipc(FILE).write_csv(NEW)`"),
+    (
+        b"TDSm",
+        "it is TDMS, which this program was built without: `cargo build --release --features tdms`, or export it as CSV or MDF 4",
+    ),
+    (
+        b"PAR1",
+        "it is Parquet, which this program was built without: `cargo build --release --features parquet`, or export it as CSV, e.g. \
+         with `polars.read_parquet(FILE).write_csv(NEW)`",
+    ),
+    (
+        b"ARROW1",
+        "it is Arrow, which this program was built without: `cargo build --release --features parquet`, or export it as CSV, e.g. \
+         with `polars.read_ipc(FILE).write_csv(NEW)`",
+    ),
     (b"\x89HDF", "it is HDF5 or a newer MATLAB file; export it as CSV"),
     (b"MATLAB", "it is a MATLAB file; export it as CSV"),
     (b"\xD0\xCF\x11\xE0", "it is a workbook of Excel before 2007; save it as .xlsx"),

@@ -8,28 +8,40 @@
 mod cells;
 mod clock;
 mod clock_choice;
+#[cfg(any(feature = "parquet", feature = "tdms"))]
+mod column_rows;
 mod encoding;
 mod instant;
 mod number;
+mod parts;
+#[cfg(feature = "parquet")]
+mod record_batches;
 mod row_stream;
 mod separator;
 mod table_head;
 mod table_log;
+mod value;
 
 use mapper_logs::LogFormats;
 
 /// Declares the formats' modules and the list of them.
 macro_rules! logs {
-    ($($name:ident),* $(,)?) => {
-        $(mod $name;)*
+    ($($(#[$feature:meta])? $name:ident),* $(,)?) => {
+        $($(#[$feature])? mod $name;)*
 
         /// Every format, in the order in which they are asked.
-        pub const LOG_FORMATS: LogFormats = LogFormats(&[$($name::FORMAT),*]);
+        pub const LOG_FORMATS: LogFormats = LogFormats(&[$($(#[$feature])? $name::FORMAT),*]);
     };
 }
 
 logs! {
     mdf4,
+    #[cfg(feature = "tdms")]
+    tdms,
+    #[cfg(feature = "parquet")]
+    parquet,
+    #[cfg(feature = "parquet")]
+    arrow,
     xlsx,
     delimited,
 }

@@ -1,13 +1,12 @@
 //! Workbooks of Excel: a table on each sheet.
 
 use crate::cells::{Cells, Rows};
-use crate::instant::{Instant, NS_PER_DAY, parse_instant};
-use crate::number::parse_number;
+use crate::instant::{Instant, NS_PER_DAY};
+use crate::parts::{Part, side_by_side};
 use crate::table_head::COLUMN_LIMIT;
 use crate::table_log::Table;
+use crate::value::Value;
 use calamine::{Cell, DataRef, DataType, Reader, Xlsx, XlsxCellReader};
-use jiff::ToSpan;
-use jiff::civil::{Date, Time};
 use mapper_logs::{DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
 use std::io::{self, Read as _};
 
@@ -40,15 +39,7 @@ fn recognises(head: &[u8]) -> bool {
 struct Workbook {
     file: LogFile,
     layout: Layout,
-    /// Name and table of each sheet that has one, with its first group and its first column.
-    sheets: Vec<Sheet>,
-}
-
-struct Sheet {
-    name: String,
-    table: Table,
-    first_group: usize,
-    first_column: usize,
+    sheets: Vec<Part>,
 }
 
 fn failed(file: &LogFile) -> impl Fn(calamine::XlsxError) -> LogError + '_ {
@@ -102,33 +93,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             Err(problem) => problems.push(format!("sheet `{name}` is passed over: {problem}")),
         }
     }
-    if found.is_empty() {
-        let why = if problems.is_empty() { "its sheets are empty".to_owned() } else { problems.join("; ") };
-        return Err(file.content(NAME, why));
-    }
-    let several = found.len() > 1;
-    let mut layout = Layout::default();
-    let mut sheets = Vec::new();
-    for (name, mut table) in found {
-        let (first_group, first_column) = (layout.groups.len(), layout.columns.len());
-        for group in &table.layout.groups {
-            let mut group = group.clone();
-            group.name = match (several, group.name.is_empty()) {
-                (false, _) => group.name,
-                (true, true) => name.clone(),
-                (true, false) => format!("{name}: {}", group.name),
-            };
-            layout.groups.push(group);
-        }
-        layout.columns.extend(table.layout.columns.iter().cloned().map(|mut column| {
-            column.group += first_group;
-            column
-        }));
-        layout.findings.extend(table.layout.findings.drain(..).map(|finding| format!("sheet `{name}`: {finding}")));
-        layout.start_time_ns = layout.start_time_ns.or(table.layout.start_time_ns);
-        sheets.push(Sheet { name, table, first_group, first_column });
-    }
-    layout.findings.append(&mut problems);
+    let (layout, sheets) = side_by_side("sheet", found, problems).map_err(|why| file.content(NAME, why))?;
     Ok(Box::new(Workbook { file: file.clone(), layout, sheets }))
 }
 
@@ -140,53 +105,25 @@ impl Log for Workbook {
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
         let mut book = book(&self.file)?;
         for sheet in &self.sheets {
-            let columns = sheet.first_column..sheet.first_column + sheet.table.layout.columns.len();
-            let own: Vec<usize> = wanted.iter().filter(|column| columns.contains(*column)).map(|column| column - sheet.first_column).collect();
+            let own = sheet.own(wanted);
             if own.is_empty() {
                 continue;
             }
             let reader = book.worksheet_cells_reader(&sheet.name).map_err(failed(&self.file))?;
-            let mut of_book = |row: Row<'_>| sink(Row { group: row.group + sheet.first_group, ..row });
+            let mut of_book = |row: Row<'_>| sheet.give(row, sink);
             sheet.table.rows(&mut SheetRows::new(&self.file, reader), &own, &mut of_book)?;
         }
         Ok(())
     }
 }
 
-/// What a cell holds.
-#[derive(Debug, Clone, PartialEq)]
-enum Value {
-    Empty,
-    Number(f64),
-    Text(String),
-    Instant(Instant),
-}
-
-impl Value {
-    fn of(data: &DataRef<'_>) -> Value {
-        match data {
-            DataRef::DateTime(date) => instant_of(date.as_f64()).map_or(Value::Empty, Value::Instant),
-            DataRef::String(text) | DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => Value::Text(text.trim().to_owned()),
-            DataRef::SharedString(text) => Value::Text(text.trim().to_owned()),
-            data => data.as_f64().filter(|value| value.is_finite()).map_or(Value::Empty, Value::Number),
-        }
-    }
-
-    fn is_empty(&self) -> bool {
-        match self {
-            Value::Empty => true,
-            Value::Text(text) => text.is_empty(),
-            _ => false,
-        }
-    }
-
-    fn text(&self) -> String {
-        match self {
-            Value::Empty => String::new(),
-            Value::Number(value) => value.to_string(),
-            Value::Text(text) => text.clone(),
-            Value::Instant(instant) => text_of(*instant).unwrap_or_default(),
-        }
+/// A cell of a sheet.
+fn value_of(data: &DataRef<'_>) -> Value {
+    match data {
+        DataRef::DateTime(date) => instant_of(date.as_f64()).map_or(Value::Empty, Value::Instant),
+        DataRef::String(text) | DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => Value::Text(text.trim().to_owned()),
+        DataRef::SharedString(text) => Value::Text(text.trim().to_owned()),
+        data => data.as_f64().filter(|value| value.is_finite()).map_or(Value::Empty, Value::Number),
     }
 }
 
@@ -199,16 +136,6 @@ fn instant_of(days: f64) -> Option<Instant> {
     let ns_of_day = ((days.fract() * NS_PER_DAY as f64) / 1e3).round() as i64 * 1000;
     let day = (days >= 1.0).then_some(days.trunc() as i64 - EXCEL_EPOCH_DAYS);
     Some(Instant { day, ns_of_day: Some(ns_of_day) })
-}
-
-fn text_of(instant: Instant) -> Option<String> {
-    let ns = instant.ns_of_day?.rem_euclid(NS_PER_DAY);
-    let second = ns / 1_000_000_000;
-    let (hour, minute) = (i8::try_from(second / 3600).ok()?, i8::try_from(second / 60 % 60).ok()?);
-    let time = Time::new(hour, minute, i8::try_from(second % 60).ok()?, i32::try_from(ns % 1_000_000_000).ok()?).ok()?;
-    let Some(day) = instant.day else { return Some(time.to_string()) };
-    let date = Date::new(1970, 1, 1).ok()?.checked_add(day.days()).ok()?;
-    Some(format!("{date} {time}"))
 }
 
 /// The rows of a sheet; those without any cell do not count.
@@ -238,26 +165,18 @@ impl<'a> SheetRows<'a> {
         self.ended = cell.is_none();
         Ok(cell.map(|cell| {
             let (row, column) = cell.get_position();
-            (row, usize::try_from(column).unwrap_or(usize::MAX), Value::of(cell.get_value()))
+            (row, usize::try_from(column).unwrap_or(usize::MAX), value_of(cell.get_value()))
         }))
     }
 }
 
 impl Cells for SheetRows<'_> {
     fn number(&self, column: usize) -> f64 {
-        match self.row.get(column) {
-            Some(Value::Number(value)) => *value,
-            Some(Value::Text(text)) => parse_number(text.as_bytes(), b'.').unwrap_or(f64::NAN),
-            _ => f64::NAN,
-        }
+        self.row.get(column).map_or(f64::NAN, Value::number)
     }
 
     fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
-        match self.row.get(column)? {
-            Value::Instant(instant) => Some(*instant),
-            Value::Text(text) => parse_instant(text, order),
-            _ => None,
-        }
+        self.row.get(column)?.instant(order)
     }
 }
 

@@ -1,0 +1,40 @@
+//! Parquet.
+
+use crate::record_batches::{Batches, open_log};
+use arrow_schema::Schema;
+use mapper_logs::{Log, LogError, LogFile, LogFormat, LogOptions};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::errors::ParquetError;
+use std::fs::File;
+
+/// The format.
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+
+const NAME: &str = "Parquet";
+
+/// Rows that are decoded at once.
+const BATCH_ROWS: usize = 8192;
+
+fn recognises(head: &[u8]) -> bool {
+    head.starts_with(b"PAR1")
+}
+
+fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
+    open_log(NAME, file, options, batches)
+}
+
+fn batches(file: &LogFile) -> Result<(Schema, Batches), LogError> {
+    let failed = |error: ParquetError| file.content(NAME, error.to_string());
+    macro_rules! reader_of {
+        ($source:expr) => {{
+            let builder = ParquetRecordBatchReaderBuilder::try_new($source).map_err(failed)?;
+            let schema = builder.schema().as_ref().clone();
+            let reader = builder.with_batch_size(BATCH_ROWS).build().map_err(failed)?;
+            (schema, Box::new(reader) as Batches)
+        }};
+    }
+    Ok(match file.bytes() {
+        Some(bytes) => reader_of!(bytes::Bytes::copy_from_slice(bytes)),
+        None => reader_of!(File::open(file.path()).map_err(|error| file.error(error))?),
+    })
+}

@@ -1,0 +1,327 @@
+//! TDMS: the files of LabVIEW and of National Instruments' loggers. Each group is a table; channels of a waveform have a rate of their own.
+
+use crate::column_rows::{Chunk, Chunks, ColumnRows};
+use crate::instant::Instant;
+use crate::parts::{Part, side_by_side};
+use crate::table_head::COLUMN_LIMIT;
+use crate::table_log::Table;
+use mapper_logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
+use std::io::Read;
+use tedium::{ChannelPath, DataType, PropertyPath, PropertyValue, TdmsError, TdmsFile, TdmsStorageType};
+
+/// The format.
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+
+const NAME: &str = "TDMS";
+
+/// How many rows of a group are looked at.
+const HEAD_ROWS: usize = 400;
+
+/// Values that are held in memory at once: 32 MiB of them.
+const VALUES_AT_ONCE: usize = 1 << 22;
+
+/// Days from LabVIEW's origin, 1904-01-01, to 1970-01-01.
+const EPOCH_DAYS: i64 = 24_107;
+
+/// Days of a date that 64 bits hold as nanoseconds: 1970 to 2200.
+const DAYS: std::ops::Range<i64> = 0..84_000;
+
+fn recognises(head: &[u8]) -> bool {
+    head.starts_with(b"TDSm")
+}
+
+/// A date and time of day as the file has it.
+#[derive(Clone, Copy)]
+struct Stamp {
+    /// Since 1904.
+    seconds: i64,
+    /// Of a second, in 2^-64.
+    fraction: u64,
+}
+
+impl Stamp {
+    fn instant(self) -> Option<Instant> {
+        let day = self.seconds.div_euclid(86_400) - EPOCH_DAYS;
+        // The fraction to the nanosecond: what is below is lost in every f64 of a date.
+        let ns = (u128::from(self.fraction) * 1_000_000_000) >> 64;
+        let ns_of_day = self.seconds.rem_euclid(86_400) * 1_000_000_000 + i64::try_from(ns).ok()?;
+        DAYS.contains(&day).then_some(Instant { day: Some(day), ns_of_day: Some(ns_of_day) })
+    }
+}
+
+impl TdmsStorageType for Stamp {
+    const SUPPORTED_TYPES: &'static [DataType] = &[DataType::Timestamp];
+    const NATURAL_TYPE: DataType = DataType::Timestamp;
+
+    fn read_le(reader: &mut impl Read) -> Result<Self, TdmsError> {
+        let (fraction, seconds) = (u64::read_le(reader)?, i64::read_le(reader)?);
+        Ok(Stamp { seconds, fraction })
+    }
+
+    fn read_be(reader: &mut impl Read) -> Result<Self, TdmsError> {
+        let (seconds, fraction) = (i64::read_be(reader)?, u64::read_be(reader)?);
+        Ok(Stamp { seconds, fraction })
+    }
+
+    fn write_le(&self, writer: &mut impl std::io::Write) -> Result<(), TdmsError> {
+        self.fraction.write_le(writer)?;
+        self.seconds.write_le(writer)
+    }
+
+    fn write_be(&self, writer: &mut impl std::io::Write) -> Result<(), TdmsError> {
+        self.seconds.write_be(writer)?;
+        self.fraction.write_be(writer)
+    }
+
+    fn size(&self) -> usize {
+        16
+    }
+}
+
+type Source = TdmsFile<Box<dyn ReadSeek>>;
+
+/// Reads values of a channel from one on.
+type ReadValues = fn(&mut Source, &ChannelPath, u64, usize) -> Result<Chunk, TdmsError>;
+
+fn numbers<T: TdmsStorageType + Copy + Default>(
+    source: &mut Source,
+    path: &ChannelPath,
+    from: u64,
+    count: usize,
+    number: fn(T) -> f64,
+) -> Result<Chunk, TdmsError> {
+    let mut values = vec![T::default(); count];
+    source.read_channel_from(path, from, &mut values)?;
+    Ok(Chunk::Numbers(values.into_iter().map(number).collect()))
+}
+
+fn instants(source: &mut Source, path: &ChannelPath, from: u64, count: usize) -> Result<Chunk, TdmsError> {
+    let mut values = vec![Stamp { seconds: 0, fraction: 0 }; count];
+    source.read_channel_from(path, from, &mut values)?;
+    Ok(Chunk::Instants(values.into_iter().map(Stamp::instant).collect()))
+}
+
+/// One for each type that a channel of readings or a clock may have.
+const READERS: [ReadValues; 12] = [
+    |s, p, from, n| numbers::<f64>(s, p, from, n, |v| v),
+    |s, p, from, n| numbers::<f32>(s, p, from, n, f64::from),
+    |s, p, from, n| numbers::<i16>(s, p, from, n, f64::from),
+    |s, p, from, n| numbers::<i32>(s, p, from, n, f64::from),
+    |s, p, from, n| numbers::<u16>(s, p, from, n, f64::from),
+    |s, p, from, n| numbers::<u32>(s, p, from, n, f64::from),
+    |s, p, from, n| numbers::<i8>(s, p, from, n, f64::from),
+    |s, p, from, n| numbers::<u8>(s, p, from, n, f64::from),
+    // Counts beyond 2^53 lose their last digit, as everywhere.
+    |s, p, from, n| numbers::<i64>(s, p, from, n, |v| v as f64),
+    |s, p, from, n| numbers::<u64>(s, p, from, n, |v| v as f64),
+    |s, p, from, n| numbers::<bool>(s, p, from, n, |v| f64::from(u8::from(v))),
+    instants,
+];
+
+/// A channel that is read.
+struct Channel {
+    path: ChannelPath,
+    unit: String,
+    length: u64,
+    read: ReadValues,
+    waveform: Option<Waveform>,
+}
+
+/// The time axis of a channel that has one of its own.
+#[derive(Clone, Copy, PartialEq)]
+struct Waveform {
+    interval_s: f64,
+    start_offset_s: f64,
+    start: Option<Instant>,
+}
+
+struct Tdms {
+    file: LogFile,
+    layout: Layout,
+    source: Source,
+    parts: Vec<Part>,
+    /// The channels of each part.
+    channels: Vec<Vec<Channel>>,
+}
+
+fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
+    let mut source = TdmsFile::new(file.open()?).map_err(|error| failed(file, &error))?;
+    let names: Vec<String> = source.list_groups().map(plain).collect();
+    let (mut found, mut problems, mut channels) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut left_out, mut seen) = (0usize, 0usize);
+    for name in &names {
+        let paths: Vec<ChannelPath> = source.list_channels_in_group(&PropertyPath::group(name)).collect();
+        seen += paths.len();
+        if seen > COLUMN_LIMIT {
+            return Err(file.content(NAME, format!("it has more than {COLUMN_LIMIT} channels")));
+        }
+        let mut of_group: Vec<Channel> = Vec::new();
+        for path in paths {
+            match channel(&mut source, path) {
+                Some(channel) => of_group.push(channel),
+                None => left_out += 1,
+            }
+        }
+        for channels_of in by_clock(of_group, options) {
+            let waveform = channels_of.first().and_then(|channel| channel.waveform);
+            let several = found.iter().any(|(other, _): &(String, Table)| other.starts_with(name.as_str()));
+            let title = if several { format!("{name} ({})", found.len() + 1) } else { name.clone() };
+            match look(file, &mut source, &channels_of, waveform, options)? {
+                Ok(table) => {
+                    found.push((title, table));
+                    channels.push(channels_of);
+                }
+                Err(problem) => problems.push(format!("group `{title}` is passed over: {problem}")),
+            }
+        }
+    }
+    if left_out > 0 {
+        problems.push(format!("{left_out} channels are left out: texts, empty, or of a type that is not read"));
+    }
+    let (layout, parts) = side_by_side("group", found, problems).map_err(|why| file.content(NAME, why))?;
+    Ok(Box::new(Tdms { file: file.clone(), layout, source, parts, channels }))
+}
+
+fn failed(file: &LogFile, error: &TdmsError) -> LogError {
+    file.content(NAME, error.to_string())
+}
+
+/// A name as people write it; the file doubles the quotes in it.
+fn plain(name: &str) -> String {
+    name.trim_matches('\'').replace("''", "'")
+}
+
+/// The channel, if it holds numbers or dates.
+fn channel(source: &mut Source, path: ChannelPath) -> Option<Channel> {
+    let length = source.channel_length(&path).filter(|length| *length > 0)?;
+    let read = READERS.into_iter().find(|read| read(source, &path, 0, 1).is_ok())?;
+    let of_path = PropertyPath::channel(path.group_name(), path.channel_name());
+    let property = |name: &str| source.read_property(&of_path, name).ok().flatten();
+    let number = |name: &str| match property(name)? {
+        PropertyValue::DoubleFloat(value) => Some(*value),
+        PropertyValue::SingleFloat(value) => Some(f64::from(*value)),
+        _ => None,
+    };
+    let unit = ["unit_string", "NI_UnitDescription", "unit", "Unit"].into_iter().find_map(|name| match property(name)? {
+        PropertyValue::String(unit) if !unit.trim().is_empty() => Some(unit.trim().to_owned()),
+        _ => None,
+    });
+    let start = match property("wf_start_time") {
+        Some(PropertyValue::Timestamp(stamp)) => {
+            let (seconds, fraction) = stamp.to_parts();
+            Stamp { seconds, fraction }.instant()
+        }
+        _ => None,
+    };
+    let waveform = number("wf_increment").filter(|interval_s| *interval_s > 0.0 && interval_s.is_finite()).map(|interval_s| Waveform {
+        interval_s,
+        start_offset_s: number("wf_start_offset").filter(|offset_s| offset_s.is_finite()).unwrap_or(0.0),
+        start,
+    });
+    Some(Channel { path, unit: unit.unwrap_or_default(), length, read, waveform })
+}
+
+/// Channels that share a clock: those of one waveform, and all that have none. A clock or a rate that a user names counts more.
+fn by_clock(channels: Vec<Channel>, options: &LogOptions) -> Vec<Vec<Channel>> {
+    let named = options.rate_hz.is_some() || channels.iter().any(|channel| options.time.iter().any(|name| name == channel.path.channel_name()));
+    let mut groups: Vec<Vec<Channel>> = Vec::new();
+    for mut channel in channels {
+        channel.waveform = channel.waveform.filter(|_| !named);
+        match groups.iter_mut().find(|group| group.iter().all(|other| other.waveform == channel.waveform)) {
+            Some(group) => group.push(channel),
+            None => groups.push(vec![channel]),
+        }
+    }
+    groups
+}
+
+/// The table of some channels, or why there is none.
+fn look(
+    file: &LogFile,
+    source: &mut Source,
+    channels: &[Channel],
+    waveform: Option<Waveform>,
+    options: &LogOptions,
+) -> Result<Result<Table, String>, LogError> {
+    let mut options = options.clone();
+    if let Some(waveform) = waveform {
+        options.rate_hz = Some(1.0 / waveform.interval_s);
+        options.time.clear();
+    }
+    let head = ColumnRows::new(head(channels), GroupChunks::new(file, source, channels, HEAD_ROWS)).texts(HEAD_ROWS)?;
+    let mut table = match Table::look(&head, b'.', &options) {
+        Ok(table) => table,
+        Err(problem) => return Ok(Err(problem)),
+    };
+    let findings = &mut table.layout.findings;
+    // Where a header stands in rows says nothing of a file without rows.
+    findings.retain(|finding| !finding.starts_with("header: ") && (waveform.is_none() || !finding.starts_with("clock: ")));
+    if let Some(waveform) = waveform {
+        findings.push(format!("clock: a waveform with a value every {} s (time, rate)", waveform.interval_s));
+        let start_ns = waveform.start.map(|start| start.ns() as f64 + 1e9 * waveform.start_offset_s);
+        table.layout.start_time_ns = start_ns.filter(|ns| *ns > 0.0 && *ns < i64::MAX as f64).map(|ns| ns as u64);
+    }
+    Ok(Ok(table))
+}
+
+/// Names, and units where any is known.
+fn head(channels: &[Channel]) -> Vec<Vec<String>> {
+    let names = channels.iter().map(|channel| channel.path.channel_name().to_owned()).collect();
+    if channels.iter().all(|channel| channel.unit.is_empty()) {
+        return vec![names];
+    }
+    vec![names, channels.iter().map(|channel| channel.unit.clone()).collect()]
+}
+
+impl Log for Tdms {
+    fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
+        for (part, channels) in self.parts.iter().zip(&self.channels) {
+            let own = part.own(wanted);
+            if own.is_empty() {
+                continue;
+            }
+            let at_once = (VALUES_AT_ONCE / channels.len().max(1)).max(1);
+            let chunks = GroupChunks::new(&self.file, &mut self.source, channels, at_once);
+            let mut of_file = |row: Row<'_>| part.give(row, sink);
+            part.table.rows(&mut ColumnRows::new(head(channels), chunks), &own, &mut of_file)?;
+        }
+        Ok(())
+    }
+}
+
+/// The channels of a group, some rows at a time; shorter ones are empty behind their end.
+struct GroupChunks<'a> {
+    file: &'a LogFile,
+    source: &'a mut Source,
+    channels: &'a [Channel],
+    at_once: usize,
+    from: u64,
+}
+
+impl<'a> GroupChunks<'a> {
+    fn new(file: &'a LogFile, source: &'a mut Source, channels: &'a [Channel], at_once: usize) -> Self {
+        GroupChunks { file, source, channels, at_once, from: 0 }
+    }
+}
+
+impl Chunks for GroupChunks<'_> {
+    fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError> {
+        let left = |channel: &Channel| usize::try_from(channel.length.saturating_sub(self.from)).unwrap_or(usize::MAX).min(self.at_once);
+        let count = self.channels.iter().map(left).max().unwrap_or(0);
+        if count == 0 {
+            return Ok(None);
+        }
+        let mut chunks = Vec::with_capacity(self.channels.len());
+        for channel in self.channels {
+            let rows = left(channel);
+            let chunk = if rows == 0 { Ok(Chunk::Numbers(Vec::new())) } else { (channel.read)(self.source, &channel.path, self.from, rows) };
+            chunks.push(chunk.map_err(|error| failed(self.file, &error))?);
+        }
+        self.from += count as u64;
+        Ok(Some((count, chunks)))
+    }
+}

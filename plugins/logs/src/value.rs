@@ -1,0 +1,66 @@
+//! A cell of a table whose cells have types.
+
+use crate::instant::{Instant, NS_PER_DAY, parse_instant};
+use crate::number::parse_number;
+use jiff::ToSpan;
+use jiff::civil::{Date, Time};
+use mapper_logs::DateOrder;
+
+/// What a cell holds.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Value {
+    Empty,
+    Number(f64),
+    Text(String),
+    Instant(Instant),
+}
+
+impl Value {
+    pub(crate) fn is_empty(&self) -> bool {
+        match self {
+            Value::Empty => true,
+            Value::Text(text) => text.is_empty(),
+            _ => false,
+        }
+    }
+
+    /// The number in it; NaN where there is none.
+    pub(crate) fn number(&self) -> f64 {
+        match self {
+            Value::Number(value) => *value,
+            Value::Text(text) => parse_number(text.as_bytes(), b'.').unwrap_or(f64::NAN),
+            _ => f64::NAN,
+        }
+    }
+
+    /// The date or time of day in it.
+    pub(crate) fn instant(&self, order: DateOrder) -> Option<Instant> {
+        match self {
+            Value::Instant(instant) => Some(*instant),
+            Value::Text(text) => parse_instant(text, order),
+            _ => None,
+        }
+    }
+
+    /// As a cell of a text file would have it.
+    pub(crate) fn text(&self) -> String {
+        match self {
+            Value::Empty => String::new(),
+            Value::Number(value) => value.to_string(),
+            Value::Text(text) => text.clone(),
+            Value::Instant(instant) => text_of(*instant).unwrap_or_default(),
+        }
+    }
+}
+
+fn text_of(instant: Instant) -> Option<String> {
+    let ns = instant.ns_of_day?.rem_euclid(NS_PER_DAY);
+    let second = ns / 1_000_000_000;
+    let (hour, minute) = (i8::try_from(second / 3600).ok()?, i8::try_from(second / 60 % 60).ok()?);
+    let time =
+        Time::new(hour, minute, i8::try_from(second % 60).ok()?, i32::try_from(ns % 1_000_000_000).ok()?)
+            .ok()?;
+    let Some(day) = instant.day else { return Some(time.to_string()) };
+    let date = Date::new(1970, 1, 1).ok()?.checked_add(day.days()).ok()?;
+    Some(format!("{date} {time}"))
+}

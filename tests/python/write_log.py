@@ -10,6 +10,10 @@ FORMAT is one of
   xlsx      openpyxl: names, units, numbers
   mdf4      asammdf: one group a device, compressed blocks
   mcap      mcap: one topic a device, units in the metadata
+  tdms      npTDMS: one group a device, all channels waveforms with a start and an increment
+  tdms_time npTDMS: one group a device, each with a channel of dates
+  parquet   polars: names with units in brackets, seconds
+  arrow     polars: the same as Arrow's file, with dates instead of seconds
 
 No step marks, no campaign, no truth. SI units where nothing else is said. Prints the steps of the recording, and how far the log's
 clock is ahead of the recording's, as one JSON object.
@@ -86,6 +90,47 @@ def write_mdf4(target, times, groups):
             signals = [asammdf.Signal(values, times, name=field, unit=unit_of(field)) for field, values in fields.items()]
             mdf.append(signals, acq_name=topic.split("/")[-1], common_timebase=True)
         mdf.save(target, overwrite=True, compression=2)
+
+
+START = np.datetime64("2026-11-22T09:58:21.300000", "us")
+
+
+def write_tdms(target, times, groups, dates):
+    from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+
+    with TdmsWriter(target) as writer:
+        # In pieces, as a logger writes.
+        for rows in np.array_split(np.arange(len(times)), 7):
+            objects = [RootObject({"name": "stand"})]
+            for topic, fields in groups.items():
+                group = topic.split("/")[-1]
+                objects.append(GroupObject(group))
+                if dates:
+                    objects.append(ChannelObject(group, "time", stamps(times[rows])))
+                for field, values in fields.items():
+                    properties = {"unit_string": unit_of(field)}
+                    if not dates:
+                        properties |= {"wf_start_time": START, "wf_start_offset": float(times[0]), "wf_increment": 0.1}
+                    objects.append(ChannelObject(group, field, values[rows], properties))
+            writer.write_segment(objects)
+
+
+def stamps(times):
+    return START + np.round(times * 1e6).astype("timedelta64[us]")
+
+
+def frame(times, groups, name):
+    import polars
+
+    return polars.DataFrame({name: times} | {f"{name} [{unit}]": values for name, (values, unit) in flat(groups).items()})
+
+
+def write_parquet(target, times, groups):
+    frame(times, groups, "time [s]").write_parquet(target, row_group_size=1000)
+
+
+def write_arrow(target, times, groups):
+    frame(stamps(times), groups, "time").write_ipc(target)
 
 
 def write_mcap(target, times, groups):
@@ -197,6 +242,12 @@ def main():
             write_mcap(target, times, groups)
         case "mdf4":
             write_mdf4(target, times, groups)
+        case "tdms" | "tdms_time":
+            write_tdms(target, times, groups, kind == "tdms_time")
+        case "parquet":
+            write_parquet(target, times, groups)
+        case "arrow":
+            write_arrow(target, times, groups)
         case _:
             sys.exit(__doc__)
     assert not any(math.isnan(step) for step in steps)

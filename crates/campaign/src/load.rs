@@ -104,14 +104,27 @@ pub fn check_with(
 /// A mistake in the settings of a backend, which only the backend can judge, at its place in the campaign's text.
 ///
 /// `setting` is the path below the backend's name, e.g. `machine.alpha_area`; a path that the text does not have
-/// points at what there is of it.
-pub fn backend_mistake(text: &str, origin: &Path, backend: &str, setting: &str, message: &str) -> Findings {
-    let source = Source::new(&DOCUMENT, origin, text);
+/// points at what there is of it. A `hidden` value is shown as asterisks: terminals are logged.
+pub fn backend_mistake(
+    text: &str,
+    origin: &Path,
+    backend: &str,
+    setting: &str,
+    message: &str,
+    hidden: bool,
+) -> Findings {
+    let mut source = Source::new(&DOCUMENT, origin, text);
     let mut notes = Notes::default();
     let root = mapper_yaml::read(&source, &mut notes);
     let mut steps = steps!["backend", backend].to_vec();
     steps.extend(setting.split('.').filter(|key| !key.is_empty()).map(Step::from));
     let span = root.map_or(0..0, |root| root.place(&steps));
+    if let (true, Some(value)) = (hidden, text.get(span.clone())) {
+        // As long as it was, so that all places stay.
+        let asterisks = value.bytes().map(|byte| if byte == b'\n' { '\n' } else { '*' }).collect::<String>();
+        source =
+            Source::new(&DOCUMENT, origin, &[&text[..span.start], &asterisks, &text[span.end..]].concat());
+    }
     let remedy = "the settings of each backend are listed in docs/tour.md".to_owned();
     let kind = FindingKind::WrongValue;
     notes.push(source.finding(kind, path_text(&steps), span, message.to_owned(), remedy));

@@ -1,10 +1,11 @@
 //! Why a command ended early, with what to print and what to return.
 
 use crate::exit_code::Code;
-use crate::manner;
+use crate::{manner, standard_error};
 use mapper_blind::BlindError;
 use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
+use mapper_host::DriverError;
 use mapper_live::LiveError;
 use mapper_record::{ChannelMapError, RecordError};
 use mapper_session::{ErrorKind, SessionError};
@@ -65,7 +66,8 @@ impl Failure {
         let Ok(text) = mapper_campaign::read_text(campaign) else { return error.into() };
         let findings = match &error {
             SessionError::Backend(BackendError::Settings { backend, path, source }) => {
-                mapper_campaign::backend_mistake(&text, campaign, backend, path, &source.to_string())
+                let hidden = matches!(source.downcast_ref(), Some(DriverError::Secret));
+                mapper_campaign::backend_mistake(&text, campaign, backend, path, &source.to_string(), hidden)
             }
             SessionError::UnknownFormat { name, known } => {
                 mapper_campaign::format_mistake(&text, campaign, name, known)
@@ -92,13 +94,12 @@ impl Failure {
     }
 
     /// Prints the message to standard error and gives the exit code; `None` where nobody is left to tell: a normal end.
-    #[allow(clippy::print_stderr)]
     pub fn say(&self) -> Option<ExitCode> {
         match self.manner {
             Manner::ClosedPipe => return None,
             Manner::Told => {}
-            Manner::Rendered => eprint!("{}", self.message),
-            Manner::Sentence => eprintln!("mapper: {}", self.message),
+            Manner::Rendered => standard_error::say(&self.message),
+            Manner::Sentence => standard_error::say(&format!("mapper: {}\n", self.message)),
         }
         Some(ExitCode::from(self.code as u8))
     }

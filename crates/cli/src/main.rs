@@ -15,6 +15,7 @@ mod output;
 mod registry;
 mod rig_states;
 mod shown;
+mod standard_error;
 mod subcommands;
 mod wall;
 

@@ -2,6 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
+use crate::standard_error;
 use clap::Args;
 use mapper_session::{Existing, SessionError, write_file};
 use serde::Serialize;
@@ -42,9 +43,8 @@ pub fn print(text: &str) -> Result<(), Failure> {
 }
 
 /// Writes what is already laid out to standard error: warnings, which no program reads.
-#[allow(clippy::print_stderr, reason = "beside the output, as errors are")]
 pub fn warn(text: &str) {
-    eprint!("{text}");
+    standard_error::say(text);
 }
 
 /// Writes one JSON object and a line end to standard output.

@@ -136,9 +136,10 @@ impl Driver {
         let settings = Configure { settings: settings.clone() };
         driver.ask("configure", &settings, patience.slow)?;
         let answer = driver.ask("describe", &json!({}), patience.slow)?;
-        let described: Described =
-            serde_json::from_value(answer).map_err(|error| wrong(DriverError::Garbage(error.to_string())))?;
-        let rig = description(&described.description, name, &version).map_err(|error| wrong(error.into()))?;
+        let described: Described = serde_json::from_value(answer)
+            .map_err(|error| driver.lost(DriverError::Garbage(error.to_string())))?;
+        let rig =
+            description(&described.description, name, &version).map_err(|error| driver.lost(error.into()))?;
         driver.description = Some(rig);
         Ok(driver)
     }
@@ -153,7 +154,8 @@ impl Driver {
             frame_limit_bytes: mapper_protocol::FRAME_LIMIT_BYTES,
         };
         let answer = self.ask("hello", &hello, self.patience.hello)?;
-        let wrong = |error| settings_error(&self.name, String::new(), error);
+        // Without what it may have said of a secret.
+        let wrong = |error| self.lost(error);
         let welcome: Welcome = serde_json::from_value(answer)
             .map_err(|error| wrong(DriverError::NoDriver(format!("its hello lacks something: {error}"))))?;
         let theirs = welcome.hello;

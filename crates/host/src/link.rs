@@ -14,6 +14,8 @@ use std::time::{Duration, Instant};
 
 /// Messages that wait in each direction.
 const WAITING: usize = 64;
+/// How long they are waited for once its output has ended.
+const LAST_WORDS_WITHIN: Duration = Duration::from_millis(200);
 /// What is kept of a driver's last words, bytes.
 const LAST_WORDS_BYTES: usize = 2_000;
 
@@ -47,6 +49,8 @@ pub(crate) struct Link {
     inlet: Receiver<Came>,
     frame_limit: Arc<AtomicU32>,
     last_words: Arc<Mutex<Vec<u8>>>,
+    /// Closed by the thread that listens, once it has heard everything.
+    heard: Receiver<()>,
 }
 
 impl Link {
@@ -69,6 +73,7 @@ impl Link {
         let (tell, inlet) = sync_channel(WAITING);
         let last_words = Arc::new(Mutex::new(Vec::new()));
         let packed = Arc::new(AtomicBool::new(false));
+        let (listens, heard) = sync_channel::<()>(1);
         let (limit, words, its) = (frame_limit.clone(), last_words.clone(), packed.clone());
         // None of them is waited for: each ends with its pipe.
         std::thread::Builder::new()
@@ -80,12 +85,20 @@ impl Link {
                     .spawn(move || read_all(stdout, &tell, &its))
             })
             .and_then(|_| {
-                std::thread::Builder::new()
-                    .name("driver's words".to_owned())
-                    .spawn(move || listen(stderr, &words))
+                std::thread::Builder::new().name("driver's words".to_owned()).spawn(move || {
+                    listen(stderr, &words);
+                    drop(listens);
+                })
             })
             .map_err(not_started)?;
-        Ok(Link { child, outlet: Some(Outlet { to_write: send, packed }), inlet, frame_limit, last_words })
+        Ok(Link {
+            child,
+            outlet: Some(Outlet { to_write: send, packed }),
+            inlet,
+            frame_limit,
+            last_words,
+            heard,
+        })
     }
 
     /// Where to send.
@@ -109,6 +122,8 @@ impl Link {
 
     /// What the driver said last on standard error, to be put behind a sentence.
     fn words(&self) -> String {
+        // Its output has ended; its last words may still be on their way.
+        let _ = self.heard.recv_timeout(LAST_WORDS_WITHIN);
         let Ok(words) = self.last_words.lock() else { return String::new() };
         let text = String::from_utf8_lossy(&words);
         let line = text.lines().map(str::trim).rfind(|line| !line.is_empty());

@@ -6,7 +6,8 @@ use mapper_core::{
 use mapper_protocol::Unusable;
 use std::collections::VecDeque;
 
-/// Most values that wait, of all columns: three hours of 19 channels at 10 Hz, 32 MB.
+/// Most values that wait, of all columns, at 8 bytes each, names and words counted likewise: three hours of 19 channels at 10 Hz,
+/// 32 MB.
 const MOST_VALUES: usize = 4_000_000;
 /// Most events that wait.
 const MOST_EVENTS: usize = 10_000;
@@ -31,8 +32,14 @@ impl Pending {
     /// # Errors
     /// [`Unusable`] for samples that do not follow those before, or that are too many.
     pub(crate) fn push(&mut self, mut batch: SampleBatch) -> Result<(), Unusable> {
+        // An event of another clock would never be due, a rig that trips least of all.
+        let latest_s = batch.t_s.last().copied().or(self.last_s).unwrap_or(0.0);
+        for event in &mut batch.events {
+            event.t_s = if event.t_s.is_finite() { event.t_s.min(latest_s) } else { latest_s };
+        }
         self.events.append(&mut batch.events);
-        if self.events.len() > MOST_EVENTS {
+        let words: usize = self.events.iter().map(|event| event.message.len()).sum();
+        if self.events.len() > MOST_EVENTS || self.values + words / 8 > MOST_VALUES {
             return Err(Unusable::TooMany);
         }
         let Some(first_s) = batch.t_s.first().copied() else { return Ok(()) };
@@ -42,7 +49,7 @@ impl Pending {
         if let Some(before_s) = self.last_s.filter(|last_s| first_s <= *last_s) {
             return Err(Unusable::Time { before_s, t_s: first_s });
         }
-        self.values += batch.t_s.len() * width(&batch);
+        self.values += batch.t_s.len() * width(&batch) + names(&batch);
         if self.values > MOST_VALUES {
             return Err(Unusable::TooMany);
         }
@@ -75,6 +82,9 @@ impl Pending {
             let due = batch.t_s.partition_point(|t_s| *t_s <= until_s);
             self.values = self.values.saturating_sub(due * width(&batch));
             let later = split(&mut batch, due);
+            if later.t_s.is_empty() {
+                self.values = self.values.saturating_sub(names(&batch));
+            }
             append(&mut whole, batch);
             if !later.t_s.is_empty() {
                 self.batches.push_front(later);
@@ -91,6 +101,11 @@ impl Pending {
 
 fn width(batch: &SampleBatch) -> usize {
     1 + batch.columns.len() + batch.elements.len() + batch.truth.len() + 2 * batch.provenance.len()
+}
+
+/// What the names of a batch take, in values.
+fn names(batch: &SampleBatch) -> usize {
+    batch.truth.iter().map(|column| column.name.len() + column.unit.len()).sum::<usize>() / 8
 }
 
 /// What comes after the first `at` samples. All columns are of one length: they were read that way.
@@ -226,6 +241,25 @@ mod tests {
         assert_eq!(from.quality, [Quality::Good, Quality::Good, Quality::Bad]);
         let rest = pending.take(9.0, &[T1, T2]);
         assert_eq!((rest.first_sequence, &rest.t_s[..]), (3, &[0.3][..]));
+    }
+
+    #[test]
+    fn an_event_with_the_time_of_another_clock_is_told_with_the_samples_it_came_with() {
+        let mut pending = Pending::default();
+        let tripped = Event { t_s: 1.8e9, kind: EventKind::RigTripped, message: "overspeed".to_owned() };
+        let with_it = SampleBatch { events: vec![tripped], ..batch(0, &[0.0, 0.1], &[Channel::T1]) };
+        pending.push(with_it).unwrap();
+        assert_eq!(pending.take(0.1, &[Channel::T1]).events[0].t_s, 0.1);
+    }
+
+    #[test]
+    fn words_and_names_count_too() {
+        let mut pending = Pending::default();
+        let long = Event { t_s: 0.0, kind: EventKind::Note, message: "x".repeat(1 << 20) };
+        let flood = (0..100).try_for_each(|_| {
+            pending.push(SampleBatch { events: vec![long.clone()], ..SampleBatch::default() })
+        });
+        assert_eq!(flood, Err(Unusable::TooMany));
     }
 
     #[test]

@@ -26,6 +26,8 @@ impl Secrets {
     ) -> Result<Secrets, (String, DriverError)> {
         let mut secrets = Secrets::default();
         secrets.look(settings, &mut Vec::new(), variable)?;
+        // The longest first: one that begins another must not leave that one's end.
+        secrets.0.sort_by_key(|secret| std::cmp::Reverse(secret.len()));
         Ok(secrets)
     }
 
@@ -85,6 +87,9 @@ mod tests {
         let read = |settings: Value| Secrets::of(&settings, &variable);
         let secrets = read(json!({"user": "lab", "security": {"password": {"env": "PLC"}}})).ok().unwrap();
         assert_eq!(secrets.hide("login of lab with hunter2 failed"), "login of lab with [secret] failed");
+        let two = |name: &str| Some(if name == "A" { "hunter" } else { "hunter2" }.to_owned());
+        let secrets = Secrets::of(&json!([{"env": "A"}, {"env": "B"}]), &two).ok().unwrap();
+        assert_eq!(secrets.hide("hunter2, hunter"), "[secret], [secret]");
         let (path, error) = read(json!({"security": [{"Password": "hunter2"}]})).err().unwrap();
         assert_eq!(path, "security.0.Password");
         assert!(!error.to_string().contains("hunter2"));

@@ -9,8 +9,8 @@ use crate::server::{Served, serve};
 use mapper_page::live_page;
 use mapper_session::SessionEvent;
 use std::net::{SocketAddr, TcpListener};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 /// Browsers get so long for the last message.
@@ -109,7 +109,7 @@ impl Live {
                 operator.say(format!("operator, on the live page: {what}"));
                 of_ask.asked(asked);
             }),
-            open: AtomicUsize::new(0),
+            open: Mutex::default(),
         });
         let for_thread = served.clone();
         let _ = std::thread::Builder::new()
@@ -135,7 +135,7 @@ impl Live {
         served.hub.publish(&feed.ended(outcome, page));
         served.hub.close();
         let until = Instant::now() + FAREWELL;
-        while served.open.load(Ordering::SeqCst) > 0 && Instant::now() < until {
+        while served.are_open() && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(5));
         }
     }

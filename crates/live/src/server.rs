@@ -4,17 +4,21 @@ use crate::access::Access;
 use crate::asked::Asked;
 use crate::hub::Hub;
 use crate::request::{Request, read_request};
-use std::io::Write;
-use std::net::{TcpListener, TcpStream};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::collections::HashMap;
+use std::io::{ErrorKind, Write};
+use std::net::{IpAddr, TcpListener, TcpStream};
 use std::sync::mpsc::RecvTimeoutError;
-use std::time::Duration;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 /// Connections at once; further ones are closed.
 const CONNECTIONS_MAX: usize = 32;
+/// Connections of one address at once: nobody without the token takes all of them from the operator.
+const CONNECTIONS_OF_ONE_MAX: usize = 8;
 /// Longest time that a browser may keep one read or write waiting.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// Bytes of a page that are written at once.
+const PIECE: usize = 1 << 14;
 /// A stream that has nothing to say says so this often: a browser that hears nothing for longer connects again.
 const HEARTBEAT: Duration = Duration::from_secs(2);
 const HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
@@ -29,27 +33,58 @@ pub(crate) struct Served {
     pub(crate) snapshot: Box<dyn Fn() -> Arc<str> + Send + Sync>,
     /// Does what a button asks for.
     pub(crate) ask: Box<dyn Fn(Asked) + Send + Sync>,
-    /// Connections that are open.
-    pub(crate) open: AtomicUsize,
+    /// Connections that are open, by address.
+    pub(crate) open: Mutex<HashMap<IpAddr, usize>>,
+}
+
+impl Served {
+    /// Whether any connection is open.
+    pub(crate) fn are_open(&self) -> bool {
+        self.open.lock().is_ok_and(|open| !open.is_empty())
+    }
+}
+
+/// Counts a connection as long as it is there.
+struct Slot {
+    served: Arc<Served>,
+    address: IpAddr,
+}
+
+impl Slot {
+    /// `None` where there is none left for this address.
+    fn take(served: &Arc<Served>, address: IpAddr) -> Option<Slot> {
+        let mut open = served.open.lock().ok()?;
+        let all: usize = open.values().sum();
+        let own = open.entry(address).or_default();
+        if all >= CONNECTIONS_MAX || *own >= CONNECTIONS_OF_ONE_MAX {
+            return None;
+        }
+        *own += 1;
+        Some(Slot { served: served.clone(), address })
+    }
+}
+
+impl Drop for Slot {
+    fn drop(&mut self) {
+        let Ok(mut open) = self.served.open.lock() else { return };
+        if let Some(own) = open.get_mut(&self.address) {
+            *own -= 1;
+        }
+        open.retain(|_, own| *own > 0);
+    }
 }
 
 /// Answers until the process ends.
 pub(crate) fn serve(listener: &TcpListener, served: &Arc<Served>) {
     for stream in listener.incoming().filter_map(Result::ok) {
-        let served = served.clone();
-        if served.open.fetch_add(1, Ordering::SeqCst) >= CONNECTIONS_MAX {
-            served.open.fetch_sub(1, Ordering::SeqCst);
+        let Some(slot) = stream.peer_addr().ok().and_then(|peer| Slot::take(served, peer.ip())) else {
             continue;
-        }
-        let counted = served.clone();
-        let answered = std::thread::Builder::new().name("live".to_owned()).spawn(move || {
+        };
+        // Where no thread can be started the slot is dropped with what it should have run.
+        let _ = std::thread::Builder::new().name("live".to_owned()).spawn(move || {
             // A browser that goes away ends its own connection.
-            let _ = answer(stream, &served);
-            served.open.fetch_sub(1, Ordering::SeqCst);
+            let _ = answer(stream, &slot.served);
         });
-        if answered.is_err() {
-            counted.open.fetch_sub(1, Ordering::SeqCst);
-        }
     }
 }
 
@@ -105,7 +140,15 @@ fn page(stream: &mut TcpStream, page: &str) -> std::io::Result<()> {
         "HTTP/1.1 200 OK\r\n{HEADERS}Content-Security-Policy: frame-ancestors 'none'\r\n\
          Content-Type: text/html; charset=utf-8\r\nContent-Length: {length}\r\n\r\n"
     )?;
-    stream.write_all(page.as_bytes())
+    // A reader of a byte at a time keeps its slot no longer than this.
+    let until = Instant::now() + PATIENCE;
+    for piece in page.as_bytes().chunks(PIECE) {
+        if Instant::now() > until {
+            return Err(ErrorKind::TimedOut.into());
+        }
+        stream.write_all(piece)?;
+    }
+    Ok(())
 }
 
 /// The whole state, then every message, until one side goes away.

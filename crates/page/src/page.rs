@@ -63,6 +63,7 @@ pub fn run_page(page: &RunPage<'_>) -> Result<String, serde_json::Error> {
             (sections::step::step(page))
             (sections::points::points(page, &display))
             (sections::plan::plan(page, &display))
+            (sections::gap::gap(page))
             (sections::notes::notes(page, &units))
             (sections::provenance::provenance(page))
         }

@@ -3,6 +3,7 @@
 use mapper_core::{CompressorMap, Recording};
 use mapper_identify::{T2Course, ZeroOutcome};
 use mapper_report::RunReport;
+use maud::Markup;
 
 /// Everything that the page shows.
 pub struct RunPage<'a> {
@@ -20,6 +21,8 @@ pub struct RunPage<'a> {
     pub tested_at: Option<&'a str>,
     /// Program and version.
     pub program: &'a str,
+    /// The diagnosis of the gap to the nominal model, where one was made.
+    pub gap: Option<Markup>,
     /// Maps to hold this one against.
     pub others: &'a [OtherRun<'a>],
 }

@@ -55,40 +55,56 @@ pub fn gap_page(title: &str, done: &Diagnosed) -> String {
             }
             body {
                 main {
-                h1 { (headline(diagnosis)) }
-                p { (title) }
-                // The law that stands in the headline is not said again.
-                @for law in diagnosis.laws.iter().filter(|law| !headline(diagnosis).contains(&law.sentence)) {
-                    p { "A law for what is missing in " (law.submodel) ": " b { (law.sentence) } }
-                }
-                h2 { "Which" }
-                (causes(done))
-                h2 { "Where" }
-                (places(done))
-                (PreEscaped(map_of_where(done)))
-                @if !diagnosis.forces.is_empty() {
-                    h2 { "Missing forces, each as if it were the only one" }
-                    (forces(done))
-                }
-                h2 { "Residuals without the cause, step by channel, in sigma" }
-                p {
-                    "Each number is the root mean square of a step and channel in units of what is declared: 1 is noise. \
-                     Tolerances are those fitted together with the first cause."
-                }
-                (heat_map(done, &done.without_cause.1))
-                @if let Some(best) = done.fits.first() {
-                    h2 { "Residuals with the first cause" }
-                    (heat_map(done, &best.residual))
-                    h2 { "Before and after" }
-                    (PreEscaped(traces(done)))
-                }
-                h2 { "In words" }
-                pre { (gap_text(diagnosis)) }
+                    h1 { (headline(diagnosis)) }
+                    p { (title) }
+                    (sections(done, &|title| html! { h2 { (title) } }))
                 }
             }
         }
     };
     page.into_string()
+}
+
+/// The diagnosis as a part of another page, below a heading of its own: its headline, and everything that its page shows.
+pub fn gap_part(done: &Diagnosed) -> Markup {
+    html! {
+        p { b { (headline(&done.diagnosis)) } }
+        (sections(done, &|title| html! { h3 { (title) } }))
+    }
+}
+
+/// What is found and what shows it, each below a heading.
+fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
+    let diagnosis = &done.diagnosis;
+    html! {
+        // The law that stands in the headline is not said again.
+        @for law in diagnosis.laws.iter().filter(|law| !headline(diagnosis).contains(&law.sentence)) {
+            p { "A law for what is missing in " (law.submodel) ": " b { (law.sentence) } }
+        }
+        (heading("Which"))
+        (causes(done))
+        (heading("Where"))
+        (places(done))
+        (PreEscaped(map_of_where(done)))
+        @if !diagnosis.forces.is_empty() {
+            (heading("Missing forces, each as if it were the only one"))
+            (forces(done))
+        }
+        (heading("Residuals without the cause, step by channel, in sigma"))
+        p {
+            "Each number is the root mean square of a step and channel in units of what is declared: 1 is noise. \
+             Tolerances are those fitted together with the first cause."
+        }
+        (heat_map(done, &done.without_cause.1))
+        @if let Some(best) = done.fits.first() {
+            (heading("Residuals with the first cause"))
+            (heat_map(done, &best.residual))
+            (heading("Before and after"))
+            (PreEscaped(traces(done)))
+        }
+        (heading("In words"))
+        pre { (gap_text(diagnosis)) }
+    }
 }
 
 /// The first causes with their probabilities as bars.

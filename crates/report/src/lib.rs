@@ -56,7 +56,7 @@ pub use display::Display;
 pub use doubts::{Doubt, doubts};
 pub use drift_text::drift_text;
 pub use duration::duration;
-pub use gap_page::gap_page;
+pub use gap_page::{gap_page, gap_part};
 pub use gap_text::{gap_text, headline};
 pub use heat_picture::{ErrorAtGradient, error_figure, heat_transfer_figure};
 pub use held_text::held_text;

@@ -25,7 +25,16 @@ pub struct Deadlined {
     calls: Sender<(u64, Call)>,
     answers: Receiver<Answer>,
     number: u64,
-    limit: Duration,
+    deadlines: Deadlines,
+}
+
+/// How long calls may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Deadlines {
+    /// To connect and arm, and to let go again.
+    pub arming: Duration,
+    /// Every other call.
+    pub call: Duration,
 }
 
 /// The rig's thread is gone.
@@ -34,11 +43,11 @@ pub struct Deadlined {
 struct Gone(String);
 
 impl Deadlined {
-    /// `backend` with so much time for each call.
+    /// `backend` with so much time for its calls.
     ///
     /// # Errors
     /// [`BackendError::Lost`] where no thread can be started.
-    pub fn new(mut backend: Box<dyn Backend>, limit: Duration) -> Result<Self, BackendError> {
+    pub fn new(mut backend: Box<dyn Backend>, deadlines: Deadlines) -> Result<Self, BackendError> {
         let description = backend.describe();
         let (calls, to_do) = channel::<(u64, Call)>();
         let (tell, answers) = channel::<Answer>();
@@ -64,10 +73,14 @@ impl Deadlined {
                 }
             })
             .map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
-        Ok(Deadlined { description, calls, answers, number: 0, limit })
+        Ok(Deadlined { description, calls, answers, number: 0, deadlines })
     }
 
     fn call(&mut self, name: &'static str, call: Call) -> Result<Option<SampleBatch>, BackendError> {
+        let limit = match call {
+            Call::Arm | Call::Disarm => self.deadlines.arming,
+            _ => self.deadlines.call,
+        };
         self.number += 1;
         let gone = || {
             let source = Box::new(Gone("its thread has ended".to_owned()));
@@ -75,12 +88,12 @@ impl Deadlined {
         };
         self.calls.send((self.number, call)).map_err(|_| gone())?;
         loop {
-            match self.answers.recv_timeout(self.limit) {
+            match self.answers.recv_timeout(limit) {
                 // An answer to a call that was given up.
                 Ok((number, _)) if number < self.number => {}
                 Ok((_, answer)) => return answer,
                 Err(RecvTimeoutError::Timeout) => {
-                    return Err(BackendError::Deadline { call: name, limit_s: self.limit.as_secs_f64() });
+                    return Err(BackendError::Deadline { call: name, limit_s: limit.as_secs_f64() });
                 }
                 Err(RecvTimeoutError::Disconnected) => return Err(gone()),
             }
@@ -159,7 +172,9 @@ mod tests {
     #[test]
     fn a_rig_that_hangs_is_given_up_and_late_answers_are_not_mixed_up() {
         let (go, going) = channel();
-        let mut rig = Deadlined::new(Box::new(Hangs(Mutex::new(going))), Duration::from_millis(20)).unwrap();
+        // Half a second, for a machine that is busy with other tests.
+        let [arming, call] = [Duration::from_secs(10), Duration::from_millis(500)];
+        let mut rig = Deadlined::new(Box::new(Hangs(Mutex::new(going))), Deadlines { arming, call }).unwrap();
         rig.arm().unwrap();
         go.send(()).unwrap();
         assert_eq!(rig.poll(1.0).unwrap().t_s, [1.0]);

@@ -26,7 +26,7 @@ mod until_certain;
 mod way_out;
 
 pub use batch_watch::BatchWatch;
-pub use deadline::Deadlined;
+pub use deadline::{Deadlined, Deadlines};
 pub use drift_watch::DriftWatch;
 pub use first_look::FirstLook;
 pub use guard::{Guard, Told, Trip};

@@ -21,6 +21,13 @@ const VALVE_MAX_RATIO: f64 = mapper_core::OperatingPoint::OPENING_MAX_RATIO;
 #[error("the backend failed: {0}")]
 struct Panicked(String);
 
+/// Whoever is told may panic: the rig comes down all the same.
+fn contained(telling: impl FnOnce() -> Result<(), RunError>) -> Result<(), RunError> {
+    let panicked =
+        |panic: Box<dyn std::any::Any + Send>| Err(RunError::Panicked { message: words_of(&*panic) });
+    catch_unwind(AssertUnwindSafe(telling)).unwrap_or_else(panicked)
+}
+
 impl Run<'_, '_> {
     /// Makes the rig safe, then tells why. Nothing interrupts it, and it takes a bounded time.
     pub(crate) fn way_out(&mut self, halt: Halt) -> Result<RunEnd, RunError> {
@@ -49,9 +56,9 @@ impl Run<'_, '_> {
             }
         };
         // The error that ended the run outranks any that telling of it may meet.
-        let told = self.tell_why(unseen.as_deref(), counts, kind, &message);
+        let told = contained(|| self.tell_why(unseen.as_deref(), counts, kind, &message));
         let safe = self.down(begun).and_then(|()| self.cut_air());
-        let told = told.and_then(|()| self.tell_safe(safe.as_ref().err()));
+        let told = told.and_then(|()| contained(|| self.tell_safe(safe.as_ref().err())));
         match (end, safe) {
             (Err(error), Err(source)) => Err(RunError::NotSafe { why: error.to_string(), source }),
             (Ok(_), Err(source)) => Err(RunError::NotSafe { why: message, source }),

@@ -4,7 +4,7 @@ use crate::files::{json_text, write_new};
 use crate::identified::{Identified, SoughtSurge};
 use crate::program::program_and_commit;
 use crate::recorded::Recorded;
-use crate::{Registry, Session, SessionError, run_directory};
+use crate::{Gap, Registry, Session, SessionError, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
@@ -14,7 +14,7 @@ use mapper_observe::FusedChannel;
 use mapper_page::{OtherRun, RunPage, run_page};
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_report::{ReportSource, RunReport, SurgeReport, instant, run_report};
+use mapper_report::{ReportSource, RunReport, SurgeReport, gap_part, instant, run_report};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
@@ -176,7 +176,8 @@ impl Session<'_> {
         self.written(&told, identified, (first, further), remarks, directory)
     }
 
-    /// The page of one run or recording, with the maps of others to hold it against. Nothing is written.
+    /// The page of one run or recording, with the maps of others to hold it against and the diagnosis of its gap, where one was
+    /// made. Nothing is written.
     ///
     /// # Errors
     /// As [`Session::identify`].
@@ -185,6 +186,7 @@ impl Session<'_> {
         shown: Recorded,
         others: Vec<Recorded>,
         channels: &ChannelMap,
+        gap: Option<&Gap>,
     ) -> Result<String, SessionError> {
         let several = [shown];
         let told = Told::of(&several);
@@ -209,7 +211,7 @@ impl Session<'_> {
             other_maps.iter().map(|(name, map)| OtherRun { name: name.clone(), map }).collect();
         let repeats = identified.repeats();
         let report = run_report_of(&told, &identified, &remarks, &repeats, false);
-        page_of(&told, &identified, &report, map.as_ref(), &others, self.registry.commit)
+        page_of(&told, &identified, &report, map.as_ref(), &others, gap, self.registry.commit)
     }
 
     /// The files of what was identified.
@@ -247,7 +249,7 @@ impl Session<'_> {
         write_new(&report, run_report(&shown).as_bytes())?;
         let page = directory.join(run_directory::PAGE);
         let page_text =
-            page_of(told, &identified, &shown, compressor_map.as_ref(), &[], self.registry.commit)?;
+            page_of(told, &identified, &shown, compressor_map.as_ref(), &[], None, self.registry.commit)?;
         write_new(&page, page_text.as_bytes())?;
         let Identified { points, thermal, two_parameter, sensors, zero, score, surge, .. } = identified;
         Ok(Results {
@@ -324,6 +326,7 @@ fn page_of(
     report: &RunReport<'_>,
     map: Option<&CompressorMap>,
     others: &[OtherRun<'_>],
+    gap: Option<&Gap>,
     commit: &str,
 ) -> Result<String, SessionError> {
     let course = |point: &IdentifiedPoint| t2_course(&identified.recording, point, &identified.config);
@@ -336,6 +339,7 @@ fn page_of(
         zero: &identified.zero,
         tested_at: told.tested_at.as_deref(),
         program: &program_and_commit(commit),
+        gap: gap.map(|gap| gap_part(&gap.diagnosed)),
         others,
     })?)
 }

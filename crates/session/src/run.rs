@@ -27,14 +27,14 @@ use mapper_core::{Backend, Clock, Plan, Reaction, RigDescription, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
 use mapper_runner::{
-    Deadlined, PlanSteps, RunEnd, RunError, RunObserver, StepSource, SurgeSearch, UntilCertain,
+    Deadlined, Deadlines, PlanSteps, RunEnd, RunError, RunObserver, StepSource, SurgeSearch, UntilCertain,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Time that a rig has for each call.
-const DEADLINE: Duration = Duration::from_secs(2);
+/// Time that a rig has for its calls: to connect and to let go a little more than a driver has (docs/protocol.md).
+const DEADLINES: Deadlines = Deadlines { arming: Duration::from_secs(11), call: Duration::from_secs(2) };
 
 /// What to run.
 pub struct RunRequest<'a> {
@@ -223,7 +223,7 @@ impl PreparedRun<'_> {
         let campaign = self.request.campaign;
         let rig = self.rig();
         if !rig.simulated_time {
-            self.backend = Box::new(Deadlined::new(self.backend, DEADLINE).map_err(SessionError::Backend)?);
+            self.backend = Box::new(Deadlined::new(self.backend, DEADLINES).map_err(SessionError::Backend)?);
         }
         let mut claim = self.claim(&rig)?;
         let (directory, plan_json) = (self.directory()?, json_text(&self.plan)?);

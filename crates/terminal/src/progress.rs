@@ -6,7 +6,9 @@ use mapper_core::StepMarker;
 use mapper_report::wrapped;
 use mapper_session::SessionEvent;
 use serde_json::json;
-use std::sync::Mutex;
+use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::time::Duration;
 
 /// How often the clock of a bar is drawn.
@@ -47,13 +49,123 @@ impl ProgressManner {
             _ => ProgressManner::Quiet,
         }
     }
+
+    /// Whether anything is shown of an event.
+    fn shows(self, event: &SessionEvent) -> bool {
+        use SessionEvent as E;
+        match self {
+            ProgressManner::Quiet => false,
+            ProgressManner::Json => !matches!(event, E::Readings { .. }),
+            ProgressManner::Lines => {
+                matches!(
+                    event,
+                    E::RunStarted { .. }
+                        | E::StepStarted(_)
+                        | E::Told(_)
+                        | E::Progress { .. }
+                        | E::PiecesDone { .. }
+                )
+            }
+            ProgressManner::Bar => !matches!(
+                event,
+                E::StepEnded(_) | E::Readings { .. } | E::PointEstimated(_) | E::PointIdentified(_)
+            ),
+        }
+    }
 }
 
-/// Shows what a session tells. It may be told from many threads.
+/// Most of what is told and not yet shown.
+const QUEUE: usize = 4096;
+/// How long a session waits for somebody who reads slowly, once: then what is told is lost until there is room again.
+const PATIENCE: Duration = Duration::from_millis(10);
+/// How long the end waits for what is still to be shown.
+const LAST_WORDS: Duration = Duration::from_secs(1);
+
+/// Shows what a session tells. It may be told from many threads, and none of them waits for a terminal or a pipe: it is shown on a
+/// thread of its own. A terminal that is held (Ctrl-S) or a pipe that nobody reads loses lines; a run and its guards go on.
 pub struct Progress {
     manner: ProgressManner,
-    bar: ProgressBar,
-    state: Mutex<State>,
+    to: SyncSender<Said>,
+    stalled: AtomicBool,
+}
+
+enum Said {
+    Event(SessionEvent),
+    /// Takes the bar away and answers.
+    Clear(SyncSender<()>),
+}
+
+impl Progress {
+    /// Nothing is shown before the first event.
+    pub fn new(manner: ProgressManner) -> Self {
+        let (to, said) = sync_channel(QUEUE);
+        // Without a thread nothing is shown, and everything works.
+        let started =
+            std::thread::Builder::new().name("progress".to_owned()).spawn(move || show_all(manner, &said));
+        let manner = if started.is_ok() { manner } else { ProgressManner::Quiet };
+        Progress { manner, to, stalled: AtomicBool::new(false) }
+    }
+
+    /// Shows an event.
+    pub fn show(&self, event: &SessionEvent) {
+        if !self.manner.shows(event) {
+            return;
+        }
+        match self.to.try_send(Said::Event(event.clone())) {
+            Ok(()) => self.stalled.store(false, Ordering::Relaxed),
+            Err(TrySendError::Full(said)) if !self.stalled.load(Ordering::Relaxed) => {
+                std::thread::sleep(PATIENCE);
+                self.stalled.store(self.to.try_send(said).is_err(), Ordering::Relaxed);
+            }
+            Err(_) => {}
+        }
+    }
+
+    /// Says what is begun before there is anything to count.
+    pub fn begin(&self, what: &str) {
+        self.show(&SessionEvent::Progress { done_ratio: 0.0, what: what.to_owned() });
+    }
+
+    /// Shows how many of many pieces of work are done.
+    pub fn pieces(&self, done: usize, of: usize) {
+        self.show(&SessionEvent::PiecesDone { done, of });
+    }
+
+    /// Takes the bar away, once everything is shown.
+    pub fn clear(&self) {
+        let (done, is_done) = sync_channel(1);
+        if self.to.try_send(Said::Clear(done)).is_ok() {
+            let _ = is_done.recv_timeout(LAST_WORDS);
+        }
+    }
+}
+
+/// What was told before an error is shown before it.
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.clear();
+    }
+}
+
+fn show_all(manner: ProgressManner, said: &Receiver<Said>) {
+    let target = match manner {
+        ProgressManner::Bar => ProgressDrawTarget::stderr(),
+        _ => ProgressDrawTarget::hidden(),
+    };
+    let shown = Shown { bar: ProgressBar::with_draw_target(None, target) };
+    let mut state = State::default();
+    for said in said {
+        match (said, manner) {
+            (Said::Event(event), ProgressManner::Json) => tell_program(&event, &mut state),
+            (Said::Event(event), ProgressManner::Lines) => say_lines(&event, &mut state),
+            (Said::Event(event), ProgressManner::Bar) => shown.draw(&event, &mut state),
+            (Said::Event(_), ProgressManner::Quiet) => {}
+            (Said::Clear(done), _) => {
+                shown.bar.finish_and_clear();
+                let _ = done.try_send(());
+            }
+        }
+    }
 }
 
 #[derive(Default)]
@@ -70,42 +182,12 @@ struct State {
     told_s: f64,
 }
 
-impl Progress {
-    /// Nothing is shown before the first event.
-    pub fn new(manner: ProgressManner) -> Self {
-        let target = match manner {
-            ProgressManner::Bar => ProgressDrawTarget::stderr(),
-            _ => ProgressDrawTarget::hidden(),
-        };
-        Progress { manner, bar: ProgressBar::with_draw_target(None, target), state: Mutex::default() }
-    }
+/// The bar.
+struct Shown {
+    bar: ProgressBar,
+}
 
-    /// Shows an event.
-    pub fn show(&self, event: &SessionEvent) {
-        let Ok(mut state) = self.state.lock() else { return };
-        match self.manner {
-            ProgressManner::Quiet => {}
-            ProgressManner::Json => tell_program(event, &mut state),
-            ProgressManner::Lines => say_lines(event, &mut state),
-            ProgressManner::Bar => self.draw(event, &mut state),
-        }
-    }
-
-    /// Says what is begun before there is anything to count.
-    pub fn begin(&self, what: &str) {
-        self.show(&SessionEvent::Progress { done_ratio: 0.0, what: what.to_owned() });
-    }
-
-    /// Shows how many of many pieces of work are done.
-    pub fn pieces(&self, done: usize, of: usize) {
-        self.show(&SessionEvent::PiecesDone { done, of });
-    }
-
-    /// Takes the bar away.
-    pub fn clear(&self) {
-        self.bar.finish_and_clear();
-    }
-
+impl Shown {
     fn draw(&self, event: &SessionEvent, state: &mut State) {
         match event {
             SessionEvent::RunStarted { steps, duration_s, .. } => {
@@ -180,7 +262,6 @@ fn event_line(t_s: f64, message: &str) -> String {
     wrapped(&format!("{t_s:8.1} s  {message}"), COLUMNS, 12).trim_end().to_owned()
 }
 
-#[allow(clippy::print_stderr, reason = "beside the results")]
 fn say_lines(event: &SessionEvent, state: &mut State) {
     let line = match event {
         SessionEvent::RunStarted { steps, duration_s, .. } => {
@@ -203,14 +284,12 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
     if let SessionEvent::Progress { what, .. } = event {
         state.said.clone_from(what);
     }
-    eprintln!("{line}");
+    say(&line);
 }
 
 /// One JSON object a line: the event as the session has it. Readings are for a live page, and the rig's time is told now and then.
-#[allow(clippy::print_stderr, reason = "beside the results")]
 fn tell_program(event: &SessionEvent, state: &mut State) {
     match event {
-        SessionEvent::Readings { .. } => return,
         SessionEvent::RunStarted { duration_s, .. } => state.duration_s = *duration_s,
         SessionEvent::RigTime { t_s } => {
             if *t_s < state.told_s + state.duration_s / RIG_TIMES {
@@ -220,9 +299,11 @@ fn tell_program(event: &SessionEvent, state: &mut State) {
         }
         _ => {}
     }
-    eprintln!(
-        "{}",
-        serde_json::to_value(event)
-            .unwrap_or_else(|error| json!({ "event": "error", "message": error.to_string() }))
-    );
+    let value = serde_json::to_value(event);
+    say(&value.unwrap_or_else(|error| json!({ "event": "error", "message": error.to_string() })).to_string());
+}
+
+/// A reader that has gone away, as `tee` on Ctrl-C, is no reason to panic.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
 }

@@ -16,6 +16,7 @@ use arrow_array::types::{
 use arrow_array::{Array, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Field, Schema, TimeUnit};
 use mapper_logs::{Layout, Log, LogError, LogFile, LogOptions, RowSink};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// How many rows are looked at.
 const HEAD_ROWS: usize = 400;
@@ -40,7 +41,7 @@ pub(crate) fn open_log(
     options: &LogOptions,
     open: OpenBatches,
 ) -> Result<Box<dyn Log>, LogError> {
-    let (schema, batches) = open(file)?;
+    let (schema, batches) = contained(name, file, || open(file))?;
     let columns = schema.fields().len();
     if columns > COLUMN_LIMIT {
         return Err(file.content(name, format!("it has {columns} columns; at most {COLUMN_LIMIT} are read")));
@@ -73,7 +74,7 @@ impl Log for BatchLog {
     }
 
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
-        let (schema, batches) = (self.open)(&self.file)?;
+        let (schema, batches) = contained(self.name, &self.file, || (self.open)(&self.file))?;
         let chunks = BatchChunks { file: &self.file, name: self.name, batches };
         self.table.rows(&mut ColumnRows::new(head(&schema), chunks), wanted, sink)
     }
@@ -87,10 +88,28 @@ struct BatchChunks<'a> {
 
 impl Chunks for BatchChunks<'_> {
     fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError> {
-        let Some(batch) = self.batches.next() else { return Ok(None) };
-        let batch = batch.map_err(|error| self.file.content(self.name, error.to_string()))?;
-        Ok(Some((batch.num_rows(), batch.columns().iter().map(|column| chunk(column.as_ref())).collect())))
+        let BatchChunks { file, name, batches } = self;
+        contained(name, file, || {
+            let Some(batch) = batches.next() else { return Ok(None) };
+            let batch = batch.map_err(|error| file.content(name, error.to_string()))?;
+            Ok(Some((
+                batch.num_rows(),
+                batch.columns().iter().map(|column| chunk(column.as_ref())).collect(),
+            )))
+        })
     }
+}
+
+/// Arrow's libraries check sizes and offsets by panicking (one damaged file in a hundred, found by flipping bytes): that is an
+/// error of the file here. What was under way is dropped, never used again.
+fn contained<T>(
+    name: &'static str,
+    file: &LogFile,
+    reading: impl FnOnce() -> Result<T, LogError>,
+) -> Result<T, LogError> {
+    let damaged =
+        || file.content(name, "it is damaged: a size or an offset in it cannot be; export it again");
+    catch_unwind(AssertUnwindSafe(reading)).unwrap_or_else(|_| Err(damaged()))
 }
 
 /// Whether a column holds numbers, times or texts.

@@ -6,7 +6,7 @@ use crate::parts::{Part, side_by_side};
 use crate::table_head::COLUMN_LIMIT;
 use crate::table_log::Table;
 use mapper_logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
-use std::io::Read;
+use std::io::{Read, Seek as _, SeekFrom};
 use tedium::{ChannelPath, DataType, PropertyPath, PropertyValue, TdmsError, TdmsFile, TdmsStorageType};
 
 /// The format.
@@ -101,21 +101,21 @@ fn instants(source: &mut Source, path: &ChannelPath, from: u64, count: usize) ->
     Ok(Chunk::Instants(values.into_iter().map(Stamp::instant).collect()))
 }
 
-/// One for each type that a channel of readings or a clock may have.
-const READERS: [ReadValues; 12] = [
-    |s, p, from, n| numbers::<f64>(s, p, from, n, |v| v),
-    |s, p, from, n| numbers::<f32>(s, p, from, n, f64::from),
-    |s, p, from, n| numbers::<i16>(s, p, from, n, f64::from),
-    |s, p, from, n| numbers::<i32>(s, p, from, n, f64::from),
-    |s, p, from, n| numbers::<u16>(s, p, from, n, f64::from),
-    |s, p, from, n| numbers::<u32>(s, p, from, n, f64::from),
-    |s, p, from, n| numbers::<i8>(s, p, from, n, f64::from),
-    |s, p, from, n| numbers::<u8>(s, p, from, n, f64::from),
+/// One for each type that a channel of readings or a clock may have, with the bytes of a value.
+const READERS: [(u64, ReadValues); 12] = [
+    (8, |s, p, from, n| numbers::<f64>(s, p, from, n, |v| v)),
+    (4, |s, p, from, n| numbers::<f32>(s, p, from, n, f64::from)),
+    (2, |s, p, from, n| numbers::<i16>(s, p, from, n, f64::from)),
+    (4, |s, p, from, n| numbers::<i32>(s, p, from, n, f64::from)),
+    (2, |s, p, from, n| numbers::<u16>(s, p, from, n, f64::from)),
+    (4, |s, p, from, n| numbers::<u32>(s, p, from, n, f64::from)),
+    (1, |s, p, from, n| numbers::<i8>(s, p, from, n, f64::from)),
+    (1, |s, p, from, n| numbers::<u8>(s, p, from, n, f64::from)),
     // Counts beyond 2^53 lose their last digit, as everywhere.
-    |s, p, from, n| numbers::<i64>(s, p, from, n, |v| v as f64),
-    |s, p, from, n| numbers::<u64>(s, p, from, n, |v| v as f64),
-    |s, p, from, n| numbers::<bool>(s, p, from, n, |v| f64::from(u8::from(v))),
-    instants,
+    (8, |s, p, from, n| numbers::<i64>(s, p, from, n, |v| v as f64)),
+    (8, |s, p, from, n| numbers::<u64>(s, p, from, n, |v| v as f64)),
+    (1, |s, p, from, n| numbers::<bool>(s, p, from, n, |v| f64::from(u8::from(v)))),
+    (16, instants),
 ];
 
 /// A channel that is read.
@@ -145,7 +145,9 @@ struct Tdms {
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    let mut source = TdmsFile::new(file.open()?).map_err(|error| failed(file, &error))?;
+    let mut bytes = file.open()?;
+    let size = bytes.seek(SeekFrom::End(0)).map_err(|error| file.error(error))?;
+    let mut source = TdmsFile::new(bytes).map_err(|error| failed(file, &error))?;
     let names: Vec<String> = source.list_groups().map(plain).collect();
     let (mut found, mut problems, mut channels) = (Vec::new(), Vec::new(), Vec::new());
     let (mut left_out, mut seen) = (0usize, 0usize);
@@ -157,7 +159,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         }
         let mut of_group: Vec<Channel> = Vec::new();
         for path in paths {
-            match channel(&mut source, path) {
+            match channel(&mut source, path, size) {
                 Some(channel) => of_group.push(channel),
                 None => left_out += 1,
             }
@@ -192,9 +194,13 @@ fn plain(name: &str) -> String {
 }
 
 /// The channel, if it holds numbers or dates.
-fn channel(source: &mut Source, path: ChannelPath) -> Option<Channel> {
+fn channel(source: &mut Source, path: ChannelPath, file_bytes: u64) -> Option<Channel> {
     let length = source.channel_length(&path).filter(|length| *length > 0)?;
-    let read = READERS.into_iter().find(|read| read(source, &path, 0, 1).is_ok())?;
+    let (value_bytes, read) = READERS.into_iter().find(|(_, read)| read(source, &path, 0, 1).is_ok())?;
+    // A damaged file declares more values than it has bytes; what is not there would be read as zeros.
+    if length > file_bytes / value_bytes {
+        return None;
+    }
     let of_path = PropertyPath::channel(path.group_name(), path.channel_name());
     let property = |name: &str| source.read_property(&of_path, name).ok().flatten();
     let number = |name: &str| match property(name)? {

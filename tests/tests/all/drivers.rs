@@ -109,7 +109,7 @@ fn drivers_are_listed_with_where_they_are_or_the_line_that_builds_them() {
 fn a_driver_that_is_not_there_and_a_secret_in_a_campaign_are_mistakes_at_their_places() {
     for (backend, words, never) in [
         ("  no_such_rig: {x: 1}", "mapper-backend-no_such_rig", "\u{0}"),
-        ("  lab: {campaign: x.yaml, password: hunter2}", "{env: NAME}", "error: hunter2"),
+        ("  lab: {campaign: x.yaml, password: hunter2}", "{env: NAME}", "hunter2"),
         ("  lab: {password: {env: MAPPER_TEST_NOT_SET}}", "MAPPER_TEST_NOT_SET is not set", "\u{0}"),
         ("  lab: {real_time: true}", "campaign", "\u{0}"),
     ] {

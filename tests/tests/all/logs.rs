@@ -84,6 +84,10 @@ fn every_format_leads_to_the_same_points_to_the_last_digit() {
         run.identify(&log, &channels).exits(0).json()["points"].clone()
     };
     assert_eq!(points("csv", "log.csv"), expected);
+    assert_eq!(points("parquet", "log.parquet"), expected);
+    assert_eq!(points("arrow", "log.arrow"), expected);
+    assert_eq!(points("tdms", "log.tdms"), expected);
+    assert_eq!(points("tdms_time", "dated.tdms"), expected);
     // Excel's files keep 15 to 16 of the 17 digits of a number.
     for (found, expected) in
         points("xlsx", "log.xlsx").as_array().unwrap().iter().zip(expected.as_array().unwrap())

@@ -2,12 +2,12 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{drivers, output, registry};
+use crate::{drivers, output, registry, rig_states};
 use clap::{Args, Subcommand};
 use mapper_conformance::{Candidate, RULES};
 use mapper_core::{RigMode, Setpoints};
 use mapper_host::Found;
-use mapper_session::nominal_model;
+use mapper_session::{RigStates, nominal_model};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -91,7 +91,10 @@ impl Backend {
         }
         let (registry, model) = (registry::registry(), nominal_model(&campaign)?);
         // Mistakes in the settings are told as those of a campaign.
-        registry.make_backend(&campaign, &model).map_err(|error| Failure::in_campaign(error, path))?;
+        let rig = registry.make_backend(&campaign, &model).map_err(|error| Failure::in_campaign(error, path))?.describe();
+        // A rig that another runner has, or that is latched, is left alone.
+        let states = RigStates::new(&rig_states::directory(None));
+        let claim = rig.exclusive.as_deref().map(|rig| states.claim(rig, None)).transpose()?;
         let make = || match registry.make_backend(&campaign, &model) {
             Ok(backend) => Ok(backend),
             Err(mapper_session::SessionError::Backend(error)) => Err(error),
@@ -109,6 +112,9 @@ impl Backend {
         let candidate = Candidate { name, make: &make, setpoints, lasts_s: None };
         let found: Vec<(&str, Result<(), String>)> =
             RULES.iter().map(|(rule, check)| (*rule, check(&candidate))).collect();
+        if let Some(claim) = claim {
+            claim.release()?;
+        }
         let broken = found.iter().filter(|(_, kept)| kept.is_err()).count();
         if self.json {
             let rules = found.iter().map(

@@ -3,11 +3,12 @@
 use crate::failure::Failure;
 use crate::given::{channel_map, given_campaign};
 use crate::output::Replace;
-use crate::{output, registry};
+use crate::{manner, output, registry};
 use clap::Args;
-use mapper_session::{Recorded, Session, SessionError};
+use mapper_record::ChannelMap;
+use mapper_session::{Gap, Recorded, Registry, Session, SessionError};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Make the page of a run: map, points, transients, plan and provenance in one HTML file
 #[derive(Debug, Args)]
@@ -24,6 +25,9 @@ pub struct Report {
     /// Campaign with machine, sensors and window, instead of the one attached to the recordings
     #[arg(long, value_name = "FILE")]
     pub campaign: Option<PathBuf>,
+    /// Also diagnose the gap between the first run and the nominal model of this campaign, which takes up to a minute
+    #[arg(long, value_name = "CAMPAIGN")]
+    pub gap: Option<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -41,11 +45,28 @@ impl Report {
         let mut recorded = self.runs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
         let others = recorded.split_off(1.min(recorded.len()));
         let shown = recorded.pop().ok_or(SessionError::NoRecording)?;
-        let page = Session::new(&registry).page(shown, others, &map)?;
+        let gap = self.gap.as_deref().map(|file| diagnosed(file, &registry, &shown, &map)).transpose()?;
+        let page = Session::new(&registry).page(shown, others, &map, gap.as_ref())?;
         self.replace.write(&self.out, page.as_bytes())?;
         match self.json {
             true => output::print_json(&json!({ "page": self.out })),
             false => output::print(&format!("page       {}\n", self.out.display())),
         }
     }
+}
+
+fn diagnosed(
+    file: &Path,
+    registry: &Registry,
+    recorded: &Recorded,
+    map: &ChannelMap,
+) -> Result<Gap, Failure> {
+    let campaign = mapper_campaign::load(file).map_err(Failure::of_campaign)?;
+    let effects = registry.effects_with(&[])?;
+    let progress = manner::progress();
+    let on_event = |event: &_| progress.show(event);
+    let session = Session { on_event: &on_event, ..Session::new(registry) };
+    let gap = session.diagnose_gap(recorded, &campaign, map, effects);
+    progress.clear();
+    Ok(gap?)
 }

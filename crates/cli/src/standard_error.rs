@@ -1,0 +1,8 @@
+//! What stands beside the output.
+
+use std::io::Write;
+
+/// Writes text to standard error. Nobody is left to tell where this fails.
+pub fn say(text: &str) {
+    let _ = write!(std::io::stderr().lock(), "{text}");
+}

@@ -30,7 +30,8 @@ pub(crate) struct ReadLog {
     pub(crate) start_time_ns: Option<u64>,
     pub(crate) warnings: Vec<ReadWarning>,
     pub(crate) averaged: bool,
-    pub(crate) full: bool,
+    /// Values that are kept.
+    kept: u64,
 }
 
 /// What a wanted column is for.
@@ -52,7 +53,7 @@ pub(crate) fn read_log(
     map: &ChannelMap,
     options: &ReadOptions,
 ) -> Result<ReadLog, RecordError> {
-    let (_, mut log) = options.logs.open(file, &map.log)?;
+    let (format, mut log) = options.logs.open(file, &map.log)?;
     let layout = log.layout().clone();
     let wanted = wanted(map, &layout)?;
     // Each column once, in the order of the layout: several channels may read one.
@@ -95,7 +96,18 @@ pub(crate) fn read_log(
     let mut rows = 0u64;
     let mut take_row = |row: Row<'_>| {
         rows += 1;
-        let usable = row.t_s.is_finite() && row.t_s.abs() < LONGEST_S && rows <= options.max_messages;
+        if rows > options.max_messages {
+            let message = format!("it has more than {} rows; cut it into shorter logs", options.max_messages);
+            return Err(file.content(format.name, message));
+        }
+        if read.kept > options.max_values {
+            let message = format!(
+                "its mapped columns hold more than {} values; map fewer columns, or cut it into shorter logs",
+                options.max_values
+            );
+            return Err(file.content(format.name, message));
+        }
+        let usable = row.t_s.is_finite() && row.t_s.abs() < LONGEST_S;
         if let (Some(blocks), Some(places), true) = (blocks.get_mut(row.group), places.get(row.group), usable)
         {
             blocks.push(row.t_s, row.values, &mut |t_s, values| read.take(places, t_s, values));
@@ -107,7 +119,6 @@ pub(crate) fn read_log(
         blocks.finish(&mut |t_s, values| read.take(places, t_s, values));
         read.averaged |= blocks.averages();
     }
-    read.full = rows > options.max_messages;
     Ok(read)
 }
 
@@ -122,6 +133,7 @@ impl ReadLog {
                 Target::Ambient => self.ambient.get_or_insert_default(),
             };
             builder.push(time_ns, unit.to_inside(value));
+            self.kept += 1;
         }
     }
 }

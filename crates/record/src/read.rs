@@ -95,9 +95,6 @@ fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Resul
     if log.averaged {
         warnings.push(ReadWarning::Averaged);
     }
-    if log.full {
-        warnings.push(ReadWarning::TooManyMessages { limit: options.max_messages });
-    }
     warnings.extend(missing(map, &log.builders));
     let ambient = log.ambient.map(|builder| builder.build(Channel::P1, log.zero_ns, &mut warnings));
     let mut gathered = gather(map, log.builders, log.zero_ns, ambient, &mut warnings);

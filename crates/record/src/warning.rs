@@ -28,6 +28,12 @@ pub enum ReadWarning {
         /// What it is, and what is wrong with it.
         part: DamagedPart,
     },
+    /// More damage than is listed.
+    #[error("{count} more chunks and records were left out: they are damaged as well")]
+    MoreDamage {
+        /// How many.
+        count: u64,
+    },
     /// Messages on a mapped topic that are not JSON objects.
     #[error("{count} messages on {topic} were left out: they are not JSON objects")]
     DamagedMessages {
@@ -92,9 +98,15 @@ pub enum ReadWarning {
         /// Samples with the time of another one.
         repeated: usize,
     },
-    /// More messages than the reader takes.
-    #[error("only the first {limit} messages were read")]
+    /// More messages and other records than the reader takes.
+    #[error("only the first {limit} messages and other records were read")]
     TooManyMessages {
+        /// The limit.
+        limit: u64,
+    },
+    /// More values than the reader keeps.
+    #[error("only the first {limit} values were read; cut the recording into shorter ones")]
+    TooManyValues {
         /// The limit.
         limit: u64,
     },

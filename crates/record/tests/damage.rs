@@ -115,6 +115,32 @@ fn messages_are_bounded() {
 }
 
 #[test]
+fn values_are_bounded() {
+    let options = ReadOptions { max_values: 100, ..ReadOptions::default() };
+    let report =
+        read_recording_from(&recorded(&batch(100)), Path::new("x"), &ChannelMap::native(), &options).unwrap();
+    assert!(report.warnings.contains(&ReadWarning::TooManyValues { limit: 100 }));
+    let kept: usize = report.recording.series.values().map(|series| series.t_s.len()).sum();
+    assert!((80..130).contains(&kept), "{kept}");
+}
+
+/// Records that a chunk holds by the million take no memory each.
+#[test]
+fn damaged_records_are_counted_and_a_few_are_listed() {
+    let magic = b"\x89MCAP0\r\n";
+    // A message of one byte.
+    let cut = [&[5u8][..], &1u64.to_le_bytes(), &[0]].concat();
+    let bytes = [&magic[..], &cut.repeat(1000)].concat();
+    let report = read(&bytes).unwrap();
+    let listed = report.warnings.iter().filter(|w| matches!(w, ReadWarning::DamagedRecord { .. })).count();
+    assert_eq!(listed, 100);
+    assert!(report.warnings.contains(&ReadWarning::MoreDamage { count: 900 }), "{:?}", report.warnings);
+    let options = ReadOptions { max_messages: 500, ..ReadOptions::default() };
+    let bounded = read_recording_from(&bytes, Path::new("x"), &ChannelMap::native(), &options).unwrap();
+    assert!(bounded.warnings.contains(&ReadWarning::MoreDamage { count: 400 }), "{:?}", bounded.warnings);
+}
+
+#[test]
 fn what_is_no_mcap_file_is_said_to_be_none() {
     let error = read(b"time,T2\n0,300\n").unwrap_err();
     assert!(error.to_string().contains("not an MCAP file"), "{error}");

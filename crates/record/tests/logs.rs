@@ -71,3 +71,19 @@ fn units_that_contradict_the_log_are_told_and_gauge_units_need_the_word() {
     let error = read(&log(10), "channels:\n  P1: {field: p1}\n").unwrap_err().to_string();
     assert!(error.contains("over the ambient pressure") && error.contains("gauge: true"), "{error}");
 }
+
+#[test]
+fn a_log_with_more_values_than_there_is_room_for_is_refused() {
+    let bounded = |max_messages, max_values| {
+        let map =
+            ChannelMap::from_yaml("channels:\n  N: {field: n}\n  T2: {field: T2}\n", Path::new("map.yaml"));
+        let options = ReadOptions { logs: LOG_FORMATS, max_messages, max_values, ..ReadOptions::default() };
+        read_recording_from(log(100).as_bytes(), Path::new("log.csv"), &map.unwrap(), &options)
+    };
+    // 6000 rows, 600 means of each of two columns.
+    assert!(bounded(6000, 1200).is_ok());
+    let error = bounded(6000, 1000).unwrap_err().to_string();
+    assert!(error.contains("more than 1000 values"), "{error}");
+    let error = bounded(5999, 1200).unwrap_err().to_string();
+    assert!(error.contains("more than 5999 rows"), "{error}");
+}

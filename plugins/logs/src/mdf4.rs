@@ -1,7 +1,9 @@
 //! ASAM MDF, version 4: the format of measuring systems on engine test beds.
 
-use falcon_mdf::{Channel, ChannelGroup, Mf4File, Signal};
+use falcon_mdf::io::reader::BufferedSource;
+use falcon_mdf::{Channel, ChannelGroup, Mf4File, OpenOptions, Signal};
 use mapper_logs::{Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink};
+use std::sync::Arc;
 
 /// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
@@ -13,6 +15,9 @@ const CHUNK: usize = 4096;
 
 /// Most channels of a file.
 const CHANNEL_LIMIT: usize = 10_000;
+
+/// Largest compressed block, unpacked, bytes: writers make them of 4 MiB, as the standard has it.
+const BLOCK_LIMIT: u64 = 256 << 20;
 
 fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"MDF     ") || head.starts_with(b"UnFinMF ")
@@ -30,9 +35,11 @@ struct Mdf4 {
 
 fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
     let failed = |error: falcon_mdf::error::Mf4Error| path.content(NAME, error.to_string());
+    let limits = OpenOptions { max_decompressed: BLOCK_LIMIT, ..OpenOptions::default() };
     let file = match path.bytes() {
-        Some(bytes) => Mf4File::from_bytes(bytes.to_vec()),
-        None => Mf4File::open_buffered(path.path()),
+        Some(bytes) => Mf4File::from_bytes_with_options(bytes.to_vec(), limits),
+        None => BufferedSource::open(path.path())
+            .and_then(|source| Mf4File::from_source_with_options(Arc::new(source), limits)),
     };
     let file = file.map_err(failed)?;
     if file.channel_count() > CHANNEL_LIMIT {

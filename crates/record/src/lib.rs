@@ -19,6 +19,7 @@ mod format;
 mod framing;
 mod log_blocks;
 mod log_read;
+mod measured_valve;
 mod message;
 mod plausibility;
 mod read;

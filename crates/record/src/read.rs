@@ -3,6 +3,7 @@
 use crate::complaints::Complaints;
 use crate::definitions::{Reads, source_of};
 use crate::log_read::{is_mcap, log_of_path, read_log};
+use crate::measured_valve::{hold, turns_share};
 use crate::read_options::ReadOptions;
 use crate::rig_sink::RigSink;
 use crate::scan::{Scanned, scan};
@@ -99,7 +100,7 @@ fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Resul
     let ambient = log.ambient.map(|builder| builder.build(Channel::P1, log.zero_ns, &mut warnings));
     let mut gathered = gather(map, log.builders, log.zero_ns, ambient, &mut warnings);
     complete(map, &mut gathered, &log.units)?;
-    let steps = steps_without_marks(map, &gathered, &mut warnings);
+    let steps = steps_without_marks(map, &mut gathered.series, &mut warnings);
     let Gathered { series, elements, .. } = gathered;
     Ok(ReadReport {
         recording: Recording { events: Vec::new(), series, elements, steps },
@@ -178,7 +179,7 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> Result<R
         let last_s = span_s(&gathered.series).map_or(0.0, |(_, last_s)| last_s);
         steps_from_markers(markers, last_s, &mut warnings)
     } else {
-        steps_without_marks(map, &gathered, &mut warnings)
+        steps_without_marks(map, &mut gathered.series, &mut warnings)
     };
     let events = sink.events.into_iter().map(|(log_time_ns, mut event)| {
         if sink.start_time_ns.is_none() {
@@ -288,10 +289,17 @@ fn complete(
 /// Steps from commands, or else from jumps of what was measured.
 fn steps_without_marks(
     map: &ChannelMap,
-    gathered: &Gathered,
+    series: &mut BTreeMap<Channel, Series>,
     warnings: &mut Vec<ReadWarning>,
 ) -> Vec<StepMarker> {
-    let series = &gathered.series;
+    if let Some(share) = series.get(&Channel::ValveCommand).and_then(turns_share) {
+        warnings.push(ReadWarning::MeasuredValve { turns_percent: 100.0 * share });
+        let steps = steps_from_jumps(series, true, warnings);
+        if let Some(position) = series.get_mut(&Channel::ValveCommand) {
+            hold(position, &steps);
+        }
+        return without_rest(steps, series);
+    }
     let span_s = span_s(series);
     // A command that stays at a value marks no step.
     let moves = |channel: &Channel| series.contains_key(channel) && !map.constants.contains_key(channel);
@@ -299,7 +307,7 @@ fn steps_without_marks(
     if commanded || !can_be_searched(series) {
         return without_rest(steps_from_commands(series, span_s, warnings), series);
     }
-    without_rest(steps_from_jumps(series, warnings), series)
+    without_rest(steps_from_jumps(series, false, warnings), series)
 }
 
 /// The readings of channels of which the recording holds single sensors alone, on the times of the first of them: what the

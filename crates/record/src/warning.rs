@@ -113,9 +113,17 @@ pub enum ReadWarning {
     /// A fast log was averaged while it was read.
     #[error("the log is faster than identification needs: it was averaged to 10 samples a second")]
     Averaged,
+    /// The opening of the valve is a measured position.
+    #[error(
+        "valve_command turns back in {turns_percent:.0} % of its samples: it is a measured position; each step has the opening that was held at its end"
+    )]
+    MeasuredValve {
+        /// Samples in which it turns back, %.
+        turns_percent: f64,
+    },
     /// Steps were found in what was measured.
     #[error(
-        "the recording has neither step marks nor commands: {count} steps were found where {channels} jump"
+        "the recording has neither step marks nor commands that mark steps: {count} steps were found where {channels} jump"
     )]
     StepsFound {
         /// How many.

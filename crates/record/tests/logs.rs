@@ -87,3 +87,34 @@ fn a_log_with_more_values_than_there_is_room_for_is_refused() {
     let error = bounded(5999, 1200).unwrap_err().to_string();
     assert!(error.contains("more than 5999 rows"), "{error}");
 }
+
+/// The valve's own position, with noise of 0.1 % of it, in place of its command.
+#[test]
+fn a_measured_valve_position_keeps_the_steps_and_says_so() {
+    let mut text = String::from("t [s];n [1/min];mc [g/s];valve [-]\n");
+    for row in 0..3000 {
+        let t_s = f64::from(row) / 10.0;
+        let (speed, flow, opening) = match t_s {
+            t_s if t_s < 100.0 => (60_000, 30.0, 0.7),
+            t_s if t_s < 200.0 => (60_000, 24.0, 0.5),
+            _ => (90_000, 40.0, 0.5),
+        };
+        let noise = 1e-3 * (f64::from(row) * 12.9898).sin();
+        text.push_str(&format!("{t_s};{speed};{flow};{}\n", opening * (1.0 + noise)));
+    }
+    let map =
+        "channels:\n  N: {field: n}\n  m_c: {field: mc}\n  valve_command: {field: valve, unit: \"1\"}\n";
+    let read = read(&text, map).unwrap();
+    let steps: Vec<(f64, f64)> =
+        read.recording.steps.iter().map(|step| (step.start_s, step.valve_opening_ratio)).collect();
+    assert_eq!(steps.len(), 3, "{steps:?}");
+    for ((start_s, opening), expected) in steps.iter().zip([(0.0, 0.7), (100.0, 0.5), (200.0, 0.5)]) {
+        // A jump is seen within a second; of 500 samples the median is that of noise over its root.
+        assert!((start_s - expected.0).abs() <= 1.0 && (opening - expected.1).abs() < 2e-4, "{steps:?}");
+    }
+    let measured = |warning: &&ReadWarning| matches!(warning, ReadWarning::MeasuredValve { .. });
+    assert_eq!(read.warnings.iter().filter(measured).count(), 1, "{:?}", read.warnings);
+    // Identification waits for commands to come to rest: the position stands still within each step.
+    let valve = &read.recording.series[&Channel::ValveCommand].values;
+    assert_eq!(valve.windows(2).filter(|pair| pair[0] != pair[1]).count(), 2);
+}

@@ -237,12 +237,17 @@ fn unit_of(
     complaints: &mut Complaints,
 ) -> Option<&'static Unit> {
     let kind = channel.map_or(Kind::Pressure, kind_of);
+    let name = channel.map_or("the ambient pressure", Channel::symbol);
+    let recorded = layout.columns.get(column).and_then(|column| column.unit.as_deref());
+    if let Some((message, remedy)) = recorded.and_then(|text| wrong_reference(name, text, source, channel)) {
+        complaints.add(FindingKind::Unit, &at("field"), message, remedy);
+        return None;
+    }
     // What the map has was checked when it was read.
     if let Some(written) = &source.unit {
         return unit(kind, written).ok();
     }
-    let name = channel.map_or("the ambient pressure", Channel::symbol);
-    let Some(recorded) = layout.columns.get(column).and_then(|column| column.unit.as_deref()) else {
+    let Some(recorded) = recorded else {
         let message = format!("neither the channel map nor the log gives the unit of {name}");
         let example = channel.map_or("kPa", |channel| channel.unit());
         complaints.add(FindingKind::Unit, &at("field"), message, format!("add e.g. `unit: {example}`"));
@@ -250,12 +255,6 @@ fn unit_of(
     };
     let known = header_unit(recorded);
     match known.filter(|known| known.kind == kind) {
-        Some(known) if known.reference == Reference::Gauge && !source.gauge => {
-            let message = format!("the log gives {name} in {recorded}, a pressure over the ambient pressure");
-            let remedy = "write `gauge: true`, and `ambient_pressure`".to_owned();
-            complaints.add(FindingKind::Unit, &at("field"), message, remedy);
-            None
-        }
         Some(known) => Some(known.unit),
         None => match unit(kind, recorded) {
             Ok(unit) => Some(unit),
@@ -272,6 +271,28 @@ fn unit_of(
             }
         },
     }
+}
+
+/// Where the log says what a pressure is measured from, and the map something else: a message and what would be right.
+fn wrong_reference(
+    name: &str,
+    recorded: &str,
+    source: &ChannelSource,
+    channel: Option<Channel>,
+) -> Option<(String, String)> {
+    let known = header_unit(recorded).filter(|known| known.kind == Kind::Pressure)?;
+    let (over, remedy) = match (known.reference, source.gauge, channel) {
+        (Reference::Gauge, _, None) => (
+            "over the ambient pressure",
+            "name a column of the absolute ambient pressure, or write its value",
+        ),
+        (Reference::Gauge, false, Some(_)) => {
+            ("over the ambient pressure", "write `gauge: true`, and `ambient_pressure`")
+        }
+        (Reference::Absolute, true, _) => ("over vacuum", "leave `gauge: true` out"),
+        _ => return None,
+    };
+    Some((format!("the log gives {name} in {recorded}, a pressure {over}"), remedy.to_owned()))
 }
 
 /// Whether a file that starts with these bytes is MCAP, or too short to be anything else.

@@ -118,3 +118,27 @@ fn a_measured_valve_position_keeps_the_steps_and_says_so() {
     let valve = &read.recording.series[&Channel::ValveCommand].values;
     assert_eq!(valve.windows(2).filter(|pair| pair[0] != pair[1]).count(), 2);
 }
+
+#[test]
+fn what_a_pressure_is_measured_from_is_not_overruled_by_its_unit() {
+    for (header, source, remedy) in [
+        ("p2 [bar rel]", "{field: p2, unit: bar}", "write `gauge: true`"),
+        ("p2 [bar abs]", "{field: p2, unit: bar, gauge: true}", "leave `gauge: true` out"),
+        ("p2 [bar abs]", "{field: p2, gauge: true}", "leave `gauge: true` out"),
+        ("p2 [bar rel]", "{field: p2, unit: bar, gauge: true}", ""),
+        ("p2 [bar]", "{field: p2, unit: bar, gauge: true}", ""),
+        ("p2 [bar]", "{field: p2, unit: bar}", ""),
+    ] {
+        let text =
+            log(10).replace("p1 [mbar rel]", header).replace(";-12.5;", ";1.9;").replace(";-2.5;", ";1.2;");
+        let map =
+            format!("channels:\n  N: {{field: n}}\n  P2: {source}\nambient_pressure: {{field: pAmb}}\n");
+        match read(&text, &map) {
+            Ok(_) => assert!(remedy.is_empty(), "{header}, {source}"),
+            Err(error) => assert!(!remedy.is_empty() && error.to_string().contains(remedy), "{error}"),
+        }
+    }
+    let map = "channels:\n  P1: {field: p1, gauge: true}\nambient_pressure: {field: pAmb, unit: mbar}\n";
+    let error = read(&log(10).replace("pAmb [mbar]", "pAmb [mbar rel]"), map).unwrap_err().to_string();
+    assert!(error.contains("absolute ambient pressure"), "{error}");
+}

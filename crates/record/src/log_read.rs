@@ -24,6 +24,7 @@ pub(crate) struct ReadLog {
     pub(crate) builders: BTreeMap<Reads, SeriesBuilder>,
     /// Ambient pressure, Pa.
     pub(crate) ambient: Option<SeriesBuilder>,
+    pub(crate) ambient_unit: Option<&'static Unit>,
     pub(crate) units: BTreeMap<Reads, &'static Unit>,
     pub(crate) zero_ns: u64,
     /// Time 0 in nanoseconds since 1970, where the log says it.
@@ -83,6 +84,7 @@ pub(crate) fn read_log(
         zero_ns: ZERO_NS,
         start_time_ns: layout.start_time_ns,
         warnings: contradictions(map, &layout, &wanted),
+        ambient_unit: wanted.iter().find(|wanted| wanted.target == Target::Ambient).map(|found| found.unit),
         units: wanted
             .iter()
             .filter_map(|wanted| match wanted.target {

@@ -4,6 +4,7 @@ use crate::complaints::Complaints;
 use crate::definitions::{Reads, source_of};
 use crate::log_read::{is_mcap, log_of_path, read_log};
 use crate::measured_valve::{hold, turns_share};
+use crate::plausibility::Readings;
 use crate::read_options::ReadOptions;
 use crate::rig_sink::RigSink;
 use crate::scan::{Scanned, scan};
@@ -98,8 +99,9 @@ fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Resul
     }
     warnings.extend(missing(map, &log.builders));
     let ambient = log.ambient.map(|builder| builder.build(Channel::P1, log.zero_ns, &mut warnings));
-    let mut gathered = gather(map, log.builders, log.zero_ns, ambient, &mut warnings);
-    complete(map, &mut gathered, &log.units)?;
+    let mut gathered = gather(map, log.builders, log.zero_ns, ambient.as_ref(), &mut warnings);
+    let ambient = ambient.as_ref().zip(log.ambient_unit);
+    complete(map, &mut gathered, &log.units, ambient)?;
     let steps = steps_without_marks(map, &mut gathered.series, &mut warnings);
     let Gathered { series, elements, .. } = gathered;
     Ok(ReadReport {
@@ -168,7 +170,7 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> Result<R
     let first_sample_ns = sink.builders.values().filter_map(SeriesBuilder::first_time_ns).min();
     let zero_ns = sink.start_time_ns.or(first_sample_ns).unwrap_or(0);
     let mut gathered = gather(map, sink.builders, zero_ns, None, &mut warnings);
-    complete(map, &mut gathered, &sink.units)?;
+    complete(map, &mut gathered, &sink.units, None)?;
     let steps = if sink.format.is_some() || !sink.steps.is_empty() {
         let markers = sink.steps.into_iter().map(|(log_time_ns, mut message)| {
             if sink.start_time_ns.is_none() {
@@ -227,11 +229,11 @@ fn gather(
     map: &ChannelMap,
     builders: BTreeMap<Reads, SeriesBuilder>,
     zero_ns: u64,
-    ambient: Option<Series>,
+    ambient: Option<&Series>,
     warnings: &mut Vec<ReadWarning>,
 ) -> Gathered {
     let mut gathered = Gathered { series: BTreeMap::new(), elements: BTreeMap::new() };
-    let ambient_pa = |t_s: f64| match (&map.ambient_pressure, &ambient) {
+    let ambient_pa = |t_s: f64| match (&map.ambient_pressure, ambient) {
         (Some(AmbientPressure::Constant(value_pa)), _) => Some(*value_pa),
         (_, Some(series)) => series.interpolate(t_s),
         _ => None,
@@ -263,16 +265,28 @@ fn complete(
     map: &ChannelMap,
     gathered: &mut Gathered,
     units: &BTreeMap<Reads, &'static Unit>,
+    ambient: Option<(&Series, &'static Unit)>,
 ) -> Result<(), RecordError> {
     if !map.is_native() {
         let mut complaints = Complaints::default();
+        let (column, unit) = ambient.unzip();
+        if let Some(pressure) = &map.ambient_pressure {
+            plausibility::check_ambient(pressure, column, unit, &mut complaints);
+        }
+        let ambient_pa = match (&map.ambient_pressure, column) {
+            (Some(AmbientPressure::Constant(value_pa)), _) => Some(*value_pa),
+            (_, Some(series)) => mapper_numerics::statistics::median(&series.values),
+            _ => None,
+        };
         for (reads, source) in sources(map) {
             let series = match reads {
                 Reads::Channel(channel) => gathered.series.get(&channel),
                 Reads::Element(element) => gathered.elements.get(&element),
             };
             if let (Some(series), Some(unit)) = (series, units.get(&reads)) {
-                plausibility::check(reads.channel(), source, unit, series, &mut complaints);
+                let channel = reads.channel();
+                let readings = Readings { channel, source, unit, series, ambient_pa };
+                plausibility::check(&readings, &mut complaints);
             }
         }
         complaints.result(map)?;

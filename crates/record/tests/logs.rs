@@ -142,3 +142,35 @@ fn what_a_pressure_is_measured_from_is_not_overruled_by_its_unit() {
     let error = read(&log(10).replace("pAmb [mbar]", "pAmb [mbar rel]"), map).unwrap_err().to_string();
     assert!(error.contains("absolute ambient pressure"), "{error}");
 }
+
+#[test]
+fn gauge_readings_and_the_ambient_pressure_are_held_against_what_is_possible() {
+    for (header, map, expected) in [
+        // 100 to 190 kPa over ambient, read as bar: no boost is that high.
+        ("p2", "P2: {field: p2, unit: bar, gauge: true}\nambient_pressure: 99 kPa", "write `unit: kPa`"),
+        // 100 to 190 kPa are absolute ones, if they are read in kPa; over 990 kPa none is.
+        (
+            "p2",
+            "P2: {field: p2, unit: kPa, gauge: true}\nambient_pressure: 990 kPa",
+            "between 50 and 110 kPa",
+        ),
+        (
+            "p2",
+            "P2: {field: p2, unit: kPa, gauge: true}\nambient_pressure: {field: pAmb, unit: kPa}",
+            "write `unit: mbar`",
+        ),
+        ("p2", "P2: {field: p2, unit: kPa, gauge: true}\nambient_pressure: 0.98 bar", ""),
+        ("p2", "P2: {field: p2, unit: kPa, gauge: true}\nambient_pressure: {field: pAmb, unit: mbar}", ""),
+    ] {
+        let text =
+            log(10).replace("p1 [mbar rel]", header).replace(";-12.5;", ";190;").replace(";-2.5;", ";100;");
+        let whole = ["channels:\n  N: {field: n}\n  ", map, "\n"].concat();
+        match read(&text, &whole) {
+            Ok(_) => assert!(expected.is_empty(), "{map}"),
+            Err(error) => {
+                let words = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+                assert!(!expected.is_empty() && words.contains(expected), "{map}: {error}");
+            }
+        }
+    }
+}

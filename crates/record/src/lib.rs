@@ -18,6 +18,7 @@ mod error;
 mod format;
 mod framing;
 mod log_blocks;
+mod log_clock;
 mod log_read;
 mod measured_valve;
 mod message;

@@ -3,6 +3,7 @@
 use crate::complaints::Complaints;
 use crate::definitions::{Reads, source_of};
 use crate::log_blocks::Blocks;
+use crate::log_clock::{LogClock, Restart};
 use crate::series_builder::SeriesBuilder;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, ReadWarning, RecordError};
 use mapper_core::Channel;
@@ -14,9 +15,6 @@ use std::path::Path;
 
 /// Time 0 of a log on the clock of [`SeriesBuilder`]: logs may begin before it.
 const ZERO_NS: u64 = 1 << 62;
-
-/// Times beyond this are no times, s: a century, within what the clock holds.
-const LONGEST_S: f64 = 3.2e9;
 
 /// What was read of a log.
 #[derive(Debug, Default)]
@@ -95,6 +93,7 @@ pub(crate) fn read_log(
         ..ReadLog::default()
     };
     let mut blocks: Vec<Blocks> = members.iter().map(|_| Blocks::default()).collect();
+    let mut clocks: Vec<LogClock> = members.iter().map(|_| LogClock::default()).collect();
     let mut rows = 0u64;
     let mut take_row = |row: Row<'_>| {
         rows += 1;
@@ -109,15 +108,19 @@ pub(crate) fn read_log(
             );
             return Err(file.content(format.name, message));
         }
-        let usable = row.t_s.is_finite() && row.t_s.abs() < LONGEST_S;
-        if let (Some(blocks), Some(places), true) = (blocks.get_mut(row.group), places.get(row.group), usable)
-        {
-            blocks.push(row.t_s, row.values, &mut |t_s, values| read.take(places, t_s, values));
-        }
-        Ok(())
+        let of_group = (clocks.get_mut(row.group), blocks.get_mut(row.group), places.get(row.group));
+        let (Some(clock), Some(blocks), Some(places)) = of_group else { return Ok(()) };
+        let mut keep = |t_s: f64, values: &[f64]| read.take(places, t_s, values);
+        let took = clock.push(row.t_s, row.values, &mut |t_s, values| blocks.push(t_s, values, &mut keep));
+        took.map_err(|restart| file.content(format.name, restart_words(restart, &layout, row.group)))
     };
     log.rows(&columns, &mut take_row)?;
-    for (blocks, places) in blocks.iter_mut().zip(&places) {
+    for ((clock, blocks), places) in clocks.iter_mut().zip(&mut blocks).zip(&places) {
+        let mut keep = |t_s: f64, values: &[f64]| read.take(places, t_s, values);
+        clock.finish(&mut |t_s, values| blocks.push(t_s, values, &mut keep));
+        if clock.strays > 0 {
+            read.warnings.push(ReadWarning::StrayTimes { count: clock.strays, first_s: clock.stray_s });
+        }
         blocks.finish(&mut |t_s, values| read.take(places, t_s, values));
         read.averaged |= blocks.averages();
     }
@@ -138,6 +141,17 @@ impl ReadLog {
             self.kept += 1;
         }
     }
+}
+
+/// What to do about a clock that starts again.
+fn restart_words(restart: Restart, layout: &Layout, group: usize) -> String {
+    let Restart { row, from_s, to_s } = restart;
+    let group = layout.groups.get(group).filter(|group| !group.name.is_empty());
+    let of = group.map_or_else(String::new, |group| format!(" of `{}`", group.name));
+    format!(
+        "the clock{of} goes back from {from_s} s to {to_s} s in row {row} of the data, as where two runs stand in one file: cut it \
+         there and give the parts as logs of their own, or name another clock with `time`"
+    )
 }
 
 /// The columns that the map names, with their units; or all mistakes of the map for this log.

@@ -110,6 +110,16 @@ pub enum ReadWarning {
         /// The limit.
         limit: u64,
     },
+    /// Rows or samples with times that cannot be.
+    #[error(
+        "{count} rows were left out: their times, the first of them {first_s} s, are none or more than a day from those beside them, or step back"
+    )]
+    StrayTimes {
+        /// How many.
+        count: u64,
+        /// The first of these times, s.
+        first_s: f64,
+    },
     /// A fast log was averaged while it was read.
     #[error("the log is faster than identification needs: it was averaged to 10 samples a second")]
     Averaged,

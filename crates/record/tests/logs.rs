@@ -174,3 +174,24 @@ fn gauge_readings_and_the_ambient_pressure_are_held_against_what_is_possible() {
         }
     }
 }
+
+#[test]
+fn two_runs_in_one_file_are_refused_where_the_second_begins() {
+    let one = log(10);
+    let two = [one.as_str(), one.split_once('\n').unwrap().1].concat();
+    let error = read(&two, "channels:\n  N: {field: n}\n").unwrap_err().to_string();
+    assert!(error.contains("from 59.9 s to 0 s in row 601 of the data"), "{error}");
+}
+
+#[test]
+fn a_single_wrong_time_is_left_out_and_told() {
+    let text = format!("{}1e9;60000;-2.5;990;45\n", log(10));
+    let read = read(&text, "channels:\n  N: {field: n}\n").unwrap();
+    assert!(
+        read.warnings.contains(&ReadWarning::StrayTimes { count: 1, first_s: 1e9 }),
+        "{:?}",
+        read.warnings
+    );
+    let end_s = read.recording.steps.last().unwrap().end_s;
+    assert!(end_s < 60.0, "{end_s}");
+}

@@ -1,17 +1,8 @@
 //! The steps of a recording that has neither marks nor commands: where speed, flow and pressures jump.
 
 use crate::ReadWarning;
-use mapper_core::{Channel, Series, StepKind, StepMarker};
+use mapper_core::{Channel, JUMPS, Series, StepKind, StepMarker, VALVE_JUMP_RATIO};
 use std::collections::BTreeMap;
-
-/// Channels that jump with the points of a map, each with the share of itself by which it moves at least. Temperatures follow
-/// for minutes, and say nothing about the beginning.
-const SIGNALS: [(Channel, f64); 4] = [
-    (Channel::ShaftSpeed, 0.01),
-    (Channel::CompressorFlow, 0.02),
-    (Channel::P3, 0.015),
-    (Channel::P2, 0.015),
-];
 
 /// Time over which means are compared before and after, s.
 const WINDOW_S: f64 = 3.0;
@@ -44,11 +35,11 @@ const SETTLING_SHARE: f64 = 0.2;
 const AT_REST_RPM: f64 = 1000.0;
 
 /// The opening of the valve, where it was measured.
-const MEASURED_VALVE: (Channel, f64) = (Channel::ValveCommand, 0.02);
+const MEASURED_VALVE: (Channel, f64) = (Channel::ValveCommand, VALVE_JUMP_RATIO);
 
 /// Whether there is anything that jumps.
 pub(crate) fn can_be_searched(series: &BTreeMap<Channel, Series>) -> bool {
-    SIGNALS.iter().any(|(channel, _)| series.get(channel).is_some_and(|series| series.t_s.len() > 30))
+    JUMPS.iter().any(|(channel, _)| series.get(channel).is_some_and(|series| series.t_s.len() > 30))
 }
 
 /// Steps from jump to jump. What was held before the first jump is the first step. A valve that was measured is looked at too.
@@ -58,7 +49,7 @@ pub(crate) fn steps_from_jumps(
     warnings: &mut Vec<ReadWarning>,
 ) -> Vec<StepMarker> {
     let wanted: Vec<(Channel, f64)> =
-        SIGNALS.into_iter().chain(measured_valve.then_some(MEASURED_VALVE)).collect();
+        JUMPS.into_iter().chain(measured_valve.then_some(MEASURED_VALVE)).collect();
     let grid = Grid::of(series, &wanted);
     let (Some(first_s), Some(last_s)) = (grid.t_s.first().copied(), grid.t_s.last().copied()) else {
         return Vec::new();

@@ -52,6 +52,7 @@ fn book(file: &LogFile) -> Result<Xlsx<Box<dyn ReadSeek>>, LogError> {
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
+    options.without(&["separator", "decimal", "encoding"]).map_err(|why| file.content(NAME, why))?;
     check::check(file)?;
     let mut book_of = book(file)?;
     let names: Vec<String> = book_of.sheet_names();

@@ -167,8 +167,13 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> Result<R
     if !map.is_native() {
         warnings.extend(missing(map, &sink.builders));
     }
+    let strays: Vec<(u64, u64)> = sink.builders.values_mut().filter_map(SeriesBuilder::drop_strays).collect();
     let first_sample_ns = sink.builders.values().filter_map(SeriesBuilder::first_time_ns).min();
     let zero_ns = sink.start_time_ns.or(first_sample_ns).unwrap_or(0);
+    if let Some((_, first_ns)) = strays.first() {
+        let count = strays.iter().map(|(count, _)| count).sum();
+        warnings.push(ReadWarning::StrayTimes { count, first_s: run_time_s(*first_ns, zero_ns) });
+    }
     let mut gathered = gather(map, sink.builders, zero_ns, None, &mut warnings);
     complete(map, &mut gathered, &sink.units, None)?;
     let steps = if sink.format.is_some() || !sink.steps.is_empty() {

@@ -112,7 +112,7 @@ pub enum ReadWarning {
     },
     /// Rows or samples with times that cannot be.
     #[error(
-        "{count} rows were left out: their times, the first of them {first_s} s, are none or more than a day from those beside them, or step back"
+        "{count} rows or samples were left out: their times, the first of them {first_s} s, are none or more than a day from those beside them, or step back"
     )]
     StrayTimes {
         /// How many.

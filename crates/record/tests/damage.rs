@@ -207,6 +207,21 @@ fn times_out_of_order_are_sorted_and_repeats_left_out() {
 }
 
 #[test]
+fn a_single_wrong_time_is_left_out_and_told() {
+    let second = 1_000_000_000;
+    let mut rows: Vec<(u64, &str)> =
+        (0..100).map(|row| (1_795_356_185 * second + row * second, "{\"tt2\": 1}")).collect();
+    // A clock that was not yet set, and one in another unit.
+    rows.insert(3, (0, "{\"tt2\": 1}"));
+    rows.push((9_000_000_000 * second, "{\"tt2\": 1}"));
+    let report = read_foreign(&foreign("/daq", &rows, &[]), &map(", unit: degC")).unwrap();
+    let t_s = &report.recording.series[&Channel::T2].t_s;
+    assert_eq!((t_s.len(), t_s[0], t_s[99]), (100, 0.0, 99.0));
+    let told = |warning: &ReadWarning| matches!(warning, ReadWarning::StrayTimes { count: 2, .. });
+    assert!(report.warnings.iter().any(told), "{:?}", report.warnings);
+}
+
+#[test]
 fn a_unit_comes_from_the_map_or_the_recording_and_never_from_a_guess() {
     let rows = [(0, "{\"tt2\": 1}")];
     let missing = read_foreign(&foreign("/daq", &rows, &[]), &map(""));

@@ -10,7 +10,11 @@ fn file() -> LogFile {
     let group = writer.add_group(&[0.0, 10.0, 20.0]).unwrap();
     group.add_channel("n_TC", "rpm", &[1e5, -9999.0, 1.1e5]).unwrap();
     group.add_channel("n_TC", "rpm", &[2e5, 2e5, 2e5]).unwrap();
-    let path = std::env::temp_dir().join(format!("mapper-mdf4-{}-{:?}.mf4", std::process::id(), std::thread::current().id()));
+    let path = std::env::temp_dir().join(format!(
+        "mapper-mdf4-{}-{:?}.mf4",
+        std::process::id(),
+        std::thread::current().id()
+    ));
     writer.write_to_file(&path).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     std::fs::remove_file(path).unwrap();
@@ -25,7 +29,8 @@ fn options(keys: &[(&str, &str)]) -> LogOptions {
 
 #[test]
 fn a_clock_in_milliseconds_and_values_that_stand_for_none() {
-    let (_, mut log) = LOG_FORMATS.open(&file(), &options(&[("time_unit", "ms"), ("missing", "-9999")])).unwrap();
+    let (_, mut log) =
+        LOG_FORMATS.open(&file(), &options(&[("time_unit", "ms"), ("missing", "-9999")])).unwrap();
     let mut rows: Vec<(f64, f64)> = Vec::new();
     let mut take = |row: Row<'_>| {
         rows.push((row.t_s, row.values[0]));

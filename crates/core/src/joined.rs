@@ -1,6 +1,6 @@
 //! Several recordings of one machine, one behind the other, as one recording.
 
-use crate::{Element, Recording, Series, StepKind, StepMarker};
+use crate::{Element, HeldPoint, Recording, Series, StepKind, StepMarker};
 use std::collections::BTreeMap;
 
 /// Time between two recordings that are joined, s: far more than any housing remembers, so that nobody takes the last step of
@@ -19,12 +19,15 @@ pub struct StepOrigin {
 }
 
 /// Joins recordings in the order in which they are given; one alone stays as it is. Times and indices of steps go on from
-/// recording to recording. A point that an earlier recording has visited is a repeat where the same jump leads to it, and a
+/// recording to recording. Points are told apart by their targets, by their commands, or where neither is known by what was
+/// measured. A point that an earlier recording has visited is a repeat where the same jump leads to it, and a
 /// return where another does, so that each point stands on the map once. The origins are those of the steps, in order.
 pub fn joined(recordings: Vec<Recording>) -> (Recording, Vec<StepOrigin>) {
     let alone = recordings.len() < 2;
     let mut whole = Recording::default();
     let mut origins = Vec::new();
+    // What each step of the whole held, and the one before it, where that alone says what point it was.
+    let mut held: Vec<Held> = Vec::new();
     for (number, mut recording) in recordings.into_iter().enumerate() {
         origins.extend(recording.steps.iter().map(|step| StepOrigin { recording: number, step: step.index }));
         if alone {
@@ -32,8 +35,12 @@ pub fn joined(recordings: Vec<Recording>) -> (Recording, Vec<StepOrigin>) {
         }
         let shift_s = end_s(&whole).map_or(0.0, |end_s| end_s + BETWEEN_S) - start_s(&recording);
         let before = whole.steps.len();
-        for step in &mut recording.steps {
-            step.kind = kind(step, &whole.steps[..before]);
+        let points: Vec<Option<HeldPoint>> =
+            recording.steps.iter().map(|step| HeldPoint::of(&recording, step)).collect();
+        let from = std::iter::once(None).chain(points.iter().copied());
+        held.extend(points.iter().copied().zip(from));
+        for (step, held_now) in recording.steps.iter_mut().zip(held[before..].to_vec()) {
+            step.kind = kind((step, held_now), &whole.steps[..before], &held);
             step.index = whole.steps.len();
             step.start_s += shift_s;
             step.end_s += shift_s;
@@ -55,20 +62,36 @@ fn append<K: Ord>(whole: &mut BTreeMap<K, Series>, more: BTreeMap<K, Series>, sh
     }
 }
 
-fn kind(step: &StepMarker, earlier: &[StepMarker]) -> StepKind {
-    let at_the_point = |other: &&StepMarker| match (step.to, other.to) {
-        (Some(to), Some(other)) => to == other,
-        (None, None) => {
+/// What a step held, and what the step before it.
+type Held = (Option<HeldPoint>, Option<HeldPoint>);
+
+fn kind((step, held): (&StepMarker, Held), earlier: &[StepMarker], earlier_held: &[Held]) -> StepKind {
+    let same = |a: Option<HeldPoint>, b: Option<HeldPoint>| match (a, b) {
+        (Some(a), Some(b)) => a.is_same(&b),
+        (None, None) => true,
+        _ => false,
+    };
+    let at_the_point = |(other, other_held): &(&StepMarker, &Held)| match (step.to, other.to, held.0) {
+        (Some(to), Some(other), _) => to == other,
+        (None, None, Some(_)) => same(held.0, other_held.0),
+        (None, None, None) => {
             alike(step.p3_pa, other.p3_pa) && alike(step.valve_opening_ratio, other.valve_opening_ratio)
         }
         _ => false,
     };
     // A repeat is there to compare: the point itself may come later, by another jump.
-    let mut there = earlier.iter().filter(|other| other.kind.measures()).filter(at_the_point).peekable();
+    let mut there = earlier
+        .iter()
+        .zip(earlier_held)
+        .filter(|(other, _)| other.kind.measures())
+        .filter(at_the_point)
+        .peekable();
     if step.kind != StepKind::Point || there.peek().is_none() {
         return step.kind;
     }
-    if there.any(|other| other.from == step.from) { StepKind::Repeat } else { StepKind::Return }
+    let by_the_same_jump =
+        |(other, other_held): (&StepMarker, &Held)| other.from == step.from && same(held.1, other_held.1);
+    if there.any(by_the_same_jump) { StepKind::Repeat } else { StepKind::Return }
 }
 
 fn alike(a: f64, b: f64) -> bool {
@@ -141,6 +164,45 @@ mod tests {
             assert_eq!(t2.slice(step.start_s, step.end_s).0.len(), 11);
         }
         assert!(whole.steps[2].start_s - whole.steps[1].end_s >= BETWEEN_S);
+    }
+
+    /// Speeds and flows that were held for 100 s each, and nothing that was commanded.
+    fn measured(points: &[(f64, f64)]) -> Recording {
+        let t_s: Vec<f64> = (0..100 * points.len()).map(|t| t as f64).collect();
+        let held = |pick: fn(&(f64, f64)) -> f64| Series {
+            t_s: t_s.clone(),
+            values: t_s.iter().map(|t_s| pick(&points[*t_s as usize / 100])).collect(),
+        };
+        let step = |index: usize| StepMarker {
+            index,
+            kind: StepKind::Point,
+            start_s: 100.0 * index as f64,
+            end_s: 100.0 * index as f64 + 99.0,
+            from: None,
+            to: None,
+            p3_pa: f64::NAN,
+            valve_opening_ratio: f64::NAN,
+        };
+        Recording {
+            series: [
+                (Channel::ShaftSpeed, held(|point| point.0)),
+                (Channel::CompressorFlow, held(|point| point.1)),
+            ]
+            .into(),
+            steps: (0..points.len()).map(step).collect(),
+            ..Recording::default()
+        }
+    }
+
+    #[test]
+    fn without_commands_what_was_measured_says_where_a_step_was() {
+        let first = measured(&[(6e4, 0.03), (9e4, 0.05), (9e4, 0.04)]);
+        // Set by hand: the same jump, the first point of the first run by another jump, and a new point.
+        let second = measured(&[(6.02e4, 0.0301), (9.03e4, 0.0496), (6e4, 0.03), (9e4, 0.045)]);
+        let (whole, _) = joined(vec![first, second]);
+        let kinds: Vec<_> = whole.steps[3..].iter().map(|step| step.kind).collect();
+        use StepKind::{Point, Repeat, Return};
+        assert_eq!(kinds, [Repeat, Repeat, Return, Point]);
     }
 
     #[test]

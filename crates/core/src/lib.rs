@@ -17,6 +17,7 @@ mod declared_uncertainty;
 mod event;
 mod fitted_map;
 mod guard;
+mod held_point;
 mod identified;
 mod inlet_convection;
 mod joined;
@@ -61,6 +62,7 @@ pub use fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
 pub use guard::{
     GuardName, GuardSet, LargestChange, Reaction, SafeTrajectory, SignalGuard, SpeedBand, SurgeVariation,
 };
+pub use held_point::{HeldPoint, JUMPS, VALVE_JUMP_RATIO};
 pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
     half_width_95, standard_error_of,

@@ -1,6 +1,6 @@
 //! Steps of all runs on one axis of time, and the stretches of them over which readings are averaged.
 
-use mapper_core::{Channel, NoiseColour, Recording, StepMarker};
+use mapper_core::{Channel, HeldPoint, NoiseColour, Recording, StepMarker};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_observe::mean::{BEFORE_S, mean_between};
 use mapper_observe::schedule::Schedule;
@@ -59,7 +59,8 @@ pub(crate) fn steps(runs: &[&Recording]) -> Vec<CampaignStep> {
     for (run, recording) in runs.iter().enumerate() {
         let mut from = None;
         for marker in &recording.steps {
-            let condition = condition_of(marker, &mut conditions);
+            let held = HeldPoint::of(recording, marker);
+            let condition = condition_of(marker, held, &mut conditions);
             steps.push(CampaignStep {
                 run,
                 index: marker.index,
@@ -80,16 +81,20 @@ pub(crate) fn steps(runs: &[&Recording]) -> Vec<CampaignStep> {
 }
 
 /// What was commanded for an operating point: its speed where that is known, since a loop that holds it moves P3; else P3, Pa.
-/// Beside it the opening of the valve.
+/// Beside it the opening of the valve. Where neither was commanded, what was measured.
 #[derive(Debug, Clone, Copy)]
 struct Condition {
     speed_rpm: Option<f64>,
     p3_pa: f64,
     valve_opening_ratio: f64,
+    held: Option<HeldPoint>,
 }
 
 impl Condition {
     fn is_same(&self, other: &Condition) -> bool {
+        if let (Some(own), Some(other)) = (self.held, other.held) {
+            return own.is_same(&other);
+        }
         let same = |a: f64, b: f64| (a - b).abs() <= SAME_COMMAND * a.abs().max(b.abs());
         let drive = match (self.speed_rpm, other.speed_rpm) {
             (Some(own), Some(other)) => same(own, other),
@@ -99,11 +104,12 @@ impl Condition {
     }
 }
 
-fn condition_of(marker: &StepMarker, conditions: &mut Vec<Condition>) -> usize {
+fn condition_of(marker: &StepMarker, held: Option<HeldPoint>, conditions: &mut Vec<Condition>) -> usize {
     let condition = Condition {
         speed_rpm: marker.to.map(|to| to.speed_rpm),
         p3_pa: marker.p3_pa,
         valve_opening_ratio: marker.valve_opening_ratio,
+        held,
     };
     match conditions.iter().position(|known| known.is_same(&condition)) {
         Some(position) => position,

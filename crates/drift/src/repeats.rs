@@ -7,6 +7,10 @@ use std::collections::BTreeMap;
 
 /// Visits of one jump that are needed: two show a difference, only a third shows that it stays or grows.
 const VISITS_NEEDED: usize = 3;
+/// Longest step through which the model is driven, s.
+const LONGEST_STEP_S: f64 = 86_400.0;
+/// Longest time of all steps together, s.
+const LONGEST_S: f64 = 30.0 * 86_400.0;
 /// Silence of a channel within the steps that is taken for a gap, s.
 const GAP_S: f64 = 3.0;
 
@@ -37,6 +41,27 @@ pub(crate) fn refusal(
             "No verdict: recording {} was made with another campaign or machine than recording 1 (their fingerprints \
              differ), so differences between them need not be drift. Compare runs of one campaign on one machine.",
             other + 1
+        ));
+    }
+    if let Some(step) = steps.iter().find(|step| !step.valve_opening_ratio.is_finite()) {
+        return Some(format!(
+            "No verdict: recording {} does not say how far the valve was open, and the model is driven with that. Map it as \
+             `valve_command`, as commanded or as measured, or give it among `constants`.",
+            step.run + 1
+        ));
+    }
+    let longest = steps.iter().find(|step| step.end_s - step.start_s > LONGEST_STEP_S);
+    let whole_s: f64 = steps.iter().map(|step| step.end_s - step.start_s).sum();
+    if let Some(step) = longest.or(steps.first().filter(|_| whole_s > LONGEST_S)) {
+        return Some(format!(
+            "No verdict: step {} of recording {} lasts {:.1} h of {:.1} h in all; steps of a campaign last up to {:.0} h, and all of \
+             them up to {:.0} h. A wrong time in the log would do that.",
+            step.index + 1,
+            step.run + 1,
+            (step.end_s - step.start_s) / 3600.0,
+            whole_s / 3600.0,
+            LONGEST_STEP_S / 3600.0,
+            LONGEST_S / 3600.0,
         ));
     }
     for (index, run) in runs.iter().enumerate() {
@@ -100,4 +125,33 @@ fn gap(recording: &Recording) -> Option<(Channel, f64, f64)> {
         }
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(end_s: f64, valve_opening_ratio: f64) -> CampaignStep {
+        CampaignStep {
+            run: 0,
+            index: 0,
+            start_s: 0.0,
+            end_s,
+            offset_s: 0.0,
+            condition: 0,
+            from: None,
+            valve_opening_ratio,
+            p3_pa: 2e5,
+        }
+    }
+
+    #[test]
+    fn a_log_without_a_valve_and_one_with_a_wrong_time_are_refused_by_name() {
+        let said = |steps: &[CampaignStep]| refusal(&[], steps, &[]).unwrap();
+        assert!(said(&[step(60.0, f64::NAN)]).contains("`valve_command`"));
+        // The last step reaches to a time of 1e9 s; or many steps together last for years.
+        assert!(said(&[step(60.0, 0.7), step(1e9, 0.7)]).contains("lasts 277777.8 h"));
+        assert!(said(&vec![step(8e4, 0.7); 100]).contains("2222.2 h in all"));
+        assert!(said(&[step(60.0, 0.7)]).contains("no repeats"));
+    }
 }

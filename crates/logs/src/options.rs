@@ -234,9 +234,65 @@ impl LogOptions {
     }
 }
 
+impl LogOptions {
+    /// The keys that were given.
+    fn given(&self) -> Vec<&'static str> {
+        [
+            ("separator", self.separator.is_some()),
+            ("decimal", self.decimal.is_some()),
+            ("encoding", self.encoding.is_some()),
+            ("names_row", self.names_row.is_some()),
+            ("units_row", self.units_row.is_some()),
+            ("data_row", self.data_row.is_some()),
+            ("time", !self.time.is_empty()),
+            ("time_unit", self.time_unit_s.is_some()),
+            ("date_order", self.date_order.is_some()),
+            ("rate", self.rate_hz.is_some()),
+            ("sheet", self.sheet.is_some()),
+            ("missing", !self.missing.is_empty()),
+        ]
+        .into_iter()
+        .filter_map(|(key, given)| given.then_some(key))
+        .collect()
+    }
+
+    /// That no other key was given than those which a format uses.
+    ///
+    /// # Errors
+    /// What to do about the first other one.
+    pub fn only(&self, used: &[&str]) -> Result<(), String> {
+        match self.given().into_iter().find(|key| !used.contains(key)) {
+            Some(key) => {
+                Err(format!("`{key}` means nothing in this format: leave it out; its keys are {}", used.join(", ")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// That no key was given which a format does not use.
+    ///
+    /// # Errors
+    /// As [`LogOptions::only`].
+    pub fn without(&self, unused: &[&str]) -> Result<(), String> {
+        let used: Vec<&str> =
+            OPTION_KEYS.iter().map(|key| key.name).filter(|key| !unused.contains(key)).collect();
+        self.only(&used)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn keys_that_a_format_does_not_use_are_refused() {
+        for key in OPTION_KEYS {
+            let mut options = LogOptions::default();
+            options.set(key.name, key.example).unwrap();
+            assert!(options.only(&[key.name]).is_ok() && options.only(&["x"]).unwrap_err().contains(key.name));
+            assert!(options.without(&[key.name]).is_err() && options.without(&["x"]).is_ok());
+        }
+    }
 
     #[test]
     fn every_example_is_a_value_of_its_key_and_nonsense_is_none() {

@@ -18,11 +18,13 @@ pub fn fits(channel: Channel, low: f64, high: f64) -> bool {
     }
 }
 
-/// Units in which values of this course would be plausible.
-pub fn fitting_units(channel: Channel, low: f64, high: f64) -> Vec<&'static Unit> {
+/// Units in which values of this course would be plausible, `over` (0, or for gauge pressures the ambient pressure in Pa) added to
+/// them.
+pub fn fitting_units(channel: Channel, low: f64, high: f64, over: f64) -> Vec<&'static Unit> {
     let kind = kind_of(channel);
     let rare = |unit: &&Unit| !["degF", "degR", "lb/s", "atm", "rad/s", "ppm"].contains(&unit.symbol());
-    let fitting = |unit: &&'static Unit| fits(channel, unit.to_inside(low), unit.to_inside(high));
+    let fitting =
+        |unit: &&'static Unit| fits(channel, unit.to_inside(low) + over, unit.to_inside(high) + over);
     let bare = unit(kind, "1").ok();
     kind.units().iter().chain(bare).filter(rare).filter(fitting).collect()
 }
@@ -46,8 +48,10 @@ mod tests {
         // A car's compressor at 40 kg/h to 1100 kg/h taken for g/s and for kg/s.
         assert!(fits(Channel::CompressorFlow, 0.011, 0.31));
         assert!(!fits(Channel::CompressorFlow, 40.0, 1100.0));
-        let symbols: Vec<_> =
-            fitting_units(Channel::CompressorFlow, 40.0, 1100.0).iter().map(|unit| unit.symbol()).collect();
+        let symbols: Vec<_> = fitting_units(Channel::CompressorFlow, 40.0, 1100.0, 0.0)
+            .iter()
+            .map(|unit| unit.symbol())
+            .collect();
         assert!(symbols.contains(&"kg/h") && !symbols.contains(&"kg/s"), "{symbols:?}");
         // degC taken for K, K for degC, rpm in thousands.
         assert!(!fits(Channel::T1, 19.0, 25.0) && !fits(Channel::T1, 565.0, 573.0));

@@ -6,8 +6,11 @@ const RATE_HZ: f64 = 10.0;
 /// A group is left as it is up to this rate, Hz: blocks would hold one sample, or now one and now two.
 const LEFT_ALONE_HZ: f64 = 15.0;
 
-/// Rows from which the rate is taken.
+/// Rows from which the rate is taken first.
 const LOOKED_AT: usize = 256;
+
+/// Intervals that are looked at later on: a log may be slow at rest and fast from a trigger on.
+const LATER: u32 = u64::BITS;
 
 /// The rows of one group, averaged where they come fast.
 #[derive(Debug, Default)]
@@ -21,8 +24,28 @@ pub(crate) struct Blocks {
 enum State {
     #[default]
     Looking,
-    AsItIs,
+    AsItIs(Pace),
     Averaging(Block),
+}
+
+/// The latest intervals of a slow log.
+#[derive(Debug)]
+struct Pace {
+    last_s: f64,
+    /// A bit for each interval, set where it was short.
+    short: u64,
+}
+
+impl Pace {
+    /// Whether most of the intervals have become short.
+    fn quickens(&mut self, t_s: f64) -> bool {
+        let step_s = t_s - self.last_s;
+        if step_s > 0.0 || self.last_s.is_nan() {
+            self.short = self.short << 1 | u64::from(step_s * LEFT_ALONE_HZ < 1.0);
+            self.last_s = t_s;
+        }
+        2 * self.short.count_ones() > LATER
+    }
 }
 
 #[derive(Debug, Default)]
@@ -39,7 +62,13 @@ pub(crate) type TakeRow<'a> = dyn FnMut(f64, &[f64]) + 'a;
 impl Blocks {
     pub(crate) fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
         match &mut self.state {
-            State::AsItIs => take(t_s, values),
+            State::AsItIs(pace) => {
+                if pace.quickens(t_s) {
+                    self.state = State::Averaging(Block::default());
+                    return self.push(t_s, values, take);
+                }
+                take(t_s, values);
+            }
             State::Averaging(block) => block.push(t_s, values, take),
             State::Looking => {
                 self.first.push((t_s, values.to_owned()));
@@ -71,7 +100,8 @@ impl Blocks {
         intervals_s.sort_by(f64::total_cmp);
         let typical_s = intervals_s.get(intervals_s.len() / 2).copied().unwrap_or(f64::INFINITY);
         let fast = typical_s * LEFT_ALONE_HZ < 1.0;
-        self.state = if fast { State::Averaging(Block::default()) } else { State::AsItIs };
+        let slow = || State::AsItIs(Pace { last_s: f64::NAN, short: 0 });
+        self.state = if fast { State::Averaging(Block::default()) } else { slow() };
         for (t_s, values) in std::mem::take(&mut self.first) {
             self.push(t_s, &values, take);
         }
@@ -129,6 +159,21 @@ mod tests {
             assert!((t_s - (0.1 * index as f64 + 0.045)).abs() < 1e-9, "{t_s}");
             assert!((values[0] - 5.0 * t_s).abs() < 1e-9 && values[1] == 1.0);
         }
+    }
+
+    #[test]
+    fn a_log_that_becomes_fast_is_averaged_from_then_on() {
+        let (mut blocks, mut out) = (Blocks::default(), Vec::new());
+        let mut take = |t_s: f64, values: &[f64]| out.push((t_s, values[0]));
+        let rest = (0..600).map(f64::from);
+        let run = (0..10_000).map(|row| 600.0 + f64::from(row) / 100.0);
+        rest.chain(run).for_each(|t_s| blocks.push(t_s, &[5.0 * t_s], &mut take));
+        blocks.finish(&mut take);
+        assert!(blocks.averages());
+        // 600 rows of rest as they are, 100 s at 10 Hz, and those few that showed the change.
+        assert!((1600..1640).contains(&out.len()), "{}", out.len());
+        assert!(out[..600].iter().enumerate().all(|(row, (t_s, _))| *t_s == row as f64));
+        assert!(out.iter().all(|(t_s, value)| (value - 5.0 * t_s).abs() < 1e-9));
     }
 
     #[test]

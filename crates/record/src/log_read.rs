@@ -3,6 +3,7 @@
 use crate::complaints::Complaints;
 use crate::definitions::{Reads, source_of};
 use crate::log_blocks::Blocks;
+use crate::log_clock::{LogClock, Restart};
 use crate::series_builder::SeriesBuilder;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, ReadWarning, RecordError};
 use mapper_core::Channel;
@@ -15,22 +16,21 @@ use std::path::Path;
 /// Time 0 of a log on the clock of [`SeriesBuilder`]: logs may begin before it.
 const ZERO_NS: u64 = 1 << 62;
 
-/// Times beyond this are no times, s: a century, within what the clock holds.
-const LONGEST_S: f64 = 3.2e9;
-
 /// What was read of a log.
 #[derive(Debug, Default)]
 pub(crate) struct ReadLog {
     pub(crate) builders: BTreeMap<Reads, SeriesBuilder>,
     /// Ambient pressure, Pa.
     pub(crate) ambient: Option<SeriesBuilder>,
+    pub(crate) ambient_unit: Option<&'static Unit>,
     pub(crate) units: BTreeMap<Reads, &'static Unit>,
     pub(crate) zero_ns: u64,
     /// Time 0 in nanoseconds since 1970, where the log says it.
     pub(crate) start_time_ns: Option<u64>,
     pub(crate) warnings: Vec<ReadWarning>,
     pub(crate) averaged: bool,
-    pub(crate) full: bool,
+    /// Values that are kept.
+    kept: u64,
 }
 
 /// What a wanted column is for.
@@ -52,7 +52,7 @@ pub(crate) fn read_log(
     map: &ChannelMap,
     options: &ReadOptions,
 ) -> Result<ReadLog, RecordError> {
-    let (_, mut log) = options.logs.open(file, &map.log)?;
+    let (format, mut log) = options.logs.open(file, &map.log)?;
     let layout = log.layout().clone();
     let wanted = wanted(map, &layout)?;
     // Each column once, in the order of the layout: several channels may read one.
@@ -82,6 +82,7 @@ pub(crate) fn read_log(
         zero_ns: ZERO_NS,
         start_time_ns: layout.start_time_ns,
         warnings: contradictions(map, &layout, &wanted),
+        ambient_unit: wanted.iter().find(|wanted| wanted.target == Target::Ambient).map(|found| found.unit),
         units: wanted
             .iter()
             .filter_map(|wanted| match wanted.target {
@@ -92,22 +93,37 @@ pub(crate) fn read_log(
         ..ReadLog::default()
     };
     let mut blocks: Vec<Blocks> = members.iter().map(|_| Blocks::default()).collect();
+    let mut clocks: Vec<LogClock> = members.iter().map(|_| LogClock::default()).collect();
     let mut rows = 0u64;
     let mut take_row = |row: Row<'_>| {
         rows += 1;
-        let usable = row.t_s.is_finite() && row.t_s.abs() < LONGEST_S && rows <= options.max_messages;
-        if let (Some(blocks), Some(places), true) = (blocks.get_mut(row.group), places.get(row.group), usable)
-        {
-            blocks.push(row.t_s, row.values, &mut |t_s, values| read.take(places, t_s, values));
+        if rows > options.max_messages {
+            let message = format!("it has more than {} rows; cut it into shorter logs", options.max_messages);
+            return Err(file.content(format.name, message));
         }
-        Ok(())
+        if read.kept > options.max_values {
+            let message = format!(
+                "its mapped columns hold more than {} values; map fewer columns, or cut it into shorter logs",
+                options.max_values
+            );
+            return Err(file.content(format.name, message));
+        }
+        let of_group = (clocks.get_mut(row.group), blocks.get_mut(row.group), places.get(row.group));
+        let (Some(clock), Some(blocks), Some(places)) = of_group else { return Ok(()) };
+        let mut keep = |t_s: f64, values: &[f64]| read.take(places, t_s, values);
+        let took = clock.push(row.t_s, row.values, &mut |t_s, values| blocks.push(t_s, values, &mut keep));
+        took.map_err(|restart| file.content(format.name, restart_words(restart, &layout, row.group)))
     };
     log.rows(&columns, &mut take_row)?;
-    for (blocks, places) in blocks.iter_mut().zip(&places) {
+    for ((clock, blocks), places) in clocks.iter_mut().zip(&mut blocks).zip(&places) {
+        let mut keep = |t_s: f64, values: &[f64]| read.take(places, t_s, values);
+        clock.finish(&mut |t_s, values| blocks.push(t_s, values, &mut keep));
+        if clock.strays > 0 {
+            read.warnings.push(ReadWarning::StrayTimes { count: clock.strays, first_s: clock.stray_s });
+        }
         blocks.finish(&mut |t_s, values| read.take(places, t_s, values));
         read.averaged |= blocks.averages();
     }
-    read.full = rows > options.max_messages;
     Ok(read)
 }
 
@@ -122,8 +138,20 @@ impl ReadLog {
                 Target::Ambient => self.ambient.get_or_insert_default(),
             };
             builder.push(time_ns, unit.to_inside(value));
+            self.kept += 1;
         }
     }
+}
+
+/// What to do about a clock that starts again.
+fn restart_words(restart: Restart, layout: &Layout, group: usize) -> String {
+    let Restart { row, from_s, to_s } = restart;
+    let group = layout.groups.get(group).filter(|group| !group.name.is_empty());
+    let of = group.map_or_else(String::new, |group| format!(" of `{}`", group.name));
+    format!(
+        "the clock{of} goes back from {from_s} s to {to_s} s in row {row} of the data, as where two runs stand in one file: cut it \
+         there and give the parts as logs of their own, or name another clock with `time`"
+    )
 }
 
 /// The columns that the map names, with their units; or all mistakes of the map for this log.
@@ -225,12 +253,17 @@ fn unit_of(
     complaints: &mut Complaints,
 ) -> Option<&'static Unit> {
     let kind = channel.map_or(Kind::Pressure, kind_of);
+    let name = channel.map_or("the ambient pressure", Channel::symbol);
+    let recorded = layout.columns.get(column).and_then(|column| column.unit.as_deref());
+    if let Some((message, remedy)) = recorded.and_then(|text| wrong_reference(name, text, source, channel)) {
+        complaints.add(FindingKind::Unit, &at("field"), message, remedy);
+        return None;
+    }
     // What the map has was checked when it was read.
     if let Some(written) = &source.unit {
         return unit(kind, written).ok();
     }
-    let name = channel.map_or("the ambient pressure", Channel::symbol);
-    let Some(recorded) = layout.columns.get(column).and_then(|column| column.unit.as_deref()) else {
+    let Some(recorded) = recorded else {
         let message = format!("neither the channel map nor the log gives the unit of {name}");
         let example = channel.map_or("kPa", |channel| channel.unit());
         complaints.add(FindingKind::Unit, &at("field"), message, format!("add e.g. `unit: {example}`"));
@@ -238,12 +271,6 @@ fn unit_of(
     };
     let known = header_unit(recorded);
     match known.filter(|known| known.kind == kind) {
-        Some(known) if known.reference == Reference::Gauge && !source.gauge => {
-            let message = format!("the log gives {name} in {recorded}, a pressure over the ambient pressure");
-            let remedy = "write `gauge: true`, and `ambient_pressure`".to_owned();
-            complaints.add(FindingKind::Unit, &at("field"), message, remedy);
-            None
-        }
         Some(known) => Some(known.unit),
         None => match unit(kind, recorded) {
             Ok(unit) => Some(unit),
@@ -260,6 +287,28 @@ fn unit_of(
             }
         },
     }
+}
+
+/// Where the log says what a pressure is measured from, and the map something else: a message and what would be right.
+fn wrong_reference(
+    name: &str,
+    recorded: &str,
+    source: &ChannelSource,
+    channel: Option<Channel>,
+) -> Option<(String, String)> {
+    let known = header_unit(recorded).filter(|known| known.kind == Kind::Pressure)?;
+    let (over, remedy) = match (known.reference, source.gauge, channel) {
+        (Reference::Gauge, _, None) => (
+            "over the ambient pressure",
+            "name a column of the absolute ambient pressure, or write its value",
+        ),
+        (Reference::Gauge, false, Some(_)) => {
+            ("over the ambient pressure", "write `gauge: true`, and `ambient_pressure`")
+        }
+        (Reference::Absolute, true, _) => ("over vacuum", "leave `gauge: true` out"),
+        _ => return None,
+    };
+    Some((format!("the log gives {name} in {recorded}, a pressure {over}"), remedy.to_owned()))
 }
 
 /// Whether a file that starts with these bytes is MCAP, or too short to be anything else.

@@ -1,9 +1,9 @@
 //! Whether what was read can be what the channel map says, before anything is computed from it.
 
-use crate::ChannelSource;
 use crate::complaints::Complaints;
+use crate::{AmbientPressure, ChannelSource};
 use mapper_core::{Channel, Series};
-use mapper_logs::plausible::{fits, fitting_units, looks_like_gauge};
+use mapper_logs::plausible::{AMBIENT_PA, fits, fitting_units, looks_like_gauge};
 use mapper_logs::units::{kind_of, unit};
 use mapper_logs::{Kind, Unit};
 use mapper_numerics::statistics::quantile;
@@ -12,30 +12,37 @@ use mapper_yaml::{FindingKind, steps};
 /// Share of the readings left out at each end: spikes are no matter of units.
 const OUTER: f64 = 0.02;
 
+/// The readings of a channel.
+pub(crate) struct Readings<'a> {
+    pub(crate) channel: Channel,
+    pub(crate) source: &'a ChannelSource,
+    pub(crate) unit: &'static Unit,
+    /// SI, gauge pressures made absolute.
+    pub(crate) series: &'a Series,
+    /// Typical ambient pressure, Pa; `None` where none is known.
+    pub(crate) ambient_pa: Option<f64>,
+}
+
 /// Complains about a channel whose readings are impossible in their unit, where another unit would make them possible. Readings
 /// that no unit makes possible are a matter of the sensor, not of the map.
-pub(crate) fn check(
-    channel: Channel,
-    source: &ChannelSource,
-    unit_used: &'static Unit,
-    series: &Series,
-    complaints: &mut Complaints,
-) {
-    let values: Vec<f64> = series.values.iter().copied().filter(|value| value.is_finite()).collect();
-    let at = |share: f64| quantile(&values, share);
-    let (Some(low), Some(high)) = (at(OUTER), at(1.0 - OUTER)) else { return };
+pub(crate) fn check(readings: &Readings<'_>, complaints: &mut Complaints) {
+    let Readings { channel, source, unit: unit_used, series, ambient_pa } = *readings;
+    let Some((low, high)) = range(series) else { return };
     if fits(channel, low, high) {
         return;
     }
-    let written = |inside: f64| unit_used.from_inside(inside);
+    // What was added to the readings.
+    let over_pa = if source.gauge { ambient_pa.unwrap_or(f64::NAN) } else { 0.0 };
+    let written = |inside: f64| unit_used.from_inside(inside - over_pa);
     let (written_low, written_high) = (written(low), written(high));
     let mut right: Vec<String> = Vec::new();
     if looks_like_gauge(channel, low, high) && !source.gauge {
         right.push("as pressures over the ambient pressure they would be plausible: write `gauge: true` and `ambient_pressure`".to_owned());
     }
-    // Without their gauge part those of a gauge pressure are not known here.
-    let absolute = !source.gauge;
-    for other in fitting_units(channel, written_low, written_high).into_iter().filter(|_| absolute) {
+    if source.gauge && fits(channel, low - over_pa, high - over_pa) {
+        right.push("as absolute pressures they would be plausible: leave `gauge: true` out".to_owned());
+    }
+    for other in fitting_units(channel, written_low, written_high, over_pa) {
         let shown = shown_unit(kind_of(channel));
         let at = |value: f64| {
             short(shown.map_or(other.to_inside(value), |shown| shown.from_inside(other.to_inside(value))))
@@ -54,7 +61,7 @@ pub(crate) fn check(
     }
     let has_unit = source.unit.is_some();
     let place = steps!["channels", channel.symbol(), if has_unit { "unit" } else { "field" }];
-    let over = if source.gauge { " with the ambient pressure" } else { "" };
+    let over = if source.gauge { " over the ambient pressure" } else { "" };
     let message = format!(
         "the readings of `{}` lie between {} and {} {}{over}, which is impossible for {channel}, {}",
         source.field,
@@ -65,6 +72,57 @@ pub(crate) fn check(
     );
     let remedy = format!("{}; or leave {channel} out", right.join("; "));
     complaints.add(FindingKind::Implausible, &place, message, remedy);
+}
+
+/// Complains about an ambient pressure that no place on earth has: gauge pressures are added to it.
+pub(crate) fn check_ambient(
+    ambient: &AmbientPressure,
+    column: Option<&Series>,
+    unit_used: Option<&'static Unit>,
+    complaints: &mut Complaints,
+) {
+    let (least, most) = AMBIENT_PA;
+    let allowed = format!("it lies between {:.0} and {:.0} kPa", least / 1e3, most / 1e3);
+    match (ambient, column.and_then(range)) {
+        (AmbientPressure::Constant(value_pa), _) if !(least..=most).contains(value_pa) => {
+            let message =
+                format!("the ambient pressure is {} kPa, which is impossible", short(value_pa / 1e3));
+            let remedy = format!("{allowed}: write what the barometer read");
+            complaints.add(FindingKind::Implausible, &steps!["ambient_pressure"], message, remedy);
+        }
+        (AmbientPressure::Source(source), Some((low, high))) if low < least || high > most => {
+            let written = |inside: f64| unit_used.map_or(inside, |unit| unit.from_inside(inside));
+            let symbol = unit_used.map_or("Pa", Unit::symbol);
+            let message = format!(
+                "the readings of `{}` lie between {} and {} {symbol}, which is impossible for the ambient pressure",
+                source.field,
+                short(written(low)),
+                short(written(high))
+            );
+            let fitting = |unit: &&'static Unit| {
+                unit.to_inside(written(low)) >= least && unit.to_inside(written(high)) <= most
+            };
+            let right: Vec<String> = Kind::Pressure
+                .units()
+                .iter()
+                .filter(fitting)
+                .map(|unit| format!("write `unit: {}`", unit.symbol()))
+                .collect();
+            let or = if right.is_empty() { "" } else { "; or " };
+            let remedy = format!(
+                "{allowed}: {}{or}name another column, or write what the barometer read",
+                right.join(" or ")
+            );
+            complaints.add(FindingKind::Implausible, &steps!["ambient_pressure", "field"], message, remedy);
+        }
+        _ => {}
+    }
+}
+
+/// Least and largest reading without the outer ones.
+fn range(series: &Series) -> Option<(f64, f64)> {
+    let values: Vec<f64> = series.values.iter().copied().filter(|value| value.is_finite()).collect();
+    Some((quantile(&values, OUTER)?, quantile(&values, 1.0 - OUTER)?))
 }
 
 /// A unit in which people know such values.

@@ -3,6 +3,8 @@
 use crate::complaints::Complaints;
 use crate::definitions::{Reads, source_of};
 use crate::log_read::{is_mcap, log_of_path, read_log};
+use crate::measured_valve::{hold, turns_share};
+use crate::plausibility::Readings;
 use crate::read_options::ReadOptions;
 use crate::rig_sink::RigSink;
 use crate::scan::{Scanned, scan};
@@ -95,14 +97,12 @@ fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Resul
     if log.averaged {
         warnings.push(ReadWarning::Averaged);
     }
-    if log.full {
-        warnings.push(ReadWarning::TooManyMessages { limit: options.max_messages });
-    }
     warnings.extend(missing(map, &log.builders));
     let ambient = log.ambient.map(|builder| builder.build(Channel::P1, log.zero_ns, &mut warnings));
-    let mut gathered = gather(map, log.builders, log.zero_ns, ambient, &mut warnings);
-    complete(map, &mut gathered, &log.units)?;
-    let steps = steps_without_marks(map, &gathered, &mut warnings);
+    let mut gathered = gather(map, log.builders, log.zero_ns, ambient.as_ref(), &mut warnings);
+    let ambient = ambient.as_ref().zip(log.ambient_unit);
+    complete(map, &mut gathered, &log.units, ambient)?;
+    let steps = steps_without_marks(map, &mut gathered.series, &mut warnings);
     let Gathered { series, elements, .. } = gathered;
     Ok(ReadReport {
         recording: Recording { events: Vec::new(), series, elements, steps },
@@ -167,10 +167,15 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> Result<R
     if !map.is_native() {
         warnings.extend(missing(map, &sink.builders));
     }
+    let strays: Vec<(u64, u64)> = sink.builders.values_mut().filter_map(SeriesBuilder::drop_strays).collect();
     let first_sample_ns = sink.builders.values().filter_map(SeriesBuilder::first_time_ns).min();
     let zero_ns = sink.start_time_ns.or(first_sample_ns).unwrap_or(0);
+    if let Some((_, first_ns)) = strays.first() {
+        let count = strays.iter().map(|(count, _)| count).sum();
+        warnings.push(ReadWarning::StrayTimes { count, first_s: run_time_s(*first_ns, zero_ns) });
+    }
     let mut gathered = gather(map, sink.builders, zero_ns, None, &mut warnings);
-    complete(map, &mut gathered, &sink.units)?;
+    complete(map, &mut gathered, &sink.units, None)?;
     let steps = if sink.format.is_some() || !sink.steps.is_empty() {
         let markers = sink.steps.into_iter().map(|(log_time_ns, mut message)| {
             if sink.start_time_ns.is_none() {
@@ -181,7 +186,7 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> Result<R
         let last_s = span_s(&gathered.series).map_or(0.0, |(_, last_s)| last_s);
         steps_from_markers(markers, last_s, &mut warnings)
     } else {
-        steps_without_marks(map, &gathered, &mut warnings)
+        steps_without_marks(map, &mut gathered.series, &mut warnings)
     };
     let events = sink.events.into_iter().map(|(log_time_ns, mut event)| {
         if sink.start_time_ns.is_none() {
@@ -229,11 +234,11 @@ fn gather(
     map: &ChannelMap,
     builders: BTreeMap<Reads, SeriesBuilder>,
     zero_ns: u64,
-    ambient: Option<Series>,
+    ambient: Option<&Series>,
     warnings: &mut Vec<ReadWarning>,
 ) -> Gathered {
     let mut gathered = Gathered { series: BTreeMap::new(), elements: BTreeMap::new() };
-    let ambient_pa = |t_s: f64| match (&map.ambient_pressure, &ambient) {
+    let ambient_pa = |t_s: f64| match (&map.ambient_pressure, ambient) {
         (Some(AmbientPressure::Constant(value_pa)), _) => Some(*value_pa),
         (_, Some(series)) => series.interpolate(t_s),
         _ => None,
@@ -265,16 +270,28 @@ fn complete(
     map: &ChannelMap,
     gathered: &mut Gathered,
     units: &BTreeMap<Reads, &'static Unit>,
+    ambient: Option<(&Series, &'static Unit)>,
 ) -> Result<(), RecordError> {
     if !map.is_native() {
         let mut complaints = Complaints::default();
+        let (column, unit) = ambient.unzip();
+        if let Some(pressure) = &map.ambient_pressure {
+            plausibility::check_ambient(pressure, column, unit, &mut complaints);
+        }
+        let ambient_pa = match (&map.ambient_pressure, column) {
+            (Some(AmbientPressure::Constant(value_pa)), _) => Some(*value_pa),
+            (_, Some(series)) => mapper_numerics::statistics::median(&series.values),
+            _ => None,
+        };
         for (reads, source) in sources(map) {
             let series = match reads {
                 Reads::Channel(channel) => gathered.series.get(&channel),
                 Reads::Element(element) => gathered.elements.get(&element),
             };
             if let (Some(series), Some(unit)) = (series, units.get(&reads)) {
-                plausibility::check(reads.channel(), source, unit, series, &mut complaints);
+                let channel = reads.channel();
+                let readings = Readings { channel, source, unit, series, ambient_pa };
+                plausibility::check(&readings, &mut complaints);
             }
         }
         complaints.result(map)?;
@@ -291,10 +308,17 @@ fn complete(
 /// Steps from commands, or else from jumps of what was measured.
 fn steps_without_marks(
     map: &ChannelMap,
-    gathered: &Gathered,
+    series: &mut BTreeMap<Channel, Series>,
     warnings: &mut Vec<ReadWarning>,
 ) -> Vec<StepMarker> {
-    let series = &gathered.series;
+    if let Some(share) = series.get(&Channel::ValveCommand).and_then(turns_share) {
+        warnings.push(ReadWarning::MeasuredValve { turns_percent: 100.0 * share });
+        let steps = steps_from_jumps(series, true, warnings);
+        if let Some(position) = series.get_mut(&Channel::ValveCommand) {
+            hold(position, &steps);
+        }
+        return without_rest(steps, series);
+    }
     let span_s = span_s(series);
     // A command that stays at a value marks no step.
     let moves = |channel: &Channel| series.contains_key(channel) && !map.constants.contains_key(channel);
@@ -302,7 +326,7 @@ fn steps_without_marks(
     if commanded || !can_be_searched(series) {
         return without_rest(steps_from_commands(series, span_s, warnings), series);
     }
-    without_rest(steps_from_jumps(series, warnings), series)
+    without_rest(steps_from_jumps(series, false, warnings), series)
 }
 
 /// The readings of channels of which the recording holds single sensors alone, on the times of the first of them: what the

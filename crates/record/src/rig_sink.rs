@@ -42,6 +42,7 @@ pub(crate) struct RigSink<'a> {
     pub(crate) failure: Option<RecordError>,
     damaged: BTreeMap<String, u64>,
     values: Vec<FieldValue>,
+    kept: u64,
 }
 
 impl<'a> RigSink<'a> {
@@ -64,6 +65,7 @@ impl<'a> RigSink<'a> {
             failure: None,
             damaged: BTreeMap::new(),
             values: Vec::new(),
+            kept: 0,
         }
     }
 
@@ -114,8 +116,12 @@ impl Sink for RigSink<'_> {
                 for (index, reads, unit) in mapped.outputs.iter().filter(|_| whole) {
                     let builder = self.builders.entry(*reads).or_default();
                     match self.values.get(*index) {
-                        Some(FieldValue::Number(value)) => builder.push(log_time_ns, unit.to_inside(*value)),
+                        Some(FieldValue::Number(value)) => {
+                            self.kept += 1;
+                            builder.push(log_time_ns, unit.to_inside(*value));
+                        }
                         Some(FieldValue::Other) => {
+                            self.kept += 1;
                             builder.push(log_time_ns, f64::NAN);
                             builder.not_numbers += 1;
                         }
@@ -124,16 +130,26 @@ impl Sink for RigSink<'_> {
                 }
                 if whole { Ok(()) } else { Err(mapped.topic.clone()) }
             }
-            Some(Topic::Step) => serde_json::from_slice(data)
-                .map(|step| self.steps.push((log_time_ns, step)))
-                .map_err(|_| STEP_TOPIC.to_owned()),
-            Some(Topic::Event) => serde_json::from_slice(data)
-                .map(|event| self.events.push((log_time_ns, event)))
-                .map_err(|_| EVENT_TOPIC.to_owned()),
+            Some(Topic::Step) => {
+                self.kept += values_of(size_of::<StepMessage>());
+                serde_json::from_slice(data)
+                    .map(|step| self.steps.push((log_time_ns, step)))
+                    .map_err(|_| STEP_TOPIC.to_owned())
+            }
+            Some(Topic::Event) => {
+                self.kept += values_of(size_of::<Event>() + data.len());
+                serde_json::from_slice(data)
+                    .map(|event| self.events.push((log_time_ns, event)))
+                    .map_err(|_| EVENT_TOPIC.to_owned())
+            }
         };
         if let Err(topic) = whole {
             *self.damaged.entry(topic).or_default() += 1;
         }
+    }
+
+    fn kept(&self) -> u64 {
+        self.kept
     }
 
     fn metadata(&mut self, name: String, mut pairs: BTreeMap<String, String>) {
@@ -157,4 +173,9 @@ impl Sink for RigSink<'_> {
             _ => {}
         }
     }
+}
+
+/// How many values of a series, with their times, take as much memory.
+fn values_of(bytes: usize) -> u64 {
+    u64::try_from(bytes / 16 + 1).unwrap_or(u64::MAX)
 }

@@ -14,6 +14,12 @@ use std::path::Path;
 /// Schemas beyond this are not looked at; it bounds what many of them could hold in memory.
 const SCHEMA_LIMIT_BYTES: usize = 1 << 20;
 
+/// Definitions of topics and their schemas together; those beyond are not looked at.
+const DEFINITIONS_LIMIT_BYTES: usize = 64 << 20;
+
+/// Damaged chunks and records that are listed; more are counted.
+const LISTED_DAMAGE: u64 = 100;
+
 /// Takes what a recording holds.
 pub(crate) trait Sink {
     /// A topic, before its first message.
@@ -24,6 +30,8 @@ pub(crate) trait Sink {
     fn metadata(&mut self, name: String, pairs: BTreeMap<String, String>);
     /// An attachment.
     fn attachment(&mut self, name: String, data: &[u8]);
+    /// Values that it keeps by now.
+    fn kept(&self) -> u64;
 }
 
 /// What a pass found apart from what it handed on.
@@ -35,7 +43,11 @@ pub(crate) struct Scanned {
     schemas: BTreeMap<u16, Vec<u8>>,
     /// Messages that came before any definition of their topic.
     undefined: BTreeMap<u16, u64>,
-    messages: u64,
+    /// Records of any kind, damaged ones included.
+    records: u64,
+    damaged: u64,
+    /// Bytes of all definitions and schemas.
+    defined_bytes: usize,
 }
 
 /// Reads a recording into a fresh sink. Where a damaged chunk held the definition of a topic, and the index at the
@@ -96,10 +108,17 @@ fn pass(
                 scanned.record(offset, opcode, body, options, sink);
             }
         }
-        if scanned.messages > options.max_messages {
+        if scanned.records > options.max_messages {
             scanned.warnings.push(ReadWarning::TooManyMessages { limit: options.max_messages });
             break;
         }
+        if sink.kept() > options.max_values {
+            scanned.warnings.push(ReadWarning::TooManyValues { limit: options.max_values });
+            break;
+        }
+    }
+    if scanned.damaged > LISTED_DAMAGE {
+        scanned.warnings.push(ReadWarning::MoreDamage { count: scanned.damaged - LISTED_DAMAGE });
     }
     let count = scanned.undefined.values().sum();
     if count > 0 {
@@ -109,6 +128,23 @@ fn pass(
 }
 
 impl Scanned {
+    fn damage(&mut self, warning: ReadWarning) {
+        self.damaged += 1;
+        if self.damaged <= LISTED_DAMAGE {
+            self.warnings.push(warning);
+        }
+    }
+
+    /// Whether that many bytes of definitions still find room.
+    fn has_room(&mut self, bytes: usize) -> bool {
+        let together = self.defined_bytes.saturating_add(bytes);
+        let fits = together <= DEFINITIONS_LIMIT_BYTES;
+        if fits {
+            self.defined_bytes = together;
+        }
+        fits
+    }
+
     fn chunk(
         &mut self,
         offset: u64,
@@ -120,13 +156,13 @@ impl Scanned {
         let mut rest = match unpacker.unpack(body, options.max_chunk_bytes) {
             Ok(content) => content,
             Err(error) => {
-                self.warnings.push(ReadWarning::DamagedChunk { offset, source: error });
+                self.damage(ReadWarning::DamagedChunk { offset, source: error });
                 return;
             }
         };
-        while !rest.is_empty() {
+        while !rest.is_empty() && self.records <= options.max_messages && sink.kept() <= options.max_values {
             let Some((opcode, body, after)) = split_record(rest) else {
-                self.warnings.push(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
+                self.damage(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
                 return;
             };
             self.record(offset, opcode, body, options, sink);
@@ -135,24 +171,27 @@ impl Scanned {
     }
 
     fn record(&mut self, offset: u64, opcode: u8, body: &[u8], options: &ReadOptions, sink: &mut dyn Sink) {
+        self.records += 1;
+        if self.records > options.max_messages || sink.kept() > options.max_values {
+            return;
+        }
         let whole = match opcode {
-            op::MESSAGE => parse_message(body).map(|(id, log_time_ns, data)| {
-                self.messages += 1;
-                if self.messages > options.max_messages {
-                    return;
-                }
-                match self.definitions.contains_key(&id) {
+            op::MESSAGE => {
+                parse_message(body).map(|(id, log_time_ns, data)| match self.definitions.contains_key(&id) {
                     true => sink.message(id, log_time_ns, data),
                     false => *self.undefined.entry(id).or_default() += 1,
-                }
-            }),
+                })
+            }
             op::SCHEMA => parse_schema(body).map(|(id, data)| {
-                if data.len() <= SCHEMA_LIMIT_BYTES {
-                    self.schemas.entry(id).or_insert_with(|| data.to_owned());
+                let new = data.len() <= SCHEMA_LIMIT_BYTES && !self.schemas.contains_key(&id);
+                if new && self.has_room(data.len()) {
+                    self.schemas.insert(id, data.to_owned());
                 }
             }),
             op::CHANNEL => parse_channel(body).map(|(mut definition, schema_id)| {
-                if self.definitions.contains_key(&definition.id) {
+                let schema_bytes = self.schemas.get(&schema_id).map_or(0, Vec::len);
+                if self.definitions.contains_key(&definition.id) || !self.has_room(body.len() + schema_bytes)
+                {
                     return;
                 }
                 definition.schema = self.schemas.get(&schema_id).cloned().unwrap_or_default();
@@ -171,7 +210,7 @@ impl Scanned {
                 op::METADATA => DamagedPart::Metadata,
                 _ => DamagedPart::Attachment,
             };
-            self.warnings.push(ReadWarning::DamagedRecord { offset, part });
+            self.damage(ReadWarning::DamagedRecord { offset, part });
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Samples of one channel in the order of the file, and the series made of them.
 
 use crate::ReadWarning;
+use crate::log_clock::STRAY_S;
 use mapper_core::{Channel, Series};
 
 /// Collects the samples of one channel.
@@ -19,6 +20,30 @@ impl SeriesBuilder {
 
     pub(crate) fn first_time_ns(&self) -> Option<u64> {
         self.times_ns.iter().copied().min()
+    }
+
+    /// Leaves out samples that are further than a day from both samples beside them in time; how many, and the first such time.
+    pub(crate) fn drop_strays(&mut self) -> Option<(u64, u64)> {
+        let mut sorted = self.times_ns.clone();
+        sorted.sort_unstable();
+        let far = |a: u64, b: u64| a.abs_diff(b) as f64 > STRAY_S * 1e9;
+        let strays: Vec<u64> = sorted
+            .iter()
+            .enumerate()
+            .filter(|(at, time_ns)| {
+                let before = at.checked_sub(1).and_then(|before| sorted.get(before));
+                let after = sorted.get(at + 1);
+                sorted.len() > 2
+                    && [before, after].into_iter().flatten().all(|beside| far(*beside, **time_ns))
+            })
+            .map(|(_, time_ns)| *time_ns)
+            .collect();
+        // Where most are apart, that is how the channel was sampled.
+        let first = *strays.first().filter(|_| 2 * strays.len() < sorted.len())?;
+        let kept =
+            self.times_ns.iter().zip(&self.values).filter(|(time, _)| strays.binary_search(time).is_err());
+        (self.times_ns, self.values) = kept.map(|(time_ns, value)| (*time_ns, *value)).unzip();
+        Some((strays.len() as u64, first))
     }
 
     /// The series over run time, strictly increasing; of samples at the same time the first one stays.

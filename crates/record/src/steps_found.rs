@@ -1,17 +1,8 @@
 //! The steps of a recording that has neither marks nor commands: where speed, flow and pressures jump.
 
 use crate::ReadWarning;
-use mapper_core::{Channel, Series, StepKind, StepMarker};
+use mapper_core::{Channel, JUMPS, Series, StepKind, StepMarker, VALVE_JUMP_RATIO};
 use std::collections::BTreeMap;
-
-/// Channels that jump with the points of a map, each with the share of itself by which it moves at least. Temperatures follow
-/// for minutes, and say nothing about the beginning.
-const SIGNALS: [(Channel, f64); 4] = [
-    (Channel::ShaftSpeed, 0.01),
-    (Channel::CompressorFlow, 0.02),
-    (Channel::P3, 0.015),
-    (Channel::P2, 0.015),
-];
 
 /// Time over which means are compared before and after, s.
 const WINDOW_S: f64 = 3.0;
@@ -43,23 +34,31 @@ const SETTLING_SHARE: f64 = 0.2;
 /// Shaft speed below which the machine is at rest, rpm: far below any idle, far above any sensor's noise.
 const AT_REST_RPM: f64 = 1000.0;
 
+/// The opening of the valve, where it was measured.
+const MEASURED_VALVE: (Channel, f64) = (Channel::ValveCommand, VALVE_JUMP_RATIO);
+
 /// Whether there is anything that jumps.
 pub(crate) fn can_be_searched(series: &BTreeMap<Channel, Series>) -> bool {
-    SIGNALS.iter().any(|(channel, _)| series.get(channel).is_some_and(|series| series.t_s.len() > 30))
+    JUMPS.iter().any(|(channel, _)| series.get(channel).is_some_and(|series| series.t_s.len() > 30))
 }
 
-/// Steps from jump to jump. What was held before the first jump is the first step.
+/// Steps from jump to jump. What was held before the first jump is the first step. A valve that was measured is looked at too.
 pub(crate) fn steps_from_jumps(
     series: &BTreeMap<Channel, Series>,
+    measured_valve: bool,
     warnings: &mut Vec<ReadWarning>,
 ) -> Vec<StepMarker> {
-    let grid = Grid::of(series);
+    let wanted: Vec<(Channel, f64)> =
+        JUMPS.into_iter().chain(measured_valve.then_some(MEASURED_VALVE)).collect();
+    let grid = Grid::of(series, &wanted);
     let (Some(first_s), Some(last_s)) = (grid.t_s.first().copied(), grid.t_s.last().copied()) else {
         return Vec::new();
     };
     let starts_s: Vec<f64> = std::iter::once(first_s).chain(grid.jumps_s()).collect();
     let ends_s = starts_s.iter().skip(1).map(|next_s| next_s - grid.interval_s).chain([last_s]);
-    let p3 = series.get(&Channel::P3);
+    let held = |channel: Channel, start_s: f64, end_s: f64| {
+        series.get(&channel).map_or(f64::NAN, |series| median(series, 0.5 * (start_s + end_s), end_s))
+    };
     let steps: Vec<StepMarker> = starts_s
         .iter()
         .zip(ends_s)
@@ -71,8 +70,8 @@ pub(crate) fn steps_from_jumps(
             end_s: end_s.max(*start_s),
             from: None,
             to: None,
-            p3_pa: p3.map_or(f64::NAN, |p3| median(p3, 0.5 * (start_s + end_s), end_s)),
-            valve_opening_ratio: f64::NAN,
+            p3_pa: held(Channel::P3, *start_s, end_s),
+            valve_opening_ratio: held(Channel::ValveCommand, *start_s, end_s),
         })
         .collect();
     let channels: Vec<&str> = grid.signals.iter().map(|signal| signal.channel.symbol()).collect();
@@ -119,8 +118,8 @@ struct Signal {
 }
 
 impl Grid {
-    fn of(series: &BTreeMap<Channel, Series>) -> Grid {
-        let found: Vec<(Channel, f64, &Series)> = SIGNALS
+    fn of(series: &BTreeMap<Channel, Series>, wanted: &[(Channel, f64)]) -> Grid {
+        let found: Vec<(Channel, f64, &Series)> = wanted
             .iter()
             .filter_map(|(channel, ratio)| {
                 Some((*channel, *ratio, series.get(channel).filter(|s| s.t_s.len() > 30)?))
@@ -287,7 +286,7 @@ mod tests {
     }
 
     fn starts(series: &BTreeMap<Channel, Series>) -> Vec<f64> {
-        let steps = without_rest(steps_from_jumps(series, &mut Vec::new()), series);
+        let steps = without_rest(steps_from_jumps(series, false, &mut Vec::new()), series);
         assert!(
             steps.iter().enumerate().all(|(index, step)| step.index == index && step.end_s > step.start_s)
         );

@@ -28,6 +28,12 @@ pub enum ReadWarning {
         /// What it is, and what is wrong with it.
         part: DamagedPart,
     },
+    /// More damage than is listed.
+    #[error("{count} more chunks and records were left out: they are damaged as well")]
+    MoreDamage {
+        /// How many.
+        count: u64,
+    },
     /// Messages on a mapped topic that are not JSON objects.
     #[error("{count} messages on {topic} were left out: they are not JSON objects")]
     DamagedMessages {
@@ -92,18 +98,42 @@ pub enum ReadWarning {
         /// Samples with the time of another one.
         repeated: usize,
     },
-    /// More messages than the reader takes.
-    #[error("only the first {limit} messages were read")]
+    /// More messages and other records than the reader takes.
+    #[error("only the first {limit} messages and other records were read")]
     TooManyMessages {
         /// The limit.
         limit: u64,
     },
+    /// More values than the reader keeps.
+    #[error("only the first {limit} values were read; cut the recording into shorter ones")]
+    TooManyValues {
+        /// The limit.
+        limit: u64,
+    },
+    /// Rows or samples with times that cannot be.
+    #[error(
+        "{count} rows or samples were left out: their times, the first of them {first_s} s, are none or more than a day from those beside them, or step back"
+    )]
+    StrayTimes {
+        /// How many.
+        count: u64,
+        /// The first of these times, s.
+        first_s: f64,
+    },
     /// A fast log was averaged while it was read.
     #[error("the log is faster than identification needs: it was averaged to 10 samples a second")]
     Averaged,
+    /// The opening of the valve is a measured position.
+    #[error(
+        "valve_command turns back in {turns_percent:.0} % of its samples: it is a measured position; each step has the opening that was held at its end"
+    )]
+    MeasuredValve {
+        /// Samples in which it turns back, %.
+        turns_percent: f64,
+    },
     /// Steps were found in what was measured.
     #[error(
-        "the recording has neither step marks nor commands: {count} steps were found where {channels} jump"
+        "the recording has neither step marks nor commands that mark steps: {count} steps were found where {channels} jump"
     )]
     StepsFound {
         /// How many.

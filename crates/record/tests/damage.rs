@@ -115,6 +115,32 @@ fn messages_are_bounded() {
 }
 
 #[test]
+fn values_are_bounded() {
+    let options = ReadOptions { max_values: 100, ..ReadOptions::default() };
+    let report =
+        read_recording_from(&recorded(&batch(100)), Path::new("x"), &ChannelMap::native(), &options).unwrap();
+    assert!(report.warnings.contains(&ReadWarning::TooManyValues { limit: 100 }));
+    let kept: usize = report.recording.series.values().map(|series| series.t_s.len()).sum();
+    assert!((80..130).contains(&kept), "{kept}");
+}
+
+/// Records that a chunk holds by the million take no memory each.
+#[test]
+fn damaged_records_are_counted_and_a_few_are_listed() {
+    let magic = b"\x89MCAP0\r\n";
+    // A message of one byte.
+    let cut = [&[5u8][..], &1u64.to_le_bytes(), &[0]].concat();
+    let bytes = [&magic[..], &cut.repeat(1000)].concat();
+    let report = read(&bytes).unwrap();
+    let listed = report.warnings.iter().filter(|w| matches!(w, ReadWarning::DamagedRecord { .. })).count();
+    assert_eq!(listed, 100);
+    assert!(report.warnings.contains(&ReadWarning::MoreDamage { count: 900 }), "{:?}", report.warnings);
+    let options = ReadOptions { max_messages: 500, ..ReadOptions::default() };
+    let bounded = read_recording_from(&bytes, Path::new("x"), &ChannelMap::native(), &options).unwrap();
+    assert!(bounded.warnings.contains(&ReadWarning::MoreDamage { count: 400 }), "{:?}", bounded.warnings);
+}
+
+#[test]
 fn what_is_no_mcap_file_is_said_to_be_none() {
     let error = read(b"time,T2\n0,300\n").unwrap_err();
     assert!(error.to_string().contains("not an MCAP file"), "{error}");
@@ -178,6 +204,21 @@ fn times_out_of_order_are_sorted_and_repeats_left_out() {
     ] {
         assert!(report.warnings.contains(&expected), "{expected} in {:?}", report.warnings);
     }
+}
+
+#[test]
+fn a_single_wrong_time_is_left_out_and_told() {
+    let second = 1_000_000_000;
+    let mut rows: Vec<(u64, &str)> =
+        (0..100).map(|row| (1_795_356_185 * second + row * second, "{\"tt2\": 1}")).collect();
+    // A clock that was not yet set, and one in another unit.
+    rows.insert(3, (0, "{\"tt2\": 1}"));
+    rows.push((9_000_000_000 * second, "{\"tt2\": 1}"));
+    let report = read_foreign(&foreign("/daq", &rows, &[]), &map(", unit: degC")).unwrap();
+    let t_s = &report.recording.series[&Channel::T2].t_s;
+    assert_eq!((t_s.len(), t_s[0], t_s[99]), (100, 0.0, 99.0));
+    let told = |warning: &ReadWarning| matches!(warning, ReadWarning::StrayTimes { count: 2, .. });
+    assert!(report.warnings.iter().any(told), "{:?}", report.warnings);
 }
 
 #[test]

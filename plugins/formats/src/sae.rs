@@ -1,12 +1,17 @@
 //! SAE text, compressor (J1826, J922): `#` comments, then corrected rpm, corrected kg/s, pressure ratio, efficiency in a
 //! row, from choke to surge within a line.
 //!
-//! Manufacturers' files may begin with a title, a row of two wheel diameters and column names; those are passed over.
+//! Manufacturers' files may begin with a title, a row of two wheel diameters and column names; those are passed over,
+//! but for the units that the names give.
 
+mod columns;
+
+use columns::Columns;
 use crate::heading::heading;
 use crate::lines::{Row, map_of_rows, room_for_one_more};
 use crate::reference;
 use mapper_core::{CompressorMap, ExportError, ImportError, MapFormat, ReferenceState};
+use mapper_yaml::units::HeadingError;
 use std::fmt::Write;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
@@ -49,6 +54,7 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
 
 fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
     let (mut rows, mut found, mut machine) = (Vec::new(), None, String::new());
+    let mut columns = Columns::default();
     let mut heading_allowed = true;
     for (index, line) in text.lines().enumerate() {
         let at = index + 1;
@@ -56,7 +62,11 @@ fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, Impo
             Some((content, comment)) => (content.trim(), Some(comment)),
             None => (line.trim(), None),
         };
+        let units = |source: HeadingError| ImportError::Row { line: at, source: source.into() };
         if let Some(comment) = comment {
+            if heading_allowed {
+                columns.read(comment, true).map_err(units)?;
+            }
             found = found.or_else(|| reference::in_comment(comment));
             if let Some((_, name)) = comment.split_once("compressor map of ") {
                 machine = name.trim().chars().take(200).collect();
@@ -66,7 +76,8 @@ fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, Impo
             continue;
         }
         match four_numbers(content) {
-            Some([speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, eta]) => {
+            Some(numbers) => {
+                let [speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, eta] = columns.inside(numbers);
                 room_for_one_more(rows.len(), at)?;
                 let row =
                     Row { at, speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, eta: Some(eta) };
@@ -74,7 +85,7 @@ fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, Impo
                 rows.push(row);
                 heading_allowed = false;
             }
-            None if heading_allowed && is_heading(content) => {}
+            None if heading_allowed && is_heading(content) => columns.read(content, false).map_err(units)?,
             None => {
                 let shown: String = content.chars().take(60).collect();
                 return Err(ImportError::RowForm { line: at, text: shown, form: ROW_FORM });

@@ -212,5 +212,24 @@ fn tables_of_others_are_read_by_their_column_names() {
     let heading = "ABC   T12\n0.638     0.435\n\n 6000.5 8.2 1.48 0.78\n 6000.5 9.4 1.46 0.80\n";
     let map = import("sae", heading, Some(ReferenceState::SAE)).unwrap();
     assert_eq!((map.lines.len(), map.lines[0].points.len()), (1, 2));
+    // Units in the heading count, and one that is none of its column is refused.
+    for (heading, speed_rpm, flow_kg_s) in [
+        ("N(1/min) mdot(lb/s) PR Eff\n60000 0.2", 6e4, 0.2 * 0.453_592_37),
+        ("N(krpm) mdot(g/s)\n60 90", 6e4, 0.09),
+        ("# N [krpm] mdot [g/s] PR Eff\n60 90", 6e4, 0.09),
+        ("# of N [krpm]\n60000 0.09", 6e4, 0.09),
+    ] {
+        let text = format!("{heading} 1.48 0.78\n");
+        match import("sae", &text, Some(ReferenceState::SAE)) {
+            Ok(map) => {
+                let (line, point) = (&map.lines[0], &map.lines[0].points[0]);
+                assert!((line.speed_corrected_rpm / speed_rpm - 1.0).abs() < 1e-14, "{heading}");
+                assert!((point.flow_corrected_kg_s / flow_kg_s - 1.0).abs() < 1e-14, "{heading}");
+            }
+            Err(error) => panic!("{heading}: {error}"),
+        }
+    }
+    let error = import("sae", "N(furlongs) mdot(kg/s)\n6000.5 8.2 1.48 0.78\n", Some(ReferenceState::SAE));
+    assert!(error.unwrap_err().to_string().contains("furlongs"));
     assert!(FORMATS.read_from("CSV").is_some() && FORMATS.read_from("xlsx").is_none());
 }

@@ -34,6 +34,7 @@ struct Delimited {
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
+    options.without(&["sheet"]).map_err(|why| file.content(NAME, why))?;
     let head = file.head(HEAD_BYTES)?;
     let (found, mark) = encoding::guess(&head);
     let encoding = options.encoding.unwrap_or(found);

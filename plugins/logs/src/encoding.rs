@@ -9,6 +9,8 @@ pub(crate) fn guess(head: &[u8]) -> (Encoding, usize) {
         [0xEF, 0xBB, 0xBF, ..] => (Encoding::Utf8, 3),
         [0xFF, 0xFE, ..] => (Encoding::Utf16Le, 2),
         [0xFE, 0xFF, ..] => (Encoding::Utf16Be, 2),
+        _ if looks_like_utf16(head, 1) => (Encoding::Utf16Le, 0),
+        _ if looks_like_utf16(head, 0) => (Encoding::Utf16Be, 0),
         _ => match std::str::from_utf8(head) {
             Ok(_) => (Encoding::Utf8, 0),
             // Cut in the middle of a letter.
@@ -16,6 +18,14 @@ pub(crate) fn guess(head: &[u8]) -> (Encoding, usize) {
             Err(_) => (Encoding::Latin1, 0),
         },
     }
+}
+
+/// Whether the bytes are UTF-16 without a byte order mark: of most letters the high byte, the first or the second, is 0 and the
+/// other is not.
+fn looks_like_utf16(head: &[u8], high: usize) -> bool {
+    let pairs = head.len() / 2;
+    let latin = head.chunks_exact(2).filter(|pair| pair[high] == 0 && pair[1 - high] != 0).count();
+    pairs >= 8 && latin * 10 >= pairs * 9
 }
 
 /// A cell as text.
@@ -106,5 +116,8 @@ mod tests {
         assert_eq!(text(b"T2 [\xB0C]", Encoding::Latin1), "T2 [°C]");
         assert_eq!(guess("T2 [°C]".as_bytes()).0, Encoding::Utf8);
         assert_eq!(guess(b"\xEF\xBB\xBFT2"), (Encoding::Utf8, 3));
+        let utf16: Vec<u8> = "time;T2 [°C]".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        assert_eq!(guess(&utf16), (Encoding::Utf16Le, 0));
+        assert_eq!(guess(&utf16[1..]).0, Encoding::Utf16Be);
     }
 }

@@ -1,7 +1,10 @@
 //! ASAM MDF, version 4: the format of measuring systems on engine test beds.
 
-use falcon_mdf::{Channel, ChannelGroup, Mf4File, Signal};
-use mapper_logs::{Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink};
+use falcon_mdf::io::reader::BufferedSource;
+use falcon_mdf::{Channel, ChannelGroup, Mf4File, OpenOptions, Signal};
+use mapper_logs::{Column, Group, Kind, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink};
+use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
@@ -14,6 +17,9 @@ const CHUNK: usize = 4096;
 /// Most channels of a file.
 const CHANNEL_LIMIT: usize = 10_000;
 
+/// Largest compressed block, unpacked, bytes: writers make them of 4 MiB, as the standard has it.
+const BLOCK_LIMIT: u64 = 256 << 20;
+
 fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"MDF     ") || head.starts_with(b"UnFinMF ")
 }
@@ -22,23 +28,28 @@ struct Mdf4 {
     path: LogFile,
     file: Mf4File,
     layout: Layout,
-    /// The clock of each group.
-    masters: Vec<Channel>,
+    /// The clock of each group, and its unit in seconds.
+    masters: Vec<(Channel, f64)>,
     /// The channel of each column.
     channels: Vec<Channel>,
+    /// Values that stand for none.
+    missing: Vec<f64>,
 }
 
 fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
     let failed = |error: falcon_mdf::error::Mf4Error| path.content(NAME, error.to_string());
+    options.only(&["time", "time_unit", "missing"]).map_err(|why| path.content(NAME, why))?;
+    let limits = OpenOptions { max_decompressed: BLOCK_LIMIT, ..OpenOptions::default() };
     let file = match path.bytes() {
-        Some(bytes) => Mf4File::from_bytes(bytes.to_vec()),
-        None => Mf4File::open_buffered(path.path()),
+        Some(bytes) => Mf4File::from_bytes_with_options(bytes.to_vec(), limits),
+        None => BufferedSource::open(path.path())
+            .and_then(|source| Mf4File::from_source_with_options(Arc::new(source), limits)),
     };
     let file = file.map_err(failed)?;
     if file.channel_count() > CHANNEL_LIMIT {
         return Err(path.content(NAME, format!("it has {} channels; at most {CHANNEL_LIMIT} are read", file.channel_count())));
     }
-    let mut log = Mdf4 { path: path.clone(), layout: Layout::default(), masters: Vec::new(), channels: Vec::new(), file };
+    let mut log = Mdf4 { path: path.clone(), layout: Layout::default(), masters: Vec::new(), channels: Vec::new(), missing: options.missing.clone(), file };
     let (mut left_out, mut without_clock) = (0usize, 0usize);
     for (index, group) in log.file.data_groups().iter().flat_map(|data| &data.channel_groups).enumerate() {
         let named = |channel: &&Channel| options.time.contains(&channel.name);
@@ -58,22 +69,23 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             continue;
         }
         let number = log.layout.groups.len();
-        log.layout.groups.push(Group { name: name_of(group, index), clock: format!("`{}`", clock.name) });
+        log.layout.groups.push(Group { name: name_of(group, index), clock: clock_words(clock) });
+        let mut names: BTreeSet<String> = BTreeSet::new();
         for channel in &columns {
             log.layout.columns.push(Column {
-                name: channel.name.clone(),
+                name: distinct(&mut names, &channel.name),
                 header: channel.name.clone(),
                 unit: Some(channel.unit.trim().to_owned()).filter(|unit| !unit.is_empty()),
                 description: channel.comment.chars().take(200).collect(),
                 group: number,
             });
         }
-        log.masters.push(clock.clone());
+        log.masters.push((clock.clone(), options.time_unit_s.or(unit_s(clock)).unwrap_or(1.0)));
         log.channels.extend(columns);
     }
     distinct_names(&mut log.layout);
     let findings = &mut log.layout.findings;
-    findings.push(format!("clocks: {} groups, each with its own in seconds (time)", log.masters.len()));
+    findings.push(format!("clocks: {} groups, each with its own (time, time_unit)", log.masters.len()));
     if left_out > 0 {
         findings.push(format!("{left_out} channels are left out: texts, arrays, or not readable"));
     }
@@ -90,6 +102,27 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
 fn name_of(group: &ChannelGroup, index: usize) -> String {
     let source = group.source.as_ref().map(|source| source.name.clone());
     [Some(group.acquisition_name.clone()), source].into_iter().flatten().find(|name| !name.trim().is_empty()).unwrap_or_else(|| format!("group {}", index + 1))
+}
+
+/// The unit of a clock in seconds; `None` where it names none that is known. The standard has seconds.
+fn unit_s(clock: &Channel) -> Option<f64> {
+    Some(Kind::Duration.unit(clock.unit.trim())?.to_inside(1.0))
+}
+
+fn clock_words(clock: &Channel) -> String {
+    let unit = clock.unit.trim();
+    if unit.is_empty() { format!("`{}`", clock.name) } else { format!("`{}`, counts {unit}", clock.name) }
+}
+
+/// The name of a channel, numbered where the group has it already.
+fn distinct(names: &mut BTreeSet<String>, name: &str) -> String {
+    let mut distinct = name.to_owned();
+    let mut number = 1usize;
+    while !names.insert(distinct.clone()) {
+        number += 1;
+        distinct = format!("{name} ({number})");
+    }
+    distinct
 }
 
 /// Groups have distinct names, and one alone needs none.
@@ -112,7 +145,7 @@ impl Log for Mdf4 {
 
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
         let failed = |error: falcon_mdf::error::Mf4Error| self.path.content(NAME, error.to_string());
-        for (group, master) in self.masters.iter().enumerate() {
+        for (group, (master, unit_s)) in self.masters.iter().enumerate() {
             let mut channels: Vec<&Channel> = vec![master];
             let of_group = |column: &&usize| self.layout.columns.get(**column).is_some_and(|column| column.group == group);
             channels.extend(wanted.iter().filter(of_group).filter_map(|column| self.channels.get(*column)));
@@ -125,8 +158,11 @@ impl Log for Mdf4 {
                 let Some((times_s, columns)) = columns.split_first() else { continue };
                 for (row, t_s) in times_s.iter().enumerate() {
                     values.clear();
-                    values.extend(columns.iter().map(|column| column.get(row).copied().unwrap_or(f64::NAN)));
-                    sink(Row { group, t_s: *t_s, values: &values })?;
+                    values.extend(columns.iter().map(|column| {
+                        let value = column.get(row).copied().unwrap_or(f64::NAN);
+                        if self.missing.contains(&value) { f64::NAN } else { value }
+                    }));
+                    sink(Row { group, t_s: t_s * unit_s, values: &values })?;
                 }
             }
         }

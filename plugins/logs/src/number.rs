@@ -3,6 +3,9 @@
 /// Longest text of a number, bytes.
 const LIMIT: usize = 48;
 
+/// Digits before the first sign between thousands.
+const FIRST_GROUP: std::ops::RangeInclusive<usize> = 1..=3;
+
 /// The number in a cell; `None` for what is none, words for infinity and not-a-number included.
 pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
     let cell = cell.trim_ascii();
@@ -23,7 +26,12 @@ pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
     let mut fraction = false;
     for byte in cell {
         if *byte == thousands {
-            if fraction || digits_in_group.is_some_and(|count| count != 3) || length == 0 {
+            let well_placed = match digits_in_group {
+                Some(count) => count == 3,
+                // Of `0.100` or `1234.567` the sign is a decimal one.
+                None => starts_as_thousands(text.get(..length)?),
+            };
+            if fraction || !well_placed {
                 return None;
             }
             digits_in_group = Some(0);
@@ -41,6 +49,14 @@ pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
         return None;
     }
     plain(text.get(..length)?)
+}
+
+/// Whether what stands before the first sign between thousands is one to three digits of a number that is not 0.
+fn starts_as_thousands(text: &[u8]) -> bool {
+    let digits = text.strip_prefix(b"-").or_else(|| text.strip_prefix(b"+")).unwrap_or(text);
+    FIRST_GROUP.contains(&digits.len())
+        && digits.iter().all(u8::is_ascii_digit)
+        && digits.first() != Some(&b'0')
 }
 
 /// Whether a cell says that there is no value.
@@ -66,6 +82,12 @@ mod tests {
             (",5", b',', Some(0.5)),
             ("1.234.567,8", b',', Some(1_234_567.8)),
             ("12,345.6", b'.', Some(12_345.6)),
+            ("-1.234", b',', Some(-1234.0)),
+            ("0.100", b',', None),
+            ("-0.100", b',', None),
+            ("1234.567", b',', None),
+            ("1234,567", b'.', None),
+            ("01.234", b',', None),
             ("1.23", b',', None),
             ("1,2,3", b',', None),
             ("nan", b'.', None),

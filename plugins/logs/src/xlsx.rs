@@ -1,5 +1,7 @@
 //! Workbooks of Excel: a table on each sheet.
 
+mod check;
+
 use crate::cells::{Cells, Rows};
 use crate::instant::{Instant, NS_PER_DAY};
 use crate::parts::{Part, side_by_side};
@@ -8,7 +10,6 @@ use crate::table_log::Table;
 use crate::value::Value;
 use calamine::{Cell, DataRef, DataType, Reader, Xlsx, XlsxCellReader};
 use mapper_logs::{DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
-use std::io::{self, Read as _};
 
 /// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
@@ -18,11 +19,11 @@ const NAME: &str = "Excel";
 /// How many rows of a sheet are looked at.
 const HEAD_ROWS: usize = 400;
 
-/// Largest part of a workbook beside its sheets, unpacked, bytes: all of it is held in memory.
-const PART_LIMIT: u64 = 128 << 20;
+/// How much text of its first rows is looked at, bytes.
+const HEAD_BYTES: usize = 1 << 24;
 
-/// Largest sheet, unpacked, bytes: that of a million rows with 40 columns.
-const SHEET_LIMIT: u64 = 4 << 30;
+/// Longest text of a cell that is kept, bytes: a name, a unit or a date is shorter.
+const TEXT_LIMIT: usize = 1 << 10;
 
 /// Days from the origin of Excel's dates to 1970-01-01.
 const EXCEL_EPOCH_DAYS: i64 = 25_569;
@@ -50,26 +51,9 @@ fn book(file: &LogFile) -> Result<Xlsx<Box<dyn ReadSeek>>, LogError> {
     Xlsx::new(file.open()?).map_err(failed(file))
 }
 
-/// Refuses what would unpack to more than there is memory for.
-fn check_size(file: &LogFile) -> Result<(), LogError> {
-    let wrong = |error: zip::result::ZipError| file.content(NAME, error.to_string());
-    let mut archive = zip::ZipArchive::new(file.open()?).map_err(wrong)?;
-    for index in 0..archive.len() {
-        let part = archive.by_index(index).map_err(wrong)?;
-        let (name, declared) = (part.name().map_err(wrong)?.into_owned(), part.size());
-        let sheet = name.starts_with("xl/worksheets/sheet");
-        let limit = if sheet { SHEET_LIMIT } else { PART_LIMIT };
-        // Sheets are read piece by piece: what they declare is enough. The others are unpacked once to be sure.
-        let size = if sheet { declared } else { io::copy(&mut part.take(limit + 1), &mut io::sink()).map_err(|error| file.error(error))? };
-        if size > limit {
-            return Err(file.content(NAME, format!("{name} unpacks to more than {} MiB", limit >> 20)));
-        }
-    }
-    Ok(())
-}
-
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    check_size(file)?;
+    options.without(&["separator", "decimal", "encoding"]).map_err(|why| file.content(NAME, why))?;
+    check::check(file)?;
     let mut book_of = book(file)?;
     let names: Vec<String> = book_of.sheet_names();
     let wanted: Vec<String> = names.iter().filter(|name| options.sheet.as_ref().is_none_or(|sheet| sheet == *name)).cloned().collect();
@@ -82,8 +66,11 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         let Ok(reader) = book_of.worksheet_cells_reader(&name) else { continue };
         let mut rows = SheetRows::new(file, reader);
         let mut head: Vec<Vec<String>> = Vec::new();
-        while head.len() < HEAD_ROWS && rows.advance()? {
-            head.push(rows.row.iter().map(Value::text).collect());
+        let mut bytes = 0;
+        while head.len() < HEAD_ROWS && bytes < HEAD_BYTES && rows.advance()? {
+            let texts: Vec<String> = rows.row.iter().map(Value::text).collect();
+            bytes += texts.iter().map(|text| size_of::<String>() + text.len()).sum::<usize>();
+            head.push(texts);
         }
         if head.is_empty() {
             continue;
@@ -121,10 +108,16 @@ impl Log for Workbook {
 fn value_of(data: &DataRef<'_>) -> Value {
     match data {
         DataRef::DateTime(date) => instant_of(date.as_f64()).map_or(Value::Empty, Value::Instant),
-        DataRef::String(text) | DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => Value::Text(text.trim().to_owned()),
-        DataRef::SharedString(text) => Value::Text(text.trim().to_owned()),
+        DataRef::String(text) | DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => Value::Text(start(text)),
+        DataRef::SharedString(text) => Value::Text(start(text)),
         data => data.as_f64().filter(|value| value.is_finite()).map_or(Value::Empty, Value::Number),
     }
+}
+
+/// What is kept of a text.
+fn start(text: &str) -> String {
+    let text = text.trim();
+    text.get(..text.floor_char_boundary(TEXT_LIMIT)).unwrap_or_default().to_owned()
 }
 
 /// Excel's days since its origin; below one a time of day.

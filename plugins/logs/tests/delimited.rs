@@ -65,7 +65,8 @@ fn letters_in_latin_1_and_utf_16_are_read() {
     let latin: Vec<u8> = text.chars().map(|letter| u8::try_from(u32::from(letter)).unwrap()).collect();
     let wide: Vec<u8> =
         [0xFF, 0xFE].into_iter().chain(text.encode_utf16().flat_map(u16::to_le_bytes)).collect();
-    for bytes in [latin, wide, text.as_bytes().to_vec()] {
+    let unmarked: Vec<u8> = wide[2..].to_vec();
+    for bytes in [latin, wide, unmarked, text.as_bytes().to_vec()] {
         let (layout, rows) = read_with(&bytes, &[]).unwrap();
         assert_eq!(names(&layout)[0], ("Öl", Some("°C")));
         assert_rows(&rows[0], text);

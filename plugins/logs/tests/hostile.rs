@@ -46,9 +46,17 @@ fn mdf4() -> Vec<u8> {
 
 /// The least workbook, stored without compression so that a flipped byte reaches the XML.
 fn xlsx() -> Vec<u8> {
-    let mut rows = String::from(
-        "<row r=\"1\"><c r=\"A1\" t=\"inlineStr\"><is><t>time [s]</t></is></c><c r=\"B1\" t=\"inlineStr\"><is><t>T2 [degC]</t></is></c></row>",
-    );
+    workbook(&parts(HEADER, SHARED_STRINGS))
+}
+
+/// The cells of the first row: one holds its text, the other names a shared one.
+const HEADER: &str =
+    "<c r=\"A1\" t=\"inlineStr\"><is><t>time [s]</t></is></c><c r=\"B1\" t=\"s\"><v>0</v></c>";
+
+const SHARED_STRINGS: &str = "<sst count=\"1\" uniqueCount=\"1\"><si><t>T2 [degC]</t></si></sst>";
+
+fn parts(header: &str, shared_strings: &str) -> Vec<(String, String)> {
+    let mut rows = format!("<row r=\"1\">{header}</row>");
     for row in 2..40 {
         rows.push_str(&format!(
             "<row r=\"{row}\"><c r=\"A{row}\"><v>{row}</v></c><c r=\"B{row}\"><v>{row}.5</v></c></row>"
@@ -58,7 +66,7 @@ fn xlsx() -> Vec<u8> {
     let main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main";
     let relations = "http://schemas.openxmlformats.org/officeDocument/2006/relationships";
     let package = "http://schemas.openxmlformats.org/package/2006";
-    let parts = [
+    [
         ("[Content_Types].xml", format!("{head}<Types xmlns=\"{package}/content-types\"/>")),
         (
             "_rels/.rels",
@@ -78,19 +86,25 @@ fn xlsx() -> Vec<u8> {
                 "{head}<Relationships xmlns=\"{package}/relationships\"><Relationship Id=\"r1\" Type=\"{relations}/worksheet\" Target=\"worksheets/sheet1.xml\"/></Relationships>"
             ),
         ),
+        ("xl/sharedStrings.xml", format!("{head}{shared_strings}")),
         (
             "xl/worksheets/sheet1.xml",
             format!(
                 "{head}<worksheet xmlns=\"{main}\"><dimension ref=\"A1:B39\"/><sheetData>{rows}</sheetData></worksheet>"
             ),
         ),
-    ];
+    ]
+    .map(|(name, text)| (name.to_owned(), text))
+    .to_vec()
+}
+
+fn workbook(parts: &[(String, String)]) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut archive = zip::ZipWriter::new(&mut bytes);
     for (name, text) in parts {
         let stored =
             zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
-        archive.start_file(name, stored).unwrap();
+        archive.start_file(name.as_str(), stored).unwrap();
         archive.write_all(text.as_bytes()).unwrap();
     }
     archive.finish().unwrap();
@@ -121,6 +135,57 @@ fn every_truncation_ends() {
     for bytes in files() {
         (0..bytes.len()).step_by(bytes.len() / 60 + 1).for_each(|length| look(&bytes[..length]));
     }
+}
+
+/// Why a file is refused.
+fn refusal(bytes: &[u8]) -> String {
+    let file = LogFile::of_bytes(Path::new("log"), bytes);
+    LOG_FORMATS.open(&file, &LogOptions::default()).err().expect("refused").to_string()
+}
+
+#[test]
+fn a_workbook_that_claims_more_strings_than_it_has_room_for_is_refused() {
+    for count in ["18446744073709551615", "4000000000", "-1"] {
+        let strings = SHARED_STRINGS.replace("uniqueCount=\"1\"", &format!("uniqueCount=\"{count}\""));
+        let error = refusal(&workbook(&parts(HEADER, &strings)));
+        assert!(error.contains("sharedStrings.xml claims"), "{error}");
+    }
+}
+
+#[test]
+fn a_long_shared_string_is_cut_where_it_is_used() {
+    let strings = SHARED_STRINGS.replace("T2 [degC]", &format!("T2 [degC] {}", "long ".repeat(1 << 18)));
+    let bytes = workbook(&parts(HEADER, &strings));
+    let file = LogFile::of_bytes(Path::new("log"), &bytes);
+    let (_, log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
+    let header = &log.layout().columns[0].header;
+    assert!(header.starts_with("T2") && header.len() <= 1024, "{} bytes", header.len());
+}
+
+#[test]
+fn a_cell_that_never_ends_is_refused() {
+    let whole = "x".repeat(3 << 20);
+    let pieces = "<r><t>x</t></r>".repeat(1 << 18);
+    for text in [format!("<t>{whole}</t>"), pieces, format!("<t a=\"{whole}\">x</t>")] {
+        let header = HEADER.replace("<t>time [s]</t>", &text);
+        let error = refusal(&workbook(&parts(&header, SHARED_STRINGS)));
+        assert!(error.contains("sheet1.xml has a cell"), "{error}");
+    }
+    let deep = HEADER.replace("<is>", &format!("<is>{}", "<t>".repeat(1000)));
+    let error = refusal(&workbook(&parts(&deep, SHARED_STRINGS)));
+    assert!(error.contains("within each other"), "{error}");
+}
+
+#[test]
+fn parts_that_share_their_bytes_and_parts_without_end_are_refused() {
+    let mut many = parts(HEADER, SHARED_STRINGS);
+    many.extend((0..10_000).map(|part| (format!("xl/media/{part}.xml"), String::new())));
+    assert!(refusal(&workbook(&many)).contains("at most 10000 are read"));
+    let mut bytes = std::io::Cursor::new(xlsx());
+    let mut archive = zip::ZipWriter::new_append(&mut bytes).unwrap();
+    archive.shallow_copy_file("xl/worksheets/sheet1.xml", "xl/worksheets/sheet2.xml").unwrap();
+    archive.finish().unwrap();
+    assert!(refusal(&bytes.into_inner()).contains("overlap"));
 }
 
 #[test]

@@ -89,7 +89,7 @@ fn candidates(
                 let (low, high) = (unit.unit.to_inside(low), unit.unit.to_inside(high));
                 fits(channel, low, high) || looks_like_gauge(channel, low, high)
             }
-            None => !fitting_units(channel, low, high).is_empty(),
+            None => !fitting_units(channel, low, high, 0.0).is_empty(),
         };
         // What was computed by the stand counts after what was measured.
         let derived = if is_derived(&plain(&column.name)) { 15 } else { 0 };
@@ -117,7 +117,7 @@ fn entry(
     };
     let data = &survey.columns[best.column];
     let (low, high) = (data.quantile(OUTER), data.quantile(1.0 - OUTER));
-    let fitting = fitting_units(channel, low, high);
+    let fitting = fitting_units(channel, low, high, 0.0);
     let symbols =
         |units: &[&'static Unit]| units.iter().map(|unit| unit.symbol()).collect::<Vec<_>>().join(" or ");
     match (units[best.column], fitting.as_slice()) {

@@ -1,0 +1,73 @@
+//! The point that a step held, as it was measured: what tells points apart where nothing says what was commanded.
+
+use crate::{Channel, Recording, Series, StepMarker};
+
+/// Channels that jump with the points of a map, each with the share of itself by which it moves at least: less is the same
+/// point. Temperatures follow for minutes, and say nothing about the beginning of a step.
+pub const JUMPS: [(Channel, f64); 4] = [
+    (Channel::ShaftSpeed, 0.01),
+    (Channel::CompressorFlow, 0.02),
+    (Channel::P3, 0.015),
+    (Channel::P2, 0.015),
+];
+
+/// As in [`JUMPS`], of the valve's opening.
+pub const VALVE_JUMP_RATIO: f64 = 0.02;
+
+/// Medians of the second half of a step; NaN where there are none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeldPoint {
+    speed_rpm: f64,
+    flow_kg_s: f64,
+    p3_pa: f64,
+    valve_opening_ratio: f64,
+}
+
+impl HeldPoint {
+    /// What a step held; `None` where targets or a commanded P3 and valve say it.
+    pub fn of(recording: &Recording, step: &StepMarker) -> Option<HeldPoint> {
+        let commanded = recording.series.contains_key(&Channel::P3Command)
+            && step.p3_pa.is_finite()
+            && step.valve_opening_ratio.is_finite();
+        if step.to.is_some() || commanded {
+            return None;
+        }
+        let held = |channel: Channel| {
+            recording
+                .series
+                .get(&channel)
+                .map_or(f64::NAN, |series| median(series, 0.5 * (step.start_s + step.end_s), step.end_s))
+        };
+        Some(HeldPoint {
+            speed_rpm: held(Channel::ShaftSpeed),
+            flow_kg_s: held(Channel::CompressorFlow),
+            p3_pa: held(Channel::P3),
+            valve_opening_ratio: step.valve_opening_ratio,
+        })
+    }
+
+    /// Whether two steps held the same point: equal speed and P3, and equal opening of the valve, or where that is not known
+    /// equal flow, each to what would be a jump. A point without speed is like none.
+    pub fn is_same(&self, other: &HeldPoint) -> bool {
+        let ratio =
+            |channel: Channel| JUMPS.iter().find(|(of, _)| *of == channel).map_or(0.0, |(_, ratio)| *ratio);
+        let alike = |a: f64, b: f64, ratio: f64| (a - b).abs() <= ratio * a.abs().max(b.abs());
+        let unknown_or_alike = |a: f64, b: f64, ratio: f64| a.is_nan() && b.is_nan() || alike(a, b, ratio);
+        let opening = (self.valve_opening_ratio, other.valve_opening_ratio);
+        let third = if opening.0.is_nan() && opening.1.is_nan() {
+            alike(self.flow_kg_s, other.flow_kg_s, ratio(Channel::CompressorFlow))
+        } else {
+            alike(opening.0, opening.1, VALVE_JUMP_RATIO)
+        };
+        third
+            && alike(self.speed_rpm, other.speed_rpm, ratio(Channel::ShaftSpeed))
+            && unknown_or_alike(self.p3_pa, other.p3_pa, ratio(Channel::P3))
+    }
+}
+
+fn median(series: &Series, start_s: f64, end_s: f64) -> f64 {
+    let mut values: Vec<f64> =
+        series.slice(start_s, end_s).1.iter().copied().filter(|value| value.is_finite()).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}

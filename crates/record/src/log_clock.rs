@@ -1,0 +1,167 @@
+//! The clock of a group of rows: single times that are wrong are passed over, and one that starts again ends the reading.
+
+/// A row that is further than this from both rows beside it has a wrong time, s.
+pub(crate) const STRAY_S: f64 = 86_400.0;
+
+/// Times beyond this are no times, s: a century, within what the clock of a series holds.
+const LONGEST_S: f64 = 3.2e9;
+
+/// Intervals by which a clock may step back: loggers write a few rows out of order.
+const BACK_INTERVALS: f64 = 5.0;
+
+/// A clock may step back by this much at any rate, s: it was set by another clock.
+const BACK_S: f64 = 2.0;
+
+/// Intervals that are remembered.
+const REMEMBERED: usize = 15;
+
+/// A clock that goes back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Restart {
+    /// Number of the row, from 1.
+    pub(crate) row: u64,
+    pub(crate) from_s: f64,
+    pub(crate) to_s: f64,
+}
+
+/// Passes rows on, one row late.
+#[derive(Debug, Default)]
+pub(crate) struct LogClock {
+    rows: u64,
+    held: Option<(f64, Vec<f64>)>,
+    last_s: Option<f64>,
+    intervals_s: Vec<f64>,
+    /// How many rows were passed over.
+    pub(crate) strays: u64,
+    /// The first time that was passed over, s.
+    pub(crate) stray_s: f64,
+}
+
+/// Takes the time and the values of a row.
+pub(crate) type TakeRow<'a> = dyn FnMut(f64, &[f64]) + 'a;
+
+impl LogClock {
+    /// Takes the next row.
+    ///
+    /// # Errors
+    /// [`Restart`] where the clock starts again.
+    pub(crate) fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) -> Result<(), Restart> {
+        self.rows += 1;
+        if !t_s.is_finite() || t_s.abs() >= LONGEST_S {
+            self.stray(t_s);
+            return Ok(());
+        }
+        let mut place = Vec::new();
+        if let Some((held_s, held)) = self.held.take() {
+            match self.last_s {
+                // The first row of all: what comes behind it tells.
+                None if (t_s - held_s).abs() > STRAY_S => self.stray(held_s),
+                Some(last_s) if self.goes_back(last_s, held_s) => {
+                    if self.goes_back(last_s, t_s) {
+                        return Err(Restart { row: self.rows - 1, from_s: last_s, to_s: held_s });
+                    }
+                    self.stray(held_s);
+                }
+                Some(last_s)
+                    if held_s - last_s > STRAY_S
+                        && held_s - t_s > STRAY_S
+                        && !self.goes_back(last_s, t_s) =>
+                {
+                    self.stray(held_s);
+                }
+                _ => self.accept(held_s, &held, take),
+            }
+            place = held;
+        }
+        place.clear();
+        place.extend_from_slice(values);
+        self.held = Some((t_s, place));
+        Ok(())
+    }
+
+    /// Passes the last row on.
+    pub(crate) fn finish(&mut self, take: &mut TakeRow<'_>) {
+        let Some((held_s, held)) = self.held.take() else { return };
+        match self.last_s {
+            Some(last_s) if held_s - last_s > STRAY_S || self.goes_back(last_s, held_s) => self.stray(held_s),
+            _ => self.accept(held_s, &held, take),
+        }
+    }
+
+    fn accept(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
+        if let Some(interval_s) = self.last_s.map(|last_s| t_s - last_s).filter(|step| *step > 0.0) {
+            if self.intervals_s.len() >= REMEMBERED {
+                self.intervals_s.remove(0);
+            }
+            self.intervals_s.push(interval_s);
+        }
+        self.last_s = Some(t_s);
+        take(t_s, values);
+    }
+
+    fn stray(&mut self, t_s: f64) {
+        if self.strays == 0 {
+            self.stray_s = t_s;
+        }
+        self.strays += 1;
+    }
+
+    fn goes_back(&self, last_s: f64, t_s: f64) -> bool {
+        let back_s = last_s - t_s;
+        if back_s <= BACK_S {
+            return false;
+        }
+        let typical_s = mapper_numerics::statistics::median(&self.intervals_s).unwrap_or(0.0);
+        back_s > BACK_INTERVALS * typical_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn through(times_s: &[f64]) -> (Vec<f64>, u64, Option<Restart>) {
+        let (mut clock, mut out) = (LogClock::default(), Vec::new());
+        let mut take = |t_s: f64, values: &[f64]| {
+            assert_eq!(values, [2.0 * t_s]);
+            out.push(t_s);
+        };
+        let restart = times_s.iter().find_map(|t_s| clock.push(*t_s, &[2.0 * t_s], &mut take).err());
+        clock.finish(&mut take);
+        (out, clock.strays, restart)
+    }
+
+    #[test]
+    fn a_single_wrong_time_is_passed_over_wherever_it_stands() {
+        let good: Vec<f64> = (0..100).map(|row| f64::from(row) / 10.0).collect();
+        for wrong in [1e9, -1e9, f64::NAN, 1e300] {
+            for at in [0, 50, 100] {
+                let mut times_s = good.clone();
+                times_s.insert(at, wrong);
+                assert_eq!(through(&times_s), (good.clone(), 1, None), "{wrong} at {at}");
+            }
+        }
+        // Back to 0 for one row.
+        let mut times_s = good.clone();
+        times_s.insert(90, 0.0);
+        assert_eq!(through(&times_s), (good, 1, None));
+    }
+
+    #[test]
+    fn a_clock_that_starts_again_says_where() {
+        let run = || (0..100).map(|row| f64::from(row) / 10.0);
+        let times_s: Vec<f64> = run().chain(run()).collect();
+        let restart = through(&times_s).2.unwrap();
+        assert_eq!(restart, Restart { row: 101, from_s: 9.9, to_s: 0.0 });
+    }
+
+    #[test]
+    fn pauses_and_rows_a_little_out_of_order_stay() {
+        let weekend = [0.0, 0.1, 0.2, 2e5, 2e5 + 0.1, 2e5 + 0.05, 2e5 + 0.2];
+        assert_eq!(through(&weekend), (weekend.to_vec(), 0, None));
+        // Once a minute, and four minutes back.
+        let slow = [0.0, 60.0, 120.0, 180.0, 240.0, 0.0, 60.0, 300.0];
+        assert_eq!(through(&slow).2, None);
+        assert_eq!(through(&[5.0]).0, [5.0]);
+    }
+}

@@ -1,0 +1,200 @@
+//! What a workbook would unpack to, before a library unpacks it without bounds.
+
+use super::NAME;
+use mapper_logs::{LogError, LogFile};
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+use std::cell::Cell;
+use std::io::{self, BufReader, Read};
+use std::rc::Rc;
+
+/// Largest part of a workbook beside its sheets, unpacked, bytes: all of it is held in memory.
+const PART_LIMIT: u64 = 128 << 20;
+
+/// Largest part with the formats of cells, unpacked, bytes: each format holds copies of what it names.
+const STYLES_LIMIT: u64 = 8 << 20;
+
+/// All parts together, unpacked, bytes: a sheet of a million rows with 40 columns.
+const WHOLE_LIMIT: u64 = 4 << 30;
+
+/// Most parts.
+const PART_COUNT_LIMIT: usize = 10_000;
+
+/// Longest piece between two tags, or tag, bytes, and longest cell: Excel's own limit of a cell is 32 767 letters.
+const PIECE_LIMIT: u64 = 1 << 20;
+
+/// Longest tag among the formats of cells, bytes: Excel's own limit of a number format is 255 letters.
+const STYLE_PIECE_LIMIT: u64 = 1 << 12;
+
+/// Elements within each other: a cell of rich text has ten.
+const DEPTH_LIMIT: usize = 64;
+
+/// Fewest bytes of a shared string, `<si/>`.
+const SHARED_STRING_BYTES: u64 = 5;
+
+/// Which parts are looked into: calamine bounds nothing in them.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Sheet,
+    SharedStrings,
+    Styles,
+    Other,
+}
+
+impl Kind {
+    fn of(name: &str) -> Kind {
+        let name = name.to_ascii_lowercase().replace('\\', "/");
+        match name {
+            name if name.ends_with("sharedstrings.xml") => Kind::SharedStrings,
+            name if name.ends_with("styles.xml") => Kind::Styles,
+            name if name.starts_with("xl/worksheets/") && name.ends_with(".xml") => Kind::Sheet,
+            _ => Kind::Other,
+        }
+    }
+
+    fn limit(self) -> u64 {
+        match self {
+            Kind::Sheet => WHOLE_LIMIT,
+            Kind::Styles => STYLES_LIMIT,
+            Kind::SharedStrings | Kind::Other => PART_LIMIT,
+        }
+    }
+}
+
+/// Refuses what would unpack to more than there is memory for.
+pub(super) fn check(file: &LogFile) -> Result<(), LogError> {
+    let refused = |message: String| file.content(NAME, message);
+    let wrong = |error: zip::result::ZipError| refused(error.to_string());
+    let mut archive = zip::ZipArchive::new(file.open()?).map_err(wrong)?;
+    if archive.len() > PART_COUNT_LIMIT {
+        return Err(refused(format!("it has {} parts; at most {PART_COUNT_LIMIT} are read", archive.len())));
+    }
+    if archive.has_overlapping_files().map_err(wrong)? {
+        return Err(refused("its parts overlap: the same bytes are unpacked several times".to_owned()));
+    }
+    let mut left = WHOLE_LIMIT;
+    for index in 0..archive.len() {
+        let part = archive.by_index(index).map_err(wrong)?;
+        let name = part.name().map_err(wrong)?.into_owned();
+        let read = check_part(part, Kind::of(&name), left).map_err(|why| refused(format!("{name} {why}")))?;
+        left -= read;
+    }
+    Ok(())
+}
+
+/// Bytes that a part unpacks to, or what is wrong with it.
+fn check_part(part: impl Read, kind: Kind, left: u64) -> Result<u64, String> {
+    let limit = kind.limit().min(left);
+    let read = Rc::new(Cell::new(0));
+    let piece = Rc::new(Cell::new(0));
+    let mut counted = Counted { inner: part.take(limit + 1), read: read.clone(), piece: piece.clone() };
+    if kind == Kind::Other {
+        io::copy(&mut counted, &mut io::sink()).map_err(|error| error.to_string())?;
+    } else {
+        // What the buffer takes ahead belongs to no piece.
+        let buffer = 1 << 13;
+        let pieces = Pieces { kind, read: read.clone(), piece, buffer: buffer as u64 };
+        let found = pieces.check(Reader::from_reader(BufReader::with_capacity(buffer, counted)));
+        if read.get() <= limit {
+            found?;
+        }
+    }
+    if read.get() > limit {
+        return Err(format!("unpacks to more than {} MiB, or all parts together to more than {} MiB", kind.limit() >> 20, WHOLE_LIMIT >> 20));
+    }
+    Ok(read.get())
+}
+
+/// Counts what is read, and ends the reading where one piece is too long.
+struct Counted<R> {
+    inner: R,
+    read: Rc<Cell<u64>>,
+    /// How far a piece may reach, bytes from the start; 0 for no bound.
+    piece: Rc<Cell<u64>>,
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.piece.get() > 0 && self.read.get() > self.piece.get() {
+            return Err(io::Error::other("has a cell, a text or a tag that is too long"));
+        }
+        let count = self.inner.read(buffer)?;
+        self.read.set(self.read.get() + count as u64);
+        Ok(count)
+    }
+}
+
+struct Pieces {
+    kind: Kind,
+    read: Rc<Cell<u64>>,
+    piece: Rc<Cell<u64>>,
+    buffer: u64,
+}
+
+impl Pieces {
+    fn check<R: io::BufRead>(&self, mut xml: Reader<R>) -> Result<(), String> {
+        let piece_limit = match self.kind {
+            Kind::Sheet => PIECE_LIMIT,
+            Kind::Styles => STYLE_PIECE_LIMIT,
+            // Shared strings are cut where they are used.
+            Kind::SharedStrings | Kind::Other => PART_LIMIT,
+        };
+        let (mut buffer, mut depth) = (Vec::new(), 0usize);
+        // Depth of the cell that is being read: texts of several pieces become one there.
+        let mut cell: Option<usize> = None;
+        let mut strings = 0;
+        loop {
+            buffer.clear();
+            if cell.is_none() {
+                self.piece.set(self.read.get() + self.buffer + piece_limit);
+            }
+            let event = xml.read_event_into(&mut buffer).map_err(|error| match error {
+                quick_xml::Error::Io(error) => error.to_string(),
+                error => format!("is no XML: {error}"),
+            })?;
+            match event {
+                Event::Start(tag) => {
+                    depth += 1;
+                    strings = self.declared_strings(&tag, strings)?;
+                    if cell.is_none() && self.kind == Kind::Sheet && tag.local_name().as_ref() == "c" {
+                        cell = Some(depth);
+                    }
+                }
+                Event::Empty(tag) => strings = self.declared_strings(&tag, strings)?,
+                Event::End(_) => {
+                    cell = cell.filter(|of_cell| depth > *of_cell);
+                    depth = depth.saturating_sub(1);
+                }
+                Event::Eof => break,
+                _ => {}
+            }
+            if depth > DEPTH_LIMIT {
+                return Err(format!("has more than {DEPTH_LIMIT} elements within each other"));
+            }
+        }
+        if strings > self.read.get() / SHARED_STRING_BYTES {
+            return Err(format!("claims {strings} strings in {} bytes", self.read.get()));
+        }
+        Ok(())
+    }
+
+    /// The largest number of shared strings that is declared: the library makes room for as many.
+    fn declared_strings(&self, tag: &BytesStart<'_>, before: u64) -> Result<u64, String> {
+        if self.kind != Kind::SharedStrings || tag.local_name().as_ref() != "sst" {
+            return Ok(before);
+        }
+        let mut most = before;
+        for attribute in tag.attributes().with_checks(false) {
+            let attribute = attribute.map_err(|error| format!("is no XML: {error}"))?;
+            if attribute.key.local_name().as_ref() == "uniqueCount" {
+                let count = attribute.value.trim().parse();
+                most = most.max(count.map_err(|_| format!("claims `{}` strings", short(&attribute.value)))?);
+            }
+        }
+        Ok(most)
+    }
+}
+
+fn short(text: &str) -> String {
+    text.chars().take(40).collect()
+}

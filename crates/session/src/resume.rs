@@ -3,7 +3,7 @@
 use crate::journal::{Identity, JournalPart, read_journal};
 use crate::{SessionError, run_directory};
 use mapper_campaign::Campaign;
-use mapper_core::{Plan, PlanStep, SampleBatch, StepKind, StepMarker};
+use mapper_core::{Plan, PlanStep, StepKind};
 use mapper_runner::{StepSource, StepSourceError};
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
@@ -129,14 +129,6 @@ impl StepSource for MissingSteps<'_> {
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
         Ok(self.next.pop_front())
-    }
-
-    fn on_batch(&mut self, _: &SampleBatch) -> bool {
-        false
-    }
-
-    fn after_step(&mut self, _: &StepMarker) -> Result<(), StepSourceError> {
-        Ok(())
     }
 
     fn take_notes(&mut self) -> Vec<String> {

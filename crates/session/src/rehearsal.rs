@@ -3,6 +3,7 @@
 use crate::drive::drive;
 use crate::planned::plan;
 use crate::scripted_steps::ScriptedSteps;
+use crate::surge::count_surge_search;
 use crate::{Session, SessionError};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{BackendChoice, SequenceSource};
@@ -51,10 +52,11 @@ pub fn rehearse(
         }
         RunEnd::Interrupted { .. } => return Err(SessionError::Interrupted),
     }
-    let plan = steps.steps.executed(&base);
+    let mut plan = steps.steps.executed(&base);
     if plan.steps.is_empty() {
         return Err(SessionError::NoSteps { path: source.path.clone() });
     }
+    count_surge_search(campaign, model, &mut plan);
     Ok(Rehearsal { plan, notes: steps.notes })
 }
 
@@ -112,7 +114,8 @@ fn base_plan(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Res
     let canonical = serde_json::to_string(&without_script)?;
     // The planner plans one point alone: the script has the say over the others.
     let points = campaign.points.iter().copied().take(1).collect();
-    let mut plan = plan(&Campaign { points, order: VisitOrder::Listed, ..without_script }, model)?;
+    let mut plan =
+        plan(&Campaign { points, order: VisitOrder::Listed, surge_search: None, ..without_script }, model)?;
     plan.objective = OBJECTIVE.to_owned();
     plan.made_from.campaign_sha256 = mapper_planner::sha256_hex(&canonical);
     plan.made_from.script_sha256 = Some(mapper_planner::sha256_hex(&source.text));

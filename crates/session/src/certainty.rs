@@ -31,7 +31,9 @@ const APART_S: f64 = 2.0;
 const LAST_S: f64 = 6.0;
 const MOST_TRIED: f64 = 60.0;
 /// How often dwells and the errors that they are forecast to give are brought together.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 4;
+/// So close to the required error they are no further.
+const CLOSE_RATIO: f64 = 0.01;
 /// Halvings of the logarithm of the price, and the prices between which it is sought, fraction^2/s.
 const HALVINGS: usize = 40;
 const PRICES: (f64, f64) = (1e-16, 1.0);
@@ -109,15 +111,23 @@ pub(crate) struct DwellPrices {
 pub fn retimed(campaign: &Campaign, request: &PlanRequest<'_>, plan: Plan) -> Result<Plan, SessionError> {
     let joint = campaign.identification.method == Method::Joint && campaign.sequence.is_none();
     let Some(required) = campaign.required_sigma_eta.filter(|_| joint) else { return Ok(plan) };
-    let (mut retimed, mut between) = (plan.clone(), None);
+    let reaches = |error: Option<f64>| error.is_some_and(|error| error <= REACHED_RATIO * required);
+    let (mut now, mut between) = (plan.clone(), None);
+    // One dwell for all is a choice that prices have too.
+    let mut shortest = Some(plan.clone()).filter(|plan| reaches(plan.figures.open_rms_error_eta));
     for _ in 0..ROUNDS {
-        let Some(prices) = DwellPrices::about(campaign, request, &retimed, Some(required))? else { break };
+        let Some(prices) = DwellPrices::about(campaign, request, &now, Some(required))? else { break };
         between = Some([LESS_NOISE_RATIO, MORE_NOISE_RATIO].map(|ratio| prices.with_noise(ratio)));
-        retimed = with_dwells(request, &retimed, &prices.dwells_s(prices.price), false)?.plan;
-        if retimed.figures.open_rms_error_eta.is_some_and(|error| error <= REACHED_RATIO * required) {
+        now = with_dwells(request, &now, &prices.dwells_s(prices.price), false)?.plan;
+        let error = now.figures.open_rms_error_eta;
+        if reaches(error) && shortest.as_ref().is_none_or(|plan| now.figures.minutes < plan.figures.minutes) {
+            shortest = Some(now.clone());
+        }
+        if error.is_some_and(|error| (error / required - 1.0).abs() <= CLOSE_RATIO) {
             break;
         }
     }
+    let retimed = shortest.unwrap_or(now);
     let dwells_s: Vec<f64> = retimed.steps.iter().map(|step| step.dwell_s).collect();
     let Retimed { plan: mut retimed, forbidden } = with_dwells(request, &retimed, &dwells_s, true)?;
     if let Some(why) = forbidden.first() {

@@ -7,7 +7,7 @@ use crate::surge::count_surge_search;
 use crate::{Session, SessionError};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{BackendChoice, SequenceSource};
-use mapper_core::{Plan, PlanStep, SampleBatch, StepMarker, VisitOrder};
+use mapper_core::{Plan, PlanStep, StepMarker, VisitOrder};
 use mapper_physics::model::Model;
 use mapper_runner::{RunEnd, RunError, RunObserver, StepSource, StepSourceError};
 
@@ -71,20 +71,16 @@ struct Rehearsing {
 }
 
 impl StepSource for Rehearsing {
-    fn warm_up_s(&self) -> f64 {
-        self.steps.warm_up_s()
+    fn inner(&self) -> Option<&dyn StepSource> {
+        Some(&self.steps)
     }
 
-    fn cool_down_s(&self) -> f64 {
-        self.steps.cool_down_s()
+    fn inner_mut(&mut self) -> Option<&mut dyn StepSource> {
+        Some(&mut self.steps)
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
         self.steps.next_step()
-    }
-
-    fn on_batch(&mut self, batch: &SampleBatch) -> bool {
-        self.steps.on_batch(batch)
     }
 
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
@@ -95,10 +91,6 @@ impl StepSource for Rehearsing {
                 result.h_w_m2k().map(|h| result.sigma_h_w_m2k() / h).filter(|ratio| ratio.is_finite());
         }
         Ok(())
-    }
-
-    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        self.steps.skipped(marker)
     }
 
     fn take_notes(&mut self) -> Vec<String> {

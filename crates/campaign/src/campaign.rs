@@ -21,7 +21,7 @@ use crate::elements::tolerances::TolerancesElement;
 use crate::elements::zero::ZeroFile;
 use crate::units::{Fraction, Quantity};
 use mapper_core::{
-    Channel, GuardSet, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats,
+    Channel, GuardSet, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats, Replan,
     SafeTrajectory, Soak, SpeedControlSettings, SurgeSeek, Timing, VisitOrder,
 };
 use mapper_physics::follow_outlet::FollowOutlet;
@@ -82,6 +82,9 @@ pub struct Campaign {
     pub identification: Identification,
     /// Order of the points.
     pub order: VisitOrder,
+    /// Whether what is left is planned again while the campaign runs.
+    #[serde(skip_serializing_if = "Replan::is_off")]
+    pub replan: Replan,
     /// The script that says which step comes next, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sequence: Option<SequenceSource>,
@@ -169,6 +172,10 @@ pub(crate) struct CampaignFile {
     /// Order of the points. `sum_gradient`, the default, maximises the sum of the thermal gradients, `worst_gradient` the smallest of them; `information` minimises the predicted error of the efficiency; `time` makes the campaign as short as possible and chooses each dwell; `greedy` looks one step ahead; `listed` keeps the order of the grid.
     #[serde(default)]
     order: VisitOrder,
+    /// Whether the order of what is left is thought over while the campaign runs: `after_each_step`, by what the steps so far have told, or `off`, the default. It needs the joint method. A point that a guard has left out is tried again at the end.
+    #[serde(default)]
+    #[schemars(example = &"after_each_step")]
+    replan: Replan,
     /// A rhai script that says which step comes next, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/sequences.md says what it may call.
     #[schemars(regex(pattern = r"\.rhai$"), example = &"scripts/zigzag.rhai")]
     sequence: Option<String>,
@@ -254,6 +261,7 @@ impl CampaignFile {
             zero: self.zero.map(|zero| zero.soak(boundary.t1_k)),
             identification: self.identification.unwrap_or_default().identification(alpha_area_ratio),
             order: self.order,
+            replan: self.replan,
             sequence: sequence(self.sequence.as_deref(), origin, files)?,
             required_sigma_eta: self.required_sigma_eta.map(|error| error.inside),
             repeats: repeats(self.repeats),

@@ -114,6 +114,14 @@ fn orders_and_repeats_fit_the_rest() {
         "the error that is to be reached",
         "required_sigma_eta",
     );
+    one(
+        "campaign: short\n",
+        "campaign: short\nreplan: after_each_step\norder: listed\n",
+        Kind::Conflict,
+        "after_each_step",
+        "keeps the order of the grid",
+        "`replan: off`",
+    );
     let (text, _) = with(
         "campaign: short\n",
         "campaign: short\nrepeats: {jump: {from: {speed: 90 krpm, opening: 0.7}, to: {speed: 90000 rpm, opening: 0.7}}}\n",

@@ -137,7 +137,7 @@ pub struct PlanFigures {
     /// Largest predicted error of the efficiency, standard error and bias in quadrature (fraction).
     #[serde(default)]
     pub worst_error_eta: Option<f64>,
-    /// Duration of the run, warm-up and cool-down included, minutes.
+    /// Duration of the run, warm-up, cool-down and the search for surge included, minutes.
     pub minutes: f64,
 }
 
@@ -175,6 +175,9 @@ pub struct Plan {
     pub cool_down_s: f64,
     /// The steps in order.
     pub steps: Vec<PlanStep>,
+    /// Time that seeking surge behind the steps is forecast to take, s; 0 where it is not sought.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub surge_search_s: f64,
     /// The plan in four numbers.
     pub figures: PlanFigures,
     /// How good the best order can be; `None` where the order was not searched for.
@@ -188,9 +191,14 @@ pub struct Plan {
     pub remarks: Vec<String>,
 }
 
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 impl Plan {
-    /// Duration of the whole run, warm-up and cool-down included, s.
+    /// Duration of the whole run, warm-up, cool-down and the search for surge included, s.
     pub fn duration_s(&self) -> f64 {
-        self.warm_up_s + self.steps.iter().map(|step| step.dwell_s).sum::<f64>() + self.cool_down_s
+        let steps_s = self.steps.iter().map(|step| step.dwell_s).sum::<f64>();
+        self.warm_up_s + steps_s + self.surge_search_s + self.cool_down_s
     }
 }

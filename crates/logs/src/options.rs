@@ -262,9 +262,10 @@ impl LogOptions {
     /// What to do about the first other one.
     pub fn only(&self, used: &[&str]) -> Result<(), String> {
         match self.given().into_iter().find(|key| !used.contains(key)) {
-            Some(key) => {
-                Err(format!("`{key}` means nothing in this format: leave it out; its keys are {}", used.join(", ")))
-            }
+            Some(key) => Err(format!(
+                "`{key}` means nothing in this format: leave it out; its keys are {}",
+                used.join(", ")
+            )),
             None => Ok(()),
         }
     }
@@ -289,7 +290,9 @@ mod tests {
         for key in OPTION_KEYS {
             let mut options = LogOptions::default();
             options.set(key.name, key.example).unwrap();
-            assert!(options.only(&[key.name]).is_ok() && options.only(&["x"]).unwrap_err().contains(key.name));
+            assert!(
+                options.only(&[key.name]).is_ok() && options.only(&["x"]).unwrap_err().contains(key.name)
+            );
             assert!(options.without(&[key.name]).is_err() && options.without(&["x"]).is_ok());
         }
     }

@@ -25,11 +25,16 @@ pub(crate) fn cost_of(open_rms_error_eta: Option<f64>, minutes: f64) -> f64 {
     open_rms_error_eta.map_or(f64::INFINITY, |rms| rms * rms * minutes)
 }
 
-/// How a plan is made under one order.
-type Make = fn(&PlanRequest<'_>) -> Result<Plan, PlanError>;
+/// Whether one plan costs less than so many times the other: mean square error times minutes.
+pub fn clearly_cheaper(one: &Plan, other: &Plan, ratio: f64) -> bool {
+    cost(one) < ratio * cost(other)
+}
 
-/// The plan under each order that allows one, the cheapest first.
-pub(crate) fn all(request: &PlanRequest<'_>, make: Make) -> Result<Vec<Plan>, PlanError> {
+/// The plan under each order that allows one, the cheapest first; `make` makes one.
+pub(crate) fn all<E: Send>(
+    request: &PlanRequest<'_>,
+    make: impl Fn(&PlanRequest<'_>) -> Result<Plan, E> + Sync,
+) -> Result<Vec<Plan>, E> {
     let made = parallel::map(&ORDERS, |order| make(&PlanRequest { order: *order, ..request.clone() }));
     let (mut plans, mut failed) = (Vec::new(), None);
     for made in made {
@@ -45,8 +50,14 @@ pub(crate) fn all(request: &PlanRequest<'_>, make: Make) -> Result<Vec<Plan>, Pl
     }
 }
 
-/// The cheapest of them, with what it was chosen from.
-pub(crate) fn best(request: &PlanRequest<'_>, make: Make) -> Result<Plan, PlanError> {
+/// The cheapest of them, with what it was chosen from; `make` makes the plan of each order.
+///
+/// # Errors
+/// Those of `make`, where no order allows a plan.
+pub fn best<E: From<PlanError> + Send>(
+    request: &PlanRequest<'_>,
+    make: impl Fn(&PlanRequest<'_>) -> Result<Plan, E> + Sync,
+) -> Result<Plan, E> {
     let plans = all(request, make)?;
     let told: Vec<String> = plans.iter().map(told).collect();
     let mut best = plans.into_iter().next().ok_or(PlanError::NoPoints)?;

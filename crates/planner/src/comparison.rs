@@ -3,7 +3,6 @@
 use crate::best::all;
 use crate::method::ForecastRow;
 use crate::order::by_speed_line;
-use crate::plan::make_plan;
 use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::{OperatingPoint, Plan};
@@ -97,14 +96,19 @@ pub fn along_speed_lines(points: &[OperatingPoint]) -> Vec<OperatingPoint> {
     order
 }
 
-/// Compares `plan` with conventional mapping and with the other orders.
+/// Compares `plan` with conventional mapping and with the other orders; `make` makes a plan as that one was made, else they would
+/// not be held against it but against how it was made.
 ///
 /// # Errors
-/// [`PlanError`] where a simulation fails, or no order is allowed.
-pub fn compare(request: &PlanRequest<'_>, plan: &Plan) -> Result<Comparison, PlanError> {
+/// [`PlanError`] where a simulation fails, or no order is allowed, as an error of `make`.
+pub fn compare<E: From<PlanError> + Send>(
+    request: &PlanRequest<'_>,
+    plan: &Plan,
+    make: impl Fn(&PlanRequest<'_>) -> Result<Plan, E> + Sync,
+) -> Result<Comparison, E> {
     let order = along_speed_lines(request.points);
     let targets = reachable(request, &order)?;
-    let plans = all(&PlanRequest { appended: None, ..request.clone() }, make_plan)?;
+    let plans = all(&PlanRequest { appended: None, ..request.clone() }, make)?;
     Ok(Comparison {
         proposed: planned(plan),
         conventional: conventional(request, &order, &targets)?,

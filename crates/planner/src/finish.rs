@@ -41,6 +41,7 @@ pub(crate) fn finished(
         bound_remark: bound_remark(request, bound.as_ref()),
         bound,
         steps,
+        surge_search_s: 0.0,
     }
 }
 
@@ -95,14 +96,14 @@ fn remarks(request: &PlanRequest<'_>, steps: &[PlanStep], repeated: Option<Opera
 }
 
 /// What of the required error is not reached within the longest dwell.
-fn not_reached(request: &PlanRequest<'_>, steps: &[PlanStep]) -> Option<String> {
+pub(crate) fn not_reached(request: &PlanRequest<'_>, steps: &[PlanStep]) -> Option<String> {
     let required = request.required_sigma_eta?;
     let (percent, longest_s) = (100.0 * required, request.timing.dwell_s);
     if request.method.is_some_and(|method| method.is_joint()) {
         let found = open_rms_error_eta(steps)?;
         return (found > REACHED_RATIO * required).then(|| {
             format!(
-                "steps of {longest_s:.0} s reach an error of {:.2} points of efficiency (rms), not the {percent:.2} that are required",
+                "steps of up to {longest_s:.0} s reach an error of {:.2} points of efficiency (rms), not the {percent:.2} that are required",
                 100.0 * found
             )
         });

@@ -32,14 +32,14 @@ pub(crate) struct Surface(pub(crate) [f64; 5]);
 
 impl Surface {
     #[inline]
-    fn at(&self, c: f64, t: f64, w: f64) -> f64 {
+    pub(crate) fn at(&self, c: f64, t: f64, w: f64) -> f64 {
         let k = &self.0;
         k[0] + (k[1] + k[4] * c) * c + k[2] * t + k[3] * w
     }
 
     /// Through values at the design's starts and their mirror images: the odd part is exact, the even part a line in c^2
     /// by least squares.
-    fn through(values: [[f64; 2]; 3]) -> Self {
+    pub(crate) fn through(values: [[f64; 2]; 3]) -> Self {
         let odd = values.map(|[a, b]| 0.5 * (a - b));
         let even = values.map(|[a, b]| 0.5 * (a + b));
         let [k1, k2, k3] = solve3(DESIGN, odd);
@@ -109,6 +109,7 @@ pub(crate) struct Housing {
     forbidden: HashSet<(usize, usize)>,
     gradient_max_k: f64,
     alike: [f64; 2],
+    scale: Scale,
     /// Whether orders end where they begin.
     pub(crate) returns: bool,
 }
@@ -152,11 +153,7 @@ impl Housing {
         worth: Option<&dyn WorthOfStep>,
     ) -> Result<Self, PlanError> {
         let scale = Scale::of(targets, start);
-        let by_speed = |a: &&SteadyState, b: &&SteadyState| {
-            a.state.shaft_speed_rad_s.total_cmp(&b.state.shaft_speed_rad_s)
-        };
-        let slowest = targets.iter().min_by(by_speed).ok_or(PlanError::NoPoints)?;
-        let fastest = targets.iter().max_by(by_speed).ok_or(PlanError::NoPoints)?;
+        let [slowest, fastest] = ends(targets).ok_or(PlanError::NoPoints)?;
         let aims: Vec<(&SteadyState, OperatingPoint)> = targets.iter().zip(points.iter().copied()).collect();
         let one = |(target, to): &(&SteadyState, OperatingPoint)| {
             response(request, target, &scale, [slowest, fastest], start.is_none(), worth)
@@ -168,6 +165,7 @@ impl Housing {
             forbidden: HashSet::new(),
             gradient_max_k: request.limits.housing_gradient_max_k.unwrap_or(f64::INFINITY),
             alike: [ALIKE_K / scale.half[0], ALIKE_K / scale.half[1]],
+            scale,
             returns: false,
         })
     }
@@ -193,6 +191,18 @@ impl Housing {
         })
     }
 
+    /// A state of the machine, scaled.
+    pub(crate) fn scaled(&self, state: &State) -> [f64; 2] {
+        let [c, t, _] = self.scale.scaled(state);
+        [c, t]
+    }
+
+    /// The starts from which each point was simulated.
+    pub(crate) fn starts(&self, targets: &[SteadyState]) -> Option<[[State; 2]; 3]> {
+        let [slowest, fastest] = ends(targets)?;
+        Some(starts(&self.scale, [slowest, fastest]))
+    }
+
     /// Takes a jump out of the search.
     pub(crate) fn forbid(&mut self, from: usize, to: usize) {
         self.forbidden.insert((from, to));
@@ -212,6 +222,28 @@ impl Housing {
     }
 }
 
+/// The slowest and the fastest of some points.
+fn ends(targets: &[SteadyState]) -> Option<[&SteadyState; 2]> {
+    let by_speed =
+        |a: &&SteadyState, b: &&SteadyState| a.state.shaft_speed_rad_s.total_cmp(&b.state.shaft_speed_rad_s);
+    Some([targets.iter().min_by(by_speed)?, targets.iter().max_by(by_speed)?])
+}
+
+/// The states from which each point is simulated, spread over what a campaign reaches.
+fn starts(scale: &Scale, [slowest, fastest]: [&SteadyState; 2]) -> [[State; 2]; 3] {
+    DESIGN.map(|design| {
+        [1.0, -1.0].map(|sign| {
+            let [c, t, w] = design.map(|x| sign * x);
+            let gas = if w < 0.0 { slowest } else { fastest };
+            State {
+                tc_k: scale.middle[0] + c * scale.half[0],
+                tt_k: scale.middle[1] + t * scale.half[1],
+                ..gas.state
+            }
+        })
+    })
+}
+
 fn response(
     request: &PlanRequest<'_>,
     target: &SteadyState,
@@ -225,15 +257,8 @@ fn response(
     let mut end = [[[0.0; 2]; 3]; 2];
     let mut error = Vec::new();
     let mut worths = worth.map(|_| [[0.0; 2]; 3]);
-    for (i, design) in DESIGN.iter().enumerate() {
-        for (j, sign) in [1.0, -1.0].into_iter().enumerate() {
-            let [c, t, w] = design.map(|x| sign * x);
-            let gas = if w < 0.0 { slowest } else { fastest };
-            let state = State {
-                tc_k: scale.middle[0] + c * scale.half[0],
-                tt_k: scale.middle[1] + t * scale.half[1],
-                ..gas.state
-            };
+    for (i, pair) in starts(scale, [slowest, fastest]).into_iter().enumerate() {
+        for (j, state) in pair.into_iter().enumerate() {
             let forecast = forecast(request, state, &target.boundary, dwell_s, true)?;
             let predicted = &forecast.predicted;
             let dtc_k = predicted.dtc_k.unwrap_or(0.0);

@@ -120,3 +120,109 @@ pub fn order_points(
     let gradients = gradients_k(&housing, &order);
     Ok((order.into_iter().map(|index| subset[index]).collect(), gradients))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::{ForecastRow, WorthOfStep};
+    use mapper_core::{DwellEnd, Limits, SettleBands, Timing, WindowRule};
+    use mapper_physics::model::Model;
+    use proptest::prelude::*;
+
+    /// A worth of no meaning, by what a joint method may look at: the housing on its way, the flow, the jump in speed.
+    #[derive(Debug)]
+    struct AnyWorth([f64; 3]);
+
+    impl WorthOfStep for AnyWorth {
+        fn of(&self, rows: &[ForecastRow]) -> Option<f64> {
+            let (first, last) = (rows.first()?, rows.last()?);
+            let [heat, flow, speed] = self.0;
+            let moved_k = last.tc_k - first.tc_k;
+            let jump = (last.speed_rpm - first.speed_rpm) / 1e5;
+            Some(1e-4 * (heat * moved_k * moved_k / 100.0 + flow * last.flow_kg_s * moved_k + speed * jump))
+        }
+    }
+
+    fn request<'a>(model: &'a Model, points: &'a [OperatingPoint]) -> PlanRequest<'a> {
+        PlanRequest {
+            campaign_name: "test",
+            campaign_canonical: "{}",
+            model,
+            boundary: Default::default(),
+            follow_outlet: Default::default(),
+            points,
+            order: VisitOrder::Information,
+            timing: Timing { warm_up_s: 600.0, dwell_s: 40.0, cool_down_s: 0.0, ends: DwellEnd::Planned },
+            window: WindowRule::Auto,
+            settle_bands: SettleBands::default(),
+            limits: Limits {
+                speed_max_rpm: 180e3,
+                p3_min_pa: 110e3,
+                p3_max_pa: 500e3,
+                p3_stroke_s: None,
+                t3_max_k: None,
+                t2_max_k: None,
+                surge_margin_min_ratio: None,
+                housing_gradient_max_k: None,
+            },
+            repeats: None,
+            return_to_first: false,
+            appended: None,
+            required_sigma_eta: None,
+            method: None,
+            effort: 0.1,
+            seed: 1,
+        }
+    }
+
+    /// All orders of `rest` behind `order`.
+    fn largest(housing: &Housing, order: &mut Vec<usize>, rest: &[usize]) -> f64 {
+        if rest.is_empty() {
+            return Objective::Sum.figure(housing, order);
+        }
+        let mut best = f64::NEG_INFINITY;
+        for (place, next) in rest.iter().enumerate() {
+            let others: Vec<usize> = rest[..place].iter().chain(&rest[place + 1..]).copied().collect();
+            order.push(*next);
+            best = best.max(largest(housing, order, &others));
+            order.pop();
+        }
+        best
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        /// The search for `information` finds what trying all orders finds, and no order exceeds the bound of what it goes by.
+        #[test]
+        fn brute_force_agrees_on_what_steps_are_worth(
+            weights in prop::array::uniform3(-1.0..1.0f64),
+            places in prop::sample::subsequence((0..18usize).collect::<Vec<_>>(), 3..=6),
+            returns in any::<bool>(),
+        ) {
+            let model = Model::nominal();
+            let points: Vec<OperatingPoint> = places
+                .iter()
+                .map(|place| OperatingPoint {
+                    speed_rpm: 50e3 + 20e3 * (place / 3) as f64,
+                    valve_opening_ratio: [0.5, 0.7, 1.0][place % 3],
+                })
+                .collect();
+            let request = request(&model, &points);
+            let targets = reachable(&request, &points).unwrap();
+            let worth = AnyWorth(weights);
+            let mut housing = Housing::of(&request, &points, &targets, None, Some(&worth)).unwrap();
+            housing.returns = returns;
+            let given: Vec<usize> = (0..points.len()).collect();
+            let found = order_on(&housing, &points, &given, &request);
+            let by_worth = housing.by_worth().unwrap();
+            let best = largest(&by_worth, &mut Vec::new(), &given);
+            let value = Objective::Sum.figure(&by_worth, &found.order);
+            prop_assert!(value >= best - 2.0 * PROOF_TOLERANCE_RATIO * best.abs(), "{value} {best}");
+            if let Some(optimistic) = Optimistic::of(&by_worth, &given) {
+                let bound = optimistic.bound(given.len(), None, returns).sum_k;
+                prop_assert!(bound >= best - 1e-9 * best.abs(), "{bound} below {best}");
+            }
+        }
+    }
+}

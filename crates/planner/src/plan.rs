@@ -1,6 +1,6 @@
 //! From a request to a plan.
 
-use crate::best::{best, cost, cost_of};
+use crate::best::{best, cost_of};
 use crate::dwell::FORECASTS;
 use crate::figures::{duration_s, open_rms_error_eta};
 use crate::forecast::MOST_TOGETHER;
@@ -12,8 +12,6 @@ use mapper_core::{Jump, Plan, Repeats, VisitOrder};
 use mapper_numerics::statistics::mean;
 use mapper_physics::steady::SteadyState;
 
-/// Cost of another plan, over this one's, from which on it is worth a word.
-const BEATEN_RATIO: f64 = 0.95;
 /// Effort of a search that only leads to another, over the usual, and the forecasts that it may take.
 const ROUGHLY_RATIO: f64 = 0.03;
 const ROUGH_FORECASTS: usize = 3;
@@ -40,29 +38,7 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
         return best(request, make_plan);
     }
     let targets = reachable(request, request.points)?;
-    let mut plan = with_or_without_return(request, &targets)?;
-    // What is ordered by errors, or goes along speed lines itself, need not be held against them.
-    if request.method.is_some() && !request.order.needs_method() && request.order != VisitOrder::SpeedLines {
-        let lines = PlanRequest { order: VisitOrder::SpeedLines, appended: None, ..request.clone() };
-        let lines = with_or_without_return(&lines, &targets);
-        plan.remarks.extend(lines.ok().and_then(|lines| beaten(&plan, &lines)));
-    }
-    Ok(plan)
-}
-
-/// Says so where the same points along speed lines are forecast to be the better bargain.
-fn beaten(plan: &Plan, lines: &Plan) -> Option<String> {
-    let told = |plan: &Plan| {
-        let figures = &plan.figures;
-        Some(format!("{:.2} points rms in {:.0} min", 100.0 * figures.open_rms_error_eta?, figures.minutes))
-    };
-    (cost(lines) < BEATEN_RATIO * cost(plan)).then_some(())?;
-    Some(format!(
-        "plain speed lines are forecast to do better: {}, this order {}; `mapper plan --compare` shows all orders, `order: best` takes \
-         the best",
-        told(lines)?,
-        told(plan)?
-    ))
+    with_or_without_return(request, &targets)
 }
 
 /// The plan as asked for, or without the way back where that is what a limit forbids.

@@ -1,7 +1,9 @@
 //! The steps of a plan with other dwells: as long as they may last, or as long as they are expected to.
 
 use crate::figures::figures;
+use crate::finish::not_reached;
 use crate::forecast::{Forecast, forecast, with_errors_together};
+use crate::graph::rejections;
 use crate::method::ForecastRow;
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::{Plan, PlanStep};
@@ -29,8 +31,17 @@ pub fn forecast_longer(
     Ok(rows)
 }
 
-/// The plan with these dwells, s, in the same order, forecast anew; `as_declared`: with the errors of a machine that is as
-/// declared, else those are the open ones.
+/// A plan with other dwells.
+#[derive(Debug, Clone)]
+pub struct Retimed {
+    /// The plan: forecast, figures and what is said of the required error are those of its dwells.
+    pub plan: Plan,
+    /// Jumps that a limit forbids from the states in which the machine now makes them, in words.
+    pub forbidden: Vec<String>,
+}
+
+/// The plan with these dwells, s, in the same order, forecast anew and held against the limits; `as_declared`: with the errors of
+/// a machine that is as declared, else those are the open ones.
 ///
 /// # Errors
 /// [`PlanError::Forecast`] where a simulation fails.
@@ -39,16 +50,21 @@ pub fn with_dwells(
     plan: &Plan,
     dwells_s: &[f64],
     as_declared: bool,
-) -> Result<Plan, PlanError> {
+) -> Result<Retimed, PlanError> {
     let mut retimed = plan.clone();
     let mut start_s = plan.warm_up_s;
     for (step, dwell_s) in retimed.steps.iter_mut().zip(dwells_s) {
         (step.start_s, step.dwell_s) = (start_s, *dwell_s);
         start_s += dwell_s;
     }
-    let (mut rows, mut predicted) = (Vec::new(), Vec::new());
+    let (mut rows, mut predicted, mut forbidden) = (Vec::new(), Vec::new(), Vec::new());
+    let mut p3_pa = None;
     along(request, &retimed, |state, boundary, step| {
         let mut found = forecast(request, state, boundary, step.dwell_s, step.from.is_some())?;
+        if let (Some(from), Some(before_pa)) = (step.from, p3_pa.replace(step.p3_pa)) {
+            let reasons = rejections(request, &found, step.p3_pa - before_pa, step.t3_k);
+            forbidden.extend(reasons.iter().map(|reason| format!("{from} to {}: {reason}", step.to)));
+        }
         rows.push(std::mem::take(&mut found.rows));
         predicted.push(found.predicted);
         Ok(found)
@@ -58,7 +74,11 @@ pub fn with_dwells(
         step.predicted = predicted;
     }
     retimed.figures = figures(&retimed.steps, retimed.duration_s() / 60.0);
-    Ok(retimed)
+    // What was said of the dwells before no longer holds.
+    let before = not_reached(request, &plan.steps);
+    retimed.remarks.retain(|remark| Some(remark) != before.as_ref());
+    retimed.remarks.extend(not_reached(request, &retimed.steps));
+    Ok(Retimed { plan: retimed, forbidden })
 }
 
 /// Goes through the steps of a plan, from the warm-up on.

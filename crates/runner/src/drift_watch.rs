@@ -2,7 +2,7 @@
 
 use crate::source::{StepSource, StepSourceError};
 use mapper_core::{
-    Channel, DeclaredUncertainty, OnDrift, OperatingPoint, PlanStep, SampleBatch, Soak, StepKind, StepMarker,
+    Channel, DeclaredUncertainty, OnDrift, OperatingPoint, PlanStep, SampleBatch, StepKind, StepMarker,
 };
 use std::collections::{BTreeMap, VecDeque};
 
@@ -111,16 +111,12 @@ impl<'a> DriftWatch<'a> {
 }
 
 impl StepSource for DriftWatch<'_> {
-    fn soak(&self) -> Option<Soak> {
-        self.inner.soak()
+    fn inner(&self) -> Option<&dyn StepSource> {
+        Some(self.inner)
     }
 
-    fn warm_up_s(&self) -> f64 {
-        self.inner.warm_up_s()
-    }
-
-    fn cool_down_s(&self) -> f64 {
-        self.inner.cool_down_s()
+    fn inner_mut(&mut self) -> Option<&mut dyn StepSource> {
+        Some(self.inner)
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
@@ -145,10 +141,6 @@ impl StepSource for DriftWatch<'_> {
             self.readings.clear();
         }
         Ok(next)
-    }
-
-    fn begins(&mut self, marker: &StepMarker) {
-        self.inner.begins(marker);
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> bool {
@@ -208,10 +200,6 @@ impl StepSource for DriftWatch<'_> {
             self.confirming = false;
         }
         Ok(())
-    }
-
-    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        self.inner.skipped(marker)
     }
 
     fn take_notes(&mut self) -> Vec<String> {

@@ -1,7 +1,7 @@
 //! The soak before a run: the machine at rest, so that sensors which must read the same can be held against each other.
 
 use crate::source::{StepSource, StepSourceError};
-use mapper_core::{PlanStep, SampleBatch, Soak, StepMarker};
+use mapper_core::{PlanStep, Soak};
 
 /// The steps of another source, after a soak. All of them come later by it.
 pub struct Soaked<'a> {
@@ -17,40 +17,20 @@ impl<'a> Soaked<'a> {
 }
 
 impl StepSource for Soaked<'_> {
+    fn inner(&self) -> Option<&dyn StepSource> {
+        Some(self.inner)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn StepSource> {
+        Some(self.inner)
+    }
+
     fn soak(&self) -> Option<Soak> {
         Some(self.soak)
-    }
-
-    fn warm_up_s(&self) -> f64 {
-        self.inner.warm_up_s()
-    }
-
-    fn cool_down_s(&self) -> f64 {
-        self.inner.cool_down_s()
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
         let next = self.inner.next_step()?;
         Ok(next.map(|step| PlanStep { start_s: step.start_s + self.soak.duration_s, ..step }))
-    }
-
-    fn begins(&mut self, marker: &StepMarker) {
-        self.inner.begins(marker);
-    }
-
-    fn on_batch(&mut self, batch: &SampleBatch) -> bool {
-        self.inner.on_batch(batch)
-    }
-
-    fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        self.inner.after_step(marker)
-    }
-
-    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        self.inner.skipped(marker)
-    }
-
-    fn take_notes(&mut self) -> Vec<String> {
-        self.inner.take_notes()
     }
 }

@@ -18,17 +18,34 @@ impl StepSourceError {
 }
 
 /// Yields steps one by one, and sees what becomes of them. Guards and observers look on all the same.
+///
+/// A source that changes the steps of another names it ([`StepSource::inner`] and [`StepSource::inner_mut`], both); whatever it
+/// does not say itself is then as there, and what it is told is passed on.
 pub trait StepSource {
-    /// How the machine rests before the warm-up; not at all by default.
-    fn soak(&self) -> Option<Soak> {
+    /// The source whose steps these are; none by default.
+    fn inner(&self) -> Option<&dyn StepSource> {
         None
     }
 
-    /// Time at the first point before its step, s.
-    fn warm_up_s(&self) -> f64;
+    /// The same, to be told and asked.
+    fn inner_mut(&mut self) -> Option<&mut dyn StepSource> {
+        None
+    }
 
-    /// Time without flow after the last step, s.
-    fn cool_down_s(&self) -> f64;
+    /// How the machine rests before the warm-up; not at all by default.
+    fn soak(&self) -> Option<Soak> {
+        self.inner()?.soak()
+    }
+
+    /// Time at the first point before its step, s; none by default.
+    fn warm_up_s(&self) -> f64 {
+        self.inner().map_or(0.0, StepSource::warm_up_s)
+    }
+
+    /// Time without flow after the last step, s; none by default.
+    fn cool_down_s(&self) -> f64 {
+        self.inner().map_or(0.0, StepSource::cool_down_s)
+    }
 
     /// The next step; `None` ends the run. Its index counts up from 0.
     ///
@@ -37,32 +54,36 @@ pub trait StepSource {
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError>;
 
     /// The step that was handed out last begins with its jump; again where a guard has it made again. Nothing by default.
-    fn begins(&mut self, _marker: &StepMarker) {}
+    fn begins(&mut self, marker: &StepMarker) {
+        if let Some(inner) = self.inner_mut() {
+            inner.begins(marker);
+        }
+    }
 
     /// Looks at new samples, warm-up included; true ends the current step before its time. Never does by default.
-    fn on_batch(&mut self, _batch: &SampleBatch) -> bool {
-        false
+    fn on_batch(&mut self, batch: &SampleBatch) -> bool {
+        self.inner_mut().is_some_and(|inner| inner.on_batch(batch))
     }
 
     /// A step has ended; the marker holds its real end. Not called for a step that a guard or a fault has cut short.
     ///
     /// # Errors
     /// [`StepSourceError`] ends the run in its safe state.
-    fn after_step(&mut self, _marker: &StepMarker) -> Result<(), StepSourceError> {
-        Ok(())
+    fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        self.inner_mut().map_or(Ok(()), |inner| inner.after_step(marker))
     }
 
     /// A guard has left the step out; the marker holds where it was cut short.
     ///
     /// # Errors
     /// [`StepSourceError`] ends the run in its safe state.
-    fn skipped(&mut self, _marker: &StepMarker) -> Result<(), StepSourceError> {
-        Ok(())
+    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        self.inner_mut().map_or(Ok(()), |inner| inner.skipped(marker))
     }
 
     /// Notes for the recording since the last call. None by default.
     fn take_notes(&mut self) -> Vec<String> {
-        Vec::new()
+        self.inner_mut().map(StepSource::take_notes).unwrap_or_default()
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::source::{StepSource, StepSourceError};
 use mapper_core::{
-    Channel, EventKind, OperatingPoint, PlanStep, Predicted, Recording, ReferenceState, SampleBatch, Soak,
+    Channel, EventKind, OperatingPoint, PlanStep, Predicted, Recording, ReferenceState, SampleBatch,
     StepKind, StepMarker, SurgeSeek,
 };
 use mapper_surge::{Look, Move, SurgeEstimate, Why, next_move};
@@ -274,16 +274,12 @@ impl Approach {
 }
 
 impl StepSource for SurgeSearch<'_> {
-    fn soak(&self) -> Option<Soak> {
-        self.inner.soak()
+    fn inner(&self) -> Option<&dyn StepSource> {
+        Some(self.inner)
     }
 
-    fn warm_up_s(&self) -> f64 {
-        self.inner.warm_up_s()
-    }
-
-    fn cool_down_s(&self) -> f64 {
-        self.inner.cool_down_s()
+    fn inner_mut(&mut self) -> Option<&mut dyn StepSource> {
+        Some(self.inner)
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {

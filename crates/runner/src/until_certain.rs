@@ -1,7 +1,7 @@
 //! Ends the steps of another source as soon as somebody who looks at their readings says that enough is known.
 
 use crate::source::{StepSource, StepSourceError};
-use mapper_core::{PlanStep, Recording, SampleBatch, Soak, StepMarker};
+use mapper_core::{PlanStep, Recording, SampleBatch, StepMarker};
 
 /// How long a step may last, and when it is looked at, s after its jump.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,16 +83,12 @@ impl<'a> UntilCertain<'a> {
 }
 
 impl StepSource for UntilCertain<'_> {
-    fn soak(&self) -> Option<Soak> {
-        self.inner.soak()
+    fn inner(&self) -> Option<&dyn StepSource> {
+        Some(self.inner)
     }
 
-    fn warm_up_s(&self) -> f64 {
-        self.inner.warm_up_s()
-    }
-
-    fn cool_down_s(&self) -> f64 {
-        self.inner.cool_down_s()
+    fn inner_mut(&mut self) -> Option<&mut dyn StepSource> {
+        Some(self.inner)
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {

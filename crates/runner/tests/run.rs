@@ -54,6 +54,7 @@ fn plan() -> Plan {
         },
         bound: None,
         bound_remark: None,
+        surge_search_s: 0.0,
         remarks: Vec::new(),
     }
 }

@@ -5,19 +5,25 @@
 //! together; a step ends when its seconds tell less. Before the run the price follows from the forecast, and each step that has
 //! told more or less than was forecast moves it.
 
+pub(crate) mod left;
+
 use crate::SessionError;
 use crate::planning::{identification_after_zero, with_plan_request};
 use crate::predicted_method::expected_row;
 use mapper_campaign::Campaign;
-use mapper_core::{DwellEnd, Method, Plan, PlanStep, Recording, StepKind, StepMarker};
+use mapper_core::{Channel, DwellEnd, Method, Plan, PlanStep, Recording, StepKind, StepMarker};
 use mapper_identify::{
     CampaignInformation, ExpectedRow, ExpectedStep, IdentifyConfig, PressureTap, StepInformation,
 };
 use mapper_numerics::parallel;
+use mapper_numerics::statistics::mean;
 use mapper_physics::forecast::ForecastRow;
 use mapper_physics::model::Model;
-use mapper_planner::{PlanRequest, REACHED_RATIO, SHORTEST_S, forecast_longer, rested_dwell_s, with_dwells};
+use mapper_planner::{
+    PlanRequest, REACHED_RATIO, Retimed, SHORTEST_S, forecast_longer, rested_dwell_s, with_dwells,
+};
 use mapper_runner::{Certainty, DwellBounds};
+use std::sync::Arc;
 
 /// How far apart the dwells lie that are tried, s, and most of them for a step.
 const APART_S: f64 = 2.0;
@@ -25,7 +31,9 @@ const APART_S: f64 = 2.0;
 const LAST_S: f64 = 6.0;
 const MOST_TRIED: f64 = 60.0;
 /// How often dwells and the errors that they are forecast to give are brought together.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 4;
+/// So close to the required error they are no further.
+const CLOSE_RATIO: f64 = 0.01;
 /// Halvings of the logarithm of the price, and the prices between which it is sought, fraction^2/s.
 const HALVINGS: usize = 40;
 const PRICES: (f64, f64) = (1e-16, 1.0);
@@ -34,6 +42,9 @@ const LESS_NOISE_RATIO: f64 = 0.8;
 const MORE_NOISE_RATIO: f64 = 1.2;
 /// More time of which an event tells what it would give, s.
 const MORE_S: f64 = 10.0;
+
+/// Where the housing is at the end of a step is read from so much of it, s.
+const END_S: f64 = 5.0;
 
 /// A dwell that a step may have.
 #[derive(Debug, Clone)]
@@ -45,7 +56,7 @@ struct Dwell {
 }
 
 /// A step of the plan.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Planned {
     step: PlanStep,
     rows: Vec<ForecastRow>,
@@ -55,6 +66,10 @@ struct Planned {
 }
 
 impl Planned {
+    fn of(step: PlanStep, rows: Vec<ForecastRow>) -> Self {
+        Planned { step, expected: rows.iter().map(expected_row).collect(), rows, told: None }
+    }
+
     /// The step as forecast, with this dwell.
     fn forecast(&self, dwell_s: f64) -> ExpectedStep<'_> {
         let count = self.expected.partition_point(|row| row.t_s <= dwell_s + 1e-6);
@@ -67,17 +82,22 @@ impl Planned {
 }
 
 /// The price of a second, and all that it follows from.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct DwellPrices {
-    information: CampaignInformation,
+    information: Arc<CampaignInformation>,
     forecast_config: IdentifyConfig,
     steps: Vec<Planned>,
     /// For each step the dwells that it may have; one alone for a step that lasts as planned.
     tables: Vec<Vec<Dwell>>,
     longest_s: f64,
-    /// Error of all points, rms, that is to be reached, without what the map's smoothness says, fraction.
-    target: f64,
+    /// Error of all points, rms, that is to be reached, without what the map's smoothness says, fraction; without one each step
+    /// lasts as planned.
+    target: Option<f64>,
     price: f64,
+    /// Whether steps end by what their readings tell.
+    looks_on: bool,
+    /// Housing temperature at the end of the last step, K, as it was read.
+    tc_k: Option<f64>,
     /// The step under way, and what it told at the looks so far: time, s, and worth.
     now: Option<usize>,
     looks: Vec<(f64, f64)>,
@@ -91,22 +111,42 @@ pub(crate) struct DwellPrices {
 pub fn retimed(campaign: &Campaign, request: &PlanRequest<'_>, plan: Plan) -> Result<Plan, SessionError> {
     let joint = campaign.identification.method == Method::Joint && campaign.sequence.is_none();
     let Some(required) = campaign.required_sigma_eta.filter(|_| joint) else { return Ok(plan) };
-    let (mut plan, mut between) = (plan, None);
+    let reaches = |error: Option<f64>| error.is_some_and(|error| error <= REACHED_RATIO * required);
+    let (mut now, mut between) = (plan.clone(), None);
+    // One dwell for all is a choice that prices have too.
+    let mut shortest = Some(plan.clone()).filter(|plan| reaches(plan.figures.open_rms_error_eta));
     for _ in 0..ROUNDS {
-        let Some(prices) = DwellPrices::about(campaign, request, &plan, required)? else { break };
+        let Some(prices) = DwellPrices::about(campaign, request, &now, Some(required))? else { break };
         between = Some([LESS_NOISE_RATIO, MORE_NOISE_RATIO].map(|ratio| prices.with_noise(ratio)));
-        plan = with_dwells(request, &plan, &prices.dwells_s(prices.price), false)?;
-        if plan.figures.open_rms_error_eta.is_some_and(|error| error <= REACHED_RATIO * required) {
+        now = with_dwells(request, &now, &prices.dwells_s(prices.price), false)?.plan;
+        let error = now.figures.open_rms_error_eta;
+        if reaches(error) && shortest.as_ref().is_none_or(|plan| now.figures.minutes < plan.figures.minutes) {
+            shortest = Some(now.clone());
+        }
+        if error.is_some_and(|error| (error / required - 1.0).abs() <= CLOSE_RATIO) {
             break;
         }
     }
-    let dwells_s: Vec<f64> = plan.steps.iter().map(|step| step.dwell_s).collect();
-    plan = with_dwells(request, &plan, &dwells_s, true)?;
-    if wanted(campaign).is_some() {
-        plan.remarks.extend(between.map(|between| remark(campaign, &plan, between)));
+    let retimed = shortest.unwrap_or(now);
+    let dwells_s: Vec<f64> = retimed.steps.iter().map(|step| step.dwell_s).collect();
+    let Retimed { plan: mut retimed, forbidden } = with_dwells(request, &retimed, &dwells_s, true)?;
+    if let Some(why) = forbidden.first() {
+        // The order was held against the limits with the dwells that it was made with.
+        let mut plan = plan;
+        plan.remarks
+            .push(format!("all steps last about equally long: with dwells by price a limit forbids {why}"));
+        return Ok(plan);
     }
-    Ok(plan)
+    if wanted(campaign).is_some() {
+        retimed.remarks.retain(|remark| !remark.starts_with(ENDS_REMARK));
+        let said = between.map(|between| remark(campaign, &retimed, between));
+        retimed.remarks.extend(said);
+    }
+    Ok(retimed)
 }
+
+/// How the remark on steps that end by their readings begins.
+const ENDS_REMARK: &str = "each step ends when its readings have told enough";
 
 /// The error to be reached, where steps end when it is.
 fn wanted(campaign: &Campaign) -> Option<f64> {
@@ -119,7 +159,7 @@ fn remark(campaign: &Campaign, plan: &Plan, [low_s, high_s]: [f64; 2]) -> String
     let minutes = |steps_s: f64| (around_s + steps_s) / 60.0;
     let most_s = plan.steps.iter().map(|step| longest_s(step, campaign)).sum::<f64>();
     format!(
-        "each step ends when its readings have told enough: forecast {:.0} min, between {:.0} and {:.0} min where noise is a fifth less or \
+        "{ENDS_REMARK}: forecast {:.0} min, between {:.0} and {:.0} min where noise is a fifth less or \
          more than declared, and never more than {:.0} min",
         minutes(plan.steps.iter().map(|step| step.dwell_s).sum()),
         minutes(low_s),
@@ -139,55 +179,59 @@ fn lasts_as_planned(step: &PlanStep) -> bool {
 }
 
 impl DwellPrices {
-    /// For a plan of a campaign whose steps end when enough is known; `None` where they do not, or nothing can be forecast.
+    /// For a plan of a campaign whose steps end when enough is known, or that is planned again while it runs; `None` where neither
+    /// is so, or nothing can be forecast.
     ///
     /// # Errors
     /// [`SessionError`] where the forecast fails.
     pub(crate) fn of(campaign: &Campaign, model: &Model, plan: &Plan) -> Result<Option<Self>, SessionError> {
-        let Some(required) = wanted(campaign) else { return Ok(None) };
-        with_plan_request(campaign, model, |request| DwellPrices::about(campaign, request, plan, required))
+        let looks_on = wanted(campaign).is_some();
+        if !looks_on && campaign.replan.is_off() {
+            return Ok(None);
+        }
+        let required = campaign.required_sigma_eta;
+        let prices = with_plan_request(campaign, model, |request| {
+            DwellPrices::about(campaign, request, plan, required)
+        })?;
+        Ok(prices.map(|prices| DwellPrices { looks_on, ..prices }))
     }
 
-    fn about(
+    pub(crate) fn about(
         campaign: &Campaign,
         request: &PlanRequest<'_>,
         plan: &Plan,
-        required: f64,
+        required: Option<f64>,
     ) -> Result<Option<Self>, SessionError> {
         let longest_s = campaign.timing.dwell_s;
         let config = identification_after_zero(campaign);
         let total = PressureTap::Total;
         let forecast_config = IdentifyConfig { inlet_tap: total, outlet_tap: total, ..config.clone() };
         let rows = forecast_longer(request, plan, longest_s)?;
-        let planned = |(step, rows): (&PlanStep, Vec<ForecastRow>)| Planned {
-            step: step.clone(),
-            expected: rows.iter().map(expected_row).collect(),
-            rows,
-            told: None,
-        };
-        let steps: Vec<Planned> = plan.steps.iter().zip(rows).map(planned).collect();
+        let steps: Vec<Planned> =
+            plan.steps.iter().zip(rows).map(|(step, rows)| Planned::of(step.clone(), rows)).collect();
         let expected: Vec<ExpectedStep<'_>> =
             steps.iter().map(|planned| planned.forecast(planned.step.dwell_s)).collect();
         let about = CampaignInformation::about(&expected, &forecast_config, &config);
         let Some((information, open)) = about.zip(plan.figures.open_rms_error_eta) else { return Ok(None) };
         let as_planned = parallel::map(&expected, |step| information.of_forecast(step, &forecast_config));
         drop(expected);
-        let (target, price) = (required, PRICES.0);
         let mut prices = DwellPrices {
-            information,
+            information: Arc::new(information),
             forecast_config,
             steps,
             tables: Vec::new(),
             longest_s,
-            target,
-            price,
+            target: required,
+            price: PRICES.0,
+            looks_on: false,
+            tc_k: None,
             now: None,
             looks: Vec::new(),
         };
         let told: Vec<Option<&StepInformation>> = as_planned.iter().map(Option::as_ref).collect();
         let Some(linear) = prices.error(&told) else { return Ok(None) };
         // What smoothness says, and the method's own bias, are known of the plan as it stands.
-        prices.target = required * linear / open;
+        prices.target = required.map(|required| required * linear / open);
         prices.tables = parallel::map(&prices.steps, |planned| prices.dwells_of(planned));
         prices.settle();
         Ok(Some(prices))
@@ -196,7 +240,7 @@ impl DwellPrices {
     /// The dwells that a step may have, the shortest in which it comes to rest first.
     fn dwells_of(&self, planned: &Planned) -> Vec<Dwell> {
         let longest_s = self.longest_s;
-        let as_planned = lasts_as_planned(&planned.step);
+        let as_planned = lasts_as_planned(&planned.step) || self.target.is_none();
         let shortest_s = if as_planned {
             planned.step.dwell_s
         } else {
@@ -238,8 +282,9 @@ impl DwellPrices {
     /// The highest price at which the required error is reached where the steps to come have these dwells to choose from; the
     /// lowest of all where it is not.
     fn highest(&self, tables: &[Vec<Dwell>]) -> f64 {
+        let Some(target) = self.target else { return PRICES.0 };
         let reaches =
-            |price: f64| self.error(&self.told_at(tables, price)).is_some_and(|error| error <= self.target);
+            |price: f64| self.error(&self.told_at(tables, price)).is_some_and(|error| error <= target);
         let (mut low, mut high) = (PRICES.0.ln(), PRICES.1.ln());
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
@@ -315,7 +360,7 @@ impl Certainty for DwellPrices {
         self.now = self.steps.iter().position(open);
         self.looks.clear();
         self.now?;
-        (!lasts_as_planned(step)).then_some(DwellBounds {
+        (self.looks_on && !lasts_as_planned(step)).then_some(DwellBounds {
             // What seconds tell is a difference between looks.
             first_look_s: (SHORTEST_S.min(self.longest_s) - LAST_S).max(0.0),
             apart_s: APART_S.max(self.longest_s / MOST_TRIED),
@@ -346,6 +391,9 @@ impl Certainty for DwellPrices {
         let forecast = planned.forecast(marker.end_s - marker.start_s);
         let told = self.information.of_readings(readings, &forecast).map(|so_far| so_far.tells);
         self.steps[now].told = Some(told);
+        let end_s = marker.end_s;
+        let tc = readings.series.get(&Channel::Tc).map(|tc_k| tc_k.slice(end_s - END_S, end_s).1);
+        self.tc_k = tc.and_then(|tc_k| mean(tc_k.iter().copied())).filter(|tc_k| tc_k.is_finite());
         self.settle();
     }
 

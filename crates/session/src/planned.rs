@@ -1,17 +1,145 @@
 //! The plan of a campaign.
 
 use crate::SessionError;
-use crate::certainty::retimed;
+use crate::certainty::{DwellPrices, retimed};
 use crate::planning::with_plan_request;
+use crate::replanned::reordering;
+use crate::surge::count_surge_search;
+use crate::thought::Question;
 use mapper_campaign::Campaign;
-use mapper_core::Plan;
+use mapper_core::{Plan, VisitOrder};
 use mapper_physics::model::Model;
-use mapper_planner::make_plan;
+use mapper_planner::{
+    Comparison, Now, PlanRequest, after_step, before_first_step, best, clearly_cheaper, compare, make_plan,
+};
 
-/// The plan of a campaign with a grid; where steps end when enough is known, with the dwells that they are expected to have.
+/// How often an order is sought about the plan that the last one gave.
+const ROUNDS: usize = 4;
+/// Most steps of a plan that is ordered again: each round goes through all of them several times.
+const MOST_STEPS: usize = 400;
+/// What another order has to save of the time, to be taken.
+const SAVES_RATIO: f64 = 0.005;
+
+/// The plan of a campaign with a grid, with what seeking surge behind it takes.
 ///
 /// # Errors
 /// [`SessionError::Plan`] where points cannot be reached or no order is allowed.
 pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
-    with_plan_request(campaign, model, |request| retimed(campaign, request, make_plan(request)?))
+    with_plan_request(campaign, model, |request| plan_of(campaign, request))
 }
+
+/// The same of a request that was made from the campaign.
+///
+/// # Errors
+/// As [`plan`].
+pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, SessionError> {
+    let mut plan = priced(campaign, request)?;
+    plan.remarks.extend(beaten(campaign, request, &plan));
+    count_surge_search(campaign, request.model, &mut plan);
+    Ok(plan)
+}
+
+/// The plan beside conventional mapping and all other orders, each made as the plan itself is.
+///
+/// # Errors
+/// As [`plan`].
+pub fn compared(
+    campaign: &Campaign,
+    request: &PlanRequest<'_>,
+    plan: &Plan,
+) -> Result<Comparison, SessionError> {
+    compare(request, plan, |request| priced(campaign, request))
+}
+
+/// The plan with dwells by price, and its order sought again for these.
+fn priced(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, SessionError> {
+    if request.order == VisitOrder::Best && request.method.is_some() {
+        return best(request, |request| priced(campaign, request));
+    }
+    let plan = retimed(campaign, request, make_plan(request)?)?;
+    if !request.order.needs_method() || request.appended.is_some() || plan.steps.len() > MOST_STEPS {
+        return Ok(plan);
+    }
+    let mut cheapest = plan;
+    for _ in 0..ROUNDS {
+        match reordered(campaign, request, &cheapest)? {
+            Some(other) if clearly_cheaper(&other, &cheapest, 1.0 - SAVES_RATIO) => cheapest = other,
+            _ => break,
+        }
+    }
+    Ok(cheapest)
+}
+
+/// The plan in another order, by what each step is worth with the dwell that it has; `None` where none was found.
+fn reordered(
+    campaign: &Campaign,
+    request: &PlanRequest<'_>,
+    plan: &Plan,
+) -> Result<Option<Plan>, SessionError> {
+    let Some((required, (first, rest))) = request.required_sigma_eta.zip(plan.steps.split_first()) else {
+        return Ok(None);
+    };
+    let Some(prices) = DwellPrices::about(campaign, request, plan, Some(required))? else { return Ok(None) };
+    let start = before_first_step(request, first, plan.warm_up_s)?;
+    let state = after_step(request, start, first, first.dwell_s)?;
+    let next_s = first.start_s + first.dwell_s;
+    let question = Question {
+        request: request.clone(),
+        reordering: &reordering(request, plan, &prices)?,
+        prices,
+        now: Now { state, at: first.to, p3_pa: first.p3_pa, next_s },
+        steps: rest.to_vec(),
+        before: 1,
+        behind: 0,
+        made_s: 0.0,
+        changed: false,
+        clearly_ratio: 0.0,
+    };
+    let Some(thought) = question.answer()? else { return Ok(None) };
+    let mut other = plan.clone();
+    other.steps.truncate(1);
+    other.steps.extend(thought.steps);
+    for (index, step) in other.steps.iter_mut().enumerate() {
+        step.index = index;
+    }
+    // Its bound and proof were those of another order.
+    Ok(Some(retimed(campaign, request, other)?))
+}
+
+/// Says so where another order of the same points is forecast to be the better bargain. A plan that is ordered by errors was
+/// sought as that; `--compare` holds it against all others.
+fn beaten(campaign: &Campaign, request: &PlanRequest<'_>, plan: &Plan) -> Option<String> {
+    let by_errors = request.order.needs_method();
+    request.method.filter(|_| !by_errors)?;
+    let others = [VisitOrder::Information, VisitOrder::SpeedLines];
+    let others = others.into_iter().filter(|order| *order != request.order);
+    let mut better: Vec<Plan> = others
+        .filter_map(|order| priced(campaign, &PlanRequest { order, appended: None, ..request.clone() }).ok())
+        .filter(|other| clearly_cheaper(other, plan, BEATEN_RATIO))
+        .collect();
+    better.sort_by(|a, b| {
+        if clearly_cheaper(a, b, 1.0) { std::cmp::Ordering::Less } else { std::cmp::Ordering::Greater }
+    });
+    let other = better.first()?;
+    let told = |plan: &Plan| {
+        let figures = &plan.figures;
+        Some(format!("{:.2} points rms in {:.0} min", 100.0 * figures.open_rms_error_eta?, figures.minutes))
+    };
+    Some(format!(
+        "`order: {}` {BETTER}: {}, this order {}; `mapper plan --compare` shows all orders, `order: best` takes the best",
+        other.objective,
+        told(other)?,
+        told(plan)?
+    ))
+}
+
+/// What is said of another order.
+const BETTER: &str = "is forecast to do better";
+
+/// Where the plan says that another order is forecast to do better: what it says.
+pub(crate) fn said_to_be_beaten(plan: &Plan) -> Option<&str> {
+    plan.remarks.iter().map(String::as_str).find(|remark| remark.contains(BETTER))
+}
+
+/// Cost of another plan, over this one's, from which on it is worth a word.
+const BEATEN_RATIO: f64 = 0.95;

@@ -26,29 +26,45 @@ pub fn with_plan_request<T, E: From<SessionError>>(
     model: &Model,
     then: impl FnOnce(&PlanRequest<'_>) -> Result<T, E>,
 ) -> Result<T, E> {
-    let canonical = serde_json::to_string(campaign).map_err(SessionError::from)?;
-    let method = predicted_method(campaign);
-    let of_transients = method.is_some();
-    then(&PlanRequest {
-        campaign_name: &campaign.name,
-        campaign_canonical: &canonical,
-        model,
-        boundary: campaign.boundary,
-        follow_outlet: campaign.follow_outlet,
-        points: &campaign.points,
-        order: campaign.order,
-        timing: campaign.timing,
-        window: campaign.identification.window,
-        settle_bands: campaign.identification.settle_bands,
-        limits: campaign.limits,
-        appended: None,
-        repeats: campaign.repeats,
-        return_to_first: campaign.return_to_first && of_transients,
-        required_sigma_eta: campaign.required_sigma_eta,
-        method: method.as_deref(),
-        effort: 1.0,
-        seed: campaign.seed,
-    })
+    then(&PlanMaterial::of(campaign)?.request(campaign, model))
+}
+
+/// What a plan's request borrows besides campaign and model.
+#[derive(Debug)]
+pub(crate) struct PlanMaterial {
+    canonical: String,
+    method: Option<Box<dyn PredictedMethod>>,
+}
+
+impl PlanMaterial {
+    pub(crate) fn of(campaign: &Campaign) -> Result<Self, SessionError> {
+        let canonical = serde_json::to_string(campaign)?;
+        Ok(PlanMaterial { canonical, method: predicted_method(campaign) })
+    }
+
+    /// `campaign`: the one that this was made of.
+    pub(crate) fn request<'a>(&'a self, campaign: &'a Campaign, model: &'a Model) -> PlanRequest<'a> {
+        PlanRequest {
+            campaign_name: &campaign.name,
+            campaign_canonical: &self.canonical,
+            model,
+            boundary: campaign.boundary,
+            follow_outlet: campaign.follow_outlet,
+            points: &campaign.points,
+            order: campaign.order,
+            timing: campaign.timing,
+            window: campaign.identification.window,
+            settle_bands: campaign.identification.settle_bands,
+            limits: campaign.limits,
+            appended: None,
+            repeats: campaign.repeats,
+            return_to_first: campaign.return_to_first && self.method.is_some(),
+            required_sigma_eta: campaign.required_sigma_eta,
+            method: self.method.as_deref(),
+            effort: 1.0,
+            seed: campaign.seed,
+        }
+    }
 }
 
 /// The campaign's method as the planner sees it, after the zero that the campaign asks for; `None` for a method that waits

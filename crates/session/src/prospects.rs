@@ -1,7 +1,7 @@
 //! What is known of a campaign before it is run: how long it takes, and what of it will come to nothing.
 
 use crate::drive::soak_s;
-use crate::planned::plan;
+use crate::planned::{plan, said_to_be_beaten};
 use crate::rehearsal::rehearse;
 use crate::{Session, SessionError};
 use mapper_campaign::{Campaign, Concern};
@@ -49,6 +49,7 @@ impl Session<'_> {
             settling(campaign, &plan),
             probe(campaign, &plan),
             required_error(campaign, &plan),
+            order(&plan),
         ];
         Ok(Prospects {
             duration_s: soak_s(campaign) + plan.duration_s(),
@@ -142,7 +143,7 @@ fn required_error(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
         Concern::warning(
             &["required_sigma_eta"],
             format!(
-                "steps of {:.0} s reach {:.2} points of efficiency (rms, where alpha_A, the probe and the direction of the heat have to be \
+                "steps of up to {:.0} s reach {:.2} points of efficiency (rms, where alpha_A, the probe and the direction of the heat have to be \
                  found), not the {:.2} that are required",
                 campaign.timing.dwell_s,
                 100.0 * found,
@@ -151,6 +152,16 @@ fn required_error(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
             "lengthen `timing.dwell`, begin with a `zero`, or require less".to_owned(),
         )
     })
+}
+
+/// Another order that is forecast to do better.
+fn order(plan: &Plan) -> Option<Concern> {
+    let said = said_to_be_beaten(plan)?;
+    Some(Concern::warning(
+        &["order"],
+        said.to_owned(),
+        "take that order, or know why this one is wanted".to_owned(),
+    ))
 }
 
 /// A window of which the declared T2 probe spends a large part on what came before.

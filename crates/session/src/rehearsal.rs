@@ -3,10 +3,11 @@
 use crate::drive::drive;
 use crate::planned::plan;
 use crate::scripted_steps::ScriptedSteps;
+use crate::surge::count_surge_search;
 use crate::{Session, SessionError};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{BackendChoice, SequenceSource};
-use mapper_core::{Plan, PlanStep, SampleBatch, StepMarker, VisitOrder};
+use mapper_core::{Plan, PlanStep, StepMarker, VisitOrder};
 use mapper_physics::model::Model;
 use mapper_runner::{RunEnd, RunError, RunObserver, StepSource, StepSourceError};
 
@@ -51,10 +52,11 @@ pub fn rehearse(
         }
         RunEnd::Interrupted { .. } => return Err(SessionError::Interrupted),
     }
-    let plan = steps.steps.executed(&base);
+    let mut plan = steps.steps.executed(&base);
     if plan.steps.is_empty() {
         return Err(SessionError::NoSteps { path: source.path.clone() });
     }
+    count_surge_search(campaign, model, &mut plan);
     Ok(Rehearsal { plan, notes: steps.notes })
 }
 
@@ -69,20 +71,16 @@ struct Rehearsing {
 }
 
 impl StepSource for Rehearsing {
-    fn warm_up_s(&self) -> f64 {
-        self.steps.warm_up_s()
+    fn inner(&self) -> Option<&dyn StepSource> {
+        Some(&self.steps)
     }
 
-    fn cool_down_s(&self) -> f64 {
-        self.steps.cool_down_s()
+    fn inner_mut(&mut self) -> Option<&mut dyn StepSource> {
+        Some(&mut self.steps)
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
         self.steps.next_step()
-    }
-
-    fn on_batch(&mut self, batch: &SampleBatch) -> bool {
-        self.steps.on_batch(batch)
     }
 
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
@@ -93,10 +91,6 @@ impl StepSource for Rehearsing {
                 result.h_w_m2k().map(|h| result.sigma_h_w_m2k() / h).filter(|ratio| ratio.is_finite());
         }
         Ok(())
-    }
-
-    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        self.steps.skipped(marker)
     }
 
     fn take_notes(&mut self) -> Vec<String> {
@@ -112,7 +106,8 @@ fn base_plan(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Res
     let canonical = serde_json::to_string(&without_script)?;
     // The planner plans one point alone: the script has the say over the others.
     let points = campaign.points.iter().copied().take(1).collect();
-    let mut plan = plan(&Campaign { points, order: VisitOrder::Listed, ..without_script }, model)?;
+    let mut plan =
+        plan(&Campaign { points, order: VisitOrder::Listed, surge_search: None, ..without_script }, model)?;
     plan.objective = OBJECTIVE.to_owned();
     plan.made_from.campaign_sha256 = mapper_planner::sha256_hex(&canonical);
     plan.made_from.script_sha256 = Some(mapper_planner::sha256_hex(&source.text));

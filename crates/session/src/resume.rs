@@ -3,7 +3,8 @@
 use crate::journal::{Identity, JournalPart, read_journal};
 use crate::{SessionError, run_directory};
 use mapper_campaign::Campaign;
-use mapper_core::{Plan, PlanStep, SampleBatch, StepKind, StepMarker};
+use mapper_core::{Plan, PlanStep, StepKind, StepMarker};
+use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_runner::{StepSource, StepSourceError};
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
@@ -32,9 +33,30 @@ impl BrokenOff {
         Ok(BrokenOff { directory: directory.to_owned(), parts })
     }
 
-    /// Steps of the plan that are in one of the recordings.
-    pub fn saved(&self) -> BTreeSet<usize> {
-        self.parts.iter().flat_map(|part| part.saved.iter().copied()).collect()
+    /// Steps of the plan, by their place in it, that are in one of the recordings.
+    pub(crate) fn saved(&self, campaign: &Campaign, plan: &Plan) -> Result<BTreeSet<usize>, SessionError> {
+        if campaign.replan.is_off() {
+            return Ok(self.parts.iter().flat_map(|part| part.saved.iter().copied()).collect());
+        }
+        // In a run that was planned again a step's number is not its place in the plan: where it led to says which one it was.
+        let mut saved = BTreeSet::new();
+        for part in &self.parts {
+            let path = self.directory.join(&part.recording);
+            let read = read_recording(&path, &ChannelMap::native(), &ReadOptions::default())?;
+            // A step before the first missing one is made once more by a run that goes on.
+            let holds = |step: &&StepMarker| {
+                part.saved.contains(&step.index)
+                    && !(step.kind == StepKind::Repeat && step.index >= plan.steps.len())
+            };
+            for marker in read.recording.steps.iter().filter(holds) {
+                let same = |step: &&PlanStep| {
+                    Some(step.to) == marker.to && step.kind == marker.kind && !saved.contains(&step.index)
+                };
+                let place = plan.steps.iter().find(same).map(|step| step.index);
+                saved.extend(place);
+            }
+        }
+        Ok(saved)
     }
 
     /// Whether one of the recordings has the soak.
@@ -66,7 +88,7 @@ impl BrokenOff {
                 ));
             }
         }
-        let saved = self.saved();
+        let saved = self.saved(campaign, plan)?;
         if plan.steps.iter().all(|step| saved.contains(&step.index)) {
             return why("all of its steps are there; `mapper identify` gives the map".to_owned());
         }
@@ -74,16 +96,21 @@ impl BrokenOff {
     }
 
     /// What is done again and why, in a sentence.
-    pub(crate) fn said(&self, campaign: &Campaign, plan: &Plan) -> String {
-        let saved = self.saved();
+    pub(crate) fn said(&self, campaign: &Campaign, plan: &Plan, saved: &BTreeSet<usize>) -> String {
         let soak = match (campaign.zero.is_some(), self.soaked()) {
             (false, _) => "without a soak, as before",
             (true, true) => "the soak is not repeated: what sensors read at rest holds for the run",
             (true, false) => "the soak is repeated: the recording does not have it whole",
         };
+        let order = match campaign.replan.is_off() {
+            true => "",
+            false => {
+                "; what is missing goes by the plan as it stood before the run, and is not planned again"
+            }
+        };
         format!(
             "resumed: {} of {} steps hold; {soak}; nobody knows how far the housings have cooled, so they are warmed up again and the step before the first \
-             missing one is made once more",
+             missing one is made once more{order}",
             plan.steps.iter().filter(|step| saved.contains(&step.index)).count(),
             plan.steps.len()
         )
@@ -129,14 +156,6 @@ impl StepSource for MissingSteps<'_> {
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
         Ok(self.next.pop_front())
-    }
-
-    fn on_batch(&mut self, _: &SampleBatch) -> bool {
-        false
-    }
-
-    fn after_step(&mut self, _: &StepMarker) -> Result<(), StepSourceError> {
-        Ok(())
     }
 
     fn take_notes(&mut self) -> Vec<String> {

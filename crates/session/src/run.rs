@@ -14,12 +14,13 @@ use crate::planning::nominal_model;
 use crate::preflight::{check_room, check_setpoints};
 use crate::program::PROGRAM;
 use crate::rehearsal::rehearse;
+use crate::replanned::{Replanned, SharedPrices};
 use crate::results::{Results, RunPart};
 use crate::resume::{BrokenOff, MissingSteps};
 use crate::rig_state::{Claim, Latch, Owner, RigStates};
 use crate::scripted_steps::ScriptedSteps;
 use crate::stored_plan::stored_plan;
-use crate::surge::{hold_near_surge, remark_surge_search};
+use crate::surge::hold_near_surge;
 use crate::{Session, SessionError, SessionEvent, run_directory};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
@@ -27,8 +28,10 @@ use mapper_core::{Backend, Clock, Plan, Reaction, RigDescription, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
 use mapper_runner::{
-    Deadlined, Deadlines, PlanSteps, RunEnd, RunError, RunObserver, StepSource, SurgeSearch, UntilCertain,
+    Deadlined, Deadlines, PlanSteps, RunEnd, RunError, RunObserver, StepSource, StepSourceError, SurgeSearch,
+    UntilCertain,
 };
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -84,6 +87,8 @@ pub struct PreparedRun<'a> {
     backend: Box<dyn Backend>,
     /// What ends the steps, where it is not the plan.
     prices: Option<DwellPrices>,
+    /// The plan as it was planned again.
+    replanned: Option<Plan>,
     steps_made: StepsMade,
 }
 
@@ -143,11 +148,10 @@ impl<'s> Session<'s> {
         let campaign = request.campaign;
         self.registry.check_formats(campaign)?;
         let model = nominal_model(campaign)?;
-        let mut made = match &campaign.sequence {
+        let made = match &campaign.sequence {
             None => plan(campaign, &model)?,
             Some(source) => rehearse(self, campaign, &model, source)?.plan,
         };
-        remark_surge_search(campaign, &model, &mut made);
         let kept = request.resume.as_ref().map(|broken_off| broken_off.directory.join(run_directory::PLAN));
         let plan = match request.plan.or(kept.as_deref()) {
             None => made.clone(),
@@ -173,6 +177,7 @@ impl<'s> Session<'s> {
             scripted,
             backend,
             prices,
+            replanned: None,
             steps_made: StepsMade::default(),
         })
     }
@@ -320,27 +325,45 @@ impl PreparedRun<'_> {
     ) -> (Ended, Result<(), SessionError>, Option<String>) {
         let mut planned = PlanSteps::new(&self.plan);
         let mut missing;
+        // A run that goes on goes by its plan as it stood.
+        let prices = self.prices.take().filter(|_| self.request.resume.is_none()).map(RefCell::new);
+        let replans = !self.request.campaign.replan.is_off();
+        let mut replanned = match prices.as_ref().filter(|_| replans) {
+            None => None,
+            Some(prices) => match Replanned::new(self.request.campaign, &self.model, &self.plan, prices) {
+                Ok(replanned) => Some(replanned),
+                Err(error) => return not_begun(recorder, error),
+            },
+        };
         // What was measured at rest holds for the whole run.
         let without_soak;
         let mut campaign = self.request.campaign;
         let steps: &mut dyn StepSource = match (&mut self.scripted, &self.request.resume) {
             (Some(scripted), _) => scripted,
             (None, Some(broken_off)) => {
-                let said = broken_off.said(campaign, &self.plan);
+                let saved = match broken_off.saved(campaign, &self.plan) {
+                    Ok(saved) => saved,
+                    Err(error) => return not_begun(recorder, error),
+                };
+                let said = broken_off.said(campaign, &self.plan, &saved);
                 if broken_off.soaked() {
                     without_soak = Campaign { zero: None, ..campaign.clone() };
                     campaign = &without_soak;
                 }
-                missing = MissingSteps::new(&self.plan, &broken_off.saved(), said);
+                missing = MissingSteps::new(&self.plan, &saved, said);
                 &mut missing
             }
-            (None, None) => &mut planned,
+            (None, None) => match &mut replanned {
+                Some(replanned) => replanned,
+                None => &mut planned,
+            },
         };
         let mut certain;
-        let steps: &mut dyn StepSource = match &mut self.prices {
+        let mut shared = prices.as_ref().map(SharedPrices);
+        let steps: &mut dyn StepSource = match &mut shared {
             None => steps,
-            Some(prices) => {
-                certain = UntilCertain::new(steps, prices);
+            Some(shared) => {
+                certain = UntilCertain::new(steps, shared);
                 &mut certain
             }
         };
@@ -373,6 +396,7 @@ impl PreparedRun<'_> {
                 Err(steps) => (drive_paced(campaign, model, steps, backend, &mut observers, pace), None),
             }
         });
+        self.replanned = replanned.map(|replanned| replanned.handed_out());
         let doubt = doubt(&end);
         let end = match (end, drifted) {
             (Ok(RunEnd::Completed), None) => Ended::Completed,
@@ -387,9 +411,11 @@ impl PreparedRun<'_> {
 
     /// The plan as it was run; where it was not all known before, it is written beside it.
     fn executed(&self, directory: &Path) -> Result<Plan, SessionError> {
-        let executed = match (&self.scripted, &self.prices) {
+        let certain = !self.request.campaign.timing.ends.is_planned();
+        let executed = match (&self.scripted, &self.replanned) {
             (Some(steps), _) => steps.executed(&self.made),
-            (None, Some(_)) => self.steps_made.plan(&self.plan),
+            (None, Some(replanned)) => self.steps_made.plan(replanned),
+            (None, None) if certain => self.steps_made.plan(&self.plan),
             (None, None) => return Ok(self.plan.clone()),
         };
         write_new(&directory.join(run_directory::EXECUTED), json_text(&executed)?.as_bytes())?;
@@ -407,6 +433,13 @@ impl PreparedRun<'_> {
             campaign_yaml: Some(self.request.campaign_text.as_bytes().to_vec()),
         }
     }
+}
+
+/// A run whose steps could not be made.
+fn not_begun(recorder: Recorder, error: SessionError) -> (Ended, Result<(), SessionError>, Option<String>) {
+    let end = Ended::Failed(StepSourceError::of(error).into());
+    let finished = recorder.finish(&sentence(&end)).map_err(SessionError::from);
+    (end, finished, None)
 }
 
 /// Why nobody knows in which state the rig is, or has to look at it before the next run.

@@ -66,8 +66,8 @@ impl SurgeForecast {
     /// One sentence for a plan's remarks.
     pub fn sentence(&self, seek: &SurgeSeek) -> String {
         format!(
-            "Behind these steps surge is sought at the ends of {} speed lines, no nearer than a margin of {:.1} %: about {} steps, \
-             {:.0} min, not counted above",
+            "behind these steps surge is sought at the ends of {} speed lines, no nearer than a margin of {:.1} %: about {} steps, \
+             {:.0} min, counted in",
             self.lines,
             100.0 * seek.closest_margin_ratio,
             self.steps,
@@ -76,9 +76,11 @@ impl SurgeForecast {
     }
 }
 
-/// Adds to the remarks of a plan what the search behind it will take.
-pub fn remark_surge_search(campaign: &Campaign, model: &Model, plan: &mut Plan) {
+/// Counts in what the search behind a plan will take, and says so in its remarks.
+pub(crate) fn count_surge_search(campaign: &Campaign, model: &Model, plan: &mut Plan) {
     if let Some((seek, forecast)) = campaign.surge_search.zip(surge_forecast(campaign, model, plan)) {
+        plan.surge_search_s = forecast.duration_s;
+        plan.figures.minutes = plan.duration_s() / 60.0;
         plan.remarks.push(forecast.sentence(&seek));
     }
 }

@@ -9,8 +9,7 @@ use mapper_backends::virtual_lab;
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, VisitOrder};
 use mapper_formats::FORMATS;
-use mapper_planner::compare;
-use mapper_session::{Registry, RunRequest, Session, nominal_model, plan, with_plan_request};
+use mapper_session::{Registry, RunRequest, Session, compared, nominal_model, plan, with_plan_request};
 use shipped::campaign;
 
 const GRID: [(&str, &str); 3] = [
@@ -113,10 +112,8 @@ fn the_best_order_is_the_best_of_those_compared() {
         small(&[ANY_ERROR, ("dwell: 120 s ", "dwell: 40 s "), ("order: information ", "order: best ")]);
     let model = nominal_model(&campaign).unwrap();
     let best = planned(&campaign);
-    let comparison = with_plan_request(&campaign, &model, |request| {
-        Ok::<_, mapper_session::SessionError>(compare(request, &best)?)
-    })
-    .unwrap();
+    let comparison =
+        with_plan_request(&campaign, &model, |request| compared(&campaign, request, &best)).unwrap();
     let cost = |way: &mapper_planner::WayOfMapping| way.open_rms_error_eta.unwrap().powi(2) * way.minutes;
     let costs: Vec<f64> = comparison.orders.iter().map(|(_, way)| cost(way)).collect();
     assert!(cost(&comparison.proposed) <= costs[0] * (1.0 + 1e-9), "{costs:?}");

@@ -23,6 +23,7 @@ pub(crate) mod order;
 pub(crate) mod outputs;
 pub(crate) mod reference;
 pub(crate) mod repeats;
+pub(crate) mod replan;
 pub(crate) mod report;
 pub(crate) mod safe_state;
 pub(crate) mod sensors;

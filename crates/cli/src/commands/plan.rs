@@ -13,8 +13,7 @@ use mapper_physics::model::Model;
 use mapper_planner::PlanRequest;
 use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
 use mapper_session::{
-    Rehearsal, Session, SessionError, json_text, nominal_model, rehearse, remark_surge_search, retimed,
-    with_plan_request,
+    Rehearsal, Session, SessionError, compared, json_text, nominal_model, plan_of, rehearse, with_plan_request,
 };
 use std::path::PathBuf;
 
@@ -80,19 +79,17 @@ impl Plan {
                 false => output::print(&jump_text(&campaign, &jump)),
             };
         }
-        let (mut plan, comparison) = with_plan_request(&campaign, &model, |request| {
+        let (plan, comparison) = with_plan_request(&campaign, &model, |request| {
             let appended = match self.append.as_slice() {
                 [from, to] => Some(mapper_core::Jump { from: *from, to: *to }),
                 _ => None,
             };
             let effort = self.effort.unwrap_or(request.effort);
-            let plan = mapper_planner::make_plan(&PlanRequest { effort, appended, ..request.clone() })?;
-            let plan = retimed(&campaign, request, plan)?;
-            let compared = self.compare || self.svg.is_some();
-            let comparison = compared.then(|| mapper_planner::compare(request, &plan)).transpose()?;
+            let plan = plan_of(&campaign, &PlanRequest { effort, appended, ..request.clone() })?;
+            let wanted = self.compare || self.svg.is_some();
+            let comparison = wanted.then(|| compared(&campaign, request, &plan)).transpose()?;
             Ok::<_, SessionError>((plan, comparison))
         })?;
-        remark_surge_search(&campaign, &model, &mut plan);
         self.store(&plan)?;
         if let (Some(path), Some(comparison)) = (&self.svg, &comparison) {
             self.replace.write(path, plan_svg(&campaign, &model, &plan, comparison).as_bytes())?;
@@ -122,8 +119,7 @@ impl Plan {
         }
         let (registry, stop) = (registry::registry(), interrupt::stop_flag()?);
         let session = Session { stop: &stop, ..Session::new(&registry) };
-        let Rehearsal { mut plan, notes } = rehearse(&session, campaign, model, source)?;
-        remark_surge_search(campaign, model, &mut plan);
+        let Rehearsal { plan, notes } = rehearse(&session, campaign, model, source)?;
         self.store(&plan)?;
         if self.json {
             let mut value = serde_json::to_value(&plan).map_err(SessionError::from)?;

@@ -134,9 +134,36 @@ impl CampaignInformation {
         Some(Known { covariance: total.cholesky()?.inverse() })
     }
 
+    /// What steps are worth where these are what is known and forecast: the slope is that of the campaign as it goes, not as it was
+    /// planned. `None` where the equations are singular.
+    pub fn worth_now<'a>(&self, steps: &[&'a StepInformation]) -> Option<WorthNow> {
+        let covariance = self.together(steps.iter().copied())?.covariance;
+        let mut answers = DMatrix::zeros(covariance.nrows(), covariance.nrows());
+        for step in steps {
+            answers += &step.answer * step.answer.transpose();
+        }
+        let slope = &covariance * answers * &covariance;
+        Some(WorthNow { covariance, slope })
+    }
+
     /// What a step is worth to the forecast campaign, fraction^2, as [`StepWorth::of`].
     pub fn worth(&self, step: &StepInformation) -> f64 {
         self.worth.of_information(&step.information, step.variance, &step.answer)
+    }
+}
+
+/// What more information is worth to a campaign as it goes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorthNow {
+    covariance: DMatrix<f64>,
+    slope: DMatrix<f64>,
+}
+
+impl WorthNow {
+    /// By how much a step makes all points more certain, less the variance of its own point, fraction^2.
+    pub fn of(&self, step: &StepInformation) -> f64 {
+        let variance = step.variance + step.answer.dot(&(&self.covariance * &step.answer));
+        self.slope.dot(&step.information) - variance
     }
 }
 

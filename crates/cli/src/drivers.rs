@@ -13,6 +13,7 @@ pub const KNOWN: &[(&str, &str, &str)] = &[
         "cargo build --release -p mapper-backend-lab",
     ),
     ("modbus", "a PLC that speaks Modbus TCP, docs/rig.md", "cargo build --release -p mapper-backend-modbus"),
+    ("opcua", "a PLC that speaks OPC UA, docs/rig.md", "cargo build --release -p mapper-backend-opcua"),
 ];
 
 /// Where drivers are looked for: beside this program, then on `PATH`.

@@ -56,8 +56,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-backend-lab", &["core", "campaign", "session", "backends", "effects", "driver"]),
     // What drivers behind a controller share.
     ("mapper-controller", &["core", "yaml"]),
+    ("mapper-backend-ak", &["core", "yaml", "driver"]),
     ("mapper-backend-modbus", &["core", "yaml", "driver", "controller"]),
     ("mapper-backend-opcua", &["core", "yaml", "driver", "controller"]),
+    // A stand to rehearse on: no driver, but what drivers talk to.
+    ("mapper-lab-server", &["core", "campaign", "session", "backends", "effects"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

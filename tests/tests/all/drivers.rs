@@ -102,7 +102,7 @@ fn drivers_are_listed_with_where_they_are_or_the_line_that_builds_them() {
     std::fs::copy(mapper_command([""; 0]).get_program(), &program).unwrap();
     let output = Command::new(&program).args(["backend", "list"]).env("PATH", "").output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
-    for name in ["modbus", "opcua"] {
+    for name in ["modbus", "opcua", "ak"] {
         assert!(text.contains(&format!("cargo build --release -p mapper-backend-{name}")), "{text}");
     }
 }

@@ -110,7 +110,13 @@ class Server:
     def over(self):
         return self.leaving and self.armed is None
 
+    def begin(self, now_s):
+        """Arming may take seconds: time and lease begin with the first word or tick after it."""
+        if self.armed and self.armed.pop("fresh", False):
+            self.armed["at_s"], self.armed["lease_s"] = now_s, now_s + LEASE_S
+
     def take(self, now_s, message):
+        self.begin(now_s)
         known = message.get("session") == self.session
         if self.armed and known:
             self.armed["lease_s"] = now_s + LEASE_S
@@ -155,7 +161,7 @@ class Server:
         if not self.rig or self.armed:
             raise Refused("out_of_order", "the rig is armed" if self.armed else "the settings have not come")
         self.rig.arm()
-        self.armed = {"at_s": now_s, "told": None, "ticks": 0, "sequence": 0, "polled_s": 0.0, "lease_s": now_s + LEASE_S,
+        self.armed = {"fresh": True, "at_s": now_s, "told": None, "ticks": 0, "sequence": 0, "polled_s": 0.0, "lease_s": now_s + LEASE_S,
                       "descent": None, "ended": False}
         return {}
 
@@ -216,6 +222,7 @@ class Server:
 
     def leave(self, now_s):
         """Nobody is there any more: the rig becomes safe, then it is over."""
+        self.begin(now_s)
         if not self.leaving:
             self.leaving = True
             self.begin_descent(now_s)
@@ -231,6 +238,7 @@ class Server:
 
     def tick(self, now_s):
         """What is due; gives the time until something is due next, s, or None."""
+        self.begin(now_s)
         armed = self.armed
         if not armed:
             return None

@@ -10,7 +10,7 @@ pub mod tree;
 
 pub use campaign::{BY_ITSELF, CampaignFile, SHIPPED, SHORT_GRID};
 pub use drift_campaign::DriftCampaign;
-pub use program::{Finished, build_drivers, mapper, mapper_command, mapper_in};
+pub use program::{Finished, build_driver, build_drivers, mapper, mapper_command, mapper_in};
 pub use python::python;
 
 use std::path::{Path, PathBuf};

@@ -49,6 +49,13 @@ pub fn build_drivers() {
     });
 }
 
+/// Builds a driver that few tests need; `cargo xtask test` has built it with everything else.
+pub fn build_driver(package: &str) {
+    if std::env::var_os("MAPPER_TEST_PROGRAM").is_none() {
+        build(&["--package", package]);
+    }
+}
+
 /// The program with arguments, to be started in the root of the repository; standard input is closed.
 pub fn mapper_command<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command {
     let mut command = Command::new(binary());

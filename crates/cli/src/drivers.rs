@@ -13,6 +13,12 @@ pub const KNOWN: &[(&str, &str, &str)] = &[
         "cargo build --release -p mapper-backend-lab",
     ),
     ("modbus", "a PLC that speaks Modbus TCP, docs/rig.md", "cargo build --release -p mapper-backend-modbus"),
+    (
+        "ak",
+        "an instrument that speaks the AK telegram, read alone, docs/rig.md",
+        "cargo build --release -p mapper-backend-ak",
+    ),
+    ("opcua", "a PLC that speaks OPC UA, docs/rig.md", "cargo build --release -p mapper-backend-opcua"),
 ];
 
 /// Where drivers are looked for: beside this program, then on `PATH`.

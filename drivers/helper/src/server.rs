@@ -25,6 +25,8 @@ pub(crate) type Opened = Box<dyn FnOnce(&Value) -> Result<Box<dyn Backend>, Back
 struct Armed {
     /// On the driver's clock, s.
     at_s: f64,
+    /// Arming may take seconds: time and lease begin with the first word or tick after it.
+    fresh: bool,
     told: Option<Setpoints>,
     /// Number of the next sample to poll for, in real time.
     ticks: u64,
@@ -82,6 +84,7 @@ impl Server {
     /// A message has come at this time of the driver's clock, s.
     pub(crate) fn take(&mut self, now_s: f64, message: Message) {
         let known = message.session.as_deref() == Some(&self.session);
+        self.begin(now_s);
         if let (Some(armed), true) = (&mut self.armed, known) {
             armed.lease_s = now_s + LEASE_S;
         }
@@ -100,6 +103,12 @@ impl Server {
             other => Err(refused(Code::UnknownMethod, format!("there is no method `{other}`"))),
         };
         self.out.push(Message::answer(id, answer));
+    }
+
+    fn begin(&mut self, now_s: f64) {
+        if let Some(armed) = self.armed.as_mut().filter(|armed| armed.fresh) {
+            (armed.fresh, armed.at_s, armed.lease_s) = (false, now_s, now_s + LEASE_S);
+        }
     }
 
     fn hello(&mut self, params: &Value) -> Result<Value, Refusal> {
@@ -149,6 +158,7 @@ impl Server {
         guarded(|| rig.arm())?;
         self.armed = Some(Armed {
             at_s: now_s,
+            fresh: true,
             told: None,
             ticks: 0,
             polled_s: 0.0,
@@ -217,6 +227,7 @@ impl Server {
 
     /// Nobody is there any more: the rig becomes safe, then it is over.
     pub(crate) fn leave(&mut self, now_s: f64) {
+        self.begin(now_s);
         if !self.leaving {
             self.leaving = true;
             self.begin_descent(now_s);
@@ -234,6 +245,7 @@ impl Server {
 
     /// What is due at this time of the driver's clock, s. Returns when something is due next, s from now; `None`: nothing.
     pub(crate) fn tick(&mut self, now_s: f64) -> Option<f64> {
+        self.begin(now_s);
         let Some(armed) = &self.armed else { return None };
         if now_s >= armed.lease_s && !armed.ended {
             let message = "nothing was heard for the time of the lease; the rig flies its safe trajectory";

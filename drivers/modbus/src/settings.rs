@@ -2,8 +2,9 @@
 
 use crate::link::Table;
 use crate::registers::{Form, Order};
-use mapper_core::{BackendError, Channel, GuardName, SetpointRange};
-use mapper_yaml::units::{Duration, Frequency, Pressure, PressureRate, Quantity, Temperature};
+use mapper_controller::{Accepts, LimitError, Safe, Stand, Target, within};
+use mapper_core::{BackendError, Channel};
+use mapper_yaml::units::{Duration, Frequency, Quantity};
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -84,56 +85,27 @@ pub(crate) struct Writes {
     pub(crate) heartbeat: Place,
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct Accepts {
-    pub(crate) p3: [Quantity<Pressure>; 2],
-    pub(crate) t3: [Quantity<Temperature>; 2],
-    pub(crate) valve: [f64; 2],
-    pub(crate) oil_temperature: [Quantity<Temperature>; 2],
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct Safe {
-    /// How fast P3 goes down; cut at once if not said.
-    pub(crate) pressure_slew: Option<Quantity<PressureRate>>,
-    /// Opening of the valve on the way.
-    pub(crate) opening: f64,
-    /// Longest time of the way.
-    pub(crate) within: Quantity<Duration>,
-}
-
 /// What is wrong with them.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SettingError {
     #[error("{0}; docs/rig.md has an example of all settings")]
     Form(serde_json::Error),
-    #[error("{value} {unit} is outside {low} to {high} {unit}")]
-    Outside { value: f64, unit: &'static str, low: f64, high: f64 },
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     #[error("the register cannot hold {value} (SI) with this type, scale and offset")]
     DoesNotFit { value: f64 },
-    #[error("the rig has to measure {0}: a guard needs it")]
-    NotMeasured(Channel),
     #[error("a setpoint is written to holding registers; leave `table` out")]
     NotWritten,
     #[error("two values are written to register {0}")]
     Shared(u16),
 }
 
-/// Guards that no rig runs without.
-pub(crate) const NEEDS: [(GuardName, Channel); 2] =
-    [(GuardName::Overspeed, Channel::ShaftSpeed), (GuardName::TurbineInletPressure, Channel::P3)];
-
 pub(crate) fn wrong(path: impl Into<String>, error: SettingError) -> BackendError {
     BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(error) }
 }
 
-fn within(path: &str, value: f64, unit: &'static str, low: f64, high: f64) -> Result<f64, BackendError> {
-    match (low..=high).contains(&value) {
-        true => Ok(value),
-        false => Err(wrong(path, SettingError::Outside { value, unit, low, high })),
-    }
+fn bound(path: &str, value: f64, unit: &'static str, low: f64, high: f64) -> Result<f64, BackendError> {
+    within(value, unit, low, high).map_err(|error| wrong(path, error.into()))
 }
 
 impl Settings {
@@ -147,61 +119,50 @@ impl Settings {
         Ok(settings)
     }
 
-    /// Samples per second, Hz.
-    pub(crate) fn rate_hz(&self) -> f64 {
-        self.rate.as_ref().map_or(10.0, |rate| rate.inside)
-    }
-
     /// Time for a request, s.
     pub(crate) fn timeout_s(&self) -> f64 {
         self.timeout.as_ref().map_or(0.2, |timeout| timeout.inside)
     }
 
-    /// Each value that is written, with the range of what it may be, SI.
-    fn written(&self) -> [(&'static str, Place, SetpointRange); 6] {
-        let Writes { p3, t3, valve, oil_temperature, air, heartbeat } = &self.write;
-        let range = |low: f64, high: f64| SetpointRange { low, high };
-        let Accepts { p3: p3_pa, t3: t3_k, valve: opening, oil_temperature: oil_k } = &self.accepts;
-        [
-            ("p3", *p3, range(p3_pa[0].inside, p3_pa[1].inside)),
-            ("t3", *t3, range(t3_k[0].inside, t3_k[1].inside)),
-            ("valve", *valve, range(opening[0], opening[1])),
-            ("oil_temperature", *oil_temperature, range(oil_k[0].inside, oil_k[1].inside)),
-            ("air", *air, range(0.0, 1.0)),
-            ("heartbeat", *heartbeat, range(0.0, 9999.0)),
-        ]
+    /// Where a value is written.
+    pub(crate) fn place(&self, target: Target) -> Place {
+        match target {
+            Target::P3 => self.write.p3,
+            Target::T3 => self.write.t3,
+            Target::Valve => self.write.valve,
+            Target::OilTemperature => self.write.oil_temperature,
+            Target::Air => self.write.air,
+            Target::Heartbeat => self.write.heartbeat,
+        }
     }
 
-    /// What the rig accepts: of P3, T3, valve, oil.
-    pub(crate) fn ranges(&self) -> [SetpointRange; 4] {
-        let [p3, t3, valve, oil, ..] = self.written().map(|(.., range)| range);
-        [p3, t3, valve, oil]
+    /// The stand that they describe.
+    pub(crate) fn stand(&self) -> Stand {
+        Stand {
+            backend: NAME,
+            version: env!("CARGO_PKG_VERSION"),
+            rig: self.rig.clone().unwrap_or_else(|| format!("modbus {}", self.address)),
+            rate_hz: self.rate.as_ref().map_or(10.0, |rate| rate.inside),
+            channels: self.read.keys().copied().collect(),
+            accepts: self.accepts,
+            safe: self.safe,
+        }
     }
 
     fn check(&self) -> Result<(), BackendError> {
-        // The heartbeat goes out with the samples.
-        within("rate", self.rate_hz(), "Hz", 2.0, 50.0)?;
-        within("timeout", self.timeout_s(), "s", 0.01, 0.8)?;
-        within("safe.within", self.safe.within.inside, "s", 0.1, 120.0)?;
-        for (_, channel) in NEEDS {
-            if !self.read.contains_key(&channel) {
-                return Err(wrong("read", SettingError::NotMeasured(channel)));
-            }
-        }
-        let places = self.read.iter().map(|(channel, place)| (format!("read.{channel}"), place));
-        for (path, place) in places {
-            within(&format!("{path}.scale"), place.scale.abs(), "", 1e-12, 1e12)?;
-            within(&format!("{path}.register"), f64::from(place.register), "", 0.0, f64::from(u16::MAX - 4))?;
+        bound("timeout", self.timeout_s(), "s", 0.01, 0.8)?;
+        self.stand().check().map_err(|(path, error)| wrong(path, error.into()))?;
+        for (channel, place) in &self.read {
+            self.check_place(&format!("read.{channel}"), place)?;
         }
         let mut taken: Vec<u16> = Vec::new();
-        for (name, place, range) in self.written() {
-            let path = format!("write.{name}");
+        for target in Target::ALL {
+            let (path, place) = (format!("write.{}", target.key()), self.place(target));
             if place.table != Table::Holding {
                 return Err(wrong(format!("{path}.table"), SettingError::NotWritten));
             }
-            within(&format!("{path}.scale"), place.scale.abs(), "", 1e-12, 1e12)?;
-            within(&format!("{path}.register"), f64::from(place.register), "", 0.0, f64::from(u16::MAX - 4))?;
-            within(&format!("accepts.{name}"), range.high - range.low, "", 0.0, f64::MAX)?;
+            self.check_place(&path, &place)?;
+            let range = self.accepts.range(target);
             for value in [range.low, range.high] {
                 if self.registers(&place, value).is_none() {
                     return Err(wrong(path, SettingError::DoesNotFit { value }));
@@ -215,6 +176,12 @@ impl Settings {
             }
         }
         Ok(())
+    }
+
+    fn check_place(&self, path: &str, place: &Place) -> Result<(), BackendError> {
+        bound(&format!("{path}.scale"), place.scale.abs(), "", 1e-12, 1e12)?;
+        bound(&format!("{path}.register"), f64::from(place.register), "", 0.0, f64::from(u16::MAX - 4))
+            .map(drop)
     }
 
     /// What goes into the registers of a value, SI.

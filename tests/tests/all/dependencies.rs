@@ -54,7 +54,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Drivers are programs of their own: what they share, and whatever each needs for its rig.
     ("mapper-driver",    &["core", "protocol"]),
     ("mapper-backend-lab", &["core", "campaign", "session", "backends", "effects", "driver"]),
-    ("mapper-backend-modbus", &["core", "yaml", "driver"]),
+    // What drivers behind a controller share.
+    ("mapper-controller", &["core", "yaml"]),
+    ("mapper-backend-ak", &["core", "yaml", "driver"]),
+    ("mapper-backend-modbus", &["core", "yaml", "driver", "controller"]),
+    ("mapper-backend-opcua", &["core", "yaml", "driver", "controller"]),
+    // A stand to rehearse on: no driver, but what drivers talk to.
+    ("mapper-lab-server", &["core", "campaign", "session", "backends", "effects"]),
     // Tests run the program and read its files; chores know nothing of it.
     ("mapper-tests",     &["core", "record"]),
     ("xtask",            &[]),

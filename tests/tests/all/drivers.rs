@@ -102,7 +102,9 @@ fn drivers_are_listed_with_where_they_are_or_the_line_that_builds_them() {
     std::fs::copy(mapper_command([""; 0]).get_program(), &program).unwrap();
     let output = Command::new(&program).args(["backend", "list"]).env("PATH", "").output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
-    assert!(text.contains("cargo build --release -p mapper-backend-modbus"), "{text}");
+    for name in ["modbus", "opcua", "ak"] {
+        assert!(text.contains(&format!("cargo build --release -p mapper-backend-{name}")), "{text}");
+    }
 }
 
 #[test]
@@ -176,34 +178,85 @@ fn a_runner_that_stands_still_loses_its_lease() {
     told(&file, |text| text.contains("disarm"));
 }
 
-/// What docs/rig.md shows, at another port.
-fn behind_modbus(port: &str) -> CampaignFile {
+/// What docs/rig.md shows for a driver, at another port, in the words of a server that shares its machine with tests.
+fn of_the_guide(driver: &str, replacements: &[(&str, &str)]) -> CampaignFile {
     let guide = std::fs::read_to_string(repository().join("docs/rig.md")).unwrap();
-    let (_, after) = guide.split_once("```yaml\nbackend:\n").unwrap();
-    let (backend, _) = after.split_once("\n```").unwrap();
-    assert!(backend.contains("address: 127.0.0.1:5020"));
-    assert!(backend.contains("timeout: 200 ms"));
-    // Tests share the machine: the server may be slower than a PLC.
-    let slower = backend.replace("timeout: 200 ms", "timeout: 800 ms");
-    short(&slower.replace(":5020", &format!(":{port}")))
+    let (_, after) = guide.split_once(&format!("```yaml\nbackend:\n  {driver}:\n")).unwrap();
+    let (settings, _) = after.split_once("\n```").unwrap();
+    let mut backend = format!("  {driver}:\n{settings}");
+    for (old, new) in replacements {
+        assert_eq!(backend.matches(old).count(), 1, "`{old}` in docs/rig.md");
+        backend = backend.replace(old, new);
+    }
+    short(&backend)
+}
+
+/// A server of tests/python, which ends with its input.
+struct Server(std::process::Child);
+
+impl Server {
+    /// Starts it; gives its port.
+    fn start(script: &str, arguments: &[&str]) -> (Server, String) {
+        use std::io::BufRead;
+        let mut server = Command::new(option_env!("MAPPER_TEST_PYTHON").unwrap_or("python3"))
+            .arg(repository().join("tests/python").join(script))
+            .args(arguments)
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .stdin(std::process::Stdio::piped())
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut port = String::new();
+        std::io::BufReader::new(server.stdout.take().unwrap()).read_line(&mut port).unwrap();
+        (Server(server), port.trim().to_owned())
+    }
+
+    fn end(mut self) {
+        drop(self.0.stdin.take());
+        assert!(self.0.wait().unwrap().success());
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }
 
 /// Behind a server that shares no code with the driver, with the settings of the guide, in real time.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_rig_behind_modbus_keeps_every_rule() {
-    use std::io::BufRead;
-    let mut server = Command::new(option_env!("MAPPER_TEST_PYTHON").unwrap_or("python3"))
-        .arg(repository().join("tests/python/modbus_rig.py"))
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .stdin(std::process::Stdio::piped())
-        .stdout(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut port = String::new();
-    std::io::BufReader::new(server.stdout.take().unwrap()).read_line(&mut port).unwrap();
-    check("modbus", &behind_modbus(port.trim()));
-    // It ends with its input.
-    drop(server.stdin.take());
-    assert!(server.wait().unwrap().success());
+    let (server, port) = Server::start("modbus_rig.py", &[]);
+    let replacements = [(":5020 ", &*format!(":{port} ")), ("timeout: 200 ms", "timeout: 800 ms")];
+    check("modbus", &of_the_guide("modbus", &replacements));
+    server.end();
+}
+
+/// The same over OPC UA, signed and encrypted, as a user who trusts a server; the password stands in nothing that is written.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_rig_behind_opcua_keeps_every_rule() {
+    mapper_tests::build_driver("mapper-backend-opcua");
+    let scratch = mapper_tests::scratch();
+    let pki = scratch.path().join("pki");
+    let (server, port) = Server::start("opcua_rig.py", &["0", "--secure", pki.to_str().unwrap()]);
+    let replacements = [(":4840", &*format!(":{port}")), ("timeout: 300 ms", "timeout: 800 ms")];
+    let campaign = of_the_guide("opcua", &replacements);
+    let state = scratch.path().join("state");
+    let as_user = |mut command: Command| {
+        command.env("MAPPER_STATE_DIR", &state).env("PLC_USER", "lab").env("PLC_PASSWORD", "hunter2");
+        done(command)
+    };
+    let program = Path::new(mapper_command([""; 0]).get_program()).with_file_name("mapper-backend-opcua");
+    let mut trust = Command::new(program);
+    trust.args(["trust", &format!("opc.tcp://127.0.0.1:{port}")]);
+    as_user(trust).exits(0);
+    let arguments = ["backend", "check", "opcua", "--campaign"].map(std::ffi::OsStr::new);
+    let arguments: Vec<_> = arguments.into_iter().chain([campaign.path.as_os_str()]).collect();
+    let finished = as_user(with_drivers(&arguments));
+    assert!(!finished.stdout.contains("BROKEN"), "{}", finished.stdout);
+    assert_eq!(finished.exits(0).stdout.lines().count(), 12);
+    server.end();
 }

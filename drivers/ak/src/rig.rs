@@ -1,0 +1,168 @@
+//! An instrument as a source of readings. Nothing is ever written to it.
+
+use crate::settings::{NAME, Questions, Settings};
+use mapper_backend_ak::telegram::{Answer, Assembler, Code, TelegramError, answer, question};
+use mapper_core::{
+    Backend, BackendError, Channel, ChannelColumn, Event, EventKind, RigDescription, SafeTrajectory,
+    SampleBatch, Setpoints,
+};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+/// Makes the source; nothing is connected.
+pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
+    let (settings, questions) = Settings::read(value)?;
+    Ok(Box::new(Instrument { settings, questions, stream: None, armed: None }))
+}
+
+/// Why there is no answer.
+#[derive(Debug, thiserror::Error)]
+enum AskError {
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+    #[error("the instrument did not answer {0} in time")]
+    Late(Code),
+    #[error("the instrument closed the connection")]
+    Closed,
+    #[error(transparent)]
+    Telegram(#[from] TelegramError),
+}
+
+struct Armed {
+    sequence: u64,
+    last_s: f64,
+    /// The error status that was said last.
+    error: u8,
+}
+
+struct Instrument {
+    settings: Settings,
+    questions: Questions,
+    stream: Option<TcpStream>,
+    armed: Option<Armed>,
+}
+
+impl Instrument {
+    fn armed(&mut self, call: &'static str) -> Result<&mut Armed, BackendError> {
+        self.armed.as_mut().ok_or(BackendError::OutOfOrder { call, state: "not armed", needed: "armed" })
+    }
+
+    /// A question and its answer. After a failure the connection is a new one: a late answer would be taken for the next.
+    fn ask(&mut self, code: Code, channel: u8) -> Result<Answer, AskError> {
+        let within = Duration::from_secs_f64(self.settings.timeout_s());
+        let until = Instant::now() + within;
+        let mut stream = match self.stream.take() {
+            Some(stream) => stream,
+            None => TcpStream::connect_timeout(&self.settings.address, within)?,
+        };
+        stream.set_write_timeout(Some(within))?;
+        stream.write_all(&question(code, channel, ""))?;
+        let (mut assembler, mut bytes) = (Assembler::default(), [0u8; 512]);
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Err(AskError::Late(code));
+            }
+            stream.set_read_timeout(Some(left))?;
+            let count = match stream.read(&mut bytes) {
+                Ok(0) => return Err(AskError::Closed),
+                Ok(count) => count,
+                Err(error)
+                    if matches!(
+                        error.kind(),
+                        std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut
+                    ) =>
+                {
+                    return Err(AskError::Late(code));
+                }
+                Err(error) => return Err(error.into()),
+            };
+            let whole = bytes.iter().take(count).find_map(|byte| assembler.push(*byte));
+            if let Some(body) = whole {
+                let found = answer(&body, code)?;
+                self.stream = Some(stream);
+                return Ok(found);
+            }
+        }
+    }
+}
+
+impl Backend for Instrument {
+    fn describe(&self) -> RigDescription {
+        RigDescription {
+            backend: NAME.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            channels: self.settings.read.keys().copied().collect(),
+            sample_rate_hz: self.settings.rate_hz(),
+            simulated_time: false,
+            controls: false,
+            exclusive: Some(format!("ak {}", self.settings.address)),
+            needs_guarded: Vec::new(),
+            accepts: None,
+            safe: SafeTrajectory { p3_slew_pa_s: None, valve_opening_ratio: 1.0, within_s: 1.0 },
+        }
+    }
+
+    fn arm(&mut self) -> Result<(), BackendError> {
+        if self.armed.is_some() {
+            return Err(BackendError::OutOfOrder { call: "arm", state: "armed", needed: "not armed" });
+        }
+        for (code, channel) in self.questions.keys().copied().collect::<Vec<_>>() {
+            let asked = self.ask(code, channel);
+            asked.map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
+        }
+        self.armed = Some(Armed { sequence: 0, last_s: -1.0, error: 0 });
+        Ok(())
+    }
+
+    /// Nothing is told to an instrument.
+    fn set(&mut self, _: &Setpoints) -> Result<(), BackendError> {
+        self.armed("set").map(drop)
+    }
+
+    fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+        let armed = self.armed("poll")?;
+        let (first_sequence, before) = (armed.sequence, armed.error);
+        if !(until_s >= 0.0 && until_s > armed.last_s) {
+            return Ok(SampleBatch { first_sequence, ..SampleBatch::default() });
+        }
+        (armed.last_s, armed.sequence) = (until_s, first_sequence + 1);
+        let (mut values, mut error) = (BTreeMap::<Channel, f64>::new(), before);
+        for ((code, channel), places) in self.questions.clone() {
+            // An instrument that does not answer gives samples without readings: who uses them counts how long.
+            let Ok(found) = self.ask(code, channel) else { continue };
+            error = found.error;
+            for (channel, place) in places {
+                let value = found.number(place.value).map(|number| number * place.scale + place.offset);
+                values.insert(channel, value.filter(|value| value.is_finite()).unwrap_or(f64::NAN));
+            }
+        }
+        self.armed("poll")?.error = error;
+        let message = format!("{}: error status {error}", self.settings.address);
+        let said = (error != before).then_some(Event { t_s: until_s, kind: EventKind::Note, message });
+        let column = |channel: &Channel| ChannelColumn {
+            channel: *channel,
+            values: vec![values.get(channel).copied().unwrap_or(f64::NAN)],
+        };
+        Ok(SampleBatch {
+            first_sequence,
+            t_s: vec![until_s],
+            columns: self.settings.read.keys().map(column).collect(),
+            events: said.into_iter().collect(),
+            ..SampleBatch::default()
+        })
+    }
+
+    fn make_safe(&mut self) -> Result<(), BackendError> {
+        self.armed("make_safe").map(drop)
+    }
+
+    fn disarm(&mut self) -> Result<(), BackendError> {
+        self.armed("disarm")?;
+        (self.armed, self.stream) = (None, None);
+        Ok(())
+    }
+}

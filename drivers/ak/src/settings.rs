@@ -1,0 +1,126 @@
+//! The settings of the driver as a campaign writes them below `ak`.
+
+use mapper_backend_ak::telegram::{Code, TelegramError};
+use mapper_core::{BackendError, Channel};
+use mapper_yaml::units::{Duration, Frequency, Quantity};
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+
+/// Name of the driver.
+pub(crate) const NAME: &str = "ak";
+/// Most questions in a second that instruments answer.
+const MOST_HZ: f64 = 10.0;
+
+/// Below `ak`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Settings {
+    /// Address and port of the instrument, in numbers: a name would have to be looked up, which may hang.
+    pub(crate) address: SocketAddr,
+    /// How often it is asked; 2 Hz if not said.
+    rate: Option<Quantity<Frequency>>,
+    /// Time for each answer; 300 ms if not said.
+    timeout: Option<Quantity<Duration>>,
+    /// Where each channel stands.
+    pub(crate) read: BTreeMap<Channel, Place>,
+}
+
+/// A number in an answer: what stands there times `scale` plus `offset` is SI.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Place {
+    /// What is asked: a code that begins with A, such as AKON.
+    pub(crate) code: String,
+    /// Channel of the instrument; 0 is itself.
+    #[serde(default)]
+    pub(crate) channel: u8,
+    /// Which number of the answer, from 1.
+    #[serde(default = "first")]
+    pub(crate) value: usize,
+    #[serde(default = "one")]
+    pub(crate) scale: f64,
+    #[serde(default)]
+    pub(crate) offset: f64,
+}
+
+fn first() -> usize {
+    1
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// What is wrong with them.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum SettingError {
+    #[error("{0}; docs/rig.md has an example of all settings")]
+    Form(serde_json::Error),
+    #[error("{value} {unit} is outside {low} to {high} {unit}")]
+    Outside { value: f64, unit: &'static str, low: f64, high: f64 },
+    #[error(transparent)]
+    Code(#[from] TelegramError),
+    #[error("{0} would control or set the instrument; it is only read, by codes that begin with A")]
+    Controls(Code),
+    #[error(
+        "{questions} questions at {rate_hz} Hz are more than the {MOST_HZ} a second that instruments answer"
+    )]
+    TooMany { questions: usize, rate_hz: f64 },
+    #[error("nothing is read")]
+    Nothing,
+}
+
+fn wrong(path: impl Into<String>, error: SettingError) -> BackendError {
+    BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(error) }
+}
+
+fn within(path: &str, value: f64, unit: &'static str, low: f64, high: f64) -> Result<(), BackendError> {
+    let error = SettingError::Outside { value, unit, low, high };
+    (low..=high).contains(&value).then_some(()).ok_or_else(|| wrong(path, error))
+}
+
+impl Settings {
+    /// Reads and checks them; each question once, with the channels in its answer.
+    pub(crate) fn read(value: &Value) -> Result<(Settings, Questions), BackendError> {
+        let settings: Settings = serde_path_to_error::deserialize(value).map_err(|error| {
+            let path = error.path().to_string();
+            wrong(path.trim_start_matches('.'), SettingError::Form(error.into_inner()))
+        })?;
+        within("rate", settings.rate_hz(), "Hz", 0.1, MOST_HZ)?;
+        within("timeout", settings.timeout_s(), "s", 0.01, 0.8)?;
+        let mut questions = Questions::new();
+        for (channel, place) in &settings.read {
+            let path = format!("read.{channel}");
+            within(&format!("{path}.scale"), place.scale.abs(), "", 1e-12, 1e12)?;
+            within(&format!("{path}.value"), place.value as f64, "", 1.0, 1000.0)?;
+            let code: Code = place.code.parse().map_err(|error: TelegramError| wrong(&path, error.into()))?;
+            if !code.asks() {
+                return Err(wrong(path, SettingError::Controls(code)));
+            }
+            questions.entry((code, place.channel)).or_default().push((*channel, place.clone()));
+        }
+        let rate_hz = settings.rate_hz();
+        match questions.len() {
+            0 => Err(wrong("read", SettingError::Nothing)),
+            count if count as f64 * rate_hz > MOST_HZ => {
+                Err(wrong("rate", SettingError::TooMany { questions: count, rate_hz }))
+            }
+            _ => Ok((settings, questions)),
+        }
+    }
+
+    /// Samples per second, Hz.
+    pub(crate) fn rate_hz(&self) -> f64 {
+        self.rate.as_ref().map_or(2.0, |rate| rate.inside)
+    }
+
+    /// Time for an answer, s.
+    pub(crate) fn timeout_s(&self) -> f64 {
+        self.timeout.as_ref().map_or(0.3, |timeout| timeout.inside)
+    }
+}
+
+/// Code and channel of each question, and where in its answer the channels stand.
+pub(crate) type Questions = BTreeMap<(Code, u8), Vec<(Channel, Place)>>;

@@ -1,0 +1,247 @@
+//! The AK telegram, as manuals print it: STX, a byte that says nothing, four letters, a blank, the channel (`K0`) or the error status, data, ETX.
+//!
+//! Testo CU-2 and NanoMet3, CAI 600 and 700, Servomex ServoPro, Emerson NGA 2000 ("AK-Protocol", 90003752).
+
+use std::str::FromStr;
+
+const STX: u8 = 0x02;
+const ETX: u8 = 0x03;
+/// What the byte after STX is where nobody says otherwise.
+const DONT_CARE: u8 = b' ';
+/// Longest telegram that is taken, bytes: some hundred numbers.
+const LONGEST: usize = 4096;
+/// What an instrument answers to a code that it does not know.
+const UNKNOWN: [u8; 4] = *b"????";
+
+/// Four capital letters, digits allowed: `AKON`, `ASTZ`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Code([u8; 4]);
+
+impl Code {
+    /// Whether it asks for something: others control (`S`) or set (`E`) an instrument.
+    pub fn asks(self) -> bool {
+        self.0[0] == b'A'
+    }
+}
+
+impl FromStr for Code {
+    type Err = TelegramError;
+
+    fn from_str(text: &str) -> Result<Code, TelegramError> {
+        let fits =
+            |bytes: &[u8; 4]| bytes.iter().all(|byte| byte.is_ascii_uppercase() || byte.is_ascii_digit());
+        let code = <[u8; 4]>::try_from(text.as_bytes()).ok().filter(fits);
+        code.map(Code).ok_or_else(|| TelegramError::NoCode(text.to_owned()))
+    }
+}
+
+impl std::fmt::Display for Code {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&String::from_utf8_lossy(&self.0))
+    }
+}
+
+/// Why bytes are no telegram, or not the one that was waited for.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TelegramError {
+    /// Not a function code.
+    #[error("`{0}` is not a code of four capital letters, such as AKON")]
+    NoCode(String),
+    /// It ends too early, or a blank is not where it has to be.
+    #[error("{0:?} is not an AK telegram")]
+    Torn(String),
+    /// The instrument does not know the code.
+    #[error("the instrument does not know {0}")]
+    Unknown(Code),
+    /// The answer to another question.
+    #[error("the answer is to {found}, not to {asked}")]
+    Other {
+        /// What was asked.
+        asked: Code,
+        /// What it answers.
+        found: String,
+    },
+}
+
+/// The question for a channel of the instrument, with parameters.
+pub fn question(code: Code, channel: u8, parameters: &str) -> Vec<u8> {
+    let mut telegram = vec![STX, DONT_CARE];
+    telegram.extend(code.0);
+    telegram.extend(format!(" K{channel}").bytes());
+    if !parameters.is_empty() {
+        // What would end the telegram early is no parameter.
+        let plain = parameters.bytes().filter(|byte| (b' '..=b'~').contains(byte));
+        telegram.push(b' ');
+        telegram.extend(plain);
+    }
+    telegram.push(ETX);
+    telegram
+}
+
+/// An answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answer {
+    /// 0: the instrument has no error; 1 to 9, which counts up with each change of its errors.
+    pub error: u8,
+    /// What it says, as words.
+    pub words: Vec<String>,
+}
+
+impl Answer {
+    /// The number at this place, from 1; `None` where there is none, or where it is marked as not valid by `#`.
+    pub fn number(&self, place: usize) -> Option<f64> {
+        let word = self.words.get(place.checked_sub(1)?)?;
+        // Rust reads "inf" and "nan" as numbers, instruments do not write them.
+        let plain = word.bytes().all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte));
+        word.parse::<f64>().ok().filter(|number| plain && number.is_finite())
+    }
+}
+
+/// The answer to a question: what stands between STX and ETX.
+///
+/// # Errors
+/// [`TelegramError`] for what is no answer, or that to another question.
+pub fn answer(body: &[u8], asked: Code) -> Result<Answer, TelegramError> {
+    let torn = || TelegramError::Torn(String::from_utf8_lossy(body).into_owned());
+    let (Some(code), Some(b' '), Some(status)) = (body.get(1..5), body.get(5), body.get(6)) else {
+        return Err(torn());
+    };
+    if code == UNKNOWN {
+        return Err(TelegramError::Unknown(asked));
+    }
+    if code != asked.0 {
+        return Err(TelegramError::Other { asked, found: String::from_utf8_lossy(code).into_owned() });
+    }
+    let data = body.get(7..).unwrap_or_default();
+    let separated = data.first().is_none_or(|byte| b" \r\n".contains(byte));
+    if !status.is_ascii_digit() || !separated || !data.is_ascii() {
+        return Err(torn());
+    }
+    let words = data.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let words = words.map(|word| String::from_utf8_lossy(word).into_owned()).collect();
+    Ok(Answer { error: status - b'0', words })
+}
+
+/// Bytes as they come, in pieces, become telegrams.
+#[derive(Debug, Default)]
+pub struct Assembler {
+    /// What has come since STX; `None` before it.
+    body: Option<Vec<u8>>,
+}
+
+impl Assembler {
+    /// Takes the next byte; what stands between STX and ETX, when a telegram is complete. Each STX begins a new one.
+    pub fn push(&mut self, byte: u8) -> Option<Vec<u8>> {
+        match byte {
+            STX => {
+                self.body = Some(Vec::new());
+                None
+            }
+            ETX => self.body.take(),
+            _ => {
+                let body = self.body.as_mut()?;
+                body.push(byte);
+                if body.len() > LONGEST {
+                    self.body = None;
+                }
+                None
+            }
+        }
+    }
+}
+
+/// The question that an instrument was asked: code, channel and parameters.
+///
+/// # Errors
+/// [`TelegramError::Torn`]
+pub fn asked(body: &[u8]) -> Result<(Code, u8, String), TelegramError> {
+    let torn = || TelegramError::Torn(String::from_utf8_lossy(body).into_owned());
+    let text = std::str::from_utf8(body.get(1..).ok_or_else(torn)?).map_err(|_| torn())?;
+    let mut words = text.splitn(3, ' ');
+    let code = words.next().unwrap_or_default().parse()?;
+    let channel = words.next().and_then(|word| word.strip_prefix('K')).and_then(|word| word.parse().ok());
+    Ok((code, channel.ok_or_else(torn)?, words.next().unwrap_or_default().to_owned()))
+}
+
+/// The answer of an instrument without error; `None`: it does not know the code.
+pub fn reply(code: Option<Code>, words: &[String]) -> Vec<u8> {
+    let mut telegram = vec![STX, DONT_CARE];
+    telegram.extend(code.map_or(UNKNOWN, |code| code.0));
+    telegram.extend(b" 0");
+    for word in words {
+        telegram.push(b' ');
+        telegram.extend(word.bytes().filter(|byte| (b'!'..=b'~').contains(byte)));
+    }
+    telegram.push(ETX);
+    telegram
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn bodies(bytes: &[u8]) -> Vec<Vec<u8>> {
+        let mut assembler = Assembler::default();
+        bytes.iter().filter_map(|byte| assembler.push(*byte)).collect()
+    }
+
+    fn code(text: &str) -> Code {
+        text.parse().unwrap()
+    }
+
+    /// The example of the CAI and Servomex manuals: 02H 20H "ASTZ" 20H "K0" 03H, answered by "ASTZ 0 SREM STBY".
+    #[test]
+    fn the_example_of_manuals() {
+        assert_eq!(question(code("ASTZ"), 0, ""), b"\x02 ASTZ K0\x03");
+        let found = bodies(b"\x02 ASTZ 0 SREM STBY\x03");
+        let answer = answer(&found[0], code("ASTZ")).unwrap();
+        assert_eq!((answer.error, answer.words), (0, vec!["SREM".to_owned(), "STBY".to_owned()]));
+        // Testo: the byte that says nothing is 30H, an unknown code is echoed as ????.
+        let found = bodies(b"\x020???? 0\x03");
+        assert_eq!(super::answer(&found[0], code("AXXX")), Err(TelegramError::Unknown(code("AXXX"))));
+    }
+
+    /// Numbers in plain and E form, separated by blanks or by line ends; the error status counts beside them.
+    #[test]
+    fn numbers_stand_at_their_places() {
+        let found = bodies(b"\x020AKON 3 12.5 -1.25E+02\r\n#7.0 0 inf\x03");
+        let answer = answer(&found[0], code("AKON")).unwrap();
+        let numbers: Vec<_> = (0..=6).map(|place| answer.number(place)).collect();
+        assert_eq!(numbers, [None, Some(12.5), Some(-125.0), None, Some(0.0), None, None]);
+        assert_eq!(answer.error, 3);
+    }
+
+    /// A telegram whose end is lost: the next STX begins a new one.
+    #[test]
+    fn torn_telegrams_are_thrown_away() {
+        assert_eq!(bodies(b"noise\x03\x02 AKON 0 1\x02 AKON 0 2\x03"), [b" AKON 0 2".to_vec()]);
+        assert_eq!(bodies(&[&b"\x02 AKON 0 "[..], &[b'1'; 5000], b"\x03"].concat()), [Vec::<u8>::new(); 0]);
+        for torn in [&b""[..], b" AKO", b" AKON", b" AKON 0x", b" AKON  1", b" AKON0 1", b" AKON 0 \xff"] {
+            assert!(matches!(answer(torn, code("AKON")), Err(TelegramError::Torn(_))), "{torn:?}");
+        }
+        assert!(matches!(answer(b" ASTF 0", code("AKON")), Err(TelegramError::Other { .. })));
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+            for body in bodies(&bytes) {
+                let _ = answer(&body, code("AKON")).map(|answer| answer.number(1));
+                let _ = asked(&body);
+            }
+            let _ = answer(&bytes, code("AKON"));
+        }
+
+        #[test]
+        fn what_is_asked_and_replied_is_read(channel in 0u8..100, numbers in prop::collection::vec(-1e6f64..1e6, 0..40)) {
+            let question = bodies(&question(code("AKON"), channel, "1 2"));
+            prop_assert_eq!(asked(&question[0]).unwrap(), (code("AKON"), channel, "1 2".to_owned()));
+            let words: Vec<String> = numbers.iter().map(|number| number.to_string()).collect();
+            let found = bodies(&reply(Some(code("AKON")), &words));
+            let answer = answer(&found[0], code("AKON")).unwrap();
+            let read: Vec<f64> = (1..=numbers.len()).filter_map(|place| answer.number(place)).collect();
+            prop_assert_eq!(read, numbers);
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! The rig behind a controller.
+
+use crate::Controller;
+use crate::limits::{Accepts, HEARTBEAT_MAX, LimitError, NEEDS, Safe, Target, within};
+use mapper_core::{
+    Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Provenance, Quality, RigDescription,
+    RigMode, SampleBatch, Setpoints,
+};
+use std::collections::BTreeMap;
+
+/// How often the heartbeat counts, s.
+const HEARTBEAT_S: f64 = 0.5;
+/// What was told, as channels.
+const COMMANDS: [Channel; 4] =
+    [Channel::P3Command, Channel::T3Command, Channel::ValveCommand, Channel::TOilCommand];
+
+/// One reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// SI; NaN where there is none.
+    pub value: f64,
+    /// When the source took it, s since arming; `None`: when it arrived.
+    pub source_t_s: Option<f64>,
+    /// How good it is, by the controller's word.
+    pub quality: Quality,
+}
+
+impl Reading {
+    /// A good one, taken when it arrived.
+    pub fn good(value: f64) -> Reading {
+        Reading { value, source_t_s: None, quality: Quality::Good }
+    }
+}
+
+/// What a stand is, beside its controller.
+#[derive(Debug)]
+pub struct Stand {
+    /// Name of the driver.
+    pub backend: &'static str,
+    /// Version of the driver.
+    pub version: &'static str,
+    /// Name of the rig, of which there is one.
+    pub rig: String,
+    /// Samples per second, Hz.
+    pub rate_hz: f64,
+    /// What is read.
+    pub channels: Vec<Channel>,
+    /// Setpoints that it takes.
+    pub accepts: Accepts,
+    /// Its way into the safe state.
+    pub safe: Safe,
+}
+
+impl Stand {
+    /// What no stand can do without.
+    ///
+    /// # Errors
+    /// Key path and reason.
+    pub fn check(&self) -> Result<(), (String, LimitError)> {
+        let at = |path: &str| {
+            let path = path.to_owned();
+            move |error| (path, error)
+        };
+        // The heartbeat goes out with the samples.
+        within(self.rate_hz, "Hz", 2.0, 50.0).map_err(at("rate"))?;
+        within(self.safe.within.inside, "s", 0.1, 120.0).map_err(at("safe.within"))?;
+        for (_, channel) in NEEDS {
+            if !self.channels.contains(&channel) {
+                return Err(("read".to_owned(), LimitError::NotMeasured(channel)));
+            }
+        }
+        for target in Target::ALL {
+            let range = self.accepts.range(target);
+            let path = format!("accepts.{}", target.key());
+            within(range.high - range.low, "", 0.0, f64::MAX).map_err(at(&path))?;
+        }
+        let opening = self.accepts.range(Target::Valve);
+        within(self.safe.opening, "", opening.low, opening.high).map_err(at("safe.opening")).map(drop)
+    }
+}
+
+/// The rig behind this controller. Nothing is connected before it is armed.
+pub fn rig(stand: Stand, controller: impl Controller + 'static) -> Box<dyn Backend> {
+    Box::new(Rig { stand, controller, armed: None })
+}
+
+struct Rig<C> {
+    stand: Stand,
+    controller: C,
+    armed: Option<Armed>,
+}
+
+struct Armed {
+    told: Option<Setpoints>,
+    sequence: u64,
+    last_s: f64,
+    heartbeat: u16,
+    /// When it counted last, s.
+    beaten_s: f64,
+}
+
+impl<C: Controller> Rig<C> {
+    fn armed(&mut self, call: &'static str) -> Result<&mut Armed, BackendError> {
+        self.armed.as_mut().ok_or(BackendError::OutOfOrder { call, state: "not armed", needed: "armed" })
+    }
+
+    fn lost(&self, error: C::Error) -> BackendError {
+        let t_s = self.armed.as_ref().map_or(0.0, |armed| armed.last_s.max(0.0));
+        BackendError::Lost { t_s, source: Box::new(error) }
+    }
+
+    fn write(&mut self, values: &[(Target, f64)]) -> Result<(), BackendError> {
+        self.controller.write(values).map_err(|error| self.lost(error))
+    }
+
+    fn beat(&mut self, until_s: f64) {
+        let Some(armed) = self.armed.as_mut().filter(|armed| until_s - armed.beaten_s >= HEARTBEAT_S) else {
+            return;
+        };
+        armed.beaten_s = until_s;
+        armed.heartbeat = (armed.heartbeat + 1) % (HEARTBEAT_MAX + 1);
+        let count = f64::from(armed.heartbeat);
+        // Where it does not arrive the controller cuts the air by itself, which is what it is for.
+        let _ = self.write(&[(Target::Heartbeat, count)]);
+    }
+
+    fn channels(&self) -> Vec<Channel> {
+        self.stand.channels.iter().copied().filter(|one| !COMMANDS.contains(one)).chain(COMMANDS).collect()
+    }
+}
+
+fn command(channel: Channel, told: Option<Setpoints>) -> f64 {
+    let Some(told) = told else { return f64::NAN };
+    match channel {
+        Channel::P3Command => told.p3_pa,
+        Channel::T3Command => told.t3_k,
+        Channel::ValveCommand => told.valve_opening_ratio,
+        _ => told.oil_temperature_k,
+    }
+}
+
+/// Where readings come from, for those that are not simply good.
+fn provenance(readings: &BTreeMap<Channel, Reading>, t_s: f64) -> Vec<Provenance> {
+    let told = |reading: &Reading| reading.source_t_s.is_some() || reading.quality != Quality::Good;
+    let of = |(channel, reading): (&Channel, &Reading)| Provenance {
+        channel: *channel,
+        source_t_s: vec![reading.source_t_s.unwrap_or(t_s)],
+        quality: vec![reading.quality],
+    };
+    readings
+        .iter()
+        .filter(|(channel, reading)| told(reading) && !COMMANDS.contains(channel))
+        .map(of)
+        .collect()
+}
+
+impl<C: Controller> Backend for Rig<C> {
+    fn describe(&self) -> RigDescription {
+        RigDescription {
+            backend: self.stand.backend.to_owned(),
+            version: self.stand.version.to_owned(),
+            channels: self.channels(),
+            sample_rate_hz: self.stand.rate_hz,
+            simulated_time: false,
+            controls: true,
+            exclusive: Some(self.stand.rig.clone()),
+            needs_guarded: NEEDS.map(|(guard, _)| guard).to_vec(),
+            accepts: Some(self.stand.accepts.ranges()),
+            safe: self.stand.safe.trajectory(),
+        }
+    }
+
+    fn arm(&mut self) -> Result<(), BackendError> {
+        if self.armed.is_some() {
+            return Err(BackendError::OutOfOrder { call: "arm", state: "armed", needed: "not armed" });
+        }
+        let opened = self.controller.open();
+        let begun = opened.and_then(|()| self.controller.write(&[(Target::Heartbeat, 0.0)]));
+        if let Err(error) = begun {
+            self.controller.close();
+            return Err(self.lost(error));
+        }
+        self.armed = Some(Armed { told: None, sequence: 0, last_s: -1.0, heartbeat: 0, beaten_s: 0.0 });
+        Ok(())
+    }
+
+    fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
+        self.stand.accepts.ranges().check(setpoints)?;
+        self.armed("set")?;
+        let on = setpoints.mode == RigMode::Running;
+        // The valve first: less back pressure is never worse.
+        let values = [
+            (Target::Valve, setpoints.valve_opening_ratio),
+            (Target::P3, setpoints.p3_pa),
+            (Target::T3, setpoints.t3_k),
+            (Target::OilTemperature, setpoints.oil_temperature_k),
+        ];
+        // Off before anything else, on after everything else.
+        let off = (!on).then_some((Target::Air, 0.0));
+        let on = on.then_some((Target::Air, 1.0));
+        let values: Vec<_> = off.into_iter().chain(values).chain(on).collect();
+        self.write(&values)?;
+        self.armed("set")?.told = Some(*setpoints);
+        Ok(())
+    }
+
+    fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+        let armed = self.armed("poll")?;
+        let (first_sequence, told) = (armed.sequence, armed.told);
+        if !(until_s >= 0.0 && until_s > armed.last_s) {
+            return Ok(SampleBatch { first_sequence, ..SampleBatch::default() });
+        }
+        armed.last_s = until_s;
+        armed.sequence += 1;
+        self.beat(until_s);
+        // A controller that does not answer gives samples without readings: the guards count how long.
+        let readings = self.controller.read(until_s);
+        let column = |channel: Channel| {
+            let value = match COMMANDS.contains(&channel) {
+                true => command(channel, told),
+                false => readings.get(&channel).map_or(f64::NAN, |reading| reading.value),
+            };
+            ChannelColumn { channel, values: vec![value] }
+        };
+        let note = |message| Event { t_s: until_s, kind: EventKind::Note, message };
+        Ok(SampleBatch {
+            first_sequence,
+            t_s: vec![until_s],
+            columns: self.channels().into_iter().map(column).collect(),
+            provenance: provenance(&readings, until_s),
+            events: self.controller.remark().map(note).into_iter().collect(),
+            ..SampleBatch::default()
+        })
+    }
+
+    fn make_safe(&mut self) -> Result<(), BackendError> {
+        let open = self.armed("make_safe")?.told.map_or(0.0, |told| told.valve_opening_ratio);
+        let highest = self.stand.accepts.range(Target::Valve).high;
+        let valve = open.max(self.stand.safe.opening).min(highest);
+        self.write(&[(Target::Air, 0.0), (Target::Valve, valve)])
+    }
+
+    fn disarm(&mut self) -> Result<(), BackendError> {
+        self.armed("disarm")?;
+        self.armed = None;
+        self.controller.close();
+        Ok(())
+    }
+}

@@ -1,0 +1,242 @@
+//! The lab as a PLC sees it: readings, setpoints, a heartbeat, and interlocks that nothing from outside passes. Time is an argument.
+
+use mapper_core::{
+    Backend, BackendError, CHANNELS, Channel, EventKind, RigMode, SetpointRange, SetpointRanges, Setpoints,
+};
+use std::collections::BTreeMap;
+
+/// Without another heartbeat for so long the air is cut, s on the wall.
+const WATCHDOG_S: f64 = 2.0;
+/// Above the campaign's limit of speed by this factor the air is cut.
+const OVERSPEED: f64 = 1.05;
+
+/// What the stand measures, in the order of registers.
+pub fn measured() -> Vec<Channel> {
+    let is_command = |channel: Channel| channel.symbol().ends_with("_command");
+    CHANNELS.iter().map(|row| row.channel).filter(|channel| !is_command(*channel)).collect()
+}
+
+/// Something that is written, in the order of registers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// Pa.
+    P3,
+    /// K.
+    T3,
+    /// Ratio.
+    Valve,
+    /// K.
+    OilTemperature,
+    /// 1 on, 0 off.
+    Air,
+    /// Any number, another one at least each 2 s.
+    Heartbeat,
+    /// 1: somebody has looked at the stand; only without air.
+    Acknowledge,
+}
+
+/// A value that the stand does not take.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("{value} is outside {low} to {high}")]
+pub struct Refused {
+    value: f64,
+    low: f64,
+    high: f64,
+}
+
+/// The lab and its interlocks.
+pub struct Stand {
+    lab: Box<dyn Backend>,
+    accepts: SetpointRanges,
+    trip_rpm: f64,
+    told: Setpoints,
+    sent: Option<Setpoints>,
+    heartbeat: f64,
+    /// When it changed last, s on the wall.
+    beaten_s: f64,
+    tripped: Option<String>,
+    readings: BTreeMap<Channel, f64>,
+    speed: f64,
+    wall_s: f64,
+}
+
+impl Stand {
+    /// A stand at rest. `speed`: how many seconds of the lab pass in one on the wall.
+    ///
+    /// # Errors
+    /// What the lab says.
+    pub fn new(mut lab: Box<dyn Backend>, speed_max_rpm: f64, speed: f64) -> Result<Stand, BackendError> {
+        let any = SetpointRange { low: f64::MIN, high: f64::MAX };
+        let all = SetpointRanges { p3_pa: any, t3_k: any, valve_opening_ratio: any, oil_temperature_k: any };
+        let accepts = lab.describe().accepts.unwrap_or(all);
+        lab.arm()?;
+        let told = Setpoints {
+            mode: RigMode::Standstill,
+            p3_pa: 110e3,
+            t3_k: 298.15,
+            valve_opening_ratio: 1.0,
+            oil_temperature_k: 323.15,
+        };
+        Ok(Stand {
+            lab,
+            accepts,
+            trip_rpm: OVERSPEED * speed_max_rpm,
+            told,
+            sent: None,
+            heartbeat: 0.0,
+            beaten_s: 0.0,
+            tripped: None,
+            readings: BTreeMap::new(),
+            speed,
+            wall_s: 0.0,
+        })
+    }
+
+    /// Somebody writes.
+    ///
+    /// # Errors
+    /// [`Refused`] for what the stand does not take; nothing is changed.
+    pub fn tell(&mut self, target: Target, value: f64) -> Result<(), Refused> {
+        let switch = SetpointRange { low: 0.0, high: 1.0 };
+        let range = match target {
+            Target::P3 => self.accepts.p3_pa,
+            Target::T3 => self.accepts.t3_k,
+            Target::Valve => self.accepts.valve_opening_ratio,
+            Target::OilTemperature => self.accepts.oil_temperature_k,
+            Target::Air | Target::Acknowledge => switch,
+            Target::Heartbeat => SetpointRange { low: 0.0, high: f64::MAX },
+        };
+        if !(range.low..=range.high).contains(&value) {
+            return Err(Refused { value, low: range.low, high: range.high });
+        }
+        match target {
+            Target::P3 => self.told.p3_pa = value,
+            Target::T3 => self.told.t3_k = value,
+            Target::Valve => self.told.valve_opening_ratio = value,
+            Target::OilTemperature => self.told.oil_temperature_k = value,
+            // A tripped stand takes no air.
+            Target::Air if value >= 0.5 && self.tripped.is_none() => {
+                self.told.mode = RigMode::Running;
+                self.beaten_s = self.wall_s;
+            }
+            Target::Air => self.told.mode = RigMode::Standstill,
+            Target::Heartbeat if value != self.heartbeat => {
+                (self.heartbeat, self.beaten_s) = (value, self.wall_s);
+            }
+            Target::Heartbeat => {}
+            Target::Acknowledge if value >= 0.5 && self.told.mode == RigMode::Standstill => {
+                self.tripped = None
+            }
+            Target::Acknowledge => {}
+        }
+        Ok(())
+    }
+
+    /// What stands where somebody writes.
+    pub fn told(&self, target: Target) -> f64 {
+        match target {
+            Target::P3 => self.told.p3_pa,
+            Target::T3 => self.told.t3_k,
+            Target::Valve => self.told.valve_opening_ratio,
+            Target::OilTemperature => self.told.oil_temperature_k,
+            Target::Air => f64::from(u8::from(self.told.mode == RigMode::Running)),
+            Target::Heartbeat => self.heartbeat,
+            Target::Acknowledge => 0.0,
+        }
+    }
+
+    /// SI; `None` where nothing was measured yet, or the sensor gave nothing.
+    pub fn reading(&self, channel: Channel) -> Option<f64> {
+        self.readings.get(&channel).copied().filter(|value| value.is_finite())
+    }
+
+    /// Why the air is held off, until somebody acknowledges it.
+    pub fn tripped(&self) -> Option<&str> {
+        self.tripped.as_deref()
+    }
+
+    fn trip(&mut self, why: String) {
+        self.told.mode = RigMode::Standstill;
+        self.tripped.get_or_insert(why);
+    }
+
+    /// Lets time go on until this moment on the wall, s since the beginning.
+    ///
+    /// # Errors
+    /// What the lab says.
+    pub fn advance(&mut self, wall_s: f64) -> Result<(), BackendError> {
+        self.wall_s = wall_s;
+        let silent_s = wall_s - self.beaten_s;
+        if self.told.mode == RigMode::Running && silent_s > WATCHDOG_S {
+            self.trip(format!("no heartbeat for {silent_s:.1} s"));
+        }
+        if self.sent != Some(self.told) {
+            self.lab.set(&self.told)?;
+            self.sent = Some(self.told);
+        }
+        let batch = self.lab.poll(wall_s * self.speed)?;
+        for column in &batch.columns {
+            if let Some(value) = column.values.last() {
+                self.readings.insert(column.channel, *value);
+            }
+        }
+        let own = batch.events.iter().find(|event| event.kind == EventKind::RigTripped);
+        if let Some(event) = own {
+            self.trip(event.message.clone());
+        }
+        let rpm = self.reading(Channel::ShaftSpeed).unwrap_or(0.0);
+        if rpm > self.trip_rpm && self.told.mode == RigMode::Running {
+            self.trip(format!("overspeed: {rpm:.0} rpm"));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_backends::BACKENDS;
+    use mapper_session::{Registry, nominal_model};
+
+    fn stand() -> Stand {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/turbo_a.yaml");
+        let campaign = mapper_campaign::load(path.as_ref()).unwrap();
+        let registry = Registry { backends: BACKENDS.to_vec(), ..Registry::default() };
+        let lab = registry.make_backend(&campaign, &nominal_model(&campaign).unwrap()).unwrap();
+        Stand::new(lab, 120_000.0, 10.0).unwrap()
+    }
+
+    /// Ten seconds of the lab in one on the wall.
+    fn run(stand: &mut Stand, from_s: f64, to_s: f64, beats: bool) {
+        let tenths = ((to_s - from_s) * 10.0).round() as u32;
+        for tenth in 1..=tenths {
+            if beats {
+                stand.tell(Target::Heartbeat, f64::from(tenth)).unwrap();
+            }
+            stand.advance(from_s + f64::from(tenth) / 10.0).unwrap();
+        }
+    }
+
+    #[test]
+    fn the_air_is_cut_without_a_heartbeat_and_above_the_speed_until_somebody_has_looked() {
+        let mut stand = stand();
+        for (target, value) in [(Target::P3, 180e3), (Target::T3, 700.0), (Target::Air, 1.0)] {
+            stand.tell(target, value).unwrap();
+        }
+        run(&mut stand, 0.0, 4.0, true);
+        let rpm = stand.reading(Channel::ShaftSpeed).unwrap();
+        assert!(rpm > 50_000.0 && stand.tripped().is_none(), "{rpm}");
+        assert!(stand.tell(Target::P3, 1e9).is_err());
+        assert_eq!(stand.told(Target::P3), 180e3);
+        run(&mut stand, 4.0, 7.0, false);
+        assert!(stand.tripped().unwrap().contains("no heartbeat"));
+        stand.tell(Target::Air, 1.0).unwrap();
+        assert_eq!(stand.told(Target::Air), 0.0);
+        stand.tell(Target::Acknowledge, 1.0).unwrap();
+        stand.tell(Target::Air, 1.0).unwrap();
+        assert_eq!(stand.told(Target::Air), 1.0);
+        stand.tell(Target::P3, 380e3).unwrap();
+        run(&mut stand, 7.0, 12.0, true);
+        assert!(stand.tripped().unwrap().contains("overspeed"), "{:?}", stand.reading(Channel::ShaftSpeed));
+    }
+}

@@ -1,0 +1,140 @@
+//! The driver against pymodbus, a server that shares no code with it: restarted, paused, and gone for good, in real time.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_core::{Backend, BackendError, Channel, RigMode, SampleBatch, Setpoints};
+use mapper_host::{Driver, PATIENCE};
+use serde_json::json;
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::time::Instant;
+
+/// A stand behind a server, which ends with the test.
+struct Stand {
+    server: Child,
+    port: String,
+}
+
+impl Drop for Stand {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+impl Stand {
+    /// On this port, or on any; the server is there when this returns.
+    fn new(port: &str) -> Stand {
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/python/modbus_rig.py");
+        let mut server = Command::new(option_env!("MAPPER_TEST_PYTHON").unwrap_or("python3"))
+            .args([script, port])
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(server.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        Stand { server, port: line.trim().to_owned() }
+    }
+
+    fn kill(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+
+    fn signal(&self, name: &str) {
+        let pid = self.server.id().to_string();
+        assert!(Command::new("kill").args(["-s", name, &pid]).status().unwrap().success());
+    }
+
+    fn armed(&self) -> Driver {
+        let settings = json!({
+            "address": format!("127.0.0.1:{}", self.port), "timeout": "400 ms",
+            "read": {"N": {"register": 0}, "T2": {"register": 10}, "P3": {"register": 16}},
+            "write": {
+                "p3": {"register": 100}, "t3": {"register": 102}, "valve": {"register": 104}, "oil_temperature": {"register": 106},
+                "air": {"register": 110, "type": "u16"}, "heartbeat": {"register": 111, "type": "u16"},
+            },
+            "accepts": {"p3": ["105 kPa", "400 kPa"], "t3": ["280 K", "900 K"], "valve": [0.1, 2.5], "oil_temperature": ["280 K", "400 K"]},
+            "safe": {"pressure_slew": "100 kPa/s", "opening": 1.0, "within": "20 s"},
+        });
+        let program = env!("CARGO_BIN_EXE_mapper-backend-modbus").as_ref();
+        let mut rig = Driver::of_program(program, "modbus", &settings, PATIENCE).unwrap();
+        rig.arm().unwrap();
+        rig.set(&SETPOINTS).unwrap();
+        rig
+    }
+}
+
+const SETPOINTS: Setpoints = Setpoints {
+    mode: RigMode::Running,
+    p3_pa: 150e3,
+    t3_k: 600.0,
+    valve_opening_ratio: 1.0,
+    oil_temperature_k: 323.15,
+};
+
+/// Polls each half second until `reached`; how long that took.
+fn until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool) -> f64 {
+    let begun = Instant::now();
+    loop {
+        *t_s += 0.5;
+        let batch = rig.poll(*t_s).unwrap();
+        if reached(&batch) {
+            return begun.elapsed().as_secs_f64();
+        }
+        assert!(begun.elapsed().as_secs() < 60, "nothing came of it in a minute");
+    }
+}
+
+fn reads(batch: &SampleBatch) -> bool {
+    batch.last(Channel::T2).is_some_and(f64::is_finite)
+}
+
+fn reads_nothing(batch: &SampleBatch) -> bool {
+    batch.last(Channel::T2).is_some_and(f64::is_nan)
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_server_that_restarts_or_stands_still_is_read_within_three_seconds() {
+    let mut stand = Stand::new("0");
+    let (mut rig, mut t_s) = (stand.armed(), 0.0);
+    until(&mut rig, &mut t_s, reads);
+    stand.kill();
+    until(&mut rig, &mut t_s, reads_nothing);
+    // Starting takes the server some seconds; the lease is renewed by polls alone.
+    let port = stand.port.clone();
+    let starting = std::thread::spawn(move || Stand::new(&port));
+    until(&mut rig, &mut t_s, |_| starting.is_finished());
+    let stand = starting.join().unwrap();
+    let took_s = until(&mut rig, &mut t_s, reads);
+    assert!(took_s < 3.0, "{took_s} s after a restart");
+    stand.signal("STOP");
+    until(&mut rig, &mut t_s, reads_nothing);
+    let back_s = t_s + 5.0;
+    until(&mut rig, &mut t_s, |batch| batch.t_s.last().is_some_and(|t_s| *t_s >= back_s));
+    stand.signal("CONT");
+    let took_s = until(&mut rig, &mut t_s, reads);
+    assert!(took_s < 3.0, "{took_s} s after a pause");
+    rig.set(&SETPOINTS).unwrap();
+    rig.make_safe().unwrap();
+    rig.disarm().unwrap();
+}
+
+/// What cannot be done is said in time: the runner knows then that the rig is in doubt.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_server_that_is_gone_for_good_is_said_within_two_seconds() {
+    let mut stand = Stand::new("0");
+    let (mut rig, mut t_s) = (stand.armed(), 0.0);
+    until(&mut rig, &mut t_s, reads);
+    stand.kill();
+    let begun = Instant::now();
+    let lost = rig.make_safe().unwrap_err();
+    assert!(matches!(lost, BackendError::Lost { .. }), "{lost}");
+    assert!(begun.elapsed().as_secs_f64() < 2.0, "{:?}", begun.elapsed());
+    until(&mut rig, &mut t_s, reads_nothing);
+    rig.disarm().unwrap();
+}

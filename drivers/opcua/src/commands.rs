@@ -1,0 +1,103 @@
+//! What the program does for people.
+
+use crate::link::{LinkError, endpoints};
+use crate::store::{Store, StoreError, fingerprint};
+use clap::{Parser, Subcommand};
+use opcua::crypto::X509;
+use std::io::Write;
+use std::process::ExitCode;
+
+/// Driver of gas stands that speak OPC UA. `mapper` starts it without arguments; these are for people.
+#[derive(Parser)]
+#[command(name = "mapper-backend-opcua", version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Pins the certificate that a server has now: from then on no other is talked to there.
+    ///
+    /// Compare the fingerprint with the one that the server itself shows.
+    Trust {
+        /// As in the campaign: opc.tcp://HOST:PORT
+        endpoint: String,
+        /// Pins it only if this is its SHA-256.
+        #[arg(long, value_name = "SHA256")]
+        fingerprint: Option<String>,
+        /// Pins it though another one was pinned.
+        #[arg(long)]
+        replace: bool,
+    },
+    /// Says where this program's own certificate is, which the server has to trust; makes it if there is none.
+    Certificate,
+}
+
+#[derive(Debug, thiserror::Error)]
+enum CommandError {
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+    #[error("{0} has no certificate: it offers no encryption")]
+    NoCertificate(String),
+    #[error("the certificate has the fingerprint {found}, not {wanted}; nothing was pinned")]
+    OtherFingerprint { found: String, wanted: String },
+}
+
+pub(crate) fn run() -> ExitCode {
+    match Arguments::parse().command.run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // Where standard error is closed nobody is told.
+            let _ = writeln!(std::io::stderr(), "error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+impl Command {
+    fn run(self) -> Result<(), CommandError> {
+        let store = Store::of_environment()?;
+        match self {
+            Command::Certificate => say(&store.own()?.display().to_string()),
+            Command::Trust { endpoint, fingerprint, replace } => {
+                trust(&store, &endpoint, fingerprint, replace)
+            }
+        }
+    }
+}
+
+fn say(words: &str) -> Result<(), CommandError> {
+    Ok(writeln!(std::io::stdout(), "{words}")?)
+}
+
+fn trust(store: &Store, endpoint: &str, wanted: Option<String>, replace: bool) -> Result<(), CommandError> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let offered = runtime.block_on(endpoints(store, endpoint))?;
+    let der = offered.iter().map(|one| one.server_certificate.as_ref()).find(|der| !der.is_empty());
+    let der = der.ok_or_else(|| CommandError::NoCertificate(endpoint.to_owned()))?;
+    let certificate = X509::from_der(der).map_err(|_| CommandError::NoCertificate(endpoint.to_owned()))?;
+    let found = fingerprint(der);
+    say(&format!("{endpoint}\nsubject      {}", certificate.subject_name()))?;
+    if let (Ok(from), Ok(to)) = (certificate.not_before(), certificate.not_after()) {
+        say(&format!("valid        {} to {}", from.format("%Y-%m-%d"), to.format("%Y-%m-%d")))?;
+    }
+    say(&format!("fingerprint  SHA-256 {found}"))?;
+    let plain = |text: &str| text.replace([':', ' '], "").to_ascii_uppercase();
+    if let Some(wanted) = wanted.filter(|wanted| plain(wanted) != plain(&found)) {
+        return Err(CommandError::OtherFingerprint { found, wanted });
+    }
+    if let Some(there) = store.trusted(endpoint)? {
+        let pinned = fingerprint(&crate::link::der(&there));
+        if pinned != found && !replace {
+            return Err(StoreError::Changed { server: endpoint.to_owned(), found, pinned }.into());
+        }
+    }
+    let file = store.trust(endpoint, der)?;
+    say(&format!("trusted from now on: {}", file.display()))?;
+    say(&format!("our own certificate, for the server to trust: {}", store.own()?.display()))
+}

@@ -1,0 +1,436 @@
+//! The session with a server. It is polled with Read; the library connects again by itself, within a second of the server's return.
+
+use crate::settings::{Security, User};
+use crate::store::{APPLICATION_URI, Store, StoreError, fingerprint, server};
+use crate::value::words;
+use futures::{StreamExt, pin_mut};
+use mapper_controller::Target;
+use opcua::client::services::Read;
+use opcua::client::{Client, ClientBuilder, IdentityToken, Session, SessionPollResult, UARequest};
+use opcua::crypto::{SecurityPolicy, X509};
+use opcua::types::{
+    AttributeId, DataValue, DateTime, EndpointDescription, Error, MessageSecurityMode, NodeId, NumericRange,
+    QualifiedName, ReadValueId, StatusCode, TimestampsToReturn, Variant, WriteValue,
+};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tokio::runtime::Runtime;
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+use tokio::time::timeout;
+
+/// For the list of endpoints, and for the session: both are within the 10 s that a host waits for arming.
+const CONNECTING: Duration = Duration::from_secs(4);
+/// For values to be written, a connection that comes back included: less than the 2 s that a host waits.
+const WRITING: Duration = Duration::from_millis(1500);
+/// First and longest pause between two tries to connect.
+const RETRY: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(1));
+/// A server that is silent for this many seconds gets a new connection.
+const SILENT_S: u64 = 4;
+
+/// Why a call failed.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum LinkError {
+    #[error("{server} did not answer within {} ms", within.as_millis())]
+    Late { server: String, within: Duration },
+    #[error("{server}: {words}")]
+    Failed { server: String, words: String },
+    #[error(
+        "{server} does not let this program in: {words}. Look at user and password, and whether the server trusts {own}"
+    )]
+    NotLetIn { server: String, words: String, own: String },
+    #[error("{server} has no endpoint with {policy}; it offers {offered}")]
+    NoEndpoint { server: String, policy: String, offered: String },
+    #[error("the node {node} {words}")]
+    Node { node: NodeId, words: String },
+    #[error("{server} refuses {value} for the node {node}: {words}")]
+    Refused { server: String, node: NodeId, value: f64, words: String },
+    #[error("the node {node} cannot hold {value}")]
+    DoesNotFit { node: NodeId, value: f64 },
+    #[error("the type of {} is not known yet", .0.key())]
+    Unknown(Target),
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+/// What has happened to the connection.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum State {
+    Connecting,
+    Connected,
+    Failed(StatusCode),
+}
+
+/// What was read.
+pub(crate) struct Answer {
+    /// As many as nodes were asked for.
+    pub(crate) values: Vec<DataValue>,
+    /// When the server sent them, by its own clock.
+    pub(crate) sent: DateTime,
+}
+
+struct Open {
+    session: Arc<Session>,
+    state: watch::Receiver<State>,
+    task: JoinHandle<()>,
+}
+
+/// A session that is made when the rig is armed.
+pub(crate) struct Link {
+    runtime: Runtime,
+    endpoint: String,
+    security: Security,
+    user: Option<User>,
+    within: Duration,
+    open: Option<Open>,
+    /// Since when there is no connection.
+    away: Option<Instant>,
+    remark: Option<String>,
+}
+
+pub(crate) fn policy(security: Security) -> SecurityPolicy {
+    match security {
+        Security::Basic256Sha256 => SecurityPolicy::Basic256Sha256,
+        Security::Aes128Sha256RsaOaep => SecurityPolicy::Aes128Sha256RsaOaep,
+        Security::Aes256Sha256RsaPss => SecurityPolicy::Aes256Sha256RsaPss,
+        Security::None => SecurityPolicy::None,
+    }
+}
+
+/// A client that tries to connect once, or again and again.
+fn client(store: &Store, tries: i32) -> Result<Client, String> {
+    let built = ClientBuilder::new()
+        .application_name("mapper")
+        .application_uri(APPLICATION_URI)
+        .product_uri(APPLICATION_URI)
+        .session_name("mapper")
+        .pki_dir(store.root())
+        .create_sample_keypair(false)
+        // The certificate is compared with the pinned one, to the byte, before a session is made; names in it say nothing more.
+        .trust_server_certs(true)
+        .verify_server_certs(false)
+        .session_retry_limit(tries)
+        .session_retry_initial(RETRY.0)
+        .session_retry_max(RETRY.1)
+        .keep_alive_interval(Duration::from_secs(1))
+        .max_failed_keep_alive_count(SILENT_S)
+        .request_timeout(Duration::from_secs(1))
+        .recreate_subscriptions(false);
+    built.client().map_err(|errors| errors.join("; "))
+}
+
+/// What a server offers.
+pub(crate) async fn endpoints(store: &Store, endpoint: &str) -> Result<Vec<EndpointDescription>, LinkError> {
+    let failed = |words: String| LinkError::Failed { server: server(endpoint).to_owned(), words };
+    let client = client(store, 0).map_err(failed)?;
+    let asked = timeout(CONNECTING, client.get_server_endpoints_from_url(endpoint));
+    let late = LinkError::Late { server: server(endpoint).to_owned(), within: CONNECTING };
+    asked.await.map_err(|_| late)?.map_err(|error| failed(error.to_string()))
+}
+
+/// Codes by which a server says that it will not have us: to ask again would lock an account.
+fn is_refusal(status: StatusCode) -> bool {
+    [
+        StatusCode::BadUserAccessDenied,
+        StatusCode::BadIdentityTokenInvalid,
+        StatusCode::BadIdentityTokenRejected,
+        StatusCode::BadSecurityChecksFailed,
+        StatusCode::BadCertificateUntrusted,
+        StatusCode::BadCertificateInvalid,
+        StatusCode::BadCertificateTimeInvalid,
+        StatusCode::BadCertificateUriInvalid,
+        StatusCode::BadCertificateUseNotAllowed,
+        StatusCode::BadSecurityPolicyRejected,
+    ]
+    .contains(&status)
+}
+
+impl Link {
+    /// Nothing is connected yet.
+    pub(crate) fn new(
+        endpoint: String,
+        security: Security,
+        user: Option<User>,
+        within: Duration,
+    ) -> std::io::Result<Link> {
+        // The session lives on a thread of its own: keep-alives and new connections do not wait for the next sample.
+        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
+        Ok(Link { runtime, endpoint, security, user, within, open: None, away: None, remark: None })
+    }
+
+    fn server(&self) -> String {
+        server(&self.endpoint).to_owned()
+    }
+
+    fn failed(&self, words: impl Into<String>) -> LinkError {
+        LinkError::Failed { server: self.server(), words: words.into() }
+    }
+
+    /// The endpoint with the security that was asked for, and with the pinned certificate.
+    fn choose(
+        &self,
+        store: &Store,
+        offered: Vec<EndpointDescription>,
+    ) -> Result<EndpointDescription, LinkError> {
+        let policy = policy(self.security);
+        let mode = match self.security {
+            Security::None => MessageSecurityMode::None,
+            _ => MessageSecurityMode::SignAndEncrypt,
+        };
+        let uri = policy.to_uri();
+        let fits =
+            |one: &&EndpointDescription| one.security_mode == mode && one.security_policy_uri.as_ref() == uri;
+        let Some(found) = offered.iter().find(fits) else {
+            let name = |one: &EndpointDescription| {
+                let uri = one.security_policy_uri.as_ref();
+                format!("{} {:?}", uri.rsplit('#').next().unwrap_or(uri), one.security_mode)
+            };
+            let offered: Vec<String> = offered.iter().map(name).collect();
+            let (server, policy) = (self.server(), format!("{policy} {mode:?}"));
+            return Err(LinkError::NoEndpoint { server, policy, offered: offered.join(", ") });
+        };
+        let mut found = found.clone();
+        if self.security != Security::None {
+            let pinned = store.pinned(&self.endpoint)?;
+            let (there, pinned) = (found.server_certificate.as_ref().to_vec(), der(&pinned));
+            if there != pinned {
+                let (found, pinned) = (fingerprint(&there), fingerprint(&pinned));
+                return Err(StoreError::Changed { server: self.endpoint.clone(), found, pinned }.into());
+            }
+        }
+        // Servers name themselves as they like; the way to them is the one that was given.
+        found.endpoint_url = self.endpoint.as_str().into();
+        Ok(found)
+    }
+
+    /// Makes the session.
+    pub(crate) fn open(&mut self) -> Result<(), LinkError> {
+        self.close();
+        let store = Store::of_environment()?;
+        let own = match self.security {
+            Security::None => None,
+            _ => Some(store.own()?),
+        };
+        let offered = self.runtime.block_on(endpoints(&store, &self.endpoint))?;
+        let endpoint = self.choose(&store, offered)?;
+        let client = client(&store, -1).map_err(|words| self.failed(words))?;
+        let identity = self.user.as_ref().map_or(IdentityToken::Anonymous, |user| {
+            IdentityToken::new_user_name(user.name.as_str(), user.password.as_str())
+        });
+        let built = client
+            .session_builder()
+            .user_identity_token(identity)
+            .connect_to_endpoint_directly(endpoint)
+            .and_then(|builder| builder.build(client.certificate_store().clone()));
+        let (session, events) = built.map_err(|error| self.failed(error.to_string()))?;
+        let (tell, state) = watch::channel(State::Connecting);
+        let task = self.runtime.spawn(async move {
+            let events = events.enter();
+            pin_mut!(events);
+            while let Some(event) = events.next().await {
+                let _ = match event {
+                    Ok(SessionPollResult::Reconnected(_)) => tell.send(State::Connected),
+                    Ok(
+                        SessionPollResult::ConnectionLost(status)
+                        | SessionPollResult::ReconnectFailed(status),
+                    )
+                    | Err(status) => tell.send(State::Failed(status)),
+                    Ok(_) => Ok(()),
+                };
+            }
+        });
+        self.open = Some(Open { session, state, task });
+        let connected = self.wait(CONNECTING);
+        connected.map_err(|error| {
+            self.close();
+            match error {
+                Some(status) if is_refusal(status) => LinkError::NotLetIn {
+                    server: self.server(),
+                    words: words(status),
+                    own: own.map_or_else(|| "it".to_owned(), |own| own.display().to_string()),
+                },
+                Some(status) => self.failed(words(status)),
+                None => LinkError::Late { server: self.server(), within: CONNECTING },
+            }
+        })
+    }
+
+    /// Waits for the connection; what was wrong last, where it does not come.
+    fn wait(&mut self, within: Duration) -> Result<(), Option<StatusCode>> {
+        let Some(open) = &mut self.open else { return Err(None) };
+        let connected = async {
+            loop {
+                match *open.state.borrow_and_update() {
+                    State::Connected => return Ok(()),
+                    State::Failed(status) if is_refusal(status) => return Err(status),
+                    _ => {}
+                }
+                if open.state.changed().await.is_err() {
+                    return Err(StatusCode::BadConnectionClosed);
+                }
+            }
+        };
+        match self.runtime.block_on(async { timeout(within, connected).await }) {
+            Ok(done) => done.map_err(Some),
+            Err(_) => Err(match *open.state.borrow() {
+                State::Failed(status) => Some(status),
+                _ => None,
+            }),
+        }
+    }
+
+    /// Reads an attribute of each of these nodes.
+    pub(crate) fn read(&mut self, nodes: &[NodeId], attribute: AttributeId) -> Result<Answer, LinkError> {
+        let wanted: Vec<ReadValueId> = nodes
+            .iter()
+            .map(|node| ReadValueId {
+                node_id: node.clone(),
+                attribute_id: attribute as u32,
+                index_range: NumericRange::None,
+                data_encoding: QualifiedName::null(),
+            })
+            .collect();
+        let within = self.within;
+        let Some(open) = &self.open else { return Err(self.failed("there is no session")) };
+        let session = open.session.clone();
+        // 0: no older than now.
+        let read = Read::new(&session)
+            .nodes_to_read(wanted)
+            .timestamps_to_return(TimestampsToReturn::Source)
+            .max_age(0.0)
+            .send(session.channel());
+        let read = async { timeout(within, read).await };
+        let answer = match self.runtime.block_on(read) {
+            Err(_) => Err(LinkError::Late { server: self.server(), within }),
+            Ok(Err(error)) => Err(self.failed(error.to_string())),
+            Ok(Ok(answer)) => {
+                let values = answer.results.unwrap_or_default();
+                match values.len() == nodes.len() {
+                    true => Ok(Answer { values, sent: answer.response_header.timestamp }),
+                    false => {
+                        let words =
+                            format!("{} values came where {} were asked for", values.len(), nodes.len());
+                        Err(self.failed(words))
+                    }
+                }
+            }
+        };
+        self.notice(answer.is_ok());
+        answer
+    }
+
+    fn notice(&mut self, there: bool) {
+        match (there, self.away) {
+            (false, None) => self.away = Some(Instant::now()),
+            (true, Some(since)) => {
+                self.away = None;
+                let words =
+                    format!("{} answers again after {:.1} s", self.server(), since.elapsed().as_secs_f64());
+                self.remark = Some(words);
+            }
+            _ => {}
+        }
+    }
+
+    /// What has become of the connection, once.
+    pub(crate) fn remark(&mut self) -> Option<String> {
+        self.remark.take()
+    }
+
+    /// Writes values, of which none waits for another. Waits for a connection that is coming back, and tries again.
+    pub(crate) fn write(
+        &mut self,
+        values: &[(NodeId, Variant, f64)],
+        until: Instant,
+    ) -> Result<(), LinkError> {
+        let write: Vec<WriteValue> = values
+            .iter()
+            .map(|(node, value, _)| WriteValue {
+                node_id: node.clone(),
+                attribute_id: AttributeId::Value as u32,
+                index_range: NumericRange::None,
+                value: DataValue::value_only(value.clone()),
+            })
+            .collect();
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            self.wait(left).map_err(|status| match status {
+                Some(status) => self.failed(words(status)),
+                None => LinkError::Late { server: self.server(), within: WRITING },
+            })?;
+            let Some(open) = &self.open else { return Err(self.failed("there is no session")) };
+            let session = open.session.clone();
+            let left = until.saturating_duration_since(Instant::now());
+            let answer = self.runtime.block_on(async { timeout(left, session.write(&write)).await });
+            match answer {
+                Err(_) => return Err(LinkError::Late { server: self.server(), within: WRITING }),
+                // Writing the same twice does no harm. The state says a moment later that the connection is gone.
+                Ok(Err(error)) if is_passing(&error) && !left.is_zero() => {
+                    self.runtime.block_on(async { tokio::time::sleep(Duration::from_millis(20)).await });
+                }
+                Ok(Err(error)) => return Err(self.failed(error.to_string())),
+                Ok(Ok(answers)) => return self.refusal(values, &answers),
+            }
+        }
+    }
+
+    fn refusal(&self, values: &[(NodeId, Variant, f64)], answers: &[StatusCode]) -> Result<(), LinkError> {
+        if answers.len() != values.len() {
+            return Err(self.failed(format!(
+                "{} values were written, {} answers came",
+                values.len(),
+                answers.len()
+            )));
+        }
+        match values.iter().zip(answers).find(|(_, status)| !status.is_good()) {
+            None => Ok(()),
+            Some(((node, _, value), status)) => Err(LinkError::Refused {
+                server: self.server(),
+                node: node.clone(),
+                value: *value,
+                words: words(*status),
+            }),
+        }
+    }
+
+    /// Until when values that are written now have to be there. A heartbeat does not wait: the next one comes soon, and samples wait for it.
+    pub(crate) fn deadline(&self, is_heartbeat: bool) -> Instant {
+        Instant::now() + if is_heartbeat { self.within } else { WRITING }
+    }
+
+    /// Gives the session up.
+    pub(crate) fn close(&mut self) {
+        if let Some(open) = self.open.take() {
+            let _ = self
+                .runtime
+                .block_on(async { timeout(Duration::from_secs(1), open.session.disconnect()).await });
+            open.task.abort();
+        }
+        self.away = None;
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+/// Whether a new connection may do what this one could not.
+fn is_passing(error: &Error) -> bool {
+    [
+        StatusCode::BadNotConnected,
+        StatusCode::BadConnectionClosed,
+        StatusCode::BadSecureChannelClosed,
+        StatusCode::BadSessionIdInvalid,
+        StatusCode::BadSessionClosed,
+        StatusCode::BadSessionNotActivated,
+        StatusCode::BadCommunicationError,
+    ]
+    .contains(&error.status())
+}
+
+/// A certificate as it goes over the wire.
+pub(crate) fn der(certificate: &X509) -> Vec<u8> {
+    certificate.as_byte_string().as_ref().to_vec()
+}

@@ -1,0 +1,219 @@
+//! The nodes of the rig.
+
+use crate::link::{Link, LinkError};
+use crate::settings::{Checked, SettingError, Settings, Timestamps, wrong};
+use crate::value::{like, number, quality, words};
+use mapper_controller::{Controller, Reading, Target, rig};
+use mapper_core::{Backend, BackendError, Channel, Quality};
+use opcua::types::{AttributeId, DataValue, DateTime, NodeId, StatusCode, Variant};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// A clock that is off by more is said, s.
+const CLOCK_SAID_S: f64 = 1.0;
+/// The bit of an access level that lets values be written.
+const WRITABLE: u8 = 2;
+
+/// Makes the rig; nothing is connected.
+pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
+    let mut checked = Settings::read(value)?;
+    let within = Duration::from_secs_f64(checked.settings.timeout_s());
+    let (endpoint, user) = (checked.settings.endpoint.clone(), checked.user.take());
+    let link = Link::new(endpoint, checked.settings.security, user, within)
+        .map_err(|error| wrong("", SettingError::Store(error.to_string())))?;
+    let nodes = checked.reads.iter().map(|(_, node, _)| node.clone()).collect();
+    Ok(rig(checked.settings.stand(), Nodes { checked, link, nodes, types: BTreeMap::new(), remark: None }))
+}
+
+struct Nodes {
+    checked: Checked,
+    link: Link,
+    /// What is read, in the order of `checked.reads`.
+    nodes: Vec<NodeId>,
+    /// What stands at the nodes that are written.
+    types: BTreeMap<Target, Variant>,
+    remark: Option<String>,
+}
+
+fn between_s(earlier: &DateTime, later: &DateTime) -> f64 {
+    // A tick is 100 ns.
+    (later.ticks() - earlier.ticks()) as f64 * 1e-7
+}
+
+/// A status with which a node will not be there later either.
+fn is_for_good(status: StatusCode) -> bool {
+    [
+        StatusCode::BadNodeIdUnknown,
+        StatusCode::BadNodeIdInvalid,
+        StatusCode::BadAttributeIdInvalid,
+        StatusCode::BadNotReadable,
+        StatusCode::BadUserAccessDenied,
+    ]
+    .contains(&status)
+}
+
+impl Nodes {
+    /// Says where the server's clock is another time of day.
+    fn compare_clocks(&mut self, sent: &DateTime) {
+        let off_s = between_s(&DateTime::now(), sent);
+        if off_s.abs() > CLOCK_SAID_S && !sent.is_null() {
+            let side = if off_s > 0.0 { "ahead" } else { "behind" };
+            self.remark =
+                Some(format!("the server's clock is {:.1} s {side}; ages are by its own clock", off_s.abs()));
+        }
+    }
+
+    /// When the source took a value, s since arming, for a sample at `t_s`: as long before it as the server says, by the server's own clock.
+    fn source_t_s(&self, value: &DataValue, sent: &DateTime, t_s: f64) -> Option<f64> {
+        let taken = value.source_timestamp.as_ref().filter(|taken| !taken.is_null() && !sent.is_null())?;
+        (self.checked.settings.timestamps == Timestamps::Source).then(|| t_s - between_s(taken, sent))
+    }
+
+    /// What stands at a node that is written: values of another type would be refused.
+    fn type_of(&mut self, node: &NodeId, value: &DataValue) -> Result<Variant, LinkError> {
+        if let Some(status) = value.status.filter(|status| is_for_good(*status)) {
+            return Err(LinkError::Node {
+                node: node.clone(),
+                words: format!("cannot be read: {}", words(status)),
+            });
+        }
+        match &value.value {
+            Some(value)
+                if !number(value).is_nan() || matches!(value, Variant::Float(_) | Variant::Double(_)) =>
+            {
+                return Ok(value.clone());
+            }
+            Some(value) if !value.is_empty() => {
+                return Err(LinkError::Node {
+                    node: node.clone(),
+                    words: format!("holds no number: {value}"),
+                });
+            }
+            _ => {}
+        }
+        // Nobody has written there yet.
+        let answer = self.link.read(std::slice::from_ref(node), AttributeId::DataType)?;
+        let data_type = answer.values.into_iter().next().and_then(|answer| answer.value);
+        let built_in = match data_type {
+            Some(Variant::NodeId(id)) if id.namespace == 0 => id.as_u32(),
+            _ => None,
+        };
+        // Part 6 of the specification, table 1.
+        Ok(match built_in {
+            Some(1) => Variant::Boolean(false),
+            Some(2) => Variant::SByte(0),
+            Some(3) => Variant::Byte(0),
+            Some(4) => Variant::Int16(0),
+            Some(5) => Variant::UInt16(0),
+            Some(6) => Variant::Int32(0),
+            Some(7) => Variant::UInt32(0),
+            Some(8) => Variant::Int64(0),
+            Some(9) => Variant::UInt64(0),
+            Some(10) => Variant::Float(0.0),
+            Some(11) => Variant::Double(0.0),
+            _ => return Err(LinkError::Node { node: node.clone(), words: "holds no number".to_owned() }),
+        })
+    }
+
+    /// Types and access of what is written.
+    fn learn_types(&mut self) -> Result<(), LinkError> {
+        let written: Vec<(Target, NodeId)> =
+            self.checked.written().map(|(target, node)| (target, node.clone())).collect();
+        let nodes: Vec<NodeId> = written.iter().map(|(_, node)| node.clone()).collect();
+        let values = self.link.read(&nodes, AttributeId::Value)?.values;
+        for ((target, node), value) in written.into_iter().zip(values) {
+            let there = self.type_of(&node, &value)?;
+            self.types.insert(target, there);
+        }
+        let levels = self.link.read(&nodes, AttributeId::UserAccessLevel)?.values;
+        let locked = nodes
+            .iter()
+            .zip(levels)
+            .find(|(_, level)| matches!(level.value, Some(Variant::Byte(level)) if level & WRITABLE == 0));
+        match locked {
+            None => Ok(()),
+            Some((node, _)) => {
+                let words = "may not be written by this user".to_owned();
+                Err(LinkError::Node { node: node.clone(), words })
+            }
+        }
+    }
+}
+
+/// What may go out in one request: the valve before pressures, the air after everything.
+fn rank(target: Target) -> u8 {
+    match target {
+        Target::Valve => 0,
+        Target::P3 | Target::T3 | Target::OilTemperature => 1,
+        Target::Air => 2,
+        Target::Heartbeat => 3,
+    }
+}
+
+impl Controller for Nodes {
+    type Error = LinkError;
+
+    fn open(&mut self) -> Result<(), LinkError> {
+        self.link.open()?;
+        let answer = self.link.read(&self.nodes, AttributeId::Value)?;
+        self.compare_clocks(&answer.sent);
+        for (node, value) in self.nodes.iter().zip(answer.values) {
+            if let Some(status) = value.status.filter(|status| is_for_good(*status)) {
+                let words = format!("cannot be read: {}", words(status));
+                return Err(LinkError::Node { node: node.clone(), words });
+            }
+        }
+        self.learn_types()
+    }
+
+    fn read(&mut self, t_s: f64) -> BTreeMap<Channel, Reading> {
+        let Ok(answer) = self.link.read(&self.nodes, AttributeId::Value) else { return BTreeMap::new() };
+        let reading =
+            |((channel, _, scale), value): (&(Channel, NodeId, crate::settings::Scale), DataValue)| {
+                let mut quality = quality(&value);
+                let inside = value.value.as_ref().map_or(f64::NAN, |value| scale.inside(number(value)));
+                if inside.is_nan() {
+                    quality = Quality::Bad;
+                }
+                (
+                    *channel,
+                    Reading {
+                        value: inside,
+                        source_t_s: self.source_t_s(&value, &answer.sent, t_s),
+                        quality,
+                    },
+                )
+            };
+        self.checked.reads.iter().zip(answer.values).map(reading).collect()
+    }
+
+    fn write(&mut self, values: &[(Target, f64)]) -> Result<(), LinkError> {
+        let until = self.link.deadline(values.iter().all(|(target, _)| *target == Target::Heartbeat));
+        for together in values.chunk_by(|(a, _), (b, _)| rank(*a) == rank(*b)) {
+            let mut request = Vec::with_capacity(together.len());
+            for (target, value) in together {
+                let Some(((node, scale), there)) = self.checked.write(*target).zip(self.types.get(target))
+                else {
+                    // Every target has its place, and a type once the rig is armed.
+                    return Err(LinkError::Unknown(*target));
+                };
+                let outside = scale.outside(*value);
+                let fits = like(there, outside);
+                let fits =
+                    fits.ok_or_else(|| LinkError::DoesNotFit { node: node.clone(), value: outside })?;
+                request.push((node.clone(), fits, outside));
+            }
+            self.link.write(&request, until)?;
+        }
+        Ok(())
+    }
+
+    fn remark(&mut self) -> Option<String> {
+        self.remark.take().or_else(|| self.link.remark())
+    }
+
+    fn close(&mut self) {
+        self.link.close();
+    }
+}

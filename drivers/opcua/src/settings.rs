@@ -1,0 +1,348 @@
+//! The settings of the driver as a campaign writes them below `opcua`.
+
+use mapper_controller::{Accepts, LimitError, Safe, Stand, Target, within};
+use mapper_core::{BackendError, Channel, Dimension};
+use mapper_driver::{SecretError, secret};
+use mapper_yaml::units::{Duration, Frequency, Kind, Quantity};
+use opcua::types::NodeId;
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+/// Name of the driver.
+pub(crate) const NAME: &str = "opcua";
+
+/// Below `opcua`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Settings {
+    /// Address of the server, `opc.tcp://HOST:PORT/...`.
+    pub(crate) endpoint: String,
+    /// How what goes over the wire is protected.
+    #[serde(default)]
+    pub(crate) security: Security,
+    /// Name of the user: `{env: NAME}`. Anonymous if not said.
+    #[serde(default)]
+    user: Value,
+    /// Password of the user: `{env: NAME}`.
+    #[serde(default)]
+    password: Value,
+    /// Name of the rig, of which there is one; its endpoint if not said.
+    pub(crate) rig: Option<String>,
+    /// How often it is read; 10 Hz if not said.
+    pub(crate) rate: Option<Quantity<Frequency>>,
+    /// Time for each read; 300 ms if not said.
+    pub(crate) timeout: Option<Quantity<Duration>>,
+    /// Which time of a reading counts for its age.
+    #[serde(default)]
+    pub(crate) timestamps: Timestamps,
+    /// Where each channel stands.
+    pub(crate) read: BTreeMap<Channel, Place>,
+    /// Where each setpoint goes.
+    pub(crate) write: Writes,
+    /// Setpoints that the rig takes.
+    pub(crate) accepts: Accepts,
+    /// Its way into the safe state.
+    pub(crate) safe: Safe,
+}
+
+/// Signed and encrypted, or by name in the clear.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Security {
+    /// Basic256Sha256, signed and encrypted.
+    #[default]
+    Basic256Sha256,
+    /// Aes128-Sha256-RsaOaep, signed and encrypted.
+    Aes128Sha256RsaOaep,
+    /// Aes256-Sha256-RsaPss, signed and encrypted.
+    Aes256Sha256RsaPss,
+    /// Nothing: whoever is on the network can read and write.
+    None,
+}
+
+/// Which time of a reading counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Timestamps {
+    /// The server's source timestamp.
+    #[default]
+    Source,
+    /// When it arrived: for servers that stamp a value only when it changes.
+    Arrival,
+}
+
+/// A node; its value times `scale` plus `offset` is SI, or it is in `unit`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Place {
+    /// As `ns=2;s=Stand.P3` or `ns=3;i=1001`.
+    #[serde(deserialize_with = "node_id")]
+    pub(crate) node: NodeId,
+    /// Unit of the value there.
+    unit: Option<String>,
+    scale: Option<f64>,
+    offset: Option<f64>,
+}
+
+fn node_id<'de, D: serde::Deserializer<'de>>(from: D) -> Result<NodeId, D::Error> {
+    let text = String::deserialize(from)?;
+    NodeId::from_str(&text).map_err(|_| {
+        let words = format!("`{text}` is not a node id; they are written as ns=2;s=Stand.P3 or ns=3;i=1001");
+        serde::de::Error::custom(words)
+    })
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Writes {
+    p3: Place,
+    t3: Place,
+    valve: Place,
+    oil_temperature: Place,
+    /// 1 or true: air on.
+    air: Place,
+    /// Counts up twice a second: the controller cuts the air by itself where it stands still.
+    heartbeat: Place,
+}
+
+/// What is wrong with them.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum SettingError {
+    #[error("{0}; docs/rig.md has an example of all settings")]
+    Form(serde_json::Error),
+    #[error(transparent)]
+    Limit(#[from] LimitError),
+    #[error(transparent)]
+    Secret(#[from] SecretError),
+    #[error("an endpoint is written as opc.tcp://HOST:PORT, not `{0}`")]
+    Endpoint(String),
+    #[error("{channel} is not given in `{unit}`; its units are {units}")]
+    Unit { channel: Channel, unit: String, units: String },
+    #[error("write `unit`, or `scale` and `offset`, not both")]
+    TwoScales,
+    #[error("two values are written to the node {0}")]
+    Shared(NodeId),
+    #[error("a user has a password, and a password a user")]
+    HalfAUser,
+    #[error("with `security: none` the password would go over the wire in the clear")]
+    Exposed,
+    #[error("{0}")]
+    Store(String),
+}
+
+pub(crate) fn wrong(path: impl Into<String>, error: impl Into<SettingError>) -> BackendError {
+    BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(error.into()) }
+}
+
+/// How a number at a node becomes SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Scale {
+    scale: f64,
+    offset: f64,
+}
+
+impl Scale {
+    pub(crate) fn inside(self, number: f64) -> f64 {
+        let value = number * self.scale + self.offset;
+        if value.is_finite() { value } else { f64::NAN }
+    }
+
+    pub(crate) fn outside(self, value: f64) -> f64 {
+        (value - self.offset) / self.scale
+    }
+}
+
+fn kind(channel: Channel) -> Option<Kind> {
+    match channel.info().dimension {
+        Dimension::RotationalSpeed => Some(Kind::Speed),
+        Dimension::MassFlow => Some(Kind::MassFlow),
+        Dimension::Pressure => Some(Kind::Pressure),
+        Dimension::Temperature => Some(Kind::Temperature),
+        Dimension::Ratio => None,
+    }
+}
+
+impl Place {
+    /// How the number there becomes the value of a channel.
+    fn scale(&self, channel: Channel) -> Result<Scale, SettingError> {
+        let Some(unit) = &self.unit else {
+            let scale = self.scale.unwrap_or(1.0);
+            within(scale.abs(), "", 1e-12, 1e12)?;
+            let offset = within(self.offset.unwrap_or(0.0), "", -1e12, 1e12)?;
+            return Ok(Scale { scale, offset });
+        };
+        if self.scale.is_some() || self.offset.is_some() {
+            return Err(SettingError::TwoScales);
+        }
+        let kind = kind(channel);
+        let Some(found) = kind.and_then(|kind| kind.unit(unit)) else {
+            let units = kind.map_or_else(|| "none".to_owned(), Kind::unit_list);
+            return Err(SettingError::Unit { channel, unit: unit.clone(), units });
+        };
+        let offset = found.to_inside(0.0);
+        Ok(Scale { scale: found.to_inside(1.0) - offset, offset })
+    }
+}
+
+/// A user, and the password. It is printed nowhere.
+pub(crate) struct User {
+    pub(crate) name: String,
+    pub(crate) password: String,
+}
+
+/// Settings that have been looked at.
+pub(crate) struct Checked {
+    pub(crate) settings: Settings,
+    pub(crate) user: Option<User>,
+    pub(crate) reads: Vec<(Channel, NodeId, Scale)>,
+    writes: BTreeMap<Target, (NodeId, Scale)>,
+}
+
+impl Settings {
+    /// Reads and checks them.
+    pub(crate) fn read(value: &Value) -> Result<Checked, BackendError> {
+        let settings: Settings = serde_path_to_error::deserialize(value).map_err(|error| {
+            let path = error.path().to_string();
+            wrong(path.trim_start_matches('.'), SettingError::Form(error.into_inner()))
+        })?;
+        settings.check()
+    }
+
+    fn check(self) -> Result<Checked, BackendError> {
+        if !self.endpoint.starts_with("opc.tcp://") || self.endpoint.len() <= "opc.tcp://".len() {
+            return Err(wrong("endpoint", SettingError::Endpoint(self.endpoint.clone())));
+        }
+        within(self.timeout_s(), "s", 0.01, 0.8).map_err(|error| wrong("timeout", error))?;
+        self.stand().check().map_err(|(path, error)| wrong(path, error))?;
+        let user = secret(&self.user).map_err(|error| wrong("user", error))?;
+        let password = secret(&self.password).map_err(|error| wrong("password", error))?;
+        let user = match (user, password) {
+            (None, None) => None,
+            (Some(name), Some(password)) => Some(User { name, password }),
+            _ => return Err(wrong("user", SettingError::HalfAUser)),
+        };
+        if user.is_some() && self.security == Security::None {
+            return Err(wrong("security", SettingError::Exposed));
+        }
+        let mut reads = Vec::new();
+        for (channel, place) in &self.read {
+            let scale = place.scale(*channel).map_err(|error| wrong(format!("read.{channel}"), error))?;
+            reads.push((*channel, place.node.clone(), scale));
+        }
+        let mut writes: BTreeMap<Target, (NodeId, Scale)> = BTreeMap::new();
+        for target in Target::ALL {
+            let (place, like) = self.write.place(target);
+            let path = format!("write.{}", target.key());
+            let scale = place.scale(like).map_err(|error| wrong(path.clone(), error))?;
+            if writes.values().any(|(node, _)| *node == place.node) {
+                return Err(wrong(path, SettingError::Shared(place.node.clone())));
+            }
+            writes.insert(target, (place.node.clone(), scale));
+        }
+        Ok(Checked { settings: self, user, reads, writes })
+    }
+
+    /// Time for a read, s.
+    pub(crate) fn timeout_s(&self) -> f64 {
+        self.timeout.as_ref().map_or(0.3, |timeout| timeout.inside)
+    }
+
+    /// The stand that they describe.
+    pub(crate) fn stand(&self) -> Stand {
+        Stand {
+            backend: NAME,
+            version: env!("CARGO_PKG_VERSION"),
+            rig: self.rig.clone().unwrap_or_else(|| format!("opcua {}", self.endpoint)),
+            rate_hz: self.rate.as_ref().map_or(10.0, |rate| rate.inside),
+            channels: self.read.keys().copied().collect(),
+            accepts: self.accepts,
+            safe: self.safe,
+        }
+    }
+}
+
+impl Writes {
+    /// Where a value goes, and the channel that has the units it may be in.
+    fn place(&self, target: Target) -> (&Place, Channel) {
+        match target {
+            Target::P3 => (&self.p3, Channel::P3),
+            Target::T3 => (&self.t3, Channel::T3),
+            Target::Valve => (&self.valve, Channel::ValveCommand),
+            Target::OilTemperature => (&self.oil_temperature, Channel::TOil),
+            Target::Air => (&self.air, Channel::ValveCommand),
+            Target::Heartbeat => (&self.heartbeat, Channel::ValveCommand),
+        }
+    }
+}
+
+impl Checked {
+    /// Where a value goes, and how it becomes the number there. All targets are there.
+    pub(crate) fn write(&self, target: Target) -> Option<&(NodeId, Scale)> {
+        self.writes.get(&target)
+    }
+
+    /// Every node that is written.
+    pub(crate) fn written(&self) -> impl Iterator<Item = (Target, &NodeId)> {
+        self.writes.iter().map(|(target, (node, _))| (*target, node))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn settings() -> Value {
+        json!({
+            "endpoint": "opc.tcp://127.0.0.1:4840",
+            "read": {"N": {"node": "ns=2;s=N"}, "P3": {"node": "ns=2;i=3", "unit": "kPa"}, "T3": {"node": "ns=2;s=T3", "unit": "degC"}},
+            "write": {
+                "p3": {"node": "ns=2;s=p3", "scale": 1000.0}, "t3": {"node": "ns=2;s=t3"}, "valve": {"node": "ns=2;s=v"},
+                "oil_temperature": {"node": "ns=2;s=oil"}, "air": {"node": "ns=2;s=air"}, "heartbeat": {"node": "ns=2;s=beat"}
+            },
+            "accepts": {"p3": ["105 kPa", "400 kPa"], "t3": ["280 K", "900 K"], "valve": [0.1, 2.5], "oil_temperature": ["280 K", "400 K"]},
+            "safe": {"opening": 1.0, "within": "20 s"}
+        })
+    }
+
+    /// 300 kPa are 300 000 Pa, 26.85 degC are 300 K; what is written goes the other way.
+    #[test]
+    fn units_and_scales_lead_to_si_and_back() {
+        let checked = Settings::read(&settings()).ok().unwrap();
+        let scale = |channel| checked.reads.iter().find(|(one, ..)| *one == channel).unwrap().2;
+        assert_eq!(scale(Channel::P3).inside(300.0), 300e3);
+        assert!((scale(Channel::T3).inside(26.85) - 300.0).abs() < 1e-9);
+        assert!(scale(Channel::P3).inside(f64::INFINITY).is_nan());
+        assert_eq!(checked.write(Target::P3).unwrap().1.outside(300e3), 300.0);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_at_its_place() {
+        let path = |change: &dyn Fn(&mut Value)| {
+            let mut value = settings();
+            change(&mut value);
+            match Settings::read(&value) {
+                Err(BackendError::Settings { path, source, .. }) => (path, source.to_string()),
+                _ => panic!("{value}"),
+            }
+        };
+        assert_eq!(path(&|value| value["endpoint"] = json!("127.0.0.1:4840")).0, "endpoint");
+        assert_eq!(path(&|value| value["security"] = json!("weak")).0, "security");
+        assert_eq!(path(&|value| value["rate"] = json!("1 Hz")).0, "rate");
+        assert!(path(&|value| value["read"]["N"]["node"] = json!("N")).1.contains("ns=2;s=Stand.P3"));
+        assert!(path(&|value| value["read"]["P3"]["unit"] = json!("degC")).1.contains("kPa"));
+        assert_eq!(path(&|value| value["write"]["t3"] = json!({"node": "ns=2;s=p3"})).0, "write.t3");
+        assert_eq!(path(&|value| value["user"] = json!("plain")).0, "user");
+        // PATH is set wherever tests run.
+        assert_eq!(path(&|value| value["user"] = json!({"env": "PATH"})).0, "user");
+        let exposed = path(&|value| {
+            value["security"] = json!("none");
+            (value["user"], value["password"]) = (json!({"env": "PATH"}), json!({"env": "PATH"}));
+        });
+        assert_eq!(exposed.0, "security");
+        let unmeasured = path(&|value| drop(value["read"].as_object_mut().unwrap().remove("P3")));
+        assert_eq!(unmeasured.0, "read");
+    }
+}

@@ -1,0 +1,183 @@
+//! Certificates on disk: our own, and the one that each server had when somebody said that it is to be trusted.
+
+use crate::settings::NAME;
+use opcua::crypto::{CertificateStore, X509, X509Data};
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+
+/// Our name in the world of OPC UA; it stands in our certificate.
+pub(crate) const APPLICATION_URI: &str = "urn:mapper:backend:opcua";
+/// How long our own certificate holds, days.
+const VALID_DAYS: u32 = 10 * 365;
+const KEY_BITS: u32 = 2048;
+
+/// Why a certificate is not there.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum StoreError {
+    #[error("set MAPPER_STATE_DIR or HOME: the certificates have no directory")]
+    NoPlace,
+    #[error("{}: {source}", path.display())]
+    File { path: PathBuf, source: std::io::Error },
+    #[error("failed to make a certificate: {0}")]
+    Made(String),
+    #[error("{} is not a certificate", .0.display())]
+    Garbage(PathBuf),
+    #[error("nobody has said that the certificate of {0} is to be trusted: `mapper-backend-opcua trust {0}`")]
+    NotTrusted(String),
+    #[error(
+        "{server} has another certificate than the trusted one: {found} where {pinned} was pinned. If the server was given a \
+         new one, `mapper-backend-opcua trust {server} --replace`; if not, somebody else answers"
+    )]
+    Changed { server: String, found: String, pinned: String },
+    #[error("the certificate of {server} {words}; give the server a new one and trust it")]
+    Expired { server: String, words: String },
+}
+
+/// The directory of certificates.
+#[derive(Debug, Clone)]
+pub(crate) struct Store {
+    root: PathBuf,
+}
+
+impl Store {
+    /// In `$MAPPER_STATE_DIR`, `$XDG_STATE_HOME/mapper` or `~/.local/state/mapper`, as locks and latches.
+    pub(crate) fn of_environment() -> Result<Store, StoreError> {
+        let variable =
+            |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+        let state = variable("MAPPER_STATE_DIR")
+            .or_else(|| variable("XDG_STATE_HOME").map(|state| state.join("mapper")))
+            .or_else(|| variable("HOME").map(|home| home.join(".local/state/mapper")));
+        Ok(Store { root: state.ok_or(StoreError::NoPlace)?.join(NAME) })
+    }
+
+    /// Where it is.
+    pub(crate) fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// Our own certificate, which is made where there is none.
+    pub(crate) fn own(&self) -> Result<PathBuf, StoreError> {
+        let store = CertificateStore::new(&self.root);
+        let (certificate, key) = (store.own_certificate_path(), store.own_private_key_path());
+        if certificate.exists() && key.exists() {
+            return Ok(certificate);
+        }
+        for directory in [certificate.parent(), key.parent()].into_iter().flatten() {
+            self.directory(directory)?;
+        }
+        CertificateStore::create_certificate_and_key(&about(VALID_DAYS), true, &certificate, &key)
+            .map_err(StoreError::Made)?;
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            std::fs::set_permissions(&key, std::fs::Permissions::from_mode(0o600))
+                .map_err(|source| StoreError::File { path: key, source })?;
+        }
+        Ok(certificate)
+    }
+
+    /// Makes a directory that nobody else looks into: a key is written there.
+    fn directory(&self, path: &Path) -> Result<(), StoreError> {
+        let mut made = std::fs::DirBuilder::new();
+        made.recursive(true);
+        #[cfg(unix)]
+        std::os::unix::fs::DirBuilderExt::mode(&mut made, 0o700);
+        made.create(path).map_err(|source| StoreError::File { path: path.to_owned(), source })
+    }
+
+    fn pin(&self, endpoint: &str) -> PathBuf {
+        let plain = |c: char| if c.is_ascii_alphanumeric() || "-.".contains(c) { c } else { '_' };
+        let name: String = server(endpoint).to_ascii_lowercase().chars().map(plain).collect();
+        self.root.join("servers").join(format!("{name}.der"))
+    }
+
+    /// The certificate that a server had when it was trusted, still valid.
+    pub(crate) fn pinned(&self, endpoint: &str) -> Result<X509, StoreError> {
+        let Some(certificate) = self.trusted(endpoint)? else {
+            return Err(StoreError::NotTrusted(endpoint.to_owned()));
+        };
+        let expired = |error: opcua::types::Error| StoreError::Expired {
+            server: server(endpoint).to_owned(),
+            words: match certificate.not_after() {
+                Ok(day) => format!("is not valid now (until {})", day.format("%Y-%m-%d")),
+                Err(_) => format!("is not valid: {error}"),
+            },
+        };
+        certificate.is_time_valid(&opcua::types::DateTime::now().as_chrono()).map_err(expired)?;
+        Ok(certificate)
+    }
+
+    /// The certificate that is trusted; `None` where there is none.
+    pub(crate) fn trusted(&self, endpoint: &str) -> Result<Option<X509>, StoreError> {
+        let path = self.pin(endpoint);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let der = std::fs::read(&path).map_err(|source| StoreError::File { path: path.clone(), source })?;
+        X509::from_der(&der).map(Some).map_err(|_| StoreError::Garbage(path))
+    }
+
+    /// Trusts this certificate from now on. Gives the file.
+    pub(crate) fn trust(&self, endpoint: &str, der: &[u8]) -> Result<PathBuf, StoreError> {
+        let path = self.pin(endpoint);
+        self.directory(path.parent().unwrap_or(&self.root))?;
+        std::fs::write(&path, der).map_err(|source| StoreError::File { path: path.clone(), source })?;
+        Ok(path)
+    }
+}
+
+/// What stands in a certificate of ours.
+fn about(valid_days: u32) -> X509Data {
+    let text = || "mapper".to_owned();
+    X509Data {
+        key_size: KEY_BITS,
+        common_name: text(),
+        organization: text(),
+        organizational_unit: text(),
+        country: "XX".to_owned(),
+        state: "-".to_owned(),
+        alt_host_names: X509Data::alt_host_names(APPLICATION_URI, None, false, true, false),
+        certificate_duration_days: valid_days,
+    }
+}
+
+/// Host and port of an endpoint.
+pub(crate) fn server(endpoint: &str) -> &str {
+    let after = endpoint.strip_prefix("opc.tcp://").unwrap_or(endpoint);
+    after.split('/').next().unwrap_or(after)
+}
+
+/// SHA-256 of a certificate, as other programs show it.
+pub(crate) fn fingerprint(der: &[u8]) -> String {
+    let bytes: Vec<String> = Sha256::digest(der).iter().map(|byte| format!("{byte:02X}")).collect();
+    bytes.join(":")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_server_is_its_host_and_port() {
+        assert_eq!(server("opc.tcp://plc.lab:4840/stand/1"), "plc.lab:4840");
+        let store = Store { root: PathBuf::from("/state") };
+        assert_eq!(store.pin("opc.tcp://PLC:4840/"), store.pin("opc.tcp://plc:4840"));
+        assert_eq!(store.pin("opc.tcp://../x:1"), PathBuf::from("/state/servers/...der"));
+    }
+
+    /// One that holds for no day at all, and ours.
+    #[test]
+    fn a_certificate_that_has_expired_is_not_talked_to() {
+        let scratch = tempfile::tempdir().unwrap();
+        let (store, endpoint) = (Store { root: scratch.path().join("opcua") }, "opc.tcp://plc:4840");
+        assert!(matches!(store.pinned(endpoint), Err(StoreError::NotTrusted(_))));
+        let (expired, _) = X509::cert_and_pkey(&about(0)).unwrap();
+        store.trust(endpoint, &expired.to_der().unwrap()).unwrap();
+        let refused = store.pinned(endpoint).err().unwrap().to_string();
+        assert!(refused.contains("is not valid now"), "{refused}");
+        let own = store.own().unwrap();
+        assert_eq!(store.own().unwrap(), own);
+        store.trust(endpoint, &std::fs::read(own).unwrap()).unwrap();
+        assert!(store.pinned(endpoint).is_ok());
+    }
+}

@@ -1,0 +1,102 @@
+//! Numbers in values of OPC UA.
+
+use mapper_core::Quality;
+use opcua::types::{DataValue, StatusCode, Variant};
+
+/// The number that a value holds; NaN where it holds none. A truth value is 1 or 0.
+pub(crate) fn number(value: &Variant) -> f64 {
+    match value {
+        Variant::Boolean(value) => f64::from(u8::from(*value)),
+        Variant::SByte(value) => f64::from(*value),
+        Variant::Byte(value) => f64::from(*value),
+        Variant::Int16(value) => f64::from(*value),
+        Variant::UInt16(value) => f64::from(*value),
+        Variant::Int32(value) => f64::from(*value),
+        Variant::UInt32(value) => f64::from(*value),
+        Variant::Int64(value) => *value as f64,
+        Variant::UInt64(value) => *value as f64,
+        Variant::Float(value) => f64::from(*value),
+        Variant::Double(value) => *value,
+        _ => f64::NAN,
+    }
+}
+
+/// The number as a value of the type that stands there; `None` where it does not fit.
+pub(crate) fn like(there: &Variant, number: f64) -> Option<Variant> {
+    let whole = number.round();
+    let within = |low: f64, high: f64| (low..=high).contains(&whole).then_some(whole);
+    // Each cast is of a whole number within the bounds of its type.
+    Some(match there {
+        Variant::Boolean(_) => Variant::Boolean(within(0.0, 1.0)? == 1.0),
+        Variant::SByte(_) => Variant::SByte(within(f64::from(i8::MIN), f64::from(i8::MAX))? as i8),
+        Variant::Byte(_) => Variant::Byte(within(0.0, f64::from(u8::MAX))? as u8),
+        Variant::Int16(_) => Variant::Int16(within(f64::from(i16::MIN), f64::from(i16::MAX))? as i16),
+        Variant::UInt16(_) => Variant::UInt16(within(0.0, f64::from(u16::MAX))? as u16),
+        Variant::Int32(_) => Variant::Int32(within(f64::from(i32::MIN), f64::from(i32::MAX))? as i32),
+        Variant::UInt32(_) => Variant::UInt32(within(0.0, f64::from(u32::MAX))? as u32),
+        // Beyond 2^53 a double has no units.
+        Variant::Int64(_) => Variant::Int64(within(-9.0e15, 9.0e15)? as i64),
+        Variant::UInt64(_) => Variant::UInt64(within(0.0, 9.0e15)? as u64),
+        Variant::Float(_) if (number as f32).is_finite() => Variant::Float(number as f32),
+        Variant::Double(_) if number.is_finite() => Variant::Double(number),
+        _ => return None,
+    })
+}
+
+/// How good a value is, by its status: an absent status is a good one.
+pub(crate) fn quality(value: &DataValue) -> Quality {
+    match value.status {
+        None => Quality::Good,
+        Some(status) if status.is_good() => Quality::Good,
+        Some(status) if status.is_uncertain() => Quality::Uncertain,
+        Some(_) => Quality::Bad,
+    }
+}
+
+/// A status as people look it up: `BadOutOfRange (0x803C0000)`.
+pub(crate) fn words(status: StatusCode) -> String {
+    format!("{status} (0x{:08X})", status.bits())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What goes out comes back, in each type; what does not fit does not go out.
+    #[test]
+    fn numbers_keep_the_type_that_stands_there() {
+        for there in [
+            Variant::SByte(0),
+            Variant::Byte(0),
+            Variant::Int16(0),
+            Variant::UInt16(0),
+            Variant::Int32(0),
+            Variant::UInt32(0),
+            Variant::Int64(0),
+            Variant::UInt64(0),
+            Variant::Float(0.0),
+            Variant::Double(0.0),
+        ] {
+            let value = like(&there, 101.0).unwrap();
+            assert_eq!(value.type_id(), there.type_id());
+            assert_eq!(number(&value), 101.0);
+            assert_eq!(like(&there, f64::NAN), None, "{there:?}");
+        }
+        assert_eq!(like(&Variant::Boolean(false), 1.0), Some(Variant::Boolean(true)));
+        assert_eq!(like(&Variant::Boolean(false), 2.0), None);
+        assert_eq!(like(&Variant::UInt16(0), 65_536.0), None);
+        assert_eq!(like(&Variant::Byte(0), -1.0), None);
+        assert_eq!(like(&Variant::Float(0.0), 1e300), None);
+        assert_eq!(like(&Variant::Empty, 1.0), None);
+        assert!(number(&Variant::from("101")).is_nan());
+    }
+
+    #[test]
+    fn a_status_is_a_quality() {
+        let with = |status| quality(&DataValue { status, ..DataValue::null() });
+        assert_eq!(with(None), Quality::Good);
+        assert_eq!(with(Some(StatusCode::GoodClamped)), Quality::Good);
+        assert_eq!(with(Some(StatusCode::UncertainLastUsableValue)), Quality::Uncertain);
+        assert_eq!(with(Some(StatusCode::BadSensorFailure)), Quality::Bad);
+    }
+}

@@ -1,0 +1,280 @@
+//! The driver against asyncua, a server that shares no code with it: signed and encrypted, in real time. Deadlines are what a rig needs; the
+//! machine of the tests may be slow, so that waiting for a server to start is not bounded by them.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_core::{Backend, BackendError, Channel, Quality, RigMode, SampleBatch, Setpoints};
+use mapper_host::{Driver, PATIENCE};
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Instant;
+
+const PASSWORD: &str = "hunter2";
+
+fn repository() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}
+
+/// A stand behind a server, which ends with the test.
+struct Stand {
+    server: Child,
+    port: String,
+    scratch: tempfile::TempDir,
+}
+
+impl Stand {
+    fn new() -> Stand {
+        let scratch = tempfile::tempdir().unwrap();
+        let (server, port) = serve("0", &scratch.path().join("pki"));
+        Stand { server, port, scratch }
+    }
+
+    /// The same stand, whose server has stopped and begun again, with the certificate of this directory.
+    fn restart(&mut self, certificate: &str) {
+        self.kill();
+        (self.server, self.port) = serve(&self.port, &self.scratch.path().join(certificate));
+    }
+
+    fn kill(&mut self) {
+        self.server.kill().unwrap();
+        self.server.wait().unwrap();
+    }
+
+    fn signal(&self, name: &str) {
+        let pid = self.server.id().to_string();
+        assert!(Command::new("kill").args(["-s", name, &pid]).status().unwrap().success());
+    }
+
+    fn endpoint(&self) -> String {
+        format!("opc.tcp://127.0.0.1:{}", self.port)
+    }
+
+    /// The program with an environment of its own.
+    fn program(&self, password: &str) -> PathBuf {
+        let (state, real) = (self.scratch.path().join("state"), env!("CARGO_BIN_EXE_mapper-backend-opcua"));
+        let script = format!(
+            "#!/bin/sh\nexport MAPPER_STATE_DIR='{}' PLC_USER=lab PLC_PASSWORD={password}\nexec '{real}' \"$@\"\n",
+            state.display()
+        );
+        let path = self.scratch.path().join(format!("driver-{password}"));
+        std::fs::write(&path, script).unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+        path
+    }
+
+    fn command(&self, arguments: &[&str]) -> Output {
+        Command::new(self.program(PASSWORD)).args(arguments).output().unwrap()
+    }
+
+    fn trust(&self) {
+        let output = self.command(&["trust", &self.endpoint()]);
+        assert!(output.status.success(), "{output:?}");
+    }
+
+    fn settings(&self) -> Value {
+        let node = |name: &str| json!({"node": format!("ns=2;s={name}")});
+        let read: serde_json::Map<_, _> = ["N", "m_c", "P1", "T1", "P2", "T2", "P3", "T3"]
+            .iter()
+            .map(|name| (name.to_string(), node(name)))
+            .collect();
+        json!({
+            "endpoint": self.endpoint(), "user": {"env": "PLC_USER"}, "password": {"env": "PLC_PASSWORD"},
+            // Slower than a rig's: the tests share their machine.
+            "timeout": "800 ms",
+            "read": read,
+            "write": {
+                "p3": node("p3"), "t3": node("t3"), "valve": node("valve"), "oil_temperature": node("oil_temperature"),
+                "air": node("air"), "heartbeat": node("heartbeat"),
+            },
+            // More than the stand itself takes.
+            "accepts": {"p3": ["105 kPa", "900 kPa"], "t3": ["280 K", "900 K"], "valve": [0.1, 2.5], "oil_temperature": ["280 K", "400 K"]},
+            "safe": {"pressure_slew": "100 kPa/s", "opening": 1.0, "within": "20 s"},
+        })
+    }
+
+    fn driver(&self, password: &str) -> Driver {
+        Driver::of_program(&self.program(password), "opcua", &self.settings(), PATIENCE).unwrap()
+    }
+
+    fn armed(&self) -> Driver {
+        let mut rig = self.driver(PASSWORD);
+        rig.arm().unwrap();
+        rig.set(&setpoints(150e3)).unwrap();
+        rig
+    }
+}
+
+impl Drop for Stand {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// A server on this port, or on any; it is there when this returns.
+fn serve(port: &str, certificate: &Path) -> (Child, String) {
+    let mut server = Command::new(option_env!("MAPPER_TEST_PYTHON").unwrap_or("python3"))
+        .arg(repository().join("tests/python/opcua_rig.py"))
+        .args([port, "--secure"])
+        .arg(certificate)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(server.stdout.take().unwrap()).read_line(&mut line).unwrap();
+    (server, line.trim().to_owned())
+}
+
+fn setpoints(p3_pa: f64) -> Setpoints {
+    Setpoints {
+        mode: RigMode::Running,
+        p3_pa,
+        t3_k: 600.0,
+        valve_opening_ratio: 1.0,
+        oil_temperature_k: 323.15,
+    }
+}
+
+/// Polls each half second until `reached`; how long that took.
+fn until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool) -> f64 {
+    let begun = Instant::now();
+    loop {
+        *t_s += 0.5;
+        let batch = rig.poll(*t_s).unwrap();
+        if reached(&batch) {
+            return begun.elapsed().as_secs_f64();
+        }
+        assert!(begun.elapsed().as_secs() < 60, "nothing came of it in a minute");
+    }
+}
+
+fn reads(batch: &SampleBatch) -> bool {
+    batch.last(Channel::T2).is_some_and(f64::is_finite)
+}
+
+fn reads_nothing(batch: &SampleBatch) -> bool {
+    batch.last(Channel::T2).is_some_and(f64::is_nan)
+}
+
+fn words(error: BackendError) -> String {
+    let words = error.to_string();
+    assert!(!words.contains(PASSWORD), "{words}");
+    words
+}
+
+/// Nobody is talked to whose certificate nobody has looked at; then values come with the source's time, and setpoints arrive.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_trusted_server_is_read_and_written() {
+    let mut stand = Stand::new();
+    let refused = words(stand.driver(PASSWORD).arm().unwrap_err());
+    assert!(refused.contains(&format!("mapper-backend-opcua trust {}", stand.endpoint())), "{refused}");
+    let other = stand.command(&["trust", &stand.endpoint(), "--fingerprint", "00:11"]);
+    assert!(!other.status.success() && String::from_utf8_lossy(&other.stderr).contains("nothing was pinned"));
+    stand.trust();
+    let mut rig = stand.armed();
+    let mut t_s = 0.0;
+    until(&mut rig, &mut t_s, |batch| batch.last(Channel::ShaftSpeed).is_some_and(|rpm| rpm > 10_000.0));
+    let batch = rig.poll(t_s + 1.0).unwrap();
+    let from = batch.provenance_of(Channel::T2).unwrap();
+    assert!(from.quality.iter().all(|quality| *quality == Quality::Good), "{from:?}");
+    for (source_s, t_s) in from.source_t_s.iter().zip(&batch.t_s) {
+        // Taken each 20 ms, on one machine; a second is for a machine that does not keep up.
+        assert!((-1.0..=0.0).contains(&(source_s - t_s)), "{source_s} for {t_s}");
+    }
+    rig.make_safe().unwrap();
+    rig.disarm().unwrap();
+
+    // Another one answers there.
+    stand.restart("other");
+    let changed = words(rig.arm().unwrap_err());
+    assert!(changed.contains("another certificate than the trusted one"), "{changed}");
+    let kept = stand.command(&["trust", &stand.endpoint()]);
+    assert!(!kept.status.success() && String::from_utf8_lossy(&kept.stderr).contains("--replace"));
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_wrong_password_and_a_refused_setpoint_are_said_with_their_codes() {
+    let stand = Stand::new();
+    stand.trust();
+    let refused = words(stand.driver("wrong").arm().unwrap_err());
+    assert!(
+        refused.contains("BadUserAccessDenied") || refused.contains("BadIdentityTokenRejected"),
+        "{refused}"
+    );
+    let mut rig = stand.armed();
+    let refused = words(rig.set(&setpoints(800e3)).unwrap_err());
+    assert!(refused.contains("BadOutOfRange") && refused.contains("ns=2;s=p3"), "{refused}");
+    rig.make_safe().unwrap();
+    rig.disarm().unwrap();
+}
+
+/// A restart costs its own time and 3 s; while nobody answers there are samples without readings, which the guards count.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_server_that_restarts_is_read_within_three_seconds() {
+    let mut stand = Stand::new();
+    stand.trust();
+    let (mut rig, mut t_s) = (stand.armed(), 0.0);
+    until(&mut rig, &mut t_s, reads);
+    stand.kill();
+    until(&mut rig, &mut t_s, reads_nothing);
+    // Starting takes the server some seconds; the lease is renewed by polls alone.
+    let (certificate, port) = (stand.scratch.path().join("pki"), stand.port.clone());
+    let starting = std::thread::spawn(move || serve(&port, &certificate));
+    until(&mut rig, &mut t_s, |_| starting.is_finished());
+    (stand.server, stand.port) = starting.join().unwrap();
+    let took_s = until(&mut rig, &mut t_s, reads);
+    assert!(took_s < 3.0, "{took_s} s");
+    rig.set(&setpoints(160e3)).unwrap();
+    rig.make_safe().unwrap();
+    rig.disarm().unwrap();
+}
+
+/// It hangs with its connection alive, for longer than the client waits before it makes a new one.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_server_that_stands_still_is_read_within_three_seconds_of_its_return() {
+    let stand = Stand::new();
+    stand.trust();
+    let (mut rig, mut t_s) = (stand.armed(), 0.0);
+    for pause_s in [2.0, 12.0] {
+        until(&mut rig, &mut t_s, reads);
+        stand.signal("STOP");
+        until(&mut rig, &mut t_s, reads_nothing);
+        let back_s = t_s + pause_s;
+        while t_s < back_s {
+            t_s += 0.5;
+            assert!(!reads(&rig.poll(t_s).unwrap()), "a server that stands still gives no readings");
+        }
+        stand.signal("CONT");
+        let took_s = until(&mut rig, &mut t_s, reads);
+        assert!(took_s < 3.0, "{took_s} s after {pause_s} s");
+    }
+    rig.make_safe().unwrap();
+    rig.disarm().unwrap();
+}
+
+/// What cannot be done is said in time: the runner knows then that the rig is in doubt.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_server_that_is_gone_for_good_is_said_within_two_seconds() {
+    let mut stand = Stand::new();
+    stand.trust();
+    let (mut rig, mut t_s) = (stand.armed(), 0.0);
+    until(&mut rig, &mut t_s, reads);
+    stand.kill();
+    let begun = Instant::now();
+    let lost = rig.make_safe().unwrap_err();
+    assert!(matches!(lost, BackendError::Lost { .. }), "{lost}");
+    assert!(begun.elapsed().as_secs_f64() < 2.0, "{:?}", begun.elapsed());
+    until(&mut rig, &mut t_s, reads_nothing);
+    rig.disarm().unwrap();
+}

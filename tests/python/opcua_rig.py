@@ -1,0 +1,154 @@
+"""The small rig of drivers/python in real time behind asyncua, an OPC UA server that shares no code with the driver.
+
+Usage: opcua_rig.py [PORT] [--secure DIRECTORY] [--seed N]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
+reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean). As a PLC has to, it cuts the
+air by itself where the heartbeat stands still. Values that no stand could bear are refused with BadOutOfRange.
+
+With --secure it takes signed and encrypted sessions alone, of the user `lab` with the password `hunter2`; the certificate is made in the directory
+where there is none yet.
+"""
+
+import argparse
+import asyncio
+import datetime
+import importlib.machinery
+import importlib.util
+import logging
+import pathlib
+import socket
+import sys
+import time
+
+from asyncua import Server, ua
+from asyncua.crypto.cert_gen import setup_self_signed_certificate
+from asyncua.server.user_managers import UserManager
+from asyncua.crypto.permission_rules import User, UserRole
+from cryptography.x509.oid import ExtendedKeyUsageOID
+
+CHANNELS = ["N", "m_c", "P1", "T1", "P2", "T2", "Tc", "m_t", "P3", "T3", "P4", "T4", "Tt", "T_oil", "T_amb"]
+SETPOINTS = {"p3": ("p3_pa", 110e3, 500e3), "t3": ("t3_k", 298.15, 950.0), "valve": ("valve_opening_ratio", 1.0, 2.5),
+             "oil_temperature": ("oil_temperature_k", 323.15, 420.0)}
+WATCHDOG_S = 2.0
+NAMESPACE = "urn:mapper:tests:stand"
+APPLICATION = "urn:mapper:tests:server"
+
+root = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(root / "drivers/python"))
+loader = importlib.machinery.SourceFileLoader("rig", str(root / "drivers/python/mapper-backend-python_rig"))
+rig_module = importlib.util.module_from_spec(importlib.util.spec_from_loader("rig", loader))
+loader.exec_module(rig_module)
+
+
+class Users(UserManager):
+    def get_user(self, iserver, username=None, password=None, certificate=None):
+        return User(role=UserRole.User) if (username, password) == ("lab", "hunter2") else None
+
+
+async def certificate(directory):
+    """The files of a certificate of the server's own."""
+    key, cert = directory / "key.pem", directory / "cert.der"
+    directory.mkdir(parents=True, exist_ok=True)
+    await setup_self_signed_certificate(
+        key, cert, APPLICATION, "localhost", [ExtendedKeyUsageOID.CLIENT_AUTH, ExtendedKeyUsageOID.SERVER_AUTH], {"commonName": "stand"})
+    return key, cert
+
+
+async def make(arguments):
+    server = Server(user_manager=Users() if arguments.secure else None)
+    await server.init()
+    await server.set_application_uri(APPLICATION)
+    server.set_endpoint(f"opc.tcp://127.0.0.1:{arguments.port}/")
+    if arguments.secure:
+        key, cert = await certificate(pathlib.Path(arguments.secure))
+        await server.load_certificate(str(cert))
+        await server.load_private_key(str(key))
+        server.set_security_policy([ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt])
+        server.set_identity_tokens([ua.UserNameIdentityToken])
+    else:
+        server.set_security_policy([ua.SecurityPolicyType.NoSecurity])
+    index = await server.register_namespace(NAMESPACE)
+    assert index == 2
+    stand = await server.nodes.objects.add_object(index, "Stand")
+    nodes = {}
+    for name in CHANNELS:
+        nodes[name] = await stand.add_variable(ua.NodeId(name, index), name, 0.0, ua.VariantType.Double)
+    for name, (_, first, _) in SETPOINTS.items():
+        nodes[name] = await stand.add_variable(ua.NodeId(name, index), name, first, ua.VariantType.Float)
+    nodes["air"] = await stand.add_variable(ua.NodeId("air", index), "air", False, ua.VariantType.Boolean)
+    nodes["heartbeat"] = await stand.add_variable(ua.NodeId("heartbeat", index), "heartbeat", 0, ua.VariantType.UInt32)
+    nodes["tripped"] = await stand.add_variable(ua.NodeId("tripped", index), "tripped", False, ua.VariantType.Boolean)
+    for name in [*SETPOINTS, "air", "heartbeat"]:
+        await nodes[name].set_writable()
+    refuse_what_is_too_much(server, index)
+    return server, nodes
+
+
+def refuse_what_is_too_much(server, index):
+    """Writes beyond the stand's own limits are refused, as a PLC does."""
+    service = server.iserver.attribute_service
+    write = service.write
+
+    async def checked(params, user):
+        results = []
+        for one in params.NodesToWrite:
+            limit = SETPOINTS.get(one.NodeId.Identifier) if one.NodeId.NamespaceIndex == index else None
+            if limit and one.Value.Value.Value > limit[2]:
+                results.append(ua.StatusCode(ua.StatusCodes.BadOutOfRange))
+                continue
+            single = ua.WriteParameters()
+            single.NodesToWrite = [one]
+            results += await write(single, user)
+        return results
+
+    service.write = checked
+
+
+async def live(nodes, seed):
+    """The rig follows its nodes, and fills them."""
+
+    async def put(name, value, kind):
+        now = datetime.datetime.now(datetime.timezone.utc)
+        await nodes[name].write_value(ua.DataValue(ua.Variant(value, kind), SourceTimestamp=now, ServerTimestamp=now))
+
+    rig = rig_module.PythonRig({"noise": 1, "seed": seed})
+    rig.arm()
+    begun = time.monotonic()
+    beat, beaten = None, begun
+    while True:
+        now = time.monotonic()
+        told = {key: await nodes[name].read_value() for name, (key, _, _) in SETPOINTS.items()}
+        air, heartbeat = await nodes["air"].read_value(), await nodes["heartbeat"].read_value()
+        if heartbeat != beat:
+            beat, beaten = heartbeat, now
+        if now - beaten > WATCHDOG_S and air:
+            air = False
+            await put("air", False, ua.VariantType.Boolean)
+            await put("tripped", True, ua.VariantType.Boolean)
+        rig.set({"mode": "running" if air else "standstill", **told})
+        times, columns, _ = rig.poll(now - begun)
+        if times:
+            for name in CHANNELS:
+                await put(name, columns[name][-1], ua.VariantType.Double)
+        await asyncio.sleep(0.02)
+
+
+async def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("port", nargs="?", type=int, default=0)
+    parser.add_argument("--secure")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    logging.disable(logging.ERROR)
+    if not arguments.port:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            arguments.port = free.getsockname()[1]
+    server, nodes = await make(arguments)
+    async with server:
+        living = asyncio.create_task(live(nodes, arguments.seed))
+        print(arguments.port, flush=True)
+        await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
+        living.cancel()
+
+
+asyncio.run(main())

@@ -19,7 +19,7 @@ pub struct Machine<'a> {
 /// Whether the file is on the disk when it is said to be there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Durability {
-    /// Written through, and its name with it: it outlives a power cut.
+    /// Written through before it has its name: whole after a power cut, if it is there.
     Synced,
     /// Whenever the system likes; it can be made again.
     Unsynced,
@@ -46,9 +46,6 @@ pub(crate) fn write_whole(
         }
         drop(file);
         std::fs::rename(&new, path)?;
-        if durability == Durability::Synced && cfg!(unix) {
-            File::open(folder)?.sync_all()?;
-        }
         Ok(())
     };
     write().map_err(|source| {

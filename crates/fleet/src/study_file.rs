@@ -1,6 +1,5 @@
 //! A study as people write it: its name and kind here, everything else by the kind.
 
-use crate::{FleetError, Kind};
 use mapper_yaml::{
     Document, FindingKind, Findings, Node, Notes, ReadError, Schema, Source, path_text, steps,
 };
@@ -98,21 +97,4 @@ pub fn open_study(path: &Path) -> Result<StudyFile, StudyFileError> {
     let word = |key: &str| root.get(&steps![key]).and_then(Node::text).map(str::to_owned);
     let (name, kind) = (word("fleet").unwrap_or_default(), word("study").unwrap_or_default());
     Ok(StudyFile { path: path.to_owned(), name, kind, source, root })
-}
-
-/// The kind of this name; a mistake at its place in the file where there is none.
-///
-/// # Errors
-/// [`StudyFileError::Mistakes`].
-pub fn kind_of<'a>(study: &StudyFile, kinds: &[&'a dyn Kind]) -> Result<&'a dyn Kind, FleetError> {
-    if let Some(kind) = kinds.iter().find(|kind| kind.name() == study.kind) {
-        return Ok(*kind);
-    }
-    let known = kinds.iter().map(|kind| format!("{} ({})", kind.name(), kind.summary()));
-    let remedy = format!("write `study: KIND`; the kinds are {}", known.collect::<Vec<_>>().join(", "));
-    let message = match study.kind.as_str() {
-        "" => "it does not say what kind of study it is".to_owned(),
-        other => format!("`{other}` is not a kind of study"),
-    };
-    Err(study.mistake("study", message, &remedy).into())
 }

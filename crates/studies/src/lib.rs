@@ -5,12 +5,14 @@ mod calibration;
 mod error;
 mod maps;
 mod nightly;
+mod program;
 mod source;
 
 use mapper_fleet::Kind;
-use mapper_session::{Registry, program_and_commit};
+use mapper_session::Registry;
 
 pub use nightly::rows_of;
+pub use program::program;
 
 /// All kinds, with the plug-ins that they may use.
 pub fn kinds(registry: &Registry) -> Vec<Box<dyn Kind + '_>> {
@@ -20,9 +22,4 @@ pub fn kinds(registry: &Registry) -> Vec<Box<dyn Kind + '_>> {
         Box::new(calibration::Calibration(registry)),
         Box::new(maps::Maps(registry)),
     ]
-}
-
-/// What items and parts carry as their program: name, version and commit.
-pub fn program(registry: &Registry) -> String {
-    program_and_commit(registry.commit)
 }

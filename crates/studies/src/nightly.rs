@@ -1,6 +1,7 @@
 //! `study: nightly`: the runs of a nightly campaign.
 
 use crate::error::StudyError;
+use crate::program::program;
 use crate::source::CampaignSource;
 use mapper_campaign::load_nightly;
 use mapper_core::Method;
@@ -105,7 +106,7 @@ impl Kind for Nightly<'_> {
 /// # Errors
 /// [`FleetError`] where there is no result, or it is none of a night.
 pub fn rows_of(directory: &Path, registry: &Registry) -> Result<Vec<RunRow>, FleetError> {
-    let fleet = Fleet::open(directory, &crate::program(registry))?;
+    let fleet = Fleet::open(directory, &program(registry))?;
     let path = fleet.result().join(RUNS);
     let text = merged_text(&path)?;
     serde_json::from_str(&text)

@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::fleet_place::on_this_machine;
-use crate::output;
+use crate::{manner, output};
 use clap::Args;
 use mapper_fleet::{Made, kind_of, open_study};
 use mapper_studies::program;
@@ -28,7 +28,11 @@ impl Make {
         on_this_machine(|registry, kinds, machine| {
             let study = open_study(&self.study).map_err(mapper_fleet::FleetError::from)?;
             let kind = kind_of(&study, kinds)?;
-            let made = Made::make(&study, kind, &self.out, &program(registry), machine.name)?;
+            let progress = manner::progress();
+            progress.begin("making items");
+            let made = Made::make(&study, kind, &self.out, &program(registry), machine.name);
+            progress.clear();
+            let made = made?;
             let items = made.fleet.study.items.len();
             if self.json {
                 let (new, gone) = (made.new, made.gone);

@@ -8,6 +8,7 @@ fn main() {
         ("MAPPER_TEST_PYTHON", "with_python"),
         ("MAPPER_TEST_TMPFS", "with_tmpfs"),
         ("MAPPER_TEST_CHROMIUM", "with_chromium"),
+        ("MAPPER_TEST_SLURM", "with_slurm"),
     ] {
         println!("cargo::rerun-if-env-changed={name}");
         println!("cargo::rustc-check-cfg=cfg({flag})");

@@ -3,12 +3,14 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod campaign;
+mod cluster;
 mod drift_campaign;
 mod program;
 mod python;
 pub mod tree;
 
 pub use campaign::{BY_ITSELF, CampaignFile, SHIPPED, SHORT_GRID};
+pub use cluster::Cluster;
 pub use drift_campaign::DriftCampaign;
 pub use program::{Finished, build_driver, build_drivers, mapper, mapper_command, mapper_in};
 pub use python::python;

@@ -66,6 +66,28 @@ pub fn has_deny() -> bool {
     step::succeeds(&workspace::cargo(), &["deny", "--version"])
 }
 
+/// Slurm, all of it on this machine.
+const SLURM: Tool = Tool {
+    name: "slurm",
+    used_for: "takes the tasks of a fleet",
+    probe: &["slurmctld", "-V"],
+    source: Source::Debian(&["slurm-wlm"]),
+};
+
+/// Whether Slurm's daemons can be run here: they need root, and no systemd. Installed where that can be done; the test on a
+/// cluster is left out otherwise.
+pub fn has_slurm() -> bool {
+    let install = || match SLURM.source {
+        Source::Debian(packages) => install_debian(&SLURM, packages, &mut false),
+        Source::Rustup(_) => Ok(()),
+    };
+    is_root() && (works(&SLURM) || (install().is_ok() && works(&SLURM)))
+}
+
+fn is_root() -> bool {
+    step::output(step::command("id", &["-u"])).is_ok_and(|id| id == "0")
+}
+
 /// Whether a file system of limited size can be made here: the test of a full disk needs one.
 pub fn can_mount() -> bool {
     let target = workspace::target_dir();
@@ -82,8 +104,7 @@ fn works(tool: &Tool) -> bool {
 }
 
 fn install_debian(tool: &Tool, packages: &[&str], listed: &mut bool) -> Result<(), Error> {
-    let root = step::output(step::command("id", &["-u"])).is_ok_and(|id| id == "0");
-    if !root || !step::succeeds("apt-get", &["--version"]) {
+    if !is_root() || !step::succeeds("apt-get", &["--version"]) {
         return Err(missing_tool(tool, by_hand(&tool.source)));
     }
     let apt_get = |arguments: &[&str]| {

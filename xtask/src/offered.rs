@@ -10,12 +10,14 @@ pub struct Offered {
     pub python: PathBuf,
     /// Whether a small file system can be mounted.
     pub mountable: bool,
+    /// Whether Slurm's daemons can be run.
+    pub slurm: bool,
 }
 
 impl Offered {
     /// With this Python.
     pub fn with(python: PathBuf) -> Self {
-        Offered { python, mountable: machine::can_mount() }
+        Offered { python, mountable: machine::can_mount(), slurm: machine::has_slurm() }
     }
 
     /// A command that knows of it. All commands that build get the same, so that nothing is built again.
@@ -24,6 +26,9 @@ impl Offered {
         command.env("MAPPER_TEST_CHROMIUM", "chromium");
         if self.mountable {
             command.env("MAPPER_TEST_TMPFS", "1");
+        }
+        if self.slurm {
+            command.env("MAPPER_TEST_SLURM", "1");
         }
         command
     }

@@ -62,6 +62,11 @@ pub fn test() -> Result<(), Error> {
             "\nLEFT OUT: the test of a full disk. It mounts a small tmpfs: run `cargo xtask test` as root.\n",
         );
     }
+    if !offered.slurm {
+        say(
+            "\nLEFT OUT: the test on a cluster. It runs Slurm as root: apt-get install slurm-wlm, then `cargo xtask test` as root.\n",
+        );
+    }
     if !knows_licences {
         say(
             "\nLEFT OUT: licences and sources of dependencies (deny.toml). cargo install cargo-deny --locked\n",
@@ -85,6 +90,7 @@ fn tests(offered: &Offered) -> Result<(), Error> {
     if !well {
         return Err(Error::Failed { command: "the tests".to_owned() });
     }
-    let left_out = tally.ignored.saturating_sub(usize::from(!offered.mountable));
+    let left_out =
+        tally.ignored.saturating_sub(usize::from(!offered.mountable) + usize::from(!offered.slurm));
     if left_out > 0 { Err(Error::LeftOut { count: left_out }) } else { Ok(()) }
 }

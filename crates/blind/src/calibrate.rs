@@ -9,6 +9,7 @@ use crate::logistic::logistic;
 use crate::outside::{OutsideUse, outside_kinds};
 use crate::ruler::{StudyRuler, declared};
 use mapper_campaign::{Campaign, nominal_model};
+use mapper_fleet::Engine;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::coordinate::coordinates;
 use mapper_gap::diagnose::{Diagnosed, Question, diagnose, prior};
@@ -17,8 +18,10 @@ use mapper_gap::report::Verdict;
 use mapper_gap::study::{Study, members};
 use mapper_numerics::statistics::{NORMAL_975, quantile};
 use mapper_physics::effect::Effect;
+use mapper_physics::model::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Which cases calibrate.
@@ -30,6 +33,19 @@ pub struct Plan {
     pub nulls: usize,
     /// Cases of all other kinds.
     pub others: usize,
+}
+
+impl Plan {
+    /// The command that calibrates with it on one machine.
+    pub fn command(&self, campaign: &Path) -> String {
+        format!(
+            "mapper gap blind calibrate --campaign {} --seed {} --nulls {} --cases {}",
+            campaign.display(),
+            self.seed,
+            self.nulls,
+            self.others
+        )
+    }
 }
 
 /// What one diagnosis gave, as far as the calibration needs it.
@@ -60,7 +76,7 @@ impl Observed {
     }
 }
 
-/// Draws the cases, diagnoses them and fits. `done` is told each diagnosis.
+/// Draws the cases, diagnoses them, several at a time, and fits; `None` where the operator stopped it.
 ///
 /// # Errors
 /// [`BlindError`] where a case cannot be run; a recording that cannot be diagnosed is left out.
@@ -69,10 +85,31 @@ pub fn calibrate(
     catalogue: &[Arc<dyn Effect>],
     plan: &Plan,
     made_by: String,
-    done: &dyn Fn(&Observed),
-) -> Result<(Calibration, Vec<Observed>), BlindError> {
+    engine: &Engine<'_>,
+) -> Result<Option<(Calibration, Vec<Observed>)>, BlindError> {
+    let cases = cases(campaign, catalogue, plan)?;
+    let diagnosis = Calibrated::new(campaign, catalogue)?;
+    let observed = engine.each(&cases, |_, case| diagnosis.observe(case))?;
+    // What was not begun was stopped; what could not be diagnosed is left out.
+    let Some(observed) = observed.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
+    let observed: Vec<Observed> = observed.into_iter().flatten().collect();
+    Ok(Some((fit(&shipped()?, &observed, made_by), observed)))
+}
+
+fn shipped() -> Result<Calibration, BlindError> {
+    Calibration::shipped().map_err(BlindError::signatures)
+}
+
+/// The cases that calibrate.
+///
+/// # Errors
+/// [`BlindError`] where the campaign has no nominal model or cannot be run.
+pub fn cases(
+    campaign: &Campaign,
+    catalogue: &[Arc<dyn Effect>],
+    plan: &Plan,
+) -> Result<Vec<Case>, BlindError> {
     let nominal = nominal_model(campaign)?;
-    let before = Calibration::shipped().map_err(BlindError::signatures)?;
     let schedule = Schedule::new(campaign, &nominal)?;
     let mut known = catalogue.to_vec();
     known.extend(outside_kinds(OutsideUse::Calibration));
@@ -81,25 +118,44 @@ pub fn calibrate(
     let others = vec![CaseKind::Single, CaseKind::Pair, CaseKind::Outside];
     let mut cases = draw(plan.others, others, plan.seed).cases(catalogue, &ruler);
     cases.extend(draw(plan.nulls, vec![CaseKind::None], plan.seed.wrapping_add(1)).cases(catalogue, &ruler));
-    let mut observed = Vec::with_capacity(cases.len());
-    for case in &cases {
-        let recording = schedule.record(case)?;
+    Ok(cases)
+}
+
+/// What every case that calibrates is diagnosed with.
+pub struct Calibrated<'a> {
+    campaign: &'a Campaign,
+    catalogue: &'a [Arc<dyn Effect>],
+    nominal: Model,
+    before: Calibration,
+}
+
+impl<'a> Calibrated<'a> {
+    /// With the calibration that ships.
+    ///
+    /// # Errors
+    /// [`BlindError`] where the campaign has no nominal model.
+    pub fn new(campaign: &'a Campaign, catalogue: &'a [Arc<dyn Effect>]) -> Result<Self, BlindError> {
+        Ok(Calibrated { campaign, catalogue, nominal: nominal_model(campaign)?, before: shipped()? })
+    }
+
+    /// Runs and diagnoses a case; `None` where its recording cannot be diagnosed.
+    ///
+    /// # Errors
+    /// [`BlindError`] where it cannot be run.
+    pub fn observe(&self, case: &Case) -> Result<Option<Observed>, BlindError> {
+        let recording = Schedule::new(self.campaign, &self.nominal)?.record(case)?;
         let diagnosed = diagnose(Question {
             tolerances_declared: true,
             jumps: Vec::new(),
             recording: &recording,
-            declared: declared(campaign),
-            model: nominal.clone(),
-            effects: catalogue.to_vec(),
-            calibration: before.clone(),
+            declared: declared(self.campaign),
+            model: self.nominal.clone(),
+            effects: self.catalogue.to_vec(),
+            calibration: self.before.clone(),
             progress: &|_, _| {},
         });
-        let Ok(diagnosed) = diagnosed else { continue };
-        let one = observe(case, &before, &diagnosed);
-        done(&one);
-        observed.push(one);
+        Ok(diagnosed.ok().map(|diagnosed| observe(case, &self.before, &diagnosed)))
     }
-    Ok((fit(&before, &observed, made_by), observed))
 }
 
 fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Observed {
@@ -148,6 +204,14 @@ const LEAST_THRESHOLD: f64 = 3.0;
 /// Weakest signature that temperature and logistic are fitted to, sigmas: an outside cause that can hardly be seen cannot be
 /// told from one inside, and would teach the logistic to doubt everything.
 const SEEN_SIGMA: f64 = 12.0;
+
+/// The calibration that fits what was observed, beside the one that ships.
+///
+/// # Errors
+/// [`BlindError::Signatures`] where the one that ships was spoilt.
+pub fn fitted(observed: &[Observed], made_by: String) -> Result<Calibration, BlindError> {
+    Ok(fit(&shipped()?, observed, made_by))
+}
 
 /// The calibration that fits what was observed.
 pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {

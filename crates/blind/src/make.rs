@@ -41,6 +41,23 @@ pub fn make(
     directory: &Path,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Made, BlindError> {
+    let cases = drawn(campaign, catalogue, draw)?;
+    let nominal = nominal_model(campaign)?;
+    let schedule = Schedule::new(campaign, &nominal)?;
+    std::fs::create_dir_all(directory).map_err(BlindError::file(directory))?;
+    let answers = run_all(&schedule, campaign, &cases, directory, done)?;
+    Ok(Made { manifest: seal(&campaign.name, &answers, directory)?, answers })
+}
+
+/// Draws cases.
+///
+/// # Errors
+/// [`BlindError`] where the campaign has no nominal model or cannot be run, or there are too many.
+pub fn drawn(
+    campaign: &Campaign,
+    catalogue: &[Arc<dyn Effect>],
+    draw: &Draw,
+) -> Result<Vec<Case>, BlindError> {
     if !(1..=MOST_CASES).contains(&draw.cases) {
         return Err(BlindError::Cases { cases: draw.cases, most: MOST_CASES });
     }
@@ -49,17 +66,39 @@ pub fn make(
     let mut known = catalogue.to_vec();
     known.extend(outside_kinds(draw.outside));
     let ruler = StudyRuler::new(campaign, &schedule, &nominal, known, draw.seed)?;
-    let cases = draw.cases(catalogue, &ruler);
-    std::fs::create_dir_all(directory).map_err(BlindError::file(directory))?;
-    let answers = run_all(&schedule, campaign, &cases, directory, done)?;
+    Ok(draw.cases(catalogue, &ruler))
+}
+
+/// Runs one case into a new recording, and gives its answer.
+///
+/// # Errors
+/// [`BlindError`] where the lab stops or the file cannot be written.
+pub fn record(campaign: &Campaign, case: &Case, file: &Path) -> Result<Truth, BlindError> {
+    let nominal = nominal_model(campaign)?;
+    Schedule::new(campaign, &nominal)?.run(case, file, &header(campaign))
+}
+
+/// Writes answers and the manifest with their hash into a directory that has neither.
+///
+/// # Errors
+/// [`BlindError::File`].
+pub fn seal(campaign: &str, answers: &[Truth], directory: &Path) -> Result<Manifest, BlindError> {
     let bytes = json(&answers, &directory.join(ANSWERS_NAME))?;
     let manifest = Manifest {
-        campaign: campaign.name.clone(),
-        cases: cases.into_iter().map(|case| case.name).collect(),
+        campaign: campaign.to_owned(),
+        cases: answers.iter().map(|answer| answer.name.clone()).collect(),
         answers_sha256: sha256(&bytes),
     };
     json(&manifest, &directory.join(MANIFEST_NAME))?;
-    Ok(Made { manifest, answers })
+    Ok(manifest)
+}
+
+fn header(campaign: &Campaign) -> RecordingHeader {
+    RecordingHeader {
+        library: concat!("mapper ", env!("CARGO_PKG_VERSION")).to_owned(),
+        metadata: [("campaign".to_owned(), campaign.name.clone())].into(),
+        ..RecordingHeader::default()
+    }
 }
 
 /// Runs the cases on all cores; each is independent of the others.
@@ -73,11 +112,7 @@ fn run_all(
     let finished = AtomicUsize::new(0);
     // No case is worth starting once one has failed.
     parallel::try_map(cases, |case| {
-        let header = RecordingHeader {
-            library: concat!("mapper ", env!("CARGO_PKG_VERSION")).to_owned(),
-            metadata: [("campaign".to_owned(), campaign.name.clone())].into(),
-            ..RecordingHeader::default()
-        };
+        let header = header(campaign);
         let truth = schedule.run(case, &directory.join(format!("{}.mcap", case.name)), &header);
         done(finished.fetch_add(1, Ordering::Relaxed) + 1);
         truth

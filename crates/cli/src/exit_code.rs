@@ -17,6 +17,8 @@ pub enum Code {
     BadRecording = 6,
     /// A nightly run failed, or one of its figures left the band of the nights before.
     Moved = 7,
+    /// Items of a fleet are missing or failed.
+    Incomplete = 8,
     /// Stopped by the operator; the rig is safe and what was recorded is kept.
     Interrupted = 130,
 }
@@ -32,4 +34,5 @@ Exit codes:
   5    the rig failed, a guard tripped, the rig is in use, latched or not guarded as it needs; the recording is kept
   6    the recording does not hold what identification needs
   7    a nightly run failed, or one of its figures left the band of the nights before
+  8    items of a fleet are missing or failed (all are named)
   130  stopped by the operator; the rig is safe, the recording is kept";

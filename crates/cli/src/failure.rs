@@ -5,6 +5,7 @@ use crate::{manner, standard_error};
 use mapper_blind::BlindError;
 use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
+use mapper_fleet::{FleetError, StudyFileError};
 use mapper_host::DriverError;
 use mapper_live::LiveError;
 use mapper_record::{ChannelMapError, RecordError};
@@ -83,6 +84,26 @@ impl Failure {
         Failure::new(code, error)
     }
 
+    /// What a kind of study found, as the command of its own says it.
+    fn of_kind(error: Box<dyn std::error::Error + Send + Sync>) -> Self {
+        let error = match error.downcast::<CampaignError>() {
+            Ok(error) => return Failure::of_campaign(*error),
+            Err(error) => error,
+        };
+        let error = match error.downcast::<NightlyError>() {
+            Ok(error) => return SessionError::from(*error).into(),
+            Err(error) => error,
+        };
+        let error = match error.downcast::<SessionError>() {
+            Ok(error) => return (*error).into(),
+            Err(error) => error,
+        };
+        match error.downcast::<BlindError>() {
+            Ok(error) => (*error).into(),
+            Err(error) => Failure::new(Code::BadInput, error),
+        }
+    }
+
     /// Standard output was closed by its reader: a normal end of a pipe.
     pub fn closed_pipe() -> Self {
         Failure { manner: Manner::ClosedPipe, ..Failure::new(Code::Failure, "") }
@@ -152,5 +173,23 @@ impl From<BlindError> for Failure {
             _ => Code::Failure,
         };
         Failure::new(code, error)
+    }
+}
+
+impl From<FleetError> for Failure {
+    fn from(error: FleetError) -> Self {
+        let code = match &error {
+            FleetError::File { .. } | FleetError::Queue { .. } | FleetError::NothingTried { .. } => {
+                Code::Failure
+            }
+            FleetError::Interrupted => Code::Interrupted,
+            _ => Code::BadInput,
+        };
+        match error {
+            FleetError::StudyFile(StudyFileError::Mistakes(findings)) => Failure::of_findings(&findings),
+            FleetError::StudyFile(error) => Failure::new(Code::Failure, error),
+            FleetError::Kind(error) => Failure::of_kind(error),
+            error => Failure::new(code, error),
+        }
     }
 }

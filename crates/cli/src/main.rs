@@ -8,6 +8,7 @@ mod drivers;
 mod ending;
 mod exit_code;
 mod failure;
+mod fleet_place;
 mod given;
 mod interrupt;
 mod manner;

@@ -1,10 +1,10 @@
 //! The figures of one run that are kept and watched.
 
 use crate::Floor;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// One figure of a run. Efficiencies are fractions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Metric {
     /// Points with the verdict `good`.

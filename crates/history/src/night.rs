@@ -1,11 +1,11 @@
 //! The rows of one night, before they are stored.
 
 use crate::Metric;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// What a run is, from night to night.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunKey {
     /// Name of the campaign.
     pub campaign: String,
@@ -24,7 +24,7 @@ impl std::fmt::Display for RunKey {
 }
 
 /// One identified point beside its truth.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PointRow {
     /// Speed aimed at, rpm.
     pub speed_rpm: f64,
@@ -51,7 +51,7 @@ impl PointRow {
 }
 
 /// One run of a night.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunRow {
     /// Which run.
     #[serde(flatten)]

@@ -95,9 +95,34 @@ where
     results.into_iter().map(|(_, result)| result).collect()
 }
 
+/// `work` with at most so many threads for all its [`map`] and [`try_map`]: one of several long pieces of work that share the
+/// cores out among themselves. Where no threads can be had it runs on those of the whole program.
+pub fn confined<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
+    match rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build() {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Never more at a time than allowed, and the results are those of any number.
+    #[test]
+    fn confined_work_keeps_to_its_threads() {
+        let items: Vec<u64> = (0..200).collect();
+        let (at_once, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let one = |i: &u64| {
+            most.fetch_max(at_once.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+            let result = (0..20_000).fold(*i, |sum, x| sum ^ (x * x));
+            at_once.fetch_sub(1, Ordering::SeqCst);
+            result
+        };
+        let found = confined(1, || map(&items, one));
+        assert_eq!(most.load(Ordering::SeqCst), 1);
+        assert_eq!(found, map(&items, one));
+    }
 
     #[test]
     fn results_come_in_the_order_of_the_items() {

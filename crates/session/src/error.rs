@@ -57,6 +57,14 @@ pub enum SessionError {
         /// The run.
         key: String,
     },
+    /// Runs that were made elsewhere are not those of the night.
+    #[error(
+        "the runs that were made elsewhere are not those of this nightly campaign: {lacks}; make the study again from it"
+    )]
+    OtherNight {
+        /// What differs.
+        lacks: String,
+    },
     /// A log without steps has too little.
     #[error(transparent)]
     Driven(#[from] mapper_driven::DrivenError),
@@ -375,6 +383,7 @@ impl SessionError {
             | E::Nightly(NightlyError::Mistakes(_))
             | E::NightlySequence { .. }
             | E::NightlyTwice { .. }
+            | E::OtherNight { .. }
             | E::NoRecording
             | E::NotTogether { .. }
             | E::Method { .. }

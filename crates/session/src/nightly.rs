@@ -5,10 +5,9 @@ use crate::planning::nominal_model;
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Nightly;
 use mapper_core::Method;
-use mapper_history::{RunKey, RunRow};
-use mapper_numerics::parallel;
+use mapper_fleet::Engine;
+use mapper_history::RunRow;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// All runs of a night, ready to start.
 pub struct PreparedNight {
@@ -36,23 +35,35 @@ impl PreparedNight {
             let seeds = if group.seeds.is_empty() { vec![campaign.seed] } else { group.seeds.clone() };
             for method in methods {
                 for &seed in &seeds {
-                    let mut campaign = campaign.clone();
-                    campaign.identification.method = method;
-                    campaign.seed = seed;
-                    let key = RunKey {
-                        campaign: campaign.name.clone(),
-                        machine: campaign.machine.name.clone(),
-                        method: method.to_string(),
-                        seed,
-                    };
-                    if runs.iter().any(|run| run.key == key) {
-                        return Err(SessionError::NightlyTwice { key: key.to_string() });
+                    let run = NightlyRun::new(campaign.clone(), model.clone(), method, seed);
+                    if runs.iter().any(|earlier| earlier.key == run.key) {
+                        return Err(SessionError::NightlyTwice { key: run.key.to_string() });
                     }
-                    runs.push(NightlyRun { campaign, model: model.clone(), key });
+                    runs.push(run);
                 }
             }
         }
         Ok(PreparedNight { runs })
+    }
+
+    /// The runs, in the order of the nightly campaign.
+    pub fn runs(&self) -> &[NightlyRun] {
+        &self.runs
+    }
+
+    /// Rows that were made elsewhere, where they are those of this night's runs.
+    ///
+    /// # Errors
+    /// [`SessionError::OtherNight`] where a run is missing, or belongs to another night.
+    pub fn checked(&self, rows: Vec<RunRow>) -> Result<Vec<RunRow>, SessionError> {
+        let here = self.runs.iter().map(|run| &run.key);
+        if here.eq(rows.iter().map(|row| &row.key)) {
+            return Ok(rows);
+        }
+        let lacks = self.runs.iter().find(|run| !rows.iter().any(|row| row.key == run.key));
+        let lacks = lacks
+            .map_or_else(|| "it has other runs besides".to_owned(), |run| format!("it has no {}", run.key));
+        Err(SessionError::OtherNight { lacks })
     }
 
     /// Number of runs.
@@ -86,20 +97,19 @@ impl Session<'_> {
             .prefix("mapper-nightly-")
             .tempdir()
             .map_err(SessionError::file("create a directory in", &room))?;
-        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        let jobs = jobs.unwrap_or(cores).clamp(1, runs.len().max(1));
-        let done = AtomicUsize::new(0);
-        self.tell(SessionEvent::PiecesDone { done: 0, of: runs.len() });
-        parallel::try_map_on(jobs, runs, |index, run| {
-            let row = self.nightly_run(run, &scratch.path().join(index.to_string()))?;
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            self.tell(SessionEvent::PiecesDone { done, of: runs.len() });
-            Ok(row)
-        })
+        let told = |done, of| self.tell(SessionEvent::PiecesDone { done, of });
+        let engine = Engine { jobs, stop: self.stop, told: &told };
+        let one =
+            |index: usize, run: &NightlyRun| self.nightly_run(run, &scratch.path().join(index.to_string()));
+        // What was not begun was stopped.
+        engine.each(runs, one)?.into_iter().collect::<Option<_>>().ok_or(SessionError::Interrupted)
     }
 
-    /// One run in a directory of its own, which is gone afterwards: a night of recordings need not fit on the disk.
-    fn nightly_run(&self, run: &NightlyRun, directory: &Path) -> Result<RunRow, SessionError> {
+    /// One run in a new directory of its own, which is gone afterwards: a night of recordings need not fit on the disk.
+    ///
+    /// # Errors
+    /// As [`Session::night`].
+    pub fn nightly_run(&self, run: &NightlyRun, directory: &Path) -> Result<RunRow, SessionError> {
         std::fs::create_dir(directory).map_err(SessionError::file("create", directory))?;
         let row = run.run(self, directory);
         let _ = std::fs::remove_dir_all(directory);

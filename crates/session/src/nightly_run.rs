@@ -8,27 +8,44 @@ use crate::program::PROGRAM;
 use crate::recorded::Recorded;
 use crate::{ErrorKind, Session, SessionError, planned, run_directory};
 use mapper_campaign::Campaign;
-use mapper_core::Plan;
+use mapper_core::{Method, Plan};
 use mapper_history::{RunKey, RunRow};
 use mapper_physics::model::Model;
 use mapper_record::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, read_recording};
 use mapper_runner::{PlanSteps, RunEnd};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A campaign with method and seed set, ready to run.
-pub(crate) struct NightlyRun {
+pub struct NightlyRun {
+    /// The campaign, with method and seed.
     pub campaign: Campaign,
+    /// Its nominal model.
     pub model: Model,
+    /// What the run is, from night to night.
     pub key: RunKey,
 }
 
 impl NightlyRun {
+    /// A campaign by a method with a seed.
+    pub fn new(mut campaign: Campaign, model: Model, method: Method, seed: u64) -> NightlyRun {
+        campaign.identification.method = method;
+        campaign.seed = seed;
+        let key = RunKey {
+            campaign: campaign.name.clone(),
+            machine: campaign.machine.name.clone(),
+            method: method.to_string(),
+            seed,
+        };
+        NightlyRun { campaign, model, key }
+    }
+
     /// Plans, runs, records, identifies and scores. What fails stands in the row.
     ///
     /// # Errors
     /// [`SessionError::Interrupted`] where the operator stopped it.
-    pub fn run(&self, session: &Session<'_>, directory: &Path) -> Result<RunRow, SessionError> {
+    pub(crate) fn run(&self, session: &Session<'_>, directory: &Path) -> Result<RunRow, SessionError> {
         let mut row = RunRow {
             key: self.key.clone(),
             campaign_sha256: String::new(),
@@ -49,21 +66,59 @@ impl NightlyRun {
         let plan = planned::plan(&self.campaign, &self.model)?;
         row.campaign_sha256 = plan.made_from.campaign_sha256.clone();
         row.model_sha256 = plan.made_from.model_sha256.clone();
-        let recording = directory.join(run_directory::RECORDING);
-        match self.record(&plan, session, &recording)? {
-            RunEnd::Completed => {}
-            RunEnd::Interrupted { .. } => return Err(SessionError::Interrupted),
-            RunEnd::Tripped(trip) => {
-                row.failure = Some(format!("stopped at {:.1} s: {}", trip.t_s, trip.reason));
-                return Ok(());
+        match self.recorded(&plan, session, directory)? {
+            Ok(recorded) => {
+                let identified = session.identify(vec![recorded], &ChannelMap::native(), None)?;
+                row.figures = figures(&identified.points, &plan);
+                row.points = point_rows(&identified.points);
             }
+            Err(stopped) => row.failure = Some(stopped),
         }
-        let read = read_recording(&recording, &ChannelMap::native(), &ReadOptions::default())?;
-        let recorded = Recorded::of(recording, read, Some(self.campaign.clone()));
-        let identified = session.identify(vec![recorded], &ChannelMap::native(), None)?;
-        row.figures = figures(&identified.points, &plan);
-        row.points = point_rows(&identified.points);
         Ok(())
+    }
+
+    /// One recording identified by each of the methods: the points beside their truth as `points.json` of a run has them.
+    /// `Err` within: a guard stopped the run, and why.
+    ///
+    /// # Errors
+    /// [`SessionError`] where the campaign cannot be planned, run or identified.
+    pub fn points(
+        &self,
+        session: &Session<'_>,
+        directory: &Path,
+        methods: &[Method],
+    ) -> Result<Result<Vec<Value>, String>, SessionError> {
+        let plan = planned::plan(&self.campaign, &self.model)?;
+        let recording = match self.recorded(&plan, session, directory)? {
+            Ok(recorded) => recorded.path,
+            Err(stopped) => return Ok(Err(stopped)),
+        };
+        let one = |method: &Method| -> Result<Value, SessionError> {
+            let recorded = self.read(&recording)?;
+            let identified = session.identify(vec![recorded], &ChannelMap::native(), Some(*method))?;
+            Ok(serde_json::to_value(&identified.points)?)
+        };
+        methods.iter().map(one).collect::<Result<_, _>>().map(Ok)
+    }
+
+    /// Runs the campaign and reads the recording; `Err` within: a guard stopped it, and why.
+    fn recorded(
+        &self,
+        plan: &Plan,
+        session: &Session<'_>,
+        directory: &Path,
+    ) -> Result<Result<Recorded, String>, SessionError> {
+        let recording = directory.join(run_directory::RECORDING);
+        match self.record(plan, session, &recording)? {
+            RunEnd::Completed => Ok(Ok(self.read(&recording)?)),
+            RunEnd::Interrupted { .. } => Err(SessionError::Interrupted),
+            RunEnd::Tripped(trip) => Ok(Err(format!("stopped at {:.1} s: {}", trip.t_s, trip.reason))),
+        }
+    }
+
+    fn read(&self, recording: &Path) -> Result<Recorded, SessionError> {
+        let read = read_recording(recording, &ChannelMap::native(), &ReadOptions::default())?;
+        Ok(Recorded::of(recording.to_owned(), read, Some(self.campaign.clone())))
     }
 
     fn record(&self, plan: &Plan, session: &Session<'_>, recording: &Path) -> Result<RunEnd, SessionError> {

@@ -11,6 +11,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-core",      &[]),
     ("mapper-chart",     &[]),
     ("mapper-numerics",  &[]),
+    // Work in many pieces; knows nothing of what the pieces are.
+    ("mapper-fleet",     &["numerics", "yaml"]),
     ("mapper-physics",   &["core", "numerics"]),
     ("mapper-mesh",      &["core", "chart"]),
     ("mapper-campaign",  &["core", "physics", "yaml"]),
@@ -39,18 +41,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart", "mesh"]),
     ("mapper-log-formats", &["logs"]),
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
-    ("mapper-blind",     &["core", "numerics", "physics", "campaign", "runner", "record", "observe", "gap", "backends", "effects"]),
+    ("mapper-blind",     &["core", "numerics", "physics", "campaign", "runner", "record", "observe", "gap", "backends", "effects", "fleet"]),
     // Words, pages and pictures made from data.
-    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "assemble", "gap", "drift", "driven", "history", "logs", "record", "reproduce", "sequence"]),
+    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "assemble", "gap", "drift", "driven", "history", "logs", "record", "reproduce", "sequence", "fleet"]),
     // The page of a run, for a browser.
     ("mapper-page",      &["core", "chart", "mesh", "campaign", "assemble", "identify", "numerics", "observe", "record", "report"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics"]),
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics", "fleet"]),
+    // What fleets work on: one file a kind, above the application and the blind cases.
+    ("mapper-studies",   &["blind", "campaign", "core", "fleet", "history", "record", "session"]),
     // What a terminal, a pipe or another program sees; what a browser sees while a run goes on.
     ("mapper-terminal",  &["core", "campaign", "assemble", "identify", "observe", "report", "session"]),
     ("mapper-live",      &["core", "campaign", "page", "report", "session"]),
     // The program names the plug-ins; nothing sees the program.
-    ("mapper-cli",       &["core", "physics", "campaign", "conformance", "host", "planner", "record", "drift", "gap", "discover", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "terminal", "live", "backends", "blind", "effects", "formats"]),
+    ("mapper-cli",       &["core", "physics", "campaign", "conformance", "host", "planner", "record", "drift", "gap", "discover", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "terminal", "live", "backends", "blind", "effects", "formats", "fleet", "studies"]),
     // Drivers are programs of their own: what they share, and whatever each needs for its rig.
     ("mapper-driver",    &["core", "protocol"]),
     ("mapper-backend-lab", &["core", "campaign", "session", "backends", "effects", "driver"]),

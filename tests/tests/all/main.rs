@@ -11,6 +11,8 @@ mod drift;
 mod drift_refusals;
 mod drift_watched;
 mod drivers;
+mod fleet;
+mod fleet_cluster;
 mod full_disk;
 mod help;
 mod interrupted;

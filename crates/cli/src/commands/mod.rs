@@ -18,6 +18,7 @@ subcommands! { Command:
     drift::Drift,
     nightly::Nightly,
     history::History,
+    fleet::Fleet,
     reproduce::Reproduce,
     map::Map,
     completions::Completions,

@@ -22,6 +22,9 @@ pub struct Nightly {
     /// Accept what moved tonight: begin a new band with this night
     #[arg(long)]
     pub accept: bool,
+    /// Take the runs from this merged study of `mapper fleet` instead of running them
+    #[arg(long, value_name = "DIR", conflicts_with = "jobs")]
+    pub fleet: Option<PathBuf>,
     /// Number of parallel runs [default: all cores]
     #[arg(long, value_name = "COUNT")]
     pub jobs: Option<usize>,
@@ -42,7 +45,13 @@ impl Nightly {
         let on_event = |event: &_| progress.show(event);
         let session = Session { on_event: &on_event, stop: &stop, ..Session::new(&registry) };
         let started = jiff::Timestamp::now();
-        let runs = session.night(&prepared, self.jobs);
+        let runs = match &self.fleet {
+            Some(directory) => {
+                let rows = mapper_studies::rows_of(directory, &registry)?;
+                prepared.checked(rows)
+            }
+            None => session.night(&prepared, self.jobs),
+        };
         progress.clear();
         let runs = runs.map_err(|error| match error.kind() {
             ErrorKind::Interrupted => {

@@ -1,14 +1,15 @@
 //! `mapper gap blind calibrate`.
 
+use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::output::Replace;
-use crate::{manner, output, registry};
+use crate::{interrupt, manner, output, registry};
 use clap::Args;
-use mapper_blind::calibrate::{Observed, Plan, calibrate};
+use mapper_blind::calibrate::{Plan, calibrate};
+use mapper_fleet::Engine;
 use mapper_session::json_text;
 use serde_json::json;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Calibrate the probabilities on separate cases, whose outside causes are not used in the check
 #[derive(Debug, Args)]
@@ -31,6 +32,9 @@ pub struct Calibrate {
     /// Also write the result of each case to this new file (JSON)
     #[arg(long, value_name = "FILE")]
     pub observed: Option<PathBuf>,
+    /// Number of diagnoses at a time [default: all cores]
+    #[arg(long, value_name = "COUNT")]
+    pub jobs: Option<usize>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -43,21 +47,14 @@ impl Calibrate {
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let plan = Plan { seed: self.seed, nulls: self.nulls, others: self.cases };
-        let made_by = format!(
-            "mapper gap blind calibrate --campaign {} --seed {} --nulls {} --cases {}",
-            self.campaign.display(),
-            plan.seed,
-            plan.nulls,
-            plan.others
-        );
-        let (progress, done) = (manner::progress(), AtomicUsize::new(0));
-        progress.pieces(0, plan.nulls + plan.others);
-        let tell = |_: &Observed| {
-            progress.pieces(done.fetch_add(1, Ordering::Relaxed) + 1, plan.nulls + plan.others)
-        };
-        let found = calibrate(&campaign, &registry::registry().effects, &plan, made_by, &tell);
+        let (stop, progress) = (interrupt::stop_flag()?, manner::progress());
+        let told = |done, of| progress.pieces(done, of);
+        let engine = Engine { jobs: self.jobs, stop: &stop, told: &told };
+        let made_by = plan.command(&self.campaign);
+        let found = calibrate(&campaign, &registry::registry().effects, &plan, made_by, &engine);
         progress.clear();
-        let (calibration, observed) = found?;
+        let stopped = || Failure::new(Code::Interrupted, "stopped by the operator; `mapper fleet` keeps what is done");
+        let (calibration, observed) = found?.ok_or_else(stopped)?;
         self.replace.write(&self.out, json_text(&calibration)?.as_bytes())?;
         if let Some(file) = &self.observed {
             self.replace.write(file, json_text(&observed)?.as_bytes())?;

@@ -2,12 +2,13 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{manner, output};
+use crate::{interrupt, manner, output};
 use clap::Args;
 use mapper_blind::{MANIFEST_NAME, Manifest};
+use mapper_fleet::{Engine, cores};
 use mapper_session::write_new;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Diagnose the recordings that have no diagnosis yet
@@ -18,6 +19,9 @@ pub struct Run {
     /// Campaign given to the diagnosis (YAML)
     #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
     pub campaign: PathBuf,
+    /// Number of diagnoses at a time [default: all cores]
+    #[arg(long, value_name = "COUNT")]
+    pub jobs: Option<usize>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -29,33 +33,17 @@ impl Run {
         let failure = |message: String| Failure::new(Code::Failure, message);
         let manifest = Manifest::read(&self.directory.join(MANIFEST_NAME))?;
         let program = std::env::current_exe().map_err(|error| failure(error.to_string()))?;
-        let progress = manner::progress();
-        progress.pieces(0, manifest.cases.len());
-        let mut failed = Vec::new();
-        let names = manifest.cases.iter().filter(|name| !name.contains(['/', '\\']));
-        for (index, name) in names.enumerate() {
-            let of_case = |ending: &str| self.directory.join(format!("{name}.{ending}"));
-            let diagnosis = of_case("diagnosis.json");
-            if !diagnosis.exists() {
-                let finished = Command::new(&program)
-                    .args(["gap", "diagnose"])
-                    .arg(&self.campaign)
-                    .arg("--recording")
-                    .arg(of_case("mcap"))
-                    .arg("--json")
-                    .stdin(Stdio::null())
-                    .output()
-                    .map_err(|error| failure(format!("failed to start {}: {error}", program.display())))?;
-                if finished.status.success() {
-                    write_new(&diagnosis, &finished.stdout)?;
-                } else {
-                    let said = String::from_utf8_lossy(&finished.stderr);
-                    failed.push(format!("{name}: {}", said.lines().last().unwrap_or_default()));
-                }
-            }
-            progress.pieces(index + 1, manifest.cases.len());
-        }
+        let (stop, progress) = (interrupt::stop_flag()?, manner::progress());
+        let told = |done, of| progress.pieces(done, of);
+        let engine = Engine { jobs: self.jobs, stop: &stop, told: &told };
+        let names: Vec<&String> = manifest.cases.iter().filter(|name| !name.contains(['/', '\\'])).collect();
+        let threads = (cores() / engine.at_a_time(names.len())).max(1);
+        let diagnosed = engine.each(&names, |_, name| self.diagnose(&program, name, threads));
         progress.clear();
+        let diagnosed: Vec<_> = diagnosed?.into_iter().collect::<Option<_>>().ok_or_else(|| {
+            Failure::new(Code::Interrupted, "stopped by the operator; the same command goes on from there")
+        })?;
+        let failed: Vec<String> = diagnosed.into_iter().filter_map(Result::err).collect();
         if failed.is_empty() {
             if self.json {
                 return output::print_json(&json!({ "cases": manifest.cases, "directory": self.directory }));
@@ -64,5 +52,32 @@ impl Run {
             return output::print(&format!("{cases} diagnoses in {directory}\n"));
         }
         Err(failure(format!("{} recordings were not diagnosed:\n{}", failed.len(), failed.join("\n"))))
+    }
+    /// Diagnoses one case where that is not done yet; `Err` within: what the diagnosis said.
+    fn diagnose(&self, program: &Path, name: &str, threads: usize) -> Result<Result<(), String>, Failure> {
+        let of_case = |ending: &str| self.directory.join(format!("{name}.{ending}"));
+        let diagnosis = of_case("diagnosis.json");
+        if diagnosis.exists() {
+            return Ok(Ok(()));
+        }
+        let finished = Command::new(program)
+            .args(["gap", "diagnose"])
+            .arg(&self.campaign)
+            .arg("--recording")
+            .arg(of_case("mcap"))
+            .arg("--json")
+            // Several at once: each keeps to its share of the cores.
+            .env("RAYON_NUM_THREADS", threads.to_string())
+            .stdin(Stdio::null())
+            .output()
+            .map_err(|error| {
+                Failure::new(Code::Failure, format!("failed to start {}: {error}", program.display()))
+            })?;
+        if finished.status.success() {
+            write_new(&diagnosis, &finished.stdout)?;
+            return Ok(Ok(()));
+        }
+        let said = String::from_utf8_lossy(&finished.stderr);
+        Ok(Err(format!("{name}: {}", said.lines().last().unwrap_or_default())))
     }
 }

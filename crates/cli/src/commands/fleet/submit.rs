@@ -1,0 +1,85 @@
+//! `mapper fleet submit`: a study on a cluster.
+
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::fleet_place::in_fleet;
+use crate::output;
+use clap::Args;
+use mapper_fleet::{Limits, SubmitOptions, Template};
+use mapper_report::submission_text;
+use std::path::PathBuf;
+
+/// Submit what is left as an array job with the merge behind it; nothing is submitted that exceeds a limit
+#[derive(Debug, Args)]
+pub struct Submit {
+    /// Directory of the study
+    pub directory: PathBuf,
+    /// Submit to Slurm
+    #[arg(long, required_unless_present = "template", conflicts_with = "template")]
+    pub slurm: bool,
+    /// Submit to another queue by this template (docs/fleet.md)
+    #[arg(long, value_name = "FILE")]
+    pub template: Option<PathBuf>,
+    /// Partition, or queue [default: the site's own]
+    #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
+    pub partition: String,
+    /// Cores of a task, an item on each
+    #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    pub cpus: u16,
+    /// How long a task should last, minutes
+    #[arg(long, value_name = "MINUTES", default_value_t = 15.0, value_parser = minutes)]
+    pub task: f64,
+    /// Limit: time of a task, whole minutes [default: twice what it should take and 5 min]
+    #[arg(long, value_name = "MINUTES", value_parser = clap::value_parser!(u64).range(1..))]
+    pub time: Option<u64>,
+    /// Limit: number of tasks of the array
+    #[arg(long, value_name = "COUNT", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..))]
+    pub array_limit: u64,
+    /// Limit: number of tasks at once
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(1..))]
+    pub at_once: Option<u64>,
+    /// Limit: processor hours of all that is left
+    #[arg(long, value_name = "HOURS")]
+    pub hours: Option<f64>,
+    /// Limit: memory of a task, MB
+    #[arg(long, value_name = "MB")]
+    pub memory: Option<u64>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Submit {
+    /// Tries a few items where none is done, then submits.
+    pub fn run(&self) -> Result<(), Failure> {
+        let program = std::env::current_exe()
+            .map_err(|error| Failure::new(Code::Failure, format!("failed to find this program: {error}")))?;
+        let submission = in_fleet(&self.directory, None, |fleet, kind, engine, machine| {
+            let options = SubmitOptions {
+                template: self.template.as_deref().map_or_else(|| Ok(Template::slurm()), Template::read)?,
+                program,
+                partition: self.partition.clone(),
+                cpus: self.cpus.into(),
+                task_min: self.task,
+                limits: Limits {
+                    time_min: self.time,
+                    tasks: self.array_limit,
+                    at_once: self.at_once,
+                    hours: self.hours,
+                    memory_mb: self.memory,
+                },
+            };
+            let cost = fleet.tried(kind, TRIES, engine, machine)?.cost;
+            fleet.submit(&options, &cost, machine)
+        })?;
+        if self.json { output::print_json(&submission) } else { output::print(&submission_text(&submission)) }
+    }
+}
+
+/// Items that have to be done before it is known what the others cost.
+const TRIES: usize = 3;
+
+fn minutes(text: &str) -> Result<f64, String> {
+    let minutes: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of minutes"))?;
+    if minutes.is_finite() && minutes > 0.0 { Ok(minutes) } else { Err("it has to be above 0".to_owned()) }
+}

@@ -1,0 +1,59 @@
+//! `mapper fleet work`: a share of the items.
+
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::fleet_place::in_fleet;
+use crate::output;
+use clap::Args;
+use mapper_fleet::{Hash, Shard, Which};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Do a share of the items, as a task of a cluster does; each leaves one part, and what is there is skipped
+#[derive(Debug, Args)]
+pub struct Work {
+    /// Directory of the study
+    pub directory: PathBuf,
+    /// Share K of N, from 1; by the hash of the item alone, so that it stays when other items come and go
+    #[arg(long, value_name = "K/N", required_unless_present = "item", conflicts_with = "item")]
+    pub shard: Option<Shard>,
+    /// One item, by its hash
+    #[arg(long, value_name = "HASH")]
+    pub item: Option<Hash>,
+    /// Number of items at a time [default: all cores]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    /// Also do those again that failed
+    #[arg(long)]
+    pub again: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Work {
+    /// Works.
+    pub fn run(&self) -> Result<(), Failure> {
+        let which = match (self.item, self.shard) {
+            (Some(hash), _) => Which::Item(hash),
+            (None, Some(shard)) => Which::Shard(shard),
+            // clap asks for one of them.
+            (None, None) => Which::All,
+        };
+        let worked = in_fleet(&self.directory, self.jobs.map(usize::from), |fleet, kind, engine, machine| {
+            fleet.work(kind, which, self.again, engine, machine)
+        })?;
+        if self.json {
+            output::print_json(&json!({ "done": worked.done, "there": worked.there, "failed": worked.failed }))?;
+        } else {
+            let failed = worked.failed.iter().map(|(name, why)| format!("failed: {name}: {why}\n"));
+            let failed: String = failed.collect();
+            output::print(&format!("{failed}{} done, {} were there\n", worked.done, worked.there))?;
+        }
+        if worked.failed.is_empty() {
+            return Ok(());
+        }
+        let message = format!("{} items failed; `--again` does them again", worked.failed.len());
+        Err(if self.json { Failure::told(Code::Incomplete) } else { Failure::new(Code::Incomplete, message) })
+    }
+}

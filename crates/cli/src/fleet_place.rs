@@ -1,0 +1,54 @@
+//! A fleet directory opened, and what works in it: this machine.
+
+use crate::failure::Failure;
+use crate::wall::SystemWall;
+use crate::{interrupt, manner, registry};
+use mapper_core::Wall;
+use mapper_fleet::{Engine, Fleet, FleetError, Kind, Machine};
+use mapper_session::Registry;
+use std::path::Path;
+
+/// Does something with every kind there is on this machine.
+pub fn on_this_machine<T>(
+    then: impl FnOnce(&Registry, &[&dyn Kind], &Machine<'_>) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    let (registry, wall) = (registry::registry(), SystemWall::new());
+    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let task = std::env::var("SLURM_JOB_ID").map_or_else(|_| String::new(), |id| format!(" job {id}"));
+    let name = format!("{} process {}{task}", host.trim(), std::process::id());
+    let machine =
+        Machine { name: &name, thread_s: &|| thread_s(&wall), peak_memory_bytes: &peak_memory_bytes };
+    let kinds = mapper_studies::kinds(&registry);
+    let kinds: Vec<&dyn Kind> = kinds.iter().map(AsRef::as_ref).collect();
+    then(&registry, &kinds, &machine)
+}
+
+/// Does something in a fleet directory, with progress from the first second.
+pub fn in_fleet<T>(
+    directory: &Path,
+    jobs: Option<usize>,
+    then: impl FnOnce(&Fleet, &dyn Kind, &Engine<'_>, &Machine<'_>) -> Result<T, FleetError>,
+) -> Result<T, Failure> {
+    on_this_machine(|registry, kinds, machine| {
+        let fleet = Fleet::open(directory, &mapper_studies::program(registry))?;
+        let (kind, stop, progress) = (fleet.kind(kinds)?, interrupt::stop_flag()?, manner::progress());
+        let told = |done, of| progress.pieces(done, of);
+        let result = then(&fleet, kind, &Engine { jobs, stop: &stop, told: &told }, machine);
+        progress.clear();
+        Ok(result?)
+    })
+}
+
+/// Processor time of this thread as Linux counts it; elsewhere the clock's.
+fn thread_s(wall: &SystemWall) -> f64 {
+    let counted = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let ns = counted.and_then(|line| line.split(' ').next()?.parse::<f64>().ok());
+    ns.map_or_else(|| wall.now_s(), |ns| ns * 1e-9)
+}
+
+/// Largest memory of this process so far; only Linux says.
+fn peak_memory_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? << 10)
+}

@@ -1,0 +1,52 @@
+//! The one loop over pieces of work: nights, diagnoses, calibrations and fleets all run in it.
+
+use mapper_numerics::parallel;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Number of cores that this process may use.
+pub fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+/// How pieces are worked on.
+#[derive(Clone, Copy)]
+pub struct Engine<'a> {
+    /// Pieces at a time; `None`: as many as there are cores.
+    pub jobs: Option<usize>,
+    /// Set from outside to begin no further piece.
+    pub stop: &'a AtomicBool,
+    /// Told how many of how many are done, from the first second on.
+    pub told: &'a (dyn Fn(usize, usize) + Sync),
+}
+
+impl Engine<'_> {
+    /// Pieces at a time where there are so many.
+    pub fn at_a_time(&self, pieces: usize) -> usize {
+        self.jobs.unwrap_or_else(cores).clamp(1, pieces.max(1))
+    }
+
+    /// `work` on every piece; results in the order of the pieces, whatever the number of jobs. The cores are shared out among
+    /// the pieces under way, so that each runs on its own. After an error or a stop nothing is begun; a piece that was not
+    /// begun for a stop is `None`.
+    ///
+    /// # Errors
+    /// That of the first piece whose work fails.
+    pub fn each<T: Sync, R: Send, E: Send>(
+        &self,
+        pieces: &[T],
+        work: impl Fn(usize, &T) -> Result<R, E> + Sync,
+    ) -> Result<Vec<Option<R>>, E> {
+        let jobs = self.at_a_time(pieces.len());
+        let threads = (cores() / jobs).max(1);
+        let done = AtomicUsize::new(0);
+        (self.told)(0, pieces.len());
+        parallel::try_map_on(jobs, pieces, |index, piece| {
+            if self.stop.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+            let result = parallel::confined(threads, || work(index, piece))?;
+            (self.told)(done.fetch_add(1, Ordering::Relaxed) + 1, pieces.len());
+            Ok(Some(result))
+        })
+    }
+}

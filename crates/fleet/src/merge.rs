@@ -1,0 +1,109 @@
+//! From parts to the result, which no number of machines and no order of work changes.
+
+use crate::place::{Machine, make_directory};
+use crate::status::{Lacking, Status};
+use crate::{Fleet, FleetError, Kind, Outcome, Output, PartRefusal};
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+
+/// What was merged.
+#[derive(Debug)]
+pub struct Merged {
+    /// How far the study is.
+    pub status: Status,
+    /// Where the result is, and what it is in a line; `None`: something is missing, and nothing was written.
+    pub result: Option<(PathBuf, String)>,
+}
+
+impl Fleet {
+    /// Merges all parts into `result`; where something is missing or failed, only with `partial`. One part at a time is in
+    /// memory. Two that merge at once write the same bytes.
+    ///
+    /// # Errors
+    /// [`FleetError`] where a file cannot be written, or a part's result is not what the kind makes.
+    pub fn merge(&self, kind: &dyn Kind, partial: bool, machine: &Machine<'_>) -> Result<Merged, FleetError> {
+        let mut status = self.status();
+        if status.lacking() > 0 && !partial {
+            return Ok(Merged { status, result: None });
+        }
+        let new = self.directory().join(format!(".result.{}.new", safe(machine.name)));
+        let output = Output::new(make_directory(new.clone())?);
+        let spoilt: RefCell<Vec<Lacking>> = RefCell::default();
+        let mut parts = self.study.items.iter().map(|item| {
+            let result = match self.whole(item) {
+                Some(Ok((part, body))) if part.outcome == Outcome::Done => Ok(body),
+                Some(Ok((_, why))) => Err(why),
+                Some(Err(refusal)) => {
+                    let why = Some(refusal.to_string());
+                    spoilt.borrow_mut().push(Lacking { name: item.name.clone(), hash: item.hash, why });
+                    Err(refusal.to_string())
+                }
+                None => Err("missing".to_owned()),
+            };
+            (item.name.clone(), result)
+        });
+        let said = kind.merge(&self.study.settings, &mut parts, &output);
+        drop(parts);
+        // What the first lines did not show: content that was changed.
+        for lacking in spoilt.into_inner() {
+            self.put_aside(&lacking);
+            if !status.refused.contains(&lacking) {
+                status.done -= 1;
+                status.refused.push(lacking);
+            }
+        }
+        let whole = partial || status.lacking() == 0;
+        let said = match said {
+            Ok(said) if whole => said,
+            other => {
+                let _ = std::fs::remove_dir_all(&new);
+                // What is spoilt is told first: it may be why the merge failed.
+                return match other {
+                    Err(error) if whole => Err(error),
+                    _ => Ok(Merged { status, result: None }),
+                };
+            }
+        };
+        let result = self.result();
+        let installed = install(&new, &result);
+        let _ = std::fs::remove_dir_all(&new);
+        installed?;
+        Ok(Merged { status, result: Some((result, said)) })
+    }
+}
+
+impl Fleet {
+    /// Moves a part whose content was changed out of the way: its first line looks whole, and it would be taken for done.
+    fn put_aside(&self, lacking: &Lacking) {
+        let part = self.part(&lacking.hash);
+        let is_changed = lacking.why.as_deref() == Some(PartRefusal::Checksum.to_string().as_str());
+        if is_changed {
+            let _ = std::fs::rename(&part, self.parts().join(format!(".{}.changed", lacking.hash)));
+        }
+    }
+}
+
+/// Puts each file in its place, and takes away what an earlier merge left.
+fn install(new: &Path, result: &Path) -> Result<(), FleetError> {
+    make_directory(result.to_owned())?;
+    let names = |folder: &Path| -> Result<Vec<_>, FleetError> {
+        let entries = std::fs::read_dir(folder).map_err(FleetError::file("read", folder))?;
+        let mut names: Vec<_> = entries.flatten().map(|entry| entry.file_name()).collect();
+        names.sort();
+        Ok(names)
+    };
+    let files = names(new)?;
+    for name in &files {
+        let to = result.join(name);
+        std::fs::rename(new.join(name), &to).map_err(FleetError::file("write", &to))?;
+    }
+    for name in names(result)?.into_iter().filter(|name| files.binary_search(name).is_err()) {
+        // Gone already where two merge at once.
+        let _ = std::fs::remove_file(result.join(name));
+    }
+    Ok(())
+}
+
+fn safe(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
+}

@@ -1,0 +1,78 @@
+//! Files of a directory that many machines share: whole or not there, and never more of them read than a limit.
+
+use crate::FleetError;
+use std::fs::File;
+use std::io::{ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Who works, and how long it takes: nothing here reads a clock by itself.
+#[derive(Clone, Copy)]
+pub struct Machine<'a> {
+    /// Name of the machine and the process, for whoever looks for it; unique among all that work at once.
+    pub name: &'a str,
+    /// Processor time of the thread that asks, s: what an item takes, whatever else the machine has to do.
+    pub thread_s: &'a (dyn Fn() -> f64 + Sync),
+    /// Largest memory of this process so far, bytes; `None` where the system does not say.
+    pub peak_memory_bytes: &'a (dyn Fn() -> Option<u64> + Sync),
+}
+
+/// Whether the file is on the disk when it is said to be there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Durability {
+    /// Written through before it has its name: whole after a power cut, if it is there.
+    Synced,
+    /// Whenever the system likes; it can be made again.
+    Unsynced,
+}
+
+/// Writes a file so that it is there whole or not at all, whoever is killed when. `writer` keeps two writers apart.
+pub(crate) fn write_whole(
+    path: &Path,
+    pieces: &[&[u8]],
+    writer: &str,
+    durability: Durability,
+) -> Result<(), FleetError> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let writer: String = writer.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+    let new = folder.join(format!(".{name}.{writer}.new"));
+    let write = || -> std::io::Result<()> {
+        let mut file = File::create(&new)?;
+        for piece in pieces {
+            file.write_all(piece)?;
+        }
+        if durability == Durability::Synced {
+            file.sync_all()?;
+        }
+        drop(file);
+        std::fs::rename(&new, path)?;
+        Ok(())
+    };
+    write().map_err(|source| {
+        let _ = std::fs::remove_file(&new);
+        FleetError::File { action: "write", path: path.to_owned(), source }
+    })
+}
+
+/// Reads a plain file of at most so many bytes. A pipe or a device is not opened: it could hang.
+pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, FleetError> {
+    let read = || -> std::io::Result<Vec<u8>> {
+        if !std::fs::metadata(path)?.is_file() {
+            return Err(std::io::Error::new(ErrorKind::InvalidInput, "it is not a plain file"));
+        }
+        let mut bytes = Vec::new();
+        File::open(path)?.take(limit_bytes + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > limit_bytes {
+            let larger = format!("it is larger than the {limit_bytes} bytes that are read");
+            return Err(std::io::Error::new(ErrorKind::FileTooLarge, larger));
+        }
+        Ok(bytes)
+    };
+    read().map_err(FleetError::file("read", path))
+}
+
+/// Makes a directory and those above it.
+pub(crate) fn make_directory(path: PathBuf) -> Result<PathBuf, FleetError> {
+    std::fs::create_dir_all(&path).map_err(FleetError::file("create", &path))?;
+    Ok(path)
+}

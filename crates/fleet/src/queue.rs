@@ -1,0 +1,108 @@
+//! A queue of a cluster behind one template: a shell script that submits, and a line in it that asks.
+
+use crate::FleetError;
+use crate::place::read_at_most;
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+/// A template: how a queue takes an array of tasks and the merge behind it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Template {
+    /// Its name, or its file.
+    pub name: String,
+    /// The script.
+    pub text: String,
+}
+
+/// Largest template, bytes.
+const LARGEST_BYTES: u64 = 64 << 10;
+
+impl Template {
+    /// Slurm.
+    pub fn slurm() -> Template {
+        Template { name: "slurm".to_owned(), text: include_str!("../templates/slurm.sh").to_owned() }
+    }
+
+    /// Another queue, from a file.
+    ///
+    /// # Errors
+    /// [`FleetError::File`].
+    pub fn read(path: &Path) -> Result<Template, FleetError> {
+        let bytes = read_at_most(path, LARGEST_BYTES)?;
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        Ok(Template { name: path.display().to_string(), text })
+    }
+
+    /// The line that prints the state of each task of the job `$WORK`.
+    fn question(&self) -> Option<&str> {
+        self.text.lines().find_map(|line| line.strip_prefix("#states: "))
+    }
+}
+
+/// Text as one word of a shell.
+pub(crate) fn quoted(text: &str) -> String {
+    format!("'{}'", text.replace('\'', r"'\''"))
+}
+
+/// Runs the submission; what it prints as `word ID` by its word.
+pub(crate) fn submitted(script: &Path, template: &Template) -> Result<BTreeMap<String, String>, FleetError> {
+    let failed = |said: String| FleetError::Queue {
+        script: PathBuf::from(script),
+        said,
+        template: template.name.clone(),
+    };
+    let output = Command::new("sh")
+        .arg(script)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| failed(format!("failed to start sh: {error}")))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        return Err(failed(said.trim().to_owned()));
+    }
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let words = said.lines().filter_map(|line| line.trim().split_once(' '));
+    let ids: BTreeMap<String, String> =
+        words.map(|(word, id)| (word.to_owned(), id.trim().to_owned())).collect();
+    if ids.contains_key("work") {
+        Ok(ids)
+    } else {
+        Err(failed(format!("it printed no `work ID` but {said:?}")))
+    }
+}
+
+/// States of the tasks of a job by how many have them, as the queue says it; `None` where it does not answer within some
+/// seconds: nothing depends on it.
+pub fn running(template: &Template, job: &str) -> Option<BTreeMap<String, usize>> {
+    let question = template.question()?;
+    let mut child = Command::new("sh")
+        .args(["-c", question])
+        .env("WORK", job)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .ok()?;
+    for _ in 0..LOOKS {
+        if child.try_wait().ok()?.is_some() {
+            let mut said = String::new();
+            child.stdout.take()?.take(LARGEST_BYTES * 16).read_to_string(&mut said).ok()?;
+            let mut states = BTreeMap::new();
+            for state in said.lines().map(str::trim).filter(|line| !line.is_empty()) {
+                *states.entry(state.to_lowercase()).or_insert(0) += 1;
+            }
+            return Some(states);
+        }
+        std::thread::sleep(BETWEEN);
+    }
+    let _ = child.kill();
+    let _ = child.wait();
+    None
+}
+
+/// How often, and how far apart, a queue is looked at that does not answer: 5 s.
+const LOOKS: usize = 100;
+const BETWEEN: Duration = Duration::from_millis(50);

@@ -1,0 +1,275 @@
+//! Handing a study to a queue: few tasks of many items each, sized by what items cost, and never more than the limits.
+
+use crate::fleet::LOGS;
+use crate::place::{Durability, Machine, make_directory, read_at_most, write_whole};
+use crate::queue::{Template, quoted, submitted};
+use crate::{Cost, Fleet, FleetError, Shard, Status};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What is given for a submission.
+#[derive(Debug, Clone)]
+pub struct SubmitOptions {
+    /// The queue.
+    pub template: Template,
+    /// The program, as the tasks start it.
+    pub program: PathBuf,
+    /// Partition, or queue; the site's own where empty.
+    pub partition: String,
+    /// Cores of a task.
+    pub cpus: usize,
+    /// How long a task should last, minutes.
+    pub task_min: f64,
+    /// Limits.
+    pub limits: Limits,
+}
+
+/// What must not be exceeded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Time limit of a task, minutes; `None`: twice what it should last, and five minutes.
+    pub time_min: Option<u64>,
+    /// Number of tasks of an array.
+    pub tasks: u64,
+    /// Number of tasks at once, if it is limited.
+    pub at_once: Option<u64>,
+    /// Processor time of all that is left, h.
+    pub hours: Option<f64>,
+    /// Memory of a task, MB.
+    pub memory_mb: Option<u64>,
+}
+
+/// What was submitted, kept in the directory for a retry.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Submission {
+    /// Name of the template.
+    pub template: String,
+    /// Its text.
+    pub template_text: String,
+    /// Number of tasks that the items are dealt among.
+    pub tasks: u64,
+    /// The tasks that were submitted, as ranges: 1-8 or 2,5-7.
+    pub array: String,
+    /// Cores of a task.
+    pub cpus: usize,
+    /// Time limit of a task, minutes.
+    pub minutes: u64,
+    /// Memory of a task, MB.
+    pub memory_mb: u64,
+    /// Partition; empty: the site's own.
+    pub partition: String,
+    /// Tasks at once, if limited.
+    pub at_once: Option<u64>,
+    /// The program.
+    pub program: PathBuf,
+    /// The queue's number of the array job.
+    pub work: String,
+    /// That of the merge behind it.
+    pub merge: Option<String>,
+}
+
+/// How much longer than reckoned a task may take.
+const SLACK: f64 = 1.5;
+/// Memory beside the items, and what a queue counts that nobody else does, MB.
+const MEMORY_BESIDE_MB: u64 = 128;
+
+impl Fleet {
+    /// Submits what is left. The number of tasks is the smallest with which none lasts longer than wanted.
+    ///
+    /// # Errors
+    /// [`FleetError::DoesNotFit`], [`FleetError::NothingLeft`], [`FleetError::Queue`].
+    pub fn submit(
+        &self,
+        options: &SubmitOptions,
+        cost: &Cost,
+        machine: &Machine<'_>,
+    ) -> Result<Submission, FleetError> {
+        if cost.left == 0 {
+            return Err(self.nothing_left());
+        }
+        let status = self.status();
+        let limits = &options.limits;
+        let refused = |why: String| Err(FleetError::DoesNotFit { why });
+        if let Some(hours) = limits.hours.filter(|hours| cost.left_hours > *hours) {
+            return refused(format!(
+                "what is left takes {:.2} processor hours, the limit is {hours}; raise the limit or make the study smaller",
+                cost.left_hours
+            ));
+        }
+        let items_mb = (cost.memory_bytes >> 20) + 1;
+        let memory_mb = MEMORY_BESIDE_MB + items_mb * options.cpus as u64;
+        if let Some(most_mb) = limits.memory_mb.filter(|most_mb| memory_mb > *most_mb) {
+            return refused(format!(
+                "a task of {} cores needs {memory_mb} MB, the limit is {most_mb}; give it fewer cores",
+                options.cpus
+            ));
+        }
+        let lasts_min = |tasks: u64| {
+            let items = self.largest_shard(&status, tasks) as f64;
+            (items * cost.item_s / options.cpus as f64).max(cost.longest_s) / 60.0
+        };
+        let wanted_min =
+            limits.time_min.map_or(options.task_min, |most| options.task_min.min(most as f64 / SLACK));
+        let most_tasks = limits.tasks.min(cost.left as u64).max(1);
+        let fair = (cost.left_hours * 60.0 / options.cpus as f64 / wanted_min).ceil() as u64;
+        let mut tasks = fair.clamp(1, most_tasks);
+        // Shards are even on average: a few more tasks where the largest is too large.
+        while lasts_min(tasks) > 1.25 * wanted_min && tasks < most_tasks {
+            tasks = (tasks + tasks.div_ceil(10)).min(most_tasks);
+        }
+        let longest_min = lasts_min(tasks);
+        if let Some(most) = limits.time_min.filter(|most| SLACK * longest_min > *most as f64) {
+            return refused(format!(
+                "the longest of {tasks} tasks takes some {longest_min:.1} min, and the time limit of {most} min is less than {SLACK} \
+                 times that; allow more tasks, cores or time"
+            ));
+        }
+        let minutes = limits.time_min.unwrap_or((2.0 * longest_min).ceil() as u64 + 5);
+        let submission = Submission {
+            template: options.template.name.clone(),
+            template_text: options.template.text.clone(),
+            tasks,
+            array: format!("1-{tasks}"),
+            cpus: options.cpus,
+            minutes,
+            memory_mb,
+            partition: options.partition.clone(),
+            at_once: limits.at_once,
+            program: options.program.clone(),
+            work: String::new(),
+            merge: None,
+        };
+        self.hand_over(submission, "", machine)
+    }
+
+    /// Submits the tasks again whose items are missing, failed or spoilt, and the merge behind them.
+    ///
+    /// # Errors
+    /// [`FleetError::NotSubmitted`], [`FleetError::NothingLeft`], [`FleetError::Queue`].
+    pub fn retry(&self, machine: &Machine<'_>) -> Result<Submission, FleetError> {
+        let before = self.submission()?;
+        let status = self.status();
+        let mut numbers: Vec<u64> = status
+            .failed
+            .iter()
+            .chain(&status.refused)
+            .chain(&status.missing)
+            .map(|item| Shard::holding(&item.hash, before.tasks).number())
+            .collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        if numbers.is_empty() {
+            return Err(self.nothing_left());
+        }
+        self.hand_over(Submission { array: ranges(&numbers), ..before }, "--again", machine)
+    }
+
+    /// What was submitted last.
+    ///
+    /// # Errors
+    /// [`FleetError::NotSubmitted`] where nothing was.
+    pub fn submission(&self) -> Result<Submission, FleetError> {
+        let path = self.directory().join(SUBMITTED);
+        if !path.exists() {
+            return Err(FleetError::NotSubmitted { directory: self.directory().to_owned() });
+        }
+        let bytes = read_at_most(&path, 1 << 20)?;
+        serde_json::from_slice(&bytes).map_err(FleetError::content(&path, "a submission"))
+    }
+
+    fn nothing_left(&self) -> FleetError {
+        FleetError::NothingLeft { items: self.study.items.len(), directory: self.directory().to_owned() }
+    }
+
+    /// Items without a result in the largest of so many shards.
+    fn largest_shard(&self, status: &Status, tasks: u64) -> usize {
+        let lacking = status.failed.iter().chain(&status.refused).chain(&status.missing);
+        let mut counts = std::collections::BTreeMap::new();
+        for item in lacking {
+            *counts.entry(Shard::holding(&item.hash, tasks).number()).or_insert(0) += 1;
+        }
+        counts.into_values().max().unwrap_or(0)
+    }
+
+    /// Writes the scripts and runs the one that submits.
+    fn hand_over(
+        &self,
+        mut submission: Submission,
+        again: &str,
+        machine: &Machine<'_>,
+    ) -> Result<Submission, FleetError> {
+        let directory = self.directory();
+        let directory = directory.canonicalize().map_err(FleetError::file("find", directory))?;
+        make_directory(directory.join(LOGS))?;
+        let word = |path: &Path| quoted(&path.to_string_lossy());
+        let program = word(&submission.program);
+        let (cpus, tasks, here) = (submission.cpus, submission.tasks, word(&directory));
+        // Every item keeps to its share of the cores, and what else counts them sees the task's alone.
+        let task = format!(
+            "# One task: shard $1 of {tasks}.\nexport RAYON_NUM_THREADS={cpus}\n\
+             exec {program} fleet work {here} --shard \"$1/{tasks}\" --jobs {cpus} {again}\n"
+        );
+        let merge = format!("exec {program} fleet merge {here}\n");
+        let write = |name: &str, text: &str| -> Result<PathBuf, FleetError> {
+            let path = directory.join(name);
+            write_whole(&path, &[text.as_bytes()], machine.name, Durability::Unsynced)?;
+            Ok(path)
+        };
+        let values = [
+            ("NAME", quoted(&self.study.name)),
+            ("ARRAY", quoted(&submission.array)),
+            ("AT_ONCE", submission.at_once.map_or_else(String::new, |most| most.to_string())),
+            ("MINUTES", submission.minutes.to_string()),
+            ("CPUS", cpus.to_string()),
+            ("MEMORY_MB", submission.memory_mb.to_string()),
+            ("PARTITION", quoted(&submission.partition)),
+            ("LOGS", word(&directory.join(LOGS))),
+            ("TASK", word(&write("task.sh", &task)?)),
+            ("MERGE", word(&write("merge.sh", &merge)?)),
+        ];
+        let mut text = String::from(
+            "#!/bin/sh\n# Made by `mapper fleet`; submits the array job and the merge behind it.\n",
+        );
+        for (name, value) in values {
+            text += &format!("export {name}={value}\n");
+        }
+        let script = write("submit.sh", &(text + &submission.template_text))?;
+        let template = Template { name: submission.template.clone(), text: submission.template_text.clone() };
+        let mut ids = submitted(&script, &template)?;
+        submission.work = ids.remove("work").unwrap_or_default();
+        submission.merge = ids.remove("merge");
+        let path = directory.join(SUBMITTED);
+        let bytes =
+            serde_json::to_vec_pretty(&submission).map_err(FleetError::content(&path, "a submission"))?;
+        write_whole(&path, &[&bytes, b"\n"], machine.name, Durability::Synced)?;
+        Ok(submission)
+    }
+}
+
+const SUBMITTED: &str = "submitted.json";
+
+/// Sorted numbers as queues write them: 1,4-6.
+fn ranges(numbers: &[u64]) -> String {
+    let mut ranges: Vec<(u64, u64)> = Vec::new();
+    for number in numbers {
+        match ranges.last_mut() {
+            Some((_, last)) if *last + 1 == *number => *last = *number,
+            _ => ranges.push((*number, *number)),
+        }
+    }
+    let words = ranges
+        .into_iter()
+        .map(|(first, last)| if first == last { first.to_string() } else { format!("{first}-{last}") });
+    words.collect::<Vec<_>>().join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_written_as_ranges() {
+        assert_eq!(ranges(&[1]), "1");
+        assert_eq!(ranges(&[1, 2, 3, 7, 9, 10]), "1-3,7,9-10");
+    }
+}

@@ -1,0 +1,132 @@
+//! How far a study is, and what it costs, for people.
+
+use mapper_fleet::{Cost, Lacking, Merged, Status, Submission};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Items of a list that are shown; the rest is counted.
+const SHOWN: usize = 20;
+
+/// Done, under way, failed, missing, time to the end.
+pub fn status_text(name: &str, status: &Status, queue: Option<&BTreeMap<String, usize>>) -> String {
+    let mut text = format!("{name}: {} of {} items done", status.done, status.items);
+    let begun = status.begun();
+    for (count, what) in [
+        (status.failed.len(), "failed"),
+        (status.refused.len(), "with a part that is left out"),
+        (begun, "begun"),
+        (status.missing.len() - begun, "not begun"),
+    ] {
+        if count > 0 {
+            let _ = write!(text, ", {count} {what}");
+        }
+    }
+    text += "\n";
+    if let Some(left_s) = status.left_s().filter(|left_s| *left_s > 0.0) {
+        let _ = writeln!(text, "about {} of one core left", span(left_s));
+    }
+    if let Some(states) = queue {
+        let states: Vec<String> = states.iter().map(|(state, count)| format!("{count} {state}")).collect();
+        let states = if states.is_empty() { "no task any more".to_owned() } else { states.join(", ") };
+        let _ = writeln!(text, "the queue has {states}");
+    }
+    text + lacking_text(status, |item| item.why.is_some()).as_str()
+}
+
+/// Every item that has no result, and what was left out.
+fn lacking_text(status: &Status, shown: impl Fn(&Lacking) -> bool) -> String {
+    let mut text = String::new();
+    for (items, what) in [(&status.failed, "failed"), (&status.refused, "left out, its part")] {
+        list(&mut text, items, |item| {
+            format!("{what}: {} ({}): {}", item.name, item.hash.short(), item.why.as_deref().unwrap_or("-"))
+        });
+    }
+    let missing: Vec<&Lacking> = status.missing.iter().filter(|item| shown(item)).collect();
+    list(&mut text, &missing, |item| {
+        let begun = item.why.as_ref().map_or_else(String::new, |who| format!(", begun by {who}"));
+        format!("missing: {} ({}){begun}", item.name, item.hash.short())
+    });
+    list(&mut text, &status.strangers, |name| {
+        format!("left out: parts/{name} belongs to no item of this study")
+    });
+    text
+}
+
+fn list<T>(text: &mut String, items: &[T], line: impl Fn(&T) -> String) {
+    for item in items.iter().take(SHOWN) {
+        let _ = writeln!(text, "  {}", line(item));
+    }
+    if items.len() > SHOWN {
+        let _ = writeln!(text, "  and {} more; `--json` has all", items.len() - SHOWN);
+    }
+}
+
+/// What was merged, and what is missing.
+pub fn merged_text(merged: &Merged) -> String {
+    let status = &merged.status;
+    let mut text = lacking_text(status, |_| true);
+    match &merged.result {
+        Some((path, said)) => {
+            let of = if status.lacking() > 0 { " (incomplete)" } else { "" };
+            let _ = writeln!(
+                text,
+                "merged {} of {} items{of} in {}\n{said}",
+                status.done,
+                status.items,
+                path.display()
+            );
+        }
+        None => {
+            let _ = writeln!(text, "nothing merged: {} of {} items have a result", status.done, status.items);
+        }
+    }
+    text
+}
+
+/// Items, processor hours, memory, disk.
+pub fn cost_text(cost: &Cost) -> String {
+    let memory = match cost.memory_bytes {
+        0 => "unknown memory".to_owned(),
+        bytes => format!("{} of memory", bytes_text(bytes)),
+    };
+    format!(
+        "{} items, {} of them left\n{} of one core an item on average, {} the longest, from {} that are done\n\
+         {:.2} processor hours in total, {:.2} left\n{memory} for an item at a time, {} on the disk in total\n",
+        cost.items,
+        cost.left,
+        span(cost.item_s),
+        span(cost.longest_s),
+        cost.from,
+        cost.hours,
+        cost.left_hours,
+        bytes_text(cost.disk_bytes),
+    )
+}
+
+/// Job numbers, tasks, limits.
+pub fn submission_text(submission: &Submission) -> String {
+    let merge =
+        submission.merge.as_ref().map_or_else(String::new, |id| format!(", merge behind it: job {id}"));
+    format!(
+        "tasks {} of {}: job {}{merge}\n{} cores, {} min and {} MB a task at most\n",
+        submission.array,
+        submission.tasks,
+        submission.work,
+        submission.cpus,
+        submission.minutes,
+        submission.memory_mb
+    )
+}
+
+fn bytes_text(bytes: u64) -> String {
+    let megabytes = bytes as f64 / 1e6;
+    if megabytes < 1000.0 { format!("{megabytes:.1} MB") } else { format!("{:.1} GB", megabytes / 1e3) }
+}
+
+fn span(duration_s: f64) -> String {
+    match duration_s {
+        s if s < 90.0 => format!("{s:.1} s"),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}

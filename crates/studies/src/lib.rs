@@ -1,0 +1,25 @@
+//! The kinds of studies that fleets work on: one file and one line each.
+
+mod blind;
+mod calibration;
+mod error;
+mod maps;
+mod nightly;
+mod program;
+mod source;
+
+use mapper_fleet::Kind;
+use mapper_session::Registry;
+
+pub use nightly::rows_of;
+pub use program::program;
+
+/// All kinds, with the plug-ins that they may use.
+pub fn kinds(registry: &Registry) -> Vec<Box<dyn Kind + '_>> {
+    vec![
+        Box::new(nightly::Nightly(registry)),
+        Box::new(blind::Blind(registry)),
+        Box::new(calibration::Calibration(registry)),
+        Box::new(maps::Maps(registry)),
+    ]
+}

@@ -1,0 +1,8 @@
+//! What items and parts carry as their program.
+
+use mapper_session::{Registry, program_and_commit};
+
+/// Name, version and commit.
+pub fn program(registry: &Registry) -> String {
+    program_and_commit(registry.commit)
+}

@@ -195,3 +195,40 @@ fn a_single_wrong_time_is_left_out_and_told() {
     let end_s = read.recording.steps.last().unwrap().end_s;
     assert!(end_s < 60.0, "{end_s}");
 }
+
+/// The channel map that the documentation gives to copy reads a table with its columns.
+#[test]
+fn the_map_to_copy_serves_a_table() {
+    let text = include_str!("../../../examples/channels/stand_log.yaml");
+    let map = ChannelMap::from_yaml(text, Path::new("stand_log.yaml")).unwrap();
+    let columns = [
+        ("n_TC", 1e5),
+        ("m_dot_C", 0.05),
+        ("p1_C", -1.0),
+        ("T1_C", 25.0),
+        ("p2_C", 80.0),
+        ("T2_C", 110.0),
+        ("T_housing_C", 80.0),
+        ("m_dot_T", 0.05),
+        ("p3_T", 90.0),
+        ("T3_T", 500.0),
+        ("p4_T", 1.0),
+        ("T4_T", 420.0),
+        ("T_housing_T", 300.0),
+        ("T_oil", 90.0),
+        ("T_cell", 24.0),
+        ("p3_set", 190.0),
+        ("valve_set", 70.0),
+        ("p_amb", 99.0),
+    ];
+    let mut table = format!("t [s];{}\n", columns.map(|(name, _)| name).join(";"));
+    for row in 0..600 {
+        let cells = columns.map(|(_, value)| value.to_string()).join(";");
+        table.push_str(&format!("{};{cells}\n", f64::from(row) / 10.0));
+    }
+    let options = ReadOptions { logs: LOG_FORMATS, ..ReadOptions::default() };
+    let read = read_recording_from(table.as_bytes(), Path::new("log.csv"), &map, &options).unwrap();
+    assert_eq!(read.recording.series.len(), columns.len() - 1, "all but the ambient pressure");
+    assert_eq!((read.recording.steps.len(), read.recording.steps[0].valve_opening_ratio), (1, 0.7));
+    assert!(read.warnings.is_empty(), "{:?}", read.warnings);
+}

@@ -172,7 +172,7 @@ pub(crate) struct CampaignFile {
     /// Order of the points. `sum_gradient`, the default, maximises the sum of the thermal gradients, `worst_gradient` the smallest of them; `information` minimises the predicted error of the efficiency; `time` makes the campaign as short as possible and chooses each dwell; `greedy` looks one step ahead; `listed` keeps the order of the grid.
     #[serde(default)]
     order: VisitOrder,
-    /// Whether the order of what is left is thought over while the campaign runs: `after_each_step`, by what the steps so far have told, or `off`, the default. It needs the joint method. A point that a guard has left out is tried again at the end.
+    /// Whether the order of what is left is thought over while the campaign runs: `after_each_step`, by what the steps so far have told, or `off`, the default. It needs the joint method. A point that a guard has left out is tried again.
     #[serde(default)]
     #[schemars(example = &"after_each_step")]
     replan: Replan,

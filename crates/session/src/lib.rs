@@ -61,6 +61,7 @@ mod preflight;
 mod program;
 mod prospects;
 mod recorded;
+mod recording_metadata;
 mod registry;
 mod rehearsal;
 mod replanned;

@@ -315,7 +315,10 @@ impl StepSource for Replanned<'_> {
             prices.try_again(&step, behind);
             drop(prices);
             self.left.insert(place, step.clone());
-            self.say(format!("{} was left out: it is tried again at the end", step.to));
+            self.say(format!(
+                "{} was left out: it is tried again, behind the other points as things stand",
+                step.to
+            ));
         } else {
             self.say(format!("{} was left out: the other steps have to tell what it would have", step.to));
         }

@@ -13,6 +13,7 @@ use crate::planned::plan;
 use crate::planning::nominal_model;
 use crate::preflight::{check_room, check_setpoints};
 use crate::program::PROGRAM;
+use crate::recording_metadata::metadata;
 use crate::rehearsal::rehearse;
 use crate::replanned::{Replanned, SharedPrices};
 use crate::results::{Results, RunPart};
@@ -32,7 +33,6 @@ use mapper_runner::{
     UntilCertain,
 };
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -493,26 +493,4 @@ fn sentence(end: &Ended) -> String {
         }
     };
     format!("Stopped {what}: the map is not complete.")
-}
-
-/// What a recording says of its run.
-fn metadata(campaign: &Campaign, plan: &Plan) -> BTreeMap<String, String> {
-    let reference = campaign.reference;
-    let always = [
-        ("campaign", campaign.name.clone()),
-        ("machine", campaign.machine.name.clone()),
-        ("seed", campaign.seed.to_string()),
-        ("program", PROGRAM.to_owned()),
-        ("reference_temperature_k", reference.t_ref_k.to_string()),
-        ("reference_pressure_pa", reference.p_ref_pa.to_string()),
-        ("campaign_sha256", plan.made_from.campaign_sha256.clone()),
-        ("model_sha256", plan.made_from.model_sha256.clone()),
-    ];
-    let sometimes = [
-        ("script_sha256", plan.made_from.script_sha256.clone()),
-        ("serial_number", campaign.machine.serial_number.clone()),
-        ("operator", campaign.report.operator.clone()),
-    ];
-    let sometimes = sometimes.into_iter().filter_map(|(key, value)| Some((key, value?)));
-    always.into_iter().chain(sometimes).map(|(key, value)| (key.to_owned(), value)).collect()
 }

@@ -89,9 +89,9 @@ fn a_bad_order_is_mended_on_the_way_with_its_reason_and_follows_from_the_recordi
     assert!(run().0 == bytes, "same seed, same bytes");
 }
 
-/// T2 is above the guard's limit at one point alone: it is left out, tried again last of all, and left out again.
+/// T2 is above the guard's limit at one point alone, the hottest: it is left out, and tried again later.
 #[test]
-fn what_a_guard_leaves_out_is_tried_again_at_the_end() {
+fn what_a_guard_leaves_out_is_tried_again() {
     let planned = |campaign: &Campaign| plan(campaign, &nominal_model(campaign).unwrap()).unwrap();
     let mut hot: Vec<(f64, String)> = planned(&small(&[]))
         .steps
@@ -111,13 +111,12 @@ fn what_a_guard_leaves_out_is_tried_again_at_the_end() {
     let outcome = Session::new(&registry).run(RunRequest::new(&campaign, "", folder.path())).unwrap();
     assert!(matches!(outcome.end, Ended::Completed), "{}", outcome.sentence());
     let made = executed(&outcome);
-    let said = |what: &str| {
-        made.remarks.iter().position(|remark| remark.starts_with(&hot[0].1) && remark.contains(what))
-    };
-    let (first, second) = (said("tried again at the end"), said("the other steps have to tell"));
-    assert!(first.is_some() && first < second, "{:#?}", made.remarks);
-    assert!(!visits(&made.steps, StepKind::Point).contains(&hot[0].1));
-    assert_eq!(visits(&made.steps, StepKind::Point).len(), 7, "all other points were made");
+    let again = |remark: &String| remark.starts_with(&hot[0].1) && remark.contains("it is tried again");
+    assert!(made.remarks.iter().any(again), "{:#?}", made.remarks);
+    let points = visits(&made.steps, StepKind::Point);
+    let whole = visits(&planned(&campaign).steps, StepKind::Point);
+    // Whether the guard lets it pass from elsewhere is the machine's affair; the others are all made.
+    assert!(whole.iter().all(|point| points.contains(point) || *point == hot[0].1), "{points:?}");
     let last = made.steps.last().unwrap();
     assert_eq!(last.kind, StepKind::Return, "the first point still comes last");
     let left_out = recorded(&outcome.recording);

@@ -136,7 +136,7 @@ impl CampaignInformation {
 
     /// What steps are worth where these are what is known and forecast: the slope is that of the campaign as it goes, not as it was
     /// planned. `None` where the equations are singular.
-    pub fn worth_now<'a>(&self, steps: &[&'a StepInformation]) -> Option<WorthNow> {
+    pub fn worth_now(&self, steps: &[&StepInformation]) -> Option<WorthNow> {
         let covariance = self.together(steps.iter().copied())?.covariance;
         let mut answers = DMatrix::zeros(covariance.nrows(), covariance.nrows());
         for step in steps {

@@ -1,0 +1,28 @@
+//! What a recording says of its run.
+
+use crate::program::PROGRAM;
+use mapper_campaign::Campaign;
+use mapper_core::Plan;
+use std::collections::BTreeMap;
+
+/// What a recording says of its run.
+pub(crate) fn metadata(campaign: &Campaign, plan: &Plan) -> BTreeMap<String, String> {
+    let reference = campaign.reference;
+    let always = [
+        ("campaign", campaign.name.clone()),
+        ("machine", campaign.machine.name.clone()),
+        ("seed", campaign.seed.to_string()),
+        ("program", PROGRAM.to_owned()),
+        ("reference_temperature_k", reference.t_ref_k.to_string()),
+        ("reference_pressure_pa", reference.p_ref_pa.to_string()),
+        ("campaign_sha256", plan.made_from.campaign_sha256.clone()),
+        ("model_sha256", plan.made_from.model_sha256.clone()),
+    ];
+    let sometimes = [
+        ("script_sha256", plan.made_from.script_sha256.clone()),
+        ("serial_number", campaign.machine.serial_number.clone()),
+        ("operator", campaign.report.operator.clone()),
+    ];
+    let sometimes = sometimes.into_iter().filter_map(|(key, value)| Some((key, value?)));
+    always.into_iter().chain(sometimes).map(|(key, value)| (key.to_owned(), value)).collect()
+}

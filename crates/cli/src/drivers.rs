@@ -13,11 +13,7 @@ pub const KNOWN: &[(&str, &str, &str)] = &[
         "cargo build --release -p mapper-backend-lab",
     ),
     ("modbus", "a PLC that speaks Modbus TCP, docs/rig.md", "cargo build --release -p mapper-backend-modbus"),
-    (
-        "ak",
-        "an instrument that speaks the AK telegram, read alone, docs/rig.md",
-        "cargo build --release -p mapper-backend-ak",
-    ),
+    ("ak", "an instrument, read alone, docs/rig.md", "cargo build --release -p mapper-backend-ak"),
     ("opcua", "a PLC that speaks OPC UA, docs/rig.md", "cargo build --release -p mapper-backend-opcua"),
 ];
 

@@ -216,7 +216,7 @@ mod tests {
     #[test]
     fn torn_telegrams_are_thrown_away() {
         assert_eq!(bodies(b"noise\x03\x02 AKON 0 1\x02 AKON 0 2\x03"), [b" AKON 0 2".to_vec()]);
-        assert_eq!(bodies(&[&b"\x02 AKON 0 "[..], &[b'1'; 5000], b"\x03"].concat()), [Vec::<u8>::new(); 0]);
+        assert!(bodies(&[&b"\x02 AKON 0 "[..], &[b'1'; 5000], b"\x03"].concat()).is_empty());
         for torn in [&b""[..], b" AKO", b" AKON", b" AKON 0x", b" AKON  1", b" AKON0 1", b" AKON 0 \xff"] {
             assert!(matches!(answer(torn, code("AKON")), Err(TelegramError::Torn(_))), "{torn:?}");
         }

@@ -36,7 +36,9 @@ impl Make {
             let items = made.fleet.study.items.len();
             if self.json {
                 let (new, gone) = (made.new, made.gone);
-                return output::print_json(&json!({ "directory": self.out, "items": items, "new": new, "gone": gone }));
+                return output::print_json(
+                    &json!({ "directory": self.out, "items": items, "new": new, "gone": gone }),
+                );
             }
             let changed = if made.new == items && made.gone == 0 {
                 String::new()

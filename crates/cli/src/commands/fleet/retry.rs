@@ -20,8 +20,7 @@ pub struct Retry {
 impl Retry {
     /// Submits.
     pub fn run(&self) -> Result<(), Failure> {
-        let submission =
-            in_fleet(&self.directory, None, |fleet, _, _, machine| fleet.retry(machine))?;
+        let submission = in_fleet(&self.directory, None, |fleet, _, _, machine| fleet.retry(machine))?;
         if self.json { output::print_json(&submission) } else { output::print(&submission_text(&submission)) }
     }
 }

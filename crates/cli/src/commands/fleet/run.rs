@@ -29,10 +29,11 @@ pub struct Run {
 impl Run {
     /// Works and merges.
     pub fn run(&self) -> Result<(), Failure> {
-        let merged = in_fleet(&self.directory, self.jobs.map(usize::from), |fleet, kind, engine, machine| {
-            fleet.work(kind, Which::All, self.again, engine, machine)?;
-            fleet.merge(kind, false, machine)
-        })?;
+        let merged =
+            in_fleet(&self.directory, self.jobs.map(usize::from), |fleet, kind, engine, machine| {
+                fleet.work(kind, Which::All, self.again, engine, machine)?;
+                fleet.merge(kind, false, machine)
+            })?;
         let result = merged.result.as_ref().map(|(path, _)| path);
         if self.json {
             output::print_json(&json!({ "status": merged.status, "result": result }))?;

@@ -43,7 +43,9 @@ impl Status {
             });
             if self.json {
                 let left_s = status.left_s();
-                return output::print_json(&json!({ "study": fleet.study.name, "status": status, "core_s_left": left_s, "queue": states }));
+                return output::print_json(
+                    &json!({ "study": fleet.study.name, "status": status, "core_s_left": left_s, "queue": states }),
+                );
             }
             output::print(&status_text(&fleet.study.name, &status, states.as_ref()))
         })

@@ -40,11 +40,14 @@ impl Work {
             // clap asks for one of them.
             (None, None) => Which::All,
         };
-        let worked = in_fleet(&self.directory, self.jobs.map(usize::from), |fleet, kind, engine, machine| {
-            fleet.work(kind, which, self.again, engine, machine)
-        })?;
+        let worked =
+            in_fleet(&self.directory, self.jobs.map(usize::from), |fleet, kind, engine, machine| {
+                fleet.work(kind, which, self.again, engine, machine)
+            })?;
         if self.json {
-            output::print_json(&json!({ "done": worked.done, "there": worked.there, "failed": worked.failed }))?;
+            output::print_json(
+                &json!({ "done": worked.done, "there": worked.there, "failed": worked.failed }),
+            )?;
         } else {
             let failed = worked.failed.iter().map(|(name, why)| format!("failed: {name}: {why}\n"));
             let failed: String = failed.collect();

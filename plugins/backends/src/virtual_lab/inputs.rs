@@ -1,6 +1,7 @@
 //! The lab's boundary conditions: what the cell gives, and what the actuators make of the commands.
 
 use super::actuator::Actuator;
+use super::settings::LabSettings;
 use super::weather::Weather;
 use mapper_physics::inputs::Inputs;
 use mapper_physics::params::BoundaryConditions;
@@ -26,6 +27,18 @@ pub struct LabInputs {
 }
 
 impl LabInputs {
+    /// Everything held at `boundary`, by the actuators of `settings`.
+    pub fn held(settings: &LabSettings, boundary: &BoundaryConditions) -> Self {
+        LabInputs {
+            cell: *boundary,
+            weather: settings.weather.clone(),
+            p3: Actuator::at_rest(settings.p3_actuator, boundary.p3_pa),
+            t3: Actuator::at_rest(settings.t3_actuator, boundary.t3_k),
+            valve: Actuator::at_rest(settings.valve_actuator, boundary.valve_opening_ratio),
+            oil: Actuator::at_rest(settings.oil_actuator, boundary.oil_temperature_k),
+        }
+    }
+
     fn actuators(&self) -> [&Actuator; 4] {
         [&self.p3, &self.t3, &self.valve, &self.oil]
     }

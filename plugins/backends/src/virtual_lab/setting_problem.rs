@@ -119,13 +119,16 @@ pub enum SettingProblem {
 
 impl SettingProblem {
     /// The problem at its key below `virtual_lab:`.
-    pub(super) fn at(self, path: impl Into<String>) -> BackendError {
+    pub fn at(self, path: impl Into<String>) -> BackendError {
         BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(self) }
     }
 }
 
 /// Refuses a value outside its range.
-pub(super) fn within(
+///
+/// # Errors
+/// [`SettingProblem::OutOfRange`].
+pub fn within(
     value: f64,
     unit: &'static str,
     range: RangeInclusive<f64>,

@@ -51,10 +51,13 @@ pub fn make(
     let ruler = StudyRuler::new(campaign, &schedule, &nominal, known, draw.seed)?;
     let cases = draw.cases(catalogue, &ruler);
     std::fs::create_dir_all(directory).map_err(BlindError::file(directory))?;
+    // Strengths are measured on the model's own lab, so that equal seeds give equal causes on both.
+    let schedule = schedule.on(draw.laboratory);
     let answers = run_all(&schedule, campaign, &cases, directory, done)?;
     let bytes = json(&answers, &directory.join(ANSWERS_NAME))?;
     let manifest = Manifest {
         campaign: campaign.name.clone(),
+        laboratory: draw.laboratory,
         cases: cases.into_iter().map(|case| case.name).collect(),
         answers_sha256: sha256(&bytes),
     };

@@ -84,11 +84,10 @@ fn at_rest_the_energy_closes() {
     let model = Model::nominal();
     let mut boundary = BoundaryConditions { valve_opening_ratio: OPENING, ..Default::default() };
     boundary.p3_pa = setpoints(110e3).p3_pa;
-    let settings = LabSettings::ideal(model.clone(), boundary);
     let structure = OtherStructure::default();
     let mut machine = structure.settled(&model, 0.0, &boundary, Watch::default()).unwrap();
     let mut checked = 0;
-    let inputs = mapper_backends::virtual_lab::LabInputs::held(&settings, &boundary);
+    let inputs = mapper_backends::virtual_lab::LabInputs::held(&boundary);
     let mut on_sample = |_: f64, _: &_, outputs: &mapper_physics::model::Outputs| {
         let to_metal_w = outputs.compressor_heat_w + outputs.turbine.heat_w;
         let to_oil_w =

@@ -2,19 +2,20 @@
 //! housing of four nodes, a volume, a duct and another volume behind the wheel, a map with hysteresis, sensors of second
 //! order. Actuators, weather, offsets, noise, standstill and trips are the virtual lab's.
 
+mod equations;
 mod machine;
 mod motion;
 mod passage;
 mod settings_file;
 mod structure;
 
+pub use equations::turn_into;
 pub use structure::{NAME, OtherStructure};
 
-use crate::virtual_lab::{LabSettings, SecondOrder, VirtualLab};
+use crate::virtual_lab::VirtualLab;
 use mapper_core::{Backend, BackendError};
 use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::nominal_rig::NominalRig;
-use std::sync::Arc;
 
 /// The lab as campaigns ask for it.
 pub const PLUGIN: BackendPlugin =
@@ -22,16 +23,4 @@ pub const PLUGIN: BackendPlugin =
 
 fn make(rig: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {
     Ok(Box::new(VirtualLab::new(settings_file::read(settings, rig)?)))
-}
-
-/// Gives a virtual lab the equations and sensors of this one.
-pub fn turn_into(lab: &mut LabSettings, structure: OtherStructure) {
-    let sensors = structure.sensors();
-    lab.second_order = sensors
-        .into_iter()
-        .map(|(channel, frequency_hz, damping_ratio)| {
-            (channel, SecondOrder { frequency_hz, damping_ratio })
-        })
-        .collect();
-    lab.structure = Arc::new(structure);
 }

@@ -2,7 +2,7 @@
 //! `structure`.
 
 use super::structure::{NAME, OtherStructure};
-use super::turn_into;
+use super::equations::turn_into;
 use crate::virtual_lab::{LabSettings, SettingProblem, read_settings, within};
 use mapper_core::BackendError;
 use mapper_physics::nominal_rig::NominalRig;

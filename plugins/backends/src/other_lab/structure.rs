@@ -1,12 +1,6 @@
 //! What the equations of this lab have that the lumped model has not, in numbers.
 
-use super::motion::Motion;
-use crate::virtual_lab::{RunningMachine, Structure, StructureError};
 use mapper_core::Channel;
-use mapper_physics::model::{Model, State};
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::Watch;
-use mapper_physics::steady;
 
 /// Name under which campaigns ask for this backend.
 pub const NAME: &str = "other_lab";
@@ -82,29 +76,5 @@ impl OtherStructure {
             return Vec::new();
         }
         usual.map(|(channel, hz, damping)| (channel, hz * self.sensor_speed_ratio, damping)).to_vec()
-    }
-}
-
-impl Structure for OtherStructure {
-    fn name(&self) -> &'static str {
-        NAME
-    }
-
-    fn started(&self, model: &Model, t_s: f64, state: State, watch: Watch) -> Box<dyn RunningMachine> {
-        Box::new(Motion::new(model, self.clone(), t_s, state, watch))
-    }
-
-    fn settled(
-        &self,
-        model: &Model,
-        t_s: f64,
-        boundary: &BoundaryConditions,
-        watch: Watch,
-    ) -> Result<Box<dyn RunningMachine>, StructureError> {
-        // From where the lumped model rests these equations come to their own rest.
-        let rest = steady::settle_under(model, boundary)?;
-        let mut motion = Motion::new(model, self.clone(), t_s, rest.state, watch);
-        motion.settle(boundary)?;
-        Ok(Box::new(motion))
     }
 }

@@ -1,7 +1,6 @@
 //! The lab's boundary conditions: what the cell gives, and what the actuators make of the commands.
 
-use super::actuator::Actuator;
-use super::settings::LabSettings;
+use super::actuator::{Actuator, ActuatorDynamics};
 use super::weather::Weather;
 use mapper_physics::inputs::Inputs;
 use mapper_physics::params::BoundaryConditions;
@@ -27,15 +26,18 @@ pub struct LabInputs {
 }
 
 impl LabInputs {
-    /// Everything held at `boundary`, by the actuators of `settings`.
-    pub fn held(settings: &LabSettings, boundary: &BoundaryConditions) -> Self {
+    /// Everything held at `boundary`.
+    pub fn held(boundary: &BoundaryConditions) -> Self {
+        let at_rest = |value: f64| {
+            Actuator::at_rest(ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY }, value)
+        };
         LabInputs {
             cell: *boundary,
-            weather: settings.weather.clone(),
-            p3: Actuator::at_rest(settings.p3_actuator, boundary.p3_pa),
-            t3: Actuator::at_rest(settings.t3_actuator, boundary.t3_k),
-            valve: Actuator::at_rest(settings.valve_actuator, boundary.valve_opening_ratio),
-            oil: Actuator::at_rest(settings.oil_actuator, boundary.oil_temperature_k),
+            weather: Weather::default(),
+            p3: at_rest(boundary.p3_pa),
+            t3: at_rest(boundary.t3_k),
+            valve: at_rest(boundary.valve_opening_ratio),
+            oil: at_rest(boundary.oil_temperature_k),
         }
     }
 

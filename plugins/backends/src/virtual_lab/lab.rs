@@ -21,9 +21,6 @@ use mapper_physics::model::{State, rad_s_of_rpm};
 use mapper_physics::simulate::{Crossing, ModelEvent, SimulationError, Watch};
 use mapper_physics::standstill::{self, StandstillState};
 
-/// Name under which campaigns ask for this backend.
-pub const NAME: &str = "virtual_lab";
-
 /// Shaft speed at which a starting machine enters the running model and a stopping one leaves it, rpm.
 const CRANKING_SPEED_RPM: f64 = 5_000.0;
 

@@ -1,7 +1,7 @@
 //! What moves the machine while gas flows: the lumped model, or other equations under the same rig.
 
 use super::inputs::LabInputs;
-use super::lab::NAME;
+use super::name::NAME;
 use mapper_physics::model::{Model, Outputs, State};
 use mapper_physics::params::{BoundaryConditions, Params};
 use mapper_physics::simulate::{DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Simulator, Watch};

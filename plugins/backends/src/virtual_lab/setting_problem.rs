@@ -1,6 +1,6 @@
 //! What can be wrong with a value below `virtual_lab:`.
 
-use super::lab::NAME;
+use super::name::NAME;
 use mapper_core::{BackendError, Channel, with_unit};
 use mapper_physics::effect::EffectError;
 use mapper_yaml::units::{Kind, UnitError};

@@ -2,6 +2,7 @@
 
 use crate::cause::Cause;
 use crate::kind::CaseKind;
+use crate::laboratory::Laboratory;
 use crate::outside::{OutsideUse, outside_kinds};
 use crate::strength::{Ruler, shows, strength};
 use mapper_physics::effect::Effect;
@@ -38,6 +39,8 @@ pub struct Draw {
     pub outside: OutsideUse,
     /// Weakest and strongest signature of a single cause, in sigmas.
     pub sigma_range: [f64; 2],
+    /// What the cases run on.
+    pub laboratory: Laboratory,
 }
 
 /// From what can hardly be seen to what nobody overlooks.
@@ -46,7 +49,14 @@ pub const SIGMA_RANGE: [f64; 2] = [6.0, 400.0];
 impl Draw {
     /// The usual draw: all kinds, strengths from barely visible to gross.
     pub fn new(seed: u64, cases: usize, outside: OutsideUse) -> Draw {
-        Draw { seed, cases, kinds: Vec::new(), outside, sigma_range: SIGMA_RANGE }
+        Draw {
+            seed,
+            cases,
+            kinds: Vec::new(),
+            outside,
+            sigma_range: SIGMA_RANGE,
+            laboratory: Laboratory::default(),
+        }
     }
 
     /// The cases: kinds in random order, causes dealt so that each effect and each sign of it comes before any comes again,

@@ -3,8 +3,10 @@
 use crate::case::Case;
 use crate::error::BlindError;
 use crate::keep::{ToFile, ToMemory};
+use crate::laboratory::Laboratory;
 use crate::steps::{StepsOfCase, steps_of_case};
 use crate::truth::Truth;
+use mapper_backends::other_lab::{self, OtherStructure};
 use mapper_backends::virtual_lab::{
     ActuatorDynamics, LabSettings, SensorErrors, Start, VirtualLab, Weather, draw_tolerances,
 };
@@ -25,12 +27,23 @@ pub(crate) struct Schedule<'a> {
     campaign: &'a Campaign,
     nominal: &'a Model,
     steps: Vec<PlanStep>,
+    laboratory: Laboratory,
 }
 
 impl<'a> Schedule<'a> {
     /// The points in the campaign's own order, P3 commanded open loop.
     pub(crate) fn new(campaign: &'a Campaign, nominal: &'a Model) -> Result<Self, BlindError> {
-        Ok(Schedule { campaign, nominal, steps: steps_of_case(campaign, nominal)? })
+        Ok(Schedule {
+            campaign,
+            nominal,
+            steps: steps_of_case(campaign, nominal)?,
+            laboratory: Laboratory::default(),
+        })
+    }
+
+    /// The same on another simulator.
+    pub(crate) fn on(self, laboratory: Laboratory) -> Self {
+        Schedule { laboratory, ..self }
     }
 
     /// The lab of a case: nominal machine, drawn tolerances, then the causes.
@@ -55,6 +68,9 @@ impl<'a> Schedule<'a> {
         };
         settings.take(rig);
         settings.sensors = self.sensors(case.seed);
+        if self.laboratory == Laboratory::OtherLab {
+            other_lab::turn_into(&mut settings, OtherStructure::default());
+        }
         Ok(VirtualLab::new(settings))
     }
 

@@ -3,6 +3,7 @@
 use crate::case::{Case, Draw};
 use crate::error::BlindError;
 use crate::lab::Schedule;
+use crate::laboratory::Laboratory;
 use crate::outside::outside_kinds;
 use crate::ruler::StudyRuler;
 use crate::seal::{ANSWERS_NAME, MANIFEST_NAME, Manifest, sha256};
@@ -43,10 +44,11 @@ pub fn make(
 ) -> Result<Made, BlindError> {
     let cases = drawn(campaign, catalogue, draw)?;
     let nominal = nominal_model(campaign)?;
-    let schedule = Schedule::new(campaign, &nominal)?;
+    // Strengths are measured on the model's own lab, so that equal seeds give equal causes on both.
+    let schedule = Schedule::new(campaign, &nominal)?.on(draw.laboratory);
     std::fs::create_dir_all(directory).map_err(BlindError::file(directory))?;
     let answers = run_all(&schedule, campaign, &cases, directory, done)?;
-    Ok(Made { manifest: seal(&campaign.name, &answers, directory)?, answers })
+    Ok(Made { manifest: seal(&campaign.name, draw.laboratory, &answers, directory)?, answers })
 }
 
 /// Draws cases.
@@ -73,19 +75,30 @@ pub fn drawn(
 ///
 /// # Errors
 /// [`BlindError`] where the lab stops or the file cannot be written.
-pub fn record(campaign: &Campaign, case: &Case, file: &Path) -> Result<Truth, BlindError> {
+pub fn record(
+    campaign: &Campaign,
+    case: &Case,
+    laboratory: Laboratory,
+    file: &Path,
+) -> Result<Truth, BlindError> {
     let nominal = nominal_model(campaign)?;
-    Schedule::new(campaign, &nominal)?.run(case, file, &header(campaign))
+    Schedule::new(campaign, &nominal)?.on(laboratory).run(case, file, &header(campaign))
 }
 
 /// Writes answers and the manifest with their hash into a directory that has neither.
 ///
 /// # Errors
 /// [`BlindError::File`].
-pub fn seal(campaign: &str, answers: &[Truth], directory: &Path) -> Result<Manifest, BlindError> {
+pub fn seal(
+    campaign: &str,
+    laboratory: Laboratory,
+    answers: &[Truth],
+    directory: &Path,
+) -> Result<Manifest, BlindError> {
     let bytes = json(&answers, &directory.join(ANSWERS_NAME))?;
     let manifest = Manifest {
         campaign: campaign.to_owned(),
+        laboratory,
         cases: answers.iter().map(|answer| answer.name.clone()).collect(),
         answers_sha256: sha256(&bytes),
     };

@@ -79,7 +79,7 @@ pub struct ScoredCase {
 }
 
 /// Ends of the classes of signature length, sigmas.
-const CLASSES_SIGMA: [f64; 3] = [12.0, 24.0, f64::INFINITY];
+pub(crate) const CLASSES_SIGMA: [f64; 3] = [12.0, 24.0, f64::INFINITY];
 
 /// Cases whose causes show about equally plainly.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -107,6 +107,8 @@ pub struct Score {
     pub classes: [SigmaClass; CLASSES_SIGMA.len()],
     /// Recordings without effect that were left alone.
     pub none: Share,
+    /// Recordings without effect in which one was named.
+    pub none_named: Share,
     /// Single effects that were named, in a set of at most three.
     pub single: Share,
     /// Pairs of which both were named.
@@ -213,7 +215,10 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
         let of_class = sigma.and_then(|sigma| CLASSES_SIGMA.iter().position(|end| sigma < *end));
         let class = of_class.map_or(&mut unsaid, |place| &mut score.classes[place]);
         match kind {
-            CaseKind::None => score.none.count(right),
+            CaseKind::None => {
+                score.none.count(right);
+                score.none_named.count(judged.as_ref().is_some_and(|judged| !judged.named.is_empty()));
+            }
             CaseKind::Single => {
                 score.single.count(right);
                 class.single.count(right);
@@ -327,52 +332,6 @@ impl Judged {
                 .sum(),
         };
         Judged { named, set_size, right, p_truth }
-    }
-}
-
-impl Score {
-    /// The classes of signature length: a heading, and a row each.
-    pub fn class_rows(&self) -> Vec<[String; 6]> {
-        let heading =
-            ["signature", "single", "both of two", "one of two", "outside, said so", "falsely explained"];
-        let ends = CLASSES_SIGMA.iter();
-        let rows = self.classes.iter().zip(ends).map(|(class, end)| {
-            let range = if end.is_finite() {
-                format!("{:.0} to {end:.0} sigma", class.from_sigma)
-            } else {
-                format!("{:.0} sigma and more", class.from_sigma)
-            };
-            let share = |share: Share| format!("{}/{}", share.hits, share.trials);
-            let shares =
-                [class.single, class.pair, class.one_of_pair, class.outside, class.falsely_explained];
-            let [single, pair, one, outside, falsely] = shares.map(share);
-            [range, single, pair, one, outside, falsely]
-        });
-        std::iter::once(heading.map(str::to_owned)).chain(rows).collect()
-    }
-
-    /// Labels and values of the table, in its order.
-    pub fn rows(&self) -> Vec<(&'static str, String)> {
-        let number = |value: Option<f64>, decimals: usize| {
-            value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
-        };
-        let percent = self.parameter_error_median.map(|error| 100.0 * error);
-        vec![
-            ("no effect, left alone", self.none.to_string()),
-            ("single effect named", self.single.to_string()),
-            ("both of two named", self.pair.to_string()),
-            ("  at least one of two", self.one_of_pair.to_string()),
-            ("all of three named", self.triple.to_string()),
-            ("  at least two of three", self.two_of_triple.to_string()),
-            ("outside, said so", self.outside.to_string()),
-            ("  falsely explained", self.falsely_explained.to_string()),
-            ("place right (first two)", self.place.to_string()),
-            ("parameter error, median", format!("{} %", number(percent, 1))),
-            ("95 % interval covers truth", self.covered.to_string()),
-            ("shrink, median", number(self.shrink_median, 3)),
-            ("mean squared error of p", number(self.squared_miss_mean, 3)),
-            ("set size, mean", number(self.set_size_mean, 2)),
-        ]
     }
 }
 

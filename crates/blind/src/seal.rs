@@ -1,6 +1,7 @@
 //! Answers under seal: a hash printed before anything is diagnosed.
 
 use crate::error::BlindError;
+use crate::laboratory::Laboratory;
 use crate::truth::Truth;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,9 @@ pub const MANIFEST_NAME: &str = "manifest.json";
 pub struct Manifest {
     /// Name of the campaign.
     pub campaign: String,
+    /// What the cases ran on.
+    #[serde(default)]
+    pub laboratory: Laboratory,
     /// Names of the cases; each has a recording NAME.mcap.
     pub cases: Vec<String>,
     /// SHA-256 of the file of answers.

@@ -1,6 +1,7 @@
 //! How far the gap shrinks, on steps that were not used to fit.
 
 use crate::adequacy::misfit_of_steps;
+use crate::carried::{StepMisfit, carried};
 use crate::fit::{Effort, Fit, fit};
 use crate::folds::Folds;
 use crate::nuisance::OUTPUTS;
@@ -9,7 +10,6 @@ use crate::selection::{Selection, dot_over};
 use crate::study::{Hypothesis, Study};
 use crate::whiten::{Linearised, rows_of_step};
 use mapper_numerics::parallel;
-use mapper_numerics::statistics::share_interval_95;
 use std::collections::BTreeMap;
 
 /// What is compared.
@@ -45,13 +45,17 @@ pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
     let (g_before, g_after) =
         (misfit_of_steps(study, &before.residual), misfit_of_steps(study, &after.residual));
     let mean = |g: &[f64]| g.iter().sum::<f64>() / g.len().max(1) as f64;
-    let positive = |g: &[f64]| g.iter().map(|g| g.max(0.0)).sum::<f64>();
-    let total = positive(&g_before);
-    let removed = if total > 0.0 { 1.0 - positive(&g_after) / total } else { 0.0 };
-    // Few steps that hold most of the gap are few steps.
-    let squares: f64 = g_before.iter().map(|g| g.max(0.0).powi(2)).sum();
-    let independent = if squares > 0.0 { total * total / squares } else { 0.0 };
-    let (low, high) = share_interval_95(independent * removed.clamp(0.0, 1.0), independent);
+    let misfits: Vec<StepMisfit> = g_before
+        .iter()
+        .zip(&g_after)
+        .enumerate()
+        .map(|(step, (before, after))| {
+            let values = rows_of_step(study, step).len();
+            StepMisfit { before: *before, after: *after, values }
+        })
+        .collect();
+    let carried = carried(&misfits);
+    let (low, high) = carried.interval;
     let bare =
         Unseen { residual: nominal.residual(study, &nominal.base), values: nominal.base.values.clone() };
     let channels = channels(study, &bare, &before, &after);
@@ -61,9 +65,12 @@ pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
         nominal: mean(&misfit_of_steps(study, &bare.residual)),
         before: mean(&g_before),
         after: mean(&g_after),
-        shrink: if claimed { removed } else { 0.0 },
+        shrink: if claimed { carried.removed } else { 0.0 },
         shrink_low: if claimed { low } else { 0.0 },
         shrink_high: if claimed { high } else { 0.0 },
+        steps_with_gap: carried.steps,
+        largest_step: carried.largest.map(|(step, _)| step),
+        largest_share: carried.largest.map_or(0.0, |(_, share)| share),
         worse,
         held_out_steps: if folds.steps.len() > 1 { steps } else { Vec::new() },
         folds: folds.steps.clone(),

@@ -10,6 +10,7 @@ pub mod adequacy;
 pub mod another_machine;
 mod assumed;
 pub mod calibration;
+mod carried;
 pub mod coordinate;
 pub mod course;
 pub mod diagnose;

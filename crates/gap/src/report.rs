@@ -235,6 +235,12 @@ pub struct Gap {
     pub shrink_low: f64,
     /// Upper end.
     pub shrink_high: f64,
+    /// Number of steps whose misfit is beyond noise, tolerances fitted: the witnesses of the interval.
+    pub steps_with_gap: usize,
+    /// The step that carries most of the gap, by index.
+    pub largest_step: Option<usize>,
+    /// Its share of the gap.
+    pub largest_share: f64,
     /// Channels that the cause makes worse.
     pub worse: Vec<String>,
     /// Steps that were held out in one of the folds, by index; none where steps are too few.

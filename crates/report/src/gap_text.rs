@@ -184,6 +184,22 @@ fn smallest_seen(effects: &[SmallestSeen]) -> String {
     text
 }
 
+/// Share of the gap from which on a step is named: as much as five even steps have.
+const NAMED_SHARE: f64 = 0.2;
+
+/// How many steps bear witness, and the one that carries much of the gap.
+fn carried_by(gap: &mapper_gap::report::Gap) -> String {
+    let all = gap.held_out_steps.len();
+    if all == 0 {
+        return String::new();
+    }
+    let mut text = format!("  {} of {all} steps show a gap", gap.steps_with_gap);
+    if let Some(step) = gap.largest_step.filter(|_| gap.largest_share >= NAMED_SHARE) {
+        text += &format!("; step {} alone carries {:.0} % of it", step + 1, 100.0 * gap.largest_share);
+    }
+    text + "\n"
+}
+
 fn how_far(diagnosis: &Diagnosis) -> String {
     let gap = &diagnosis.gap;
     let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
@@ -201,6 +217,7 @@ fn how_far(diagnosis: &Diagnosis) -> String {
             (100.0 * gap.shrink_low).floor(),
             (100.0 * gap.shrink_high).ceil()
         );
+        text += &carried_by(gap);
     } else if !gap.worse.is_empty() {
         text += &format!("  the gap does not shrink: {} gets worse\n", gap.worse.join(", "));
     }

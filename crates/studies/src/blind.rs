@@ -3,7 +3,9 @@
 use crate::error::StudyError;
 use crate::source::CampaignSource;
 use mapper_blind::score::score;
-use mapper_blind::{CaseKind, Draw, OutsideUse, SIGMA_RANGE, StoredCase, Truth, drawn, record, seal};
+use mapper_blind::{
+    CaseKind, Draw, Laboratory, OutsideUse, SIGMA_RANGE, StoredCase, Truth, drawn, record, seal,
+};
 use mapper_fleet::{At, Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkError};
 use mapper_record::ChannelMap;
 use mapper_session::{Recorded, Registry, Session, json_text};
@@ -39,6 +41,10 @@ struct BlindStudy {
     /// Kinds of cases (none, single, pair, outside, triple); the usual four where it is left out.
     #[schemars(with = "Option<Vec<String>>", extend("examples" = [["single", "pair"]]))]
     kinds: Option<Vec<CaseKind>>,
+    /// Simulator that makes the recordings: virtual_lab (where it is left out) or other_lab, whose equations are not the model's.
+    #[serde(default)]
+    #[schemars(with = "Option<String>", example = &"other_lab")]
+    laboratory: Laboratory,
     /// Minimum and maximum signature of a cause, in sigmas.
     #[schemars(extend("examples" = [[12, 400]]))]
     sigmas: Option<[f64; 2]>,
@@ -50,6 +56,7 @@ struct BlindStudy {
 struct BlindItem {
     campaign: CampaignSource,
     case: StoredCase,
+    laboratory: Laboratory,
 }
 
 /// What became of it.
@@ -82,22 +89,30 @@ impl Kind for Blind<'_> {
         let draw = Draw {
             kinds: file.kinds.unwrap_or_default(),
             sigma_range,
+            laboratory: file.laboratory,
             ..Draw::new(file.seed, file.cases, OutsideUse::Check)
         };
         let cases = drawn(&nominal, &self.0.effects, &draw).map_err(FleetError::kind)?;
         let item = |case: &mapper_blind::Case| Draft {
             name: case.name.clone(),
-            payload: json!(BlindItem { campaign: campaign.clone(), case: StoredCase::from(case) }),
+            payload: json!(BlindItem {
+                campaign: campaign.clone(),
+                case: StoredCase::from(case),
+                laboratory: file.laboratory
+            }),
         };
-        Ok(Drafts { items: cases.iter().map(item).collect(), settings: json!({ "campaign": nominal.name }) })
+        Ok(Drafts {
+            items: cases.iter().map(item).collect(),
+            settings: json!({ "campaign": nominal.name, "laboratory": file.laboratory }),
+        })
     }
 
     fn work(&self, payload: &Value, at: At<'_>) -> Result<String, WorkError> {
-        let BlindItem { campaign, case } = BlindItem::deserialize(payload)?;
+        let BlindItem { campaign, case, laboratory } = BlindItem::deserialize(payload)?;
         let campaign = campaign.campaign()?;
         let case = case.case(&self.0.effects).map_err(StudyError::Cause)?;
         let file = at.scratch.join("case.mcap");
-        let truth = record(&campaign, &case, &file)?;
+        let truth = record(&campaign, &case, laboratory, &file)?;
         // As anybody would diagnose it: from the file alone, which has no truth.
         let recorded = Recorded::read(self.0, &file, &ChannelMap::native(), Some(&campaign))?;
         let session = Session { stop: at.stop, ..Session::new(self.0) };
@@ -121,7 +136,8 @@ impl Kind for Blind<'_> {
             truths.push(truth);
         }
         let campaign = settings["campaign"].as_str().unwrap_or_default();
-        seal(campaign, &truths, out.directory()).map_err(FleetError::kind)?;
+        let laboratory = Laboratory::deserialize(&settings["laboratory"]).unwrap_or_default();
+        seal(campaign, laboratory, &truths, out.directory()).map_err(FleetError::kind)?;
         let scored = score(out.directory()).map_err(FleetError::kind)?;
         out.write("score.json", json_text(&scored).map_err(FleetError::kind)?.as_bytes())?;
         Ok(format!(

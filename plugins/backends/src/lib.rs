@@ -19,5 +19,6 @@ macro_rules! backends {
 
 backends! {
     virtual_lab,
+    other_lab,
     replay,
 }

@@ -1,6 +1,6 @@
 //! The lab's boundary conditions: what the cell gives, and what the actuators make of the commands.
 
-use super::actuator::Actuator;
+use super::actuator::{Actuator, ActuatorDynamics};
 use super::weather::Weather;
 use mapper_physics::inputs::Inputs;
 use mapper_physics::params::BoundaryConditions;
@@ -26,6 +26,21 @@ pub struct LabInputs {
 }
 
 impl LabInputs {
+    /// Everything held at `boundary`.
+    pub fn held(boundary: &BoundaryConditions) -> Self {
+        let at_rest = |value: f64| {
+            Actuator::at_rest(ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY }, value)
+        };
+        LabInputs {
+            cell: *boundary,
+            weather: Weather::default(),
+            p3: at_rest(boundary.p3_pa),
+            t3: at_rest(boundary.t3_k),
+            valve: at_rest(boundary.valve_opening_ratio),
+            oil: at_rest(boundary.oil_temperature_k),
+        }
+    }
+
     fn actuators(&self) -> [&Actuator; 4] {
         [&self.p3, &self.t3, &self.valve, &self.oil]
     }

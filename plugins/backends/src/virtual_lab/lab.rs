@@ -5,7 +5,9 @@ use super::drift::{self, LabDrift};
 use super::elements::ElementBank;
 use super::inputs::{LOWEST_EXPANSION_RATIO, LabInputs};
 use super::precursor::Resonator;
+use super::running::RunningMachine;
 use super::samples::{Instant, Readers, SampleCollector};
+use super::second_order::SecondOrderFollower;
 use super::sensor::Sensor;
 use super::settings::{LabSettings, Start};
 use crate::setpoint_limits;
@@ -16,14 +18,8 @@ use mapper_core::{
 use mapper_physics::inputs::Inputs;
 use mapper_physics::instruments::ChannelFollower;
 use mapper_physics::model::{State, rad_s_of_rpm};
-use mapper_physics::simulate::{
-    Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Simulator, Watch,
-};
+use mapper_physics::simulate::{Crossing, ModelEvent, SimulationError, Watch};
 use mapper_physics::standstill::{self, StandstillState};
-use mapper_physics::steady;
-
-/// Name under which campaigns ask for this backend.
-pub const NAME: &str = "virtual_lab";
 
 /// Shaft speed at which a starting machine enters the running model and a stopping one leaves it, rpm.
 const CRANKING_SPEED_RPM: f64 = 5_000.0;
@@ -36,7 +32,7 @@ const LEAST_SURGE_RATIO: f64 = 1.01;
 #[derive(Debug)]
 enum Machine {
     /// Gas flows.
-    Running(Box<Simulator>),
+    Running(Box<dyn RunningMachine>),
     /// The shaft is at rest.
     Standstill {
         /// Housing temperatures.
@@ -97,7 +93,7 @@ impl VirtualLab {
 impl Backend for VirtualLab {
     fn describe(&self) -> RigDescription {
         RigDescription {
-            backend: NAME.to_owned(),
+            backend: self.settings.structure.name().to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             channels: channels(),
             sample_rate_hz: self.settings.sample_rate_hz,
@@ -151,6 +147,10 @@ impl Backend for VirtualLab {
                     .redundant
                     .iter()
                     .map(|(channel, of)| ElementBank::new(*channel, of, sample_s, settings.seed))
+                    .collect(),
+                second_order: CHANNELS
+                    .iter()
+                    .map(|row| settings.second_order.get(&row.channel).map(|of| SecondOrderFollower::new(*of)))
                     .collect(),
                 resonator: Resonator::new(settings.surge_precursor, settings.seed),
             },
@@ -226,9 +226,10 @@ impl Backend for VirtualLab {
 fn settled(settings: &LabSettings, armed: &Armed, now_s: f64) -> Result<Machine, BackendError> {
     match armed.wanted {
         RigMode::Running => {
-            let rest = steady::settle_under(&settings.model, &armed.inputs.at(now_s))
-                .map_err(|error| BackendError::Simulation { t_s: now_s, source: Box::new(error) })?;
-            Ok(Machine::Running(Box::new(running(settings, now_s, rest.state))))
+            let boundary = armed.inputs.at(now_s);
+            let machine = settings.structure.settled(&settings.model, now_s, &boundary, watch(settings));
+            let machine = machine.map_err(|source| BackendError::Simulation { t_s: now_s, source })?;
+            Ok(Machine::Running(machine))
         }
         RigMode::Standstill => {
             let ambient_k = settings.cell.ambient_temperature_k;
@@ -241,9 +242,8 @@ fn settled(settings: &LabSettings, armed: &Armed, now_s: f64) -> Result<Machine,
     }
 }
 
-fn running(settings: &LabSettings, t_s: f64, state: State) -> Simulator {
-    let watch = Watch { overspeed_rpm: settings.trip_speed_rpm };
-    Simulator::new(&settings.model, t_s, state, DEFAULT_RELATIVE_TOLERANCE, watch)
+fn watch(settings: &LabSettings) -> Watch {
+    Watch { overspeed_rpm: settings.trip_speed_rpm }
 }
 
 impl Armed {
@@ -272,7 +272,7 @@ impl Armed {
                 let cell = &self.inputs.cell;
                 let speed_rad_s = rad_s_of_rpm(CRANKING_SPEED_RPM);
                 let start = State::new(speed_rad_s, cell.p1_pa * 1.0005, state.tc_k, state.tt_k, cell.t1_k);
-                Machine::Running(Box::new(running(settings, now_s, start)))
+                Machine::Running(settings.structure.started(&settings.model, now_s, start, watch(settings)))
             }
             (Some(Machine::Running(simulator)), RigMode::Standstill)
                 if simulator.state().shaft_speed_rpm() < CRANKING_SPEED_RPM =>
@@ -317,7 +317,7 @@ impl Armed {
         }
         let first_index = self.next_sequence + batch.len() as u64;
         let rate_hz = settings.sample_rate_hz;
-        let sample_times_s = (first_index..).map(|index| index as f64 / rate_hz).take_while(|t| *t <= end_s);
+        let mut sample_times_s = (first_index..).map(|index| index as f64 / rate_hz).take_while(|t| *t <= end_s);
         let Armed { inputs, machine, readers, commands, .. } = self;
         match machine {
             None => Err(BackendError::OutOfOrder {
@@ -330,8 +330,8 @@ impl Armed {
                 let result = simulator.run_to(
                     end_s,
                     inputs,
-                    sample_times_s,
-                    |t_s, state, outputs| {
+                    &mut sample_times_s,
+                    &mut |t_s, state, outputs| {
                         let instant = Instant {
                             boundary: inputs.at(t_s),
                             speed_rpm: state.shaft_speed_rpm(),
@@ -341,7 +341,7 @@ impl Armed {
                         };
                         batch.push(t_s, &instant, commands.as_ref(), readers, settings);
                     },
-                    |event| crossings.push(event),
+                    &mut |event| crossings.push(event),
                 );
                 for crossing in crossings {
                     self.report(settings, crossing, end_s);

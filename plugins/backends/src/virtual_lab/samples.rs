@@ -3,6 +3,7 @@
 use super::drift;
 use super::elements::ElementBank;
 use super::precursor::{P2_SHARE, Resonator, Swing};
+use super::second_order::SecondOrderFollower;
 use super::sensor::Sensor;
 use super::settings::LabSettings;
 use super::truth::TruthRecorder;
@@ -47,6 +48,8 @@ impl Instant<'_> {
 pub(super) struct Readers {
     pub(super) sensors: Vec<(Channel, Sensor)>,
     pub(super) followers: Vec<ChannelFollower>,
+    /// Sensors that follow in second order, beside their channel.
+    pub(super) second_order: Vec<Option<SecondOrderFollower>>,
     /// Channels with several sensors.
     pub(super) several: Vec<ElementBank>,
     /// What flow and pressures do before surge.
@@ -90,16 +93,18 @@ impl SampleCollector {
         self.t_s.push(t_s);
         let surge_flow_kg_s = instant.surge_flow_kg_s(settings);
         let prepared = instant.running.map(|_| settings.model.prepare(&instant.boundary));
-        let Readers { sensors, followers, several, resonator } = readers;
+        let Readers { sensors, followers, second_order, several, resonator } = readers;
         let swing = swing(t_s, instant, surge_flow_kg_s, resonator, settings);
         let mut elements = self.elements.iter_mut();
-        for ((row, column), follower) in CHANNELS.iter().zip(&mut self.columns).zip(followers) {
+        let follow = followers.iter_mut().zip(second_order);
+        for ((row, column), (follower, second)) in CHANNELS.iter().zip(&mut self.columns).zip(follow) {
             let total = true_value(row.channel, instant, prepared.as_ref(), commands, swing);
             let truth = match settings.static_tap_pipe_diameters_m.get(&row.channel) {
                 Some(pipe_diameter_m) => at_the_wall_pa(row.channel, total, *pipe_diameter_m, instant),
                 None => total,
             };
             let uneven = settings.uneven_at_rest.get(&row.channel).filter(|_| instant.running.is_none());
+            let truth = second.as_mut().map_or(truth, |second| second.read(t_s, truth));
             let truth = follower.read(t_s, truth) + uneven.copied().unwrap_or(0.0);
             let drifted = |reading| drift::drifted_reading(&settings.drifts, row.channel, t_s, reading);
             if let Some(bank) = several.iter_mut().find(|bank| bank.channel == row.channel) {

@@ -1,6 +1,6 @@
 //! What can be wrong with a value below `virtual_lab:`.
 
-use super::lab::NAME;
+use super::name::NAME;
 use mapper_core::{BackendError, Channel, with_unit};
 use mapper_physics::effect::EffectError;
 use mapper_yaml::units::{Kind, UnitError};
@@ -119,13 +119,16 @@ pub enum SettingProblem {
 
 impl SettingProblem {
     /// The problem at its key below `virtual_lab:`.
-    pub(super) fn at(self, path: impl Into<String>) -> BackendError {
+    pub fn at(self, path: impl Into<String>) -> BackendError {
         BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(self) }
     }
 }
 
 /// Refuses a value outside its range.
-pub(super) fn within(
+///
+/// # Errors
+/// [`SettingProblem::OutOfRange`].
+pub fn within(
     value: f64,
     unit: &'static str,
     range: RangeInclusive<f64>,

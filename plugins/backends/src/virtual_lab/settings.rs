@@ -4,6 +4,8 @@ use super::actuator::ActuatorDynamics;
 use super::drift::LabDrift;
 use super::elements::LabElements;
 use super::precursor::SurgePrecursor;
+use super::running::{Lumped, Structure};
+use super::second_order::SecondOrder;
 use super::sensor::SensorErrors;
 use super::weather::Weather;
 use mapper_core::Channel;
@@ -12,6 +14,7 @@ use mapper_physics::instruments::Instruments;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// How the machine stands when the lab is armed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +62,10 @@ pub struct LabSettings {
     pub static_tap_pipe_diameters_m: BTreeMap<Channel, f64>,
     /// Shaft speed at which the lab cuts the air by itself, rpm.
     pub trip_speed_rpm: f64,
+    /// The equations that move the machine.
+    pub structure: Arc<dyn Structure>,
+    /// Sensors that follow in second order before their own lag; none in the nominal lab.
+    pub second_order: BTreeMap<Channel, SecondOrder>,
     /// Swing of flow and outlet pressure beyond the surge line, ratio of their values.
     pub surge_swing_ratio: f64,
     /// Swing of flow and pressures before the surge line.
@@ -97,6 +104,8 @@ impl LabSettings {
             drifts: Vec::new(),
             static_tap_pipe_diameters_m: BTreeMap::new(),
             trip_speed_rpm: f64::INFINITY,
+            structure: Arc::new(Lumped),
+            second_order: BTreeMap::new(),
             surge_swing_ratio: 0.0,
             surge_precursor: SurgePrecursor::NONE,
             seed: 0,

@@ -6,6 +6,7 @@ use super::drift_file::{self, DriftFile};
 use super::effects_file::{EffectValues, put_in};
 use super::elements_file::{self, FaultFile};
 use super::precursor::SurgePrecursor;
+use super::running::Lumped;
 use super::sensor::SensorErrors;
 use super::setting_problem::{SettingProblem, within};
 use super::settings::{LabSettings, Start};
@@ -23,6 +24,7 @@ use mapper_yaml::units::{
 };
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The keys below `virtual_lab`. Everything may be left out.
 #[derive(Debug, Default, Deserialize)]
@@ -247,6 +249,8 @@ pub fn read_settings(
         drifts: drift_file::read(&file.drift)?,
         static_tap_pipe_diameters_m: nominal.static_tap_pipe_diameters_m.clone(),
         trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.inside),
+        structure: Arc::new(Lumped),
+        second_order: BTreeMap::new(),
         surge_swing_ratio,
         surge_precursor: file.surge_precursor.precursor()?,
         seed: nominal.seed,

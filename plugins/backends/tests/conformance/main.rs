@@ -1,6 +1,7 @@
 //! Every backend keeps every rule of the seam. A new backend gets its row in [`candidates`], and all rules with it.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use mapper_backends::other_lab::{self, OtherStructure};
 use mapper_backends::replay::{self, ReplayBackend};
 use mapper_backends::virtual_lab::{self, ActuatorDynamics, LabSettings, SensorErrors, Start, VirtualLab};
 use mapper_conformance::{Candidate, RULES};
@@ -9,10 +10,12 @@ use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 
 /// All backends, each as it is driven in practice.
-fn candidates() -> [Candidate<'static>; 3] {
+fn candidates() -> [Candidate<'static>; 5] {
     [
         Candidate { name: virtual_lab::NAME, make: &settled_lab, setpoints: setpoints(150e3), lasts_s: None },
         Candidate { name: virtual_lab::NAME, make: &lab_at_rest, setpoints: setpoints(150e3), lasts_s: None },
+        Candidate { name: other_lab::NAME, make: &settled_other, setpoints: setpoints(150e3), lasts_s: None },
+        Candidate { name: other_lab::NAME, make: &other_at_rest, setpoints: setpoints(150e3), lasts_s: None },
         Candidate {
             name: replay::NAME,
             make: &replay_of_the_lab,
@@ -56,6 +59,20 @@ fn settled_lab() -> Result<Box<dyn Backend>, BackendError> {
 
 fn lab_at_rest() -> Result<Box<dyn Backend>, BackendError> {
     Ok(Box::new(VirtualLab::new(lab(Start::Standstill))))
+}
+
+fn other(start: Start) -> Result<Box<dyn Backend>, BackendError> {
+    let mut settings = lab(start);
+    other_lab::turn_into(&mut settings, OtherStructure::default());
+    Ok(Box::new(VirtualLab::new(settings)))
+}
+
+fn settled_other() -> Result<Box<dyn Backend>, BackendError> {
+    other(Start::Settled)
+}
+
+fn other_at_rest() -> Result<Box<dyn Backend>, BackendError> {
+    other(Start::Standstill)
 }
 
 /// More than any rule takes.

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::{manner, output, registry};
 use clap::{Args, ValueEnum};
-use mapper_blind::{CaseKind, Draw, OutsideUse};
+use mapper_blind::{CaseKind, Draw, Laboratory, OutsideUse};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -34,6 +34,9 @@ pub struct Make {
     /// Draw outside causes from those kept for calibration, not from those reserved for the check
     #[arg(long)]
     pub calibration: bool,
+    /// Backend that makes the recordings: virtual_lab, or other_lab, whose structure no model of the catalogue has
+    #[arg(long, value_name = "NAME", default_value = "virtual_lab")]
+    laboratory: Laboratory,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -73,6 +76,7 @@ impl Make {
         let outside = if self.calibration { OutsideUse::Calibration } else { OutsideUse::Check };
         let draw = Draw {
             kinds: self.kinds.iter().map(|kind| CaseKind::from(*kind)).collect(),
+            laboratory: self.laboratory,
             sigma_range: [self.least_sigma, self.most_sigma],
             ..Draw::new(self.seed, self.cases, outside)
         };

@@ -1,0 +1,46 @@
+//! These equations in the virtual lab's rig.
+
+use super::motion::Motion;
+use super::structure::{NAME, OtherStructure};
+use crate::virtual_lab::{LabSettings, RunningMachine, SecondOrder, Structure, StructureError};
+use mapper_physics::model::{Model, State};
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::simulate::Watch;
+use mapper_physics::steady;
+use std::sync::Arc;
+
+/// Gives a virtual lab the equations and sensors of this one.
+pub fn turn_into(lab: &mut LabSettings, structure: OtherStructure) {
+    let sensors = structure.sensors();
+    lab.second_order = sensors
+        .into_iter()
+        .map(|(channel, frequency_hz, damping_ratio)| {
+            (channel, SecondOrder { frequency_hz, damping_ratio })
+        })
+        .collect();
+    lab.structure = Arc::new(structure);
+}
+
+impl Structure for OtherStructure {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn started(&self, model: &Model, t_s: f64, state: State, watch: Watch) -> Box<dyn RunningMachine> {
+        Box::new(Motion::new(model, self.clone(), t_s, state, watch))
+    }
+
+    fn settled(
+        &self,
+        model: &Model,
+        t_s: f64,
+        boundary: &BoundaryConditions,
+        watch: Watch,
+    ) -> Result<Box<dyn RunningMachine>, StructureError> {
+        // From where the lumped model rests these equations come to their own rest.
+        let rest = steady::settle_under(model, boundary)?;
+        let mut motion = Motion::new(model, self.clone(), t_s, rest.state, watch);
+        motion.settle(boundary)?;
+        Ok(Box::new(motion))
+    }
+}

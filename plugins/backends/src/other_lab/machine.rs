@@ -1,0 +1,265 @@
+//! The rates of this lab's states, and what its sensors would see.
+//!
+//! Map, turbine, bearing and the laws of single parts are the model's own, so that every effect has its meaning here; how
+//! the parts hang together is not.
+
+use super::passage::{
+    AREA_SHARES, BACK_NODE, CAPACITY_SHARES, EXTERNAL_SHARES, FLANGE_NODE, NODES, PROBE_NODE, along, h_ratios,
+};
+use super::structure::OtherStructure;
+use mapper_physics::model::{Model, Outputs, State};
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::{air, compression, housing, orifice};
+
+/// Shaft, two pressures, duct flow, turbine housing, probe tip, gas of the first volume, separation, nodes, their inner
+/// walls, hidden temperatures of hooks.
+pub(super) const STATES: usize = 18;
+const SHAFT: usize = 0;
+const P_FIRST: usize = 1;
+const DUCT_FLOW: usize = 2;
+const P_SECOND: usize = 3;
+const TURBINE: usize = 4;
+const TIP: usize = 5;
+const GAS: usize = 6;
+const SEPARATION: usize = 7;
+const OUTER: usize = 8;
+const INNER: usize = 12;
+const EXTRA: usize = 16;
+
+/// Usual sizes of the states.
+pub(super) const SIZES: [f64; STATES] =
+    [1e4, 1e5, 0.1, 1e5, 5e2, 3e2, 3e2, 1.0, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2];
+
+/// Specific heat ratio of air in the volumes.
+const GAMMA: f64 = 1.4;
+/// Place on the speed line where the flow separates, and by how much it must go back before it lies on again.
+const SEPARATES_AT: f64 = 0.90;
+const LIES_ON_BELOW: f64 = 0.12;
+/// Width of that transition in places on the speed line, and its time, s.
+const TRANSITION: f64 = 0.04;
+const SEPARATION_S: f64 = 0.5;
+
+/// One instant.
+pub(super) struct Instantly {
+    pub(super) state: State,
+    pub(super) outputs: Outputs,
+    pub(super) rates: [f64; STATES],
+}
+
+/// All states of a machine that the lumped model has at `state`.
+pub(super) fn start(model: &Model, boundary: &BoundaryConditions, state: &State) -> [f64; STATES] {
+    let outputs = model.prepare(boundary).evaluate(state);
+    let mut y = [state.tc_k; STATES];
+    y[SHAFT] = state.shaft_speed_rad_s;
+    y[P_FIRST] = state.p2_pa;
+    y[P_SECOND] = state.p2_pa;
+    y[DUCT_FLOW] = outputs.flow_kg_s;
+    y[TURBINE] = state.tt_k;
+    y[TIP] = state.t2_tip_k;
+    y[GAS] = outputs.t2_k;
+    y[SEPARATION] = 0.0;
+    y[INNER..EXTRA].fill(state.inner_k);
+    y[EXTRA..].copy_from_slice(&state.extra_k);
+    y
+}
+
+/// What the rig's sensors would call the state: P2 before the valve, Tc at its probe.
+pub(super) fn seen(y: &[f64; STATES]) -> State {
+    State {
+        shaft_speed_rad_s: y[SHAFT],
+        p2_pa: y[P_SECOND],
+        tc_k: y[OUTER + PROBE_NODE],
+        tt_k: y[TURBINE],
+        t2_tip_k: y[TIP],
+        inner_k: y[INNER + PROBE_NODE],
+        extra_k: [y[EXTRA], y[EXTRA + 1]],
+    }
+}
+
+fn four(y: &[f64; STATES], first: usize) -> [f64; NODES] {
+    std::array::from_fn(|node| y[first + node])
+}
+
+fn mean(values: &[f64; NODES], shares: &[f64; NODES]) -> f64 {
+    values.iter().zip(shares).map(|(value, share)| value * share).sum()
+}
+
+/// Everything at one instant. `model` is the rig's, whose scales of flow and efficiency are those without separation.
+pub(super) fn evaluate(
+    model: &Model,
+    structure: &OtherStructure,
+    t_s: f64,
+    boundary: &BoundaryConditions,
+    y: &[f64; STATES],
+) -> Instantly {
+    let separation = y[SEPARATION].clamp(0.0, 1.0);
+    let mut separated = model.clone();
+    let compressor = &mut separated.params.compressor;
+    compressor.efficiency_scale_ratio *= 1.0 - structure.hysteresis_ratio * separation;
+    compressor.flow_scale_ratio *= 1.0 - 0.5 * structure.hysteresis_ratio * separation;
+    let prepared = separated.prepare_at(t_s, boundary);
+    let params = &separated.params;
+    let compressor = &params.compressor;
+    let (outer_k, inner_k) = (four(y, OUTER), four(y, INNER));
+    let has_inner = separated.has_inner_wall();
+    let walls_k = if has_inner { inner_k } else { outer_k };
+    let wheel = State {
+        p2_pa: y[P_FIRST],
+        tc_k: mean(&outer_k, &CAPACITY_SHARES),
+        inner_k: mean(&inner_k, &AREA_SHARES),
+        ..seen(y)
+    };
+    // The model's own way through map, wheel and turbine, at the mean of the walls.
+    let lumped = prepared.evaluate(&wheel);
+    let mut outputs = lumped;
+
+    // Along the nodes in place of the one wall.
+    let flow_kg_s = lumped.flow_kg_s;
+    let moist_cp_ratio = air::moist_heat_capacity_ratio(compressor.humidity_kg_kg);
+    let gas_constant_j_kgk = air::moist_gas_constant_j_kgk(compressor.humidity_kg_kg);
+    let cp1_j_kgk = moist_cp_ratio * air::heat_capacity_j_kgk(boundary.t1_k);
+    let rise_ratio = lumped.pressure_ratio.powf(gas_constant_j_kgk / cp1_j_kgk) - 1.0;
+    let bulk_k = compression::compressed_k(boundary.t1_k, rise_ratio, lumped.efficiency);
+    let cp2_j_kgk = moist_cp_ratio * air::heat_capacity_j_kgk(bulk_k);
+    let whole_w_k = lumped.h_w_m2k * compressor.internal_area_m2;
+    let directed_w_k = |wall_k: f64, gas_k: f64| {
+        whole_w_k * if wall_k > gas_k { compressor.hot_metal_h_ratio } else { 1.0 }
+    };
+    let behind_w_k =
+        |wall_k: f64, gas_k: f64| directed_w_k(wall_k, gas_k) * (1.0 - compressor.alpha_area_ratio);
+    let h_ratios = h_ratios(structure);
+    let (gas_k, mut heats_w) =
+        along(&h_ratios, structure.mixed_gas, behind_w_k, lumped.t2_prime_k, &walls_k, flow_kg_s, cp2_j_kgk);
+    let one_wall_w_k = behind_w_k(lumped.wall_k, lumped.t2_prime_k);
+    let (one_wall_w, one_wall_k) =
+        compression::after_wheel(one_wall_w_k, lumped.t2_prime_k, lumped.wall_k, flow_kg_s, cp2_j_kgk);
+    // What hooks make of the gas at the outlet stays.
+    let gas_k = gas_k + (lumped.t2_k - one_wall_k);
+    // Before the wheel the gas meets the shroud; its temperature there is the model's, at the mean of the walls.
+    heats_w[0] += lumped.compressor_heat_w - one_wall_w;
+
+    // Two volumes and the duct between them.
+    let volume_m3 = params.outlet.volume_m3;
+    let first_m3 = structure.volume_share_ratio * volume_m3;
+    let second_m3 = volume_m3 - first_m3;
+    let [p_first_pa, p_second_pa, duct_kg_s, t_first_k] =
+        [y[P_FIRST], y[P_SECOND], y[DUCT_FLOW], y[GAS].max(100.0)];
+    let section_m2 = 0.25 * std::f64::consts::PI * compressor.outlet_diameter_m.powi(2);
+    let density_kg_m3 = p_second_pa / (gas_constant_j_kgk * t_first_k);
+    let loss_pa = structure.duct_loss_ratio * duct_kg_s * duct_kg_s.abs()
+        / (2.0 * density_kg_m3 * section_m2 * section_m2);
+    let duct_rate = section_m2 / structure.duct_length_m * (p_first_pa - p_second_pa - loss_pa);
+    let p_first_rate =
+        GAMMA * gas_constant_j_kgk / first_m3 * (flow_kg_s * gas_k - duct_kg_s * t_first_k);
+    let gas_kg = p_first_pa * first_m3 / (gas_constant_j_kgk * t_first_k);
+    let gas_rate =
+        (flow_kg_s * cp2_j_kgk * (gas_k - t_first_k) + first_m3 * p_first_rate) / (gas_kg * cp2_j_kgk);
+    let valve_kg_s = (air::GAS_CONSTANT_J_KGK / gas_constant_j_kgk).sqrt()
+        * orifice::flow_kg_s(
+            boundary.valve_opening_ratio * params.outlet.discharge_coefficient * params.outlet.valve_area_m2,
+            p_second_pa,
+            t_first_k,
+            boundary.p1_pa,
+        );
+    let p_second_rate = GAMMA * gas_constant_j_kgk * t_first_k / second_m3
+        * (duct_kg_s - valve_kg_s + lumped.added.outlet_flow_kg_s);
+
+    // The probe: its stem ends in the flange, its tip in the first volume.
+    let chi = params.t2_probe_stem_ratio;
+    let recovery_k = lumped.t2_probe_target_k - (lumped.t2_k + chi * (wheel.tc_k - lumped.t2_k));
+    outputs.t2_k = gas_k;
+    outputs.t2_probe_target_k = t_first_k + chi * (outer_k[FLANGE_NODE] - t_first_k) + recovery_k;
+    let tau_s = lumped.t2_probe_time_constant_s;
+    outputs.t2_probe_k = if tau_s > 0.0 { y[TIP] } else { outputs.t2_probe_target_k };
+
+    // The metal.
+    let bearing_w_k = housing::bearing_conductance_w_k(&params.bearing);
+    let bearing_k = housing::bearing_k(
+        bearing_w_k,
+        params.bearing.oil_conductance_w_k,
+        outer_k[BACK_NODE],
+        y[TURBINE],
+        boundary.oil_temperature_k,
+    );
+    outputs.bearing_k = bearing_k;
+    outputs.radiation_w = housing::radiation_w(params.radiation_area_m2, y[TURBINE], outer_k[BACK_NODE]);
+    let external_w: [f64; NODES] = std::array::from_fn(|node| {
+        housing::external_heat_w(
+            compressor.external_area_m2 * EXTERNAL_SHARES[node],
+            compressor.emissivity_ratio,
+            params.external_convection_ratio,
+            outer_k[node],
+            boundary.ambient_temperature_k,
+        )
+    });
+    outputs.compressor_external_heat_w = external_w.iter().sum();
+    outputs.compressor_heat_w = heats_w.iter().sum();
+    outputs.valve_flow_kg_s = valve_kg_s;
+    outputs.wall_k = mean(&walls_k, &AREA_SHARES);
+
+    let mut rates = [0.0; STATES];
+    let phi = compressor.inner_capacity_ratio;
+    for node in 0..NODES {
+        let share = CAPACITY_SHARES[node];
+        let capacity_j_k = |wall_k: f64| share * housing::compressor_capacity_j_k(params, wall_k);
+        let along_w: f64 = [node.checked_sub(1), Some(node + 1).filter(|next| *next < NODES)]
+            .into_iter()
+            .flatten()
+            .map(|beside| structure.housing_coupling_w_k * (outer_k[beside] - outer_k[node]))
+            .sum();
+        let gas_w = heats_w[node] + share * lumped.added.inner_heat_w;
+        let from_inside_w = if has_inner {
+            let inner_w = compressor.inner_conductance_w_k * share * (inner_k[node] - outer_k[node]);
+            rates[INNER + node] = (gas_w - inner_w) / (phi * capacity_j_k(inner_k[node]));
+            inner_w
+        } else {
+            gas_w
+        };
+        let from_behind_w = if node == BACK_NODE {
+            bearing_w_k * (bearing_k - outer_k[node]) + outputs.radiation_w
+        } else {
+            0.0
+        };
+        rates[OUTER + node] = (from_inside_w + along_w + from_behind_w - external_w[node]
+            + share * lumped.added.compressor_heat_w)
+            / ((1.0 - phi) * capacity_j_k(outer_k[node]));
+    }
+    rates[SHAFT] = prepared.shaft_balance_w(&outputs) / (params.shaft_inertia_kgm2 * y[SHAFT]);
+    rates[P_FIRST] = p_first_rate;
+    rates[DUCT_FLOW] = duct_rate;
+    rates[P_SECOND] = p_second_rate;
+    rates[TURBINE] = prepared.turbine_housing_balance_w(&wheel, &outputs)
+        / housing::turbine_capacity_j_k(params, y[TURBINE]);
+    rates[TIP] = if tau_s > 0.0 { (outputs.t2_probe_target_k - y[TIP]) / tau_s } else { 0.0 };
+    rates[GAS] = gas_rate;
+    rates[SEPARATION] = separation_rate(structure, lumped.surge_position_ratio, y[SEPARATION]);
+    rates[EXTRA..].copy_from_slice(&lumped.added.extra_rates_k_s);
+    Instantly { state: seen(y), outputs, rates }
+}
+
+/// Two stable states between the two thresholds: what lies on separates at the upper one, what has separated lies on again
+/// below the lower one.
+fn separation_rate(structure: &OtherStructure, place: f64, separation: f64) -> f64 {
+    if structure.hysteresis_ratio == 0.0 {
+        return 0.0;
+    }
+    let threshold = SEPARATES_AT - LIES_ON_BELOW * separation;
+    let wanted = 1.0 / (1.0 + (-(place - threshold) / (0.25 * TRANSITION)).exp());
+    (wanted - separation) / SEPARATION_S
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Between the thresholds the flow stays as it was, on whichever side it came from.
+    #[test]
+    fn what_separated_stays_so_until_it_is_well_back() {
+        let structure = OtherStructure::default();
+        let rest = |place: f64, from: f64| {
+            (0..2000).fold(from, |at, _| at + 0.05 * separation_rate(&structure, place, at))
+        };
+        assert!(rest(0.84, 0.0) < 0.05 && rest(0.84, 1.0) > 0.95);
+        assert!(rest(0.97, 0.0) > 0.95 && rest(0.70, 1.0) < 0.05);
+    }
+}

@@ -1,0 +1,180 @@
+//! This lab's machine in motion.
+
+use super::machine::{SIZES, STATES, evaluate, seen, start};
+use super::structure::OtherStructure;
+use crate::virtual_lab::{LabInputs, RunningMachine, StructureError};
+use mapper_physics::inputs::Inputs;
+use mapper_physics::model::{Model, Outputs, State};
+use mapper_physics::params::{BoundaryConditions, Params};
+use mapper_physics::rosenbrock::{Integrator, OdeSystem, Tolerances};
+use mapper_physics::simulate::{
+    Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch,
+};
+
+/// Time in which everything has come to rest: many time constants of the turbine housing, s.
+const LONG_S: f64 = 40_000.0;
+
+/// A machine of these equations.
+#[derive(Debug)]
+pub(super) struct Motion {
+    model: Model,
+    structure: OtherStructure,
+    watch: Watch,
+    /// `None` until the boundary conditions are known; then the start is in it.
+    integrator: Option<Integrator<STATES>>,
+    begin: (f64, State),
+    /// Whether it was beyond the surge line and above the speed limit at the end of the last step.
+    beyond: Option<[bool; 2]>,
+}
+
+impl Motion {
+    pub(super) fn new(
+        model: &Model,
+        structure: OtherStructure,
+        t_s: f64,
+        state: State,
+        watch: Watch,
+    ) -> Self {
+        Motion { model: model.clone(), structure, watch, integrator: None, begin: (t_s, state), beyond: None }
+    }
+
+    /// Lets everything come to rest under `boundary`, in no time of the lab's.
+    pub(super) fn settle(&mut self, boundary: &BoundaryConditions) -> Result<(), StructureError> {
+        let (t_s, state) = self.begin;
+        let mut integrator = Integrator::new(t_s, start(&self.model, boundary, &state), tolerances());
+        let mut system = System::new(&self.model, &self.structure, boundary, t_s);
+        while integrator.t_s < t_s + LONG_S {
+            integrator.step(&mut system, t_s + LONG_S)?;
+        }
+        self.begin.1 = seen(&integrator.y);
+        self.integrator = Some(Integrator::new(t_s, integrator.y, tolerances()));
+        Ok(())
+    }
+}
+
+fn tolerances() -> Tolerances<STATES> {
+    let relative_ratio = DEFAULT_RELATIVE_TOLERANCE;
+    Tolerances { relative_ratio, absolute: SIZES.map(|size| 1e-3 * size * relative_ratio) }
+}
+
+impl RunningMachine for Motion {
+    fn state(&self) -> State {
+        self.integrator.as_ref().map_or(self.begin.1, |integrator| seen(&integrator.y))
+    }
+
+    fn restart(&mut self) {
+        if let Some(integrator) = &mut self.integrator {
+            integrator.restart();
+        }
+    }
+
+    fn change_params(&mut self, params: Params) {
+        if params != self.model.params {
+            self.model.params = params;
+            self.restart();
+        }
+    }
+
+    fn run_to(
+        &mut self,
+        end_s: f64,
+        inputs: &LabInputs,
+        sample_times_s: &mut dyn Iterator<Item = f64>,
+        on_sample: &mut dyn FnMut(f64, &State, &Outputs),
+        on_event: &mut dyn FnMut(ModelEvent),
+    ) -> Result<(), SimulationError> {
+        let Motion { model, structure, watch, integrator, begin, beyond } = self;
+        let integrator = integrator.get_or_insert_with(|| {
+            let (t_s, state) = *begin;
+            Integrator::new(t_s, start(model, &inputs.at(t_s), &state), tolerances())
+        });
+        let mut samples = sample_times_s.peekable();
+        let mut sample = |t_s: f64, y: &[f64; STATES]| {
+            let now = evaluate(model, structure, inputs.time_s(t_s), &inputs.at(t_s), y);
+            on_sample(t_s, &now.state, &now.outputs);
+        };
+        while let Some(t_s) = samples.next_if(|t| *t <= integrator.t_s) {
+            sample(t_s, &integrator.y);
+        }
+        while integrator.t_s < end_s {
+            let start_s = integrator.t_s;
+            let boundary = inputs.at(start_s);
+            boundary.check().map_err(|source| SimulationError::Boundary { t_s: start_s, source })?;
+            let kink_s = inputs.next_kink_s(start_s);
+            let stretch_end_s = kink_s.min(end_s);
+            let mut system = System::new(model, structure, inputs, start_s);
+            while integrator.t_s < stretch_end_s {
+                let step = integrator.step(&mut system, stretch_end_s)?;
+                while let Some(t_s) = samples.next_if(|t| *t <= step.t1_s) {
+                    sample(t_s, &step.at(t_s));
+                }
+                report(model, structure, *watch, inputs, (step.t1_s, &step.y1), beyond, on_event);
+            }
+            if kink_s <= end_s {
+                integrator.restart();
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Tells what was crossed since the last step, at the step's end: its steps are far shorter than anybody looks.
+fn report(
+    model: &Model,
+    structure: &OtherStructure,
+    watch: Watch,
+    inputs: &LabInputs,
+    (t_s, y): (f64, &[f64; STATES]),
+    beyond: &mut Option<[bool; 2]>,
+    on_event: &mut dyn FnMut(ModelEvent),
+) {
+    let now = evaluate(model, structure, inputs.time_s(t_s), &inputs.at(t_s), y);
+    let speed_rpm = now.state.shaft_speed_rpm();
+    let pressure_ratio = now.outputs.pressure_ratio;
+    let is = [now.outputs.surge_position_ratio > 1.0, speed_rpm > watch.overspeed_rpm];
+    let was = beyond.replace(is).unwrap_or(is);
+    let crossings = [
+        [Crossing::SurgeEntered, Crossing::SurgeLeft],
+        [Crossing::OverspeedEntered, Crossing::OverspeedLeft],
+    ];
+    for ((was, is), [entered, left]) in was.into_iter().zip(is).zip(crossings) {
+        if was != is {
+            let crossing = if is { entered } else { left };
+            on_event(ModelEvent { t_s, crossing, speed_rpm, pressure_ratio });
+        }
+    }
+}
+
+struct System<'a, I> {
+    model: &'a Model,
+    structure: &'a OtherStructure,
+    inputs: &'a I,
+    constant: bool,
+}
+
+impl<'a, I: Inputs> System<'a, I> {
+    fn new(model: &'a Model, structure: &'a OtherStructure, inputs: &'a I, t_s: f64) -> Self {
+        System { model, structure, inputs, constant: inputs.is_constant_after(t_s) }
+    }
+}
+
+impl<I: Inputs> OdeSystem<STATES> for System<'_, I> {
+    fn rates(&mut self, t_s: f64, y: &[f64; STATES]) -> [f64; STATES] {
+        evaluate(self.model, self.structure, self.inputs.time_s(t_s), &self.inputs.at(t_s), y).rates
+    }
+
+    fn time_derivative(
+        &mut self,
+        t_s: f64,
+        y: &[f64; STATES],
+        rates: &[f64; STATES],
+    ) -> Option<[f64; STATES]> {
+        if self.constant {
+            return None;
+        }
+        // One-sided, ahead: behind may lie a kink.
+        let ahead_s = 1e-6;
+        let moved = self.rates(t_s + ahead_s, y);
+        Some(std::array::from_fn(|i| (moved[i] - rates[i]) / ahead_s))
+    }
+}

@@ -1,0 +1,89 @@
+//! The lab's settings as a campaign writes them below `backend: {other_lab: ...}`: all keys of the virtual lab, and
+//! `structure`.
+
+use super::structure::{NAME, OtherStructure};
+use super::equations::turn_into;
+use crate::virtual_lab::{LabSettings, SettingProblem, read_settings, within};
+use mapper_core::BackendError;
+use mapper_physics::nominal_rig::NominalRig;
+use mapper_yaml::units::{Conductance, Fraction, Length, Quantity};
+use serde::Deserialize;
+
+/// The keys below `structure`. Everything may be left out.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct StructureFile {
+    /// Conductance between neighbouring nodes of the housing; 5 W/K where left out.
+    housing_coupling: Option<Quantity<Conductance>>,
+    /// By how much h falls along the passage; 50 % where left out.
+    uneven_h: Option<Quantity<Fraction>>,
+    /// Whether the gas has one temperature in all of the passage; it has not where left out.
+    mixed_gas: Option<bool>,
+    /// Length of the duct; 400 mm where left out.
+    duct_length: Option<Quantity<Length>>,
+    /// Loss of the duct over its dynamic pressure; 0.2 where left out.
+    duct_loss: Option<f64>,
+    /// Share of the outlet volume before the duct; 30 % where left out.
+    volume_share: Option<Quantity<Fraction>>,
+    /// Loss of efficiency once the flow has separated; 1 % where left out.
+    hysteresis: Option<Quantity<Fraction>>,
+    /// Factor on the natural frequencies of the sensors; 1 where left out.
+    sensor_speed: Option<f64>,
+}
+
+/// Reads a campaign's settings for this lab.
+///
+/// # Errors
+/// [`BackendError::Settings`] with the key that is wrong and what would be right.
+pub(super) fn read(settings: &serde_json::Value, nominal: &NominalRig) -> Result<LabSettings, BackendError> {
+    read_keys(settings, nominal).map_err(|error| match error {
+        BackendError::Settings { path, source, .. } => {
+            BackendError::Settings { backend: NAME.to_owned(), path, source }
+        }
+        other => other,
+    })
+}
+
+fn read_keys(settings: &serde_json::Value, nominal: &NominalRig) -> Result<LabSettings, BackendError> {
+    let mut rest = settings.clone();
+    let own = rest.as_object_mut().and_then(|keys| keys.remove("structure")).unwrap_or_default();
+    let file: StructureFile = if own.is_null() {
+        StructureFile::default()
+    } else {
+        serde_path_to_error::deserialize(&own).map_err(|error| {
+            let key = format!("structure.{}", error.path());
+            SettingProblem::Form(error.into_inner()).at(key.trim_end_matches('.').to_owned())
+        })?
+    };
+    let mut lab = read_settings(&rest, nominal)?;
+    turn_into(&mut lab, file.structure()?);
+    Ok(lab)
+}
+
+impl StructureFile {
+    fn structure(&self) -> Result<OtherStructure, BackendError> {
+        let usual = OtherStructure::default();
+        let structure = OtherStructure {
+            housing_coupling_w_k: self.housing_coupling.map_or(usual.housing_coupling_w_k, |it| it.inside),
+            uneven_h_ratio: self.uneven_h.map_or(usual.uneven_h_ratio, |it| it.inside),
+            mixed_gas: self.mixed_gas.unwrap_or(usual.mixed_gas),
+            duct_length_m: self.duct_length.map_or(usual.duct_length_m, |it| it.inside),
+            duct_loss_ratio: self.duct_loss.unwrap_or(usual.duct_loss_ratio),
+            volume_share_ratio: self.volume_share.map_or(usual.volume_share_ratio, |it| it.inside),
+            hysteresis_ratio: self.hysteresis.map_or(usual.hysteresis_ratio, |it| it.inside),
+            sensor_speed_ratio: self.sensor_speed.unwrap_or(usual.sensor_speed_ratio),
+        };
+        for (key, value, unit, range) in [
+            ("housing_coupling", structure.housing_coupling_w_k, "W/K", 0.1..=1e6),
+            ("uneven_h", 100.0 * structure.uneven_h_ratio, "%", 0.0..=90.0),
+            ("duct_length", 1e3 * structure.duct_length_m, "mm", 1.0..=5e3),
+            ("duct_loss", structure.duct_loss_ratio, "", 0.0..=5.0),
+            ("volume_share", 100.0 * structure.volume_share_ratio, "%", 2.0..=90.0),
+            ("hysteresis", 100.0 * structure.hysteresis_ratio, "%", 0.0..=10.0),
+            ("sensor_speed", structure.sensor_speed_ratio, "", 0.1..=100.0),
+        ] {
+            within(value, unit, range).map_err(|problem| problem.at(format!("structure.{key}")))?;
+        }
+        Ok(structure)
+    }
+}

@@ -1,0 +1,80 @@
+//! What the equations of this lab have that the lumped model has not, in numbers.
+
+use mapper_core::Channel;
+
+/// Name under which campaigns ask for this backend.
+pub const NAME: &str = "other_lab";
+
+/// The structure. The defaults were set from the usual build of such machines before anything was diagnosed with them, and
+/// are not fitted to how a diagnosis comes out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OtherStructure {
+    /// Conductance between neighbouring nodes of the housing, W/K, > 0. Aluminium, 160 W/(m K), a wall of 150 mm by 8 mm,
+    /// nodes 40 mm apart: 5 W/K.
+    pub housing_coupling_w_k: f64,
+    /// By how much h falls along the passage, ratio: 0 is even; 0.5 is from 1.5 times the mean behind the wheel to 0.5
+    /// times at the outlet flange.
+    pub uneven_h_ratio: f64,
+    /// Whether the gas has one temperature in all of the passage, as in the lumped model; it cools along it otherwise.
+    pub mixed_gas: bool,
+    /// Length of the duct between the two volumes, m, > 0: its gas has inertia.
+    pub duct_length_m: f64,
+    /// Loss of the duct over its dynamic pressure.
+    pub duct_loss_ratio: f64,
+    /// Share of the outlet volume that lies between wheel and duct, 0..1 without its ends.
+    pub volume_share_ratio: f64,
+    /// Loss of efficiency, as a ratio, once the flow has separated; half of it is the loss of flow.
+    pub hysteresis_ratio: f64,
+    /// Factor on the natural frequencies of all sensors; infinity for sensors that follow at once.
+    pub sensor_speed_ratio: f64,
+}
+
+impl Default for OtherStructure {
+    fn default() -> Self {
+        OtherStructure {
+            housing_coupling_w_k: 5.0,
+            uneven_h_ratio: 0.5,
+            mixed_gas: false,
+            duct_length_m: 0.4,
+            duct_loss_ratio: 0.2,
+            volume_share_ratio: 0.3,
+            hysteresis_ratio: 0.01,
+            sensor_speed_ratio: 1.0,
+        }
+    }
+}
+
+impl OtherStructure {
+    /// The limit in which these equations become the lumped model's: nodes tied together, even h, mixed gas, a short duct without loss,
+    /// hardly a volume before it, no hysteresis, fast sensors.
+    pub fn lumped_limit() -> Self {
+        OtherStructure {
+            housing_coupling_w_k: 1e5,
+            uneven_h_ratio: 0.0,
+            mixed_gas: true,
+            duct_length_m: 1e-3,
+            duct_loss_ratio: 0.0,
+            volume_share_ratio: 0.02,
+            hysteresis_ratio: 0.0,
+            sensor_speed_ratio: f64::INFINITY,
+        }
+    }
+
+    /// Sensors of second order: channel, natural frequency in Hz, damping. Pressure lines ring, meters are filtered, probes
+    /// in a sheath are slow twice.
+    pub(super) fn sensors(&self) -> Vec<(Channel, f64, f64)> {
+        let usual = [
+            (Channel::P2, 8.0, 0.5),
+            (Channel::CompressorFlow, 3.0, 0.7),
+            (Channel::TurbineFlow, 3.0, 0.7),
+            (Channel::T2, 2.0, 1.2),
+            (Channel::T4, 1.0, 1.2),
+            (Channel::Tc, 0.2, 1.2),
+            (Channel::Tt, 0.2, 1.2),
+        ];
+        if self.sensor_speed_ratio.is_infinite() {
+            return Vec::new();
+        }
+        usual.map(|(channel, hz, damping)| (channel, hz * self.sensor_speed_ratio, damping)).to_vec()
+    }
+}

@@ -1,0 +1,104 @@
+//! The lab of other equations: where they become the lumped model's, and whether its energy closes.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_backends::other_lab::{OtherStructure, turn_into};
+use mapper_backends::virtual_lab::{LabSettings, Structure, VirtualLab};
+use mapper_core::{Backend, CHANNELS, Channel, RigMode, SampleBatch, Setpoints};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::simulate::Watch;
+use mapper_physics::steady;
+
+const OPENING: f64 = 0.7;
+
+fn setpoints(speed_rpm: f64) -> Setpoints {
+    let boundary = BoundaryConditions { valve_opening_ratio: OPENING, ..Default::default() };
+    let p3_pa = steady::hold_speed(&Model::nominal(), speed_rpm, &boundary).unwrap().boundary.p3_pa;
+    Setpoints {
+        mode: RigMode::Running,
+        p3_pa,
+        t3_k: 773.15,
+        valve_opening_ratio: OPENING,
+        oil_temperature_k: 323.15,
+    }
+}
+
+/// Ten seconds at 110 krpm, 110 at 50 krpm, without noise.
+fn recorded(structure: Option<OtherStructure>) -> SampleBatch {
+    let mut settings = LabSettings::ideal(Model::nominal(), BoundaryConditions::default());
+    if let Some(structure) = structure {
+        turn_into(&mut settings, structure);
+    }
+    let mut lab = VirtualLab::new(settings);
+    lab.arm().unwrap();
+    lab.set(&setpoints(110e3)).unwrap();
+    lab.poll(10.0).unwrap();
+    lab.set(&setpoints(50e3)).unwrap();
+    lab.poll(120.0).unwrap()
+}
+
+fn column(batch: &SampleBatch, channel: Channel) -> &[f64] {
+    &batch.columns.iter().find(|column| column.channel == channel).unwrap().values
+}
+
+/// With nodes tied together, even h, mixed gas, next to no duct and fast sensors only the gas in the first volume is left,
+/// which is under way for a millisecond: a hundredth of the noise that campaigns declare of one sample.
+#[test]
+fn tied_together_it_is_the_virtual_lab() {
+    let (lumped, other) = (recorded(None), recorded(Some(OtherStructure::lumped_limit())));
+    for (channel, most) in [
+        (Channel::ShaftSpeed, 1.0),
+        (Channel::CompressorFlow, 1e-5),
+        (Channel::P2, 1.0),
+        (Channel::T2, 0.01),
+        (Channel::Tc, 0.01),
+        (Channel::Tt, 0.01),
+    ] {
+        // From a second after the jump on.
+        let pairs = column(&lumped, channel).iter().zip(column(&other, channel)).skip(10);
+        let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < most, "{channel}: {apart} apart, {most} allowed");
+    }
+}
+
+/// As it is it is another machine: by more than the noise of the declared rig in what the structure changes.
+#[test]
+fn as_it_is_it_is_another_machine() {
+    let (lumped, other) = (recorded(None), recorded(Some(OtherStructure::default())));
+    assert_eq!(lumped.columns.len(), CHANNELS.len());
+    let apart = |channel| {
+        let pairs = column(&lumped, channel).iter().zip(column(&other, channel)).skip(10);
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    assert!(
+        apart(Channel::T2) > 0.1 && apart(Channel::Tc) > 0.3,
+        "{} {}",
+        apart(Channel::T2),
+        apart(Channel::Tc)
+    );
+}
+
+/// At rest all heat from both gases goes to the cell and the oil (the shaft's power goes from gas to gas).
+#[test]
+fn at_rest_the_energy_closes() {
+    let model = Model::nominal();
+    let mut boundary = BoundaryConditions { valve_opening_ratio: OPENING, ..Default::default() };
+    boundary.p3_pa = setpoints(110e3).p3_pa;
+    let structure = OtherStructure::default();
+    let mut machine = structure.settled(&model, 0.0, &boundary, Watch::default()).unwrap();
+    let mut checked = 0;
+    let inputs = mapper_backends::virtual_lab::LabInputs::held(&boundary);
+    let mut on_sample = |_: f64, _: &_, outputs: &mapper_physics::model::Outputs| {
+        let to_metal_w = outputs.compressor_heat_w + outputs.turbine.heat_w;
+        let to_oil_w =
+            model.params.bearing.oil_conductance_w_k * (outputs.bearing_k - boundary.oil_temperature_k);
+        let to_cell_w = outputs.compressor_external_heat_w + outputs.turbine_external_heat_w;
+        let left_w = to_metal_w - to_oil_w - to_cell_w;
+        assert!(left_w.abs() < 1e-3, "{left_w} W of {to_metal_w} W");
+        let flows = [outputs.flow_kg_s, outputs.valve_flow_kg_s];
+        assert!((flows[0] / flows[1] - 1.0).abs() < 1e-6, "{flows:?}");
+        checked += 1;
+    };
+    machine.run_to(1.0, &inputs, &mut [0.0, 0.5, 1.0].into_iter(), &mut on_sample, &mut |_| {}).unwrap();
+    assert_eq!(checked, 3);
+}

@@ -11,7 +11,8 @@ FORMAT is one of
   mdf4      asammdf: one group a device, compressed blocks
   mcap      mcap: one topic a device, units in the metadata
   tdms      npTDMS: one group a device, all channels waveforms with a start and an increment
-  tdms_time npTDMS: one group a device, each with a channel of dates
+  tdms_time npTDMS: one group a device, each with a channel of seconds
+  tdms_date npTDMS: the same with a channel of dates
   parquet   polars: names with units in brackets, seconds
   arrow     polars: the same as Arrow's file, with dates instead of seconds
 
@@ -95,7 +96,7 @@ def write_mdf4(target, times, groups):
 START = np.datetime64("2026-11-22T09:58:21.300000", "us")
 
 
-def write_tdms(target, times, groups, dates):
+def write_tdms(target, times, groups, clock):
     from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
     with TdmsWriter(target) as writer:
@@ -105,11 +106,11 @@ def write_tdms(target, times, groups, dates):
             for topic, fields in groups.items():
                 group = topic.split("/")[-1]
                 objects.append(GroupObject(group))
-                if dates:
-                    objects.append(ChannelObject(group, "time", stamps(times[rows])))
+                if clock:
+                    objects.append(ChannelObject(group, "time", clock(times[rows]), {"unit_string": "s"}))
                 for field, values in fields.items():
                     properties = {"unit_string": unit_of(field)}
-                    if not dates:
+                    if not clock:
                         properties |= {"wf_start_time": START, "wf_start_offset": float(times[0]), "wf_increment": 0.1}
                     objects.append(ChannelObject(group, field, values[rows], properties))
             writer.write_segment(objects)
@@ -242,8 +243,8 @@ def main():
             write_mcap(target, times, groups)
         case "mdf4":
             write_mdf4(target, times, groups)
-        case "tdms" | "tdms_time":
-            write_tdms(target, times, groups, kind == "tdms_time")
+        case "tdms" | "tdms_time" | "tdms_date":
+            write_tdms(target, times, groups, {"tdms_time": np.asarray, "tdms_date": stamps}.get(kind))
         case "parquet":
             write_parquet(target, times, groups)
         case "arrow":

@@ -5,7 +5,7 @@ use crate::{FleetError, Kind, StudyFile};
 /// The kind of this name; a mistake at its place in the file where there is none.
 ///
 /// # Errors
-/// [`StudyFileError::Mistakes`].
+/// [`FleetError::StudyFile`].
 pub fn kind_of<'a>(study: &StudyFile, kinds: &[&'a dyn Kind]) -> Result<&'a dyn Kind, FleetError> {
     if let Some(kind) = kinds.iter().find(|kind| kind.name() == study.kind) {
         return Ok(*kind);

@@ -90,7 +90,7 @@ pub struct Progress {
 }
 
 enum Said {
-    Event(SessionEvent),
+    Event(Box<SessionEvent>),
     /// Takes the bar away and answers.
     Clear(SyncSender<()>),
 }
@@ -111,7 +111,7 @@ impl Progress {
         if !self.manner.shows(event) {
             return;
         }
-        match self.to.try_send(Said::Event(event.clone())) {
+        match self.to.try_send(Said::Event(Box::new(event.clone()))) {
             Ok(()) => self.stalled.store(false, Ordering::Relaxed),
             Err(TrySendError::Full(said)) if !self.stalled.load(Ordering::Relaxed) => {
                 std::thread::sleep(PATIENCE);

@@ -6,8 +6,8 @@ use crate::parts::{Part, side_by_side};
 use crate::table_head::COLUMN_LIMIT;
 use crate::table_log::Table;
 use mapper_logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
-use std::io::{Read, Seek as _, SeekFrom};
-use tedium::{ChannelPath, DataType, PropertyPath, PropertyValue, TdmsError, TdmsFile, TdmsStorageType};
+use std::io::{Seek as _, SeekFrom};
+use tedium::{ChannelPath, PropertyPath, PropertyValue, TdmsError, TdmsFile, TdmsStorageType};
 
 /// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
@@ -30,52 +30,13 @@ fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"TDSm")
 }
 
-/// A date and time of day as the file has it.
-#[derive(Clone, Copy)]
-struct Stamp {
-    /// Since 1904.
-    seconds: i64,
-    /// Of a second, in 2^-64.
-    fraction: u64,
-}
-
-impl Stamp {
-    fn instant(self) -> Option<Instant> {
-        let day = self.seconds.div_euclid(86_400) - EPOCH_DAYS;
-        // The fraction to the nanosecond: what is below is lost in every f64 of a date.
-        let ns = (u128::from(self.fraction) * 1_000_000_000) >> 64;
-        let ns_of_day = self.seconds.rem_euclid(86_400) * 1_000_000_000 + i64::try_from(ns).ok()?;
-        DAYS.contains(&day).then_some(Instant { day: Some(day), ns_of_day: Some(ns_of_day) })
-    }
-}
-
-impl TdmsStorageType for Stamp {
-    const SUPPORTED_TYPES: &'static [DataType] = &[DataType::Timestamp];
-    const NATURAL_TYPE: DataType = DataType::Timestamp;
-
-    fn read_le(reader: &mut impl Read) -> Result<Self, TdmsError> {
-        let (fraction, seconds) = (u64::read_le(reader)?, i64::read_le(reader)?);
-        Ok(Stamp { seconds, fraction })
-    }
-
-    fn read_be(reader: &mut impl Read) -> Result<Self, TdmsError> {
-        let (seconds, fraction) = (i64::read_be(reader)?, u64::read_be(reader)?);
-        Ok(Stamp { seconds, fraction })
-    }
-
-    fn write_le(&self, writer: &mut impl std::io::Write) -> Result<(), TdmsError> {
-        self.fraction.write_le(writer)?;
-        self.seconds.write_le(writer)
-    }
-
-    fn write_be(&self, writer: &mut impl std::io::Write) -> Result<(), TdmsError> {
-        self.seconds.write_be(writer)?;
-        self.fraction.write_be(writer)
-    }
-
-    fn size(&self) -> usize {
-        16
-    }
+/// A date and time of day as the file has it: seconds since 1904 and a fraction of one in 2^-64.
+fn instant((seconds, fraction): (i64, u64)) -> Option<Instant> {
+    let day = seconds.div_euclid(86_400).checked_sub(EPOCH_DAYS)?;
+    // The fraction to the nanosecond: what is below is lost in every f64 of a date.
+    let ns = (u128::from(fraction) * 1_000_000_000) >> 64;
+    let ns_of_day = seconds.rem_euclid(86_400) * 1_000_000_000 + i64::try_from(ns).ok()?;
+    DAYS.contains(&day).then_some(Instant { day: Some(day), ns_of_day: Some(ns_of_day) })
 }
 
 type Source = TdmsFile<Box<dyn ReadSeek>>;
@@ -95,14 +56,8 @@ fn numbers<T: TdmsStorageType + Copy + Default>(
     Ok(Chunk::Numbers(values.into_iter().map(number).collect()))
 }
 
-fn instants(source: &mut Source, path: &ChannelPath, from: u64, count: usize) -> Result<Chunk, TdmsError> {
-    let mut values = vec![Stamp { seconds: 0, fraction: 0 }; count];
-    source.read_channel_from(path, from, &mut values)?;
-    Ok(Chunk::Instants(values.into_iter().map(Stamp::instant).collect()))
-}
-
-/// One for each type that a channel of readings or a clock may have, with the bytes of a value.
-const READERS: [(u64, ReadValues); 12] = [
+/// One for each type that is read, with the bytes of a value.
+const READERS: [(u64, ReadValues); 11] = [
     (8, |s, p, from, n| numbers::<f64>(s, p, from, n, |v| v)),
     (4, |s, p, from, n| numbers::<f32>(s, p, from, n, f64::from)),
     (2, |s, p, from, n| numbers::<i16>(s, p, from, n, f64::from)),
@@ -115,7 +70,6 @@ const READERS: [(u64, ReadValues); 12] = [
     (8, |s, p, from, n| numbers::<i64>(s, p, from, n, |v| v as f64)),
     (8, |s, p, from, n| numbers::<u64>(s, p, from, n, |v| v as f64)),
     (1, |s, p, from, n| numbers::<bool>(s, p, from, n, |v| f64::from(u8::from(v)))),
-    (16, instants),
 ];
 
 /// A channel that is read.
@@ -150,7 +104,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     let mut source = TdmsFile::new(bytes).map_err(|error| failed(file, &error))?;
     let names: Vec<String> = source.list_groups().map(plain).collect();
     let (mut found, mut problems, mut channels) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut left_out, mut seen) = (0usize, 0usize);
+    let (mut empty, mut seen) = (0usize, 0usize);
     for name in &names {
         let paths: Vec<ChannelPath> = source.list_channels_in_group(&PropertyPath::group(name)).collect();
         seen += paths.len();
@@ -160,8 +114,9 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         let mut of_group: Vec<Channel> = Vec::new();
         for path in paths {
             match channel(&mut source, path, size) {
-                Some(channel) => of_group.push(channel),
-                None => left_out += 1,
+                Ok(Some(channel)) => of_group.push(channel),
+                Ok(None) => empty += 1,
+                Err(why) => return Err(file.content(NAME, why)),
             }
         }
         for channels_of in by_clock(of_group, options) {
@@ -177,8 +132,8 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             }
         }
     }
-    if left_out > 0 {
-        problems.push(format!("{left_out} channels are left out: texts, empty, or of a type that is not read"));
+    if empty > 0 {
+        problems.push(format!("{empty} channels are left out: they are empty"));
     }
     let (layout, parts) = side_by_side("group", found, problems).map_err(|why| file.content(NAME, why))?;
     Ok(Box::new(Tdms { file: file.clone(), layout, source, parts, channels }))
@@ -193,13 +148,17 @@ fn plain(name: &str) -> String {
     name.trim_matches('\'').replace("''", "'")
 }
 
-/// The channel, if it holds numbers or dates.
-fn channel(source: &mut Source, path: ChannelPath, file_bytes: u64) -> Option<Channel> {
-    let length = source.channel_length(&path).filter(|length| *length > 0)?;
-    let (value_bytes, read) = READERS.into_iter().find(|(_, read)| read(source, &path, 0, 1).is_ok())?;
+/// The channel, if it holds any numbers; why the file cannot be read where it holds something else: the library takes a date for half as
+/// long as it is, and would read the channels behind it at the wrong places.
+fn channel(source: &mut Source, path: ChannelPath, file_bytes: u64) -> Result<Option<Channel>, String> {
+    let Some(length) = source.channel_length(&path).filter(|length| *length > 0) else { return Ok(None) };
+    let Some((value_bytes, read)) = READERS.into_iter().find(|(_, read)| read(source, &path, 0, 1).is_ok()) else {
+        let name = path.channel_name();
+        return Err(format!("channel `{name}` holds no plain numbers (dates, say): leave it out of the file, or export it as CSV or MDF 4"));
+    };
     // A damaged file declares more values than it has bytes; what is not there would be read as zeros.
     if length > file_bytes / value_bytes {
-        return None;
+        return Err(format!("channel `{}` has {length} values in a file of {file_bytes} bytes", path.channel_name()));
     }
     let of_path = PropertyPath::channel(path.group_name(), path.channel_name());
     let property = |name: &str| source.read_property(&of_path, name).ok().flatten();
@@ -213,10 +172,7 @@ fn channel(source: &mut Source, path: ChannelPath, file_bytes: u64) -> Option<Ch
         _ => None,
     });
     let start = match property("wf_start_time") {
-        Some(PropertyValue::Timestamp(stamp)) => {
-            let (seconds, fraction) = stamp.to_parts();
-            Stamp { seconds, fraction }.instant()
-        }
+        Some(PropertyValue::Timestamp(stamp)) => instant(stamp.to_parts()),
         _ => None,
     };
     let waveform = number("wf_increment").filter(|interval_s| *interval_s > 0.0 && interval_s.is_finite()).map(|interval_s| Waveform {
@@ -224,7 +180,7 @@ fn channel(source: &mut Source, path: ChannelPath, file_bytes: u64) -> Option<Ch
         start_offset_s: number("wf_start_offset").filter(|offset_s| offset_s.is_finite()).unwrap_or(0.0),
         start,
     });
-    Some(Channel { path, unit: unit.unwrap_or_default(), length, read, waveform })
+    Ok(Some(Channel { path, unit: unit.unwrap_or_default(), length, read, waveform }))
 }
 
 /// Channels that share a clock: those of one waveform, and all that have none. A clock or a rate that a user names counts more.

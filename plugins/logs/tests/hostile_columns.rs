@@ -15,7 +15,7 @@ use tedium::{ChannelPath, DataLayout, PropertyPath, PropertyValue, TdmsFile};
 fn look(bytes: &[u8]) -> Option<u64> {
     let file = LogFile::of_bytes(Path::new("log"), bytes);
     let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).ok()?;
-    survey(log.as_mut()).ok().map(|found| found.groups[0].rows as u64)
+    survey(log.as_mut()).ok().map(|found| found.groups[0].rows)
 }
 
 const ROWS: usize = 300;

@@ -6,10 +6,10 @@
 
 mod columns;
 
-use columns::Columns;
 use crate::heading::heading;
 use crate::lines::{Row, map_of_rows, room_for_one_more};
 use crate::reference;
+use columns::Columns;
 use mapper_core::{CompressorMap, ExportError, ImportError, MapFormat, ReferenceState};
 use mapper_yaml::units::HeadingError;
 use std::fmt::Write;

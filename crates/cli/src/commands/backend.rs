@@ -91,7 +91,10 @@ impl Backend {
         }
         let (registry, model) = (registry::registry(), nominal_model(&campaign)?);
         // Mistakes in the settings are told as those of a campaign.
-        let rig = registry.make_backend(&campaign, &model).map_err(|error| Failure::in_campaign(error, path))?.describe();
+        let rig = registry
+            .make_backend(&campaign, &model)
+            .map_err(|error| Failure::in_campaign(error, path))?
+            .describe();
         // A rig that another runner has, or that is latched, is left alone.
         let states = RigStates::new(&rig_states::directory(None));
         let claim = rig.exclusive.as_deref().map(|rig| states.claim(rig, None)).transpose()?;

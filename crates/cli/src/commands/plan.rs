@@ -13,7 +13,8 @@ use mapper_physics::model::Model;
 use mapper_planner::PlanRequest;
 use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
 use mapper_session::{
-    Rehearsal, Session, SessionError, compared, json_text, nominal_model, plan_of, rehearse, with_plan_request,
+    Rehearsal, Session, SessionError, compared, json_text, nominal_model, plan_of, rehearse,
+    with_plan_request,
 };
 use std::path::PathBuf;
 

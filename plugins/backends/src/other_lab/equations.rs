@@ -14,9 +14,7 @@ pub fn turn_into(lab: &mut LabSettings, structure: OtherStructure) {
     let sensors = structure.sensors();
     lab.second_order = sensors
         .into_iter()
-        .map(|(channel, frequency_hz, damping_ratio)| {
-            (channel, SecondOrder { frequency_hz, damping_ratio })
-        })
+        .map(|(channel, frequency_hz, damping_ratio)| (channel, SecondOrder { frequency_hz, damping_ratio }))
         .collect();
     lab.structure = Arc::new(structure);
 }

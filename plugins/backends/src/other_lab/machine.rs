@@ -122,9 +122,8 @@ pub(super) fn evaluate(
     let bulk_k = compression::compressed_k(boundary.t1_k, rise_ratio, lumped.efficiency);
     let cp2_j_kgk = moist_cp_ratio * air::heat_capacity_j_kgk(bulk_k);
     let whole_w_k = lumped.h_w_m2k * compressor.internal_area_m2;
-    let directed_w_k = |wall_k: f64, gas_k: f64| {
-        whole_w_k * if wall_k > gas_k { compressor.hot_metal_h_ratio } else { 1.0 }
-    };
+    let directed_w_k =
+        |wall_k: f64, gas_k: f64| whole_w_k * if wall_k > gas_k { compressor.hot_metal_h_ratio } else { 1.0 };
     let behind_w_k =
         |wall_k: f64, gas_k: f64| directed_w_k(wall_k, gas_k) * (1.0 - compressor.alpha_area_ratio);
     let h_ratios = h_ratios(structure);
@@ -149,8 +148,7 @@ pub(super) fn evaluate(
     let loss_pa = structure.duct_loss_ratio * duct_kg_s * duct_kg_s.abs()
         / (2.0 * density_kg_m3 * section_m2 * section_m2);
     let duct_rate = section_m2 / structure.duct_length_m * (p_first_pa - p_second_pa - loss_pa);
-    let p_first_rate =
-        GAMMA * gas_constant_j_kgk / first_m3 * (flow_kg_s * gas_k - duct_kg_s * t_first_k);
+    let p_first_rate = GAMMA * gas_constant_j_kgk / first_m3 * (flow_kg_s * gas_k - duct_kg_s * t_first_k);
     let gas_kg = p_first_pa * first_m3 / (gas_constant_j_kgk * t_first_k);
     let gas_rate =
         (flow_kg_s * cp2_j_kgk * (gas_k - t_first_k) + first_m3 * p_first_rate) / (gas_kg * cp2_j_kgk);

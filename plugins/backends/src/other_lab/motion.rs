@@ -7,9 +7,7 @@ use mapper_physics::inputs::Inputs;
 use mapper_physics::model::{Model, Outputs, State};
 use mapper_physics::params::{BoundaryConditions, Params};
 use mapper_physics::rosenbrock::{Integrator, OdeSystem, Tolerances};
-use mapper_physics::simulate::{
-    Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch,
-};
+use mapper_physics::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch};
 
 /// Time in which everything has come to rest: many time constants of the turbine housing, s.
 const LONG_S: f64 = 40_000.0;

@@ -39,9 +39,8 @@ pub(super) fn along(
     flow_kg_s: f64,
     cp_j_kgk: f64,
 ) -> (f64, [f64; NODES]) {
-    let node_w_k = |node: usize, gas_k: f64| {
-        conductance_w_k(walls_k[node], gas_k) * h_ratios[node] * AREA_SHARES[node]
-    };
+    let node_w_k =
+        |node: usize, gas_k: f64| conductance_w_k(walls_k[node], gas_k) * h_ratios[node] * AREA_SHARES[node];
     if mixed {
         // Each node meets the gas of the outlet: eq. 3 with several walls.
         let nodes_w_k: [f64; NODES] = std::array::from_fn(|node| node_w_k(node, gas_k));

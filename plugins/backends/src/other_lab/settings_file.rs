@@ -1,8 +1,8 @@
 //! The lab's settings as a campaign writes them below `backend: {other_lab: ...}`: all keys of the virtual lab, and
 //! `structure`.
 
-use super::structure::{NAME, OtherStructure};
 use super::equations::turn_into;
+use super::structure::{NAME, OtherStructure};
 use crate::virtual_lab::{LabSettings, SettingProblem, read_settings, within};
 use mapper_core::BackendError;
 use mapper_physics::nominal_rig::NominalRig;

@@ -28,9 +28,8 @@ pub struct LabInputs {
 impl LabInputs {
     /// Everything held at `boundary`.
     pub fn held(boundary: &BoundaryConditions) -> Self {
-        let at_rest = |value: f64| {
-            Actuator::at_rest(ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY }, value)
-        };
+        let at_rest =
+            |value: f64| Actuator::at_rest(ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY }, value);
         LabInputs {
             cell: *boundary,
             weather: Weather::default(),

@@ -150,7 +150,9 @@ impl Backend for VirtualLab {
                     .collect(),
                 second_order: CHANNELS
                     .iter()
-                    .map(|row| settings.second_order.get(&row.channel).map(|of| SecondOrderFollower::new(*of)))
+                    .map(|row| {
+                        settings.second_order.get(&row.channel).map(|of| SecondOrderFollower::new(*of))
+                    })
                     .collect(),
                 resonator: Resonator::new(settings.surge_precursor, settings.seed),
             },
@@ -317,7 +319,8 @@ impl Armed {
         }
         let first_index = self.next_sequence + batch.len() as u64;
         let rate_hz = settings.sample_rate_hz;
-        let mut sample_times_s = (first_index..).map(|index| index as f64 / rate_hz).take_while(|t| *t <= end_s);
+        let mut sample_times_s =
+            (first_index..).map(|index| index as f64 / rate_hz).take_while(|t| *t <= end_s);
         let Armed { inputs, machine, readers, commands, .. } = self;
         match machine {
             None => Err(BackendError::OutOfOrder {

@@ -128,11 +128,7 @@ impl SettingProblem {
 ///
 /// # Errors
 /// [`SettingProblem::OutOfRange`].
-pub fn within(
-    value: f64,
-    unit: &'static str,
-    range: RangeInclusive<f64>,
-) -> Result<(), SettingProblem> {
+pub fn within(value: f64, unit: &'static str, range: RangeInclusive<f64>) -> Result<(), SettingProblem> {
     if range.contains(&value) {
         return Ok(());
     }

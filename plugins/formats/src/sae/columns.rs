@@ -60,7 +60,9 @@ impl Columns {
 /// Headings between blanks, commas and semicolons; a unit behind a blank belongs to the name before it.
 fn fields(line: &str) -> Vec<String> {
     let mut fields: Vec<String> = Vec::new();
-    for word in line.split(|c: char| c.is_whitespace() || matches!(c, ',' | ';')).filter(|word| !word.is_empty()) {
+    for word in
+        line.split(|c: char| c.is_whitespace() || matches!(c, ',' | ';')).filter(|word| !word.is_empty())
+    {
         match fields.last_mut().filter(|_| word.starts_with(['[', '('])) {
             Some(name) => name.push_str(word),
             None => fields.push(word.to_owned()),

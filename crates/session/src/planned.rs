@@ -13,9 +13,7 @@ use mapper_planner::{
     Comparison, Now, PlanRequest, after_step, before_first_step, best, clearly_cheaper, compare, make_plan,
 };
 
-/// How often an order is sought about the plan that the last one gave.
-const ROUNDS: usize = 4;
-/// Most steps of a plan that is ordered again: each round goes through all of them several times.
+/// Most steps of a plan that is ordered again: that goes through all of them several times.
 const MOST_STEPS: usize = 400;
 /// What another order has to save of the time, to be taken.
 const SAVES_RATIO: f64 = 0.005;
@@ -60,14 +58,9 @@ fn priced(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, Sessio
     if !request.order.needs_method() || request.appended.is_some() || plan.steps.len() > MOST_STEPS {
         return Ok(plan);
     }
-    let mut cheapest = plan;
-    for _ in 0..ROUNDS {
-        match reordered(campaign, request, &cheapest)? {
-            Some(other) if clearly_cheaper(&other, &cheapest, 1.0 - SAVES_RATIO) => cheapest = other,
-            _ => break,
-        }
-    }
-    Ok(cheapest)
+    // Once: about the plan that this gives, nothing better was found on any campaign that was tried.
+    let other = reordered(campaign, request, &plan)?;
+    Ok(other.filter(|other| clearly_cheaper(other, &plan, 1.0 - SAVES_RATIO)).unwrap_or(plan))
 }
 
 /// The plan in another order, by what each step is worth with the dwell that it has; `None` where none was found.

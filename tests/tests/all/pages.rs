@@ -58,6 +58,15 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     // The map of where, and the traces; the parser of a browser leaves out what is no SVG.
     assert_eq!(dom.matches("<svg").count(), 2, "{dom}");
     assert!(dom.matches("<polyline").count() + dom.matches("<path").count() > 8);
+
+    // The same on the page of the run.
+    let whole = scratch.path().join("run.html");
+    let run = only_run(&campaign.runs());
+    let arguments = ["report".as_ref(), run.as_os_str(), "--gap".as_ref(), campaign.path.as_os_str()];
+    mapper(arguments.into_iter().chain(["-o".as_ref(), whole.as_os_str()])).exits(0);
+    let text = std::fs::read_to_string(whole).unwrap();
+    let section = text.split("id=\"gap\"").nth(1).unwrap();
+    assert!(section.contains("(stem_conduction) explains the gap") && section.matches("<svg").count() == 2);
     for heading in [
         "Which",
         "Where",

@@ -41,6 +41,9 @@ pub(crate) fn open_log(
     options: &LogOptions,
     open: OpenBatches,
 ) -> Result<Box<dyn Log>, LogError> {
+    options
+        .only(&["time", "time_unit", "date_order", "rate", "missing"])
+        .map_err(|why| file.content(name, why))?;
     let (schema, batches) = contained(name, file, || open(file))?;
     let columns = schema.fields().len();
     if columns > COLUMN_LIMIT {

@@ -99,6 +99,9 @@ struct Tdms {
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
+    options
+        .only(&["time", "time_unit", "date_order", "rate", "missing"])
+        .map_err(|why| file.content(NAME, why))?;
     let mut bytes = file.open()?;
     let size = bytes.seek(SeekFrom::End(0)).map_err(|error| file.error(error))?;
     let mut source = TdmsFile::new(bytes).map_err(|error| failed(file, &error))?;

@@ -22,7 +22,7 @@ LEASE_S = 2.0
 STEP_S = 0.1  # between two setpoints on the way into the safe state
 HEATER_OFF_K = 293.15
 ATMOSPHERE_PA = 105e3
-TRIES = 3
+PATIENCE_S = 20.0  # how long a driver that nobody listens to goes on behind the longest way
 WAITING = 256  # messages for a host that does not read; samples beyond are dropped, which the host sees
 ROWS = 500  # samples in one message
 
@@ -193,11 +193,13 @@ class Server:
     def on_make_safe(self, _, __):
         armed = self.held()
         self.rig.make_safe()
-        armed["descent"] = armed["told"] = None
+        armed["descent"], armed["told"], armed["in_doubt"] = None, None, False
         return {}
 
     def on_disarm(self, _, __):
-        self.held()
+        armed = self.held()
+        if armed["told"] or armed["descent"]:
+            self.on_make_safe(None, None)  # a rig that does not confirm it is not let go
         self.rig.disarm()
         self.armed = None
         return {}
@@ -246,7 +248,8 @@ class Server:
             self.say("nothing was heard for the time of the lease; the rig flies its safe trajectory")
             self.begin_descent(now_s)
         next_s = max(0.0, armed["lease_s"] - now_s) if not armed["ended"] else 1.0
-        if not self.about["simulated_time"]:
+        # A rig that does not confirm its safe state is not polled, so that what watches the driver acts.
+        if not self.about["simulated_time"] and not armed.get("in_doubt"):
             period_s = 1.0 / self.about["sample_rate_hz"]
             due = max(0, int((now_s - armed["at_s"]) / period_s + 5e-7))
             if due >= armed["ticks"]:
@@ -271,35 +274,62 @@ class Server:
 
     def descend(self, now_s):
         """Valve open and heater off at once, P3 down at its slew, then the air off."""
-        told, begun_s = self.armed["descent"]
+        armed = self.armed
+        told, begun_s = armed["descent"]
         safe, simulated = self.about["safe"], self.about["simulated_time"]
         after_s = self.run_s(now_s) - begun_s + STEP_S
-        slew_pa_s = safe.get("p3_slew_pa_s")
-        if told and told["mode"] == "running" and slew_pa_s and after_s <= safe["within_s"]:
-            p3_pa = told["p3_pa"] - slew_pa_s * after_s
-            opening = max(told["valve_opening_ratio"], safe["valve_opening_ratio"])
-            if p3_pa > ATMOSPHERE_PA:
-                try:
-                    self.rig.set({**told, "p3_pa": p3_pa, "t3_k": HEATER_OFF_K, "valve_opening_ratio": opening})
+        if not armed.get("cut"):
+            try:
+                wanted = self.on_the_way(told, safe, after_s)
+                if wanted:
+                    self.rig.set(wanted)
                     if simulated:
-                        self.armed["polled_s"] += STEP_S
-                        self.rig.poll(self.armed["polled_s"])
+                        armed["polled_s"] += STEP_S
+                        self.rig.poll(armed["polled_s"])
                     return 0.0 if simulated else STEP_S
-                except Exception:
-                    pass  # then at once
-        self.armed["descent"] = None
-        if not self.cut_air():
-            self.say("the rig did not confirm its safe state")
-        return 0.0
+            except Exception:
+                pass  # then at once
+            armed["cut"] = True
+        if self.cut_air():
+            armed["descent"], armed["told"], armed["in_doubt"] = None, None, False
+        else:
+            if not armed.get("in_doubt"):
+                self.say("the rig did not confirm its safe state, and is told again")
+            armed["in_doubt"] = True
+            if simulated:
+                armed["polled_s"] += STEP_S
+            if self.leaving and after_s > safe["within_s"] + PATIENCE_S:
+                armed["descent"] = None  # nobody listens, and the rig does not answer
+        return STEP_S
+
+    def on_the_way(self, told, safe, after_s):
+        """What the rig is told after_s into the way; None: the air is cut."""
+        slew_pa_s = safe.get("p3_slew_pa_s")
+        if not (told and told.get("mode") == "running" and slew_pa_s and after_s <= safe["within_s"]):
+            return None
+        p3_pa = told["p3_pa"] - slew_pa_s * after_s
+        if p3_pa <= ATMOSPHERE_PA:
+            return None
+        wanted = {
+            **told,
+            "p3_pa": p3_pa,
+            "t3_k": HEATER_OFF_K,
+            "valve_opening_ratio": max(told["valve_opening_ratio"], safe["valve_opening_ratio"]),
+        }
+        # A command that the rig refuses would cut the air at full pressure.
+        accepts = self.about.get("accepts") or {}
+        for key in ("t3_k", "valve_opening_ratio"):
+            if key in accepts:
+                low, high = accepts[key]
+                wanted[key] = max(min(wanted[key], high), low)
+        return wanted
 
     def cut_air(self):
-        for _ in range(TRIES):
-            try:
-                self.rig.make_safe()
-                return True
-            except Exception:
-                continue
-        return False
+        try:
+            self.rig.make_safe()
+            return True
+        except Exception:
+            return False
 
 
 def read_frame(stream):
@@ -356,22 +386,33 @@ def serve(name, version, open_rig):
         for message in server.out:
             try:
                 to_write.put_nowait(json.dumps(message, allow_nan=False).encode())
-            except (queue.Full, ValueError):
+            except queue.Full:
                 pass  # it will be missed: by its number, or by the deadline of who asked
+            except Exception as error:  # numpy's numbers, say: json does not know them
+                print(f"not sent: {error!r}; give plain numbers and texts", file=sys.stderr)
         server.out.clear()
 
-    while not server.over():
-        try:
-            while True:  # what has come while the rig was busy has come in time
-                heed(news.get_nowait())
-        except queue.Empty:
-            pass
-        within_s = server.tick(time.monotonic())
-        send()
-        if server.over():
-            break
-        try:
-            heed(news.get(timeout=within_s))
-        except queue.Empty:
-            pass
-        send()
+    try:
+        while not server.over():
+            try:
+                while True:  # what has come while the rig was busy has come in time
+                    heed(news.get_nowait())
+            except queue.Empty:
+                pass
+            within_s = server.tick(time.monotonic())
+            send()
+            if server.over():
+                break
+            try:
+                heed(news.get(timeout=within_s))
+            except queue.Empty:
+                pass
+            send()
+    finally:
+        # Whatever failed above: no rig is left driven.
+        if server.armed:
+            server.cut_air()
+            try:
+                server.rig.disarm()
+            except Exception:
+                pass  # nobody can be told

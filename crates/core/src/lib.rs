@@ -48,6 +48,7 @@ mod surge;
 mod thermal_model;
 mod timing;
 mod visit_order;
+mod way_down;
 mod window_rule;
 mod with_unit;
 

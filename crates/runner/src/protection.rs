@@ -1,7 +1,7 @@
 //! What stands around a run besides its guards: the way into the safe state, the band of the speed, the pace of looking.
 
 use crate::operator::Operator;
-use mapper_core::{SafeTrajectory, SpeedBand};
+use mapper_core::{SafeTrajectory, SetpointRanges, SpeedBand};
 use std::sync::atomic::AtomicBool;
 
 /// See the module. [`Protection::default`] has none of it.
@@ -11,6 +11,8 @@ pub struct Protection<'a> {
     pub safe: SafeTrajectory,
     /// P3 at which the air is cut, Pa: the lowest that the rig may be told.
     pub p3_min_pa: f64,
+    /// What the rig accepts, the way into the safe state included; `None`: everything.
+    pub accepts: Option<SetpointRanges>,
     /// How far a step may miss its speed; `None`: it is not looked at.
     pub speed: Option<SpeedBand>,
     /// Set from outside to stop at the end of the step.
@@ -28,6 +30,7 @@ impl Default for Protection<'_> {
         Protection {
             safe: SafeTrajectory::default(),
             p3_min_pa: 0.0,
+            accepts: None,
             speed: None,
             stop_after_step: &NEVER,
             each_sample: false,

@@ -1,20 +1,17 @@
 //! The way out when something is wrong: the safe state first, then the records of why.
 
 use crate::guard::Told;
+use crate::protection::Protection;
 use crate::run::{Halt, Run, RunEnd, RunError, words_of};
-use mapper_core::{BackendError, Event, EventKind, GuardName, RigMode, SampleBatch, Setpoints};
+use mapper_core::{BackendError, Event, EventKind, GuardName, SampleBatch, Setpoints};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Time between two setpoints on the way down, s.
 const STEP_S: f64 = 0.1;
 /// How long the rig is still watched after it was made safe, s: the recording shows that it got there.
 const WATCH_S: f64 = 5.0;
-/// A heater that is told this does not heat, K.
-const HEATER_OFF_K: f64 = 293.15;
 /// How often a rig is asked to become safe before it counts as lost.
 const TRIES: usize = 3;
-/// Largest opening of a valve.
-const VALVE_MAX_RATIO: f64 = mapper_core::OperatingPoint::OPENING_MAX_RATIO;
 
 /// The panic of a backend as an answer of it.
 #[derive(Debug, thiserror::Error)]
@@ -107,15 +104,8 @@ impl Run<'_, '_> {
 
     /// Setpoints on the way down after `after_s` of it; `None` where the air is to be cut.
     fn on_the_way(&self, from: &Setpoints, after_s: f64) -> Option<Setpoints> {
-        let safe = &self.protection.safe;
-        let p3_pa = from.p3_pa - safe.p3_slew_pa_s? * after_s;
-        let goes_on = from.mode == RigMode::Running && after_s <= safe.within_s;
-        (goes_on && p3_pa > self.protection.p3_min_pa).then_some(Setpoints {
-            p3_pa,
-            t3_k: HEATER_OFF_K,
-            valve_opening_ratio: from.valve_opening_ratio.max(safe.valve_opening_ratio).min(VALVE_MAX_RATIO),
-            ..*from
-        })
+        let Protection { safe, p3_min_pa, accepts, .. } = self.protection;
+        safe.setpoints(from, after_s, *p3_min_pa, accepts.as_ref())
     }
 
     /// The first command of the way. What it started from, where it goes on.

@@ -71,6 +71,7 @@ pub fn drive_paced(
     let protection = Protection {
         safe: campaign.safe_state.unwrap_or(rig.safe),
         p3_min_pa: campaign.limits.p3_min_pa,
+        accepts: rig.accepts,
         speed: campaign.guard_set().speed.filter(|_| rig.controls),
         stop_after_step: pace.stop_after_step,
         each_sample: pace.each_sample || !rig.simulated_time,

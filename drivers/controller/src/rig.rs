@@ -124,6 +124,11 @@ impl<C: Controller> Rig<C> {
         let _ = self.write(&[(Target::Heartbeat, count)]);
     }
 
+    /// The lowest that the heater may be told, K.
+    fn heater_off_k(&self) -> f64 {
+        self.stand.accepts.range(Target::T3).low
+    }
+
     fn channels(&self) -> Vec<Channel> {
         self.stand.channels.iter().copied().filter(|one| !COMMANDS.contains(one)).chain(COMMANDS).collect()
     }
@@ -175,7 +180,10 @@ impl<C: Controller> Backend for Rig<C> {
             return Err(BackendError::OutOfOrder { call: "arm", state: "armed", needed: "not armed" });
         }
         let opened = self.controller.open();
-        let begun = opened.and_then(|()| self.controller.write(&[(Target::Heartbeat, 0.0)]));
+        // A driver that was killed left the air on; a heartbeat must not bring it back.
+        let begun = opened
+            .and_then(|()| self.controller.write(&[(Target::Air, 0.0)]))
+            .and_then(|()| self.controller.write(&[(Target::Heartbeat, 0.0)]));
         if let Err(error) = begun {
             self.controller.close();
             return Err(self.lost(error));
@@ -192,7 +200,8 @@ impl<C: Controller> Backend for Rig<C> {
         let values = [
             (Target::Valve, setpoints.valve_opening_ratio),
             (Target::P3, setpoints.p3_pa),
-            (Target::T3, setpoints.t3_k),
+            // Without air nothing carries the heat away.
+            (Target::T3, if on { setpoints.t3_k } else { self.heater_off_k() }),
             (Target::OilTemperature, setpoints.oil_temperature_k),
         ];
         // Off before anything else, on after everything else.
@@ -237,7 +246,7 @@ impl<C: Controller> Backend for Rig<C> {
         let open = self.armed("make_safe")?.told.map_or(0.0, |told| told.valve_opening_ratio);
         let highest = self.stand.accepts.range(Target::Valve).high;
         let valve = open.max(self.stand.safe.opening).min(highest);
-        self.write(&[(Target::Air, 0.0), (Target::Valve, valve)])
+        self.write(&[(Target::Air, 0.0), (Target::T3, self.heater_off_k()), (Target::Valve, valve)])
     }
 
     fn disarm(&mut self) -> Result<(), BackendError> {

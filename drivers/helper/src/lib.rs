@@ -13,8 +13,10 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod armed;
 mod descent;
 mod pipes;
+mod refusal;
 mod secret;
 mod server;
 

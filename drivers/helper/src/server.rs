@@ -1,43 +1,18 @@
 //! What a driver does at each message and at each tick; time is an argument.
 
-use crate::descent::{Descent, STEP_S, make_safe};
-use mapper_core::{Backend, BackendError, RigDescription, Setpoints};
+use crate::armed::Armed;
+use crate::descent::{Descent, make_safe};
+use crate::refusal::{Refusal, guarded, no_settings, read, refused, write};
+use mapper_core::{Backend, BackendError, RigDescription};
 use mapper_protocol::{
-    Code, Configure, Described, FRAME_LIMIT_BYTES, Failure, Hello, LEASE_S, LastSample, MAGIC, Message, Poll,
-    VERSION, Welcome, description_on_the_wire, error_on_the_wire, pieces, setpoints,
+    Code, Configure, Described, FRAME_LIMIT_BYTES, Hello, LEASE_S, LastSample, MAGIC, Message, Poll, VERSION,
+    Welcome, description_on_the_wire, error_on_the_wire, pieces, setpoints,
 };
-use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
-/// Why a request is refused.
-type Refusal = Box<Failure>;
-
-fn refused(code: Code, message: impl Into<String>) -> Refusal {
-    Box::new(Failure::new(code, message))
-}
 
 /// Makes the rig.
 pub(crate) type Opened = Box<dyn FnOnce(&Value) -> Result<Box<dyn Backend>, BackendError>>;
-
-/// A rig that is held.
-struct Armed {
-    /// On the driver's clock, s.
-    at_s: f64,
-    /// Arming may take seconds: time and lease begin with the first word or tick after it.
-    fresh: bool,
-    told: Option<Setpoints>,
-    /// Number of the next sample to poll for, in real time.
-    ticks: u64,
-    /// Run time of the last poll, s.
-    polled_s: f64,
-    /// Without a word until then the rig is made safe, s on the driver's clock.
-    lease_s: f64,
-    descent: Option<Descent>,
-    /// The lease had ended: nothing but giving back.
-    ended: bool,
-}
 
 /// A driver, from hello to the end.
 pub(crate) struct Server {
@@ -156,16 +131,7 @@ impl Server {
             return Err(refused(Code::OutOfOrder, "the rig is armed"));
         }
         guarded(|| rig.arm())?;
-        self.armed = Some(Armed {
-            at_s: now_s,
-            fresh: true,
-            told: None,
-            ticks: 0,
-            polled_s: 0.0,
-            lease_s: now_s + LEASE_S,
-            descent: None,
-            ended: false,
-        });
+        self.armed = Some(Armed::new(now_s));
         Ok(json!({}))
     }
 
@@ -214,11 +180,16 @@ impl Server {
     fn make_safe(&mut self) -> Result<Value, Refusal> {
         let (rig, _, armed) = self.held()?;
         guarded(|| rig.make_safe())?;
-        (armed.descent, armed.told) = (None, None);
+        (armed.descent, armed.told, armed.in_doubt) = (None, None, false);
         Ok(json!({}))
     }
 
+    /// A rig that has not confirmed its safe state is not let go.
     fn disarm(&mut self) -> Result<Value, Refusal> {
+        let (.., armed) = self.held()?;
+        if armed.told.is_some() || armed.descent.is_some() {
+            self.make_safe()?;
+        }
         let (rig, ..) = self.held()?;
         guarded(|| rig.disarm())?;
         self.armed = None;
@@ -252,11 +223,12 @@ impl Server {
             self.out.push(Message::note("note", json!({ "message": message })));
             self.begin_descent(now_s);
         }
-        let limit = self.frame_limit_bytes;
+        let (limit, leaving) = (self.frame_limit_bytes, self.leaving);
         let Ok((rig, description, armed)) = self.held() else { return None };
         let simulated = description.simulated_time;
-        let mut next_s = armed.lease_s - now_s;
-        if !simulated {
+        let mut next_s = if armed.ended { 1.0 } else { armed.lease_s - now_s };
+        let polls = !simulated && !armed.in_doubt;
+        if polls {
             let period_s = 1.0 / description.sample_rate_hz;
             let run_s = now_s - armed.at_s;
             // The newest that is due; half a millionth of a period is rounding.
@@ -280,25 +252,14 @@ impl Server {
             }
         }
         let Ok((rig, description, armed)) = self.held() else { return None };
-        if !simulated {
+        if polls {
             next_s = next_s.min(armed.ticks as f64 / description.sample_rate_hz - (now_s - armed.at_s));
         }
-        if let Some(descent) = armed.descent {
-            let t_s = if simulated { armed.polled_s } else { now_s - armed.at_s };
-            let (over, safe) = descent.fly(rig, &description.safe, t_s);
-            if simulated && !over {
-                armed.polled_s += STEP_S;
-                let until_s = armed.polled_s;
-                // Samples of a way that nobody looks at.
-                let _ = guarded(|| rig.poll(until_s));
-            }
-            next_s = if simulated { 0.0 } else { next_s.min(STEP_S) };
-            if over {
-                armed.descent = None;
-                if let Err(error) = safe {
-                    let message = format!("the rig did not confirm its safe state: {error}");
-                    self.out.push(Message::note("note", json!({ "message": message })));
-                }
+        if let Some((due_s, doubt)) = armed.fly_on(rig, description, now_s, leaving) {
+            next_s = next_s.min(due_s);
+            if let Some(error) = doubt {
+                let message = format!("the rig did not confirm its safe state, and is told again: {error}");
+                self.out.push(Message::note("note", json!({ "message": message })));
             }
         }
         if self.leaving {
@@ -318,30 +279,11 @@ impl Server {
     }
 }
 
-fn no_settings() -> Refusal {
-    refused(Code::OutOfOrder, "the settings have not come")
-}
-
-fn read<T: DeserializeOwned>(params: &Value) -> Result<T, Refusal> {
-    T::deserialize(params).map_err(|error| refused(Code::Params, error.to_string()))
-}
-
-fn write(value: &impl serde::Serialize) -> Result<Value, Refusal> {
-    serde_json::to_value(value).map_err(|error| refused(Code::Failed, error.to_string()))
-}
-
-/// A call of the author's code: its errors and panics as refusals.
-fn guarded<T>(call: impl FnOnce() -> Result<T, BackendError>) -> Result<T, Refusal> {
-    match catch_unwind(AssertUnwindSafe(call)) {
-        Ok(answer) => answer.map_err(|error| Box::new(error_on_the_wire(&error))),
-        Err(_) => Err(refused(Code::Lost, "the driver failed; its own words stand on its standard error")),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{Channel, ChannelColumn, RigMode, SafeTrajectory, SampleBatch};
+    use mapper_core::{Channel, ChannelColumn, RigMode, SafeTrajectory, SampleBatch, Setpoints};
+    use mapper_protocol::Failure;
     use std::sync::{Arc, Mutex};
 
     type Log = Arc<Mutex<Vec<String>>>;
@@ -353,6 +295,8 @@ mod tests {
         samples: u64,
         /// So many setpoints are taken before it panics.
         takes: usize,
+        /// So often it refuses to become safe.
+        refuses: usize,
     }
 
     impl Told {
@@ -386,12 +330,20 @@ mod tests {
         }
         fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
             self.samples += 1;
+            if self.refuses > 0 {
+                self.write("poll".to_owned())?;
+            }
             let columns = vec![ChannelColumn { channel: Channel::T2, values: vec![300.0] }];
             let t_s = vec![until_s];
             Ok(SampleBatch { first_sequence: self.samples - 1, t_s, columns, ..SampleBatch::default() })
         }
         fn make_safe(&mut self) -> Result<(), BackendError> {
-            self.write("safe".to_owned())
+            if self.refuses == 0 {
+                return self.write("safe".to_owned());
+            }
+            self.refuses -= 1;
+            self.write("refused".to_owned())?;
+            Err(BackendError::Lost { t_s: 0.0, source: "the controller restarts".into() })
         }
         fn disarm(&mut self) -> Result<(), BackendError> {
             Ok(())
@@ -400,8 +352,12 @@ mod tests {
 
     /// A driver that is armed since 0 s and told 150 kPa; what its rig is told after that.
     fn flying(simulated_time: bool, takes: usize) -> (Server, Log) {
+        refusing(simulated_time, takes, 0)
+    }
+
+    fn refusing(simulated_time: bool, takes: usize, refuses: usize) -> (Server, Log) {
         let log = Log::default();
-        let rig = Told { log: log.clone(), simulated_time, samples: 0, takes };
+        let rig = Told { log: log.clone(), simulated_time, samples: 0, takes, refuses };
         let open: Opened = Box::new(|_| Ok(Box::new(rig)));
         let mut server = Server::new("told", "1", "s".to_owned(), open);
         let hello = json!({"magic": MAGIC, "protocol": VERSION, "name": "x", "version": "1", "frame_limit_bytes": 100_000});
@@ -494,5 +450,30 @@ mod tests {
         server.tick(1.1);
         assert_eq!(log.lock().unwrap()[..2], [WAY[0], "safe"]);
         assert!(server.is_over());
+    }
+
+    /// A controller that is away when the lease ends: it is asked again each tenth of a second until it is back, and it is not polled
+    /// meanwhile, so that the heartbeat stands still. It is not let go before it has confirmed.
+    #[test]
+    fn a_rig_in_doubt_is_told_again_and_its_heartbeat_stops() {
+        let (mut server, log) = refusing(false, 1, 30);
+        let mut next_s = 2.0;
+        for hundredth in 0..600 {
+            let now_s = f64::from(hundredth) / 100.0;
+            if now_s >= next_s {
+                next_s = now_s + server.tick(now_s).unwrap().max(0.01);
+            }
+            if hundredth == 300 {
+                assert!(ask(&mut server, now_s, "disarm", json!({})).is_some());
+            }
+        }
+        let log = log.lock().unwrap();
+        let first = log.iter().position(|told| told == "refused").unwrap();
+        let (before, after) = log.split_at(first);
+        assert!(before.iter().all(|told| told == "poll"), "{before:?}");
+        assert_eq!(after.iter().filter(|told| *told == "refused").count(), 30);
+        let polled = after.iter().take_while(|told| *told != "safe").filter(|told| *told == "poll").count();
+        assert_eq!(polled, 0, "{after:?}");
+        assert!(after.contains(&"safe".to_owned()));
     }
 }

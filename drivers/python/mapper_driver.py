@@ -275,6 +275,9 @@ class Server:
     def descend(self, now_s):
         """Valve open and heater off at once, P3 down at its slew, then the air off."""
         armed = self.armed
+        if not self.about["simulated_time"] and now_s < armed.get("due_s", 0.0):
+            return armed["due_s"] - now_s
+        armed["due_s"] = now_s + STEP_S
         told, begun_s = armed["descent"]
         safe, simulated = self.about["safe"], self.about["simulated_time"]
         after_s = self.run_s(now_s) - begun_s + STEP_S

@@ -179,10 +179,10 @@ impl<C: Controller> Backend for Rig<C> {
         if self.armed.is_some() {
             return Err(BackendError::OutOfOrder { call: "arm", state: "armed", needed: "not armed" });
         }
-        let opened = self.controller.open();
+        let (heater_off_k, opened) = (self.heater_off_k(), self.controller.open());
         // A driver that was killed left the air on; a heartbeat must not bring it back.
         let begun = opened
-            .and_then(|()| self.controller.write(&[(Target::Air, 0.0)]))
+            .and_then(|()| self.controller.write(&[(Target::Air, 0.0), (Target::T3, heater_off_k)]))
             .and_then(|()| self.controller.write(&[(Target::Heartbeat, 0.0)]));
         if let Err(error) = begun {
             self.controller.close();
@@ -246,7 +246,8 @@ impl<C: Controller> Backend for Rig<C> {
         let open = self.armed("make_safe")?.told.map_or(0.0, |told| told.valve_opening_ratio);
         let highest = self.stand.accepts.range(Target::Valve).high;
         let valve = open.max(self.stand.safe.opening).min(highest);
-        self.write(&[(Target::Air, 0.0), (Target::T3, self.heater_off_k()), (Target::Valve, valve)])
+        // The heater last: a controller that refuses it has opened its valve.
+        self.write(&[(Target::Air, 0.0), (Target::Valve, valve), (Target::T3, self.heater_off_k())])
     }
 
     fn disarm(&mut self) -> Result<(), BackendError> {

@@ -19,6 +19,7 @@ pub(crate) mod profile;
 pub(crate) mod quantity;
 pub(crate) mod regions;
 pub(crate) mod rows;
+mod seen;
 pub(crate) mod shared;
 pub(crate) mod smoothing;
 pub(crate) mod smoothness;

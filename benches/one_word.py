@@ -86,7 +86,7 @@ def main():
         said, errors = process.communicate()
         if process.returncode:
             print(f"{name}: exit {process.returncode}\n{errors[-2000:]}")
-        results[name] = json.loads(said)
+        results[name] = {"points": [], **json.loads(said)}
     for server in servers:
         server.kill()
     (out / "results.json").write_text(json.dumps(results))
@@ -99,15 +99,15 @@ def main():
         print(f"| {step} |", " | ".join(cells), "|")
     for name in files:
         common = [step for step in steps if step in points[name]]
-        off = [abs(points[name][step]["eta"] - points["virtual_lab"][step]["eta"]) for step in common]
+        off = [0.0] + [abs(points[name][step]["eta"] - points["virtual_lab"][step]["eta"]) for step in common]
         print(f"{name}: {len(common)} points, at most {100 * max(off):.2f} percentage points of efficiency from the virtual lab's")
     for name in files:
         directory = next((out / f"runs-{name}").iterdir())
         again = json.loads(call("mapper", "identify", directory, "--json").stdout)
         eta = [point.get("eta") for point in again["points"]] == [point.get("eta") for point in results[name]["points"]]
-        gap = call("mapper", "gap", "diagnose", directory, "--json", check=False)
+        gap = call("mapper", "gap", "diagnose", directory / "campaign.yaml", "--recording", directory / "recording.mcap", "--json", check=False)
         drift = call("mapper", "drift", directory, "--json", check=False)
-        print(f"{name}: identify {'the same points' if eta else 'OTHER POINTS'}; gap exit {gap.returncode}; drift exit {drift.returncode}")
+        print(f"{name}: identify {'the same points' if eta else 'OTHER POINTS'}; gap {json.loads(gap.stdout).get('verdict') if gap.returncode == 0 else gap.stderr[-100:]}; drift exit {drift.returncode}")
         (out / f"gap-{name}.json").write_text(gap.stdout + gap.stderr)
         (out / f"drift-{name}.json").write_text(drift.stdout + drift.stderr)
 

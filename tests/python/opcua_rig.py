@@ -1,10 +1,10 @@
 """The small rig of drivers/python in real time behind asyncua, an OPC UA server that shares no code with the driver.
 
-Usage: opcua_rig.py [PORT] [--secure DIRECTORY] [--seed N]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
+Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD]] [--seed N]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
 reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean). As a PLC has to, it cuts the
 air by itself where the heartbeat stands still. Values that no stand could bear are refused with BadOutOfRange.
 
-With --secure it takes signed and encrypted sessions alone, of the user `lab` with the password `hunter2`; the certificate is made in the directory
+With --secure it takes signed and encrypted sessions alone, of the user `lab` with the password `hunter2` if nothing else is said; the certificate is made in the directory
 where there is none yet.
 """
 
@@ -40,8 +40,11 @@ loader.exec_module(rig_module)
 
 
 class Users(UserManager):
+    def __init__(self, name, password):
+        self.only = (name, password)
+
     def get_user(self, iserver, username=None, password=None, certificate=None):
-        return User(role=UserRole.User) if (username, password) == ("lab", "hunter2") else None
+        return User(role=UserRole.User) if (username, password) == self.only else None
 
 
 async def certificate(directory):
@@ -54,7 +57,7 @@ async def certificate(directory):
 
 
 async def make(arguments):
-    server = Server(user_manager=Users() if arguments.secure else None)
+    server = Server(user_manager=Users(arguments.user, arguments.password) if arguments.secure else None)
     await server.init()
     await server.set_application_uri(APPLICATION)
     server.set_endpoint(f"opc.tcp://127.0.0.1:{arguments.port}/")
@@ -137,6 +140,8 @@ async def main():
     parser.add_argument("port", nargs="?", type=int, default=0)
     parser.add_argument("--secure")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--user", default="lab")
+    parser.add_argument("--password", default="hunter2")
     arguments = parser.parse_args()
     logging.disable(logging.ERROR)
     if not arguments.port:

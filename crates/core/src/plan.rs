@@ -117,6 +117,9 @@ pub struct MadeFrom {
     pub model_sha256: String,
     /// SHA-256 of the sequence script, if there was one.
     pub script_sha256: Option<String>,
+    /// SHA-256 of what the rig said of itself, where one was asked: a plan alone needs none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rig_sha256: Option<String>,
 }
 
 /// The plan in four numbers.

@@ -4,9 +4,11 @@ use crate::error::DriverError;
 use crate::find::{PREFIX, Places, file_name};
 use crate::lease::Lease;
 use crate::link::Link;
-use crate::pending::Pending;
+use crate::pending::{Pending, ROUNDING_S};
 use crate::secrets::Secrets;
-use mapper_core::{Backend, BackendError, RigDescription, SampleBatch, Setpoints};
+use mapper_core::{
+    Backend, BackendError, RigDescription, SampleBatch, SetpointRange, SetpointRanges, Setpoints,
+};
 use mapper_protocol::{
     Configure, Described, Failure, Hello, MAGIC, Message, Poll, Samples, VERSION, Welcome, batch,
     description, rig_error, setpoints_on_the_wire,
@@ -348,9 +350,10 @@ impl Backend for Driver {
     }
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
-        if let Some(accepts) = &self.rig()?.accepts {
-            accepts.check(setpoints)?;
-        }
+        // What is no number cannot be written in a frame, whatever the rig accepts.
+        let any = SetpointRange { low: f64::MIN, high: f64::MAX };
+        let all = SetpointRanges { p3_pa: any, t3_k: any, valve_opening_ratio: any, oil_temperature_k: any };
+        self.rig()?.accepts.unwrap_or(all).check(setpoints)?;
         self.need_armed("set")?;
         self.ask("set", &setpoints_on_the_wire(setpoints), self.patience.call).map(drop)
     }
@@ -368,7 +371,9 @@ impl Backend for Driver {
             return Err(self.lost(error));
         }
         let channels = self.rig()?.channels.clone();
-        Ok(self.pending.take(until_s, &channels))
+        // Simulated time is the driver's own to the last bit, and nothing is waiting for it.
+        let rounding_s = if self.simulated() { 0.0 } else { ROUNDING_S };
+        Ok(self.pending.take(until_s, rounding_s, &channels))
     }
 
     fn make_safe(&mut self) -> Result<(), BackendError> {

@@ -9,6 +9,8 @@ use std::collections::VecDeque;
 /// Most values that wait, of all columns, at 8 bytes each, names and words counted likewise: three hours of 19 channels at 10 Hz,
 /// 32 MB.
 const MOST_VALUES: usize = 4_000_000;
+/// A sample so far beyond the time that was asked for is due, s: that time is a sum of periods, the sample's a multiple.
+pub(crate) const ROUNDING_S: f64 = 1e-7;
 /// Most events that wait.
 const MOST_EVENTS: usize = 10_000;
 /// Events beyond which a driver's remarks are left out.
@@ -23,6 +25,8 @@ pub(crate) struct Pending {
     expected: u64,
     next: u64,
     last_s: Option<f64>,
+    /// Time of the last sample that was handed out, s.
+    taken_s: Option<f64>,
     values: usize,
 }
 
@@ -71,15 +75,25 @@ impl Pending {
         self.last_s.is_some_and(|last_s| last_s >= t_s)
     }
 
-    /// Everything up to `until_s`, with a column for each of `channels`: NaN where there is no reading.
-    pub(crate) fn take(&mut self, until_s: f64, channels: &[Channel]) -> SampleBatch {
+    /// Everything up to `until_s`, one within `rounding_s` beyond it as if it were of then, with a column for each of `channels`: NaN where there is no reading.
+    pub(crate) fn take(&mut self, until_s: f64, rounding_s: f64, channels: &[Channel]) -> SampleBatch {
         let mut whole = SampleBatch {
             first_sequence: self.next,
             columns: channels.iter().map(|c| ChannelColumn { channel: *c, values: Vec::new() }).collect(),
             ..SampleBatch::default()
         };
         while let Some(mut batch) = self.batches.pop_front() {
-            let due = batch.t_s.partition_point(|t_s| *t_s <= until_s);
+            let mut due = batch.t_s.partition_point(|t_s| *t_s <= until_s);
+            let before_s = due.checked_sub(1).and_then(|last| batch.t_s.get(last).copied()).or(self.taken_s);
+            if let Some(t_s) = batch.t_s.get_mut(due)
+                && *t_s <= until_s + rounding_s
+                && before_s.is_none_or(|before_s| before_s < until_s)
+            {
+                (*t_s, due) = (until_s, due + 1);
+            }
+            if due > 0 {
+                self.taken_s = batch.t_s.get(due - 1).copied();
+            }
             self.values = self.values.saturating_sub(due * width(&batch));
             let later = split(&mut batch, due);
             if later.t_s.is_empty() {
@@ -232,15 +246,27 @@ mod tests {
             vec![Provenance { channel: T1, source_t_s: vec![0.1, 0.1], quality: vec![Quality::Bad; 2] }];
         pending.push(worse).unwrap();
         assert!(pending.reaches(0.3) && !pending.reaches(0.31));
-        let whole = pending.take(0.25, &[T1, T2]);
+        let whole = pending.take(0.25, 0.0, &[T1, T2]);
         assert_eq!((whole.first_sequence, &whole.t_s[..]), (0, &[0.0, 0.1, 0.2][..]));
         assert_eq!(whole.column(T1), Some(&[0.0, 0.1, 0.2][..]));
         assert!(whole.column(T2).unwrap()[2].is_nan());
         let from = whole.provenance_of(T1).unwrap();
         assert_eq!(from.source_t_s, [0.0, 0.1, 0.1]);
         assert_eq!(from.quality, [Quality::Good, Quality::Good, Quality::Bad]);
-        let rest = pending.take(9.0, &[T1, T2]);
+        let rest = pending.take(9.0, 0.0, &[T1, T2]);
         assert_eq!((rest.first_sequence, &rest.t_s[..]), (3, &[0.3][..]));
+    }
+
+    /// 0.1 seven times is a bit less than seven times 0.1: a sample that waits for the next poll reaches its guard a tenth of a second later.
+    #[test]
+    fn a_sample_is_not_late_by_rounding() {
+        let mut pending = Pending::default();
+        let (sum_s, multiple_s) = ([0.1; 7].iter().sum::<f64>(), 7.0 * 0.1);
+        assert!(sum_s < multiple_s);
+        pending.push(batch(0, &[multiple_s], &[Channel::T1])).unwrap();
+        assert_eq!(pending.take(sum_s, ROUNDING_S, &[Channel::T1]).t_s, [sum_s]);
+        pending.push(batch(1, &[multiple_s + 1e-3], &[Channel::T1])).unwrap();
+        assert!(pending.take(multiple_s, ROUNDING_S, &[Channel::T1]).t_s.is_empty());
     }
 
     #[test]
@@ -249,7 +275,7 @@ mod tests {
         let tripped = Event { t_s: 1.8e9, kind: EventKind::RigTripped, message: "overspeed".to_owned() };
         let with_it = SampleBatch { events: vec![tripped], ..batch(0, &[0.0, 0.1], &[Channel::T1]) };
         pending.push(with_it).unwrap();
-        assert_eq!(pending.take(0.1, &[Channel::T1]).events[0].t_s, 0.1);
+        assert_eq!(pending.take(0.1, 0.0, &[Channel::T1]).events[0].t_s, 0.1);
     }
 
     #[test]

@@ -22,6 +22,7 @@ pub fn made_from(request: &PlanRequest<'_>) -> MadeFrom {
         campaign_sha256: sha256_hex(request.campaign_canonical),
         model_sha256: sha256_hex(&model),
         script_sha256: None,
+        rig_sha256: None,
     }
 }
 

@@ -112,6 +112,7 @@ fn plan() -> Plan {
             campaign_sha256: String::new(),
             model_sha256: String::new(),
             script_sha256: None,
+            rig_sha256: None,
         },
         warm_up_s: 0.0,
         cool_down_s: 0.0,

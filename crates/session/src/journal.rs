@@ -30,6 +30,17 @@ pub struct Identity {
     pub backend: String,
     /// Hash of the backend's settings.
     pub settings_sha256: String,
+    /// Hash of what the rig says of itself; journals of older runs lack it.
+    #[serde(default)]
+    pub rig_sha256: Option<String>,
+}
+
+/// The hash of what a rig says of itself: channels, rate, what it accepts, its safe trajectory.
+///
+/// # Errors
+/// [`SessionError::Json`] where it cannot be written as JSON.
+pub fn rig_sha256(rig: &RigDescription) -> Result<String, SessionError> {
+    Ok(mapper_planner::sha256_hex(&serde_json::to_string(rig)?))
 }
 
 impl Identity {
@@ -40,25 +51,33 @@ impl Identity {
     pub fn of(campaign: &Campaign, plan: &Plan, rig: &RigDescription) -> Result<Self, SessionError> {
         let hash = |text: &str| mapper_planner::sha256_hex(text);
         let behind = rig.exclusive.as_deref().map(|name| format!(" ({name})")).unwrap_or_default();
+        // The rig has a hash of its own, so that what differs is said by its name.
+        let mut without_rig = plan.clone();
+        without_rig.made_from.rig_sha256 = None;
         Ok(Identity {
             machine: campaign.machine.name.clone(),
             serial_number: campaign.machine.serial_number.clone(),
             campaign_sha256: plan.made_from.campaign_sha256.clone(),
             model_sha256: plan.made_from.model_sha256.clone(),
-            plan_sha256: hash(&serde_json::to_string(plan)?),
+            plan_sha256: hash(&serde_json::to_string(&without_rig)?),
             backend: format!("{} {}{behind}", rig.backend, rig.version),
             settings_sha256: hash(&campaign.backend.settings.to_string()),
+            rig_sha256: Some(rig_sha256(rig)?),
         })
     }
 
     /// What differs, in words.
     pub fn differences(&self, now: &Identity) -> Vec<&'static str> {
+        let other = |then: &Option<String>, now: &Option<String>| {
+            then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)
+        };
         [
             ("the machine", self.machine != now.machine || self.serial_number != now.serial_number),
             ("the campaign", self.campaign_sha256 != now.campaign_sha256),
             ("the nominal model", self.model_sha256 != now.model_sha256),
             ("the plan", self.plan_sha256 != now.plan_sha256),
             ("the backend", self.backend != now.backend || self.settings_sha256 != now.settings_sha256),
+            ("what the rig says of itself", other(&self.rig_sha256, &now.rig_sha256)),
         ]
         .into_iter()
         .filter_map(|(what, differs)| differs.then_some(what))
@@ -172,6 +191,7 @@ mod tests {
                 plan_sha256: text(),
                 backend: text(),
                 settings_sha256: text(),
+                rig_sha256: None,
             },
             recording: recording.to_owned(),
         }

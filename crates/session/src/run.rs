@@ -7,7 +7,7 @@ use crate::estimates::Estimates;
 use crate::executed::StepsMade;
 use crate::files::{json_text, write_new};
 use crate::guards::{check_guards, drift_watch};
-use crate::journal::{Entry, Identity, Journal};
+use crate::journal::{Entry, Identity, Journal, rig_sha256};
 use crate::observers::{Recorder, Teller};
 use crate::planned::plan;
 use crate::planning::nominal_model;
@@ -148,22 +148,24 @@ impl<'s> Session<'s> {
         let campaign = request.campaign;
         self.registry.check_formats(campaign)?;
         let model = nominal_model(campaign)?;
-        let made = match &campaign.sequence {
+        let mut made = match &campaign.sequence {
             None => plan(campaign, &model)?,
             Some(source) => rehearse(self, campaign, &model, source)?.plan,
         };
+        let backend = self.registry.make_backend(campaign, &model)?;
+        let rig = backend.describe();
+        made.made_from.rig_sha256 = Some(rig_sha256(&rig)?);
         let kept = request.resume.as_ref().map(|broken_off| broken_off.directory.join(run_directory::PLAN));
-        let plan = match request.plan.or(kept.as_deref()) {
+        let mut plan = match request.plan.or(kept.as_deref()) {
             None => made.clone(),
             Some(path) => stored_plan(path, &made, campaign)?,
         };
+        plan.made_from.rig_sha256.clone_from(&made.made_from.rig_sha256);
         let scripted = match &campaign.sequence {
             Some(source) if request.plan.is_none() => Some(ScriptedSteps::new(campaign, &model, source)?),
             _ => None,
         };
         let prices = DwellPrices::of(campaign, &model, &plan)?;
-        let backend = self.registry.make_backend(campaign, &model)?;
-        let rig = backend.describe();
         check_guards(campaign, &rig)?;
         check_setpoints(&plan, &rig)?;
         if let Some(broken_off) = &request.resume {

@@ -28,10 +28,15 @@ pub fn stored_plan(path: &Path, made: &Plan, campaign: &Campaign) -> Result<Plan
     let stored: Plan = serde_json::from_slice(&bytes)
         .map_err(|source| SessionError::NotAPlan { path: path.to_owned(), source })?;
     let (then, now) = (&stored.made_from, &made.made_from);
+    // A plan that was made without a rig may be run on any.
+    let other = |then: &Option<String>, now: &Option<String>| {
+        then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)
+    };
     let changed: Vec<&str> = [
         ("the campaign", then.campaign_sha256 != now.campaign_sha256),
         ("the nominal model", then.model_sha256 != now.model_sha256),
         ("the sequence script", then.script_sha256 != now.script_sha256),
+        ("what the rig says of itself", other(&then.rig_sha256, &now.rig_sha256)),
     ]
     .into_iter()
     .filter_map(|(what, changed)| changed.then_some(what))

@@ -4,13 +4,21 @@ use crate::settings::{NAME, Questions, Settings};
 use mapper_backend_ak::telegram::{Answer, Assembler, Code, TelegramError, answer, question};
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Event, EventKind, RigDescription, SafeTrajectory,
-    SampleBatch, Setpoints,
+    SampleBatch, SetpointRange, SetpointRanges, Setpoints,
 };
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
+
+/// Nothing is told to an instrument; a setpoint that means nothing is a mistake all the same.
+const PLAUSIBLE: SetpointRanges = SetpointRanges {
+    p3_pa: SetpointRange { low: 50e3, high: 1e6 },
+    t3_k: SetpointRange { low: 200.0, high: 1500.0 },
+    valve_opening_ratio: SetpointRange { low: 0.0, high: 10.0 },
+    oil_temperature_k: SetpointRange { low: 200.0, high: 500.0 },
+};
 
 /// Makes the source; nothing is connected.
 pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
@@ -101,7 +109,7 @@ impl Backend for Instrument {
             controls: false,
             exclusive: Some(format!("ak {}", self.settings.address)),
             needs_guarded: Vec::new(),
-            accepts: None,
+            accepts: Some(PLAUSIBLE),
             safe: SafeTrajectory { p3_slew_pa_s: None, valve_opening_ratio: 1.0, within_s: 1.0 },
         }
     }
@@ -119,7 +127,8 @@ impl Backend for Instrument {
     }
 
     /// Nothing is told to an instrument.
-    fn set(&mut self, _: &Setpoints) -> Result<(), BackendError> {
+    fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
+        PLAUSIBLE.check(setpoints)?;
         self.armed("set").map(drop)
     }
 

@@ -3,13 +3,16 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod ak;
 mod modbus;
+mod opcua_nodes;
 mod stand;
 
 use clap::Parser;
 use mapper_backends::BACKENDS;
 use mapper_campaign::campaign::BackendChoice;
 use mapper_session::{Registry, nominal_model};
+use opcua_nodes::{Protection, ServeError, Shared};
 use stand::Stand;
 use std::io::Write;
 use std::net::SocketAddr;
@@ -18,24 +21,37 @@ use std::process::ExitCode;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
+use tokio::runtime::Runtime;
+use tokio::task::JoinHandle;
 
 /// How often the lab goes on.
 const STEP: Duration = Duration::from_millis(20);
 
 /// The virtual lab of a campaign behind a real server, to rehearse a night on. As a PLC has to, it cuts the air without a heartbeat for 2 s and
-/// above 1.05 times the campaign's limit of speed, and holds it off until somebody acknowledges that.
+/// above 1.05 times the campaign's limit of speed, and holds it off until somebody acknowledges that. One stand may be behind several servers.
 #[derive(Parser)]
 #[command(name = "mapper-lab-server", version)]
+#[command(group(clap::ArgGroup::new("servers").required(true).multiple(true).args(["modbus", "opcua", "ak"])))]
 struct Arguments {
     /// Campaign whose machine stands there; its virtual lab, or one without settings where it names another backend
     campaign: PathBuf,
     /// Serve Modbus TCP there, e.g. 127.0.0.1:5020; port 0: any that is free
     #[arg(long, value_name = "ADDRESS")]
-    modbus: SocketAddr,
+    modbus: Option<SocketAddr>,
+    /// Serve OPC UA there, e.g. 127.0.0.1:4840: signed and encrypted, for the user $PLC_USER with the password $PLC_PASSWORD, or without a name
+    /// where they are not set
+    #[arg(long, value_name = "ADDRESS")]
+    opcua: Option<SocketAddr>,
+    /// OPC UA in the clear instead, for anybody
+    #[arg(long, requires = "opcua")]
+    clear: bool,
+    /// Serve readings as AK telegrams there, e.g. 127.0.0.1:8888; they control nothing
+    #[arg(long, value_name = "ADDRESS")]
+    ak: Option<SocketAddr>,
     /// Seconds of the lab in one second on the wall, 0.1 to 100
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
-    /// Serve other computers too: whoever reaches this one may write, without a password
+    /// Serve other computers too: over Modbus whoever reaches this one may write, without a password
     #[arg(long)]
     public: bool,
 }
@@ -54,6 +70,10 @@ enum LabError {
     Io(#[from] std::io::Error),
     #[error("{0}")]
     Lab(#[from] mapper_core::BackendError),
+    #[error("{0}")]
+    Serve(#[from] ServeError),
+    #[error("the OPC UA server ended: {0}")]
+    OpcUa(String),
     #[error("a thread of this program failed")]
     Thread,
 }
@@ -77,6 +97,11 @@ fn make(arguments: &Arguments) -> Result<Stand, LabError> {
         let name = mapper_backends::virtual_lab::NAME.to_owned();
         campaign.backend = BackendChoice { name, settings: serde_json::json!({}) };
     }
+    // Read by others at their own pace: a lab that measured no oftener than they ask would give them readings up to a sample old.
+    if let Some(settings) = campaign.backend.settings.as_object_mut() {
+        let rate_hz = (1.0 / STEP.as_secs_f64() / arguments.speed).clamp(10.0, 50.0);
+        settings.entry("sample_rate").or_insert_with(|| format!("{rate_hz} Hz").into());
+    }
     let registry =
         Registry { backends: BACKENDS.to_vec(), effects: mapper_effects::catalogue(), ..Registry::default() };
     let model = nominal_model(&campaign).map_err(|error| wrong(error.to_string()))?;
@@ -84,29 +109,71 @@ fn make(arguments: &Arguments) -> Result<Stand, LabError> {
     Ok(Stand::new(lab, campaign.limits.speed_max_rpm, arguments.speed)?)
 }
 
+/// Where somebody listens, once it does.
+fn listen(
+    runtime: &Runtime,
+    arguments: &Arguments,
+    at: SocketAddr,
+) -> Result<(TcpListener, SocketAddr), LabError> {
+    if !at.ip().is_loopback() && !arguments.public {
+        return Err(LabError::Public(at));
+    }
+    let listener = runtime.block_on(TcpListener::bind(at)).map_err(|error| LabError::Listen(at, error))?;
+    let at = listener.local_addr()?;
+    Ok((listener, at))
+}
+
+/// Everything that was asked for; a line for each on standard output says where it is.
+fn serve(
+    runtime: &Runtime,
+    arguments: &Arguments,
+    shared: &Shared,
+) -> Result<Vec<JoinHandle<Result<(), LabError>>>, LabError> {
+    let mut serving = Vec::new();
+    let mut out = std::io::stdout();
+    if let Some(at) = arguments.modbus {
+        let (listener, at) = listen(runtime, arguments, at)?;
+        let served = modbus::serve(listener, shared.stand.clone());
+        serving.push(runtime.spawn(async { Ok(served.await?) }));
+        writeln!(out, "modbus {at}")?;
+    }
+    if let Some(at) = arguments.opcua {
+        let (listener, at) = listen(runtime, arguments, at)?;
+        let protection = if arguments.clear { Protection::Clear } else { Protection::Encrypted };
+        let entered = runtime.enter();
+        let server = opcua_nodes::make(at, shared, protection)?;
+        drop(entered);
+        serving.push(runtime.spawn(async { server.run_with(listener).await.map_err(LabError::OpcUa) }));
+        writeln!(out, "opcua opc.tcp://{at}")?;
+    }
+    if let Some(at) = arguments.ak {
+        let (listener, at) = listen(runtime, arguments, at)?;
+        let served = ak::serve(listener, shared.stand.clone());
+        serving.push(runtime.spawn(async { Ok(served.await?) }));
+        writeln!(out, "ak {at}")?;
+    }
+    Ok(serving)
+}
+
 fn run(arguments: &Arguments) -> Result<(), LabError> {
     if !(0.1..=100.0).contains(&arguments.speed) {
         return Err(LabError::Speed(arguments.speed));
     }
-    let address = arguments.modbus;
-    if !address.ip().is_loopback() && !arguments.public {
-        return Err(LabError::Public(address));
-    }
     let stand = Arc::new(Mutex::new(make(arguments)?));
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
-    let listener =
-        runtime.block_on(TcpListener::bind(address)).map_err(|error| LabError::Listen(address, error))?;
-    writeln!(std::io::stdout(), "modbus {}", listener.local_addr()?)?;
-    let serving = runtime.spawn(modbus::serve(listener, stand.clone()));
-    let (begun, mut said) = (Instant::now(), false);
-    while !serving.is_finished() {
+    // One for the commands of whoever drives, one for who looks on.
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+    let shared = Shared { stand: stand.clone(), begun: Instant::now() };
+    let serving = serve(&runtime, arguments, &shared)?;
+    let mut said = false;
+    while !serving.iter().any(JoinHandle::is_finished) {
         let mut stand = stand.lock().map_err(|_| LabError::Thread)?;
-        stand.advance(begun.elapsed().as_secs_f64())?;
+        stand.advance(shared.begun.elapsed().as_secs_f64())?;
         let tripped = stand.tripped().map(str::to_owned);
         drop(stand);
         match (&tripped, said) {
             (Some(why), false) => {
-                writeln!(std::io::stdout(), "tripped: {why}; 1 in register 113 acknowledges it")?
+                let how = "1 in register 113, or true in the node ns=2;s=acknowledge, acknowledges it";
+                writeln!(std::io::stdout(), "tripped: {why}; {how}")?
             }
             (None, true) => writeln!(std::io::stdout(), "acknowledged")?,
             _ => {}
@@ -114,5 +181,8 @@ fn run(arguments: &Arguments) -> Result<(), LabError> {
         said = tripped.is_some();
         std::thread::sleep(STEP);
     }
-    Ok(runtime.block_on(serving).map_err(|_| LabError::Thread)??)
+    for ended in serving.into_iter().filter(JoinHandle::is_finished) {
+        runtime.block_on(ended).map_err(|_| LabError::Thread)??;
+    }
+    Ok(())
 }

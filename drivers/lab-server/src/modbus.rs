@@ -1,7 +1,7 @@
 //! The stand as holding registers, as the example of docs/rig.md has them: readings from 0 and setpoints from 100 as singles of two registers,
 //! air 110, heartbeat 111, tripped 112, acknowledge 113.
 
-use crate::stand::{Stand, Target, measured};
+use crate::stand::{SETPOINTS as SETPOINTS_IN_ORDER, Stand, Target, measured};
 use std::future::{Ready, ready};
 use std::sync::{Arc, Mutex};
 use tokio::net::TcpListener;
@@ -15,7 +15,6 @@ const HEARTBEAT: u16 = 111;
 const TRIPPED: u16 = 112;
 const ACKNOWLEDGE: u16 = 113;
 const END: u16 = 200;
-const SINGLES: [Target; 4] = [Target::P3, Target::T3, Target::Valve, Target::OilTemperature];
 
 #[derive(Clone)]
 struct Registers(Arc<Mutex<Stand>>);
@@ -33,7 +32,7 @@ impl Registers {
             HEARTBEAT => stand.told(Target::Heartbeat) as u16,
             TRIPPED => u16::from(stand.tripped().is_some()),
             SETPOINTS..AIR => {
-                let target = SINGLES.get(usize::from(at - SETPOINTS) / 2);
+                let target = SETPOINTS_IN_ORDER.get(usize::from(at - SETPOINTS) / 2);
                 target.map_or(0, |target| pair(stand.told(*target), at))
             }
             _ => {
@@ -59,7 +58,7 @@ impl Registers {
                 HEARTBEAT => (Target::Heartbeat, f64::from(*first), 1),
                 ACKNOWLEDGE => (Target::Acknowledge, f64::from(*first), 1),
                 SETPOINTS..AIR if at % 2 == 0 => {
-                    let target = SINGLES.get(usize::from(at - SETPOINTS) / 2);
+                    let target = SETPOINTS_IN_ORDER.get(usize::from(at - SETPOINTS) / 2);
                     let (target, second) =
                         target.zip(more.first()).ok_or(ExceptionCode::IllegalDataAddress)?;
                     let bits = u32::from(*first) << 16 | u32::from(*second);

@@ -16,7 +16,10 @@ pub fn measured() -> Vec<Channel> {
     CHANNELS.iter().map(|row| row.channel).filter(|channel| !is_command(*channel)).collect()
 }
 
-/// Something that is written, in the order of registers.
+/// The setpoints, in the order of registers.
+pub const SETPOINTS: [Target; 4] = [Target::P3, Target::T3, Target::Valve, Target::OilTemperature];
+
+/// Something that is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Target {
     /// Pa.
@@ -148,6 +151,11 @@ impl Stand {
     /// SI; `None` where nothing was measured yet, or the sensor gave nothing.
     pub fn reading(&self, channel: Channel) -> Option<f64> {
         self.readings.get(&channel).copied().filter(|value| value.is_finite())
+    }
+
+    /// The moment of the readings, s on the wall since the beginning.
+    pub fn wall_s(&self) -> f64 {
+        self.wall_s
     }
 
     /// Why the air is held off, until somebody acknowledges it.

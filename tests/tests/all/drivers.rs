@@ -13,7 +13,7 @@ use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
 /// The shipped campaign on four points, each step by itself, with another backend.
-fn short(backend: &str) -> CampaignFile {
+pub(crate) fn short(backend: &str) -> CampaignFile {
     let own = [("  virtual_lab: {}", backend)];
     let replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).chain(&own).copied().collect();
     CampaignFile::shipped_with(&replacements)
@@ -25,16 +25,19 @@ fn lab(of: &CampaignFile, more: &str) -> CampaignFile {
 }
 
 /// `mapper` where the drivers in Python are on the path too.
-fn with_drivers(arguments: &[&std::ffi::OsStr]) -> Command {
+pub(crate) fn with_drivers(arguments: &[&std::ffi::OsStr]) -> Command {
     build_drivers();
     let mut command = mapper_command(arguments.iter().copied());
     let path = std::env::var_os("PATH").unwrap_or_default();
     let places = [repository().join("drivers/python")].into_iter().chain(std::env::split_paths(&path));
+    // Drivers in Python find the packages of the tests.
+    let python = option_env!("MAPPER_TEST_PYTHON").and_then(|python| Path::new(python).parent());
+    let places = python.map(Path::to_path_buf).into_iter().chain(places);
     command.env("PATH", std::env::join_paths(places).unwrap()).env("PYTHONDONTWRITEBYTECODE", "1");
     command
 }
 
-fn done(mut command: Command) -> Finished {
+pub(crate) fn done(mut command: Command) -> Finished {
     command.output().unwrap().into()
 }
 
@@ -84,6 +87,49 @@ fn the_rig_in_python_keeps_every_rule_and_gives_the_points_of_the_same_model() {
         // One model, docs/physics.md, written twice: noise moves a step by some tenths of a percent.
         assert!((found - expected).abs() < 0.01, "{found} and {expected}");
     }
+}
+
+/// A model as a rig: the FMU is built by pythonfmu, stepped by FMPy, and has units and names of its own.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_model_keeps_every_rule_and_gives_the_points_of_its_rig() {
+    let scratch = mapper_tests::scratch();
+    let settings = mapper_tests::python("build_fmu.py", [scratch.path().join("small.fmu")]);
+    let campaign = short(&format!("  fmu: {settings}"));
+    check("fmu", &campaign);
+    // The model is the rig in Python with the noise of its seed: its points are that rig's.
+    let (found, expected) = (run(&campaign), run(&short("  python_rig: {noise: 1, seed: 1}")));
+    let (found, expected) = (found["points"].as_array().unwrap(), expected["points"].as_array().unwrap());
+    assert_eq!(found.len(), 4);
+    let eta = |point: &Value| point["eta"].as_f64();
+    let both = found.iter().zip(expected).filter_map(|(found, expected)| Some((eta(found)?, eta(expected)?)));
+    let both: Vec<_> = both.collect();
+    assert!(both.len() >= 3, "{found:?}");
+    for (found, expected) in both {
+        // A set-point reaches it a step later, and its noise falls on other samples then.
+        assert!((found - expected).abs() < 0.005, "{found} and {expected}");
+    }
+    for (old, new, words) in [
+        ("shaft.n", "shaft.m", "the model has no variable `shaft.m`"),
+        ("small.fmu", "absent.fmu", "cannot be read as an FMU"),
+        ("\"p3_set\"", "7", "write the variable of the model"),
+    ] {
+        let wrong = short(&format!("  fmu: {}", settings.to_string().replace(old, new)));
+        let finished = done(with_drivers(&["check".as_ref(), wrong.path.as_os_str()])).exits(3);
+        assert!(
+            finished.stderr.contains(words) && finished.stderr.contains("backend.fmu."),
+            "{}",
+            finished.stderr
+        );
+    }
+}
+
+/// The helper in Python, held by a clock of its own: lease, way down, tries again, limits, bytes that are nothing.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python: run `cargo xtask test`")]
+fn the_helper_in_python_keeps_what_the_protocol_promises() {
+    let held = mapper_tests::python("driver_rules.py", [""; 0]);
+    assert_eq!(held["held"].as_array().unwrap().len(), 11, "{held}");
 }
 
 #[test]
@@ -179,7 +225,7 @@ fn a_runner_that_stands_still_loses_its_lease() {
 }
 
 /// What docs/rig.md shows for a driver, at another port, in the words of a server that shares its machine with tests.
-fn of_the_guide(driver: &str, replacements: &[(&str, &str)]) -> CampaignFile {
+pub(crate) fn of_the_guide(driver: &str, replacements: &[(&str, &str)]) -> CampaignFile {
     let guide = std::fs::read_to_string(repository().join("docs/rig.md")).unwrap();
     let (_, after) = guide.split_once(&format!("```yaml\nbackend:\n  {driver}:\n")).unwrap();
     let (settings, _) = after.split_once("\n```").unwrap();
@@ -192,11 +238,11 @@ fn of_the_guide(driver: &str, replacements: &[(&str, &str)]) -> CampaignFile {
 }
 
 /// A server of tests/python, which ends with its input.
-struct Server(std::process::Child);
+pub(crate) struct Server(std::process::Child);
 
 impl Server {
     /// Starts it; gives its port.
-    fn start(script: &str, arguments: &[&str]) -> (Server, String) {
+    pub(crate) fn start(script: &str, arguments: &[&str]) -> (Server, String) {
         use std::io::BufRead;
         let mut server = Command::new(option_env!("MAPPER_TEST_PYTHON").unwrap_or("python3"))
             .arg(repository().join("tests/python").join(script))
@@ -211,7 +257,7 @@ impl Server {
         (Server(server), port.trim().to_owned())
     }
 
-    fn end(mut self) {
+    pub(crate) fn end(mut self) {
         drop(self.0.stdin.take());
         assert!(self.0.wait().unwrap().success());
     }

@@ -1,0 +1,75 @@
+//! The stand as an instrument that speaks the AK telegram: read, never controlled. `AKON K0` answers every reading in SI, in the order of the
+//! registers, `AKON Kn` the n-th; `ASTZ` whether it is remote, and whether it has tripped. What is no reading is marked by `#`.
+
+use crate::stand::{Stand, measured};
+use mapper_backend_ak::telegram::{Assembler, asked, reply};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
+
+/// Between two answers: instruments give some ten a second.
+const PACE: Duration = Duration::from_millis(50);
+/// Connections that say nothing for so long are closed.
+const SILENCE: Duration = Duration::from_secs(60);
+const CONNECTIONS: usize = 16;
+
+fn number(reading: Option<f64>) -> String {
+    reading.map_or_else(|| "#0".to_owned(), |value| value.to_string())
+}
+
+/// The answer to what stood between STX and ETX.
+fn answer(stand: &Stand, body: &[u8]) -> Vec<u8> {
+    let Ok((code, channel, _)) = asked(body) else { return reply(None, &[]) };
+    let channels = measured();
+    let words = match (code.to_string().as_str(), usize::from(channel)) {
+        ("AKON", 0) => channels.iter().map(|channel| number(stand.reading(*channel))).collect(),
+        ("AKON", n) => match channels.get(n - 1) {
+            Some(channel) => vec![number(stand.reading(*channel))],
+            None => return reply(None, &[]),
+        },
+        ("ASTZ", _) => {
+            let state = if stand.tripped().is_some() { "TRIP" } else { "READY" };
+            vec!["SREM".to_owned(), state.to_owned()]
+        }
+        _ => return reply(None, &[]),
+    };
+    reply(Some(code), &words)
+}
+
+async fn talk(mut stream: TcpStream, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {
+    let (mut assembler, mut bytes) = (Assembler::default(), [0; 512]);
+    loop {
+        let count = tokio::time::timeout(SILENCE, stream.read(&mut bytes)).await??;
+        if count == 0 {
+            return Ok(());
+        }
+        for byte in bytes.iter().take(count) {
+            let Some(body) = assembler.push(*byte) else { continue };
+            let telegram = match stand.lock() {
+                Ok(stand) => answer(&stand, &body),
+                Err(_) => return Ok(()),
+            };
+            tokio::time::sleep(PACE).await;
+            stream.write_all(&telegram).await?;
+        }
+    }
+}
+
+/// Serves until the listener fails.
+///
+/// # Errors
+/// Those of the listener.
+pub async fn serve(listener: TcpListener, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {
+    let places = Arc::new(tokio::sync::Semaphore::new(CONNECTIONS));
+    loop {
+        let (stream, _) = listener.accept().await?;
+        let Ok(place) = places.clone().try_acquire_owned() else { continue };
+        let stand = stand.clone();
+        tokio::spawn(async move {
+            // Who went away is told nothing.
+            let _ = talk(stream, stand).await;
+            drop(place);
+        });
+    }
+}

@@ -1,0 +1,226 @@
+//! The stand as nodes, as the example of docs/rig.md has them: `ns=2;s=NAME` in SI, `air`, `heartbeat`, `tripped`, `acknowledge`.
+
+use crate::stand::{SETPOINTS, Stand, Target, measured};
+use opcua::server::address_space::VariableBuilder;
+use opcua::server::authenticator::{AuthManager, DefaultAuthenticator};
+use opcua::server::diagnostics::NamespaceMetadata;
+use opcua::server::node_manager::memory::{SimpleNodeManager, simple_node_manager};
+use opcua::server::{
+    ANONYMOUS_USER_TOKEN_ID, Server, ServerBuilder, ServerEndpoint, ServerHandle, ServerUserToken,
+};
+use opcua::types::{DataTypeId, DataValue, DateTime, NodeId, ObjectId, StatusCode, Variant};
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+const NAMESPACE: &str = "urn:mapper:lab:stand";
+const APPLICATION: &str = "urn:mapper:lab:server";
+/// Where the guide expects the nodes.
+const INDEX: u16 = 2;
+/// What OPC UA counts time in.
+const TICKS_HZ: f64 = 1e7;
+/// Who is let in: the variables that the example of docs/rig.md names, so that server and driver are told once.
+const USER: (&str, &str) = ("PLC_USER", "PLC_PASSWORD");
+
+/// Why there is no server.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    #[error("{} is set and {} is not: set both, or neither for anonymous sessions", .0, .1)]
+    HalfAUser(&'static str, &'static str),
+    #[error("set MAPPER_STATE_DIR or HOME: the server's certificate has no directory")]
+    NoPlace,
+    #[error("{}: {source}", path.display())]
+    File { path: PathBuf, source: std::io::Error },
+    #[error("the server cannot be made: {0}")]
+    Made(String),
+}
+
+/// The stand and the clock that its readings are told by.
+#[derive(Clone)]
+pub struct Shared {
+    /// The stand.
+    pub stand: Arc<Mutex<Stand>>,
+    /// When its time began.
+    pub begun: Instant,
+}
+
+impl Shared {
+    /// A value of the stand with the moment at which it was taken.
+    fn value(&self, of: impl Fn(&Stand) -> Option<Variant>) -> Result<DataValue, StatusCode> {
+        let stand = self.stand.lock().map_err(|_| StatusCode::BadInternalError)?;
+        let age_s = (self.begun.elapsed().as_secs_f64() - stand.wall_s()).clamp(0.0, 60.0);
+        let now = DateTime::now();
+        let value = of(&stand).ok_or(StatusCode::BadNoDataAvailable)?;
+        Ok(DataValue {
+            value: Some(value),
+            status: Some(StatusCode::Good),
+            source_timestamp: Some(DateTime::from(now.ticks() - (age_s * TICKS_HZ) as i64)),
+            server_timestamp: Some(now),
+            ..DataValue::default()
+        })
+    }
+
+    fn tell(&self, target: Target, value: &DataValue) -> StatusCode {
+        let number = match &value.value {
+            Some(Variant::Boolean(on)) => f64::from(u8::from(*on)),
+            Some(Variant::Double(number)) => *number,
+            Some(Variant::UInt32(count)) => f64::from(*count),
+            _ => return StatusCode::BadTypeMismatch,
+        };
+        let Ok(mut stand) = self.stand.lock() else { return StatusCode::BadInternalError };
+        match stand.tell(target, number) {
+            Ok(()) => StatusCode::Good,
+            Err(_) => StatusCode::BadOutOfRange,
+        }
+    }
+}
+
+fn directory() -> Result<PathBuf, ServeError> {
+    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let state = variable("MAPPER_STATE_DIR")
+        .or_else(|| variable("XDG_STATE_HOME").map(|state| state.join("mapper")))
+        .or_else(|| variable("HOME").map(|home| home.join(".local/state/mapper")));
+    let path = state.ok_or(ServeError::NoPlace)?.join("lab-server");
+    let mut made = std::fs::DirBuilder::new();
+    made.recursive(true);
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut made, 0o700);
+    made.create(&path).map_err(|source| ServeError::File { path: path.clone(), source })?;
+    Ok(path)
+}
+
+/// Who may come in; `None`: anybody, without a name.
+fn user() -> Result<Option<(String, String)>, ServeError> {
+    let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+    match (variable(USER.0), variable(USER.1)) {
+        (Some(name), Some(password)) => Ok(Some((name, password))),
+        (None, None) => Ok(None),
+        (Some(_), None) => Err(ServeError::HalfAUser(USER.0, USER.1)),
+        (None, Some(_)) => Err(ServeError::HalfAUser(USER.1, USER.0)),
+    }
+}
+
+/// How sessions are protected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Protection {
+    /// Signed and encrypted alone.
+    Encrypted,
+    /// In the clear alone, for anybody.
+    Clear,
+}
+
+fn builder(at: SocketAddr, pki: &Path, protection: Protection) -> Result<ServerBuilder, ServeError> {
+    let users: BTreeMap<String, ServerUserToken> = match (user()?, protection) {
+        (Some((name, password)), Protection::Encrypted) => {
+            [("lab".to_owned(), ServerUserToken::user_pass(name, password))].into()
+        }
+        _ => BTreeMap::new(),
+    };
+    let who: Vec<String> = match users.is_empty() {
+        true => vec![ANONYMOUS_USER_TOKEN_ID.to_owned()],
+        false => users.keys().cloned().collect(),
+    };
+    let authenticator: Arc<dyn AuthManager> = Arc::new(DefaultAuthenticator::new(users.clone()));
+    let mut builder = ServerBuilder::new()
+        .application_name("mapper lab server")
+        .application_uri(APPLICATION)
+        .product_uri(APPLICATION)
+        .pki_dir(pki)
+        .create_sample_keypair(protection == Protection::Encrypted)
+        // Whoever reaches this computer's own address may rehearse; a PLC asks for a certificate that it knows.
+        .trust_client_certs(true)
+        .host(at.ip().to_string())
+        .port(at.port())
+        .discovery_urls(vec!["/".to_owned()])
+        .with_authenticator(authenticator)
+        .with_node_manager(simple_node_manager(
+            NamespaceMetadata { namespace_uri: NAMESPACE.to_owned(), ..NamespaceMetadata::default() },
+            "stand",
+        ));
+    for (name, token) in users {
+        builder = builder.add_user_token(name, token);
+    }
+    let endpoints = match protection {
+        Protection::Clear => vec![("clear", ServerEndpoint::new_none("/", &who))],
+        Protection::Encrypted => vec![
+            ("basic256_sha256", ServerEndpoint::new_basic256sha256_sign_encrypt("/", &who)),
+            ("aes128_sha256_rsa_oaep", ServerEndpoint::new_aes128_sha256_rsaoaep_sign_encrypt("/", &who)),
+            ("aes256_sha256_rsa_pss", ServerEndpoint::new_aes256_sha256_rsapss_sign_encrypt("/", &who)),
+        ],
+    };
+    for (name, endpoint) in endpoints {
+        builder = builder.add_endpoint(name, endpoint);
+    }
+    Ok(builder)
+}
+
+/// A name, its type, and what is written there; `None`: only read.
+fn writable() -> Vec<(&'static str, DataTypeId, Target)> {
+    let [p3, t3, valve, oil] = SETPOINTS;
+    vec![
+        ("p3", DataTypeId::Double, p3),
+        ("t3", DataTypeId::Double, t3),
+        ("valve", DataTypeId::Double, valve),
+        ("oil_temperature", DataTypeId::Double, oil),
+        ("air", DataTypeId::Boolean, Target::Air),
+        ("heartbeat", DataTypeId::UInt32, Target::Heartbeat),
+        ("acknowledge", DataTypeId::Boolean, Target::Acknowledge),
+    ]
+}
+
+fn variant(kind: DataTypeId, value: f64) -> Variant {
+    match kind {
+        DataTypeId::Boolean => Variant::Boolean(value >= 0.5),
+        DataTypeId::UInt32 => Variant::UInt32(value as u32),
+        _ => Variant::Double(value),
+    }
+}
+
+fn fill(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
+    let wrong = |words: &str| ServeError::Made(words.to_owned());
+    let manager = handle.node_managers().get_of_type::<SimpleNodeManager>();
+    let manager = manager.ok_or_else(|| wrong("it has no nodes"))?;
+    if handle.get_namespace_index(NAMESPACE) != Some(INDEX) {
+        return Err(wrong("the nodes have another namespace than ns=2"));
+    }
+    let folder = NodeId::new(INDEX, "stand");
+    let put = |name: &str, kind: DataTypeId, first: Variant, writes: bool| {
+        let id = NodeId::new(INDEX, name);
+        let builder =
+            VariableBuilder::new(&id, name, name).value(first).data_type(kind).organized_by(&folder);
+        let builder = if writes { builder.writable() } else { builder };
+        builder.insert(&mut *manager.address_space().write());
+        id
+    };
+    manager.address_space().write().add_folder(&folder, "Stand", "Stand", &ObjectId::ObjectsFolder.into());
+    for channel in measured() {
+        let id = put(channel.symbol(), DataTypeId::Double, Variant::Double(f64::NAN), false);
+        let shared = shared.clone();
+        let read = move |stand: &Stand| stand.reading(channel).map(Variant::Double);
+        manager.inner().add_read_callback(id, move |_, _, _| shared.value(read));
+    }
+    let id = put("tripped", DataTypeId::Boolean, Variant::Boolean(false), false);
+    let stand = shared.clone();
+    let tripped = |stand: &Stand| Some(Variant::Boolean(stand.tripped().is_some()));
+    manager.inner().add_read_callback(id, move |_, _, _| stand.value(tripped));
+    for (name, kind, target) in writable() {
+        let id = put(name, kind, variant(kind, 0.0), true);
+        let (reads, writes) = (shared.clone(), shared.clone());
+        let read = move |stand: &Stand| Some(variant(kind, stand.told(target)));
+        manager.inner().add_read_callback(id.clone(), move |_, _, _| reads.value(read));
+        manager.inner().add_write_callback(id, move |value, _| writes.tell(target, &value));
+    }
+    Ok(())
+}
+
+/// A server for this address; it listens once it is run.
+///
+/// # Errors
+/// [`ServeError`]
+pub fn make(at: SocketAddr, shared: &Shared, protection: Protection) -> Result<Server, ServeError> {
+    let (server, handle) = builder(at, &directory()?, protection)?.build().map_err(ServeError::Made)?;
+    fill(&handle, shared)?;
+    Ok(server)
+}

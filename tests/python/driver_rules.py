@@ -1,0 +1,209 @@
+"""What drivers/python/mapper_driver.py does when nobody is there or the rig does not obey: time is an argument, no clock is read.
+
+Prints {"held": [...]}, the facts that held; fails with the first that does not.
+"""
+
+import io
+import json
+import pathlib
+import random
+import struct
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "drivers/python"))
+import mapper_driver  # noqa: E402
+from mapper_driver import Refused, Server, description, read_frame  # noqa: E402
+
+ACCEPTS = {"p3_pa": (50e3, 600e3), "t3_k": (350.0, 1100.0), "valve_opening_ratio": (0.05, 1.4), "oil_temperature_k": (250.0, 450.0)}
+SETPOINTS = {"mode": "running", "p3_pa": 180e3, "t3_k": 800.0, "valve_opening_ratio": 0.7, "oil_temperature_k": 323.15}
+
+
+class Stubborn(mapper_driver.Rig):
+    """Writes down what it is told; takes its safe state after so many tries, and refuses set-points from a pressure on."""
+
+    def __init__(self, tries=1, simulated=False, accepts=ACCEPTS, lowest_p3=0.0):
+        self.tries, self.simulated, self.accepts, self.lowest_p3 = tries, simulated, accepts, lowest_p3
+        self.told, self.asked, self.polled, self.disarmed = [], 0, 0, False
+
+    def describe(self):
+        # Opens its valve further than it accepts: the way down has to keep to what is accepted.
+        safe = {"p3_slew_pa_s": 100e3, "valve_opening_ratio": 2.5, "within_s": 20.0}
+        return description(["N", "P3"], 10.0, self.simulated, self.accepts, safe, [])
+
+    def set(self, setpoints):
+        if setpoints["p3_pa"] < self.lowest_p3:
+            raise Refused("lost", "the controller does not take it", t_s=0.0)
+        self.told.append(dict(setpoints))
+
+    def make_safe(self):
+        self.asked += 1
+        if self.asked < self.tries:
+            raise RuntimeError("the valve does not answer")
+
+    def disarm(self):
+        self.disarmed = True
+
+    def poll(self, until_s):
+        self.polled += 1
+        return [until_s], {"N": [1.0], "P3": [1.0]}, []
+
+
+class Host:
+    """Asks a server, with a clock of its own."""
+
+    def __init__(self, rig):
+        self.rig, self.now_s, self.id = rig, 0.0, 0
+        self.server = Server("stubborn", "1", lambda _: rig)
+        self.ask("hello", magic=mapper_driver.MAGIC, protocol=mapper_driver.VERSION)
+        self.ask("configure", settings=None)
+        self.ask("describe")
+        self.ask("arm")
+        self.server.tick(self.now_s)
+        assert "result" in self.ask("set", **SETPOINTS)
+        rig.told.clear()
+
+    def ask(self, method, **params):
+        self.id += 1
+        message = {"id": self.id, "method": method, "params": params, "session": self.server.session}
+        self.server.take(self.now_s, message)
+        answers = [one for one in self.server.out if one.get("id") == self.id]
+        self.server.out = [one for one in self.server.out if "id" not in one]
+        return answers[0]
+
+    def run(self, for_s):
+        """As serve() does: it wakes when something is due, and at each tenth."""
+        end_s = self.now_s + for_s
+        while self.now_s < end_s - 1e-9 and not self.server.over():
+            within_s = self.server.tick(self.now_s)
+            self.now_s += min(max(within_s or 0.1, 0.001), 0.1)
+
+    def notes(self):
+        return [one["params"]["message"] for one in self.server.out if one["method"] == "note"]
+
+
+def the_way_down_keeps_to_what_the_rig_accepts():
+    host = Host(Stubborn())
+    host.run(4.0)
+    way = host.rig.told
+    assert len(way) >= 7, way
+    assert all(one["t3_k"] == 350.0 and one["valve_opening_ratio"] == 1.4 for one in way), way
+    steps = [a["p3_pa"] - b["p3_pa"] for a, b in zip(way, way[1:])]
+    assert all(0.0 < step < 25e3 for step in steps) and way[0]["p3_pa"] < 180e3, steps
+    assert way[-1]["p3_pa"] > 105e3 and host.rig.asked == 1
+    refused = host.ask("set", **SETPOINTS)
+    assert refused["error"]["code"] == "lease_ended", refused
+
+
+def the_lease_ends_after_two_seconds_and_not_before():
+    host = Host(Stubborn())
+    host.run(1.9)
+    assert not host.rig.told
+    host.run(0.4)
+    assert host.rig.told, "2.5 s are promised from the last word to the first command"
+
+
+def a_lease_that_is_renewed_goes_on():
+    host = Host(Stubborn())
+    for _ in range(20):
+        host.run(0.5)
+        host.server.take(host.now_s, {"method": "lease", "session": host.server.session})
+    assert not host.rig.told
+    for _ in range(5):
+        host.server.take(host.now_s, {"method": "lease", "session": "another"})
+        host.run(0.5)
+    assert host.rig.told, "a word of another session renews nothing"
+
+
+def words_that_come_meanwhile_do_not_hasten_the_way_down():
+    host = Host(Stubborn())
+    host.run(2.2)
+    before = len(host.rig.told)
+    for _ in range(50):
+        host.server.take(host.now_s, {"method": "lease", "session": host.server.session})
+        host.server.tick(host.now_s)
+    assert len(host.rig.told) <= before + 1, host.rig.told
+
+
+def a_set_point_that_is_refused_cuts_the_air_at_once():
+    host = Host(Stubborn(lowest_p3=170e3))
+    host.run(2.5)
+    assert host.rig.asked == 1 and all(one["p3_pa"] >= 170e3 for one in host.rig.told)
+
+
+def a_rig_that_does_not_confirm_is_told_again_and_not_polled():
+    host = Host(Stubborn(tries=40))
+    host.run(3.5)
+    assert 1 < host.rig.asked < 40, host.rig.asked
+    polled, asked, at_s = host.rig.polled, host.rig.asked, host.now_s
+    host.run(1.0)
+    assert host.rig.polled == polled, "its heartbeat would go on"
+    rate_hz = (host.rig.asked - asked) / (host.now_s - at_s)
+    assert 8.0 <= rate_hz <= 11.0, rate_hz
+    said = [words for words in host.notes() if "did not confirm" in words]
+    assert len(said) == 1, said
+    host.run(5.0)
+    assert host.rig.asked == 40 and host.rig.polled > polled, (host.rig.asked, host.rig.polled)
+
+
+def a_rig_that_never_confirms_is_given_up_only_where_nobody_listens():
+    listened = Host(Stubborn(tries=10**9))
+    listened.run(100.0)
+    assert not listened.server.over() and not listened.rig.disarmed
+    host = Host(Stubborn(tries=10**9))
+    host.server.leave(host.now_s)
+    host.run(39.0)
+    assert not host.server.over()
+    host.run(5.0)
+    assert host.server.over(), host.now_s
+
+
+def a_disarm_that_is_not_confirmed_fails():
+    host = Host(Stubborn(tries=3))
+    assert "error" in host.ask("disarm") and "error" in host.ask("disarm") and not host.rig.disarmed
+    assert "result" in host.ask("disarm") and host.rig.disarmed
+
+
+def in_simulated_time_the_way_down_stands_in_the_time_of_the_rig():
+    host = Host(Stubborn(simulated=True))
+    host.ask("poll", until_s=5.0)
+    host.server.leave(host.now_s)
+    for _ in range(1000):
+        if host.server.over():
+            break
+        host.server.tick(host.now_s)
+    assert host.server.over() and host.rig.disarmed and host.rig.asked >= 1
+    steps = [a["p3_pa"] - b["p3_pa"] for a, b in zip(host.rig.told, host.rig.told[1:])]
+    assert len(steps) >= 5 and all(abs(step - 10e3) < 1.0 for step in steps), steps
+
+
+def what_cannot_be_set_is_refused_and_changes_nothing():
+    host = Host(Stubborn())
+    for key, value in [("p3_pa", 1e9), ("p3_pa", None), ("t3_k", float("nan")), ("valve_opening_ratio", "1"), ("oil_temperature_k", [])]:
+        error = host.ask("set", **{**SETPOINTS, key: value})["error"]
+        assert (error["code"], error["setpoint"]) == ("setpoint_out_of_range", key), error
+    assert not host.rig.told
+
+
+def no_bytes_end_it_or_make_it_take_memory():
+    chance = random.Random(17)
+    for _ in range(3000):
+        read_frame(io.BytesIO(chance.randbytes(chance.randrange(64))))
+    assert read_frame(io.BytesIO(struct.pack(">I", 2**32 - 1) + b"x")) is None
+    assert read_frame(io.BytesIO(struct.pack(">I", 5) + b"{}")) is None
+    host = Host(Stubborn())
+    things = [None, True, -1, 1e308, "x", [], {}, [[]], {"major": 1}, "hello", "set", "arm", "__class__", "poll", "describe"]
+    for _ in range(5000):
+        message = {key: chance.choice(things) for key in ("id", "method", "params", "session", "deadline_s") if chance.random() < 0.8}
+        if chance.random() < 0.7:
+            message["session"] = host.server.session
+        host.server.take(host.now_s, message)
+        host.server.tick(host.now_s)
+        json.dumps(host.server.out)
+        host.server.out.clear()
+
+
+FACTS = [value for name, value in list(globals().items()) if callable(value) and "_" in name and getattr(value, "__module__", "") == "__main__"]
+FACTS = [fact for fact in FACTS if fact.__code__.co_argcount == 0]
+for fact in FACTS:
+    fact()
+print(json.dumps({"held": [fact.__name__ for fact in FACTS]}))

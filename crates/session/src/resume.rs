@@ -1,6 +1,7 @@
 //! A run that goes on after it was broken off: what of it holds, and what has to be done again.
 
 use crate::journal::{Identity, JournalPart, read_journal};
+use crate::replayed::depends_on_readings;
 use crate::{SessionError, run_directory};
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, PlanStep, StepKind, StepMarker};
@@ -64,7 +65,7 @@ impl BrokenOff {
         self.parts.iter().any(|part| part.soaked)
     }
 
-    /// Refuses what is not the same run, and what cannot go on from its middle.
+    /// Refuses what is not the same run, and what has nothing left to do.
     ///
     /// # Errors
     /// [`SessionError::NotResumable`] with what differs or why.
@@ -76,23 +77,20 @@ impl BrokenOff {
                 return why(format!("{} changed since", differences.join(" and ")));
             }
         }
-        for (key, set) in [
-            ("sequence", campaign.sequence.is_some()),
-            ("surge_search", campaign.surge_search.is_some()),
-            ("drift", campaign.on_drift.is_some()),
-            ("timing.ends", !campaign.timing.ends.is_planned()),
-        ] {
-            if set {
-                return why(format!(
-                    "its campaign has `{key}`, whose steps depend on all that was measured before; identify what there is, and run it again"
-                ));
-            }
-        }
-        let saved = self.saved(campaign, plan)?;
-        if plan.steps.iter().all(|step| saved.contains(&step.index)) {
-            return why("all of its steps are there; `mapper identify` gives the map".to_owned());
+        if self.directory.join(run_directory::POINTS).exists() && self.is_whole(campaign, plan)? {
+            return why("all of its steps are there, and so is its map".to_owned());
         }
         Ok(())
+    }
+
+    /// Whether every step is there, and nothing but the map may be missing.
+    pub(crate) fn is_whole(&self, campaign: &Campaign, plan: &Plan) -> Result<bool, SessionError> {
+        if depends_on_readings(campaign) {
+            // Only the end of the run says that no further step would have come.
+            return Ok(self.parts.last().is_some_and(|part| part.completed));
+        }
+        let saved = self.saved(campaign, plan)?;
+        Ok(plan.steps.iter().all(|step| saved.contains(&step.index)))
     }
 
     /// What is done again and why, in a sentence.

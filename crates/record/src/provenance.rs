@@ -8,8 +8,8 @@ use mcap::McapResult;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Times that differ by less are the same: half of what a recording keeps of a time, s.
-const SAME_S: f64 = 0.5e-9;
+/// Times that differ by less are the same, s: what clocks and threads are off.
+const SAME_S: f64 = 1e-4;
 
 /// What is not as usual of one reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

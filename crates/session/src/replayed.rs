@@ -82,8 +82,7 @@ impl<'a> GoesOn<'a> {
         inner.take_notes();
         let again = last.map(|last: PlanStep| PlanStep {
             index: AGAIN_FROM + broken_off.parts.len(),
-            // An approach to surge is made once more as what it is.
-            kind: if last.kind == StepKind::Approach { last.kind } else { StepKind::Repeat },
+            kind: StepKind::Repeat,
             from: None,
             ..last
         });
@@ -222,7 +221,10 @@ impl Told<'_, '_> {
                     next.to.valve_opening_ratio
                 )));
             }
-            self.last = Some(next);
+            // What stands near surge is no place to come from.
+            if next.kind != StepKind::Approach {
+                self.last = Some(next);
+            }
             return Ok(());
         }
     }

@@ -1,7 +1,7 @@
 //! A run that goes on after it was broken off: what of it holds, and what has to be done again.
 
 use crate::journal::{Identity, JournalPart, read_journal};
-use crate::replayed::depends_on_readings;
+use crate::replayed::{AGAIN_FROM, depends_on_readings};
 use crate::{SessionError, run_directory};
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, PlanStep, StepKind, StepMarker};
@@ -32,6 +32,36 @@ impl BrokenOff {
             return Err(why("its journal holds no run".to_owned()));
         }
         Ok(BrokenOff { directory: directory.to_owned(), parts })
+    }
+
+    /// Leaves out what a later part has made anew, and the line along which surge was sought last: a search goes on from what the
+    /// machine was told just before, and begins its line again.
+    ///
+    /// # Errors
+    /// What reading a recording says.
+    pub(crate) fn keep_what_goes_on(&mut self, campaign: &Campaign) -> Result<(), SessionError> {
+        if !depends_on_readings(campaign) {
+            return Ok(());
+        }
+        let mut first_later = AGAIN_FROM;
+        for part in self.parts.iter_mut().rev() {
+            part.saved.retain(|index| *index < first_later || *index >= AGAIN_FROM);
+            first_later = part.saved.iter().copied().next().unwrap_or(first_later).min(first_later);
+        }
+        let last = self.parts.iter_mut().rev().find(|part| part.saved.iter().any(|index| *index < AGAIN_FROM));
+        let Some(part) = last.filter(|part| campaign.surge_search.is_some() && !part.completed) else {
+            return Ok(());
+        };
+        let path = self.directory.join(&part.recording);
+        let read = read_recording(&path, &ChannelMap::native(), &ReadOptions::default())?;
+        let holds = |step: &&StepMarker| step.index < AGAIN_FROM && part.saved.contains(&step.index);
+        let held: Vec<StepMarker> = read.recording.steps.iter().filter(holds).copied().collect();
+        let speed = |step: &StepMarker| step.to.map(|to| to.speed_rpm.to_bits());
+        let line = held.last().and_then(speed);
+        let sought = |step: &&StepMarker| step.kind == StepKind::Approach && speed(step) == line;
+        let open: Vec<usize> = held.iter().rev().take_while(sought).map(|step| step.index).collect();
+        part.saved.retain(|index| !open.contains(index));
+        Ok(())
     }
 
     /// Steps of the plan, by their place in it, that are in one of the recordings.

@@ -122,7 +122,10 @@ impl<'s> Session<'s> {
     /// # Errors
     /// [`SessionError`] where there is no plan, the stored one is stale, the script fails or the backend's settings are wrong.
     pub fn prepare<'a>(&self, request: RunRequest<'a>) -> Result<PreparedRun<'a>, SessionError> {
-        let campaign = request.campaign;
+        let (campaign, mut request) = (request.campaign, request);
+        if let Some(broken_off) = &mut request.resume {
+            broken_off.keep_what_goes_on(campaign)?;
+        }
         self.registry.check_formats(campaign)?;
         let model = nominal_model(campaign)?;
         let made = match &campaign.sequence {
@@ -307,6 +310,10 @@ impl PreparedRun<'_> {
         }
         if let Some(source) = &campaign.sequence {
             write_new(&directory.join(run_directory::SEQUENCE), source.text.as_bytes())?;
+            // A run that goes on finds it where its campaign names it.
+            if Path::new(&source.named) != Path::new(run_directory::SEQUENCE) {
+                run_directory::keep_beside(&directory, &source.named, &source.text)?;
+            }
         }
         Ok(directory)
     }

@@ -66,8 +66,7 @@ impl Backend for Beside {
 
 fn rig(beside: Beside) -> WithReaders {
     let lab = VirtualLab::new(LabSettings::ideal(Model::nominal(), BoundaryConditions::default()));
-    let reader =
-        Reader { name: "cell".to_owned(), backend: Box::new(beside), channels: vec![Channel::TAmb] };
+    let reader = Reader { name: "cell".to_owned(), backend: Box::new(beside), channels: vec![Channel::TAmb] };
     let mut rig = WithReaders::new(Box::new(lab), vec![reader], Duration::from_secs(5)).unwrap();
     rig.arm().unwrap();
     rig.set(&Setpoints {
@@ -102,7 +101,8 @@ fn each_channel_has_the_times_of_its_own_source() {
         let polled = |untils: &[f64]| {
             let mut rig = rig(beside(rate_hz));
             assert_eq!(rig.describe().channels.len(), 19);
-            let batches: Vec<SampleBatch> = untils.iter().map(|until_s| rig.poll(*until_s).unwrap()).collect();
+            let batches: Vec<SampleBatch> =
+                untils.iter().map(|until_s| rig.poll(*until_s).unwrap()).collect();
             let mut next = 0;
             for batch in &batches {
                 assert_eq!(batch.first_sequence, next);

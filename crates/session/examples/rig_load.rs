@@ -290,9 +290,7 @@ fn main() {
             let (from_s, from) = seen.polled[10];
             let mut late_ms: Vec<f64> = seen.polled[10..]
                 .iter()
-                .map(|(until_s, at)| {
-                    1e3 * (at.duration_since(from).as_secs_f64() - (until_s - from_s)).abs()
-                })
+                .map(|(until_s, at)| 1e3 * (at.duration_since(from).as_secs_f64() - (until_s - from_s)).abs())
                 .collect();
             late_ms.sort_by(f64::total_cmp);
             let at = |share: f64| late_ms[((late_ms.len() - 1) as f64 * share) as usize];
@@ -336,11 +334,16 @@ fn main() {
             for (name, more) in [("by its plan", ""), ("told again", "drift: {on_drift: continue}\n")] {
                 let repeats = if more.is_empty() { "" } else { more };
                 let text = campaign(900, repeats);
-                let text = if more.is_empty() { text } else { text.replacen("repeats: off\n", "repeats: {every: 12}\n", 1) };
+                let text = if more.is_empty() {
+                    text
+                } else {
+                    text.replacen("repeats: off\n", "repeats: {every: 12}\n", 1)
+                };
                 static LAST: AtomicUsize = AtomicUsize::new(46);
                 let first = run(&text, folder.path(), false, LAST.load(Ordering::Relaxed), None);
-                let samples = read_recording(&first.recording, &ChannelMap::native(), &ReadOptions::default())
-                    .map_or(0, |read| read.recording.series[&Channel::T2].t_s.len());
+                let samples =
+                    read_recording(&first.recording, &ChannelMap::native(), &ReadOptions::default())
+                        .map_or(0, |read| read.recording.series[&Channel::T2].t_s.len());
                 let points = first.directory.join("points.json");
                 let _ = std::fs::remove_file(points);
                 let begun = cpu_s();

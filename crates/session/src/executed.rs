@@ -1,6 +1,6 @@
 //! The plan as it was run, where what was measured had a say in it.
 
-use crate::replayed::AGAIN_FROM;
+use crate::resume::AGAIN_FROM;
 use mapper_core::{Plan, PlanStep, StepMarker};
 use mapper_runner::{ObserverError, RunObserver};
 

@@ -4,14 +4,11 @@
 //! The source sees one time that goes on over all parts. Equal calls, equal steps: each is held against the recorded one.
 
 use crate::SessionError;
-use crate::resume::BrokenOff;
-use mapper_campaign::Campaign;
+use crate::resume::{AGAIN_FROM, BrokenOff};
 use mapper_core::{ChannelColumn, ElementColumn, PlanStep, Recording, SampleBatch, StepKind, StepMarker};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_runner::{RunEnd, RunError, StepSource, StepSourceError};
 
-/// Steps that are made once more to come from where the missing one comes from are numbered from here on: no plan has as many.
-pub(crate) const AGAIN_FROM: usize = 1_000_000;
 /// What was read is told in pieces of so long, s, as it was polled.
 const PIECE_S: f64 = 1.0;
 /// Between two parts of a run, in the time that the source sees, s.
@@ -20,14 +17,6 @@ const BETWEEN_S: f64 = 1.0;
 const ROUNDED_S: f64 = 1e-6;
 /// Targets that differ by less are the same, ratio: what a recording keeps of them.
 const SAME_RATIO: f64 = 1e-9;
-
-/// Whether the steps of a campaign depend on what was measured.
-pub(crate) fn depends_on_readings(campaign: &Campaign) -> bool {
-    campaign.sequence.is_some()
-        || campaign.surge_search.is_some()
-        || campaign.on_drift.is_some()
-        || !campaign.timing.ends.is_planned()
-}
 
 /// The steps of a source that has been told what there is, from the first missing one on.
 struct GoesOn<'a> {

@@ -1,7 +1,6 @@
 //! A run that goes on after it was broken off: what of it holds, and what has to be done again.
 
 use crate::journal::{Identity, JournalPart, read_journal};
-use crate::replayed::{AGAIN_FROM, depends_on_readings};
 use crate::{SessionError, run_directory};
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, PlanStep, StepKind, StepMarker};
@@ -9,6 +8,16 @@ use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_runner::{StepSource, StepSourceError};
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
+
+/// Steps that are made once more to come from where the missing one comes from are numbered from here on: no plan has as many.
+pub(crate) const AGAIN_FROM: usize = 1_000_000;
+/// Whether the steps of a campaign depend on what was measured.
+pub(crate) fn depends_on_readings(campaign: &Campaign) -> bool {
+    campaign.sequence.is_some()
+        || campaign.surge_search.is_some()
+        || campaign.on_drift.is_some()
+        || !campaign.timing.ends.is_planned()
+}
 
 /// What is known of a run that was broken off.
 #[derive(Debug, Clone)]
@@ -48,7 +57,8 @@ impl BrokenOff {
             part.saved.retain(|index| *index < first_later || *index >= AGAIN_FROM);
             first_later = part.saved.iter().copied().next().unwrap_or(first_later).min(first_later);
         }
-        let last = self.parts.iter_mut().rev().find(|part| part.saved.iter().any(|index| *index < AGAIN_FROM));
+        let last =
+            self.parts.iter_mut().rev().find(|part| part.saved.iter().any(|index| *index < AGAIN_FROM));
         let Some(part) = last.filter(|part| campaign.surge_search.is_some() && !part.completed) else {
             return Ok(());
         };

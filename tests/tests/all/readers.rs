@@ -5,7 +5,7 @@ use mapper_core::{Channel, EventKind, Quality};
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use mapper_tests::{
     BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_driver, build_drivers, mapper, mapper_command,
-    only_run,
+    only_run, python,
 };
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -58,7 +58,9 @@ fn a_channel_that_is_read_elsewhere_stands_in_the_recording_and_in_the_points() 
     assert_eq!(own.metadata["readers"], "bench");
     let points = std::fs::read_to_string(only_run(&campaign.runs()).join("points.json")).unwrap();
     let points: serde_json::Value = serde_json::from_str(&points).unwrap();
-    assert!(points["points"].as_array().unwrap().iter().filter(|point| point["eta"].is_number()).count() >= 3);
+    assert!(
+        points["points"].as_array().unwrap().iter().filter(|point| point["eta"].is_number()).count() >= 3
+    );
 }
 
 /// Each at its place, before anything is touched.
@@ -73,7 +75,9 @@ fn mistakes_of_readers_are_told_at_their_place() {
         (format!("  bench: {{backend: {replay}}}\n"), "is given by the rig too"),
         (format!("  bench: {{backend: {replay}, channels: [T9]}}\n"), "no channel is called `T9`"),
         (
-            format!("  a: {{backend: {replay}, channels: [T2]}}\n  b: {{backend: {replay}, channels: [T2]}}\n"),
+            format!(
+                "  a: {{backend: {replay}, channels: [T2]}}\n  b: {{backend: {replay}, channels: [T2]}}\n"
+            ),
             "is taken from `a` already",
         ),
         (format!("  bench: {{backend: {replay}, channel: [T2]}}\n"), "channels"),
@@ -135,13 +139,25 @@ fn an_instrument_is_read_beside_the_lab_in_real_time() {
     let report = read(&only_run(&campaign.runs()));
     let (air, t2) = (&report.recording.series[&Channel::TAmb], &report.recording.series[&Channel::T2]);
     // 10 Hz of the lab beside 5 Hz, of which 60 answers came at most.
-    assert!((20..=60).contains(&air.values.len()) && t2.values.len() > 150, "{} {}", air.values.len(), t2.values.len());
+    assert!(
+        (20..=60).contains(&air.values.len()) && t2.values.len() > 150,
+        "{} {}",
+        air.values.len(),
+        t2.values.len()
+    );
     assert!(air.values.iter().all(|kelvin| (298.0..298.3).contains(kelvin)), "{:?}", air.values);
     let noted = |event: &&mapper_core::Event| {
         event.kind == EventKind::GuardActed && event.message.contains("`cell` has given no T_amb")
     };
     assert_eq!(report.recording.events.iter().filter(noted).count(), 1, "{:?}", report.recording.events);
     assert!(report.recording.origins.values().flatten().all(|origin| origin.quality == Quality::Good));
+    // What others find in it.
+    if cfg!(with_python) {
+        let seen = python("read_recording.py", [&only_run(&campaign.runs()).join("recording.mcap")]);
+        assert_eq!(seen["topics"]["/rig/ambient"]["messages"], air.values.len());
+        let origins: usize = report.recording.origins.values().map(Vec::len).sum();
+        assert_eq!(seen["topics"]["/rig/provenance"]["messages"].as_u64().unwrap_or(0), origins as u64);
+    }
     let campaign = with_readers(&reader("T1", 30), &short);
     let finished = run(&campaign).exits(5);
     assert!(finished.stderr.contains("`cell` has given no T1"), "{}", finished.stderr);

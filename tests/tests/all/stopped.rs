@@ -46,7 +46,8 @@ fn a_campaign_that_was_edited_after_its_plan_was_made_is_not_run_by_it() {
     mapper(["plan".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), plan.as_os_str()]).exits(0);
     let arguments = || {
         let out = campaign.runs();
-        let first = ["run".into(), campaign.path.clone().into_os_string(), "--plan".into(), plan.clone().into()];
+        let first =
+            ["run".into(), campaign.path.clone().into_os_string(), "--plan".into(), plan.clone().into()];
         first.into_iter().chain(["--out".into(), out.into_os_string()]).collect::<Vec<std::ffi::OsString>>()
     };
     let edited = campaign.text.replace("dwell: 120 s ", "dwell: 110 s ");

@@ -236,11 +236,15 @@ impl mapper_runner::RunObserver for SlowDisk<'_> {
 }
 
 /// Faults of a night by the clock: a rig that is asked for each sample, and everything written slowly.
-fn night_by_the_clock(faults: &[(f64, Fault)], takes_s: f64) -> (Result<RunEnd, RunError>, Misbehaving<VirtualLab>, usize, f64) {
+fn night_by_the_clock(
+    faults: &[(f64, Fault)],
+    takes_s: f64,
+) -> (Result<RunEnd, RunError>, Misbehaving<VirtualLab>, usize, f64) {
     let (plan, wall) = (minutes(), Idle(std::cell::Cell::new(0.0)));
     let mut rig = Misbehaving::new(lab(), faults.to_vec());
     let mut disk = SlowDisk { wall: &wall, takes_s, written: 0 };
-    let guards = usual().signals.iter().map(|spec| Box::new(SignalWatch::new(*spec)) as Box<dyn Guard>).collect();
+    let guards =
+        usual().signals.iter().map(|spec| Box::new(SignalWatch::new(*spec)) as Box<dyn Guard>).collect();
     let protection = Protection {
         safe: SafeTrajectory { p3_slew_pa_s: Some(50e3), valve_opening_ratio: 1.0, within_s: 20.0 },
         p3_min_pa: 110e3,

@@ -57,8 +57,10 @@ def promised_and_lost(run):
     return len(promised - ended)
 
 
-def killed(mapper, folder, index, campaign, whole_bytes):
+def killed(mapper, folder, index, campaign, whole_bytes, until):
     """One run, killed once, resumed; what is wrong with it."""
+    if time.monotonic() > until:
+        return {"index": index, "what": "not tried"}
     rng = random.Random(index)
     out = folder / f"run-{index}"
     environment = {**os.environ, "MAPPER_STATE_DIR": str(folder / f"state-{index}")}
@@ -111,11 +113,13 @@ def main():
     parser.add_argument("--mapper", default="target/release/mapper")
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--first", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="begins no further one after so long")
     parser.add_argument("--short", action="store_true", help="nine points, each step by itself")
     parser.add_argument("--jobs", type=int, default=2)
     arguments = parser.parse_args()
     mapper = str(Path(arguments.mapper).resolve())
     found = []
+    until = time.monotonic() + 60 * arguments.minutes
     with tempfile.TemporaryDirectory() as scratch, concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         folder = Path(scratch)
         campaign = listed(folder, arguments.short)
@@ -123,7 +127,7 @@ def main():
         whole_bytes = next((folder / "whole").glob("*/recording.mcap")).stat().st_size
         whole = {key(p): p for p in points_of(next((folder / "whole").iterdir())) if p["kind"] == "point"}
         seeds = range(arguments.first, arguments.first + arguments.kills)
-        for one in pool.map(lambda index: killed(mapper, folder, index, campaign, whole_bytes), seeds):
+        for one in pool.map(lambda index: killed(mapper, folder, index, campaign, whole_bytes, until), seeds):
             found.append(one)
             if len(found) % 20 == 0:
                 print(f"{len(found)} of {arguments.kills}", file=sys.stderr, flush=True)

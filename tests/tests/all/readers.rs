@@ -4,8 +4,7 @@
 use mapper_core::{Channel, EventKind, Quality};
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use mapper_tests::{
-    BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_driver, build_drivers, mapper, mapper_command,
-    only_run, python,
+    BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_driver, mapper, mapper_command, only_run, python,
 };
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -119,7 +118,6 @@ fn instrument(answers: usize) -> String {
 /// that falls silent is noted where nothing needs it, and ends the run where it does.
 #[test]
 fn an_instrument_is_read_beside_the_lab_in_real_time() {
-    build_drivers();
     build_driver("mapper-backend-ak");
     let short = [
         ("warm_up: 60 s ", "warm_up: 1 s "),

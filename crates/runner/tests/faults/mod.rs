@@ -277,7 +277,7 @@ fn a_slow_disk_delays_the_run_and_not_the_first_safe_command() {
         // Two tenths of a second of dwell, and the sample after.
         assert!(trip.t_s - FAULT_S < 0.35, "{takes_s} s: {}", trip.t_s);
         let first = rig.told.iter().find(|(_, told)| told.t3_k < 300.0).unwrap();
-        assert!(first.0 - trip.t_s < 0.05, "{takes_s} s: {} after {}", first.0, trip.t_s);
+        assert!(first.0 - trip.t_s < 0.11, "{takes_s} s: {} after {}", first.0, trip.t_s);
         assert!(written > 70);
         assert!(wall_s - rig.safe_at_s[0] < 10.0 + late_s, "{takes_s} s: {wall_s}");
     }

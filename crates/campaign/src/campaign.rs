@@ -9,6 +9,7 @@ use crate::elements::guards::{GuardedBy, GuardsFile};
 use crate::elements::identification::IdentificationFile;
 use crate::elements::limits::LimitsFile;
 use crate::elements::machine::MachineFile;
+use crate::elements::readers::{ReaderFile, readers};
 use crate::elements::reference::ReferenceFile;
 use crate::elements::repeats::{RepeatsFile, repeats};
 use crate::elements::safe_state::SafeStateFile;
@@ -39,6 +40,7 @@ pub use crate::elements::display::DisplayUnits;
 pub use crate::elements::identification::Identification;
 pub use crate::elements::machine::{Machine, MapSource};
 pub use crate::elements::outputs::{FormatName, Outputs};
+pub use crate::elements::readers::ReaderChoice;
 pub use crate::elements::report::Report;
 pub use crate::elements::sequence::SequenceSource;
 pub use crate::elements::several_sensors::SensorDeclaration;
@@ -67,6 +69,9 @@ pub struct Campaign {
     pub tolerances_declared: bool,
     /// The rig.
     pub backend: BackendChoice,
+    /// Further sources of channels, which are read and never told anything.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub readers: Vec<ReaderChoice>,
     /// The grid in the order of the file, no point twice: `points` as listed, or for each opening all speeds, or line by
     /// line from choke to surge.
     pub points: Vec<OperatingPoint>,
@@ -159,6 +164,10 @@ pub(crate) struct CampaignFile {
     /// The rig, by the name of its backend, with the backend's own settings below it, e.g. `virtual_lab: {}`. What stands there is checked by the backend.
     #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"virtual_lab": {}}))]
     backend: BTreeMap<String, serde_json::Value>,
+    /// Further sources of channels by a name of your own, e.g. a flow meter that the PLC does not know: read beside the rig, never told anything.
+    #[serde(default)]
+    #[schemars(extend("maxProperties" = 16), example = serde_json::json!({"flow_meter": {"backend": {"ak": {}}}}))]
+    readers: BTreeMap<String, ReaderFile>,
     /// The operating points: `speeds` and `openings`, or `lines`, or `points`.
     pub(crate) grid: GridFile,
     /// How long things take.
@@ -255,6 +264,7 @@ impl CampaignFile {
             tolerances: self.tolerances.unwrap_or_default(),
             tolerances_declared: self.tolerances.is_some(),
             backend: backend(self.backend),
+            readers: readers(self.readers),
             points,
             lines,
             timing: self.timing,

@@ -8,6 +8,7 @@ use mapper_yaml::{Node, Notes, Source};
 /// Checks everything that needs more than one value.
 pub(crate) fn check(source: &Source, root: &Node, files: Files<'_>, notes: &mut Notes) {
     let mut check = Check { source, root, files, notes };
+    elements::readers::check(&mut check);
     elements::limits::check(&mut check);
     elements::guards::check(&mut check);
     elements::window::check(&mut check);

@@ -103,12 +103,12 @@ pub fn check_with(
 
 /// A mistake in the settings of a backend, which only the backend can judge, at its place in the campaign's text.
 ///
-/// `setting` is the path below the backend's name, e.g. `machine.alpha_area`; a path that the text does not have
-/// points at what there is of it. A `hidden` value is shown as asterisks: terminals are logged.
+/// `at`: keys down to the backend's name, e.g. `backend.virtual_lab`; `setting`: the path below it, e.g. `machine.alpha_area`. A
+/// path that the text does not have points at what there is of it. A `hidden` value is shown as asterisks: terminals are logged.
 pub fn backend_mistake(
     text: &str,
     origin: &Path,
-    backend: &str,
+    at: &str,
     setting: &str,
     message: &str,
     hidden: bool,
@@ -116,8 +116,8 @@ pub fn backend_mistake(
     let mut source = Source::new(&DOCUMENT, origin, text);
     let mut notes = Notes::default();
     let root = mapper_yaml::read(&source, &mut notes);
-    let mut steps = steps!["backend", backend].to_vec();
-    steps.extend(setting.split('.').filter(|key| !key.is_empty()).map(Step::from));
+    let keys = at.split('.').chain(setting.split('.'));
+    let steps: Vec<Step> = keys.filter(|key| !key.is_empty()).map(Step::from).collect();
     let span = root.map_or(0..0, |root| root.place(&steps));
     if let (true, Some(value)) = (hidden, text.get(span.clone())) {
         // As long as it was, so that all places stay.

@@ -68,7 +68,12 @@ impl Failure {
         let findings = match &error {
             SessionError::Backend(BackendError::Settings { backend, path, source }) => {
                 let hidden = matches!(source.downcast_ref(), Some(DriverError::Secret));
-                mapper_campaign::backend_mistake(&text, campaign, backend, path, &source.to_string(), hidden)
+                let at = format!("backend.{backend}");
+                mapper_campaign::backend_mistake(&text, campaign, &at, path, &source.to_string(), hidden)
+            }
+            SessionError::Reader { at, setting, source } => {
+                let hidden = matches!(source.downcast_ref(), Some(DriverError::Secret));
+                mapper_campaign::backend_mistake(&text, campaign, at, setting, &source.to_string(), hidden)
             }
             SessionError::UnknownFormat { name, known } => {
                 mapper_campaign::format_mistake(&text, campaign, name, known)

@@ -86,7 +86,7 @@ pub use one_line::one_line;
 pub use operating_point::OperatingPoint;
 pub use plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
 pub use plausible::{Plausible, plausible};
-pub use recording::{Recording, RecordingError, Series};
+pub use recording::{ReadingOrigin, Recording, RecordingError, Series};
 pub use redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};
 pub use reference_state::{NAMED_REFERENCES, NamedReference, ReferenceState, usual_references};
 pub use replan::Replan;

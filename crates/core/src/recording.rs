@@ -1,6 +1,6 @@
 //! A recording in memory: series per channel, steps, events. Truth is not part of it.
 
-use crate::{Channel, Element, Event, StepMarker};
+use crate::{Channel, Element, Event, Quality, StepMarker};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -47,6 +47,18 @@ impl Series {
     }
 }
 
+/// What is not as usual of where a reading comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ReadingOrigin {
+    /// When it arrived, s: the time of its sample.
+    pub t_s: f64,
+    /// When its source took it, s; `None`: when it arrived.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source_t_s: Option<f64>,
+    /// How good it is, by the rig's word.
+    pub quality: Quality,
+}
+
 /// Everything that was recorded of a run, in SI units.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Recording {
@@ -55,6 +67,9 @@ pub struct Recording {
     /// Each sensor of the channels that have several; empty where none has.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub elements: BTreeMap<Element, Series>,
+    /// Readings that are not good, or were not taken when they arrived, in order; others need none. A bad one is NaN in its series.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub origins: BTreeMap<Channel, Vec<ReadingOrigin>>,
     /// Steps in order; in recordings made by others found from changes of the command channels.
     pub steps: Vec<StepMarker>,
     /// Events in order.

@@ -111,6 +111,8 @@ impl Recording {
             elements: self.elements.iter_mut().map(|(element, series)| (*element, split(series))).collect(),
             steps: self.steps.split_off(first),
             events: self.events.split_off(after),
+            // Where readings come from is for those who look a run up, which is the whole one.
+            ..Recording::default()
         })
     }
 }

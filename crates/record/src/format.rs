@@ -24,6 +24,8 @@ pub(crate) const STEP_TOPIC: &str = "/step";
 pub(crate) const EVENT_TOPIC: &str = "/event";
 /// Topic of the single sensors of channels that have several.
 pub(crate) const ELEMENTS_TOPIC: &str = "/rig/elements";
+/// Topic of what is not as usual of where readings come from.
+pub(crate) const PROVENANCE_TOPIC: &str = "/rig/provenance";
 /// Topic of what only a simulator knows.
 pub(crate) const TRUTH_TOPIC: &str = "/truth/model";
 /// Everything below this belongs to scoring.

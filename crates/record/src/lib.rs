@@ -23,6 +23,7 @@ mod log_read;
 mod measured_valve;
 mod message;
 mod plausibility;
+mod provenance;
 mod read;
 mod read_options;
 mod recording_file;

@@ -5,6 +5,7 @@ use crate::definitions::{Reads, source_of};
 use crate::log_read::{is_mcap, log_of_path, read_log};
 use crate::measured_valve::{hold, turns_share};
 use crate::plausibility::Readings;
+use crate::provenance::OriginMessage;
 use crate::read_options::ReadOptions;
 use crate::rig_sink::RigSink;
 use crate::scan::{Scanned, scan};
@@ -14,7 +15,9 @@ use crate::steps_found::{can_be_searched, steps_from_jumps, without_rest};
 use crate::{
     AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError, plausibility,
 };
-use mapper_core::{Channel, Element, Group, Recording, RedundantSensors, Series, StepMarker};
+use mapper_core::{
+    Channel, Element, Group, Quality, ReadingOrigin, Recording, RedundantSensors, Series, StepMarker,
+};
 use mapper_logs::{LogError, LogFile, Unit};
 use mapper_yaml::{FindingKind, steps};
 use std::collections::BTreeMap;
@@ -105,7 +108,7 @@ fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Resul
     let steps = steps_without_marks(map, &mut gathered.series, &mut warnings);
     let Gathered { series, elements, .. } = gathered;
     Ok(ReadReport {
-        recording: Recording { events: Vec::new(), series, elements, steps },
+        recording: Recording { series, elements, steps, ..Recording::default() },
         warnings,
         start_time_ns: log.start_time_ns.unwrap_or(0),
         ..ReadReport::default()
@@ -194,9 +197,11 @@ fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> Result<R
         }
         event
     });
-    let Gathered { series, elements, .. } = gathered;
+    let Gathered { mut series, elements, .. } = gathered;
+    let origins = origins_of(sink.origins, zero_ns);
+    without_bad(&mut series, &origins, &mut warnings);
     Ok(ReadReport {
-        recording: Recording { events: events.collect(), series, elements, steps },
+        recording: Recording { events: events.collect(), series, elements, origins, steps },
         warnings,
         campaign_text: sink.campaign_text,
         plan_json: sink.plan_json,
@@ -303,6 +308,40 @@ fn complete(
         }
     }
     Ok(())
+}
+
+/// What is not as usual of readings, by channel.
+fn origins_of(found: Vec<(u64, OriginMessage)>, zero_ns: u64) -> BTreeMap<Channel, Vec<ReadingOrigin>> {
+    let mut origins: BTreeMap<Channel, Vec<ReadingOrigin>> = BTreeMap::new();
+    for (log_time_ns, message) in found {
+        for (channel, origin) in message {
+            let t_s = run_time_s(log_time_ns, zero_ns);
+            origins.entry(channel).or_default().push(ReadingOrigin { t_s, ..origin });
+        }
+    }
+    origins.values_mut().for_each(|list| list.sort_by(|a, b| a.t_s.total_cmp(&b.t_s)));
+    origins
+}
+
+/// A bad reading is no reading, whatever number stands there.
+fn without_bad(
+    series: &mut BTreeMap<Channel, Series>,
+    origins: &BTreeMap<Channel, Vec<ReadingOrigin>>,
+    warnings: &mut Vec<ReadWarning>,
+) {
+    for (channel, list) in origins {
+        let Some(series) = series.get_mut(channel) else { continue };
+        let mut count = 0;
+        for origin in list.iter().filter(|origin| origin.quality == Quality::Bad) {
+            let at = series.t_s.binary_search_by(|t_s| t_s.total_cmp(&origin.t_s));
+            if let Some(value) = at.ok().and_then(|at| series.values.get_mut(at)) {
+                (*value, count) = (f64::NAN, count + 1);
+            }
+        }
+        if count > 0 {
+            warnings.push(ReadWarning::BadReadings { channel: *channel, count });
+        }
+    }
 }
 
 /// Steps from commands, or else from jumps of what was measured.

@@ -2,9 +2,10 @@
 
 use crate::definitions::{MappedTopic, Reads, map_topic};
 use crate::format::{
-    CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, PLAN_NAME, START_KEY, STEP_TOPIC,
+    CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, PLAN_NAME, PROVENANCE_TOPIC, START_KEY, STEP_TOPIC,
 };
 use crate::message::{FieldValue, read_fields};
+use crate::provenance::{OriginMessage, read_origins};
 use crate::records::ChannelDefinition;
 use crate::scan::Sink;
 use crate::series_builder::SeriesBuilder;
@@ -20,6 +21,7 @@ enum Topic {
     Mapped(MappedTopic),
     Step,
     Event,
+    Provenance,
 }
 
 /// See the module.
@@ -33,6 +35,7 @@ pub(crate) struct RigSink<'a> {
     pub(crate) units: BTreeMap<Reads, &'static Unit>,
     pub(crate) steps: Vec<(u64, StepMessage)>,
     pub(crate) events: Vec<(u64, Event)>,
+    pub(crate) origins: Vec<(u64, OriginMessage)>,
     pub(crate) metadata: BTreeMap<String, String>,
     pub(crate) format: Option<FormatVersion>,
     pub(crate) start_time_ns: Option<u64>,
@@ -56,6 +59,7 @@ impl<'a> RigSink<'a> {
             units: BTreeMap::new(),
             steps: Vec::new(),
             events: Vec::new(),
+            origins: Vec::new(),
             metadata: BTreeMap::new(),
             format: None,
             start_time_ns: None,
@@ -97,6 +101,7 @@ impl Sink for RigSink<'_> {
         let topic = match definition.topic.as_str() {
             STEP_TOPIC => Some(Topic::Step),
             EVENT_TOPIC => Some(Topic::Event),
+            PROVENANCE_TOPIC => Some(Topic::Provenance),
             _ => self.mapped(definition),
         };
         let Some(topic) = topic else { return };
@@ -135,6 +140,12 @@ impl Sink for RigSink<'_> {
                 serde_json::from_slice(data)
                     .map(|step| self.steps.push((log_time_ns, step)))
                     .map_err(|_| STEP_TOPIC.to_owned())
+            }
+            Some(Topic::Provenance) => {
+                let origins = read_origins(data);
+                self.kept += values_of(data.len());
+                let whole = origins.ok_or_else(|| PROVENANCE_TOPIC.to_owned());
+                whole.map(|origins| self.origins.push((log_time_ns, origins)))
             }
             Some(Topic::Event) => {
                 self.kept += values_of(size_of::<Event>() + data.len());

@@ -69,6 +69,19 @@ pub(crate) fn event_schema() -> (Vec<u8>, BTreeMap<String, String>) {
     (typed("event", properties), BTreeMap::from([("t_s".to_owned(), "s".to_owned())]))
 }
 
+/// Schema of `/rig/provenance` with the units of its fields.
+pub(crate) fn provenance_schema() -> (Vec<u8>, BTreeMap<String, String>) {
+    let of = |row: &ChannelInfo| {
+        json!({"type": "object", "description": row.description, "properties": {
+            "source_t_s": {"type": "number", "description": "run time at which the source took the reading, where it is not that of the message", "unit": "s"},
+            "quality": {"type": "string", "description": "uncertain or bad, by the rig's own word; good if it is left out"},
+        }})
+    };
+    let properties: Map<String, Value> =
+        mapper_core::CHANNELS.iter().map(|row| (row.symbol.to_owned(), of(row))).collect();
+    (object("provenance", properties), BTreeMap::from([("source_t_s".to_owned(), "s".to_owned())]))
+}
+
 fn typed(title: &str, properties: Value) -> Vec<u8> {
     match properties {
         Value::Object(properties) => object(title, properties),

@@ -64,6 +64,14 @@ pub enum ReadWarning {
         /// How many.
         count: u64,
     },
+    /// The rig itself calls readings bad.
+    #[error("{count} readings of {channel} are bad by the rig's own word; they count as missing")]
+    BadReadings {
+        /// Channel.
+        channel: Channel,
+        /// How many.
+        count: u64,
+    },
     /// The map names a field that the recording does not hold.
     #[error("the recording has no `{field}` on {topic}, which the channel map gives for {channel}")]
     MissingChannel {

@@ -1,6 +1,7 @@
 //! Writing a recording: messages per device group and sample, flushed each second of the run's clock.
 
 use crate::format::{ELEMENTS_TOPIC, TRUTH_TOPIC};
+use crate::provenance::ProvenanceWriter;
 use crate::recording_file::{McapFile, OpenedFile, RecordingHeader, add_channel, io_error, open};
 use crate::schema::{Field, numeric_schema, unit_metadata};
 use crate::{BadBatch, RecordError};
@@ -64,6 +65,9 @@ pub struct RecordingWriter {
     events_written: u32,
     layouts: Vec<Layout>,
     line: Vec<u8>,
+    /// Fields without a reading are not written at all.
+    absent_left_out: bool,
+    provenance: ProvenanceWriter,
 }
 
 impl RecordingWriter {
@@ -99,7 +103,14 @@ impl RecordingWriter {
             events_written: 0,
             layouts: Vec::new(),
             line: Vec::with_capacity(512),
+            absent_left_out: false,
+            provenance: ProvenanceWriter::default(),
         })
+    }
+
+    /// Leaves fields without a reading out, in place of writing null: for channels of several sources, each with its own times.
+    pub fn leaving_out_absent(self, absent_left_out: bool) -> Self {
+        RecordingWriter { absent_left_out, ..self }
     }
 
     /// Run time up to which all samples are in the file, s; `None` before the first flush.
@@ -128,10 +139,27 @@ impl RecordingWriter {
                 let channel_id = layout.channel_id;
                 self.line.clear();
                 for (prefix, column) in layout.prefixes.iter().zip(&table.columns) {
+                    let value = column.get(index).copied().unwrap_or(f64::NAN);
+                    if self.absent_left_out && !value.is_finite() {
+                        continue;
+                    }
+                    let at = self.line.len();
                     self.line.extend_from_slice(prefix);
-                    push_number(&mut self.line, column.get(index).copied().unwrap_or(f64::NAN));
+                    // What stands before it may have been left out.
+                    self.line[at] = if at == 0 { b'{' } else { b',' };
+                    push_number(&mut self.line, value);
+                }
+                if self.line.is_empty() {
+                    continue;
                 }
                 self.line.push(b'}');
+                self.write_line(channel_id, sequence, log_time)?;
+            }
+            if let Some(message) = self.provenance.message(batch, index) {
+                let channel_id = self.provenance.channel(&mut self.mcap);
+                let channel_id = self.wrote(channel_id)?;
+                self.line.clear();
+                self.line.extend_from_slice(message.to_string().as_bytes());
                 self.write_line(channel_id, sequence, log_time)?;
             }
             self.last_sample_s = Some(*t_s);

@@ -5,7 +5,8 @@ mod common;
 
 use common::{batch, header, part, step, write};
 use mapper_core::{
-    CHANNELS, Channel, ChannelColumn, Element, ElementColumn, MAX_ELEMENTS, SampleBatch, TruthColumn,
+    CHANNELS, Channel, ChannelColumn, Element, ElementColumn, MAX_ELEMENTS, Provenance, Quality,
+    ReadingOrigin, SampleBatch, TruthColumn,
 };
 use mapper_record::{
     ChannelMap, FormatVersion, ReadOptions, ReadReport, ReadWarning, RecordError, RecordingWriter, StepPhase,
@@ -44,6 +45,73 @@ fn a_run_reads_back_whole() {
     }
     let truth = read_truth(&path).unwrap();
     assert_eq!((truth.t_s, truth.columns), (batch.t_s, batch.truth));
+}
+
+/// Quality and source time are kept where they are not as usual, a bad reading is none, and a run without any has no such topic.
+#[test]
+fn where_readings_come_from_is_kept_beside_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plain, told) = (folder.path().join("plain.mcap"), folder.path().join("told.mcap"));
+    let whole = batch(35);
+    write(&plain, &whole, &[]);
+    let usual =
+        Provenance { channel: Channel::T1, source_t_s: whole.t_s.clone(), quality: vec![Quality::Good; 35] };
+    let mut source_t_s = whole.t_s.clone();
+    let mut quality = vec![Quality::Good; 35];
+    (source_t_s[3], quality[5], quality[7]) = (source_t_s[3] - 0.04, Quality::Bad, Quality::Uncertain);
+    let unusual = Provenance { channel: Channel::T2, source_t_s, quality };
+    write(&told, &SampleBatch { provenance: vec![usual.clone(), unusual], ..whole.clone() }, &[]);
+    let same = folder.path().join("same.mcap");
+    write(&same, &SampleBatch { provenance: vec![usual], ..whole.clone() }, &[]);
+    assert_eq!(
+        std::fs::read(&same).unwrap(),
+        std::fs::read(&plain).unwrap(),
+        "what is as usual is not written"
+    );
+    let (plain, told) = (read(&plain), read(&told));
+    assert!(plain.recording.origins.is_empty());
+    assert_eq!(told.warnings, [ReadWarning::BadReadings { channel: Channel::T2, count: 1 }]);
+    let origins = &told.recording.origins;
+    assert_eq!(origins.keys().collect::<Vec<_>>(), [&Channel::T2]);
+    let of = |index: usize, source_t_s, quality| ReadingOrigin { t_s: whole.t_s[index], source_t_s, quality };
+    let expected = [
+        of(3, Some(whole.t_s[3] - 0.04), Quality::Good),
+        of(5, None, Quality::Bad),
+        of(7, None, Quality::Uncertain),
+    ];
+    assert_eq!(origins[&Channel::T2], expected);
+    let (before, after) = (&plain.recording.series[&Channel::T2], &told.recording.series[&Channel::T2]);
+    assert!(after.values[5].is_nan());
+    let others = |values: &[f64]| [&values[..5], &values[6..]].concat();
+    assert_eq!(others(&before.values), others(&after.values));
+}
+
+/// Of several sources each has its own times: what is absent is not there, and a topic without any reading has no message.
+#[test]
+fn absent_readings_are_left_out_where_that_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut whole = SampleBatch { truth: Vec::new(), elements: Vec::new(), ..batch(35) };
+    for column in &mut whole.columns {
+        let every = if column.channel == Channel::TAmb { 5 } else { 1 };
+        let sparse = |(index, value): (usize, &mut f64)| {
+            if index % every != 0 {
+                *value = f64::NAN;
+            }
+        };
+        column.values.iter_mut().enumerate().for_each(sparse);
+    }
+    let mut writer = RecordingWriter::create(&path, &header()).unwrap().leaving_out_absent(true);
+    writer.write_batch(&whole).unwrap();
+    writer.finish().unwrap();
+    let report = read(&path);
+    assert_eq!(report.warnings, []);
+    for column in &whole.columns {
+        let finite = whole.t_s.iter().zip(&column.values).filter(|(_, value)| value.is_finite());
+        let (t_s, values): (Vec<f64>, Vec<f64>) = finite.unzip();
+        let series = &report.recording.series[&column.channel];
+        assert_eq!((&series.t_s, &series.values), (&t_s, &values), "{}", column.channel);
+    }
 }
 
 #[test]

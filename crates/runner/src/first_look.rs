@@ -8,7 +8,7 @@ const LOOK_S: f64 = 5.0;
 /// A source's clock may be off by so much, s.
 const CLOCK_S: f64 = 1.0;
 /// Without these nothing can be identified: they end the run, others are noted.
-const NEEDED: [Channel; 7] = [
+pub(crate) const NEEDED: [Channel; 7] = [
     Channel::ShaftSpeed,
     Channel::CompressorFlow,
     Channel::P1,

@@ -1,6 +1,6 @@
 //! Batches of one second, put together as one.
 
-use mapper_core::SampleBatch;
+use mapper_core::{Provenance, Quality, SampleBatch};
 
 /// Appends the samples of `more`. A channel that one of both lacks is NaN there.
 pub(crate) fn append(whole: &mut SampleBatch, more: SampleBatch) {
@@ -37,10 +37,29 @@ pub(crate) fn append(whole: &mut SampleBatch, more: SampleBatch) {
             known.values.extend(column.values);
         }
     }
+    for from in more.provenance {
+        match whole.provenance.iter_mut().find(|known| known.channel == from.channel) {
+            Some(known) => {
+                known.source_t_s.extend(from.source_t_s);
+                known.quality.extend(from.quality);
+            }
+            None => {
+                let mut source_t_s = whole.t_s.clone();
+                let mut quality = vec![Quality::Good; before];
+                source_t_s.extend(from.source_t_s);
+                quality.extend(from.quality);
+                whole.provenance.push(Provenance { channel: from.channel, source_t_s, quality });
+            }
+        }
+    }
     whole.t_s.extend(more.t_s);
     whole.events.extend(more.events);
-    // Guards have seen it; what is kept of it for single readings has no place in a second that has it only in part.
-    whole.provenance.clear();
+    for from in &mut whole.provenance {
+        // What says nothing of its source was taken when it arrived.
+        let known = from.source_t_s.len().min(after);
+        from.source_t_s.extend(whole.t_s.get(known..).unwrap_or_default());
+        from.quality.resize(after, Quality::Good);
+    }
     let columns = whole.columns.iter_mut().map(|column| &mut column.values);
     let elements = whole.elements.iter_mut().map(|column| &mut column.values);
     let truth = whole.truth.iter_mut().map(|column| &mut column.values);

@@ -66,6 +66,14 @@ pub trait RunObserver {
     fn on_step_end(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
         Ok(())
     }
+
+    /// The step that has just ended is whole: neither a stop nor a fault ended it.
+    ///
+    /// # Errors
+    /// [`ObserverError`].
+    fn on_step_held(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
+        Ok(())
+    }
 }
 
 /// Observers side by side are an observer; the first error ends the round.
@@ -92,5 +100,9 @@ impl RunObserver for Vec<&mut dyn RunObserver> {
 
     fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
         self.iter_mut().try_for_each(|observer| observer.on_step_end(marker))
+    }
+
+    fn on_step_held(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.iter_mut().try_for_each(|observer| observer.on_step_held(marker))
     }
 }

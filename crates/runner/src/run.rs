@@ -264,6 +264,7 @@ impl Run<'_, '_> {
                     let told = self.with.observer.on_step_end(&marker);
                     ended?;
                     told?;
+                    self.with.observer.on_step_held(&marker)?;
                     self.with.steps.after_step(&marker)?;
                     self.skipped = 0;
                     return Ok(());

@@ -280,6 +280,21 @@ mod tests {
         assert!(look(&mut guard, &nothing, 0.6).is_some());
     }
 
+    /// A source whose clock is set back by an hour has taken nothing new as far as anybody can tell; one that is set on has.
+    #[test]
+    fn a_clock_that_is_set_back_is_silence_and_one_that_is_set_on_is_not() {
+        for (step_s, trips) in [(-3600.0, true), (3600.0, false)] {
+            let mut guard = SignalWatch::new(spec());
+            assert_eq!(look(&mut guard, &batch(0, &[300.0; 2]), 0.1), None);
+            let later = batch(2, &[300.0; 10]);
+            let source_t_s = later.t_s.iter().map(|t_s| t_s + step_s).collect();
+            let quality = vec![Quality::Good; 10];
+            let provenance = vec![Provenance { channel: Channel::T2, source_t_s, quality }];
+            let trip = look(&mut guard, &SampleBatch { provenance, ..later }, 1.1);
+            assert_eq!(trip.is_some(), trips, "set by {step_s} s: {trip:?}");
+        }
+    }
+
     #[test]
     fn a_change_and_a_frozen_reading_are_seen() {
         let change = Some(LargestChange { change: 5.0, within_s: 1.0 });

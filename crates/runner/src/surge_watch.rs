@@ -21,6 +21,8 @@ const SECOND_DIFFERENCE: f64 = 1.652;
 pub struct SurgeWatch {
     spec: SurgeVariation,
     next_look_s: f64,
+    /// Newest reading of flow, P2 and P1 since the last look: they may come from several sources, each at its own times.
+    newest: [f64; 3],
     /// Flow, P2 and P1 of the last looks.
     looks: VecDeque<[f64; 3]>,
     since_s: Option<f64>,
@@ -34,6 +36,7 @@ impl SurgeWatch {
         SurgeWatch {
             spec,
             next_look_s: f64::NEG_INFINITY,
+            newest: [f64::NAN; 3],
             looks: VecDeque::new(),
             since_s: None,
             last_s: 0.0,
@@ -74,12 +77,15 @@ impl Guard for SurgeWatch {
         let columns =
             [Channel::CompressorFlow, Channel::P2, Channel::P1].map(|channel| batch.column(channel));
         for (index, t_s) in batch.t_s.iter().enumerate() {
+            for (newest, column) in self.newest.iter_mut().zip(&columns) {
+                let value = column.and_then(|values| values.get(index)).copied();
+                *newest = value.filter(|value| value.is_finite()).unwrap_or(*newest);
+            }
             if *t_s < self.next_look_s - 1e-6 {
                 continue;
             }
             (self.next_look_s, self.last_s) = (t_s + LOOK_S, *t_s);
-            let look = columns.map(|column| column.and_then(|values| values.get(index)).copied());
-            self.looks.push_back(look.map(|value| value.unwrap_or(f64::NAN)));
+            self.looks.push_back(std::mem::replace(&mut self.newest, [f64::NAN; 3]));
             if self.looks.len() > LOOKS {
                 self.looks.pop_front();
             }

@@ -12,6 +12,8 @@ const STEP_S: f64 = 0.1;
 const WATCH_S: f64 = 5.0;
 /// How often a rig is asked to become safe before it counts as lost.
 const TRIES: usize = 3;
+/// Time between two of them, s of the run's clock: a link that is gone for a moment may be back.
+const PAUSE_S: f64 = 0.5;
 
 /// The panic of a backend as an answer of it.
 #[derive(Debug, thiserror::Error)]
@@ -143,7 +145,11 @@ impl Run<'_, '_> {
     /// Air off, as often as it takes, within reason.
     fn cut_air(&mut self) -> Result<(), BackendError> {
         let mut last = Ok(());
-        for _ in 0..TRIES {
+        for tried in 0..TRIES {
+            if tried > 0 {
+                self.now_s += PAUSE_S;
+                self.with.clock.wait_until(self.now_s);
+            }
             last = catch_unwind(AssertUnwindSafe(|| self.with.backend.make_safe())).unwrap_or_else(|panic| {
                 let source = Box::new(Panicked(words_of(&*panic)));
                 Err(BackendError::Lost { t_s: self.now_s, source })

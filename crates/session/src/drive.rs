@@ -7,8 +7,8 @@ use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::speed_response::speed_response;
 use mapper_runner::{
-    Operator, Protection, RunEnd, RunError, RunObserver, Runner, Soaked, SpeedControl, SpeedControlLimits,
-    StepSource,
+    Operator, Protection, ReadChannel, RunEnd, RunError, RunObserver, Runner, Soaked, SpeedControl,
+    SpeedControlLimits, StepSource,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -25,8 +25,14 @@ pub fn drive(
     observer: &mut dyn RunObserver,
     stop: &AtomicBool,
 ) -> Result<RunEnd, RunError> {
-    let pace =
-        Pace { clock: &mut UnpacedClock, each_sample: false, stop, stop_after_step: &NEVER, operator: None };
+    let pace = Pace {
+        clock: &mut UnpacedClock,
+        each_sample: false,
+        stop,
+        stop_after_step: &NEVER,
+        operator: None,
+        read: &[],
+    };
     drive_paced(campaign, model, steps, backend, observer, pace)
 }
 
@@ -44,6 +50,8 @@ pub struct Pace<'a> {
     pub stop_after_step: &'a AtomicBool,
     /// What the operator asks for besides.
     pub operator: Option<&'a Operator>,
+    /// Channels that are read beside the rig, which have to stay alive.
+    pub read: &'a [ReadChannel],
 }
 
 /// As [`drive`], at a pace.
@@ -59,7 +67,7 @@ pub fn drive_paced(
     pace: Pace<'_>,
 ) -> Result<RunEnd, RunError> {
     let rig = backend.describe();
-    let guards = guards(campaign, &rig);
+    let guards = guards(campaign, &rig, pace.read);
     let mut soaked;
     let steps: &mut dyn StepSource = match campaign.zero {
         None => steps,

@@ -120,6 +120,16 @@ pub enum SessionError {
     /// A backend could not be made: its name or its settings are wrong.
     #[error(transparent)]
     Backend(BackendError),
+    /// A source beside the rig cannot be made, or gives what it should not.
+    #[error("the reader at `{at}`: {source}")]
+    Reader {
+        /// Keys of the campaign down to it.
+        at: String,
+        /// Path below that, where it is one of the backend's own settings.
+        setting: String,
+        /// What is wrong.
+        source: mapper_core::BackendCause,
+    },
     /// A stored plan that no plan may be like.
     #[error("{}: {why}; make it again with `mapper plan CAMPAIGN --out FILE`", .path.display())]
     WrongPlan {
@@ -389,6 +399,7 @@ impl SessionError {
             | E::Method { .. }
             | E::Model(_)
             | E::Backend(_)
+            | E::Reader { .. }
             | E::Effect(_)
             | E::EffectTaken { .. }
             | E::EffectUnread { .. }

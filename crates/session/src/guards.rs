@@ -6,12 +6,13 @@ use mapper_campaign::Campaign;
 use mapper_core::{GuardName, RigDescription};
 use mapper_record::ChannelMap;
 use mapper_runner::{
-    BatchWatch, DriftWatch, FirstLook, Guard, RigWatch, SignalWatch, StepSource, SurgeWatch,
+    BatchWatch, DriftWatch, FirstLook, Guard, ReadChannel, ReaderWatch, RigWatch, SignalWatch, StepSource,
+    SurgeWatch,
 };
 
 /// The guards of a run of this campaign on this rig. A signal that nobody has declared a guard for, and that the rig does not
 /// deliver, is left out; one that is declared, or that the rig needs, is not: it trips.
-pub fn guards(campaign: &Campaign, rig: &RigDescription) -> Vec<Box<dyn Guard>> {
+pub fn guards(campaign: &Campaign, rig: &RigDescription, read: &[ReadChannel]) -> Vec<Box<dyn Guard>> {
     let set = campaign.guard_set();
     let mut guards: Vec<Box<dyn Guard>> = vec![Box::new(BatchWatch::default())];
     for spec in set.signals {
@@ -21,6 +22,9 @@ pub fn guards(campaign: &Campaign, rig: &RigDescription) -> Vec<Box<dyn Guard>> 
         }
     }
     guards.extend(set.surge.map(|spec| Box::new(SurgeWatch::new(spec)) as Box<dyn Guard>));
+    if !read.is_empty() {
+        guards.push(Box::new(ReaderWatch::new(read.to_vec())));
+    }
     if rig.controls {
         guards.push(Box::new(RigWatch::default()));
         guards.push(Box::new(FirstLook::new(rig.channels.clone())));

@@ -61,7 +61,10 @@ impl Identity {
             model_sha256: plan.made_from.model_sha256.clone(),
             plan_sha256: hash(&serde_json::to_string(&without_rig)?),
             backend: format!("{} {}{behind}", rig.backend, rig.version),
-            settings_sha256: hash(&campaign.backend.settings.to_string()),
+            settings_sha256: match campaign.readers.as_slice() {
+                [] => hash(&campaign.backend.settings.to_string()),
+                readers => hash(&serde_json::to_string(&(&campaign.backend.settings, readers))?),
+            },
             rig_sha256: Some(rig_sha256(rig)?),
         })
     }
@@ -151,7 +154,12 @@ pub struct JournalPart {
     pub soaked: bool,
     /// Steps that are in the recording.
     pub saved: BTreeSet<usize>,
+    /// Whether it came to the end of the run's steps.
+    pub completed: bool,
 }
+
+/// How a run ends that has made every step, in the journal's words.
+pub(crate) const COMPLETED: &str = "Completed.";
 
 /// The parts of a run. Lines that cannot be read are passed over: a step that is not known to be saved is run again.
 ///
@@ -164,12 +172,19 @@ pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
     for line in bytes.split(|byte| *byte == b'\n') {
         match (serde_json::from_slice::<Entry>(line), parts.last_mut()) {
             (Ok(Entry::Part { identity, recording }), _) => {
-                parts.push(JournalPart { identity, recording, soaked: false, saved: BTreeSet::new() });
+                parts.push(JournalPart {
+                    identity,
+                    recording,
+                    soaked: false,
+                    saved: BTreeSet::new(),
+                    completed: false,
+                });
             }
             (Ok(Entry::Soaked), Some(part)) => part.soaked = true,
             (Ok(Entry::StepSaved(index)), Some(part)) => {
                 part.saved.insert(index);
             }
+            (Ok(Entry::Ended(how)), Some(part)) => part.completed = how == COMPLETED,
             _ => {}
         }
     }

@@ -122,7 +122,7 @@ impl NightlyRun {
     }
 
     fn record(&self, plan: &Plan, session: &Session<'_>, recording: &Path) -> Result<RunEnd, SessionError> {
-        let mut backend = session.registry.make_backend(&self.campaign, &self.model)?;
+        let mut backend = session.registry.make_sources(&self.campaign, &self.model)?.backend;
         let header = RecordingHeader {
             library: PROGRAM.to_owned(),
             plan_json: Some(json_text(plan)?.into_bytes()),

@@ -16,13 +16,11 @@ pub(crate) struct Recorder {
     pending: Vec<(Entry, Option<f64>)>,
     /// The recording once more, to send it through to the disk: where a rig outlives a computer.
     through: Option<File>,
-    /// End of the step that is under way, as planned, s.
-    planned_end_s: f64,
 }
 
 impl Recorder {
     pub(crate) fn new(writer: RecordingWriter) -> Self {
-        Recorder { writer, journal: None, pending: Vec::new(), through: None, planned_end_s: 0.0 }
+        Recorder { writer, journal: None, pending: Vec::new(), through: None }
     }
 
     /// Keeps a journal, and sends all through to the disk where `through` is given.
@@ -72,7 +70,6 @@ impl Recorder {
 
 impl RunObserver for Recorder {
     fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.planned_end_s = marker.end_s;
         self.writer.write_step(marker, StepPhase::Start).map_err(ObserverError::of)
     }
 
@@ -95,11 +92,11 @@ impl RunObserver for Recorder {
     }
 
     fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::of)?;
-        // A step that was cut short does not hold.
-        if marker.end_s >= self.planned_end_s - 1.0 {
-            self.keep(Entry::StepSaved(marker.index));
-        }
+        self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::of)
+    }
+
+    fn on_step_held(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.keep(Entry::StepSaved(marker.index));
         Ok(())
     }
 }

@@ -18,7 +18,9 @@ pub(crate) fn metadata(campaign: &Campaign, plan: &Plan) -> BTreeMap<String, Str
         ("campaign_sha256", plan.made_from.campaign_sha256.clone()),
         ("model_sha256", plan.made_from.model_sha256.clone()),
     ];
+    let readers: Vec<&str> = campaign.readers.iter().map(|reader| reader.name.as_str()).collect();
     let sometimes = [
+        ("readers", (!readers.is_empty()).then(|| readers.join(", "))),
         ("script_sha256", plan.made_from.script_sha256.clone()),
         ("serial_number", campaign.machine.serial_number.clone()),
         ("operator", campaign.report.operator.clone()),

@@ -2,6 +2,7 @@
 
 use crate::SessionError;
 use mapper_campaign::Campaign;
+use mapper_campaign::campaign::BackendChoice;
 use mapper_core::{Backend, BackendError, MapFormats};
 use mapper_logs::LogFormats;
 use mapper_physics::backend_plugin::BackendPlugin;
@@ -61,15 +62,23 @@ impl Registry {
     /// # Errors
     /// [`SessionError::Backend`] where the name is unknown or the settings are wrong.
     pub fn make_backend(&self, campaign: &Campaign, model: &Model) -> Result<Box<dyn Backend>, SessionError> {
-        let wanted = &campaign.backend;
+        self.made(&campaign.backend, campaign, model).map_err(SessionError::Backend)
+    }
+
+    /// One backend by its name.
+    pub(crate) fn made(
+        &self,
+        wanted: &BackendChoice,
+        campaign: &Campaign,
+        model: &Model,
+    ) -> Result<Box<dyn Backend>, BackendError> {
         if let Some(driver) =
             self.driver.filter(|_| !self.backends.iter().any(|plugin| plugin.name == wanted.name))
         {
-            return driver(&wanted.name, &wanted.settings).map_err(SessionError::Backend);
+            return driver(&wanted.name, &wanted.settings);
         }
         let nominal = nominal_rig(campaign, model, &self.effects);
         BackendPlugin::make_by_name(&self.backends, &wanted.name, &nominal, &wanted.settings)
-            .map_err(SessionError::Backend)
     }
 
     /// The catalogue, and the effects that scripts define.

@@ -9,6 +9,16 @@ use mapper_runner::{StepSource, StepSourceError};
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
+/// Steps that are made once more to come from where the missing one comes from are numbered from here on: no plan has as many.
+pub(crate) const AGAIN_FROM: usize = 1_000_000;
+/// Whether the steps of a campaign depend on what was measured.
+pub(crate) fn depends_on_readings(campaign: &Campaign) -> bool {
+    campaign.sequence.is_some()
+        || campaign.surge_search.is_some()
+        || campaign.on_drift.is_some()
+        || !campaign.timing.ends.is_planned()
+}
+
 /// What is known of a run that was broken off.
 #[derive(Debug, Clone)]
 pub struct BrokenOff {
@@ -31,6 +41,37 @@ impl BrokenOff {
             return Err(why("its journal holds no run".to_owned()));
         }
         Ok(BrokenOff { directory: directory.to_owned(), parts })
+    }
+
+    /// Leaves out what a later part has made anew, and the line along which surge was sought last: a search goes on from what the
+    /// machine was told just before, and begins its line again.
+    ///
+    /// # Errors
+    /// What reading a recording says.
+    pub(crate) fn keep_what_goes_on(&mut self, campaign: &Campaign) -> Result<(), SessionError> {
+        if !depends_on_readings(campaign) {
+            return Ok(());
+        }
+        let mut first_later = AGAIN_FROM;
+        for part in self.parts.iter_mut().rev() {
+            part.saved.retain(|index| *index < first_later || *index >= AGAIN_FROM);
+            first_later = part.saved.iter().copied().next().unwrap_or(first_later).min(first_later);
+        }
+        let last =
+            self.parts.iter_mut().rev().find(|part| part.saved.iter().any(|index| *index < AGAIN_FROM));
+        let Some(part) = last.filter(|part| campaign.surge_search.is_some() && !part.completed) else {
+            return Ok(());
+        };
+        let path = self.directory.join(&part.recording);
+        let read = read_recording(&path, &ChannelMap::native(), &ReadOptions::default())?;
+        let holds = |step: &&StepMarker| step.index < AGAIN_FROM && part.saved.contains(&step.index);
+        let held: Vec<StepMarker> = read.recording.steps.iter().filter(holds).copied().collect();
+        let speed = |step: &StepMarker| step.to.map(|to| to.speed_rpm.to_bits());
+        let line = held.last().and_then(speed);
+        let sought = |step: &&StepMarker| step.kind == StepKind::Approach && speed(step) == line;
+        let open: Vec<usize> = held.iter().rev().take_while(sought).map(|step| step.index).collect();
+        part.saved.retain(|index| !open.contains(index));
+        Ok(())
     }
 
     /// Steps of the plan, by their place in it, that are in one of the recordings.
@@ -64,7 +105,7 @@ impl BrokenOff {
         self.parts.iter().any(|part| part.soaked)
     }
 
-    /// Refuses what is not the same run, and what cannot go on from its middle.
+    /// Refuses what is not the same run, and what has nothing left to do.
     ///
     /// # Errors
     /// [`SessionError::NotResumable`] with what differs or why.
@@ -76,23 +117,20 @@ impl BrokenOff {
                 return why(format!("{} changed since", differences.join(" and ")));
             }
         }
-        for (key, set) in [
-            ("sequence", campaign.sequence.is_some()),
-            ("surge_search", campaign.surge_search.is_some()),
-            ("drift", campaign.on_drift.is_some()),
-            ("timing.ends", !campaign.timing.ends.is_planned()),
-        ] {
-            if set {
-                return why(format!(
-                    "its campaign has `{key}`, whose steps depend on all that was measured before; identify what there is, and run it again"
-                ));
-            }
-        }
-        let saved = self.saved(campaign, plan)?;
-        if plan.steps.iter().all(|step| saved.contains(&step.index)) {
-            return why("all of its steps are there; `mapper identify` gives the map".to_owned());
+        if self.directory.join(run_directory::POINTS).exists() && self.is_whole(campaign, plan)? {
+            return why("all of its steps are there, and so is its map".to_owned());
         }
         Ok(())
+    }
+
+    /// Whether every step is there, and nothing but the map may be missing.
+    pub(crate) fn is_whole(&self, campaign: &Campaign, plan: &Plan) -> Result<bool, SessionError> {
+        if depends_on_readings(campaign) {
+            // Only the end of the run says that no further step would have come.
+            return Ok(self.parts.last().is_some_and(|part| part.completed));
+        }
+        let saved = self.saved(campaign, plan)?;
+        Ok(plan.steps.iter().all(|step| saved.contains(&step.index)))
     }
 
     /// What is done again and why, in a sentence.

@@ -3,10 +3,12 @@
 use crate::certainty::DwellPrices;
 use crate::declared::identification;
 use crate::drive::{Pace, drive_paced, soak_s};
+use crate::ended::{Ended, doubt, sentence};
 use crate::estimates::Estimates;
 use crate::executed::StepsMade;
 use crate::files::{json_text, write_new};
 use crate::guards::{check_guards, drift_watch};
+use crate::held::Held;
 use crate::journal::{Entry, Identity, Journal, rig_sha256};
 use crate::observers::{Recorder, Teller};
 use crate::planned::plan;
@@ -16,21 +18,22 @@ use crate::program::PROGRAM;
 use crate::recording_metadata::metadata;
 use crate::rehearsal::rehearse;
 use crate::replanned::{Replanned, SharedPrices};
+use crate::replayed::going_on;
 use crate::results::{Results, RunPart};
-use crate::resume::{BrokenOff, MissingSteps};
-use crate::rig_state::{Claim, Latch, Owner, RigStates};
+use crate::resume::{BrokenOff, MissingSteps, depends_on_readings};
+use crate::rig_state::RigStates;
 use crate::scripted_steps::ScriptedSteps;
+use crate::sources::Sources;
 use crate::stored_plan::stored_plan;
 use crate::surge::hold_near_surge;
 use crate::{Session, SessionError, SessionEvent, run_directory};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
-use mapper_core::{Backend, Clock, Plan, Reaction, RigDescription, UnpacedClock};
+use mapper_core::{Clock, Plan, RigDescription, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
 use mapper_runner::{
-    Deadlined, Deadlines, PlanSteps, RunEnd, RunError, RunObserver, StepSource, StepSourceError, SurgeSearch,
-    UntilCertain,
+    Deadlined, Deadlines, PlanSteps, RunObserver, StepSource, StepSourceError, SurgeSearch, UntilCertain,
 };
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -84,7 +87,7 @@ pub struct PreparedRun<'a> {
     /// The plan to be run.
     plan: Plan,
     scripted: Option<ScriptedSteps>,
-    backend: Box<dyn Backend>,
+    sources: Sources,
     /// What ends the steps, where it is not the plan.
     prices: Option<DwellPrices>,
     /// The plan as it was planned again.
@@ -112,32 +115,6 @@ impl RunOutcome {
     }
 }
 
-/// How a run ended.
-#[derive(Debug)]
-pub enum Ended {
-    /// Every step was run.
-    Completed,
-    /// Drift was seen, and the campaign says to stop then.
-    Drifted {
-        /// What drifted.
-        reason: String,
-    },
-    /// A guard tripped.
-    Tripped {
-        /// Run time, s.
-        t_s: f64,
-        /// What tripped it.
-        reason: String,
-    },
-    /// The operator stopped it.
-    Interrupted {
-        /// Run time, s.
-        t_s: f64,
-    },
-    /// Rig, script or recording failed.
-    Failed(RunError),
-}
-
 impl<'s> Session<'s> {
     /// Makes the plan, or holds the stored one against it, rehearses a script and makes the backend. What fails here never
     /// touches the rig.
@@ -145,15 +122,18 @@ impl<'s> Session<'s> {
     /// # Errors
     /// [`SessionError`] where there is no plan, the stored one is stale, the script fails or the backend's settings are wrong.
     pub fn prepare<'a>(&self, request: RunRequest<'a>) -> Result<PreparedRun<'a>, SessionError> {
-        let campaign = request.campaign;
+        let (campaign, mut request) = (request.campaign, request);
+        if let Some(broken_off) = &mut request.resume {
+            broken_off.keep_what_goes_on(campaign)?;
+        }
         self.registry.check_formats(campaign)?;
         let model = nominal_model(campaign)?;
         let mut made = match &campaign.sequence {
             None => plan(campaign, &model)?,
             Some(source) => rehearse(self, campaign, &model, source)?.plan,
         };
-        let backend = self.registry.make_backend(campaign, &model)?;
-        let rig = backend.describe();
+        let sources = self.registry.make_sources(campaign, &model)?;
+        let rig = sources.backend.describe();
         made.made_from.rig_sha256 = Some(rig_sha256(&rig)?);
         let kept = request.resume.as_ref().map(|broken_off| broken_off.directory.join(run_directory::PLAN));
         let mut plan = match request.plan.or(kept.as_deref()) {
@@ -177,7 +157,7 @@ impl<'s> Session<'s> {
             made,
             plan,
             scripted,
-            backend,
+            sources,
             prices,
             replanned: None,
             steps_made: StepsMade::default(),
@@ -206,7 +186,7 @@ impl PreparedRun<'_> {
 
     /// The rig.
     pub fn rig(&self) -> RigDescription {
-        self.backend.describe()
+        self.sources.backend.describe()
     }
 
     /// Drives the rig as fast as it goes, records, identifies, reports.
@@ -230,13 +210,15 @@ impl PreparedRun<'_> {
         let campaign = self.request.campaign;
         let rig = self.rig();
         if !rig.simulated_time {
-            self.backend = Box::new(Deadlined::new(self.backend, DEADLINES).map_err(SessionError::Backend)?);
+            let deadlined = Deadlined::new(self.sources.backend, DEADLINES).map_err(SessionError::Backend)?;
+            self.sources.backend = Box::new(deadlined);
         }
-        let mut claim = self.claim(&rig)?;
+        if let Some(whole) = self.identify_whole(session)? {
+            return Ok(whole);
+        }
+        let mut held = self.hold(&rig)?;
         let (directory, plan_json) = (self.directory()?, json_text(&self.plan)?);
-        if let Some(claim) = &mut claim {
-            claim.sign(&owner(&directory, self.request.started_name))?;
-        }
+        held.sign(&directory, self.request.started_name)?;
         check_room(&directory, soak_s(campaign) + self.plan.duration_s(), &rig)?;
         let mut parts = self.parts_before(&directory);
         let name = match parts.len() {
@@ -244,7 +226,9 @@ impl PreparedRun<'_> {
             before => format!("recording-{}.mcap", before + 1),
         };
         let recording = directory.join(&name);
-        let writer = RecordingWriter::create(&recording, &self.header(plan_json))?;
+        // Where there are several sources, each has its own times.
+        let writer = RecordingWriter::create(&recording, &self.header(plan_json))?
+            .leaving_out_absent(!self.sources.read.is_empty());
         let path = directory.join(run_directory::JOURNAL);
         let mut journal =
             Journal::open(&path, !rig.simulated_time).map_err(SessionError::file("write", &path))?;
@@ -255,38 +239,62 @@ impl PreparedRun<'_> {
         // A rig in real time outlives this computer: what is recorded goes through to the disk.
         let through = if rig.simulated_time { None } else { std::fs::File::open(&recording).ok() };
         let recorder = Recorder::new(writer).with_journal(journal, through);
+        let read = self.sources.read.clone();
         let pace = Pace {
             clock,
             each_sample,
             stop: session.stop,
             stop_after_step: session.stop_after_step,
             operator: session.operator,
+            read: &read,
         };
         let (end, finished, doubt) = self.drive_and_record(session, recorder, pace);
-        give_back(claim, doubt, &directory)?;
+        held.give_back(doubt, &directory)?;
         // A run that failed has its own reason; one that did not must have a whole file.
         if !matches!(end, Ended::Failed(_) | Ended::Interrupted { .. } | Ended::Tripped { .. }) {
             finished?;
         }
         parts.push(RunPart { recording: recording.clone(), saved: None });
         let results_directory = results_directory(&directory, parts.len())?;
-        let executed = self.executed(&directory);
-        let what = format!("identifying {} steps", self.plan.steps.len());
-        session.tell(SessionEvent::Progress { done_ratio: 0.0, what });
-        let results = executed.and_then(|plan| {
-            let started_ns = self.request.started_ns;
-            session.results(campaign, &plan, &sentence(&end), started_ns, &results_directory, &parts)
-        });
+        let executed = self.executed(&results_directory);
+        let results = self.results(session, executed, &end, &results_directory, &parts);
         Ok(RunOutcome { directory, recording, end, results })
     }
 
-    /// The rig, where it is one that can be had but once.
-    fn claim(&self, rig: &RigDescription) -> Result<Option<Claim>, SessionError> {
-        let Some(name) = &rig.exclusive else { return Ok(None) };
+    fn results(
+        &self,
+        session: &Session<'_>,
+        executed: Result<Plan, SessionError>,
+        end: &Ended,
+        directory: &Path,
+        parts: &[RunPart],
+    ) -> Result<Results, SessionError> {
+        let what = format!("identifying {} steps", self.plan.steps.len());
+        session.tell(SessionEvent::Progress { done_ratio: 0.0, what });
+        let (campaign, started_ns) = (self.request.campaign, self.request.started_ns);
+        session.results(campaign, &executed?, &sentence(end), started_ns, directory, parts)
+    }
+
+    /// A run that was broken off behind its last step: the map alone is missing, and the rig is left alone.
+    fn identify_whole(&self, session: &Session<'_>) -> Result<Option<RunOutcome>, SessionError> {
+        let Some(broken_off) = &self.request.resume else { return Ok(None) };
+        if !broken_off.is_whole(self.request.campaign, &self.plan)? {
+            return Ok(None);
+        }
+        let directory = broken_off.directory.clone();
+        let parts = self.parts_before(&directory);
+        let recording = parts.last().map_or_else(PathBuf::new, |part| part.recording.clone());
+        let end = Ended::Completed;
+        let results = self.results(session, Ok(self.plan.clone()), &end, &directory, &parts);
+        Ok(Some(RunOutcome { directory, recording, end, results }))
+    }
+
+    /// The rig and its readers, where they can be had but once.
+    fn hold(&self, rig: &RigDescription) -> Result<Held, SessionError> {
         let usual = self.request.parent.join(".rigs");
         let states = RigStates::new(self.request.rig_states.unwrap_or(&usual));
         let resumes = self.request.resume.as_ref().map(|broken_off| broken_off.directory.as_path());
-        states.claim(name, resumes).map(Some)
+        Held::take(&states, rig.exclusive.as_deref(), &self.sources.exclusive, resumes)
     }
 
     /// The directory of the run: a new one with what the run is made from, or that of the run that goes on.
@@ -304,6 +312,10 @@ impl PreparedRun<'_> {
         }
         if let Some(source) = &campaign.sequence {
             write_new(&directory.join(run_directory::SEQUENCE), source.text.as_bytes())?;
+            // A run that goes on finds it where its campaign names it.
+            if Path::new(&source.named) != Path::new(run_directory::SEQUENCE) {
+                run_directory::keep_beside(&directory, &source.named, &source.text)?;
+            }
         }
         Ok(directory)
     }
@@ -327,8 +339,11 @@ impl PreparedRun<'_> {
     ) -> (Ended, Result<(), SessionError>, Option<String>) {
         let mut planned = PlanSteps::new(&self.plan);
         let mut missing;
-        // A run that goes on goes by its plan as it stood.
-        let prices = self.prices.take().filter(|_| self.request.resume.is_none()).map(RefCell::new);
+        // A run that goes on goes by its plan as it stood, or by what it is told again.
+        let resumes = self.request.resume.as_ref();
+        let told_again = resumes.filter(|_| depends_on_readings(self.request.campaign));
+        let by_plan = resumes.filter(|_| told_again.is_none());
+        let prices = self.prices.take().filter(|_| by_plan.is_none()).map(RefCell::new);
         let replans = !self.request.campaign.replan.is_off();
         let mut replanned = match prices.as_ref().filter(|_| replans) {
             None => None,
@@ -340,7 +355,11 @@ impl PreparedRun<'_> {
         // What was measured at rest holds for the whole run.
         let without_soak;
         let mut campaign = self.request.campaign;
-        let steps: &mut dyn StepSource = match (&mut self.scripted, &self.request.resume) {
+        if resumes.is_some_and(BrokenOff::soaked) {
+            without_soak = Campaign { zero: None, ..campaign.clone() };
+            campaign = &without_soak;
+        }
+        let steps: &mut dyn StepSource = match (&mut self.scripted, by_plan) {
             (Some(scripted), _) => scripted,
             (None, Some(broken_off)) => {
                 let saved = match broken_off.saved(campaign, &self.plan) {
@@ -348,10 +367,6 @@ impl PreparedRun<'_> {
                     Err(error) => return not_begun(recorder, error),
                 };
                 let said = broken_off.said(campaign, &self.plan, &saved);
-                if broken_off.soaked() {
-                    without_soak = Campaign { zero: None, ..campaign.clone() };
-                    campaign = &without_soak;
-                }
                 missing = MissingSteps::new(&self.plan, &saved, said);
                 &mut missing
             }
@@ -383,30 +398,27 @@ impl PreparedRun<'_> {
             steps: self.plan.steps.len(),
             duration_s: soak_s(campaign) + self.plan.duration_s(),
         };
-        let (model, backend) = (&self.model, self.backend.as_mut());
-        let (end, drifted) = std::thread::scope(|scope| {
+        let (model, backend) = (&self.model, self.sources.backend.as_mut());
+        let ((end, held, later_s), drifted) = std::thread::scope(|scope| {
             let begin = || Estimates::begin(scope, identification(campaign), session.on_event);
             let mut estimates = session.estimates.then(begin);
             let mut observers: Vec<&mut dyn RunObserver> =
                 vec![&mut recorder, &mut teller, &mut self.steps_made];
             observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
+            let go = |steps: &mut dyn StepSource| {
+                going_on(told_again, steps, |steps| {
+                    drive_paced(campaign, model, steps, backend, &mut observers, pace)
+                })
+            };
             match drift_watch(campaign, steps) {
-                Ok(mut watch) => {
-                    let end = drive_paced(campaign, model, &mut watch, backend, &mut observers, pace);
-                    (end, watch.ended_by_drift().map(str::to_owned))
-                }
-                Err(steps) => (drive_paced(campaign, model, steps, backend, &mut observers, pace), None),
+                Ok(mut watch) => (go(&mut watch), watch.ended_by_drift().map(str::to_owned)),
+                Err(steps) => (go(steps), None),
             }
         });
+        self.steps_made.go_on(held, later_s);
         self.replanned = replanned.map(|replanned| replanned.handed_out());
         let doubt = doubt(&end);
-        let end = match (end, drifted) {
-            (Ok(RunEnd::Completed), None) => Ended::Completed,
-            (Ok(RunEnd::Completed), Some(reason)) => Ended::Drifted { reason },
-            (Ok(RunEnd::Interrupted { t_s }), _) => Ended::Interrupted { t_s },
-            (Ok(RunEnd::Tripped(trip)), _) => Ended::Tripped { t_s: trip.t_s, reason: trip.reason },
-            (Err(error), _) => Ended::Failed(error),
-        };
+        let end = Ended::of(end, drifted);
         let finished = recorder.finish(&sentence(&end)).map_err(SessionError::from);
         (end, finished, doubt)
     }
@@ -444,34 +456,6 @@ fn not_begun(recorder: Recorder, error: SessionError) -> (Ended, Result<(), Sess
     (end, finished, None)
 }
 
-/// Why nobody knows in which state the rig is, or has to look at it before the next run.
-fn doubt(end: &Result<RunEnd, RunError>) -> Option<String> {
-    match end {
-        Ok(RunEnd::Tripped(trip)) if trip.reaction == Reaction::Latch => Some(trip.reason.clone()),
-        Err(error) if error.leaves_doubt() => Some(error.to_string()),
-        _ => None,
-    }
-}
-
-/// Gives the rig back, latched where it is in doubt.
-fn give_back(claim: Option<Claim>, doubt: Option<String>, run: &Path) -> Result<(), SessionError> {
-    let Some(claim) = claim else { return Ok(()) };
-    if let Some(reason) = doubt {
-        claim.latch(&Latch { reason, run: run.to_owned() })?;
-    }
-    claim.release()
-}
-
-fn owner(run: &Path, started: &str) -> Owner {
-    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-    Owner {
-        process: std::process::id(),
-        host: host.trim().to_owned(),
-        run: std::path::absolute(run).unwrap_or_else(|_| run.to_owned()),
-        started: started.to_owned(),
-    }
-}
-
 /// Where results go: nothing is written over.
 fn results_directory(run: &Path, parts: usize) -> Result<PathBuf, SessionError> {
     if !run.join(run_directory::POINTS).exists() && !run.join(run_directory::REPORT).exists() {
@@ -480,19 +464,4 @@ fn results_directory(run: &Path, parts: usize) -> Result<PathBuf, SessionError> 
     let directory = run.join(format!("results-{parts}"));
     std::fs::create_dir_all(&directory).map_err(SessionError::file("create", &directory))?;
     Ok(directory)
-}
-
-/// How a run ended, in a sentence for its report.
-fn sentence(end: &Ended) -> String {
-    let what = match end {
-        Ended::Completed => return "Completed.".to_owned(),
-        Ended::Drifted { reason } => format!("({reason})"),
-        Ended::Interrupted { t_s } => format!("by the operator at {t_s:.0} s"),
-        Ended::Tripped { t_s, reason } => format!("by a guard at {t_s:.1} s ({reason})"),
-        // A script's error shows its line below the first one.
-        Ended::Failed(error) => {
-            format!("by a fault ({})", error.to_string().lines().next().unwrap_or_default())
-        }
-    };
-    format!("Stopped {what}: the map is not complete.")
 }

@@ -5,7 +5,7 @@
 use crate::blocks::Block;
 use std::future::Future;
 use std::net::SocketAddr;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use tokio::time::timeout;
 use tokio_modbus::client::{Context, tcp};
@@ -41,6 +41,8 @@ pub(crate) struct Link {
     address: SocketAddr,
     unit: u8,
     within: Duration,
+    /// When the writes that belong together have to be through.
+    until: Option<Instant>,
     connection: Option<Context>,
 }
 
@@ -48,12 +50,27 @@ impl Link {
     /// No connection is made yet.
     pub(crate) fn new(address: SocketAddr, unit: u8, within: Duration) -> std::io::Result<Link> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-        Ok(Link { runtime, address, unit, within, connection: None })
+        Ok(Link { runtime, address, unit, within, until: None, connection: None })
     }
 
     /// Forgets the connection.
     pub(crate) fn close(&mut self) {
         self.connection = None;
+    }
+
+    /// Makes writes that belong together: second tries and new connections included they end within so long, since whoever asked for
+    /// them waits no longer.
+    pub(crate) fn together<T>(&mut self, within: Duration, writes: impl FnOnce(&mut Link) -> T) -> T {
+        self.until = Instant::now().checked_add(within);
+        let done = writes(self);
+        self.until = None;
+        done
+    }
+
+    /// What a request has left, at most its own time.
+    fn left(&self) -> Duration {
+        let left = self.until.map(|until| until.saturating_duration_since(Instant::now()));
+        left.map_or(self.within, |left| left.min(self.within))
     }
 
     /// Reads registers.
@@ -88,7 +105,7 @@ impl Link {
         what: String,
         request: impl AsyncFnOnce(&mut Context) -> tokio_modbus::Result<T>,
     ) -> Result<T, LinkError> {
-        let (address, within) = (self.address, self.within);
+        let (address, within) = (self.address, self.left());
         let late = LinkError::Late { address, within };
         let mut connection = match self.connection.take() {
             Some(connection) => connection,
@@ -98,6 +115,7 @@ impl Link {
                 made.map_err(|error| LinkError::Failed { address, words: error.to_string() })?
             }
         };
+        let within = self.left();
         let answer = self.runtime.block_on(in_time(within, request(&mut connection)));
         match answer {
             None => Err(LinkError::Late { address, within }),
@@ -113,4 +131,27 @@ impl Link {
 /// `None` where it is too late. The timer begins inside of the runtime.
 async fn in_time<T>(within: Duration, work: impl Future<Output = T>) -> Option<T> {
     timeout(within, work).await.ok()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// A controller that takes connections and says nothing, at the longest time that a request may have: the writes of a safe state
+    /// end before their host stops waiting, at 2 s.
+    #[test]
+    fn writes_that_belong_together_end_in_their_time_whatever_the_controller_does() {
+        let mute = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let mut link = Link::new(mute.local_addr().unwrap(), 255, Duration::from_millis(800)).unwrap();
+        let begun = Instant::now();
+        let failed = link.together(Duration::from_millis(1500), |link| {
+            (0..3).filter(|register| link.write(*register, &[0]).is_err()).count()
+        });
+        assert_eq!(failed, 3);
+        let took_s = begun.elapsed().as_secs_f64();
+        assert!((1.4..2.0).contains(&took_s), "{took_s} s");
+        // Another request has its own time again.
+        assert_eq!(link.left(), Duration::from_millis(800));
+    }
 }

@@ -31,6 +31,9 @@ struct Registers {
     blocks: Vec<(Table, Block)>,
 }
 
+/// Time for the values of one call, second tries included: the host waits for 2 s.
+const WRITES_WITHIN: std::time::Duration = std::time::Duration::from_millis(1700);
+
 /// Why the rig was lost.
 #[derive(Debug, thiserror::Error)]
 enum RegisterError {
@@ -72,13 +75,16 @@ impl Controller for Registers {
     }
 
     fn write(&mut self, values: &[(Target, f64)]) -> Result<(), RegisterError> {
-        for (target, value) in values {
-            let place = self.settings.place(*target);
-            let registers = self.settings.registers(&place, *value);
-            let registers = registers.ok_or(SettingError::DoesNotFit { value: *value })?;
-            self.link.write(place.register, &registers)?;
-        }
-        Ok(())
+        let settings = &self.settings;
+        self.link.together(WRITES_WITHIN, |link| {
+            for (target, value) in values {
+                let place = settings.place(*target);
+                let registers = settings.registers(&place, *value);
+                let registers = registers.ok_or(SettingError::DoesNotFit { value: *value })?;
+                link.write(place.register, &registers)?;
+            }
+            Ok(())
+        })
     }
 
     fn close(&mut self) {

@@ -21,6 +21,7 @@ pub(crate) mod machine;
 pub(crate) mod opening;
 pub(crate) mod order;
 pub(crate) mod outputs;
+pub(crate) mod readers;
 pub(crate) mod reference;
 pub(crate) mod repeats;
 pub(crate) mod replan;

@@ -10,6 +10,9 @@ use std::path::{Path, PathBuf};
 /// A sequence script.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SequenceSource {
+    /// Path as the campaign has it.
+    #[serde(skip)]
+    pub named: String,
     /// Path as resolved from the campaign file. Not part of the canonical JSON: the text is what counts.
     #[serde(skip)]
     pub path: PathBuf,
@@ -29,7 +32,7 @@ pub(crate) fn sequence(
     let source = |name: &str| {
         let path = beside(origin, name);
         let text = files(&path)?;
-        Ok(SequenceSource { path, text })
+        Ok(SequenceSource { named: name.to_owned(), path, text })
     };
     name.map(source).transpose()
 }

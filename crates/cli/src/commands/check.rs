@@ -38,7 +38,7 @@ impl Check {
         // The backend reads its settings now, so that a mistake in them does not wait for the night.
         let registry = registry::registry();
         registry
-            .make_backend(&campaign, &model)
+            .make_sources(&campaign, &model)
             .map(drop)
             .and_then(|()| registry.check_formats(&campaign))
             .map_err(|error| Failure::in_campaign(error, &self.campaign))?;

@@ -208,6 +208,98 @@ fn becoming_safe_is_tried_again_and_then_said_loudly() {
     assert!(error.to_string().contains("(T2) has given no good reading"), "{error}");
 }
 
+/// A wall that passes only while somebody waits, or while a disk is slow.
+struct Idle(std::cell::Cell<f64>);
+
+impl mapper_core::Wall for &Idle {
+    fn now_s(&self) -> f64 {
+        self.0.get()
+    }
+    fn wait_s(&self, duration_s: f64) {
+        self.0.set(self.0.get() + duration_s);
+    }
+}
+
+/// Takes so long over everything that is written, s on the wall.
+struct SlowDisk<'a> {
+    wall: &'a Idle,
+    takes_s: f64,
+    written: usize,
+}
+
+impl mapper_runner::RunObserver for SlowDisk<'_> {
+    fn on_batch(&mut self, _: &mapper_core::SampleBatch) -> Result<(), mapper_runner::ObserverError> {
+        self.wall.0.set(self.wall.0.get() + self.takes_s);
+        self.written += 1;
+        Ok(())
+    }
+}
+
+/// Faults of a night by the clock: a rig that is asked for each sample, and everything written slowly.
+fn night_by_the_clock(
+    faults: &[(f64, Fault)],
+    takes_s: f64,
+) -> (Result<RunEnd, RunError>, Misbehaving<VirtualLab>, usize, f64) {
+    let (plan, wall) = (minutes(), Idle(std::cell::Cell::new(0.0)));
+    let mut rig = Misbehaving::new(lab(), faults.to_vec());
+    let mut disk = SlowDisk { wall: &wall, takes_s, written: 0 };
+    let guards =
+        usual().signals.iter().map(|spec| Box::new(SignalWatch::new(*spec)) as Box<dyn Guard>).collect();
+    let protection = Protection {
+        safe: SafeTrajectory { p3_slew_pa_s: Some(50e3), valve_opening_ratio: 1.0, within_s: 20.0 },
+        p3_min_pa: 110e3,
+        each_sample: true,
+        ..Protection::default()
+    };
+    let end = Runner {
+        steps: &mut PlanSteps::new(&plan),
+        backend: &mut rig,
+        clock: &mut mapper_core::PacedClock::new(&wall, 1.0),
+        guards,
+        observer: &mut disk,
+        speed: None,
+        stop: &AtomicBool::new(false),
+    }
+    .run_under(&protection);
+    let written = disk.written;
+    (end, rig, written, wall.0.get())
+}
+
+/// A disk that takes 0.8 s over each second's samples delays nothing but itself: the run is in time again at each poll, and the first safe
+/// command leaves with the sample that violates, before anything of it is written. One that takes 3 s makes the run late, never
+/// blind: every sample is looked at all the same.
+#[test]
+fn a_slow_disk_delays_the_run_and_not_the_first_safe_command() {
+    for (takes_s, late_s) in [(0.8, 1.0), (3.0, 400.0)] {
+        let faults = [(FAULT_S, Fault::Reads(Channel::T2, 600.0))];
+        let (end, rig, written, wall_s) = night_by_the_clock(&faults, takes_s);
+        let RunEnd::Tripped(trip) = end.unwrap() else { panic!("not seen") };
+        // Two tenths of a second of dwell, and the sample after.
+        assert!(trip.t_s - FAULT_S < 0.35, "{takes_s} s: {}", trip.t_s);
+        let first = rig.told.iter().find(|(_, told)| told.t3_k < 300.0).unwrap();
+        assert!(first.0 - trip.t_s < 0.11, "{takes_s} s: {} after {}", first.0, trip.t_s);
+        assert!(written > 70);
+        assert!(wall_s - rig.safe_at_s[0] < 10.0 + late_s, "{takes_s} s: {wall_s}");
+    }
+}
+
+/// Between two tries of the safe state the link has half a second of the run's clock to come back.
+#[test]
+fn the_tries_of_the_safe_state_have_a_pause_between_them() {
+    let wall_of = |fails: usize| {
+        let faults = [(FAULT_S, Fault::Reads(Channel::T2, 600.0)), (0.0, Fault::NotSafe(fails))];
+        let (end, rig, _, wall_s) = night_by_the_clock(&faults, 0.0);
+        assert_eq!(end.is_ok(), fails < 3);
+        assert_eq!(rig.safe_at_s.len(), usize::from(fails < 3));
+        // Up to the safe state: the seconds that are watched afterwards come where it was confirmed.
+        if fails < 3 { wall_s - 5.0 } else { wall_s }
+    };
+    let at_once_s = wall_of(0);
+    for (fails, more_s) in [(1, 0.5), (2, 1.0), (usize::MAX, 1.0)] {
+        assert!((wall_of(fails) - at_once_s - more_s).abs() < 1e-6, "{fails} tries fail");
+    }
+}
+
 /// P3 falls by 50 kPa/s from where it was, each tenth of a second, with the valve open and the heater off, and the air is cut at
 /// the lowest P3.
 #[test]

@@ -1,0 +1,74 @@
+//! `readers:`, further sources of channels, which are read beside the rig and never told anything.
+
+use super::backend::{BackendChoice, backend};
+use crate::checking::Check;
+use mapper_core::Channel;
+use mapper_yaml::{FindingKind, steps};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A source of channels beside the rig.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReaderChoice {
+    /// Name, for people.
+    pub name: String,
+    /// What reads.
+    pub backend: BackendChoice,
+    /// Channels that are taken from it; `None`: all that it delivers.
+    pub channels: Option<Vec<Channel>>,
+}
+
+/// A source that is read beside the rig, and never told anything.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ReaderFile {
+    /// What reads, by the name of its backend or driver, with its own settings below it.
+    #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"ak": {}}))]
+    backend: BTreeMap<String, serde_json::Value>,
+    /// Channels that are taken from it, also where the rig delivers them too; all that it delivers if the list is left out.
+    #[schemars(length(min = 1, max = 19), example = serde_json::json!(["m_c"]))]
+    channels: Option<Vec<String>>,
+}
+
+/// The readers, in the order of their names.
+pub(crate) fn readers(file: BTreeMap<String, ReaderFile>) -> Vec<ReaderChoice> {
+    let choice = |(name, file): (String, ReaderFile)| ReaderChoice {
+        name,
+        backend: backend(file.backend),
+        // Each was checked before.
+        channels: file
+            .channels
+            .map(|symbols| symbols.iter().filter_map(|symbol| symbol.parse().ok()).collect()),
+    };
+    file.into_iter().map(choice).collect()
+}
+
+/// Names that can stand in messages, channels that there are, none of them twice.
+pub(crate) fn check(check: &mut Check<'_>) {
+    let names: Vec<String> = check
+        .get(&steps!["readers"])
+        .map(|readers| readers.entries().iter().map(|entry| entry.key.clone()).collect())
+        .unwrap_or_default();
+    let mut taken: BTreeMap<String, String> = BTreeMap::new();
+    for name in names {
+        let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-".contains(&byte);
+        if name.is_empty() || name.len() > 40 || !name.bytes().all(plain) {
+            let message = format!("`{name}` cannot be the name of a reader");
+            let remedy = "use letters, digits, `_` and `-`, at most 40";
+            check.note_key(FindingKind::WrongValue, &steps!["readers"], &name, message, remedy);
+            continue;
+        }
+        for index in 0..check.count(&steps!["readers", name.as_str(), "channels"]) {
+            let place = steps!["readers", name.as_str(), "channels", index];
+            let Some(symbol) = check.text(&place).map(str::to_owned) else { continue };
+            if let Err(error) = symbol.parse::<Channel>() {
+                let remedy = "write the symbol of a measured quantity, e.g. `m_c`";
+                check.note(FindingKind::WrongValue, &place, error.to_string(), remedy);
+            } else if let Some(other) = taken.insert(symbol.clone(), name.clone()) {
+                let message = format!("{symbol} is taken from `{other}` already");
+                check.note(FindingKind::Conflict, &place, message, "take each channel from one reader");
+            }
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! A reader's backend: asked in the place where it is used, or on a thread of its own, so that nobody waits for it.
+
+use crate::run::words_of;
+use mapper_core::{Backend, BackendError, SampleBatch};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::Duration;
+
+/// What came of a question.
+pub(crate) type Answer = Result<SampleBatch, BackendError>;
+
+/// Why a reader is gone.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Gone(String);
+
+pub(crate) enum Ask {
+    Arm,
+    Poll(f64),
+    Disarm,
+}
+
+/// See the module.
+pub(crate) enum ReaderLink {
+    /// In simulated time, where all wait for each other.
+    Here { backend: Box<dyn Backend>, answer: Option<Answer> },
+    /// In real time.
+    Beside {
+        asks: Sender<Ask>,
+        answers: Receiver<Answer>,
+        /// A question is under way.
+        asked: bool,
+        armed: bool,
+        deadline: Duration,
+    },
+}
+
+fn gone(words: String) -> BackendError {
+    BackendError::Lost { t_s: 0.0, source: Box::new(Gone(words)) }
+}
+
+/// A panic of a reader is its own loss, not the run's.
+fn contained(call: impl FnOnce() -> Answer) -> Answer {
+    catch_unwind(AssertUnwindSafe(call))
+        .unwrap_or_else(|panic| Err(gone(format!("it panicked: {}", words_of(&*panic)))))
+}
+
+fn answered(backend: &mut dyn Backend, ask: &Ask) -> Answer {
+    contained(|| match ask {
+        Ask::Arm => backend.arm().map(|()| SampleBatch::default()),
+        Ask::Poll(until_s) => backend.poll(*until_s),
+        Ask::Disarm => backend.disarm().map(|()| SampleBatch::default()),
+    })
+}
+
+impl ReaderLink {
+    pub(crate) fn new(
+        mut backend: Box<dyn Backend>,
+        simulated_time: bool,
+        deadline: Duration,
+    ) -> Result<Self, BackendError> {
+        if simulated_time {
+            return Ok(ReaderLink::Here { backend, answer: None });
+        }
+        let (asks, to_do) = channel::<Ask>();
+        let (tell, answers) = channel::<Answer>();
+        // Detached: one that hangs must not keep the program from ending.
+        std::thread::Builder::new()
+            .name("reader".to_owned())
+            .spawn(move || {
+                for ask in to_do {
+                    if tell.send(answered(backend.as_mut(), &ask)).is_err() {
+                        break;
+                    }
+                }
+            })
+            .map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
+        Ok(ReaderLink::Beside { asks, answers, asked: false, armed: false, deadline })
+    }
+
+    /// Connects, within its deadline.
+    pub(crate) fn arm(&mut self) -> Result<(), BackendError> {
+        match self {
+            ReaderLink::Here { backend, answer } => {
+                *answer = None;
+                answered(backend.as_mut(), &Ask::Arm).map(drop)
+            }
+            ReaderLink::Beside { armed, asked, .. } => {
+                (*armed, *asked) = (true, false);
+                self.wait(Ask::Arm, "arm").map(drop)
+            }
+        }
+    }
+
+    /// Asks for what there is up to `until_s` of its own time; not again before it has answered.
+    pub(crate) fn ask(&mut self, until_s: f64) {
+        match self {
+            ReaderLink::Here { backend, answer } => {
+                *answer = Some(answered(backend.as_mut(), &Ask::Poll(until_s)));
+            }
+            ReaderLink::Beside { asks, asked, .. } => {
+                *asked = *asked || asks.send(Ask::Poll(until_s)).is_ok();
+            }
+        }
+    }
+
+    /// What has come, without waiting.
+    pub(crate) fn answer(&mut self) -> Option<Answer> {
+        match self {
+            ReaderLink::Here { answer, .. } => answer.take(),
+            ReaderLink::Beside { answers, asked, .. } => {
+                let answer = answers.try_recv().ok()?;
+                *asked = false;
+                Some(answer)
+            }
+        }
+    }
+
+    /// Lets go.
+    pub(crate) fn disarm(&mut self) -> Result<(), BackendError> {
+        match self {
+            ReaderLink::Here { backend, .. } => answered(backend.as_mut(), &Ask::Disarm).map(drop),
+            ReaderLink::Beside { armed, .. } if !*armed => Ok(()),
+            ReaderLink::Beside { armed, asked, answers, deadline, .. } => {
+                *armed = false;
+                // The answer to the last question comes first.
+                if std::mem::take(asked) {
+                    let _ = answers.recv_timeout(*deadline);
+                }
+                self.wait(Ask::Disarm, "disarm").map(drop)
+            }
+        }
+    }
+
+    fn wait(&mut self, ask: Ask, call: &'static str) -> Answer {
+        let ReaderLink::Beside { asks, answers, deadline, .. } = self else {
+            return Ok(SampleBatch::default());
+        };
+        asks.send(ask).map_err(|_| gone("its thread has ended".to_owned()))?;
+        match answers.recv_timeout(*deadline) {
+            Ok(answer) => answer,
+            Err(RecvTimeoutError::Timeout) => {
+                Err(BackendError::Deadline { call, limit_s: deadline.as_secs_f64() })
+            }
+            Err(RecvTimeoutError::Disconnected) => Err(gone("its thread has ended".to_owned())),
+        }
+    }
+}

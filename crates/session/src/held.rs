@@ -1,0 +1,55 @@
+//! The rig and the readers of a run, held while it lasts: each may be had but once.
+
+use crate::SessionError;
+use crate::rig_state::{Claim, Latch, Owner, RigStates};
+use std::path::Path;
+
+/// What a run holds.
+#[derive(Default)]
+pub(crate) struct Held {
+    /// The rig, where it is one that can be had but once.
+    rig: Option<Claim>,
+    /// Readers: a lock each. A runner that died with one leaves nothing behind: nobody was driving it.
+    readers: Vec<Claim>,
+}
+
+impl Held {
+    /// Takes the rig and the readers by their names. `resumes`: the run that goes on.
+    pub(crate) fn take(
+        states: &RigStates,
+        rig: Option<&str>,
+        readers: &[String],
+        resumes: Option<&Path>,
+    ) -> Result<Self, SessionError> {
+        let rig = rig.map(|name| states.claim(name, resumes)).transpose()?;
+        let readers = readers.iter().map(|name| states.claim(name, resumes)).collect::<Result<_, _>>()?;
+        Ok(Held { rig, readers })
+    }
+
+    /// Writes down who has the rig.
+    pub(crate) fn sign(&mut self, run: &Path, started: &str) -> Result<(), SessionError> {
+        self.rig.as_mut().map_or(Ok(()), |claim| claim.sign(&owner(run, started)))
+    }
+
+    /// Gives all back, the rig latched where it is in doubt.
+    pub(crate) fn give_back(self, doubt: Option<String>, run: &Path) -> Result<(), SessionError> {
+        for reader in self.readers {
+            reader.release()?;
+        }
+        let Some(claim) = self.rig else { return Ok(()) };
+        if let Some(reason) = doubt {
+            claim.latch(&Latch { reason, run: run.to_owned() })?;
+        }
+        claim.release()
+    }
+}
+
+fn owner(run: &Path, started: &str) -> Owner {
+    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    Owner {
+        process: std::process::id(),
+        host: host.trim().to_owned(),
+        run: std::path::absolute(run).unwrap_or_else(|_| run.to_owned()),
+        started: started.to_owned(),
+    }
+}

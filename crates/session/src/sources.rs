@@ -1,0 +1,124 @@
+//! A campaign's sources of channels: the rig, and what is read beside it.
+
+use crate::{Registry, SessionError};
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::ReaderChoice;
+use mapper_core::{Backend, BackendError, Channel, RigDescription};
+use mapper_physics::model::Model;
+use mapper_runner::{ReadChannel, Reader, WithReaders};
+use std::time::Duration;
+
+/// Time that a reader has to connect, as a rig has.
+const CONNECTS_WITHIN: Duration = Duration::from_secs(11);
+/// A reader is silent that has missed so many of its own samples, and is older than any signal may be.
+const MISSED: f64 = 3.0;
+/// Age of a signal where no guard says another, s.
+const USUAL_AGE_S: f64 = 3.0;
+
+/// Why a source beside the rig cannot be one.
+#[derive(Debug, thiserror::Error)]
+enum ReaderProblem {
+    #[error(
+        "{0} can be driven, and a reader is only read: make it the `backend`, or name a driver that reads alone"
+    )]
+    Controls(String),
+    #[error("it gives no {channel}; it gives {gives}")]
+    Lacks { channel: Channel, gives: String },
+    #[error("{channel} is given by {other} too: list the channels that are to be taken from here")]
+    Twice { channel: Channel, other: String },
+}
+
+/// The rig with its readers, and what guards have to know of these.
+pub struct Sources {
+    /// As one backend.
+    pub backend: Box<dyn Backend>,
+    /// Every channel that is read beside the rig.
+    pub read: Vec<ReadChannel>,
+    /// Names of readers that no two runs may have at once.
+    pub exclusive: Vec<String>,
+}
+
+impl Registry {
+    /// The rig of a campaign with everything that is read beside it. Nothing is connected.
+    ///
+    /// # Errors
+    /// As [`Registry::make_backend`]; [`SessionError::Reader`] for a source that is not one, gives other channels than are wanted, or
+    /// the same as another.
+    pub fn make_sources(&self, campaign: &Campaign, model: &Model) -> Result<Sources, SessionError> {
+        let rig = self.make_backend(campaign, model)?;
+        if campaign.readers.is_empty() {
+            return Ok(Sources { backend: rig, read: Vec::new(), exclusive: Vec::new() });
+        }
+        let own = rig.describe();
+        let age_s = campaign.guard_set().signals.first().map_or(USUAL_AGE_S, |guard| guard.age_s);
+        let mut taken: Vec<(Channel, String)> =
+            own.channels.iter().map(|channel| (*channel, "the rig".to_owned())).collect();
+        let (mut readers, mut read, mut exclusive) = (Vec::new(), Vec::new(), Vec::new());
+        for choice in &campaign.readers {
+            let at = format!("readers.{}.backend.{}", choice.name, choice.backend.name);
+            let wrong = |error| match error {
+                BackendError::Settings { path, source, .. } => {
+                    SessionError::Reader { at: at.clone(), setting: path, source }
+                }
+                other => {
+                    SessionError::Reader { at: at.clone(), setting: String::new(), source: Box::new(other) }
+                }
+            };
+            let backend = self.made(&choice.backend, campaign, model).map_err(wrong)?;
+            let rig = backend.describe();
+            let channels = wanted(choice, &rig, &mut taken)?;
+            let age_s = age_s.max(MISSED / rig.sample_rate_hz.max(1e-3));
+            let watched =
+                |channel: &Channel| ReadChannel { reader: choice.name.clone(), channel: *channel, age_s };
+            read.extend(channels.iter().map(watched));
+            exclusive.extend(rig.exclusive);
+            readers.push(Reader { name: choice.name.clone(), backend, channels });
+        }
+        let backend = WithReaders::new(rig, readers, CONNECTS_WITHIN).map_err(SessionError::Backend)?;
+        Ok(Sources { backend: Box::new(backend), read, exclusive })
+    }
+}
+
+/// The channels that are taken from a reader.
+fn wanted(
+    choice: &ReaderChoice,
+    rig: &RigDescription,
+    taken: &mut Vec<(Channel, String)>,
+) -> Result<Vec<Channel>, SessionError> {
+    let below = |key: &str| format!("readers.{}.{key}", choice.name);
+    let wrong = |at: String, problem: ReaderProblem| {
+        Err(SessionError::Reader { at, setting: String::new(), source: Box::new(problem) })
+    };
+    if rig.controls {
+        return wrong(below("backend"), ReaderProblem::Controls(format!("`{}`", choice.backend.name)));
+    }
+    let from = |channel: &Channel, taken: &[(Channel, String)]| {
+        taken.iter().find(|(known, _)| known == channel).map(|(_, other)| other.clone())
+    };
+    match &choice.channels {
+        Some(listed) => {
+            if let Some(channel) = listed.iter().find(|channel| !rig.channels.contains(channel)) {
+                let gives =
+                    rig.channels.iter().map(|channel| channel.symbol()).collect::<Vec<_>>().join(", ");
+                return wrong(below("channels"), ReaderProblem::Lacks { channel: *channel, gives });
+            }
+            // What is listed is meant: the rig's own is left out.
+            for channel in listed {
+                if let Some(other) = from(channel, taken).filter(|other| other != "the rig") {
+                    return wrong(below("channels"), ReaderProblem::Twice { channel: *channel, other });
+                }
+            }
+        }
+        None => {
+            for channel in &rig.channels {
+                if let Some(other) = from(channel, taken) {
+                    return wrong(below("backend"), ReaderProblem::Twice { channel: *channel, other });
+                }
+            }
+        }
+    }
+    let channels = choice.channels.clone().unwrap_or_else(|| rig.channels.clone());
+    taken.retain(|(channel, _)| !channels.contains(channel));
+    taken.extend(channels.iter().map(|channel| (*channel, format!("`{}`", choice.name))));
+    Ok(channels)
+}

@@ -1,0 +1,88 @@
+//! Runs whose steps depend on what was measured, killed and gone on with: the source of the steps is told the recording again.
+#![cfg(unix)]
+
+use crate::interrupted::Running;
+use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, only_run};
+use serde_json::Value;
+use std::path::Path;
+
+fn short(more: &[(&str, &str)]) -> CampaignFile {
+    let replacements: Vec<_> = SHORT_GRID.iter().chain(more).copied().collect();
+    CampaignFile::shipped_with(&replacements)
+}
+
+fn points(run: &Path) -> Vec<Value> {
+    let text = std::fs::read_to_string(run.join("points.json")).unwrap();
+    let found: Value = serde_json::from_str(&text).unwrap();
+    let points = found["points"].as_array().unwrap().iter().filter(|point| point["kind"] == "point").cloned();
+    let mut points: Vec<Value> = points.collect();
+    points.sort_by_key(|point| (point["target"].to_string(), point["valve"].to_string()));
+    points
+}
+
+/// Killed at two places of its recording and gone on with, the run has each point once, each as the run that nobody killed has it:
+/// within the width of its interval, since warm-up and lead-in draw other noise.
+fn goes_on(what: &str, campaign: impl Fn() -> CampaignFile) {
+    let whole = campaign();
+    let runs = whole.runs();
+    let arguments = ["run".as_ref(), whole.path.as_os_str(), "--out".as_ref(), runs.as_os_str()];
+    mapper(arguments).exits(0);
+    let run = only_run(&runs);
+    let expected = points(&run);
+    let bytes = run.join("recording.mcap").metadata().unwrap().len();
+    for share in [0.4, 0.75] {
+        let campaign = campaign();
+        let mut running = Running::start_with(&campaign, &[]);
+        let recording = running.recorded((share * bytes as f64) as u64);
+        running.kill();
+        let run = recording.parent().unwrap();
+        let arguments = ["run".as_ref(), "--resume".as_ref(), run.as_os_str()];
+        mapper(arguments).exits(0);
+        let found = points(run);
+        assert_eq!(found.len(), expected.len(), "{what} at {share}");
+        for (found, expected) in found.iter().zip(&expected) {
+            assert_eq!(found["target"], expected["target"], "{what} at {share}");
+            let number = |point: &Value, key: &str| point[key].as_f64();
+            let (Some(eta), Some(other)) = (number(found, "eta"), number(expected, "eta")) else { continue };
+            let width = number(expected, "eta_high").unwrap() - number(expected, "eta_low").unwrap();
+            assert!((eta - other).abs() < width, "{what} at {share}: {eta} and {other}, width {width}");
+        }
+    }
+}
+
+#[test]
+fn a_killed_script_goes_on_where_it_stood() {
+    goes_on("sequence", || {
+        let replaced = ("seed: 1 ", "sequence: steps/along.rhai\nseed: 1 ");
+        let campaign = short(&BY_ITSELF.iter().copied().chain([replaced]).collect::<Vec<_>>());
+        let folder = campaign.directory().join("steps");
+        std::fs::create_dir_all(&folder).unwrap();
+        // What was measured decides how long the next one is visited.
+        let script = "let last = ();\nfor p in grid() {\n    let seconds = if last == () { \"120 s\" } else { \"130 s\" };\n    \
+                      last = jump(p, seconds).eta;\n}\n";
+        std::fs::write(folder.join("along.rhai"), script).unwrap();
+        campaign
+    });
+}
+
+#[test]
+fn a_killed_watch_over_repeats_goes_on_where_it_stood() {
+    let drift = ("repeats: off\n", "repeats: {every: 3}\ndrift: {on_drift: continue}\n");
+    goes_on("drift", || short(&BY_ITSELF.iter().copied().chain([drift]).collect::<Vec<_>>()));
+}
+
+#[test]
+fn a_killed_run_until_certain_goes_on_where_it_stood() {
+    goes_on("when_certain", || {
+        short(&[
+            ("  dwell: 120 s ", "  ends: when_certain\n  dwell: 120 s "),
+            ("order: information ", "required_sigma_eta: 0.5 %\norder: information "),
+        ])
+    });
+}
+
+#[test]
+fn a_killed_search_for_surge_begins_its_line_again() {
+    let search = ("seed: 1 ", "surge_search: {}\nseed: 1 ");
+    goes_on("surge_search", || short(&BY_ITSELF.iter().copied().chain([search]).collect::<Vec<_>>()));
+}

@@ -1,0 +1,61 @@
+//! A run that is stopped by somebody, or made ready and then not run as it was made.
+#![cfg(unix)]
+
+use crate::interrupted::Running;
+use mapper_core::EventKind;
+use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
+use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper};
+use std::path::Path;
+
+fn short() -> CampaignFile {
+    CampaignFile::shipped_with(&SHORT_GRID.iter().chain(BY_ITSELF).copied().collect::<Vec<_>>())
+}
+
+fn read(recording: &Path) -> ReadReport {
+    read_recording(recording, &ChannelMap::native(), &ReadOptions::default()).unwrap()
+}
+
+/// Once at the end of the step, which is whole then; twice now, in the middle of one. At thirty times the clock a step takes four seconds.
+#[test]
+fn ctrl_c_ends_the_run_with_its_step_and_a_second_one_at_once() {
+    for times in [1, 2] {
+        let campaign = short();
+        let mut running = Running::start_with(&campaign, &["--pace", "30"]);
+        // The warm-up is over: the first step is under way.
+        let recording = running.recorded(400_000);
+        for _ in 0..times {
+            running.signal("INT");
+            // Signals of one kind that wait are one: the first has to be seen.
+            std::thread::sleep(std::time::Duration::from_millis(300));
+        }
+        running.finished().exits(130);
+        let report = read(&recording);
+        let kinds: Vec<EventKind> = report.recording.events.iter().map(|event| event.kind).collect();
+        assert!(kinds.ends_with(&[EventKind::Interrupted, EventKind::SafeState]), "{kinds:?}");
+        let last = report.recording.steps.last().unwrap();
+        let whole = last.end_s - last.start_s > 119.0;
+        assert_eq!(whole, times == 1, "{times} times: {last:?}");
+    }
+}
+
+/// A plan belongs to the campaign that it was made from.
+#[test]
+fn a_campaign_that_was_edited_after_its_plan_was_made_is_not_run_by_it() {
+    let campaign = short();
+    let plan = campaign.directory().join("plan.json");
+    mapper(["plan".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), plan.as_os_str()]).exits(0);
+    let arguments = || {
+        let out = campaign.runs();
+        let first =
+            ["run".into(), campaign.path.clone().into_os_string(), "--plan".into(), plan.clone().into()];
+        first.into_iter().chain(["--out".into(), out.into_os_string()]).collect::<Vec<std::ffi::OsString>>()
+    };
+    let edited = campaign.text.replace("dwell: 120 s ", "dwell: 110 s ");
+    assert_ne!(edited, campaign.text);
+    std::fs::write(&campaign.path, edited).unwrap();
+    let refused = mapper(arguments()).exits(4);
+    assert!(refused.stderr.contains("is stale"), "{}", refused.stderr);
+    assert!(!campaign.runs().exists(), "nothing was touched");
+    std::fs::write(&campaign.path, &campaign.text).unwrap();
+    mapper(arguments()).exits(0);
+}

@@ -47,7 +47,7 @@ pub use contour_item::{ContourLevel, Contours};
 pub use figure::{Figure, LegendPlace, Panel};
 pub use grid::{GridError, StructuredGrid};
 pub use items::{
-    Annotation, Dash, EndLabel, Item, Line, LineEnd, Marker, Polygon, Rule, RuleAt, Scatter, ScatterPoint,
+    Annotation, Dash, EndLabel, Item, Line, LineEnd, Marker, Note, Polygon, Rule, RuleAt, Scatter, ScatterPoint,
     Space, TextAnchor,
 };
 pub use marching::contour_lines;

@@ -35,5 +35,6 @@ mod speed_lines;
 mod surge;
 mod terminal;
 mod together;
+mod tour;
 mod transient;
 mod zero;

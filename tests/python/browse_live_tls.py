@@ -107,7 +107,6 @@ def asked(method, path, **headers):
 connection, answer = asked("GET", "/")
 body = answer.read()
 result["page"] = [answer.status, b"connect-src 'self'" in body, int(answer.headers["Content-Length"]) == len(body)]
-result["tls"] = connection.sock.version() if connection.sock else None
 result["without_token"] = asked("GET", "/events")[1].status
 _, answer = asked("GET", "/events", Authorization=f"Bearer {token}")
 result["with_token"] = [answer.status, answer.readline()[:16].decode()]

@@ -19,7 +19,12 @@ pub struct Offered {
 impl Offered {
     /// With this Python.
     pub fn with(python: PathBuf) -> Self {
-        Offered { python, mountable: machine::can_mount(), slurm: machine::has_slurm(), npm: machine::has_npm() }
+        Offered {
+            python,
+            mountable: machine::can_mount(),
+            slurm: machine::has_slurm(),
+            npm: machine::has_npm(),
+        }
     }
 
     /// A command that knows of it. All commands that build get the same, so that nothing is built again.

@@ -1,7 +1,7 @@
 //! From what the session tells to what browsers are shown.
 
-use crate::pressed::Pressed;
 use crate::live_run::LiveRun;
+use crate::pressed::Pressed;
 use crate::state::{EVENTS_MAX, Now, POINTS_MAX, Reading, State, Step, TRACE_ROWS, Told, Traced, Units};
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, IdentifiedPoint, PlanStep, SignalGuard, StepMarker};
@@ -41,6 +41,8 @@ struct Kept {
     ticked: Option<Instant>,
     /// How much longer each step took than planned, s.
     longer_s: Vec<f64>,
+    /// Whether the operator held the step that is under way: how long that lasts says nothing of the others.
+    held: bool,
     /// Steps that have begun.
     begun: usize,
     soak_s: f64,
@@ -89,6 +91,7 @@ impl Feed {
             unsent: VecDeque::new(),
             ticked: None,
             longer_s: Vec::new(),
+            held: false,
             begun: 0,
             soak_s,
             after_s: 0.0,
@@ -162,7 +165,8 @@ impl Feed {
                 vec![self.tick(kept)]
             }
             SessionEvent::StepEnded(marker) => {
-                let planned_s = self.plan.get(marker.index).map(|step| step.dwell_s);
+                let held = std::mem::replace(&mut kept.held, self.operator.holds());
+                let planned_s = self.plan.get(marker.index).filter(|_| !held).map(|step| step.dwell_s);
                 kept.longer_s.extend(planned_s.map(|planned_s| marker.end_s - marker.start_s - planned_s));
                 Vec::new()
             }
@@ -208,6 +212,7 @@ impl Feed {
     /// A button was pressed: what is shown of it before the run has seen it.
     pub(crate) fn asked(&self, asked: Pressed) {
         if let Ok(mut kept) = self.kept.lock() {
+            kept.held |= asked == Pressed::Hold;
             let now = &mut kept.state.now;
             match asked {
                 Pressed::Hold => now.holds = true,

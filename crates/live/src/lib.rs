@@ -24,6 +24,6 @@ mod viewers;
 pub use live_error::LiveError;
 pub use live_run::LiveRun;
 pub use onlookers::{Asked, Onlookers};
+pub use tls::{TlsError, TlsFiles};
 #[cfg(feature = "foxglove")]
 pub use viewers::{Viewers, ViewersError};
-pub use tls::{TlsError, TlsFiles};

@@ -1,11 +1,11 @@
 //! The page of a run: opened before it, told while it goes on, closed after it.
 
 use crate::access::Access;
-use crate::pressed::Pressed;
 use crate::feed::Feed;
 use crate::hub::Hub;
 use crate::live_error::LiveError;
 use crate::live_run::LiveRun;
+use crate::pressed::Pressed;
 use crate::server::{Served, serve};
 use crate::tls::{Tls, TlsFiles, read};
 use mapper_page::live_page;
@@ -64,7 +64,9 @@ impl Live {
     /// # Errors
     /// [`LiveError::Page`]: none in practice.
     pub fn begin(&self, run: &LiveRun<'_>) -> Result<(), LiveError> {
-        let Some(listener) = self.listener.lock().ok().and_then(|mut listener| listener.take()) else { return Ok(()) };
+        let Some(listener) = self.listener.lock().ok().and_then(|mut listener| listener.take()) else {
+            return Ok(());
+        };
         let feed = Arc::new(Feed::new(run));
         let of_snapshot = feed.clone();
         let (operator, after_step, now) = (run.operator.clone(), run.after_step.clone(), run.now.clone());

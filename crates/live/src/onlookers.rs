@@ -21,8 +21,6 @@ pub struct Asked<'a> {
     /// Address of the stream for Foxglove and Lichtblick.
     #[cfg(feature = "foxglove")]
     pub viewers: Option<&'a str>,
-    /// Epoch time of run time 0, ns, as in the recording.
-    pub start_time_ns: u64,
 }
 
 /// Nobody, or some.
@@ -77,7 +75,7 @@ impl<'a> Onlookers<'a> {
         }
         #[cfg(feature = "foxglove")]
         if let Some(address) = self.asked.viewers {
-            let viewers = Viewers::open(address, self.asked.start_time_ns)?;
+            let viewers = Viewers::open(address, run.start_time_ns, run.channels)?;
             lines.push(format!("for Foxglove and Lichtblick: {}", viewers.url()));
             // It is begun once.
             let _ = self.viewers.set(viewers);

@@ -1,8 +1,8 @@
 //! The server: a thread for each of few connections, one request each.
 
 use crate::access::Access;
-use crate::pressed::Pressed;
 use crate::hub::Hub;
+use crate::pressed::Pressed;
 use crate::request::{ARRIVES_WITHIN, Request, read_request};
 use crate::tls::{Punctual, Tls};
 use std::collections::HashMap;

@@ -86,7 +86,8 @@ mod with {
 
     /// Reads both files and holds them against each other.
     pub(crate) fn read(files: &TlsFiles) -> Result<Tls, TlsError> {
-        let file = |path: &std::path::Path, what, why: String| TlsError::File { path: path.to_owned(), what, why };
+        let file =
+            |path: &std::path::Path, what, why: String| TlsError::File { path: path.to_owned(), what, why };
         let certificate = |why| file(&files.certificate, "certificate", why);
         let pair = |source: rustls::Error| TlsError::Pair { files: files.clone(), why: source.to_string() };
         let chain: Vec<CertificateDer<'static>> = CertificateDer::pem_file_iter(&files.certificate)

@@ -3,14 +3,16 @@
 //! Each viewer has a queue of its own in the library, which drops the oldest message where the viewer is slow: telling waits
 //! for nobody. Nothing can be written: the server offers no service, no parameter and no topic of the viewer's own.
 
-use foxglove::{ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema, WebSocketServer};
+use foxglove::{
+    ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema, WebSocketServer,
+};
 use mapper_core::{Channel, Group, IdentifiedPoint};
 use mapper_record::{StepPhase, Topic, event_message, readings_message, step_message};
 use mapper_session::SessionEvent;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 /// Messages that wait for one viewer: three minutes of the rig's time.
 const WAITING_MAX: usize = 1024;
@@ -44,7 +46,9 @@ pub enum ViewersError {
         text: String,
     },
     /// The library cannot serve.
-    #[error("viewers cannot be served at {address}: {source}; choose another address with `--foxglove=ADDRESS`")]
+    #[error(
+        "viewers cannot be served at {address}: {source}; choose another address with `--foxglove=ADDRESS`"
+    )]
     Serve {
         /// The address.
         address: SocketAddr,
@@ -55,26 +59,35 @@ pub enum ViewersError {
 
 /// A stream of what is read, for viewers.
 pub struct Viewers {
-    context: Arc<Context>,
     address: SocketAddr,
     start_time_ns: u64,
-    /// Topics that have been defined, by name.
-    topics: Mutex<BTreeMap<&'static str, Arc<RawChannel>>>,
+    topics: BTreeMap<&'static str, Arc<RawChannel>>,
+    /// Topics are closed with it.
+    _context: Arc<Context>,
 }
 
 impl Viewers {
-    /// Begins to serve at an address of this machine, e.g. `127.0.0.1:8765`. `start_time_ns`: epoch time of run time 0, as in
-    /// the recording.
+    /// Begins to serve at an address of this machine, e.g. `127.0.0.1:8765`, readings of these channels. `start_time_ns`: epoch
+    /// time of run time 0, as in the recording.
     ///
     /// # Errors
     /// [`ViewersError`] where the address is none of this machine's, or is taken.
-    pub fn open(text: &str, start_time_ns: u64) -> Result<Viewers, ViewersError> {
+    pub fn open(text: &str, start_time_ns: u64, channels: &[Channel]) -> Result<Viewers, ViewersError> {
         let bad = || ViewersError::Address { text: text.to_owned() };
         let mut address: SocketAddr = text.parse().map_err(|_| bad())?;
         if !address.ip().is_loopback() {
             return Err(bad());
         }
         let context = Context::new();
+        // All topics are there before anybody looks: the library tells a viewer of a new one a moment before it takes
+        // a subscription to it, and one that is quicker goes without.
+        let measured = |group: &Group| channels.iter().any(|channel| channel.info().group == *group);
+        let groups = Group::ALL.into_iter().filter(measured);
+        let topics = groups
+            .map(|group| Topic::of_group(group, channels.iter().copied()))
+            .chain([Topic::of_steps(), Topic::of_events(), point_topic()])
+            .filter_map(|topic| Some((topic.name, defined(&context, topic)?)))
+            .collect();
         let server = WebSocketServer::new()
             .name("mapper")
             .bind(address.ip().to_string(), address.port())
@@ -84,7 +97,7 @@ impl Viewers {
             .map_err(|source| ViewersError::Serve { address, source })?;
         // The server lives as long as the process.
         address.set_port(server.port());
-        Ok(Viewers { context, address, start_time_ns, topics: Mutex::default() })
+        Ok(Viewers { address, start_time_ns, topics, _context: context })
     }
 
     /// What a viewer is told to open.
@@ -97,27 +110,23 @@ impl Viewers {
         match event {
             SessionEvent::Readings { t_s, values } => {
                 for group in Group::ALL {
-                    let channels = || values.iter().map(|(channel, _)| *channel);
-                    if channels().any(|channel: Channel| channel.info().group == group) {
-                        let topic = || Topic::of_group(group, channels());
-                        self.say(group.topic(), topic, *t_s, &readings_message(group, values));
-                    }
+                    self.say(group.topic(), *t_s, &readings_message(group, values));
                 }
             }
             SessionEvent::StepStarted(marker) => {
                 let (t_s, message) = step_message(marker, StepPhase::Start);
-                self.say("/step", Topic::of_steps, t_s, &message);
+                self.say("/step", t_s, &message);
             }
             SessionEvent::StepEnded(marker) => {
                 let (t_s, message) = step_message(marker, StepPhase::End);
-                self.say("/step", Topic::of_steps, t_s, &message);
+                self.say("/step", t_s, &message);
             }
             SessionEvent::Told(event) => {
-                self.say("/event", Topic::of_events, event.t_s, &event_message(event));
+                self.say("/event", event.t_s, &event_message(event));
             }
             SessionEvent::PointEstimated(point) => {
                 let t_s = point.window.map_or(0.0, |window| window.end_s);
-                self.say(POINT_TOPIC, point_topic, t_s, &point_message(point));
+                self.say(POINT_TOPIC, t_s, &point_message(point));
             }
             SessionEvent::RunStarted { .. }
             | SessionEvent::RigTime { .. }
@@ -127,27 +136,24 @@ impl Viewers {
         }
     }
 
-    fn say(&self, name: &'static str, topic: impl FnOnce() -> Topic, t_s: f64, message: &Value) {
-        let Ok(mut topics) = self.topics.lock() else { return };
-        let channel = match topics.get(name) {
-            Some(channel) => channel,
-            None => {
-                let topic = topic();
-                let schema = Schema::new(name.trim_start_matches('/').replace('/', "."), "jsonschema", topic.schema);
-                let built = ChannelBuilder::new(name)
-                    .message_encoding("json")
-                    .schema(schema)
-                    .metadata(topic.units)
-                    .context(&self.context)
-                    .build_raw();
-                let Ok(channel) = built else { return };
-                topics.entry(name).or_insert(channel)
-            }
-        };
+    fn say(&self, topic: &str, t_s: f64, message: &Value) {
+        let Some(channel) = self.topics.get(topic) else { return };
         // A run lasts for days at most: its nanoseconds fit.
         let log_time = self.start_time_ns.saturating_add((t_s.max(0.0) * 1e9).round() as u64);
         channel.log_with_meta(message.to_string().as_bytes(), PartialMetadata::with_log_time(log_time));
     }
+}
+
+/// A topic as viewers know it; `None` where the library refuses it.
+fn defined(context: &Arc<Context>, topic: Topic) -> Option<Arc<RawChannel>> {
+    let name = topic.name.trim_start_matches('/').replace('/', ".");
+    ChannelBuilder::new(topic.name)
+        .message_encoding("json")
+        .schema(Schema::new(name, "jsonschema", topic.schema))
+        .metadata(topic.units)
+        .context(context)
+        .build_raw()
+        .ok()
 }
 
 fn point_topic() -> Topic {
@@ -181,10 +187,10 @@ mod tests {
     #[test]
     fn only_this_machine_is_served() {
         for text in ["0.0.0.0:0", "192.0.2.7:8765", "nonsense", "[::]:0"] {
-            let error = Viewers::open(text, 0).err().unwrap();
+            let error = Viewers::open(text, 0, &[]).err().unwrap();
             assert!(error.to_string().contains("tunnel"), "{error}");
         }
-        let viewers = Viewers::open("127.0.0.1:0", 0).unwrap();
+        let viewers = Viewers::open("127.0.0.1:0", 0, &[]).unwrap();
         assert!(viewers.url().starts_with("ws://127.0.0.1:") && !viewers.url().ends_with(":0"));
     }
 }

@@ -1,8 +1,8 @@
 //! Points as the script draws them, in the units that are shown.
 
 use crate::run_page::RunPage;
-use mapper_campaign::units::Kind;
 use crate::sections::points::at_end;
+use mapper_campaign::units::Kind;
 use mapper_core::{Channel, IdentifiedPoint, half_width_95, standard_error_of};
 use mapper_identify::TwoParameter;
 use mapper_report::{Display, step_name, verdict_word};

@@ -49,6 +49,6 @@ pub use mapper_yaml::units::{Kind, Unit, UnitError};
 pub use read::{ReadReport, read_recording, read_recording_from};
 pub use read_options::ReadOptions;
 pub use recording_file::RecordingHeader;
-pub use warning::{DamagedPart, ReadWarning};
 pub use topics::{StepPhase, Topic, event_message, readings_message, step_message};
+pub use warning::{DamagedPart, ReadWarning};
 pub use writer::RecordingWriter;

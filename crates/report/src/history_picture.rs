@@ -70,9 +70,11 @@ pub fn history_svg(
                 listed.run.key.campaign == *campaign && listed.run.key.method == *method
             };
             for listed in runs.iter().filter(of_line) {
-                let night = nights
-                    .entry((listed.night.started_ms, listed.night.id))
-                    .or_insert((listed.night.moved, listed.night.program.as_str(), Vec::new()));
+                let night = nights.entry((listed.night.started_ms, listed.night.id)).or_insert((
+                    listed.night.moved,
+                    listed.night.program.as_str(),
+                    Vec::new(),
+                ));
                 night.2.extend(listed.run.figures.get(figure));
             }
             let (mut places, mut notes) = (Vec::new(), Vec::new());
@@ -82,7 +84,7 @@ pub fn history_svg(
                 let at = crate::history_text::time(started_ms, "%Y-%m-%d %H:%M UTC");
                 notes.push(Note {
                     text: format!(
-                        "{at}\n{campaign} {method}\n{figure}: {:.4} {unit}{}\n{program}",
+                        "{at}; {campaign} {method}; {figure}: {:.4} {unit}{}; {program}",
                         factor * value,
                         if moved { "; a figure of this night moved" } else { "" }
                     ),

@@ -86,7 +86,8 @@ fn every_command_of_the_tour_does_what_it_says() {
     let commands = commands(&fs::read_to_string(root.join("docs/tour.md")).unwrap());
     assert!(commands.len() > 12, "{commands:?}");
     for command in commands {
-        let (words, to) = command.split_once('>').map_or((command.as_str(), None), |(a, b)| (a, Some(b.trim())));
+        let (words, to) =
+            command.split_once('>').map_or((command.as_str(), None), |(a, b)| (a, Some(b.trim())));
         let words: Vec<String> = words.split_whitespace().map(|word| named(folder, word)).collect();
         eprintln!("mapper {}", words.join(" "));
         let finished = mapper_in(folder, &words).exits(0);

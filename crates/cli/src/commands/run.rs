@@ -78,8 +78,8 @@ impl Run {
         let (registry, stop, progress) = (registry::registry(), interrupt::run_stop()?, manner::progress());
         progress.begin("planning");
         let states = rig_states::directory(None);
-        let start_time_ns = u64::try_from(started.as_nanosecond()).unwrap_or(0);
-        let onlookers = self.onlookers(start_time_ns).map_err(Failure::of_live)?;
+        let started_ns = u64::try_from(started.as_nanosecond()).unwrap_or(0);
+        let onlookers = self.onlookers().map_err(Failure::of_live)?;
         let on_event = |event: &_| {
             progress.show(event);
             onlookers.show(event);
@@ -98,7 +98,7 @@ impl Run {
             campaign_text: &campaign_text,
             plan: self.plan.as_deref(),
             parent: &parent,
-            started_ns: start_time_ns,
+            started_ns,
             started_name: &started.strftime("%Y%m%dT%H%M%SZ").to_string(),
             rig_states: Some(&states),
             resume,
@@ -113,6 +113,8 @@ impl Run {
             campaign: &campaign,
             plan: prepared.plan(),
             pace,
+            channels: &prepared.rig().channels,
+            start_time_ns: prepared.start_time_ns(),
             operator: operator.clone(),
             after_step: stop.after_step.clone(),
             now: stop.now.clone(),
@@ -131,14 +133,13 @@ impl Run {
         self.tell(&campaign, outcome)
     }
 
-    fn onlookers(&self, start_time_ns: u64) -> Result<Onlookers<'_>, LiveError> {
+    fn onlookers(&self) -> Result<Onlookers<'_>, LiveError> {
         let tls = self.live_cert.clone().zip(self.live_key.clone());
         Onlookers::open(Asked {
             page: self.live.as_deref(),
             tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
             #[cfg(feature = "foxglove")]
             viewers: self.foxglove.as_deref(),
-            start_time_ns,
         })
     }
 

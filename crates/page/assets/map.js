@@ -169,7 +169,7 @@ function drawPlan() {
   }
   const plot = Plot.plot({
     width, height: Math.round(0.6 * width), marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
-    x: { label: `corrected flow, ${page.units.flow}` }, y: { label: "total pressure ratio P2/P1" },
+    x: { label: `corrected flow, ${page.units.flow}`, inset: 14 }, y: { label: "total pressure ratio P2/P1", inset: 14 },
     marks: [
       Plot.arrow([...jumps].reverse(), { x1: d => d.from.flow, y1: d => d.from.pr, x2: d => d.to.flow, y2: d => d.to.pr, stroke: d => shade(d.i), strokeWidth: d => (d.i < 5 ? 2 : 1), bend: 12, inset: 5, headLength: 6 }),
       Plot.dot(places, { x: "flow", y: "pr", fill: style("--ground"), stroke: style("--ink"), r: 3.5 }),

@@ -53,6 +53,7 @@ document.querySelectorAll("main table").forEach(table => {
   copy.type = "button";
   copy.textContent = "copy";
   copy.className = "copy";
+  if (!table.caption) copy.style.marginLeft = "0";
   copy.setAttribute("aria-label", `copy the table ${name}`);
   (table.caption ?? table.createCaption()).append(copy);
   copy.addEventListener("click", async () => {

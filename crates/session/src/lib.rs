@@ -101,6 +101,7 @@ pub use planning::{nominal_model, with_plan_request};
 pub use program::{PROGRAM, program_and_commit};
 pub use prospects::Prospects;
 pub use recorded::{Recorded, channel_map};
+pub use recording_metadata::start_time_ns;
 pub use registry::{MakeDriver, ReadEffect, Registry};
 pub use rehearsal::{Rehearsal, rehearse};
 pub use results::Results;

@@ -202,11 +202,6 @@ impl PreparedRun<'_> {
         &self.model
     }
 
-    /// Epoch time of run time 0, ns; 0 where the rig's time is simulated, so that equal runs have equal bytes.
-    pub fn start_time_ns(&self) -> u64 {
-        if self.rig().simulated_time { 0 } else { self.request.started_ns }
-    }
-
     /// The rig.
     pub fn rig(&self) -> RigDescription {
         self.backend.describe()
@@ -432,7 +427,7 @@ impl PreparedRun<'_> {
             library: PROGRAM.to_owned(),
             profile: String::new(),
             // Simulated time starts at 0, so that equal seeds give equal bytes.
-            start_time_ns: self.start_time_ns(),
+            start_time_ns: crate::start_time_ns(&self.rig(), self.request.started_ns),
             metadata: metadata(self.request.campaign, &self.plan),
             plan_json: Some(plan_json.into_bytes()),
             campaign_yaml: Some(self.request.campaign_text.as_bytes().to_vec()),

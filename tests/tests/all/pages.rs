@@ -64,6 +64,15 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     let run = only_run(&campaign.runs());
     let arguments = ["report".as_ref(), run.as_os_str(), "--gap".as_ref(), campaign.path.as_os_str()];
     mapper(arguments.into_iter().chain(["-o".as_ref(), whole.as_os_str()])).exits(0);
+    if option_env!("MAPPER_TEST_PYTHON").is_some() {
+        let pictures = scratch();
+        let seen =
+            python("browse_report.py", [chromium.as_ref(), whole.as_os_str(), pictures.path().as_os_str()]);
+        for quiet in ["requests", "said", "serious"] {
+            assert_eq!(seen[quiet], serde_json::json!([]), "{quiet}");
+        }
+        assert_eq!(seen["heads_without_sorting"], 0, "the tables of the gap are sorted too");
+    }
     let text = std::fs::read_to_string(whole).unwrap();
     let section = text.split("id=\"gap\"").nth(1).unwrap();
     assert!(section.contains("(stem_conduction) explains the gap") && section.matches("<svg").count() == 2);

@@ -12,7 +12,7 @@ use mapper_live::{Asked, LiveError, LiveRun, Onlookers, TlsFiles};
 use mapper_report::plan_text;
 use mapper_session::{
     BrokenOff, Ended, Operator, PreparedRun, RunOutcome, RunRequest, Session, SessionError, run_directory,
-    soak_s,
+    soak_s, start_time_ns,
 };
 use mapper_terminal::results_text;
 use serde_json::json;
@@ -114,7 +114,7 @@ impl Run {
             plan: prepared.plan(),
             pace,
             channels: &prepared.rig().channels,
-            start_time_ns: prepared.start_time_ns(),
+            start_time_ns: start_time_ns(&prepared.rig(), started_ns),
             operator: operator.clone(),
             after_step: stop.after_step.clone(),
             now: stop.now.clone(),

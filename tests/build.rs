@@ -9,6 +9,7 @@ fn main() {
         ("MAPPER_TEST_TMPFS", "with_tmpfs"),
         ("MAPPER_TEST_CHROMIUM", "with_chromium"),
         ("MAPPER_TEST_SLURM", "with_slurm"),
+        ("MAPPER_TEST_NPM", "with_npm"),
     ] {
         println!("cargo::rerun-if-env-changed={name}");
         println!("cargo::rustc-check-cfg=cfg({flag})");

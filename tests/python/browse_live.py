@@ -153,6 +153,10 @@ with sync_playwright() as playwright:
     result["points_after_loss"] = points()
     press(page, "go-on")
     until(page, f"document.querySelectorAll('#points tr').length > {before}")
+    # Contours stand as soon as two lines have two points each.
+    until(page, "document.querySelectorAll('#map-plot .contour path').length > 0")
+    result["contours"] = page.locator("#map-plot .contour path").count()
+    page.screenshot(path=folder / "live-contours.png", full_page=True)
     press(page, "stop")
     until(page, "document.querySelector('#phase').textContent === 'The run has ended'")
     result["connection"] = page.text_content("#connection")

@@ -81,6 +81,20 @@ with sync_playwright() as playwright:
     result["sorted_up"] = column()
     head.click()
     result["sorted_down"] = column()
+    # What a table's button copies is what is pasted elsewhere: as many rows and columns as the table has.
+    page.evaluate("""() => { const into = document.createElement('textarea'); into.id = 'paste'; document.body.append(into); }""")
+    result["copied"], result["tables"] = [], count("main table")
+    for index in range(result["tables"]):
+        of = page.locator("main table").nth(index)
+        of.locator("button.copy").click()
+        page.wait_for_timeout(50)
+        page.focus("#paste")
+        page.keyboard.press("Control+A")
+        page.keyboard.press("Control+V")
+        rows = page.input_value("#paste").split("\n")
+        result["copied"].append([len(rows) == of.locator("tr").count(), len(rows[-1].split("\t")) == of.locator("tr").last.locator("td, th").count()])
+    result["heads_without_sorting"] = count("main thead th:not(:empty):not(:has(button))")
+    page.evaluate("document.getElementById('paste').remove()")
     # By keyboard alone.
     page.focus("#step-choice")
     page.keyboard.press("ArrowDown")

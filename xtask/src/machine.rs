@@ -84,6 +84,11 @@ pub fn has_slurm() -> bool {
     is_root() && (works(&SLURM) || (install().is_ok() && works(&SLURM)))
 }
 
+/// Whether npm is there and reaches its registry. Nothing of the build needs it.
+pub fn has_npm() -> bool {
+    step::succeeds("npm", &["ping"])
+}
+
 fn is_root() -> bool {
     step::output(step::command("id", &["-u"])).is_ok_and(|id| id == "0")
 }

@@ -12,12 +12,19 @@ pub struct Offered {
     pub mountable: bool,
     /// Whether Slurm's daemons can be run.
     pub slurm: bool,
+    /// Whether npm reaches its registry: the scripts of the pages are held against its packages.
+    pub npm: bool,
 }
 
 impl Offered {
     /// With this Python.
     pub fn with(python: PathBuf) -> Self {
-        Offered { python, mountable: machine::can_mount(), slurm: machine::has_slurm() }
+        Offered {
+            python,
+            mountable: machine::can_mount(),
+            slurm: machine::has_slurm(),
+            npm: machine::has_npm(),
+        }
     }
 
     /// A command that knows of it. All commands that build get the same, so that nothing is built again.
@@ -29,6 +36,9 @@ impl Offered {
         }
         if self.slurm {
             command.env("MAPPER_TEST_SLURM", "1");
+        }
+        if self.npm {
+            command.env("MAPPER_TEST_NPM", "1");
         }
         command
     }

@@ -201,10 +201,13 @@ fn scatter(drawing: &mut Drawing, frame: &Frame, scatter: &Scatter) {
             error_bar(drawing, frame, end(low), end(high), along_x, scatter);
         }
     }
-    for point in &scatter.points {
+    for (index, point) in scatter.points.iter().enumerate() {
         let at = frame.px((point.x, point.y));
         if at.0.is_finite() && at.1.is_finite() && frame.rect.contains(at) {
-            draw_marker(drawing, at, &style);
+            match scatter.notes.get(index) {
+                None => draw_marker(drawing, at, &style),
+                Some(note) => drawing.noted(note, |drawing| draw_marker(drawing, at, &style)),
+            }
         }
     }
 }

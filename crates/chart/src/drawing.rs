@@ -1,7 +1,7 @@
 //! What a picture consists of before it becomes text or pixels.
 
 use crate::Colour;
-use crate::items::{Dash, TextAnchor};
+use crate::items::{Dash, Note, TextAnchor};
 
 /// How a line looks.
 #[derive(Debug, Clone, Copy)]
@@ -74,6 +74,9 @@ pub(crate) type Px = (f64, f64);
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
     OpenGroup(String),
+    /// Begins what is said of the shapes up to the next [`Shape::CloseNote`].
+    OpenNote(Note),
+    CloseNote(Note),
     CloseGroup,
     Line(Px, Px, Stroke),
     /// At least two points.
@@ -99,6 +102,13 @@ pub(crate) struct Drawing {
 impl Drawing {
     pub(crate) fn open_group(&mut self, name: &str) {
         self.shapes.push(Shape::OpenGroup(name.to_owned()));
+    }
+
+    /// Shapes with words, and a link where there is one.
+    pub(crate) fn noted(&mut self, note: &Note, draw: impl FnOnce(&mut Drawing)) {
+        self.shapes.push(Shape::OpenNote(note.clone()));
+        draw(self);
+        self.shapes.push(Shape::CloseNote(note.clone()));
     }
 
     pub(crate) fn close_group(&mut self) {

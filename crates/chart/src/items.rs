@@ -160,6 +160,17 @@ pub struct Scatter {
     pub size_px: f64,
     /// Entry in the legend; items with equal text share one entry.
     pub label: Option<String>,
+    /// What a viewer that has a pointer says at each point, in the order of the points; empty: nothing.
+    pub notes: Vec<Note>,
+}
+
+/// What an SVG says at a point under the pointer, and where a click on it leads. A PNG has none of it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Note {
+    /// The words.
+    pub text: String,
+    /// A file or a page.
+    pub link: Option<String>,
 }
 
 impl Scatter {
@@ -172,7 +183,14 @@ impl Scatter {
             hollow: false,
             size_px: 7.0,
             label: None,
+            notes: Vec::new(),
         }
+    }
+
+    /// Sets what is said at each point, in the order of the points.
+    pub fn notes(mut self, notes: Vec<Note>) -> Self {
+        self.notes = notes;
+        self
     }
 
     /// Sets the shape.

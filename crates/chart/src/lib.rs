@@ -47,8 +47,8 @@ pub use contour_item::{ContourLevel, Contours};
 pub use figure::{Figure, LegendPlace, Panel};
 pub use grid::{GridError, StructuredGrid};
 pub use items::{
-    Annotation, Dash, EndLabel, Item, Line, LineEnd, Marker, Polygon, Rule, RuleAt, Scatter, ScatterPoint,
-    Space, TextAnchor,
+    Annotation, Dash, EndLabel, Item, Line, LineEnd, Marker, Note, Polygon, Rule, RuleAt, Scatter,
+    ScatterPoint, Space, TextAnchor,
 };
 pub use marching::contour_lines;
 pub use palette::Colour;

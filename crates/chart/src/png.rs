@@ -70,7 +70,7 @@ struct Canvas {
 impl Canvas {
     fn shape(&mut self, shape: &Shape) {
         match shape {
-            Shape::OpenGroup(_) | Shape::CloseGroup => {}
+            Shape::OpenGroup(_) | Shape::CloseGroup | Shape::OpenNote(_) | Shape::CloseNote(_) => {}
             Shape::Line(from, to, stroke) => self.outline(open(&[*from, *to]), stroke, LineJoin::Miter),
             Shape::Polyline(points, stroke) => self.outline(open(points), stroke, LineJoin::Round),
             Shape::Areas(polygons, colour, opacity) => self.fill(closed(polygons), *colour, *opacity),

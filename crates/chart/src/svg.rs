@@ -26,6 +26,14 @@ fn element(body: &mut String, shape: &Shape) {
     let _ = match shape {
         Shape::OpenGroup(name) => writeln!(body, "<g class=\"{}\">", escape(name)),
         Shape::CloseGroup => writeln!(body, "</g>"),
+        Shape::OpenNote(note) => {
+            let title = escape(&note.text);
+            match &note.link {
+                Some(link) => writeln!(body, "<a href=\"{}\"><title>{title}</title>", escape(link)),
+                None => writeln!(body, "<g><title>{title}</title>"),
+            }
+        }
+        Shape::CloseNote(note) => writeln!(body, "{}", if note.link.is_some() { "</a>" } else { "</g>" }),
         Shape::Line(from, to, stroke) => writeln!(
             body,
             "<line x1=\"{}\" y1=\"{}\" x2=\"{}\" y2=\"{}\" {}/>",

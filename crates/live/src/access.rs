@@ -10,18 +10,20 @@ pub(crate) struct Access {
     token: Option<String>,
     /// Names by which a browser may call the server; `None`: any, which the token makes up for.
     hosts: Option<Vec<String>>,
+    /// `http` or `https`, of the server's own page.
+    scheme: &'static str,
 }
 
 impl Access {
     /// Of a server at this address.
-    pub(crate) fn new(address: SocketAddr, token: Option<String>) -> Self {
+    pub(crate) fn new(address: SocketAddr, token: Option<String>, encrypted: bool) -> Self {
         let port = address.port();
         let here = ["127.0.0.1", "localhost", "[::1]"].map(|name| format!("{name}:{port}"));
         let hosts = (!address.ip().is_unspecified()).then(|| {
             let own = address.to_string();
             here.into_iter().filter(|_| address.ip().is_loopback()).chain([own]).collect()
         });
-        Access { token, hosts }
+        Access { token, hosts, scheme: if encrypted { "https" } else { "http" } }
     }
 
     /// Whether the request calls the server by its own name: a page of another name that was bent to this address does not.
@@ -32,7 +34,7 @@ impl Access {
 
     /// Whether the request comes from the server's own page. Browsers say where a page is from with whatever changes something.
     pub(crate) fn is_of_own_page(&self, request: &Request) -> bool {
-        let own = request.host.as_ref().map(|host| format!("http://{host}"));
+        let own = request.host.as_ref().map(|host| format!("{}://{host}", self.scheme));
         request.origin.is_some() && request.origin == own
     }
 
@@ -68,7 +70,7 @@ mod tests {
 
     #[test]
     fn another_name_another_page_and_another_token_are_refused() {
-        let here = Access::new("127.0.0.1:7373".parse().unwrap(), None);
+        let here = Access::new("127.0.0.1:7373".parse().unwrap(), None, false);
         assert!(here.calls_by_name(&request("localhost:7373", None, None)));
         assert!(!here.calls_by_name(&request("evil.example:7373", None, None)));
         assert!(!here.calls_by_name(&request("localhost:80", None, None)));
@@ -78,7 +80,7 @@ mod tests {
         assert!(!here.is_of_own_page(&from(Some("null"))) && !here.is_of_own_page(&from(None)));
         assert!(here.has_token(&from(None)), "none is needed on this machine");
 
-        let there = Access::new("192.0.2.7:7373".parse().unwrap(), Some("abc".to_owned()));
+        let there = Access::new("192.0.2.7:7373".parse().unwrap(), Some("abc".to_owned()), true);
         assert!(!there.calls_by_name(&request("localhost:7373", None, None)));
         for (given, right) in
             [("Bearer abc", true), ("Bearer abd", false), ("Bearer ab", false), ("abc", false)]
@@ -86,5 +88,8 @@ mod tests {
             assert_eq!(there.has_token(&request("192.0.2.7:7373", None, Some(given))), right, "{given}");
         }
         assert!(!there.has_token(&request("192.0.2.7:7373", None, None)));
+        let from = |origin| request("192.0.2.7:7373", Some(origin), None);
+        assert!(there.is_of_own_page(&from("https://192.0.2.7:7373")));
+        assert!(!there.is_of_own_page(&from("http://192.0.2.7:7373")), "a page in clear is another one");
     }
 }

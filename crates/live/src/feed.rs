@@ -1,10 +1,11 @@
 //! From what the session tells to what browsers are shown.
 
-use crate::asked::Asked;
 use crate::live_run::LiveRun;
+use crate::pressed::Pressed;
 use crate::state::{EVENTS_MAX, Now, POINTS_MAX, Reading, State, Step, TRACE_ROWS, Told, Traced, Units};
-use mapper_core::{Channel, PlanStep, SignalGuard, StepMarker};
-use mapper_page::{live_point, planned};
+use mapper_campaign::Campaign;
+use mapper_core::{Channel, IdentifiedPoint, PlanStep, SignalGuard, StepMarker};
+use mapper_page::{LiveMap, live_map, live_point, planned};
 use mapper_report::Display;
 use mapper_session::{Operator, SessionEvent, soak_s};
 use serde_json::{Value, json};
@@ -26,6 +27,9 @@ pub(crate) struct Feed {
     display: Display,
     guards: Vec<SignalGuard>,
     plan: Vec<PlanStep>,
+    campaign: Campaign,
+    /// Points so far; apart from what is shown, so that drawing the map keeps nobody waiting.
+    estimated: Mutex<Vec<IdentifiedPoint>>,
     operator: Arc<Operator>,
     after_step: Arc<AtomicBool>,
 }
@@ -37,6 +41,8 @@ struct Kept {
     ticked: Option<Instant>,
     /// How much longer each step took than planned, s.
     longer_s: Vec<f64>,
+    /// Whether the operator held the step that is under way: how long that lasts says nothing of the others.
+    held: bool,
     /// Steps that have begun.
     begun: usize,
     soak_s: f64,
@@ -74,6 +80,7 @@ impl Feed {
                 .to_vec(),
             rows: VecDeque::new(),
             points: Vec::new(),
+            map: LiveMap::default(),
             events: VecDeque::new(),
             now: Now { phase: "planned".to_owned(), ..Now::default() },
             outcome: None,
@@ -84,6 +91,7 @@ impl Feed {
             unsent: VecDeque::new(),
             ticked: None,
             longer_s: Vec::new(),
+            held: false,
             begun: 0,
             soak_s,
             after_s: 0.0,
@@ -93,6 +101,8 @@ impl Feed {
             display,
             guards: run.campaign.guard_set().signals,
             plan: run.plan.steps.clone(),
+            campaign: run.campaign.clone(),
+            estimated: Mutex::default(),
             operator: run.operator.clone(),
             after_step: run.after_step.clone(),
         }
@@ -107,6 +117,11 @@ impl Feed {
 
     /// Takes an event in; messages for those who look on.
     pub(crate) fn take(&self, event: &SessionEvent) -> Vec<Arc<str>> {
+        // Comes from the thread that identifies: the rig does not wait for the map.
+        let map = match event {
+            SessionEvent::PointEstimated(point) => self.map_with(point),
+            _ => None,
+        };
         let Ok(mut kept) = self.kept.lock() else { return Vec::new() };
         let kept = &mut *kept;
         match event {
@@ -150,7 +165,8 @@ impl Feed {
                 vec![self.tick(kept)]
             }
             SessionEvent::StepEnded(marker) => {
-                let planned_s = self.plan.get(marker.index).map(|step| step.dwell_s);
+                let held = std::mem::replace(&mut kept.held, self.operator.holds());
+                let planned_s = self.plan.get(marker.index).filter(|_| !held).map(|step| step.dwell_s);
                 kept.longer_s.extend(planned_s.map(|planned_s| marker.end_s - marker.start_s - planned_s));
                 Vec::new()
             }
@@ -169,7 +185,12 @@ impl Feed {
                 if kept.state.points.len() < POINTS_MAX {
                     kept.state.points.push(shown);
                 }
-                vec![new]
+                let drawn = map.map(|map| {
+                    let new = message("map", json!({ "map": map }));
+                    kept.state.map = map;
+                    new
+                });
+                std::iter::once(new).chain(drawn).collect()
             }
             SessionEvent::Progress { what, .. } => {
                 (kept.state.now.phase, kept.state.now.step) = (what.clone(), None);
@@ -179,14 +200,24 @@ impl Feed {
         }
     }
 
+    /// The map with one point more.
+    fn map_with(&self, point: &IdentifiedPoint) -> Option<LiveMap> {
+        let mut estimated = self.estimated.lock().ok()?;
+        if estimated.len() < POINTS_MAX {
+            estimated.push(point.clone());
+        }
+        Some(live_map(&estimated, &self.campaign, &self.display))
+    }
+
     /// A button was pressed: what is shown of it before the run has seen it.
-    pub(crate) fn asked(&self, asked: Asked) {
+    pub(crate) fn asked(&self, asked: Pressed) {
         if let Ok(mut kept) = self.kept.lock() {
+            kept.held |= asked == Pressed::Hold;
             let now = &mut kept.state.now;
             match asked {
-                Asked::Hold => now.holds = true,
-                Asked::GoOn => now.holds = false,
-                Asked::StopAfterStep | Asked::SafeNow => now.stops = true,
+                Pressed::Hold => now.holds = true,
+                Pressed::GoOn => now.holds = false,
+                Pressed::StopAfterStep | Pressed::SafeNow => now.stops = true,
             }
         }
     }

@@ -1,21 +1,29 @@
 //! The page of a run while it goes on.
 //!
-//! [`Live`] is told what the session tells, keeps a bounded state of it, and serves it to the browsers that look on: the page,
+//! [`Onlookers`] are told what the session tells, and the page keeps a bounded state of it, which it serves to browsers: the page itself,
 //! a stream of server-sent events, and four requests for the operator's buttons. A browser that is slow, gone or hostile costs
 //! its own connection and never the run. `docs/decisions/0032-live-page.md` says why the server is what it is.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod access;
-mod asked;
 mod feed;
 mod hub;
 mod live;
+mod live_error;
 mod live_run;
+mod onlookers;
+mod pressed;
 mod request;
 mod server;
 mod state;
+mod tls;
+#[cfg(feature = "foxglove")]
+mod viewers;
 
-pub use asked::Asked;
-pub use live::{Live, LiveError};
+pub use live_error::LiveError;
 pub use live_run::LiveRun;
+pub use onlookers::{Asked, Onlookers};
+pub use tls::{TlsError, TlsFiles};
+#[cfg(feature = "foxglove")]
+pub use viewers::{Viewers, ViewersError};

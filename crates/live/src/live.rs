@@ -1,11 +1,13 @@
 //! The page of a run: opened before it, told while it goes on, closed after it.
 
 use crate::access::Access;
-use crate::asked::Asked;
 use crate::feed::Feed;
 use crate::hub::Hub;
+use crate::live_error::LiveError;
 use crate::live_run::LiveRun;
+use crate::pressed::Pressed;
 use crate::server::{Served, serve};
+use crate::tls::{Tls, TlsFiles, read};
 use mapper_page::live_page;
 use mapper_session::SessionEvent;
 use std::net::{SocketAddr, TcpListener};
@@ -16,36 +18,12 @@ use std::time::{Duration, Instant};
 /// Browsers get so long for the last message.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// Why there is no live page.
-#[derive(Debug, thiserror::Error)]
-pub enum LiveError {
-    /// It is not an address.
-    #[error("`{text}` is not an address; write e.g. 127.0.0.1:7373, or 0.0.0.0:7373 for other machines too")]
-    Address {
-        /// What was given.
-        text: String,
-    },
-    /// The address is not to be had.
-    #[error("the live page cannot be served at {address}: {source}; choose another with `--live=ADDRESS`")]
-    Listen {
-        /// The address.
-        address: SocketAddr,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// There is nothing to make a token from.
-    #[error("the system gives no random numbers for a token: {0}")]
-    Token(getrandom::Error),
-    /// The page could not be made: a fault of the program.
-    #[error("failed to write the live page: {0}")]
-    Page(#[from] serde_json::Error),
-}
-
 /// The page of a run that goes on.
 pub struct Live {
-    listener: Option<TcpListener>,
+    listener: Mutex<Option<TcpListener>>,
     address: SocketAddr,
     token: Option<String>,
+    tls: Option<Tls>,
     begun: OnceLock<(Arc<Feed>, Arc<Served>)>,
 }
 
@@ -53,54 +31,67 @@ impl Live {
     /// Takes an address, e.g. `127.0.0.1:7373`. Another machine's browsers need the token that this makes.
     ///
     /// # Errors
-    /// [`LiveError`] where the address is none, or is taken.
-    pub fn open(text: &str) -> Result<Live, LiveError> {
+    /// [`LiveError`] where the address is none, or is taken, or the files are of no use.
+    pub fn open(text: &str, tls: Option<&TlsFiles>) -> Result<Live, LiveError> {
+        let tls = tls.map(read).transpose()?;
         let address: SocketAddr = text.parse().map_err(|_| LiveError::Address { text: text.to_owned() })?;
         let listen = |source| LiveError::Listen { address, source };
         let listener = TcpListener::bind(address).map_err(listen)?;
         let address = listener.local_addr().map_err(listen)?;
         let token = if address.ip().is_loopback() { None } else { Some(token()?) };
-        Ok(Live { listener: Some(listener), address, token, begun: OnceLock::new() })
+        Ok(Live { listener: Mutex::new(Some(listener)), address, token, tls, begun: OnceLock::new() })
     }
 
     /// Where the page is, with the token behind `#`, which a browser keeps for itself.
     pub fn url(&self) -> String {
+        let scheme = if self.tls.is_some() { "https" } else { "http" };
         match &self.token {
-            None => format!("http://{}/", self.address),
-            Some(token) => format!("http://{}/#token={token}", self.address),
+            None => format!("{scheme}://{}/", self.address),
+            Some(token) => format!("{scheme}://{}/#token={token}", self.address),
         }
+    }
+
+    /// What whoever starts the run has to know about its net: other machines get there, and all that goes there is in clear.
+    pub fn warning(&self) -> Option<&'static str> {
+        (self.token.is_some() && self.tls.is_none()).then_some(
+            "the live page is open to other machines WITHOUT encryption: whoever listens on that net can read the readings and the token, \
+             and with the token press the buttons. Give --live-cert and --live-key, or stay on 127.0.0.1 and use a tunnel (ssh -L)",
+        )
     }
 
     /// Begins to serve.
     ///
     /// # Errors
     /// [`LiveError::Page`]: none in practice.
-    pub fn begin(&mut self, run: &LiveRun<'_>) -> Result<(), LiveError> {
-        let Some(listener) = self.listener.take() else { return Ok(()) };
+    pub fn begin(&self, run: &LiveRun<'_>) -> Result<(), LiveError> {
+        let Some(listener) = self.listener.lock().ok().and_then(|mut listener| listener.take()) else {
+            return Ok(());
+        };
         let feed = Arc::new(Feed::new(run));
         let of_snapshot = feed.clone();
         let (operator, after_step, now) = (run.operator.clone(), run.after_step.clone(), run.now.clone());
         let of_ask = feed.clone();
         let served = Arc::new(Served {
             page: live_page()?,
-            access: Access::new(self.address, self.token.clone()),
+            access: Access::new(self.address, self.token.clone(), self.tls.is_some()),
+            tls: self.tls.clone(),
             hub: Hub::default(),
             snapshot: Box::new(move || of_snapshot.snapshot()),
             ask: Box::new(move |asked| {
                 let what = match asked {
-                    Asked::Hold => {
+                    Pressed::Hold => {
                         operator.hold();
                         "the step is held"
                     }
-                    Asked::GoOn => {
+                    Pressed::GoOn => {
                         operator.go_on();
                         "the step goes on"
                     }
-                    Asked::StopAfterStep => {
+                    Pressed::StopAfterStep => {
                         after_step.store(true, Ordering::SeqCst);
                         "the run stops at the end of the step"
                     }
-                    Asked::SafeNow => {
+                    Pressed::SafeNow => {
                         after_step.store(true, Ordering::SeqCst);
                         now.store(true, Ordering::SeqCst);
                         "the rig goes into its safe state now"

@@ -8,7 +8,7 @@ const HEAD_MAX: usize = 8192;
 /// Most headers of a request.
 const HEADERS_MAX: usize = 64;
 /// Longest time that a request may take to arrive.
-const ARRIVES_WITHIN: Duration = Duration::from_secs(10);
+pub(crate) const ARRIVES_WITHIN: Duration = Duration::from_secs(10);
 
 /// What is looked at of a request.
 #[derive(Debug, Clone, PartialEq, Eq)]

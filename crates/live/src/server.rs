@@ -1,11 +1,12 @@
 //! The server: a thread for each of few connections, one request each.
 
 use crate::access::Access;
-use crate::asked::Asked;
 use crate::hub::Hub;
-use crate::request::{Request, read_request};
+use crate::pressed::Pressed;
+use crate::request::{ARRIVES_WITHIN, Request, read_request};
+use crate::tls::{Punctual, Tls};
 use std::collections::HashMap;
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::net::{IpAddr, TcpListener, TcpStream};
 use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex};
@@ -29,10 +30,12 @@ pub(crate) struct Served {
     pub(crate) page: String,
     pub(crate) access: Access,
     pub(crate) hub: Hub,
+    /// Where the page is served over TLS.
+    pub(crate) tls: Option<Tls>,
     /// The whole state as a message.
     pub(crate) snapshot: Box<dyn Fn() -> Arc<str> + Send + Sync>,
     /// Does what a button asks for.
-    pub(crate) ask: Box<dyn Fn(Asked) + Send + Sync>,
+    pub(crate) ask: Box<dyn Fn(Pressed) + Send + Sync>,
     /// Connections that are open, by address.
     pub(crate) open: Mutex<HashMap<IpAddr, usize>>,
 }
@@ -83,35 +86,43 @@ pub(crate) fn serve(listener: &TcpListener, served: &Arc<Served>) {
         // Where no thread can be started the slot is dropped with what it should have run.
         let _ = std::thread::Builder::new().name("live".to_owned()).spawn(move || {
             // A browser that goes away ends its own connection.
-            let _ = answer(stream, &slot.served);
+            let _ = connected(stream, &slot.served);
         });
     }
 }
 
-fn answer(mut stream: TcpStream, served: &Served) -> std::io::Result<()> {
+fn connected(stream: TcpStream, served: &Served) -> std::io::Result<()> {
     stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     stream.set_nodelay(true)?;
-    let Some(request) = read_request(&mut stream) else { return plain(&mut stream, "400 Bad Request") };
+    let mut stream = Punctual { stream, until: Instant::now() + ARRIVES_WITHIN };
+    match &served.tls {
+        None => answer(&mut stream, served),
+        Some(tls) => tls.over(stream, |stream| answer(stream, served)),
+    }
+}
+
+fn answer(stream: &mut (impl Read + Write), served: &Served) -> std::io::Result<()> {
+    let Some(request) = read_request(stream) else { return plain(stream, "400 Bad Request") };
     let access = &served.access;
     if !access.calls_by_name(&request) || access.is_of_another_page(&request) {
-        return plain(&mut stream, "403 Forbidden");
+        return plain(stream, "403 Forbidden");
     }
     match (request.method.as_str(), request.path.as_str()) {
         // Without data of the run: it is read before anybody can show a token.
-        ("GET", "/") => page(&mut stream, &served.page),
-        ("GET", "/events") if !access.has_token(&request) => plain(&mut stream, "401 Unauthorized"),
-        ("GET", "/events") => events(&mut stream, served),
+        ("GET", "/") => page(stream, &served.page),
+        ("GET", "/events") if !access.has_token(&request) => plain(stream, "401 Unauthorized"),
+        ("GET", "/events") => events(stream, served),
         ("POST", path) => match asked(path) {
-            None => plain(&mut stream, "404 Not Found"),
-            Some(_) if !may_ask(access, &request) => plain(&mut stream, "403 Forbidden"),
+            None => plain(stream, "404 Not Found"),
+            Some(_) if !may_ask(access, &request) => plain(stream, "403 Forbidden"),
             Some(asked) => {
                 (served.ask)(asked);
-                plain(&mut stream, "204 No Content")
+                plain(stream, "204 No Content")
             }
         },
-        ("GET", _) => plain(&mut stream, "404 Not Found"),
-        _ => plain(&mut stream, "405 Method Not Allowed"),
+        ("GET", _) => plain(stream, "404 Not Found"),
+        _ => plain(stream, "405 Method Not Allowed"),
     }
 }
 
@@ -119,21 +130,21 @@ fn may_ask(access: &Access, request: &Request) -> bool {
     access.is_of_own_page(request) && access.has_token(request)
 }
 
-fn asked(path: &str) -> Option<Asked> {
+fn asked(path: &str) -> Option<Pressed> {
     match path {
-        "/ask/hold" => Some(Asked::Hold),
-        "/ask/go-on" => Some(Asked::GoOn),
-        "/ask/stop" => Some(Asked::StopAfterStep),
-        "/ask/safe" => Some(Asked::SafeNow),
+        "/ask/hold" => Some(Pressed::Hold),
+        "/ask/go-on" => Some(Pressed::GoOn),
+        "/ask/stop" => Some(Pressed::StopAfterStep),
+        "/ask/safe" => Some(Pressed::SafeNow),
         _ => None,
     }
 }
 
-fn plain(stream: &mut TcpStream, status: &str) -> std::io::Result<()> {
+fn plain(stream: &mut impl Write, status: &str) -> std::io::Result<()> {
     write!(stream, "HTTP/1.1 {status}\r\n{HEADERS}Content-Length: 0\r\n\r\n")
 }
 
-fn page(stream: &mut TcpStream, page: &str) -> std::io::Result<()> {
+fn page(stream: &mut impl Write, page: &str) -> std::io::Result<()> {
     let length = page.len();
     write!(
         stream,
@@ -152,7 +163,7 @@ fn page(stream: &mut TcpStream, page: &str) -> std::io::Result<()> {
 }
 
 /// The whole state, then every message, until one side goes away.
-fn events(stream: &mut TcpStream, served: &Served) -> std::io::Result<()> {
+fn events(stream: &mut impl Write, served: &Served) -> std::io::Result<()> {
     let Some(messages) = served.hub.join((served.snapshot)()) else {
         return plain(stream, "503 Service Unavailable");
     };

@@ -1,6 +1,6 @@
 //! What a browser is shown, bounded whatever the run does.
 
-use mapper_page::{LivePoint, Planned};
+use mapper_page::{LiveMap, LivePoint, Planned};
 use serde::Serialize;
 use std::collections::VecDeque;
 
@@ -29,6 +29,8 @@ pub(crate) struct State {
     /// Run time, s, and readings.
     pub(crate) rows: VecDeque<Vec<Option<f64>>>,
     pub(crate) points: Vec<LivePoint>,
+    /// Speed lines and contours of the points so far.
+    pub(crate) map: LiveMap,
     pub(crate) events: VecDeque<Told>,
     pub(crate) now: Now,
     pub(crate) outcome: Option<String>,

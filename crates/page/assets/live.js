@@ -110,7 +110,7 @@ const take = {
     text("title", `Run of ${s.campaign} on ${s.machine}`);
     text("speed-head", `speed ${s.units.speed}`);
     text("flow-head", `flow ${s.units.flow}`);
-    Object.assign(page, { units: s.units, points: s.points, planned: s.planned });
+    Object.assign(page, { units: s.units, points: s.points, planned: s.planned, map: s.map });
     lineNames = s.lines;
     byId("points").replaceChildren();
     byId("events").replaceChildren();
@@ -133,6 +133,10 @@ const take = {
     addPoint(p);
     drawMap();
     drawEta();
+  },
+  map(m) {
+    page.map = m.map;
+    drawMap();
   },
   told: addEvent,
   end(e) { ended(e.outcome, e.page); },

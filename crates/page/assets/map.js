@@ -12,6 +12,8 @@ function words(p) {
   if (p.eta_common != null) lines.push(`  common ${shown(p.eta_common, 2)}, own ${shown(p.eta_own, 2)}`);
   if (p.h != null) lines.push(`h ${shown(p.h, 0)} ± ${shown(half(p.h_low, p.h_high), 0)} W/(m² K)`);
   if (p.dynamic) lines.push(`two-parameter ${shown(p.dynamic[0], 2)} %`);
+  // Three readings a line: the words stand beside the pointer.
+  for (let i = 0; i < p.raw.length; i += 3) lines.push(`${i ? "  " : "read "}${p.raw.slice(i, i + 3).join(", ")}`);
   lines.push(p.verdict);
   return lines.join("\n");
 }
@@ -70,7 +72,7 @@ const pointMarks = (data, y) => [
     fill: p => (p.eta == null ? "none" : lineColour(p.line)), stroke: p => (p.step === chosen ? style("--bad") : style("--ground")),
     strokeWidth: p => (p.step === chosen ? 2.5 : 0.8), className: "points", clip: true,
   }),
-  Plot.tip(data, Plot.pointer({ x: "flow", y, title: words, fill: style("--ground"), stroke: style("--line"), fontSize: 12 })),
+  Plot.tip(data, Plot.pointer({ x: "flow", y, title: words, fill: style("--ground"), stroke: style("--line"), fontSize: 12, lineWidth: innerWidth < 700 ? 24 : 42 })),
 ];
 
 // Each mark knows its step; a click takes the point under the pointer, as the words beside it do.
@@ -119,6 +121,8 @@ function drawEta() {
   const element = byId("eta-plot"), data = drawnPoints().filter(p => p.eta != null);
   const width = widthOf(element), height = Math.round(0.78 * width), marks = [];
   marks.push(Plot.gridX({ stroke: style("--grid"), strokeOpacity: 1 }), Plot.gridY({ stroke: style("--grid"), strokeOpacity: 1 }));
+  // While the map fills up, the axis is that of all points to come.
+  const flows = [...(page.planned ?? []).map(p => p.flow), ...(page.planned ? data.map(p => p.flow) : [])];
   const low = d3.min(data, p => p.eta_low ?? p.eta), high = d3.max(data, p => p.eta_high ?? p.eta);
   if (layer("lines"))
     for (const line of page.map.lines.filter(l => l.measured)) {
@@ -141,7 +145,7 @@ function drawEta() {
   marks.push(...pointMarks(data, "eta"));
   const plot = Plot.plot({
     width, height, marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
-    x: { label: `corrected flow, ${page.units.flow}`, nice: true, inset: 8 }, y: { domain: low == null ? undefined : [Math.max(0, low - 2), high + 2], label: "efficiency, %" }, marks,
+    x: { label: `corrected flow, ${page.units.flow}`, domain: flows.length ? d3.extent(flows) : undefined, nice: true, inset: 8 }, y: { domain: low == null ? undefined : [Math.max(0, low - 2), high + 2], label: "efficiency, %" }, marks,
   });
   clickable(plot, data);
   put(element, plot, `Efficiency over corrected flow of ${data.length} points, between ${shown(low, 1)} and ${shown(high, 1)} %.`);
@@ -154,15 +158,22 @@ function drawPlan() {
   const jumps = d3.pairs(stops).map(([from, to], i) => ({ from, to, i }));
   const shade = i => d3.interpolateLab(style("--accent"), style("--grid"))(jumps.length < 2 ? 0 : 0.85 * i / (jumps.length - 1));
   const width = Math.max(280, Math.min(900, element.clientWidth || 800));
-  // Numbers of steps at one place stand in one row.
-  const places = d3.groups(stops, p => `${p.line} ${p.valve}`).map(([, all]) => ({ ...all[0], steps: all.map(p => p.step + 1).join(", ") }));
+  // Numbers of steps at one place stand in one row: repeats never come back to the very same numbers.
+  const span = of => Math.max(1e-9, d3.max(stops, of) - d3.min(stops, of));
+  const [flowSpan, prSpan] = [span(p => p.flow), span(p => p.pr)];
+  const places = [];
+  for (const p of stops) {
+    const near = places.find(q => Math.hypot((q.flow - p.flow) / flowSpan, (q.pr - p.pr) / prSpan) < 0.015);
+    if (near) near.steps.push(p.step + 1);
+    else places.push({ flow: p.flow, pr: p.pr, steps: [p.step + 1] });
+  }
   const plot = Plot.plot({
     width, height: Math.round(0.6 * width), marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
-    x: { label: `corrected flow, ${page.units.flow}` }, y: { label: "total pressure ratio P2/P1" },
+    x: { label: `corrected flow, ${page.units.flow}`, inset: 14 }, y: { label: "total pressure ratio P2/P1", inset: 14 },
     marks: [
       Plot.arrow([...jumps].reverse(), { x1: d => d.from.flow, y1: d => d.from.pr, x2: d => d.to.flow, y2: d => d.to.pr, stroke: d => shade(d.i), strokeWidth: d => (d.i < 5 ? 2 : 1), bend: 12, inset: 5, headLength: 6 }),
       Plot.dot(places, { x: "flow", y: "pr", fill: style("--ground"), stroke: style("--ink"), r: 3.5 }),
-      Plot.text(places, { x: "flow", y: "pr", text: "steps", dy: -9, fontSize: 10, fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3 }),
+      Plot.text(places, { x: "flow", y: "pr", text: p => p.steps.join(", "), dy: -9, fontSize: 10, fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3 }),
     ],
   });
   put(element, plot, `The ${jumps.length} jumps of the plan in their order; the table below lists them.`);

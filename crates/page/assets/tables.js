@@ -1,28 +1,63 @@
-// Tables are sorted by a click on a head and copied with a button; then everything is drawn.
-document.querySelectorAll("table.data").forEach(table => {
+// Every table is copied with a button, and sorted by a click on a head where it has heads; then everything is drawn.
+async function copied(text) {
+  try {
+    await navigator.clipboard.writeText(text);
+    return true;
+  } catch {
+    // Where a browser gives pages from disk no clipboard, the older way still works.
+    const holder = document.createElement("textarea");
+    holder.value = text;
+    document.body.append(holder);
+    holder.select();
+    const done = document.execCommand("copy");
+    holder.remove();
+    return done;
+  }
+}
+
+const number = text => (/^[-+]?[\d.]/.test(text) ? parseFloat(text) : text);
+
+document.querySelectorAll("main table").forEach(table => {
+  // A first row of heads alone is the head.
+  if (!table.tHead && table.rows.length > 1 && [...table.rows[0].cells].every(cell => cell.tagName === "TH")) {
+    table.createTHead().append(table.rows[0]);
+    table.tHead.querySelectorAll("th").forEach(head => head.setAttribute("scope", "col"));
+  }
   const body = table.tBodies[0];
-  const key = (row, column) => { const cell = row.cells[column]; return cell.dataset.sort === undefined ? cell.textContent : Number(cell.dataset.sort); };
-  [...table.tHead.rows[0].cells].forEach((head, column) => {
+  if (!body) return;
+  const key = (row, column) => {
+    const cell = row.cells[column];
+    return !cell ? "" : cell.dataset.sort === undefined ? number(cell.textContent.trim()) : Number(cell.dataset.sort);
+  };
+  const heads = table.tHead ? [...table.tHead.rows[0].cells] : [];
+  heads.forEach((head, column) => {
+    if (!head.textContent.trim()) return;
     const button = document.createElement("button");
     button.type = "button";
     button.textContent = head.textContent;
     head.replaceChildren(button);
     button.addEventListener("click", () => {
       const down = head.getAttribute("aria-sort") === "ascending";
-      [...table.tHead.rows[0].cells].forEach(other => other.removeAttribute("aria-sort"));
+      heads.forEach(other => other.removeAttribute("aria-sort"));
       head.setAttribute("aria-sort", down ? "descending" : "ascending");
-      const order = (a, b) => { const [x, y] = [key(a, column), key(b, column)]; return (typeof x === typeof y ? d3.ascending(x, y) : typeof x === "number" ? -1 : 1) * (down ? -1 : 1); };
+      const order = (a, b) => {
+        const [x, y] = [key(a, column), key(b, column)];
+        return (typeof x === typeof y ? d3.ascending(x, y) : typeof x === "number" ? -1 : 1) * (down ? -1 : 1);
+      };
       body.append(...[...body.rows].sort(order));
     });
   });
+  const text = () => [...table.rows].map(row => [...row.cells].map(cell => cell.textContent.trim()).join("\t")).join("\n");
+  const name = table.caption?.textContent ?? table.closest("[role=region]")?.getAttribute("aria-label") ?? "table";
   const copy = document.createElement("button");
   copy.type = "button";
   copy.textContent = "copy";
-  copy.setAttribute("aria-label", `copy the table ${table.caption.textContent}`);
-  table.caption.append(copy);
+  copy.className = "copy";
+  if (!table.caption) copy.style.marginLeft = "0";
+  copy.setAttribute("aria-label", `copy the table ${name}`);
+  (table.caption ?? table.createCaption()).append(copy);
   copy.addEventListener("click", async () => {
-    const text = [...table.rows].map(row => [...row.cells].map(cell => cell.textContent).join("\t")).join("\n");
-    try { await navigator.clipboard.writeText(text); copy.textContent = "copied"; } catch { copy.textContent = "not allowed here"; }
+    copy.textContent = (await copied(text())) ? "copied" : "not allowed here";
     setTimeout(() => { copy.textContent = "copy"; }, 1500);
   });
   body.addEventListener("click", event => {

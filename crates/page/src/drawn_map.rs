@@ -8,7 +8,7 @@ use mapper_report::Display;
 use serde::Serialize;
 
 /// The map under its points.
-#[derive(Serialize, Default)]
+#[derive(Debug, Clone, Serialize, Default)]
 pub(crate) struct DrawnMap {
     lines: Vec<DrawnLine>,
     contours: Vec<DrawnContour>,
@@ -18,7 +18,7 @@ pub(crate) struct DrawnMap {
 }
 
 /// A speed line from the choke side to the surge side.
-#[derive(Serialize)]
+#[derive(Debug, Clone, Serialize)]
 struct DrawnLine {
     speed: String,
     measured: bool,
@@ -26,7 +26,7 @@ struct DrawnLine {
 }
 
 /// A place on a line: flow, pressure ratio, efficiency in % and the half width of its 95 % interval.
-#[derive(Serialize)]
+#[derive(Debug, Clone, Serialize)]
 struct DrawnNode {
     flow: f64,
     pr: f64,
@@ -36,14 +36,14 @@ struct DrawnNode {
 }
 
 /// Lines of one efficiency, %.
-#[derive(Serialize)]
+#[derive(Debug, Clone, Serialize)]
 struct DrawnContour {
     eta: f64,
     paths: Vec<Vec<[f64; 2]>>,
 }
 
 /// A surge-side end that was sought, with half widths of its 95 % intervals.
-#[derive(Serialize)]
+#[derive(Debug, Clone, Serialize)]
 struct DrawnMark {
     flow: f64,
     flow_half: f64,

@@ -1,11 +1,25 @@
 //! Points as the script draws them, in the units that are shown.
 
 use crate::run_page::RunPage;
+use crate::sections::points::at_end;
 use mapper_campaign::units::Kind;
-use mapper_core::{IdentifiedPoint, half_width_95, standard_error_of};
+use mapper_core::{Channel, IdentifiedPoint, half_width_95, standard_error_of};
 use mapper_identify::TwoParameter;
 use mapper_report::{Display, step_name, verdict_word};
 use serde::Serialize;
+
+/// Channels whose readings stand beside a point.
+const RAW: [Channel; 9] = [
+    Channel::ShaftSpeed,
+    Channel::CompressorFlow,
+    Channel::T1,
+    Channel::P1,
+    Channel::T2,
+    Channel::P2,
+    Channel::Tc,
+    Channel::P3,
+    Channel::T3,
+];
 
 /// One point. Efficiencies in %, half widths of 95 % intervals in points.
 #[derive(Debug, Clone, Serialize)]
@@ -17,9 +31,9 @@ pub(crate) struct DrawnPoint {
     speed: f64,
     flow: f64,
     pr: f64,
-    /// Half widths of 95 % intervals.
-    flow_half: f64,
-    pr_half: f64,
+    /// Half widths of 95 % intervals; `None` where nobody declared the sensors.
+    flow_half: Option<f64>,
+    pr_half: Option<f64>,
     eta: Option<f64>,
     eta_low: Option<f64>,
     eta_high: Option<f64>,
@@ -35,6 +49,8 @@ pub(crate) struct DrawnPoint {
     verdict: &'static str,
     repeat: bool,
     said: Vec<String>,
+    /// What was read at the end of the step, as it is shown.
+    raw: Vec<String>,
 }
 
 /// All points, repeats included.
@@ -49,7 +65,8 @@ pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPo
         .map(|point| {
             let rounded = line_of(point.step).unwrap_or(point.speed_corrected_rpm);
             let two = page.report.two_parameter.iter().find(|two| two.step == point.step);
-            drawn_point(point, display.speed(rounded), two, display)
+            let drawn = drawn_point(point, display.speed(rounded), two, display);
+            DrawnPoint { raw: raw(page, point.step, display), ..drawn }
         })
         .collect()
 }
@@ -70,9 +87,11 @@ pub(crate) fn drawn_point(
         speed: display.number(Kind::Speed, point.speed_corrected_rpm),
         flow: display.number(Kind::MassFlow, point.flow_corrected_kg_s),
         pr: point.pressure_ratio,
-        flow_half: half_width_95(point.common.flow_corrected_standard_error_ratio)
-            * display.number(Kind::MassFlow, point.flow_corrected_kg_s),
-        pr_half: half_width_95(point.common.pressure_ratio_standard_error),
+        flow_half: declared(
+            half_width_95(point.common.flow_corrected_standard_error_ratio)
+                * display.number(Kind::MassFlow, point.flow_corrected_kg_s),
+        ),
+        pr_half: declared(half_width_95(point.common.pressure_ratio_standard_error)),
         eta: percent(point.eta),
         eta_low: percent(point.eta_low),
         eta_high: percent(point.eta_high),
@@ -86,5 +105,28 @@ pub(crate) fn drawn_point(
         verdict: verdict_word(point.verdict),
         repeat: !point.kind.measures(),
         said: point.warnings.iter().map(|warning| warning.message.clone()).collect(),
+        raw: Vec::new(),
     }
+}
+
+/// A half width of 0 says that nobody declared the sensor, not that it is perfect.
+fn declared(half: f64) -> Option<f64> {
+    (half > 0.0).then_some(half)
+}
+
+/// Readings at the end of a step, symbol, value and unit.
+fn raw(page: &RunPage<'_>, step: usize, display: &Display) -> Vec<String> {
+    let marker = page.recording.steps.iter().find(|marker| marker.index == step);
+    let read = |channel| marker.and_then(|marker| at_end(page.recording, marker, channel));
+    let shown = |channel: Channel| {
+        let value = read(channel)?;
+        let text = match channel {
+            Channel::ShaftSpeed => display.speed(value),
+            Channel::CompressorFlow => display.flow(value),
+            Channel::P1 | Channel::P2 | Channel::P3 => display.pressure(value),
+            _ => display.temperature(value),
+        };
+        Some(format!("{channel} {text} {}", display.unit_of(channel)))
+    };
+    RAW.into_iter().filter_map(shown).collect()
 }

@@ -17,6 +17,6 @@ mod sections;
 mod shell;
 mod table;
 
-pub use live_page::{LivePoint, Planned, live_page, live_point, planned};
+pub use live_page::{LiveMap, LivePoint, Planned, live_map, live_page, live_point, planned};
 pub use page::run_page;
 pub use run_page::{OtherRun, RunPage};

@@ -1,9 +1,10 @@
 //! The page of a run that goes on: the same map, fed by the program while it runs.
 
-use crate::drawn_map::DrawnMap;
+use crate::drawn_map::{DrawnMap, drawn_map};
 use crate::drawn_points::{DrawnPoint, drawn_point};
 use crate::sections::live;
 use crate::shell::{Purpose, shell};
+use mapper_assemble::{Grouping, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::units::Kind;
 use mapper_core::{IdentifiedPoint, Plan};
@@ -32,6 +33,11 @@ struct EmptyUnits {
 #[serde(transparent)]
 pub struct LivePoint(DrawnPoint);
 
+/// The map so far as the page's script takes it: speed lines and contours.
+#[derive(Debug, Clone, Default, Serialize)]
+#[serde(transparent)]
+pub struct LiveMap(DrawnMap);
+
 /// Where a point is expected on the map, in the units that are shown.
 #[derive(Debug, Clone, Serialize)]
 pub struct Planned {
@@ -59,6 +65,15 @@ pub fn live_page() -> Result<String, serde_json::Error> {
 pub fn live_point(point: &IdentifiedPoint, display: &Display) -> LivePoint {
     let speed_rpm = point.target.map_or(point.speed_rpm, |target| target.speed_rpm);
     LivePoint(drawn_point(point, display.speed(speed_rpm), None, display))
+}
+
+/// The map of the points so far: contours between lines that have two points each, by the mesh of the finished map. Empty
+/// where there is none yet.
+pub fn live_map(points: &[IdentifiedPoint], campaign: &Campaign, display: &Display) -> LiveMap {
+    let Some(first) = points.first() else { return LiveMap::default() };
+    let (machine, reference) = (&campaign.machine.name, campaign.reference);
+    let map = assemble(points, machine, reference, first.method, Grouping::default());
+    LiveMap(map.map(|map| drawn_map(&map, display)).unwrap_or_default())
 }
 
 /// Where the plan expects its points.

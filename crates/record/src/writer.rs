@@ -4,6 +4,7 @@ use crate::format::{ELEMENTS_TOPIC, TRUTH_TOPIC};
 use crate::provenance::ProvenanceWriter;
 use crate::recording_file::{McapFile, OpenedFile, RecordingHeader, add_channel, io_error, open};
 use crate::schema::{Field, numeric_schema, unit_metadata};
+use crate::topics::{StepPhase, event_message, step_message};
 use crate::{BadBatch, RecordError};
 use mapper_core::{Channel, Event, Group, SampleBatch, StepMarker};
 use mcap::McapResult;
@@ -12,17 +13,6 @@ use serde_json::json;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
-
-/// Which end of a step a marker stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StepPhase {
-    /// The setpoints change; the marker's `start_s` counts, its `end_s` is not written.
-    Start,
-    /// The step is over; the marker's `end_s` counts.
-    End,
-    /// The step was cut short, and does not count; the marker's `end_s` counts.
-    Abandoned,
-}
 
 /// A topic of numeric fields as it is being written. Batch after batch has the same ones: making schemas again for
 /// each would cost more than writing the samples.
@@ -174,9 +164,7 @@ impl RecordingWriter {
     pub fn write_event(&mut self, event: &Event) -> Result<(), RecordError> {
         let log_time = self.advance(event.t_s)?;
         self.line.clear();
-        self.line.extend_from_slice(
-            json!({"t_s": event.t_s, "kind": event.kind, "message": event.message}).to_string().as_bytes(),
-        );
+        self.line.extend_from_slice(event_message(event).to_string().as_bytes());
         let sequence = self.events_written;
         self.events_written = sequence.wrapping_add(1);
         self.write_line(self.event_channel, sequence, log_time)
@@ -187,17 +175,9 @@ impl RecordingWriter {
     /// # Errors
     /// As [`write_batch`](Self::write_batch).
     pub fn write_step(&mut self, step: &StepMarker, phase: StepPhase) -> Result<(), RecordError> {
-        let (t_s, phase) = match phase {
-            StepPhase::Start => (step.start_s, "start"),
-            StepPhase::End => (step.end_s, "end"),
-            StepPhase::Abandoned => (step.end_s, "abandoned"),
-        };
+        let (t_s, message) = step_message(step, phase);
         let log_time = self.advance(t_s)?;
         self.line.clear();
-        let message = json!({
-            "index": step.index, "kind": step.kind, "phase": phase, "t_s": t_s,
-            "p3_pa": step.p3_pa, "valve": step.valve_opening_ratio, "from": step.from, "to": step.to,
-        });
         self.line.extend_from_slice(message.to_string().as_bytes());
         let sequence = self.steps_written;
         self.steps_written = sequence.wrapping_add(1);

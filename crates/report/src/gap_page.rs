@@ -103,7 +103,7 @@ fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
             (PreEscaped(traces(done)))
         }
         (heading("In words"))
-        pre { (gap_text(diagnosis)) }
+        pre tabindex="0" role="region" aria-label="the diagnosis in words" { (gap_text(diagnosis)) }
     }
 }
 

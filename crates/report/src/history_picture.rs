@@ -1,6 +1,6 @@
 //! Trends of the nights: a panel a figure, a line a campaign and method.
 
-use mapper_chart::{Axis, Colour, Figure as Picture, Line, Panel, Scatter};
+use mapper_chart::{Axis, Colour, Figure as Picture, Line, Note, Panel, Scatter};
 use mapper_history::{ListedRun, Metric, median};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -35,8 +35,13 @@ fn dates(first_ms: i64, last_ms: i64) -> Vec<(f64, String)> {
     .collect()
 }
 
-/// All figures as one SVG.
-pub fn history_svg(runs: &[ListedRun], figures: &[Metric]) -> String {
+/// All figures as one SVG: the pointer says night, figure and value, and a click opens what `report_of` names for a night that
+/// began then, ms since 1970.
+pub fn history_svg(
+    runs: &[ListedRun],
+    figures: &[Metric],
+    report_of: impl Fn(i64) -> Option<String>,
+) -> String {
     let first_ms = runs.iter().map(|listed| listed.night.started_ms).min().unwrap_or_default();
     let last_ms = runs.iter().map(|listed| listed.night.started_ms).max().unwrap_or_default();
     let day = |ms: i64| (ms - first_ms) as f64 / MS_PER_DAY;
@@ -58,32 +63,45 @@ pub fn history_svg(runs: &[ListedRun], figures: &[Metric]) -> String {
             Axis::new(format!("{figure}, {unit}")),
         )
         .title(figure.name());
-        let mut rings = Vec::new();
+        let (mut rings, mut of_points) = (Vec::new(), Vec::new());
         for ((campaign, method), colour) in lines.iter().zip(COLOURS.iter().cycle()) {
-            let mut nights: BTreeMap<(i64, i64), (bool, Vec<f64>)> = BTreeMap::new();
+            let mut nights: BTreeMap<(i64, i64), (bool, &str, Vec<f64>)> = BTreeMap::new();
             let of_line = |listed: &&ListedRun| {
                 listed.run.key.campaign == *campaign && listed.run.key.method == *method
             };
             for listed in runs.iter().filter(of_line) {
-                let night = nights
-                    .entry((listed.night.started_ms, listed.night.id))
-                    .or_insert((listed.night.moved, Vec::new()));
-                night.1.extend(listed.run.figures.get(figure));
+                let night = nights.entry((listed.night.started_ms, listed.night.id)).or_insert((
+                    listed.night.moved,
+                    listed.night.program.as_str(),
+                    Vec::new(),
+                ));
+                night.2.extend(listed.run.figures.get(figure));
             }
-            let mut places = Vec::new();
-            for ((started_ms, _), (moved, mut values)) in nights {
+            let (mut places, mut notes) = (Vec::new(), Vec::new());
+            for ((started_ms, _), (moved, program, mut values)) in nights {
                 let Some(value) = median(&mut values) else { continue };
                 places.push((day(started_ms), factor * value));
+                let at = crate::history_text::time(started_ms, "%Y-%m-%d %H:%M UTC");
+                notes.push(Note {
+                    text: format!(
+                        "{at}; {campaign} {method}; {figure}: {:.4} {unit}{}; {program}",
+                        factor * value,
+                        if moved { "; a figure of this night moved" } else { "" }
+                    ),
+                    link: report_of(started_ms),
+                });
                 if moved {
                     rings.push((day(started_ms), factor * value));
                 }
             }
             panel.add(Line::new(places.clone(), *colour).label(format!("{campaign} {method}")));
-            panel.add(Scatter::new(places, *colour).size_px(4.0));
+            of_points.push(Scatter::new(places, *colour).size_px(5.0).notes(notes));
         }
         if !rings.is_empty() {
             panel.add(Scatter::new(rings, MOVED).hollow().size_px(10.0).label("moved"));
         }
+        // Last: what lies above a point would keep the pointer from it.
+        of_points.into_iter().for_each(|points| panel.add(points));
         picture = picture.panel(panel);
     }
     picture.to_svg()

@@ -5,9 +5,27 @@ use mapper_chart::{
     Axis, Figure, Line, LineEnd, Marker, Panel, Rule, RuleAt, Scatter, ScatterPoint, palette,
 };
 use mapper_core::{CompressorMap, half_width_95};
+use std::path::Path;
 
 /// Every how many places the second panel draws an error bar.
 const BAR_EVERY: usize = 5;
+
+/// Names of two files for a legend: as many of their folders as it takes to tell them apart.
+pub fn told_apart(files: [&Path; 2]) -> [String; 2] {
+    let last = |path: &Path, count: usize| {
+        let parts: Vec<String> =
+            path.iter().rev().take(count).map(|part| part.to_string_lossy().into_owned()).collect();
+        parts.into_iter().rev().collect::<Vec<_>>().join("/")
+    };
+    let longest = files.map(|path| path.iter().count()).into_iter().max().unwrap_or(1).max(1);
+    let names = (1..=longest).map(|count| files.map(|path| last(path, count)));
+    let [first, second] = names
+        .into_iter()
+        .find(|[first, second]| first != second)
+        .unwrap_or_else(|| files.map(|path| path.display().to_string()));
+    // One file against itself has one name.
+    if first == second { [first, format!("{second} again")] } else { [first, second] }
+}
 
 /// Points of both maps with the places compared, and the difference of efficiency with its 95 % interval.
 pub fn map_comparison_figure(
@@ -97,4 +115,19 @@ fn eta_panel(comparison: &MapComparison) -> Panel {
         panel.add(Scatter::new(points, colour).size_px(5.0).label(&label));
     }
     panel
+}
+
+#[cfg(test)]
+mod tests {
+    use super::told_apart;
+    use std::path::Path;
+
+    #[test]
+    fn a_legend_tells_two_files_apart() {
+        let names = |a: &str, b: &str| told_apart([Path::new(a), Path::new(b)]);
+        assert_eq!(names("runs/a/map.json", "runs/b/map.json"), ["a/map.json", "b/map.json"]);
+        assert_eq!(names("a/x.csv", "b/y.csv"), ["x.csv", "y.csv"]);
+        assert_eq!(names("map.json", "b/map.json"), ["map.json", "b/map.json"]);
+        assert_eq!(names("a/map.json", "a/map.json"), ["a/map.json", "a/map.json again"]);
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::program::PROGRAM;
 use mapper_campaign::Campaign;
-use mapper_core::Plan;
+use mapper_core::{Plan, RigDescription};
 use std::collections::BTreeMap;
 
 /// What a recording says of its run.
@@ -27,4 +27,10 @@ pub(crate) fn metadata(campaign: &Campaign, plan: &Plan) -> BTreeMap<String, Str
     ];
     let sometimes = sometimes.into_iter().filter_map(|(key, value)| Some((key, value?)));
     always.into_iter().chain(sometimes).map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+/// Epoch time of run time 0, ns, of a run that was started at `started_ns`; 0 where the rig's time is simulated, so that equal
+/// runs have equal bytes.
+pub fn start_time_ns(rig: &RigDescription, started_ns: u64) -> u64 {
+    if rig.simulated_time { 0 } else { started_ns }
 }

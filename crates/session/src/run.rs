@@ -441,7 +441,7 @@ impl PreparedRun<'_> {
             library: PROGRAM.to_owned(),
             profile: String::new(),
             // Simulated time starts at 0, so that equal seeds give equal bytes.
-            start_time_ns: if self.rig().simulated_time { 0 } else { self.request.started_ns },
+            start_time_ns: crate::start_time_ns(&self.rig(), self.request.started_ns),
             metadata: metadata(self.request.campaign, &self.plan),
             plan_json: Some(plan_json.into_bytes()),
             campaign_yaml: Some(self.request.campaign_text.as_bytes().to_vec()),

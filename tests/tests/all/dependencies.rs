@@ -52,7 +52,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-studies",   &["blind", "campaign", "core", "fleet", "history", "record", "session"]),
     // What a terminal, a pipe or another program sees; what a browser sees while a run goes on.
     ("mapper-terminal",  &["core", "campaign", "assemble", "identify", "observe", "report", "session"]),
-    ("mapper-live",      &["core", "campaign", "page", "report", "session"]),
+    ("mapper-live",      &["core", "campaign", "page", "record", "report", "session"]),
     // The program names the plug-ins; nothing sees the program.
     ("mapper-cli",       &["core", "physics", "campaign", "conformance", "host", "planner", "record", "drift", "gap", "discover", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "terminal", "live", "backends", "blind", "effects", "formats", "fleet", "studies"]),
     // Drivers are programs of their own: what they share, and whatever each needs for its rig.

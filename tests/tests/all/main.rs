@@ -40,5 +40,6 @@ mod stopped;
 mod surge;
 mod terminal;
 mod together;
+mod tour;
 mod transient;
 mod zero;

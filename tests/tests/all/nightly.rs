@@ -82,7 +82,13 @@ fn nights_are_quiet_until_the_model_changes_and_then_say_what_moved() {
     let svg = folder.join("trend.svg");
     let listed = history(&["--figure", "eta_mean", "--svg", svg.to_str().unwrap()]);
     assert!(listed.stdout.contains("eta_mean %") && listed.stdout.contains("accepted"), "{}", listed.stdout);
-    assert!(std::fs::read_to_string(svg).unwrap().starts_with("<svg"));
+    let drawn = std::fs::read_to_string(svg).unwrap();
+    assert!(drawn.starts_with("<svg"));
+    // The pointer says night and value, a click opens what that night said.
+    let link = drawn.split("<a href=\"").nth(1).unwrap().split('"').next().unwrap();
+    assert!(drawn.contains("; eta_mean: ") && link.starts_with("history.nights/"), "{link}");
+    let report = std::fs::read_to_string(folder.join(link)).unwrap();
+    assert!(report.contains("The first night") && report.contains("nightly_a"), "{report}");
 }
 
 /// 0.2 points of 70 %: truth moves as well, so that no error against it shows anything.

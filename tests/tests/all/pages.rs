@@ -64,6 +64,15 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     let run = only_run(&campaign.runs());
     let arguments = ["report".as_ref(), run.as_os_str(), "--gap".as_ref(), campaign.path.as_os_str()];
     mapper(arguments.into_iter().chain(["-o".as_ref(), whole.as_os_str()])).exits(0);
+    if option_env!("MAPPER_TEST_PYTHON").is_some() {
+        let pictures = scratch();
+        let seen =
+            python("browse_report.py", [chromium.as_ref(), whole.as_os_str(), pictures.path().as_os_str()]);
+        for quiet in ["requests", "said", "serious"] {
+            assert_eq!(seen[quiet], serde_json::json!([]), "{quiet}");
+        }
+        assert_eq!(seen["heads_without_sorting"], 0, "the tables of the gap are sorted too");
+    }
     let text = std::fs::read_to_string(whole).unwrap();
     let section = text.split("id=\"gap\"").nth(1).unwrap();
     assert!(section.contains("(stem_conduction) explains the gap") && section.matches("<svg").count() == 2);
@@ -150,6 +159,10 @@ fn the_page_of_a_run_is_read_as_people_do() {
     let column = |name: &str| -> Vec<f64> {
         seen[name].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
     };
+    let all_right = |pair: &serde_json::Value| *pair == serde_json::json!([true, true]);
+    assert!(seen["copied"].as_array().unwrap().iter().all(all_right), "{}", seen["copied"]);
+    assert!(seen["tables"].as_u64().unwrap() >= 6);
+    assert_eq!(seen["heads_without_sorting"], 0, "every table is sorted by its heads");
     assert!(column("sorted_up").is_sorted() && column("sorted_down").iter().rev().is_sorted());
     // The print is a PDF.
     assert!(std::fs::read(pictures.path().join("report.pdf")).unwrap().starts_with(b"%PDF"));
@@ -195,6 +208,7 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
     for asked in ["the step is held", "the step goes on", "the run stops at the end of the step"] {
         assert!(recorded.contains(&format!("operator, on the live page: {asked}")), "{recorded}");
     }
+    assert!(seen["contours"].as_u64().unwrap() > 0, "the map has contours while it fills up");
     assert!(seen["run"]["points"].as_u64().unwrap() >= 4, "{}", seen["run"]["points"]);
     assert!(
         seen["connection"].as_str().unwrap().contains("Stopped by the operator"),
@@ -222,4 +236,124 @@ fn another_run_is_drawn_beside_the_first_and_nothing_is_overwritten() {
         |page: &str| page.split("\"points\":").nth(1).unwrap().split("\"map\":").next().unwrap().to_owned();
     assert_eq!(points(&text), points(&std::fs::read_to_string(run.join("report.html")).unwrap()));
     assert!(made().exits(1).stderr.contains("both.html"), "an existing file is not replaced");
+}
+
+#[test]
+#[cfg_attr(
+    not(all(with_chromium, with_python)),
+    ignore = "needs Chromium and Python: run `cargo xtask test`"
+)]
+fn a_run_is_looked_at_over_tls_from_another_address() {
+    let Some(chromium) = option_env!("MAPPER_TEST_CHROMIUM") else {
+        panic!("needs Chromium: run `cargo xtask test`")
+    };
+    let campaign = CampaignFile::shipped_with(NINE_POINTS);
+    let (folder, runs) = (scratch(), campaign.runs());
+    let run = mapper_command([
+        "run".as_ref(),
+        campaign.path.as_os_str(),
+        "--out".as_ref(),
+        runs.as_os_str(),
+        "--pace".as_ref(),
+        "60".as_ref(),
+    ]);
+    let command = std::iter::once(run.get_program()).chain(run.get_args());
+    let seen = python(
+        "browse_live_tls.py",
+        [chromium.as_ref(), folder.path().as_os_str()].into_iter().chain(command),
+    );
+    for (what, answer) in seen["refused"].as_object().unwrap() {
+        let (code, said) = (answer[0].as_i64().unwrap(), answer[1].as_str().unwrap());
+        assert!(
+            code != 0 && (said.contains(".pem") || said.contains(".key") || said.contains("--live")),
+            "{what}: {said}"
+        );
+    }
+    // In clear it is said loudly, and once; over TLS there is nothing to say.
+    let clear = seen["said_in_clear"].as_str().unwrap();
+    assert_eq!(clear.matches("WITHOUT encryption").count(), 1, "{clear}");
+    assert!(!seen["said_encrypted"].as_str().unwrap().contains("WITHOUT"), "{}", seen["said_encrypted"]);
+    assert_eq!(seen["scheme"], "https");
+    assert_eq!(seen["page"], serde_json::json!([200, true, true]));
+    assert_eq!(seen["without_token"], 401);
+    assert_eq!(seen["with_token"], serde_json::json!([200, "data: {\"campaign"]));
+    assert_eq!(seen["page_in_clear_presses"], 403, "a page in clear is not the server's own");
+    // Who says nothing gets an alert (0x15) when its time is over.
+    assert_eq!(
+        [&seen["in_clear"], &seen["silent"], &seen["unknown"]],
+        [&serde_json::json!(false), &serde_json::json!("\u{15}"), &serde_json::json!("refused")]
+    );
+    assert!(seen["connection"].as_str().unwrap().contains("Stopped by the operator"));
+    assert_eq!(seen["exit"], 130);
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python: run `cargo xtask test`")]
+fn a_viewer_sees_what_is_recorded_and_a_slow_one_slows_nothing() {
+    // The stream is behind a feature that `cargo xtask test` builds with.
+    if !mapper(["run", "--help"]).exits(0).stdout.contains("--foxglove") {
+        return;
+    }
+    let campaign = CampaignFile::shipped_with(NINE_POINTS);
+    let runs = campaign.runs();
+    let run = mapper_command([
+        "run".as_ref(),
+        campaign.path.as_os_str(),
+        "--out".as_ref(),
+        runs.as_os_str(),
+        "--pace".as_ref(),
+        "200".as_ref(),
+    ]);
+    let seen = python("view_stream.py", std::iter::once(run.get_program()).chain(run.get_args()));
+    assert_eq!(seen["exit"], 0);
+    assert_eq!(seen["protocol"], "foxglove.sdk.v1");
+    assert_eq!(seen["another_protocol"], 400);
+    assert_eq!(seen["server"], serde_json::json!({"op": "serverInfo", "name": "mapper", "capabilities": []}));
+    let topics = seen["topics"].as_object().unwrap();
+    for topic in ["/rig/compressor", "/rig/turbine", "/rig/ambient", "/rig/command", "/step"] {
+        let seen = &topics[topic];
+        assert_eq!(seen["encoding"], serde_json::json!(["json", "jsonschema"]), "{topic}");
+        assert_eq!(
+            [&seen["as_recorded"], &seen["values_as_recorded"], &seen["described"]],
+            [true; 3],
+            "{topic}: {seen}"
+        );
+        assert!(seen["messages"].as_u64().unwrap() > 5, "{topic}: {seen}");
+    }
+    let point = &topics["/point"];
+    assert_eq!(point["units"]["h_w_m2k"], "W/(m2 K)");
+    assert!(point["messages"].as_u64().unwrap() >= 9, "{point}");
+    assert_eq!(topics["/rig/compressor"]["units"]["outlet_temperature_k"], "K");
+    // What the layout shows is there, live and in the recording.
+    assert_eq!(seen["layout"]["unknown"], serde_json::json!([]));
+    assert_eq!(seen["layout"]["panels"], true);
+    assert!(seen["layout"]["paths"].as_u64().unwrap() > 15);
+    for (topic, recorded) in seen["recorded"].as_object().unwrap() {
+        assert_eq!(recorded["encoding"], serde_json::json!(["json", "jsonschema"]), "{topic}");
+        for (field, unit) in recorded["units"].as_object().unwrap() {
+            assert!(unit.is_string(), "{topic}.{field} has no unit");
+        }
+    }
+}
+
+/// The scripts in the pages are those that their makers publish, byte for byte.
+#[test]
+#[cfg_attr(not(with_npm), ignore = "needs npm and its registry: run `cargo xtask test`")]
+fn the_scripts_are_those_of_the_npm_packages() {
+    let scratch = scratch();
+    for (package, packed, script) in [
+        ("d3@7.9.2", "d3-7.9.2.tgz", "d3.min.js"),
+        ("@observablehq/plot@0.6.17", "observablehq-plot-0.6.17.tgz", "plot.umd.min.js"),
+    ] {
+        let run = |program: &str, arguments: &[&str]| {
+            let done = Command::new(program).args(arguments).current_dir(scratch.path()).output().unwrap();
+            assert!(done.status.success(), "{package}: {}", String::from_utf8_lossy(&done.stderr));
+            done.stdout
+        };
+        run("npm", &["pack", "--silent", package]);
+        let published =
+            run("tar", &["--extract", "--to-stdout", "--file", packed, &format!("package/dist/{script}")]);
+        let ours = std::fs::read(repository().join("crates/page/assets").join(script)).unwrap();
+        assert!(published == ours, "{script} is not that of {package}");
+    }
 }

@@ -6,7 +6,7 @@ use crate::output::Replace;
 use clap::Args;
 use mapper_history::{Filter, Metric};
 use mapper_report::{groups_text, history_svg, runs_text};
-use mapper_session::SessionError;
+use mapper_session::{SessionError, night_report_link};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -77,7 +77,8 @@ impl History {
         let runs = history.runs(&filter).map_err(SessionError::from)?;
         let figures: Vec<Metric> = if self.figure.is_empty() { SHOWN.to_vec() } else { self.figure.clone() };
         if let Some(path) = &self.svg {
-            self.replace.write(path, history_svg(&runs, &figures).as_bytes())?;
+            let report_of = |started_ms| night_report_link(path, &self.db, started_ms);
+            self.replace.write(path, history_svg(&runs, &figures, report_of).as_bytes())?;
         }
         if self.json {
             let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();

@@ -7,7 +7,9 @@ use clap::Args;
 use mapper_campaign::load_nightly;
 use mapper_history::{History, Night};
 use mapper_report::night_text;
-use mapper_session::{ErrorKind, PROGRAM, PreparedNight, Session, SessionError};
+use mapper_session::{
+    ErrorKind, PROGRAM, PreparedNight, Session, SessionError, keep_night_report, night_report_path,
+};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -68,9 +70,11 @@ impl Nightly {
             runs,
         };
         let comparison = history.append(&night, nightly.nights).map_err(SessionError::from)?;
+        keep_night_report(&path, &night, &comparison)?;
         if self.json {
             output::print_json(&json!({
                 "history": path,
+                "report": night_report_path(&path, night.started_ms),
                 "night": night,
                 "comparison": comparison,
                 "quiet": comparison.is_quiet(),

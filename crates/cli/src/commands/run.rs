@@ -8,16 +8,16 @@ use crate::{interrupt, manner, output, registry, rig_states};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
-use mapper_live::{Live, LiveRun};
+use mapper_live::{Asked, LiveError, LiveRun, Onlookers, TlsFiles};
 use mapper_report::plan_text;
 use mapper_session::{
     BrokenOff, Ended, Operator, PreparedRun, RunOutcome, RunRequest, Session, SessionError, run_directory,
-    soak_s,
+    soak_s, start_time_ns,
 };
 use mapper_terminal::results_text;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// Run a campaign: plan, drive the rig, record, identify, assemble the map, report
 #[derive(Debug, Args)]
@@ -43,6 +43,16 @@ pub struct Run {
     /// Serve a live page with buttons to hold and to stop; from other machines by the token that is printed
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:7373")]
     pub live: Option<String>,
+    /// Serve it over TLS with this certificate (PEM)
+    #[arg(long, value_name = "FILE", requires_all = ["live", "live_key"], hide_short_help = true)]
+    pub live_cert: Option<PathBuf>,
+    /// Private key of that certificate (PEM)
+    #[arg(long, value_name = "FILE", requires = "live_cert", hide_short_help = true)]
+    pub live_key: Option<PathBuf>,
+    /// Send readings, steps and points to Foxglove or Lichtblick on this machine
+    #[cfg(feature = "foxglove")]
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:8765")]
+    pub foxglove: Option<String>,
     #[command(flatten)]
     pub shown: ShownArguments,
     /// End with one JSON object on standard output
@@ -68,18 +78,16 @@ impl Run {
         let (registry, stop, progress) = (registry::registry(), interrupt::run_stop()?, manner::progress());
         progress.begin("planning");
         let states = rig_states::directory(None);
-        let mut live = self.live.as_deref().map(Live::open).transpose().map_err(Failure::of_live)?;
-        let told: OnceLock<&Live> = OnceLock::new();
+        let started_ns = u64::try_from(started.as_nanosecond()).unwrap_or(0);
+        let onlookers = self.onlookers().map_err(Failure::of_live)?;
         let on_event = |event: &_| {
             progress.show(event);
-            if let Some(live) = told.get() {
-                live.show(event);
-            }
+            onlookers.show(event);
         };
         let operator = Arc::new(Operator::default());
         let session = Session {
-            operator: live.is_some().then_some(&*operator),
-            estimates: live.is_some(),
+            operator: onlookers.have_buttons().then_some(&*operator),
+            estimates: onlookers.are_there(),
             registry: &registry,
             on_event: &on_event,
             stop: &stop.now,
@@ -90,7 +98,7 @@ impl Run {
             campaign_text: &campaign_text,
             plan: self.plan.as_deref(),
             parent: &parent,
-            started_ns: u64::try_from(started.as_nanosecond()).unwrap_or(0),
+            started_ns,
             started_name: &started.strftime("%Y%m%dT%H%M%SZ").to_string(),
             rig_states: Some(&states),
             resume,
@@ -101,18 +109,18 @@ impl Run {
             return self.dry(&campaign, &prepared, &parent);
         }
         let pace = self.pace.or((!prepared.rig().simulated_time).then_some(1.0));
-        if let Some(live) = &mut live {
-            live.begin(&LiveRun {
-                campaign: &campaign,
-                plan: prepared.plan(),
-                pace,
-                operator: operator.clone(),
-                after_step: stop.after_step.clone(),
-                now: stop.now.clone(),
-            })
-            .map_err(Failure::of_live)?;
-            output::warn(&format!("live page: {}\n", live.url()));
-            let _ = told.set(live);
+        let looked_at = LiveRun {
+            campaign: &campaign,
+            plan: prepared.plan(),
+            pace,
+            channels: &prepared.rig().channels,
+            start_time_ns: start_time_ns(&prepared.rig(), started_ns),
+            operator: operator.clone(),
+            after_step: stop.after_step.clone(),
+            now: stop.now.clone(),
+        };
+        for line in onlookers.begin(&looked_at).map_err(Failure::of_live)? {
+            output::warn(&format!("{line}\n"));
         }
         let outcome = match pace {
             Some(pace) => {
@@ -121,13 +129,18 @@ impl Run {
             None => prepared.run(&session)?,
         };
         progress.clear();
-        if let Some(live) = told.get() {
-            live.end(
-                &outcome.sentence(),
-                outcome.results.as_ref().ok().map(|results| results.page.as_path()),
-            );
-        }
+        onlookers.end(&outcome.sentence(), outcome.results.as_ref().ok().map(|results| results.page.as_path()));
         self.tell(&campaign, outcome)
+    }
+
+    fn onlookers(&self) -> Result<Onlookers<'_>, LiveError> {
+        let tls = self.live_cert.clone().zip(self.live_key.clone());
+        Onlookers::open(Asked {
+            page: self.live.as_deref(),
+            tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
+            #[cfg(feature = "foxglove")]
+            viewers: self.foxglove.as_deref(),
+        })
     }
 
     fn tell(&self, campaign: &Campaign, outcome: RunOutcome) -> Result<(), Failure> {

@@ -29,8 +29,8 @@ pub(crate) fn head(page: &RunPage<'_>) -> Markup {
             }
             nav aria-label="Sections" {
                 @for (to, name) in [("map", "Map"), ("step", "A point's transient"), ("points", "Points"), ("plan", "Plan as flown"),
-                    ("notes", "Notes"), ("provenance", "Provenance")] {
-                    a href=(format!("#{to}")) { (name) }
+                    ("gap", "Gap"), ("notes", "Notes"), ("provenance", "Provenance")] {
+                    @if to != "gap" || page.gap.is_some() { a href=(format!("#{to}")) { (name) } }
                 }
             }
         }

@@ -41,12 +41,12 @@ pub(crate) fn live() -> Markup {
             }
             section aria-labelledby="map-head" {
                 h2 #map-head { "Map so far" }
-                p { "Rings are where points are expected. Each point is identified by itself as soon as its step has ended, before the zero is \
+                p { "Rings are where points are expected; contours stand between lines that have two points each. Each point is identified by itself as soon as its step has ended, before the zero is \
                      subtracted; at the end all are identified together, and the intervals shrink." }
                 fieldset.layers.screen {
                     legend { "Show" }
-                    @for (name, words) in [("intervals", "95 % intervals"), ("repeats", "repeats")] {
-                        label { input type="checkbox" name="layer" value=(name) checked[name == "intervals"]; " " (words) }
+                    @for (name, words) in [("lines", "speed lines"), ("contours", "efficiency contours"), ("intervals", "95 % intervals"), ("repeats", "repeats")] {
+                        label { input type="checkbox" name="layer" value=(name) checked[name != "repeats"]; " " (words) }
                     }
                     button type="button" id="whole" { "whole map" }
                 }

@@ -29,7 +29,7 @@ pub(crate) fn map(page: &RunPage<'_>) -> Markup {
                 button type="button" id="whole" { "whole map" }
             }
             div.plots {
-                figure { div #map-plot {} figcaption { "Pressure ratio over corrected flow. Ctrl and the wheel zoom, dragging moves; a click on a point shows its transient." } }
+                figure { div #map-plot {} figcaption { "Pressure ratio over corrected flow." span.screen { " Ctrl and the wheel zoom, dragging moves; a click on a point shows its transient." } } }
                 figure { div #eta-plot {} figcaption { "Efficiency over corrected flow, with 95 % intervals." } }
             }
             noscript { p { "The drawings need the page's own script; the same map stands beside this file as map.svg." } }

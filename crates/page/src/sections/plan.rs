@@ -36,7 +36,7 @@ pub(crate) fn plan(page: &RunPage<'_>, display: &Display) -> Markup {
                 @if missing > 0 { "; " (missing) " of " (plan.steps.len()) " steps were not flown" } "."
                 " The thermal gradient of a step, dTc, is the change of the housing temperature within the window that was used; sigma is one standard error."
             }
-            figure { div #plan-plot {} figcaption { "Jumps in their order; the first are darkest." } }
+            figure { div #plan-plot {} figcaption { "Jumps in their order; the first stand out most. Numbers are those of the steps." } }
             (data_table("Steps", &heads, &rows))
         }
     }

@@ -117,7 +117,7 @@ fn class_of(verdict: Verdict) -> &'static str {
 }
 
 /// The mean of a channel over the last seconds of a step; `None` where nothing was read.
-fn at_end(recording: &Recording, marker: &StepMarker, channel: Channel) -> Option<f64> {
+pub(crate) fn at_end(recording: &Recording, marker: &StepMarker, channel: Channel) -> Option<f64> {
     let start_s = (marker.end_s - END_S).max(marker.start_s);
     let values = recording.series.get(&channel)?.slice(start_s, marker.end_s).1;
     mean(values).filter(|mean| mean.is_finite())

@@ -2,7 +2,7 @@
 
 /// What a button asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asked {
+pub(crate) enum Pressed {
     /// Stay at this step.
     Hold,
     /// Let it end.

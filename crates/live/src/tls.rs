@@ -1,0 +1,148 @@
+//! The page over TLS, with a certificate that the operator has.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Files of a server, PEM.
+#[derive(Debug, Clone)]
+pub struct TlsFiles {
+    /// The certificate, and those between it and one that browsers know.
+    pub certificate: PathBuf,
+    /// Its private key.
+    pub key: PathBuf,
+}
+
+/// Why a page cannot be served over TLS.
+#[derive(Debug, thiserror::Error)]
+pub enum TlsError {
+    /// A file cannot be read, or is none.
+    #[error("{}: {why}; it has to be a {what} in PEM", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What it has to hold.
+        what: &'static str,
+        /// What is wrong.
+        why: String,
+    },
+    /// Certificate and key do not fit.
+    #[error("{} and {} cannot be used together: {why}", files.certificate.display(), files.key.display())]
+    Pair {
+        /// The files.
+        files: TlsFiles,
+        /// What is wrong.
+        why: String,
+    },
+    /// The program was built without.
+    #[error("this program was built without TLS; build it with `--features tls`, or use a tunnel (ssh -L)")]
+    NotBuilt,
+}
+
+/// A connection whose requests have to arrive by a certain time: one that drips keeps its slot no longer.
+pub(crate) struct Punctual {
+    pub(crate) stream: TcpStream,
+    pub(crate) until: Instant,
+}
+
+impl Read for Punctual {
+    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        if Instant::now() > self.until {
+            return Err(std::io::ErrorKind::TimedOut.into());
+        }
+        self.stream.read(into)
+    }
+}
+
+impl Write for Punctual {
+    fn write(&mut self, from: &[u8]) -> std::io::Result<usize> {
+        self.stream.write(from)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+#[cfg(feature = "tls")]
+pub(crate) use with::{Tls, read};
+#[cfg(not(feature = "tls"))]
+pub(crate) use without::{Tls, read};
+
+#[cfg(feature = "tls")]
+mod with {
+    use super::{Punctual, TlsError, TlsFiles};
+    use rustls::crypto::ring;
+    use rustls::pki_types::pem::PemObject;
+    use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+    use rustls::{ServerConfig, ServerConnection, StreamOwned};
+    use std::io::Write;
+    use std::sync::Arc;
+
+    /// What a server says who it is with.
+    #[derive(Clone)]
+    pub(crate) struct Tls(Arc<ServerConfig>);
+
+    /// Reads both files and holds them against each other.
+    pub(crate) fn read(files: &TlsFiles) -> Result<Tls, TlsError> {
+        let file =
+            |path: &std::path::Path, what, why: String| TlsError::File { path: path.to_owned(), what, why };
+        let certificate = |why| file(&files.certificate, "certificate", why);
+        let pair = |source: rustls::Error| TlsError::Pair { files: files.clone(), why: source.to_string() };
+        let chain: Vec<CertificateDer<'static>> = CertificateDer::pem_file_iter(&files.certificate)
+            .and_then(Iterator::collect)
+            .map_err(|source| certificate(source.to_string()))?;
+        if chain.is_empty() {
+            return Err(certificate("no certificate in it".to_owned()));
+        }
+        let key = PrivateKeyDer::from_pem_file(&files.key)
+            .map_err(|source| file(&files.key, "private key", source.to_string()))?;
+        let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
+            .with_safe_default_protocol_versions()
+            .map_err(pair)?
+            .with_no_client_auth()
+            .with_single_cert(chain, key)
+            .map_err(pair)?;
+        Ok(Tls(Arc::new(config)))
+    }
+
+    impl Tls {
+        /// Does what is to be done on a connection over TLS, and ends it so that the other side knows that nothing was cut off.
+        pub(crate) fn over(
+            &self,
+            stream: Punctual,
+            answer: impl FnOnce(&mut StreamOwned<ServerConnection, Punctual>) -> std::io::Result<()>,
+        ) -> std::io::Result<()> {
+            let connection = ServerConnection::new(self.0.clone()).map_err(std::io::Error::other)?;
+            let mut stream = StreamOwned::new(connection, stream);
+            let answered = answer(&mut stream);
+            stream.conn.send_close_notify();
+            stream.flush()?;
+            answered
+        }
+    }
+}
+
+#[cfg(not(feature = "tls"))]
+mod without {
+    use super::{Punctual, TlsError, TlsFiles};
+
+    /// There is none.
+    #[derive(Clone)]
+    pub(crate) enum Tls {}
+
+    pub(crate) fn read(_files: &TlsFiles) -> Result<Tls, TlsError> {
+        Err(TlsError::NotBuilt)
+    }
+
+    impl Tls {
+        pub(crate) fn over(
+            &self,
+            _stream: Punctual,
+            _answer: impl FnOnce(&mut Punctual) -> std::io::Result<()>,
+        ) -> std::io::Result<()> {
+            match *self {}
+        }
+    }
+}

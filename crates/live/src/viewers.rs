@@ -1,0 +1,196 @@
+//! The same topics that the recording has, while it is made, for viewers that speak Foxglove's WebSocket protocol.
+//!
+//! Each viewer has a queue of its own in the library, which drops the oldest message where the viewer is slow: telling waits
+//! for nobody. Nothing can be written: the server offers no service, no parameter and no topic of the viewer's own.
+
+use foxglove::{
+    ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema, WebSocketServer,
+};
+use mapper_core::{Channel, Group, IdentifiedPoint};
+use mapper_record::{StepPhase, Topic, event_message, readings_message, step_message};
+use mapper_session::SessionEvent;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+/// Messages that wait for one viewer: three minutes of the rig's time.
+const WAITING_MAX: usize = 1024;
+
+/// Topic of points as they are identified, each by itself.
+const POINT_TOPIC: &str = "/point";
+
+/// Fields of a point with their units and what they are.
+const POINT_FIELDS: [(&str, &str, &str); 9] = [
+    ("step", "1", "number of the step, from 1"),
+    ("speed_corrected_rpm", "rpm", "corrected shaft speed"),
+    ("flow_corrected_kg_s", "kg/s", "corrected compressor mass flow"),
+    ("pressure_ratio", "1", "total pressure ratio P2/P1"),
+    ("eta", "1", "isentropic efficiency, total to total"),
+    ("eta_low", "1", "lower end of its 95 % interval"),
+    ("eta_high", "1", "upper end of its 95 % interval"),
+    ("h_w_m2k", "W/(m2 K)", "heat-transfer coefficient between gas and compressor housing"),
+    ("residual_rms_k", "K", "what the fit leaves of T2"),
+];
+
+/// Why there is no stream for viewers.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewersError {
+    /// It is not an address of this machine.
+    #[error(
+        "`{text}` is not an address of this machine, such as 127.0.0.1:8765: viewers know no token, so that others get there by a \
+         tunnel (`ssh -L 8765:127.0.0.1:8765 STAND`)"
+    )]
+    Address {
+        /// What was given.
+        text: String,
+    },
+    /// The library cannot serve.
+    #[error(
+        "viewers cannot be served at {address}: {source}; choose another address with `--foxglove=ADDRESS`"
+    )]
+    Serve {
+        /// The address.
+        address: SocketAddr,
+        /// Why.
+        source: FoxgloveError,
+    },
+}
+
+/// A stream of what is read, for viewers.
+pub struct Viewers {
+    address: SocketAddr,
+    start_time_ns: u64,
+    topics: BTreeMap<&'static str, Arc<RawChannel>>,
+    /// Topics are closed with it.
+    _context: Arc<Context>,
+}
+
+impl Viewers {
+    /// Begins to serve at an address of this machine, e.g. `127.0.0.1:8765`, readings of these channels. `start_time_ns`: epoch
+    /// time of run time 0, as in the recording.
+    ///
+    /// # Errors
+    /// [`ViewersError`] where the address is none of this machine's, or is taken.
+    pub fn open(text: &str, start_time_ns: u64, channels: &[Channel]) -> Result<Viewers, ViewersError> {
+        let bad = || ViewersError::Address { text: text.to_owned() };
+        let mut address: SocketAddr = text.parse().map_err(|_| bad())?;
+        if !address.ip().is_loopback() {
+            return Err(bad());
+        }
+        let context = Context::new();
+        // All topics are there before anybody looks: the library tells a viewer of a new one a moment before it takes
+        // a subscription to it, and one that is quicker goes without.
+        let measured = |group: &Group| channels.iter().any(|channel| channel.info().group == *group);
+        let groups = Group::ALL.into_iter().filter(measured);
+        let topics = groups
+            .map(|group| Topic::of_group(group, channels.iter().copied()))
+            .chain([Topic::of_steps(), Topic::of_events(), point_topic()])
+            .filter_map(|topic| Some((topic.name, defined(&context, topic)?)))
+            .collect();
+        let server = WebSocketServer::new()
+            .name("mapper")
+            .bind(address.ip().to_string(), address.port())
+            .message_backlog_size(WAITING_MAX)
+            .context(&context)
+            .start_blocking()
+            .map_err(|source| ViewersError::Serve { address, source })?;
+        // The server lives as long as the process.
+        address.set_port(server.port());
+        Ok(Viewers { address, start_time_ns, topics, _context: context })
+    }
+
+    /// What a viewer is told to open.
+    pub fn url(&self) -> String {
+        format!("ws://{}", self.address)
+    }
+
+    /// Passes on what the session tells. Never waits for a viewer.
+    pub fn show(&self, event: &SessionEvent) {
+        match event {
+            SessionEvent::Readings { t_s, values } => {
+                for group in Group::ALL {
+                    self.say(group.topic(), *t_s, &readings_message(group, values));
+                }
+            }
+            SessionEvent::StepStarted(marker) => {
+                let (t_s, message) = step_message(marker, StepPhase::Start);
+                self.say("/step", t_s, &message);
+            }
+            SessionEvent::StepEnded(marker) => {
+                let (t_s, message) = step_message(marker, StepPhase::End);
+                self.say("/step", t_s, &message);
+            }
+            SessionEvent::Told(event) => {
+                self.say("/event", event.t_s, &event_message(event));
+            }
+            SessionEvent::PointEstimated(point) => {
+                let t_s = point.window.map_or(0.0, |window| window.end_s);
+                self.say(POINT_TOPIC, t_s, &point_message(point));
+            }
+            SessionEvent::RunStarted { .. }
+            | SessionEvent::RigTime { .. }
+            | SessionEvent::PointIdentified(_)
+            | SessionEvent::Progress { .. }
+            | SessionEvent::PiecesDone { .. } => {}
+        }
+    }
+
+    fn say(&self, topic: &str, t_s: f64, message: &Value) {
+        let Some(channel) = self.topics.get(topic) else { return };
+        // A run lasts for days at most: its nanoseconds fit.
+        let log_time = self.start_time_ns.saturating_add((t_s.max(0.0) * 1e9).round() as u64);
+        channel.log_with_meta(message.to_string().as_bytes(), PartialMetadata::with_log_time(log_time));
+    }
+}
+
+/// A topic as viewers know it; `None` where the library refuses it.
+fn defined(context: &Arc<Context>, topic: Topic) -> Option<Arc<RawChannel>> {
+    let name = topic.name.trim_start_matches('/').replace('/', ".");
+    ChannelBuilder::new(topic.name)
+        .message_encoding("json")
+        .schema(Schema::new(name, "jsonschema", topic.schema))
+        .metadata(topic.units)
+        .context(context)
+        .build_raw()
+        .ok()
+}
+
+fn point_topic() -> Topic {
+    let property = |(name, unit, what): (&str, &str, &str)| {
+        (name.to_owned(), json!({"type": "number", "description": what, "unit": unit}))
+    };
+    let properties: serde_json::Map<String, Value> = POINT_FIELDS.into_iter().map(property).collect();
+    let schema = json!({"title": "point", "type": "object", "properties": properties});
+    let units = POINT_FIELDS.into_iter().map(|(name, unit, _)| (name.to_owned(), unit.to_owned())).collect();
+    Topic { name: POINT_TOPIC, schema: schema.to_string().into_bytes(), units }
+}
+
+fn point_message(point: &IdentifiedPoint) -> Value {
+    json!({
+        "step": point.step + 1,
+        "speed_corrected_rpm": point.speed_corrected_rpm,
+        "flow_corrected_kg_s": point.flow_corrected_kg_s,
+        "pressure_ratio": point.pressure_ratio,
+        "eta": point.eta,
+        "eta_low": point.eta_low,
+        "eta_high": point.eta_high,
+        "h_w_m2k": point.h_w_m2k,
+        "residual_rms_k": point.residual_rms_k,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_this_machine_is_served() {
+        for text in ["0.0.0.0:0", "192.0.2.7:8765", "nonsense", "[::]:0"] {
+            let error = Viewers::open(text, 0, &[]).err().unwrap();
+            assert!(error.to_string().contains("tunnel"), "{error}");
+        }
+        let viewers = Viewers::open("127.0.0.1:0", 0, &[]).unwrap();
+        assert!(viewers.url().starts_with("ws://127.0.0.1:") && !viewers.url().ends_with(":0"));
+    }
+}

@@ -1,0 +1,102 @@
+//! `docs/tour.md`: every command in it, in its order.
+
+use mapper_tests::{CampaignFile, mapper, mapper_in, only_run, python, repository, scratch};
+use std::fs;
+use std::path::Path;
+
+/// Commands of the tour: lines of its code blocks that call the program, without what stands behind `#`.
+fn commands(page: &str) -> Vec<String> {
+    let mut inside = false;
+    let mut commands = Vec::new();
+    for line in page.lines() {
+        if line.starts_with("```") {
+            inside = !inside;
+        } else if let Some(command) = line.strip_prefix("mapper ").filter(|_| inside) {
+            // A comment stands behind spaces; `#` alone may be part of a name.
+            commands.push(command.split(" #").next().unwrap().trim().to_owned());
+        }
+    }
+    commands
+}
+
+/// What the tour writes as `runs/turbo_a-...`: the latest directory of such a name.
+fn named(folder: &Path, word: &str) -> String {
+    let Some(start) = word.strip_suffix("...") else { return word.to_owned() };
+    let (parent, start) = start.rsplit_once('/').unwrap();
+    let mut found: Vec<String> = fs::read_dir(folder.join(parent))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.starts_with(start))
+        .collect();
+    found.sort();
+    format!("{parent}/{}", found.last().unwrap_or_else(|| panic!("nothing is called {word}")))
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
+        let to = to.join(entry.file_name());
+        match entry.file_type().unwrap().is_dir() {
+            true => copy(&entry.path(), &to),
+            false => drop(fs::copy(entry.path(), to).unwrap()),
+        }
+    }
+}
+
+/// A run of a few points that goes by the name of a day.
+fn run_of_a_day(folder: &Path, day: &str, seed: usize) {
+    let seed = format!("seed: {seed} ");
+    let changes = [
+        (
+            "speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]",
+            "speeds: [80 krpm, 125 krpm]",
+        ),
+        ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.4]"),
+        ("seed: 1 ", seed.as_str()),
+    ];
+    let campaign = CampaignFile::shipped_with(&changes);
+    let runs = campaign.runs();
+    mapper(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), runs.as_os_str()]).exits(0);
+    copy(&only_run(&runs), &folder.join("runs").join(day));
+}
+
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python: run `cargo xtask test`")]
+fn every_command_of_the_tour_does_what_it_says() {
+    let (scratch, root) = (scratch(), repository());
+    let folder = scratch.path();
+    for name in ["campaigns", "examples"] {
+        copy(&root.join(name), &folder.join(name));
+    }
+    // What the tour presupposes: recordings of another program, runs of three days, a campaign with an effect.
+    let gap_rig = fs::read_to_string(root.join("campaigns/gap_rig.yaml")).unwrap();
+    let lab = "    weather: wandering\n";
+    assert!(gap_rig.contains(lab));
+    let with_effect = gap_rig.replace(lab, &format!("{lab}    effects: {{stem_conduction: 5 %}}\n"));
+    fs::write(folder.join("my_gap_rig.yaml"), with_effect).unwrap();
+    mapper_in(folder, ["run", "campaigns/gap_rig.yaml", "--out", "elsewhere"]).exits(0);
+    let recording = only_run(&folder.join("elsewhere")).join("recording.mcap");
+    for name in ["rig", "monday", "tuesday"] {
+        let to = folder.join(format!("{name}.mcap"));
+        python("as_another_program.py", [recording.as_os_str(), to.as_os_str()]);
+    }
+    for (day, seed) in [("monday", 11), ("tuesday", 12), ("wednesday", 13)] {
+        run_of_a_day(folder, day, seed);
+    }
+    let commands = commands(&fs::read_to_string(root.join("docs/tour.md")).unwrap());
+    assert!(commands.len() > 12, "{commands:?}");
+    for command in commands {
+        let (words, to) =
+            command.split_once('>').map_or((command.as_str(), None), |(a, b)| (a, Some(b.trim())));
+        let words: Vec<String> = words.split_whitespace().map(|word| named(folder, word)).collect();
+        eprintln!("mapper {}", words.join(" "));
+        let finished = mapper_in(folder, &words).exits(0);
+        if let Some(to) = to {
+            fs::write(folder.join(to), &finished.stdout).unwrap();
+        }
+    }
+    // What the tour says is left is there.
+    for left in ["campaign.schema.json", "maps/rig/report.html", "maps/both/report.html", "gap.html"] {
+        assert!(folder.join(left).metadata().unwrap().len() > 1000, "{left}");
+    }
+}

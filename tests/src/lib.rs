@@ -27,6 +27,13 @@ pub fn scratch() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary directory can be made")
 }
 
+/// A directory for pictures that people look at after a test; it stays, below the target folder, until the next run of that test.
+pub fn pictures(name: &str) -> PathBuf {
+    let folder = repository().join("target/looked-at").join(name);
+    std::fs::create_dir_all(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    folder
+}
+
 /// The directory of the only run below `parent`.
 pub fn only_run(parent: &Path) -> PathBuf {
     let mut runs: Vec<PathBuf> = std::fs::read_dir(parent)

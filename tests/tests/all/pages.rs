@@ -1,6 +1,6 @@
 //! Pages that the program writes, in a browser.
 
-use mapper_tests::{CampaignFile, mapper, mapper_command, only_run, python, repository, scratch};
+use mapper_tests::{CampaignFile, mapper, mapper_command, only_run, pictures, python, repository, scratch};
 use std::process::Command;
 
 /// A rig with a probe that conducts along its stem, four points of it.
@@ -65,9 +65,9 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     let arguments = ["report".as_ref(), run.as_os_str(), "--gap".as_ref(), campaign.path.as_os_str()];
     mapper(arguments.into_iter().chain(["-o".as_ref(), whole.as_os_str()])).exits(0);
     if option_env!("MAPPER_TEST_PYTHON").is_some() {
-        let pictures = scratch();
+        let pictures = pictures("gap");
         let seen =
-            python("browse_report.py", [chromium.as_ref(), whole.as_os_str(), pictures.path().as_os_str()]);
+            python("browse_report.py", [chromium.as_ref(), whole.as_os_str(), pictures.as_os_str()]);
         for quiet in ["requests", "said", "serious"] {
             assert_eq!(seen[quiet], serde_json::json!([]), "{quiet}");
         }
@@ -127,8 +127,8 @@ fn the_page_of_a_run_is_read_as_people_do() {
     let Some(chromium) = option_env!("MAPPER_TEST_CHROMIUM") else {
         panic!("needs Chromium: run `cargo xtask test`")
     };
-    let pictures = scratch();
-    let seen = python("browse_report.py", [chromium.as_ref(), page.as_os_str(), pictures.path().as_os_str()]);
+    let pictures = pictures("report");
+    let seen = python("browse_report.py", [chromium.as_ref(), page.as_os_str(), pictures.as_os_str()]);
     // Nothing was asked of anybody, nothing was complained of, nobody is shut out.
     assert_eq!(seen["requests"], serde_json::json!([]));
     assert_eq!(seen["said"], serde_json::json!([]));
@@ -165,7 +165,7 @@ fn the_page_of_a_run_is_read_as_people_do() {
     assert_eq!(seen["heads_without_sorting"], 0, "every table is sorted by its heads");
     assert!(column("sorted_up").is_sorted() && column("sorted_down").iter().rev().is_sorted());
     // The print is a PDF.
-    assert!(std::fs::read(pictures.path().join("report.pdf")).unwrap().starts_with(b"%PDF"));
+    assert!(std::fs::read(pictures.join("report.pdf")).unwrap().starts_with(b"%PDF"));
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
         panic!("needs Chromium: run `cargo xtask test`")
     };
     let campaign = CampaignFile::shipped_with(NINE_POINTS);
-    let (pictures, runs) = (scratch(), campaign.runs());
+    let (pictures, runs) = (pictures("live"), campaign.runs());
     // Two seconds a step, however slow this machine is: long enough to press a button within one.
     let run = mapper_command([
         "run".as_ref(),
@@ -190,7 +190,7 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
     ]);
     let command = std::iter::once(run.get_program()).chain(run.get_args());
     let seen =
-        python("browse_live.py", [chromium.as_ref(), pictures.path().as_os_str()].into_iter().chain(command));
+        python("browse_live.py", [chromium.as_ref(), pictures.as_os_str()].into_iter().chain(command));
     for (what, status) in seen["refused"].as_object().unwrap() {
         assert!((403..=405).contains(&status.as_u64().unwrap()), "{what}: {status}");
     }

@@ -115,7 +115,7 @@ impl WithReaders {
         let taken = |channel: &Channel| self.sources.iter().any(|source| source.channels.contains(channel));
         let mut whole = SampleBatch { first_sequence: self.next_sequence, ..SampleBatch::default() };
         // Truth is the rig's alone.
-        whole.truth = spread_truth(&rig, &t_s);
+        whole.truth = truth_at(&rig, &t_s);
         put(&mut whole, rig, &t_s, &|channel| !taken(&channel));
         for (source, part) in self.sources.iter().zip(parts) {
             put(&mut whole, part, &t_s, &|channel| source.channels.contains(&channel));
@@ -321,7 +321,7 @@ fn spread<T: Copy>(values: &[T], own_s: &[f64], t_s: &[f64], absent: T) -> Vec<T
         .collect()
 }
 
-fn spread_truth(rig: &SampleBatch, t_s: &[f64]) -> Vec<TruthColumn> {
+fn truth_at(rig: &SampleBatch, t_s: &[f64]) -> Vec<TruthColumn> {
     let column = |column: &TruthColumn| TruthColumn {
         values: spread(&column.values, &rig.t_s, t_s, f64::NAN),
         name: column.name.clone(),

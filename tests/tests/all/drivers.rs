@@ -227,9 +227,15 @@ fn a_runner_that_stands_still_loses_its_lease() {
 /// What docs/rig.md shows for a driver, at another port, in the words of a server that shares its machine with tests.
 pub(crate) fn of_the_guide(driver: &str, replacements: &[(&str, &str)]) -> CampaignFile {
     let guide = std::fs::read_to_string(repository().join("docs/rig.md")).unwrap();
-    let (_, after) = guide.split_once(&format!("```yaml\nbackend:\n  {driver}:\n")).unwrap();
-    let (settings, _) = after.split_once("\n```").unwrap();
-    let mut backend = format!("  {driver}:\n{settings}");
+    let depth = |line: &str| line.len() - line.trim_start().len();
+    let head = format!("{driver}:");
+    let at = guide.lines().position(|line| line.trim() == head).unwrap();
+    let deep = depth(guide.lines().nth(at).unwrap());
+    let settings = guide.lines().skip(at + 1).take_while(|line| depth(line) > deep);
+    let mut backend = format!("  {driver}:");
+    for line in settings {
+        backend += &format!("\n  {}", &line[deep..]);
+    }
     for (old, new) in replacements {
         assert_eq!(backend.matches(old).count(), 1, "`{old}` in docs/rig.md");
         backend = backend.replace(old, new);

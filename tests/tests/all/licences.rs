@@ -4,9 +4,15 @@
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, PackageId};
 use std::collections::BTreeSet;
 
-fn metadata() -> Metadata {
+/// With all features, or with those that a build has if nothing is said.
+fn metadata(all_features: bool) -> Metadata {
     let manifest = mapper_tests::repository().join("Cargo.toml");
-    MetadataCommand::new().manifest_path(manifest).other_options(["--offline".to_owned()]).exec().unwrap()
+    // Of this machine alone: what others need was never downloaded.
+    let options = ["--locked", "--filter-platform", "host-tuple"]
+        .into_iter()
+        .chain(all_features.then_some("--all-features"));
+    let options: Vec<String> = options.map(str::to_owned).collect();
+    MetadataCommand::new().manifest_path(manifest).other_options(options).exec().unwrap()
 }
 
 /// The list of deny.toml: strings of `allow`.
@@ -63,7 +69,7 @@ fn one(rest: &mut Vec<&str>, allowed: &BTreeSet<String>) -> bool {
 
 #[test]
 fn every_dependency_has_a_licence_that_is_allowed() {
-    let (metadata, allowed) = (metadata(), allowed());
+    let (metadata, allowed) = (metadata(true), allowed());
     let foreign: Vec<_> = metadata.packages.iter().filter(|package| package.source.is_some()).collect();
     assert!(foreign.len() > 300, "only {} packages were found", foreign.len());
     let wrong: Vec<String> = foreign
@@ -118,7 +124,7 @@ fn tree(metadata: &Metadata, root: &str) -> BTreeSet<PackageId> {
 /// What a driver needs for its protocol stays in the driver.
 #[test]
 fn drivers_bring_nothing_into_the_program() {
-    let metadata = metadata();
+    let metadata = metadata(false);
     let program = tree(&metadata, "mapper-cli");
     assert!(program.len() > 100, "{}", program.len());
     let name_of = |id: &PackageId| {

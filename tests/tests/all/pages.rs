@@ -66,8 +66,7 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     mapper(arguments.into_iter().chain(["-o".as_ref(), whole.as_os_str()])).exits(0);
     if option_env!("MAPPER_TEST_PYTHON").is_some() {
         let pictures = pictures("gap");
-        let seen =
-            python("browse_report.py", [chromium.as_ref(), whole.as_os_str(), pictures.as_os_str()]);
+        let seen = python("browse_report.py", [chromium.as_ref(), whole.as_os_str(), pictures.as_os_str()]);
         for quiet in ["requests", "said", "serious"] {
             assert_eq!(seen[quiet], serde_json::json!([]), "{quiet}");
         }
@@ -189,8 +188,7 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
         "60".as_ref(),
     ]);
     let command = std::iter::once(run.get_program()).chain(run.get_args());
-    let seen =
-        python("browse_live.py", [chromium.as_ref(), pictures.as_os_str()].into_iter().chain(command));
+    let seen = python("browse_live.py", [chromium.as_ref(), pictures.as_os_str()].into_iter().chain(command));
     for (what, status) in seen["refused"].as_object().unwrap() {
         assert!((403..=405).contains(&status.as_u64().unwrap()), "{what}: {status}");
     }

@@ -6,7 +6,7 @@
 //! cargo run --release -p mapper-session --example rig_load -- trip      # from the sample that violates a guard to the command
 //! cargo run --release -p mapper-session --example rig_load -- resume    # a run of 12 hours that goes on
 //! ```
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Element, ElementColumn, PacedClock, RigDescription,

@@ -129,7 +129,8 @@ impl Run {
             None => prepared.run(&session)?,
         };
         progress.clear();
-        onlookers.end(&outcome.sentence(), outcome.results.as_ref().ok().map(|results| results.page.as_path()));
+        onlookers
+            .end(&outcome.sentence(), outcome.results.as_ref().ok().map(|results| results.page.as_path()));
         self.tell(&campaign, outcome)
     }
 

@@ -1,5 +1,5 @@
 //! The history of nightly runs: one row a run, one row a point, in one SQLite file; and whether tonight's figures
-//! lie in the band of the nights before.
+//! lie in the band of the nights before; and, over the machines of a production, what they have in common.
 //!
 //! A night is written in one transaction, so that a process killed in mid-write leaves the history as it was. Two
 //! processes may write at once: the second waits for the first.
@@ -10,6 +10,8 @@ mod compare;
 mod error;
 mod metric;
 mod night;
+mod outlier;
+mod production;
 mod quantity;
 mod store;
 
@@ -19,5 +21,7 @@ pub use error::HistoryError;
 pub use mapper_numerics::statistics::median;
 pub use metric::Metric;
 pub use night::{Night, PointRow, RunKey, RunRow};
+pub use outlier::{Outlier, Sign};
+pub use production::{Drift, Place, Production, Spread, Stand, productions};
 pub use quantity::PointQuantity;
-pub use store::{DEFAULT_NIGHTS, Filter, History, ListedRun, StoredNight};
+pub use store::{DEFAULT_NIGHTS, Filter, History, ListedRun, ObservedPoint, StoredNight};

@@ -19,7 +19,7 @@ pub struct RunKey {
 
 impl std::fmt::Display for RunKey {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} {} seed {}", self.campaign, self.method, self.seed)
+        write!(f, "{} {} {} seed {}", self.campaign, self.machine, self.method, self.seed)
     }
 }
 

@@ -46,6 +46,17 @@ pub struct ListedRun {
     pub run: RunRow,
 }
 
+/// A point with the run and the night that it is of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObservedPoint {
+    /// Its night, by [`StoredNight::id`].
+    pub night_id: i64,
+    /// Its run.
+    pub key: RunKey,
+    /// The point.
+    pub point: PointRow,
+}
+
 /// Which runs are listed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
@@ -242,6 +253,54 @@ impl History {
     }
 }
 
+impl History {
+    /// The points of all runs that a filter takes and the nights they are of, oldest first.
+    ///
+    /// # Errors
+    /// [`HistoryError::Sqlite`].
+    pub fn points(&self, filter: &Filter) -> Result<(Vec<StoredNight>, Vec<ObservedPoint>), HistoryError> {
+        self.try_points(filter).map_err(|source| HistoryError::Sqlite { path: self.path.clone(), source })
+    }
+
+    fn try_points(&self, filter: &Filter) -> rusqlite::Result<(Vec<StoredNight>, Vec<ObservedPoint>)> {
+        let mut nights: Vec<StoredNight> = self.try_runs(filter)?.into_iter().map(|run| run.night).collect();
+        nights.dedup();
+        let mut statement = self.connection.prepare(
+            "SELECT r.night_id, r.campaign, r.machine, r.method, r.seed, p.speed_rpm, p.valve_opening_ratio, p.visit, p.eta, \
+               p.eta_true, p.h_w_m2k, p.h_true_w_m2k \
+             FROM point p JOIN run r ON r.id = p.run_id JOIN night n ON n.id = r.night_id \
+             WHERE (?1 IS NULL OR r.machine = ?1 OR r.campaign = ?1) AND (?2 IS NULL OR r.method = ?2) \
+               AND (?3 IS NULL OR n.started_ms >= ?3) \
+             ORDER BY n.started_ms, n.id, r.id, p.speed_rpm, p.valve_opening_ratio, p.visit",
+        )?;
+        let points = statement
+            .query_map(params![filter.machine, filter.method, filter.since_ms], |row| {
+                let key = RunKey {
+                    campaign: row.get(1)?,
+                    machine: row.get(2)?,
+                    method: row.get(3)?,
+                    seed: row.get::<_, i64>(4)?.cast_unsigned(),
+                };
+                Ok(ObservedPoint { night_id: row.get(0)?, key, point: point_of(row, 5)? })
+            })?
+            .collect::<rusqlite::Result<_>>()?;
+        Ok((nights, points))
+    }
+}
+
+/// A point from the columns that begin at `first`.
+fn point_of(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<PointRow> {
+    Ok(PointRow {
+        speed_rpm: row.get(first)?,
+        valve_opening_ratio: row.get(first + 1)?,
+        visit: usize::try_from(row.get::<_, i64>(first + 2)?).unwrap_or_default(),
+        eta: row.get(first + 3)?,
+        eta_true: row.get(first + 4)?,
+        h_w_m2k: row.get(first + 5)?,
+        h_true_w_m2k: row.get(first + 6)?,
+    })
+}
+
 const RUN_COLUMNS: &str =
     "r.campaign, r.machine, r.method, r.seed, r.campaign_sha256, r.model_sha256, r.failure";
 
@@ -304,19 +363,8 @@ fn earlier(
     while let Some(row) = rows.next()? {
         let run_id: i64 = row.get(0)?;
         let mut run = run_of(row, 1)?;
-        run.points = select_points
-            .query_map([run_id], |row| {
-                Ok(PointRow {
-                    speed_rpm: row.get(0)?,
-                    valve_opening_ratio: row.get(1)?,
-                    visit: usize::try_from(row.get::<_, i64>(2)?).unwrap_or_default(),
-                    eta: row.get(3)?,
-                    eta_true: row.get(4)?,
-                    h_w_m2k: row.get(5)?,
-                    h_true_w_m2k: row.get(6)?,
-                })
-            })?
-            .collect::<rusqlite::Result<_>>()?;
+        run.points =
+            select_points.query_map([run_id], |row| point_of(row, 0))?.collect::<rusqlite::Result<_>>()?;
         earlier.entry(run.key.clone()).or_default().push(run);
     }
     Ok(earlier)

@@ -9,6 +9,7 @@
 pub mod coloured_noise;
 pub mod least_squares;
 pub mod minimise;
+pub mod mixed_model;
 pub mod parallel;
 pub mod polyline;
 pub mod root;

@@ -1,5 +1,6 @@
 //! Why a session could not do what it was asked.
 
+use crate::variant::VariantError;
 use mapper_campaign::{CampaignError, NightlyError};
 use mapper_core::{BackendError, ExportError, ImportError};
 use mapper_drift::DriftError;
@@ -51,6 +52,9 @@ pub enum SessionError {
         /// The campaign.
         path: PathBuf,
     },
+    /// The machines of a nightly campaign are wrong.
+    #[error(transparent)]
+    Variant(#[from] VariantError),
     /// Two runs of a night have the same campaign, machine, method and seed.
     #[error("{key} appears twice in the nightly campaign; give each campaign its own name")]
     NightlyTwice {
@@ -393,6 +397,7 @@ impl SessionError {
             | E::Nightly(NightlyError::Mistakes(_))
             | E::NightlySequence { .. }
             | E::NightlyTwice { .. }
+            | E::Variant(_)
             | E::OtherNight { .. }
             | E::NoRecording
             | E::NotTogether { .. }

@@ -84,6 +84,7 @@ mod thought;
 mod transient;
 mod twin_campaign;
 mod twin_files;
+mod variant;
 
 pub use declared::identification;
 pub use drift::Drift;
@@ -121,3 +122,4 @@ pub use surge::{SurgeForecast, surge_forecast};
 pub use transient::write_transient;
 pub use twin_campaign::{Twin, twin_campaign};
 pub use twin_files::{SealedForecast, found_in};
+pub use variant::{Variant, VariantError};

@@ -2,11 +2,13 @@
 
 use crate::nightly_run::NightlyRun;
 use crate::planning::nominal_model;
+use crate::variant::Variant;
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Nightly;
 use mapper_core::Method;
 use mapper_fleet::Engine;
 use mapper_history::RunRow;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// All runs of a night, ready to start.
@@ -21,6 +23,7 @@ impl PreparedNight {
     /// [`SessionError`] of the first campaign that cannot be part of a night.
     pub fn new(nightly: &Nightly) -> Result<Self, SessionError> {
         let mut runs: Vec<NightlyRun> = Vec::new();
+        let mut keys = BTreeSet::new();
         for group in &nightly.groups {
             let campaign = mapper_campaign::load(&group.campaign)?;
             if campaign.sequence.is_some() {
@@ -32,14 +35,22 @@ impl PreparedNight {
             } else {
                 group.methods.iter().map(|name| method(name)).collect::<Result<_, _>>()?
             };
+            let machines: Vec<Option<Variant>> = match (&group.machines, group.drawn_machines) {
+                (Some(table), _) => Variant::read(table)?.into_iter().map(Some).collect(),
+                (None, Some(count)) => Variant::drawn(&campaign, count).into_iter().map(Some).collect(),
+                (None, None) => vec![None],
+            };
             let seeds = if group.seeds.is_empty() { vec![campaign.seed] } else { group.seeds.clone() };
             for method in methods {
                 for &seed in &seeds {
-                    let run = NightlyRun::new(campaign.clone(), model.clone(), method, seed);
-                    if runs.iter().any(|earlier| earlier.key == run.key) {
-                        return Err(SessionError::NightlyTwice { key: run.key.to_string() });
+                    for machine in &machines {
+                        let run =
+                            NightlyRun::new(campaign.clone(), model.clone(), method, seed, machine.clone())?;
+                        if !keys.insert(run.key.clone()) {
+                            return Err(SessionError::NightlyTwice { key: run.key.to_string() });
+                        }
+                        runs.push(run);
                     }
-                    runs.push(run);
                 }
             }
         }
@@ -92,6 +103,10 @@ impl Session<'_> {
     /// recordings. A run that fails is a row that says why.
     pub fn night(&self, night: &PreparedNight, jobs: Option<usize>) -> Result<Vec<RunRow>, SessionError> {
         let runs = &night.runs;
+        // A machine that the backend does not know is told before anything runs.
+        for run in runs.iter().filter(|run| run.machine.is_some()) {
+            self.registry.make_sources(&run.campaign, &run.model)?;
+        }
         let room = std::env::temp_dir();
         let scratch = tempfile::Builder::new()
             .prefix("mapper-nightly-")

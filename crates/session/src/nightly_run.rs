@@ -6,6 +6,7 @@ use crate::nightly_row::{figures, point_rows};
 use crate::observers::Recorder;
 use crate::program::PROGRAM;
 use crate::recorded::Recorded;
+use crate::variant::{Variant, VariantError};
 use crate::{ErrorKind, Session, SessionError, planned, run_directory};
 use mapper_campaign::Campaign;
 use mapper_core::{Method, Plan};
@@ -23,22 +24,38 @@ pub struct NightlyRun {
     pub campaign: Campaign,
     /// Its nominal model.
     pub model: Model,
+    /// The machine, where it is one of many.
+    pub machine: Option<Variant>,
     /// What the run is, from night to night.
     pub key: RunKey,
 }
 
 impl NightlyRun {
-    /// A campaign by a method with a seed.
-    pub fn new(mut campaign: Campaign, model: Model, method: Method, seed: u64) -> NightlyRun {
+    /// A campaign by a method with a seed, on one of many machines where one is given.
+    ///
+    /// # Errors
+    /// [`VariantError`] where the machine cannot be put into the campaign.
+    pub fn new(
+        mut campaign: Campaign,
+        model: Model,
+        method: Method,
+        seed: u64,
+        machine: Option<Variant>,
+    ) -> Result<NightlyRun, VariantError> {
         campaign.identification.method = method;
         campaign.seed = seed;
+        if let Some(machine) = &machine {
+            machine.put_into(&mut campaign)?;
+        }
         let key = RunKey {
             campaign: campaign.name.clone(),
-            machine: campaign.machine.name.clone(),
+            machine: machine
+                .as_ref()
+                .map_or_else(|| campaign.machine.name.clone(), |machine| machine.serial_number.clone()),
             method: method.to_string(),
             seed,
         };
-        NightlyRun { campaign, model, key }
+        Ok(NightlyRun { campaign, model, machine, key })
     }
 
     /// Plans, runs, records, identifies and scores. What fails stands in the row.

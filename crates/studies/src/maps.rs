@@ -5,7 +5,7 @@ use crate::error::StudyError;
 use crate::source::CampaignSource;
 use mapper_core::Method;
 use mapper_fleet::{At, Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkError};
-use mapper_session::{ErrorKind, NightlyRun, Registry, Session, nominal_model};
+use mapper_session::{ErrorKind, NightlyRun, Registry, Session, SessionError, nominal_model};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -79,7 +79,7 @@ impl Kind for Maps<'_> {
         let model = nominal_model(&campaign)?;
         let name = campaign.name.clone();
         let method = campaign.identification.method;
-        let run = NightlyRun::new(campaign, model, method, seed);
+        let run = NightlyRun::new(campaign, model, method, seed, None).map_err(SessionError::from)?;
         let session = Session { stop: at.stop, ..Session::new(self.0) };
         let points = run.points(&session, at.scratch, &methods).map_err(|error| match error.kind() {
             ErrorKind::Interrupted => WorkError::Interrupted,

@@ -7,7 +7,9 @@ use mapper_campaign::load_nightly;
 use mapper_core::Method;
 use mapper_fleet::{At, Draft, Drafts, Fleet, FleetError, Kind, Output, Results, StudyFile, WorkError};
 use mapper_history::RunRow;
-use mapper_session::{ErrorKind, NightlyRun, PreparedNight, Registry, Session, json_text, nominal_model};
+use mapper_session::{
+    ErrorKind, NightlyRun, PreparedNight, Registry, Session, SessionError, Variant, json_text, nominal_model,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -41,6 +43,8 @@ struct NightlyItem {
     campaign: CampaignSource,
     method: Method,
     seed: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    machine: Option<Variant>,
 }
 
 /// File of the rows.
@@ -67,7 +71,7 @@ impl Kind for Nightly<'_> {
         let item = |run: &NightlyRun| {
             let campaign = sources.get(&run.campaign.name)?.clone();
             let (method, seed) = (run.campaign.identification.method, run.campaign.seed);
-            let payload = json!(NightlyItem { campaign, method, seed });
+            let payload = json!(NightlyItem { campaign, method, seed, machine: run.machine.clone() });
             Some(Draft { name: run.key.to_string(), payload })
         };
         let items = night.runs().iter().filter_map(item).collect();
@@ -78,7 +82,8 @@ impl Kind for Nightly<'_> {
         let item = NightlyItem::deserialize(payload)?;
         let campaign = item.campaign.campaign()?;
         let model = nominal_model(&campaign)?;
-        let run = NightlyRun::new(campaign, model, item.method, item.seed);
+        let run = NightlyRun::new(campaign, model, item.method, item.seed, item.machine)
+            .map_err(SessionError::from)?;
         let session = Session { stop: at.stop, ..Session::new(self.0) };
         let row = session.nightly_run(&run, &at.scratch.join("run")).map_err(|error| match error.kind() {
             ErrorKind::Interrupted => WorkError::Interrupted,

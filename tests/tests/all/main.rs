@@ -25,6 +25,7 @@ mod nightly;
 mod pages;
 mod pipes;
 mod plans;
+mod production;
 mod promises;
 mod readers;
 mod recordings;

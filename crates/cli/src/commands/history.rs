@@ -3,6 +3,7 @@
 use crate::failure::Failure;
 use crate::output;
 use crate::output::Replace;
+use crate::subcommands::subcommands;
 use clap::Args;
 use mapper_history::{Filter, Metric};
 use mapper_report::{groups_text, history_svg, runs_text};
@@ -10,9 +11,13 @@ use mapper_session::{SessionError, night_report_link};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// List, filter and plot the results of the nightly runs
+subcommands! { HistoryCommand:
+    fleet::Fleet,
+}
+
+/// Which runs of which history.
 #[derive(Debug, Args)]
-pub struct History {
+pub struct Chosen {
     /// The history
     #[arg(long, value_name = "FILE", default_value = "runs/history.db")]
     pub db: PathBuf,
@@ -22,12 +27,23 @@ pub struct History {
     /// Only this method
     #[arg(long, value_name = "METHOD")]
     pub method: Option<String>,
-    /// Show this figure instead of the default ones; may be given more than once
-    #[arg(long, value_name = "FIGURE", value_parser = figure)]
-    pub figure: Vec<Metric>,
     /// Only nights since this day (UTC)
     #[arg(long, value_name = "YYYY-MM-DD", value_parser = day)]
     pub since: Option<jiff::Timestamp>,
+}
+
+/// List, filter and plot the results of the nightly runs
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct History {
+    /// What to say of them instead
+    #[command(subcommand)]
+    command: Option<HistoryCommand>,
+    #[command(flatten)]
+    pub chosen: Chosen,
+    /// Show this figure instead of the default ones; may be given more than once
+    #[arg(long, value_name = "FIGURE", value_parser = figure)]
+    pub figure: Vec<Metric>,
     /// A row for each run, instead of the medians over the seeds
     #[arg(long)]
     pub runs: bool,
@@ -65,24 +81,35 @@ const SHOWN: [Metric; 6] = [
     Metric::HMedianError,
 ];
 
-impl History {
-    /// Lists, filters, prints JSON, draws.
-    pub fn run(&self) -> Result<(), Failure> {
-        let history = mapper_history::History::open_existing(&self.db).map_err(SessionError::from)?;
-        let filter = Filter {
+impl Chosen {
+    fn filter(&self) -> Filter {
+        Filter {
             machine: self.machine.clone(),
             method: self.method.clone(),
             since_ms: self.since.map(|since| since.as_millisecond()),
-        };
-        let runs = history.runs(&filter).map_err(SessionError::from)?;
+        }
+    }
+}
+
+fn opened(chosen: &Chosen) -> Result<mapper_history::History, Failure> {
+    Ok(mapper_history::History::open_existing(&chosen.db).map_err(SessionError::from)?)
+}
+
+impl History {
+    /// Lists, filters, prints JSON, draws.
+    pub fn run(&self) -> Result<(), Failure> {
+        if let Some(command) = &self.command {
+            return command.run();
+        }
+        let runs = opened(&self.chosen)?.runs(&self.chosen.filter()).map_err(SessionError::from)?;
         let figures: Vec<Metric> = if self.figure.is_empty() { SHOWN.to_vec() } else { self.figure.clone() };
         if let Some(path) = &self.svg {
-            let report_of = |started_ms| night_report_link(path, &self.db, started_ms);
+            let report_of = |started_ms| night_report_link(path, &self.chosen.db, started_ms);
             self.replace.write(path, history_svg(&runs, &figures, report_of).as_bytes())?;
         }
         if self.json {
             let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();
-            return output::print_json(&json!({"history": self.db, "runs": runs}));
+            return output::print_json(&json!({"history": self.chosen.db, "runs": runs}));
         }
         output::print(&if self.runs { runs_text(&runs, &figures) } else { groups_text(&runs, &figures) })
     }

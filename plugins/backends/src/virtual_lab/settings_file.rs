@@ -52,6 +52,8 @@ struct SettingsFile {
     weather: WeatherName,
     /// `drawn` from the campaign's tolerances, or `none` (the default).
     tolerances: TolerancesName,
+    /// Seed of that draw, so that a machine stays itself under other noise; the campaign's where left out.
+    tolerances_seed: Option<u64>,
     /// By how much the machine is off within its tolerances, in place of a draw.
     deviations: DeviationsFile,
     /// How the actuators follow.
@@ -211,7 +213,7 @@ pub fn read_settings(
     within(100.0 * surge_swing_ratio, "%", 0.0..=100.0).map_err(|problem| problem.at("surge_swing"))?;
     let mut rig = Rig::new(model);
     if file.tolerances == TolerancesName::Drawn {
-        draw_tolerances(&mut rig, &nominal.tolerances, nominal.seed);
+        draw_tolerances(&mut rig, &nominal.tolerances, file.tolerances_seed.unwrap_or(nominal.seed));
     }
     file.deviations.put_into(&mut rig)?;
     put_in(&mut rig, &file.effects, &nominal.effects)?;

@@ -1,0 +1,318 @@
+//! A production: what its machines have in common, how far they differ, and what the stand did to all of them.
+
+use crate::outlier::{Deviations, Outlier, outliers};
+use crate::{ObservedPoint, PointQuantity, StoredNight};
+use mapper_numerics::mixed_model::{Effect, MixedFit, MixedModel};
+use mapper_numerics::statistics::mean;
+use nalgebra::DMatrix;
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Nights from which on a drift in time is looked for: two always lie on a line.
+const NIGHTS_FOR_A_DRIFT: usize = 3;
+const MS_A_DAY: f64 = 86_400_000.0;
+
+/// What many machines gave, measured by one campaign and method.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Production {
+    /// The campaign.
+    pub campaign: String,
+    /// Method of identification.
+    pub method: String,
+    /// Runs with points.
+    pub runs: usize,
+    /// The machines, by name.
+    pub machines: Vec<String>,
+    /// Starts of the nights, ms since 1970-01-01 00:00 UTC, rising.
+    pub nights_ms: Vec<i64>,
+    /// The points of the map, by speed and opening; outliers are not in them.
+    pub places: Vec<Place>,
+    /// What the stand did to all machines alike, means over the points; `None` where there is one night.
+    pub stand: Option<Stand>,
+    /// Machines that are not like the others, farthest first; `None` where too few are there to say.
+    pub outliers: Option<Vec<Outlier>>,
+}
+
+/// One point of the map over the production.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Place {
+    /// Speed aimed at, rpm.
+    pub speed_rpm: f64,
+    /// Valve opening relative to the nominal area.
+    pub valve_opening_ratio: f64,
+    /// Efficiency, fraction; standard deviations are fractions too.
+    pub eta: Option<Spread>,
+    /// Heat-transfer coefficient, W/(m2 K); standard deviations are ratios of it.
+    pub h_w_m2k: Option<Spread>,
+}
+
+/// Where a quantity lies and how far it scatters.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Spread {
+    /// Of the average machine.
+    pub mean: f64,
+    /// Standard deviation between machines; `None` where each was measured once, so that it is within `rest_sigma`.
+    pub machine_sigma: Option<f64>,
+    /// Standard deviation between nights, a drift in time apart; `None` where there is one night.
+    pub night_sigma: Option<f64>,
+    /// Standard deviation of one measurement of one machine in one night.
+    pub rest_sigma: f64,
+}
+
+/// What all machines share from night to night.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Stand {
+    /// Drift of the efficiency, fraction a day; `None` where the nights are fewer than 3.
+    pub eta_drift: Option<Drift>,
+    /// Drift of h, ratio a day.
+    pub h_drift: Option<Drift>,
+    /// Standard deviation of the efficiency between nights beside that, fraction.
+    pub eta_night_sigma: f64,
+    /// The same of h, ratio.
+    pub h_night_sigma: f64,
+}
+
+/// A change with time, a day, and its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Drift {
+    /// Change a day.
+    pub a_day: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// One production for each campaign and method in a history.
+pub fn productions(nights: &[StoredNight], points: &[ObservedPoint]) -> Vec<Production> {
+    let starts: BTreeMap<i64, i64> = nights.iter().map(|night| (night.id, night.started_ms)).collect();
+    let mut by_key: BTreeMap<(&str, &str), Vec<&ObservedPoint>> = BTreeMap::new();
+    for point in points {
+        by_key.entry((&point.key.campaign, &point.key.method)).or_default().push(point);
+    }
+    by_key
+        .into_iter()
+        .filter_map(|((campaign, method), points)| production(campaign, method, &starts, &points))
+        .collect()
+}
+
+/// Observations of one place.
+struct Observed<'a> {
+    points: Vec<&'a ObservedPoint>,
+    machines: Vec<usize>,
+    nights: Vec<usize>,
+    days: Vec<f64>,
+}
+
+fn production(
+    campaign: &str,
+    method: &str,
+    starts: &BTreeMap<i64, i64>,
+    points: &[&ObservedPoint],
+) -> Option<Production> {
+    let machines: Vec<String> =
+        points.iter().map(|point| point.key.machine.clone()).collect::<BTreeSet<_>>().into_iter().collect();
+    let nights_ms: Vec<i64> = points
+        .iter()
+        .filter_map(|point| starts.get(&point.night_id).copied())
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .collect();
+    let first_ms = *nights_ms.first()?;
+    let runs: BTreeSet<(i64, &str, u64)> =
+        points.iter().map(|point| (point.night_id, point.key.machine.as_str(), point.key.seed)).collect();
+    let mut by_place: BTreeMap<(u64, u64), Observed<'_>> = BTreeMap::new();
+    for &point in points {
+        let place = (point.point.speed_rpm.to_bits(), point.point.valve_opening_ratio.to_bits());
+        let (Ok(machine), Some(start)) =
+            (machines.binary_search(&point.key.machine), starts.get(&point.night_id))
+        else {
+            continue;
+        };
+        let Ok(night) = nights_ms.binary_search(start) else { continue };
+        let observed = by_place.entry(place).or_insert_with(|| Observed {
+            points: Vec::new(),
+            machines: Vec::new(),
+            nights: Vec::new(),
+            days: Vec::new(),
+        });
+        observed.points.push(point);
+        observed.machines.push(machine);
+        observed.nights.push(night);
+        observed.days.push((start - first_ms) as f64 / MS_A_DAY);
+    }
+    let all: Vec<Observed<'_>> = by_place.into_values().collect();
+    let nobody = BTreeSet::new();
+    let measured = measure(&all, machines.len(), &nobody);
+    let outliers = outliers(&machines, &measured.deviations);
+    let out: BTreeSet<usize> = outliers
+        .iter()
+        .flatten()
+        .filter_map(|outlier| machines.binary_search(&outlier.machine).ok())
+        .collect();
+    let measured = if out.is_empty() { measured } else { measure(&all, machines.len(), &out) };
+    Some(Production {
+        campaign: campaign.to_owned(),
+        method: method.to_owned(),
+        runs: runs.len(),
+        stand: (nights_ms.len() > 1).then(|| stand(&measured)),
+        machines,
+        nights_ms,
+        places: measured.places,
+        outliers,
+    })
+}
+
+/// All places fitted.
+struct Measured {
+    places: Vec<Place>,
+    deviations: Vec<Deviations>,
+    eta: Vec<Fitted>,
+    h: Vec<Fitted>,
+}
+
+fn measure(all: &[Observed<'_>], machines: usize, left_out: &BTreeSet<usize>) -> Measured {
+    let mut measured =
+        Measured { places: Vec::new(), deviations: Vec::new(), eta: Vec::new(), h: Vec::new() };
+    for observed in all {
+        let Some(first) = observed.points.first() else { continue };
+        let eta = fitted(observed, PointQuantity::Eta, left_out, |eta| eta);
+        let h = fitted(observed, PointQuantity::H, left_out, f64::ln);
+        let (speed_rpm, valve_opening_ratio) = (first.point.speed_rpm, first.point.valve_opening_ratio);
+        measured.deviations.push(Deviations {
+            speed_rpm,
+            eta_mean: eta.as_ref().map_or(f64::NAN, Fitted::mean),
+            eta: deviations(observed, PointQuantity::Eta, eta.as_ref(), machines, |eta| eta),
+            ln_h: deviations(observed, PointQuantity::H, h.as_ref(), machines, f64::ln),
+        });
+        measured.places.push(Place {
+            speed_rpm,
+            valve_opening_ratio,
+            eta: eta.as_ref().map(|fitted| fitted.spread(fitted.mean())),
+            h_w_m2k: h.as_ref().map(|fitted| fitted.spread(fitted.mean().exp())),
+        });
+        measured.eta.extend(eta);
+        measured.h.extend(h);
+    }
+    measured
+}
+
+/// A mixed model of one quantity at one place.
+struct Fitted {
+    fit: MixedFit,
+    /// Places of machines and nights among the groups.
+    machines: Option<usize>,
+    nights: Option<usize>,
+    with_drift: bool,
+    middle_day: f64,
+}
+
+impl Fitted {
+    fn mean(&self) -> f64 {
+        self.fit.coefficients[0].value
+    }
+
+    fn spread(&self, mean: f64) -> Spread {
+        let sigma = |group: Option<usize>| group.map(|group| self.fit.group_sigmas[group]);
+        Spread {
+            mean,
+            machine_sigma: sigma(self.machines),
+            night_sigma: sigma(self.nights),
+            rest_sigma: self.fit.rest_sigma,
+        }
+    }
+
+    fn drift(&self) -> Option<Effect> {
+        self.with_drift.then(|| self.fit.coefficients[1])
+    }
+
+    /// What the stand adds in a night.
+    fn of_stand(&self, night: usize, day: f64) -> f64 {
+        let scatter =
+            self.nights.map_or(0.0, |group| self.fit.effects[group].get(night).map_or(0.0, |one| one.value));
+        scatter + self.drift().map_or(0.0, |drift| drift.value * (day - self.middle_day))
+    }
+}
+
+fn fitted(
+    observed: &Observed<'_>,
+    quantity: PointQuantity,
+    left_out: &BTreeSet<usize>,
+    transform: fn(f64) -> f64,
+) -> Option<Fitted> {
+    let kept: Vec<(usize, f64)> = (0..observed.points.len())
+        .filter(|i| !left_out.contains(&observed.machines[*i]))
+        .filter_map(|i| Some((i, transform(quantity.of(&observed.points[i].point)?))))
+        .filter(|(_, value)| value.is_finite())
+        .collect();
+    let y: Vec<f64> = kept.iter().map(|(_, value)| *value).collect();
+    let of = |from: &[usize]| kept.iter().map(|(i, _)| from[*i]).collect::<Vec<usize>>();
+    let (machines, nights) = (of(&observed.machines), of(&observed.nights));
+    let different = |levels: &[usize]| levels.iter().collect::<BTreeSet<_>>().len();
+    let days: Vec<f64> = kept.iter().map(|(i, _)| observed.days[*i]).collect();
+    let with_drift = different(&nights) >= NIGHTS_FOR_A_DRIFT;
+    let middle_day = mean(&days)?;
+    let fixed = DMatrix::from_fn(y.len(), 1 + usize::from(with_drift), |row, column| {
+        if column == 0 { 1.0 } else { days[row] - middle_day }
+    });
+    // One machine a measurement: what a machine has of its own is then not told apart from the rest.
+    let with_machines = different(&machines) < y.len() && different(&machines) > 1;
+    let with_nights = different(&nights) > 1 && different(&nights) < y.len();
+    let mut groups: Vec<&[usize]> = Vec::new();
+    let (mut of_machines, mut of_nights) = (None, None);
+    if with_machines {
+        of_machines = Some(groups.len());
+        groups.push(&machines);
+    }
+    if with_nights {
+        of_nights = Some(groups.len());
+        groups.push(&nights);
+    }
+    let alone = vec![0; y.len()];
+    if groups.is_empty() {
+        groups.push(&alone);
+    }
+    let fit = MixedModel { y: &y, fixed, groups }.fit().ok()?;
+    Some(Fitted { fit, machines: of_machines, nights: of_nights, with_drift, middle_day })
+}
+
+/// How far each machine lies off the average one, what the stand did in its nights apart; `None` where it was not measured.
+fn deviations(
+    observed: &Observed<'_>,
+    quantity: PointQuantity,
+    fitted: Option<&Fitted>,
+    machines: usize,
+    transform: fn(f64) -> f64,
+) -> Vec<Option<f64>> {
+    let Some(fitted) = fitted else { return vec![None; machines] };
+    let mut of_machine: Vec<Vec<f64>> = vec![Vec::new(); machines];
+    for (i, point) in observed.points.iter().enumerate() {
+        let Some(value) = quantity.of(&point.point).map(transform).filter(|value| value.is_finite()) else {
+            continue;
+        };
+        let stand = fitted.of_stand(observed.nights[i], observed.days[i]);
+        of_machine[observed.machines[i]].push(value - fitted.mean() - stand);
+    }
+    of_machine.iter().map(|values| mean(values)).collect()
+}
+
+/// What the places say together of the stand. Its errors are shared by all places, so that their errors do not shrink with the number
+/// of places.
+fn stand(measured: &Measured) -> Stand {
+    let drift = |fitted: &[Fitted]| {
+        let drifts: Vec<Effect> = fitted.iter().filter_map(Fitted::drift).collect();
+        let a_day = mean(drifts.iter().map(|drift| drift.value))?;
+        let half = 1.96 * mean(drifts.iter().map(|drift| drift.standard_error))?;
+        Some(Drift { a_day, low: a_day - half, high: a_day + half })
+    };
+    let sigma = |fitted: &[Fitted]| {
+        mean(fitted.iter().filter_map(|one| one.nights.map(|group| one.fit.group_sigmas[group])))
+            .unwrap_or(0.0)
+    };
+    Stand {
+        eta_drift: drift(&measured.eta),
+        h_drift: drift(&measured.h),
+        eta_night_sigma: sigma(&measured.eta),
+        h_night_sigma: sigma(&measured.h),
+    }
+}

@@ -1,0 +1,243 @@
+//! Machines of one kind that differ: what a nightly campaign runs one after the other instead of one nominal machine.
+
+use mapper_campaign::Campaign;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Column with the name of the machine.
+const NAME: &str = "serial_number";
+/// Largest table of machines, bytes.
+const SIZE_LIMIT: u64 = 10_000_000;
+/// Most settings of one machine.
+const COLUMNS_LIMIT: usize = 64;
+/// Seeds of drawn machines begin here, far from those of campaigns: a machine keeps its own whatever the night draws.
+const FIRST_DRAWN_SEED: u64 = 1_000_000;
+
+/// One machine: where the simulated one differs from what the campaign declares.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Variant {
+    /// Its serial number; results are kept by it.
+    pub serial_number: String,
+    /// Settings of the backend by their path, e.g. `deviations.compressor_efficiency`: `-2 %`.
+    pub settings: BTreeMap<String, String>,
+}
+
+/// Why there are no machines.
+#[derive(Debug, thiserror::Error)]
+pub enum VariantError {
+    /// The table cannot be read.
+    #[error("failed to read the machines in {}: {source}", .path.display())]
+    Read {
+        /// The table.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The table is larger than any production.
+    #[error("{} has {bytes} bytes; a table of machines has at most {SIZE_LIMIT}", .path.display())]
+    TooLarge {
+        /// The table.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+    },
+    /// A row has not the form of the others.
+    #[error("{}: {source}", .path.display())]
+    Form {
+        /// The table.
+        path: PathBuf,
+        /// Where and why.
+        source: csv::Error,
+    },
+    /// The table as a whole is wrong.
+    #[error("{}: {problem}", .path.display())]
+    Table {
+        /// The table.
+        path: PathBuf,
+        /// What is wrong and what would be right.
+        problem: String,
+    },
+    /// A setting goes into something that holds no settings.
+    #[error(
+        "machine {serial_number}: the campaign has no settings at `{key}`, but `{there}`; leave the column out, or change the campaign"
+    )]
+    Occupied {
+        /// The machine.
+        serial_number: String,
+        /// The column.
+        key: String,
+        /// What stands in its way.
+        there: String,
+    },
+}
+
+impl Variant {
+    /// Reads a table: a header with `serial_number` and paths of settings below the campaign's backend, then a machine a row; comma or
+    /// semicolon between columns, an empty cell for what is as the campaign says. Lines that begin with `#` are remarks.
+    ///
+    /// # Errors
+    /// [`VariantError`] with the line.
+    pub fn read(path: &Path) -> Result<Vec<Variant>, VariantError> {
+        let unread = |source| VariantError::Read { path: path.to_owned(), source };
+        let bytes = std::fs::metadata(path).map_err(unread)?.len();
+        if bytes > SIZE_LIMIT {
+            return Err(VariantError::TooLarge { path: path.to_owned(), bytes });
+        }
+        let text = std::fs::read_to_string(path).map_err(unread)?;
+        Self::from_text(&text, path)
+    }
+
+    fn from_text(text: &str, path: &Path) -> Result<Vec<Variant>, VariantError> {
+        let wrong = |problem: String| VariantError::Table { path: path.to_owned(), problem };
+        let form = |source| VariantError::Form { path: path.to_owned(), source };
+        let header = text.lines().find(|line| !line.starts_with('#')).unwrap_or_default();
+        let delimiter = if header.contains(';') { b';' } else { b',' };
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(delimiter)
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
+        let columns: Vec<String> = reader.headers().map_err(form)?.iter().map(str::to_owned).collect();
+        let Some(name) = columns.iter().position(|column| column == NAME) else {
+            return Err(wrong(format!("no column is called `{NAME}`; name each machine in one")));
+        };
+        if columns.len() > COLUMNS_LIMIT {
+            return Err(wrong(format!("{} columns; at most {COLUMNS_LIMIT} are allowed", columns.len())));
+        }
+        if let Some(twice) = columns.iter().enumerate().find(|(i, column)| columns[..*i].contains(column)) {
+            return Err(wrong(format!("the column `{}` appears twice", twice.1)));
+        }
+        let (mut machines, mut names) = (Vec::new(), BTreeSet::new());
+        for row in reader.records() {
+            let row = row.map_err(form)?;
+            let line = row.position().map_or(0, csv::Position::line);
+            let serial_number = row.get(name).unwrap_or_default().to_owned();
+            if serial_number.is_empty() {
+                return Err(wrong(format!("line {line}: the machine has no `{NAME}`")));
+            }
+            if !names.insert(serial_number.clone()) {
+                return Err(wrong(format!("line {line}: the machine {serial_number} appears twice")));
+            }
+            let settings = columns.iter().zip(&row).enumerate();
+            let settings = settings
+                .filter(|(place, (_, cell))| *place != name && !cell.is_empty())
+                .map(|(_, (column, cell))| (column.clone(), cell.to_owned()))
+                .collect();
+            machines.push(Variant { serial_number, settings });
+        }
+        if machines.is_empty() {
+            return Err(wrong("no machine stands below the header".to_owned()));
+        }
+        Ok(machines)
+    }
+
+    /// Machines drawn from the tolerances that the campaign declares: the same ones whenever they are asked for.
+    pub fn drawn(campaign: &Campaign, count: usize) -> Vec<Variant> {
+        let kind = campaign.machine.serial_number.as_deref().unwrap_or(&campaign.machine.name);
+        (0..count)
+            .map(|index| Variant {
+                serial_number: format!("{kind}-drawn-{:04}", index + 1),
+                settings: BTreeMap::from([
+                    ("tolerances".to_owned(), "drawn".to_owned()),
+                    ("tolerances_seed".to_owned(), (FIRST_DRAWN_SEED + index as u64).to_string()),
+                ]),
+            })
+            .collect()
+    }
+
+    /// Puts the machine into a campaign.
+    ///
+    /// # Errors
+    /// [`VariantError::Occupied`]. Whether the backend knows a setting, the backend says.
+    pub fn put_into(&self, campaign: &mut Campaign) -> Result<(), VariantError> {
+        campaign.machine.serial_number = Some(self.serial_number.clone());
+        for (key, text) in &self.settings {
+            let mut at = &mut campaign.backend.settings;
+            for part in key.split('.') {
+                if at.is_null() {
+                    *at = Value::Object(Map::new());
+                }
+                let there = at.to_string();
+                let Some(map) = at.as_object_mut() else {
+                    let (serial_number, key) = (self.serial_number.clone(), key.clone());
+                    return Err(VariantError::Occupied { serial_number, key, there });
+                };
+                at = map.entry(part).or_insert(Value::Null);
+            }
+            *at = value(text);
+        }
+        Ok(())
+    }
+}
+
+/// A cell as YAML would read it: a number, or text.
+fn value(text: &str) -> Value {
+    if let Ok(whole) = text.parse::<u64>() {
+        return json!(whole);
+    }
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => json!(number),
+        _ => json!(text),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<Variant>, String> {
+        Variant::from_text(text, Path::new("machines.csv")).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn both_separators_remarks_and_gaps_are_read() {
+        let comma = read("# production of May\nserial_number,deviations.convection\nA,+5 %\nB,\n").unwrap();
+        let semicolon = read("serial_number; deviations.convection\nA; +5 %\nB;\n").unwrap();
+        assert_eq!(comma, semicolon);
+        assert_eq!(comma[0].settings["deviations.convection"], "+5 %");
+        assert!(comma[1].settings.is_empty());
+    }
+
+    #[test]
+    fn mistakes_say_their_line() {
+        for (text, expected) in [
+            ("name,x\nA,1\n", "no column is called `serial_number`"),
+            ("serial_number,x,x\nA,1,2\n", "the column `x` appears twice"),
+            ("serial_number,x\nA,1\nA,2\n", "line 3: the machine A appears twice"),
+            ("serial_number,x\nA,1\n,2\n", "line 3: the machine has no `serial_number`"),
+            ("serial_number,x\nA,1,2\n", "line: 2"),
+            ("serial_number,x\n", "no machine stands below the header"),
+            ("", "no column is called `serial_number`"),
+        ] {
+            let told = read(text).unwrap_err();
+            assert!(told.contains(expected), "{text:?}: {told}");
+        }
+    }
+
+    #[test]
+    fn settings_come_to_their_place_and_leave_the_others() {
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/grid18.yaml"));
+        let mut campaign = mapper_campaign::load(path).unwrap();
+        campaign.backend.settings = json!({"noise": "none", "deviations": {"valve_area": "1 %"}});
+        let settings =
+            [("deviations.convection", "+5 %"), ("machine.alpha_area", "0.1"), ("tolerances_seed", "7")];
+        let settings = settings.map(|(key, text)| (key.to_owned(), text.to_owned())).into();
+        let machine = Variant { serial_number: "X-1".to_owned(), settings };
+        machine.put_into(&mut campaign).unwrap();
+        assert_eq!(
+            campaign.backend.settings,
+            json!({
+                "noise": "none", "deviations": {"valve_area": "1 %", "convection": "+5 %"},
+                "machine": {"alpha_area": 0.1}, "tolerances_seed": 7
+            })
+        );
+        assert_eq!(campaign.machine.serial_number.as_deref(), Some("X-1"));
+        let settings = [("noise.of.t2".to_owned(), "1".to_owned())].into();
+        let error =
+            Variant { serial_number: "X-2".to_owned(), settings }.put_into(&mut campaign).unwrap_err();
+        assert!(error.to_string().contains("noise.of.t2"), "{error}");
+    }
+}

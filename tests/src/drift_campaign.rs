@@ -1,8 +1,7 @@
 //! A campaign that visits one jump again and again on a rig with tolerances, so that drift shows.
 
-use crate::{CampaignFile, mapper, repository};
-use serde_json::Value;
-use std::path::{Path, PathBuf};
+use crate::{CampaignFile, made_once, repository};
+use std::path::PathBuf;
 
 /// What is changed in the campaign of the gap rig.
 #[derive(Debug, Clone)]
@@ -60,12 +59,8 @@ impl DriftCampaign<'_> {
         CampaignFile::of(text)
     }
 
-    /// Runs it into `out` and gives its recording.
-    pub fn run(&self, out: &Path) -> PathBuf {
-        let campaign = self.write();
-        let arguments = ["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref()];
-        let result: Value =
-            mapper(arguments.into_iter().chain(["--out".as_ref(), out.as_os_str()])).exits(0).json();
-        PathBuf::from(result["recording"].as_str().unwrap())
+    /// The recording of its run, which other tests may look at too.
+    pub fn recording(&self) -> PathBuf {
+        made_once(&self.write()).run.join("recording.mcap")
     }
 }

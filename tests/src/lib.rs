@@ -5,6 +5,7 @@
 mod campaign;
 mod cluster;
 mod drift_campaign;
+mod made_once;
 mod program;
 mod python;
 pub mod tree;
@@ -12,6 +13,7 @@ pub mod tree;
 pub use campaign::{BY_ITSELF, CampaignFile, SHIPPED, SHORT_GRID};
 pub use cluster::Cluster;
 pub use drift_campaign::DriftCampaign;
+pub use made_once::{MadeOnce, made_once};
 pub use program::{Finished, build_driver, build_drivers, mapper, mapper_command, mapper_in};
 pub use python::python;
 

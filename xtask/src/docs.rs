@@ -22,6 +22,9 @@ const GENERATED: &[&str] = &["reproduction.md", "reproduction", "sequences.md", 
 /// The README's picture is the map of this campaign.
 const SHIPPED: &str = "campaigns/turbo_a.yaml";
 
+/// The example that writes the page of sequences.
+pub const EXAMPLE: &str = "sequence_docs";
+
 /// Folder of the measured data that docs/real-data.md speaks of, and what `mapper transient` is told of it.
 const MEASURED: &str = "examples/real/turbotools";
 
@@ -34,21 +37,19 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
         fs::remove_dir_all(&made).map_err(at(&made))?;
     }
     let programs = build()?;
-    run(command(&programs.mapper, &["reproduce", "--out", &made.to_string_lossy()]))?;
-    let page = output(command(&programs.sequence_docs, &[]))? + "\n";
-    write(&made.join("sequences.md"), page.as_bytes())?;
-
-    let runs = workspace::target_dir().join("xtask-docs-runs");
-    if runs.exists() {
-        fs::remove_dir_all(&runs).map_err(at(&runs))?;
-    }
-    run(command(&programs.mapper, &["run", SHIPPED, "--out", &runs.to_string_lossy()]))?;
-    for run in fs::read_dir(&runs).map_err(at(&runs))? {
-        let map = run.map_err(at(&runs))?.path().join("map.svg");
-        write(&made.join("turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
-    }
-
-    measured(&programs, &made)?;
+    // Side by side: each has one core to do.
+    let (reproduced, others) = std::thread::scope(|scope| {
+        let others = scope.spawn(|| {
+            let page = output(command(&programs.sequence_docs, &[]))? + "\n";
+            write(&made.join("sequences.md"), page.as_bytes())?;
+            mapped(&programs, &made)?;
+            measured(&programs, &made)
+        });
+        let reproduced = run(command(&programs.mapper, &["reproduce", "--out", &made.to_string_lossy()]));
+        (reproduced, others.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    });
+    reproduced?;
+    others?;
 
     let (new, old) = (contents(&made)?, contents(&docs)?);
     let names: BTreeSet<&PathBuf> = new.keys().chain(old.keys()).collect();
@@ -76,6 +77,20 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
         return Err(Error::Stale { differences });
     }
     say(&format!("{}\n", differences.join("\n")));
+    Ok(())
+}
+
+/// The map of the shipped campaign.
+fn mapped(programs: &Programs, made: &Path) -> Result<(), Error> {
+    let runs = workspace::target_dir().join("xtask-docs-runs");
+    if runs.exists() {
+        fs::remove_dir_all(&runs).map_err(at(&runs))?;
+    }
+    run(command(&programs.mapper, &["run", SHIPPED, "--out", &runs.to_string_lossy()]))?;
+    for run in fs::read_dir(&runs).map_err(at(&runs))? {
+        let map = run.map_err(at(&runs))?.path().join("map.svg");
+        write(&made.join("turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
+    }
     Ok(())
 }
 
@@ -107,13 +122,15 @@ struct Programs {
 /// Builds them as the tests are built: what is computed is the same to the bit in every profile, and a clone that is
 /// being worked on has most of it already.
 fn build() -> Result<Programs, Error> {
-    // The whole workspace is named so that libraries have the features that they have in the tests.
-    let arguments = ["build", "--quiet", "--workspace", "--all-features", "--tests", "--bin", "mapper"];
-    let examples = ["--example", "sequence_docs"];
+    // The whole workspace and a test of it are named so that libraries have the features that they have in the tests. One
+    // test: with all of them, those that are told what the machine offers would be built again without that.
+    let arguments =
+        ["build", "--quiet", "--workspace", "--all-features", "--test", "turbine", "--bin", "mapper"];
+    let examples = ["--example", EXAMPLE];
     run(command(workspace::cargo(), &[&arguments[..], &examples].concat()))?;
     let built = workspace::target_dir().join("debug");
     let program = |name: &str| built.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
-    Ok(Programs { mapper: program("mapper"), sequence_docs: program("examples/sequence_docs") })
+    Ok(Programs { mapper: program("mapper"), sequence_docs: program(&format!("examples/{EXAMPLE}")) })
 }
 
 fn write(path: &Path, content: &[u8]) -> Result<(), Error> {

@@ -9,6 +9,9 @@ use crate::tally::Tally;
 use crate::{machine, python_env, test_programs, workspace};
 use std::process::Command;
 
+/// Examples that a test or the documents run.
+const EXAMPLES: &[&str] = &["--example", "mapper-backend-misbehaving", "--example", docs::EXAMPLE];
+
 /// Formatting, lints, dependencies, documentation, tests, generated documents. All are run even where one fails; only
 /// preparations end it early.
 pub fn test() -> Result<(), Error> {
@@ -52,7 +55,8 @@ pub fn test() -> Result<(), Error> {
     steps.run("building", || {
         // The program in one go with all tests: alone it would have other features of some libraries, and they
         // would be built twice.
-        run(offered.to(cargo(&["build", "--workspace", "--all-features", "--bins", "--tests", "--quiet"])))
+        let all = ["build", "--workspace", "--all-features", "--bins", "--tests", "--quiet"];
+        run(offered.to(cargo(&[&all[..], EXAMPLES].concat())))
     });
     steps.run("tests", || tests(&offered));
     steps.run("generated documents", || docs::docs(docs::Mode::Check));
@@ -83,7 +87,10 @@ fn cargo(arguments: &[&str]) -> Command {
 fn tests(offered: &Offered) -> Result<(), Error> {
     let mut tally = Tally::default();
     let mut well = true;
-    for tests in [test_programs::tests("default"), test_programs::documentation_tests()] {
+    let mut programs = test_programs::tests("default");
+    // Not the examples, which lints have looked at: those that somebody needs are built.
+    programs.arg("--tests");
+    for tests in [programs, test_programs::documentation_tests()] {
         well &= test_programs::run(with_program(offered.to(tests)), &mut tally)?;
     }
     test_programs::close(&tally, well);

@@ -13,7 +13,12 @@ pub fn tests(profile: &str) -> Command {
     if machine::has_nextest() {
         let arguments =
             ["nextest", "run", "--workspace", "--all-features", "--no-fail-fast", "--profile", profile];
-        step::command(workspace::cargo(), &[&arguments[..], &["--color", "never"]].concat())
+        let mut command =
+            step::command(workspace::cargo(), &[&arguments[..], &["--color", "never"]].concat());
+        // One more than there are cores: a test in real time mostly waits.
+        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        command.arg("--test-threads").arg((cores + 1).to_string());
+        command
     } else {
         step::command(
             workspace::cargo(),

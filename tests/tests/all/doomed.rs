@@ -1,5 +1,6 @@
 //! Campaigns of which nothing can come are told so before the night, not after it.
 
+use crate::shipped_campaign::tells_the_time_of;
 use mapper_tests::{CampaignFile, SHORT_GRID, mapper};
 
 /// The shipped campaign on a short grid, with parts replaced.
@@ -35,18 +36,11 @@ fn what_will_come_to_little_is_a_warning() {
     }
 }
 
-/// One time, however it is asked for: soak, warm-up, repeats and the way back included.
+/// The same of a campaign whose steps a script makes; `shipped_campaign.rs` has the one that is planned.
 #[test]
 fn check_and_plan_tell_the_same_time() {
-    for name in ["turbo_a", "turbo_a_adiabatic"] {
-        let campaign = format!("campaigns/{name}.yaml");
-        let checked = mapper(["check", &campaign, "--json"]).exits(0).json();
-        let plan = mapper(["plan", &campaign, "--json"]).exits(0).json();
-        let soak_min = plan["soak_s"].as_f64().unwrap() / 60.0;
-        let planned_min = soak_min + plan["figures"]["minutes"].as_f64().unwrap();
-        let minutes = checked["minutes"].as_f64().unwrap();
-        assert!((minutes - planned_min).abs() < 1e-6, "{name}: {minutes} min and {planned_min} min");
-        assert_eq!(checked["steps"].as_u64().unwrap() as usize, plan["steps"].as_array().unwrap().len());
-        assert_eq!(checked["warnings"].as_array().unwrap().len(), 0, "{checked}");
-    }
+    let campaign = "campaigns/turbo_a_adiabatic.yaml";
+    let checked = mapper(["check", campaign, "--json"]).exits(0).json();
+    let plan = mapper(["plan", campaign, "--json"]).exits(0).json();
+    tells_the_time_of(&checked, &plan, plan["soak_s"].as_f64().unwrap() / 60.0);
 }

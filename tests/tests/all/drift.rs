@@ -1,6 +1,6 @@
 //! Drift planted in the virtual lab, found by `mapper drift` in what was recorded.
 
-use mapper_tests::{DriftCampaign, mapper, scratch};
+use mapper_tests::{DriftCampaign, mapper};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -27,9 +27,8 @@ fn is_found(report: &Value, verdict: &str, cause: &str, (course, size): (&str, f
 
 #[test]
 fn planted_drifts_are_found_and_none_is_none() {
-    let scratch = scratch();
     let judge = |drift_key: &str, seed: u32| {
-        drift(&[&DriftCampaign { drift: drift_key, seed, ..DriftCampaign::default() }.run(scratch.path())])
+        drift(&[&DriftCampaign { drift: drift_key, seed, ..DriftCampaign::default() }.recording()])
     };
     let none = judge("", 21);
     assert_eq!(
@@ -51,10 +50,8 @@ fn planted_drifts_are_found_and_none_is_none() {
 
 #[test]
 fn nights_of_one_campaign_are_judged_together_and_another_machine_is_refused() {
-    let scratch = scratch();
     let night = |seed, drift, replaced: &[(&str, &str)]| {
-        let campaign = DriftCampaign { drift, seed, replaced, ..DriftCampaign::default() };
-        campaign.run(&scratch.path().join(seed.to_string()))
+        DriftCampaign { drift, seed, replaced, ..DriftCampaign::default() }.recording()
     };
     // A rig is one from night to night, its noise is not: offsets and tolerances are left out, the seed differs.
     let same_rig: &[(&str, &str)] =
@@ -73,13 +70,16 @@ fn nights_of_one_campaign_are_judged_together_and_another_machine_is_refused() {
     let another_seed = night(32, "", same_rig);
     let two = drift(&[&first, &another_seed]);
     assert!(!two["reason"].as_str().unwrap().starts_with("No verdict"), "{}", two["reason"]);
-    // A rebuilt machine is another machine, and so is one of another name.
-    let rebuilt = night(
+    // A rebuilt machine is another machine, and so is one of another name. A short night shows it.
+    let short_night = |seed, replaced: &[(&str, &str)]| {
+        let speeds = "[90 krpm, 130 krpm, 70 krpm]";
+        DriftCampaign { speeds, every: 4, seed, replaced, ..DriftCampaign::default() }.recording()
+    };
+    let rebuilt = short_night(
         33,
-        "",
         &[("  map: closed_form\n", "  map: closed_form\n  geometry: {bearing: {oil_conductance: 9 W/K}}\n")],
     );
-    let renamed = night(34, "", &[("  serial_number: TA-0001\n", "  serial_number: TA-0002\n")]);
+    let renamed = short_night(34, &[("  serial_number: TA-0001\n", "  serial_number: TA-0002\n")]);
     for other in [rebuilt, renamed] {
         let refused = drift(&[&first, &other]);
         assert_eq!([&refused["verdict"], &refused["cause"]], [&Value::from("unclear"), &Value::Null]);
@@ -91,13 +91,15 @@ fn nights_of_one_campaign_are_judged_together_and_another_machine_is_refused() {
 /// An ordinary drift is not an effect, and the diagnosis says that it was there.
 #[test]
 fn the_gap_diagnosis_looks_for_drift_first() {
-    let scratch = scratch();
     let campaign = DriftCampaign {
         drift: "{cause: T2, change: 0.8 K, over: 1 h}",
         seed: 41,
+        // Half an hour shows it: the diagnosis takes long over each step.
+        speeds: "[90 krpm, 130 krpm, 70 krpm]",
+        every: 4,
         ..DriftCampaign::default()
     };
-    let recording = campaign.run(scratch.path());
+    let recording = campaign.recording();
     let file = campaign.write();
     let arguments: [PathBuf; 5] =
         ["gap".into(), "diagnose".into(), file.path.clone(), "--recording".into(), recording];

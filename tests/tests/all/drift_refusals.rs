@@ -65,9 +65,10 @@ struct Case<'a> {
 #[test]
 fn what_cannot_be_judged_gets_a_clear_word_and_no_verdict() {
     let scratch = scratch();
-    let campaign = DriftCampaign { seed: 51, ..DriftCampaign::default() };
+    // The sound one of `drift.rs`.
+    let campaign = DriftCampaign { seed: 21, ..DriftCampaign::default() };
     let file = campaign.write();
-    let own = campaign.run(scratch.path());
+    let own = campaign.recording();
     let whole = read_recording(&own, &ChannelMap::native(), &ReadOptions::default()).unwrap().recording;
     let jump =
         |step: &mapper_core::StepMarker| step.from.zip(step.to).map(|(a, b)| (a.speed_rpm, b.speed_rpm));

@@ -26,7 +26,7 @@ fn workers(directory: &Path) -> Vec<String> {
 fn killed_and_failed_items_are_named_and_a_retry_finishes() {
     let scratch = scratch();
     let folder = scratch.path().canonicalize().unwrap();
-    let study = write_study(&folder, 25);
+    let study = write_study(&folder, 12);
     let (here, there) = (folder.join("here"), folder.join("there"));
     make(&study, &here);
     make(&study, &there);
@@ -47,7 +47,7 @@ fn killed_and_failed_items_are_named_and_a_retry_finishes() {
         Finished::from(finished).exits(8);
     }
 
-    let limits = ["--slurm", "--task", "0.04", "--array-limit", "12", "--json"];
+    let limits = ["--slurm", "--task", "0.02", "--array-limit", "12", "--json"];
     let sent = on(&cluster, fleet("submit", &there, &limits)).exits(0).json();
     assert!((3..=12).contains(&sent["tasks"].as_u64().unwrap()), "{sent}");
     let mut killed: Vec<String> = Vec::new();
@@ -79,7 +79,7 @@ fn killed_and_failed_items_are_named_and_a_retry_finishes() {
     let said =
         std::fs::read_to_string(there.join(format!("log/merge-{}.txt", again["merge"].as_str().unwrap())))
             .unwrap();
-    assert!(said.contains("merged 50 of 50 items"), "{said}");
+    assert!(said.contains("merged 24 of 24 items"), "{said}");
     on(&cluster, fleet("retry", &there, &[])).exits(3);
 
     Finished::from(mapper_command(fleet("run", &here, &[])).output().unwrap()).exits(0);

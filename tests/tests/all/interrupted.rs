@@ -16,10 +16,10 @@ const LONG: &[(&str, &str)] = &[
     ("required_sigma_eta: 0.5 %\n", ""),
     // The order is not what is tried here, and its search would take most of the time.
     ("order: information ", "order: listed "),
-    ("dwell: 120 s ", "dwell: 30 min "),
+    ("dwell: 120 s ", "dwell: 10 min "),
 ];
-/// About an hour and a quarter of the rig's time, two steps of half an hour.
-const SOME_STEPS_BYTES: u64 = 20_000_000;
+/// About fifty minutes of the rig's time, two steps of ten minutes.
+const SOME_STEPS_BYTES: u64 = 13_500_000;
 /// Without any news of the recording for so long the test gives up: a run writes each second of its own clock, thousands of
 /// which take a second.
 const LONGEST_SILENCE: Duration = Duration::from_secs(120);
@@ -118,33 +118,28 @@ fn killed_run() -> (CampaignFile, PathBuf) {
 }
 
 #[test]
-fn what_a_killed_run_has_recorded_can_be_identified() {
+fn what_a_killed_run_has_recorded_can_be_read_and_identified() {
     let (_campaign, recording) = killed_run();
     let report = read(&recording);
     let finished_steps = report.recording.steps.len();
-    // Half an hour each after half an hour of rest and a minute of warm-up; the last one was under way.
+    // Ten minutes each after half an hour of rest and a minute of warm-up; the last one was under way.
     let samples = report.recording.series.values().map(|series| series.t_s.len()).min().unwrap();
     let seconds = samples as f64 / 10.0;
-    assert!(seconds > 3000.0, "{seconds} s were saved");
-    assert_eq!(finished_steps, 1 + ((seconds - 60.0 - 1800.0) / 1800.0).floor() as usize);
+    assert!(seconds > 2500.0, "{seconds} s were saved");
+    assert_eq!(finished_steps, 1 + ((seconds - 60.0 - 1800.0) / 600.0).floor() as usize);
     let run = recording.parent().unwrap();
     let result = mapper(["identify".as_ref(), run.as_os_str(), "--json".as_ref()]).exits(0).json();
     let points = result["points"].as_array().unwrap();
     assert_eq!(points.len(), finished_steps);
     assert!(points[1]["eta"].is_f64(), "{}", points[1]);
     assert!(!result["recording_warnings"].as_array().unwrap().is_empty(), "the cut is not mentioned");
-}
-
-#[test]
-#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn what_a_killed_run_has_recorded_can_be_read_by_others() {
-    let (_campaign, recording) = killed_run();
-    let seen = python("read_recording.py", [&recording]);
-    assert_eq!(seen["complete"], false);
-    let report = read(&recording);
-    let ours = report.recording.series.values().map(|series| series.t_s.len()).max().unwrap();
-    assert_eq!(seen["topics"]["/rig/compressor"]["messages"], ours);
-    assert!(ours > 30_000, "{ours} samples");
+    // By others too.
+    if cfg!(with_python) {
+        let seen = python("read_recording.py", [&recording]);
+        assert_eq!(seen["complete"], false);
+        let ours = report.recording.series.values().map(|series| series.t_s.len()).max().unwrap();
+        assert_eq!(seen["topics"]["/rig/compressor"]["messages"], ours);
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Logs of other programs, written by those programs' own libraries: looked into, mapped, identified.
 
-use mapper_tests::{CampaignFile, Finished, mapper, python, repository, scratch};
+use mapper_tests::{CampaignFile, Finished, made_once, mapper, python, repository, scratch};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -22,10 +22,7 @@ impl Run {
             text = text.replace(old, new);
         }
         let (campaign, directory) = (CampaignFile::of(text), scratch());
-        let out = directory.path().join("runs");
-        let arguments =
-            ["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref(), "--out".as_ref(), out.as_os_str()];
-        let recording = PathBuf::from(mapper(arguments).exits(0).json()["recording"].as_str().unwrap());
+        let recording = made_once(&campaign).run.join("recording.mcap");
         Run { campaign, recording, directory }
     }
 

@@ -40,6 +40,7 @@ mod speed_lines;
 mod stopped;
 mod surge;
 mod terminal;
+mod tested;
 mod together;
 mod tour;
 mod transient;

@@ -1,6 +1,6 @@
 //! Commands on maps, as a user runs them.
 
-use mapper_tests::{CampaignFile, SHORT_GRID, mapper, only_run, python, repository, scratch};
+use mapper_tests::{CampaignFile, SHORT_GRID, made_once, mapper, python, repository, scratch};
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -132,10 +132,8 @@ fn a_map_differs_from_itself_nowhere() {
 #[test]
 fn a_run_gives_the_turbine_that_the_rig_has_and_its_pictures() {
     let scratch = scratch();
-    let campaign = CampaignFile::shipped_with(SHORT_GRID);
-    let runs = scratch.path().join("runs");
-    mapper(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), runs.as_os_str()]).exits(0);
-    let (recording, out) = (only_run(&runs), scratch.path().join("rig"));
+    let recording = made_once(&CampaignFile::shipped_with(SHORT_GRID)).run;
+    let out = scratch.path().join("rig");
     let arguments =
         || ["rig".as_ref(), recording.as_os_str(), "--out".as_ref(), out.as_os_str(), "--json".as_ref()];
     let result = run(arguments()).exits(0).json();

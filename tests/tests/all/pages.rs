@@ -1,15 +1,19 @@
 //! Pages that the program writes, in a browser.
 
-use mapper_tests::{CampaignFile, mapper, mapper_command, only_run, pictures, python, repository, scratch};
+use mapper_tests::{CampaignFile, made_once, mapper, mapper_command, pictures, python, repository, scratch};
 use std::process::Command;
 
-/// A rig with a probe that conducts along its stem, four points of it.
-const FOUR_POINTS_AND_AN_EFFECT: &[(&str, &str)] = &[
+/// Four points of the gap rig.
+pub(crate) const FOUR_POINTS: &[(&str, &str)] = &[
     (
         "speeds: [90 krpm, 150 krpm, 50 krpm, 130 krpm, 70 krpm, 110 krpm]",
         "speeds: [90 krpm, 150 krpm, 60 krpm, 120 krpm]",
     ),
     ("openings: [0.5, 0.7, 1.0]", "openings: [0.9]"),
+];
+
+/// Shorter ones, and a probe that conducts along its stem.
+const SHORTER_AND_AN_EFFECT: &[(&str, &str)] = &[
     ("dwell: 120 s", "dwell: 60 s"),
     ("end: 110 s}", "end: 55 s}"),
     ("    weather: wandering\n", "    weather: wandering\n    effects: {stem_conduction: 8 %}\n"),
@@ -19,13 +23,12 @@ const FOUR_POINTS_AND_AN_EFFECT: &[(&str, &str)] = &[
 #[cfg_attr(not(with_chromium), ignore = "needs Chromium: run `cargo xtask test`")]
 fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     let shipped = std::fs::read_to_string(repository().join("campaigns/gap_rig.yaml")).unwrap();
-    let text = FOUR_POINTS_AND_AN_EFFECT.iter().fold(shipped, |text, (from, to)| {
+    let text = FOUR_POINTS.iter().chain(SHORTER_AND_AN_EFFECT).fold(shipped, |text, (from, to)| {
         assert!(text.contains(from), "{from}");
         text.replace(from, to)
     });
     let campaign = CampaignFile::of(text);
-    mapper(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), campaign.runs().as_os_str()])
-        .exits(0);
+    let run = made_once(&campaign).run;
     let scratch = scratch();
     let page = scratch.path().join("gap.html");
     let diagnosed = mapper([
@@ -33,7 +36,7 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
         "diagnose".as_ref(),
         campaign.path.as_os_str(),
         "--recording".as_ref(),
-        only_run(&campaign.runs()).as_os_str(),
+        run.as_os_str(),
         "--json".as_ref(),
         "--html".as_ref(),
         page.as_os_str(),
@@ -61,7 +64,6 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
 
     // The same on the page of the run.
     let whole = scratch.path().join("run.html");
-    let run = only_run(&campaign.runs());
     let arguments = ["report".as_ref(), run.as_os_str(), "--gap".as_ref(), campaign.path.as_os_str()];
     mapper(arguments.into_iter().chain(["-o".as_ref(), whole.as_os_str()])).exits(0);
     if option_env!("MAPPER_TEST_PYTHON").is_some() {
@@ -100,13 +102,9 @@ const NINE_POINTS: &[(&str, &str)] = &[
     ("operator: virtual\n", "operator: '</script><img src=x onerror=alert(1)>'\n"),
 ];
 
-/// A run of them: its campaign, which goes away with the returned value, and its directory.
-fn run_of_nine_points() -> (CampaignFile, std::path::PathBuf) {
-    let campaign = CampaignFile::shipped_with(NINE_POINTS);
-    let runs = campaign.runs();
-    mapper(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), runs.as_os_str()]).exits(0);
-    let run = only_run(&runs);
-    (campaign, run)
+/// The directory of a run of them.
+fn run_of_nine_points() -> std::path::PathBuf {
+    made_once(&CampaignFile::shipped_with(NINE_POINTS)).run
 }
 
 #[test]
@@ -115,7 +113,7 @@ fn run_of_nine_points() -> (CampaignFile, std::path::PathBuf) {
     ignore = "needs Chromium and Python: run `cargo xtask test`"
 )]
 fn the_page_of_a_run_is_read_as_people_do() {
-    let (_campaign, run) = run_of_nine_points();
+    let run = run_of_nine_points();
     let page = run.join("report.html");
     let text = std::fs::read_to_string(&page).unwrap();
     // A night of 60 points has to fit into 2 MB; this one is smaller, and most of it are the two libraries.
@@ -221,7 +219,7 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
 
 #[test]
 fn another_run_is_drawn_beside_the_first_and_nothing_is_overwritten() {
-    let (_campaign, run) = run_of_nine_points();
+    let run = run_of_nine_points();
     let folder = scratch();
     let out = folder.path().join("both.html");
     let made =

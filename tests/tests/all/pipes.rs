@@ -1,13 +1,19 @@
 //! Output whose reader goes away, and output that is not a terminal.
 
-use mapper_tests::{SHIPPED, mapper, mapper_command};
+use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, mapper_command};
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
+/// Four points: what is printed matters here, not what is searched for.
+fn campaign() -> CampaignFile {
+    CampaignFile::shipped_with(&[SHORT_GRID, BY_ITSELF].concat())
+}
+
 #[test]
 fn a_reader_that_goes_away_is_no_error() {
-    let commands: [&[&str]; 4] =
-        [&["plan", SHIPPED], &["plan", SHIPPED, "--json"], &["schema"], &["check", SHIPPED]];
+    let campaign = campaign();
+    let file = campaign.path.to_str().unwrap();
+    let commands: [&[&str]; 4] = [&["plan", file], &["plan", file, "--json"], &["schema"], &["check", file]];
     for arguments in commands {
         let mut child =
             mapper_command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -22,20 +28,27 @@ fn a_reader_that_goes_away_is_no_error() {
 
 #[test]
 fn the_first_line_can_be_read_and_the_rest_left() {
-    let mut child =
-        mapper_command(["plan", SHIPPED]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut first = String::new();
-    let mut reader = BufReader::with_capacity(16, child.stdout.take().unwrap());
-    reader.read_line(&mut first).unwrap();
-    drop(reader);
-    assert!(first.contains("step"), "{first}");
-    let output = child.wait_with_output().unwrap();
-    assert_eq!((output.status.code(), output.stderr), (Some(0), Vec::new()));
+    let campaign = campaign();
+    // More than a pipe holds, and a page of text.
+    let commands: [(&[&str], &str); 2] =
+        [(&["schema"], "{"), (&["plan", campaign.path.to_str().unwrap()], "step")];
+    for (arguments, word) in commands {
+        let mut child =
+            mapper_command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut first = String::new();
+        let mut reader = BufReader::with_capacity(16, child.stdout.take().unwrap());
+        reader.read_line(&mut first).unwrap();
+        drop(reader);
+        assert!(first.contains(word), "{first}");
+        let output = child.wait_with_output().unwrap();
+        assert_eq!((output.status.code(), output.stderr), (Some(0), Vec::new()));
+    }
 }
 
 #[test]
 fn a_pipe_gets_no_colours_and_no_progress() {
-    let finished = mapper(["plan", SHIPPED]).exits(0);
+    let campaign = campaign();
+    let finished = mapper(["plan".as_ref(), campaign.path.as_os_str()]).exits(0);
     assert!(!finished.stdout.contains('\u{1b}') && !finished.stdout.contains('\r'), "{}", finished.stdout);
     assert_eq!(finished.stderr, "");
 }

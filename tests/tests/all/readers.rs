@@ -4,7 +4,8 @@
 use mapper_core::{Channel, EventKind, Quality};
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use mapper_tests::{
-    BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_driver, mapper, mapper_command, only_run, python,
+    BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_driver, made_once, mapper, mapper_command, only_run,
+    python,
 };
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -66,8 +67,7 @@ fn a_channel_that_is_read_elsewhere_stands_in_the_recording_and_in_the_points() 
 #[test]
 fn mistakes_of_readers_are_told_at_their_place() {
     let other = CampaignFile::shipped_with(&SHORT_GRID.iter().chain(BY_ITSELF).copied().collect::<Vec<_>>());
-    run(&other).exits(0);
-    let recording = only_run(&other.runs()).join("recording.mcap");
+    let recording = made_once(&other).run.join("recording.mcap");
     let replay = format!("{{replay: {{recording: {}}}}}", recording.display());
     for (readers, words) in [
         ("  bench: {backend: {virtual_lab: {}}, channels: [T2]}\n".to_owned(), "a reader is only read"),

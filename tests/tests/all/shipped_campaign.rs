@@ -1,12 +1,12 @@
 //! The main job: the shipped campaign, from the file to the map.
 
-use mapper_tests::{CampaignFile, Finished, SHIPPED, mapper, only_run, scratch};
+use mapper_tests::{CampaignFile, MadeOnce, SHIPPED, made_once, mapper};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-fn run_into(out: &Path) -> Finished {
-    mapper(["run".as_ref(), SHIPPED.as_ref(), "--json".as_ref(), "--out".as_ref(), out.as_os_str()]).exits(0)
+fn shipped() -> MadeOnce {
+    made_once(&CampaignFile::shipped_with(&[]))
 }
 
 /// Keys that scripts rely on, of the one object that `mapper run --json` prints.
@@ -30,15 +30,11 @@ const POINT_KEYS: &[&str] = &[
 
 #[test]
 fn the_shipped_campaign_gives_a_map() {
-    let scratch = scratch();
-    let out = scratch.path().join("runs");
-    let finished = run_into(&out);
-    assert_eq!(finished.stderr, "", "a run into a pipe is quiet");
-    let result = finished.json();
+    let MadeOnce { run, result, stderr } = shipped();
+    assert_eq!(stderr, "", "a run into a pipe is quiet");
     for key in RUN_KEYS {
         assert!(!result[key].is_null(), "{key}");
     }
-    let run = only_run(&out);
     assert_eq!(result["run"], run.to_str().unwrap());
     assert!(Path::new(result["recording"].as_str().unwrap()).is_file());
     for format in ["csv", "json", "svg"] {
@@ -123,10 +119,7 @@ fn intervals_of_good_points_hold_over_seeds() {
     let (mut good, mut right) = (0, 0);
     for seed in 1..=4 {
         let campaign = CampaignFile::shipped_with(&[("seed: 1 ", &format!("seed: {seed} "))]);
-        let out = campaign.runs();
-        let arguments =
-            ["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref(), "--out".as_ref(), out.as_os_str()];
-        let result = mapper(arguments).exits(0).json();
+        let result = made_once(&campaign).result;
         for point in result["points"].as_array().unwrap().iter().filter(|point| point["verdict"] == "good") {
             let [low, high] = ["eta_low", "eta_high"].map(|key| point[key].as_f64().unwrap());
             good += 1;
@@ -158,13 +151,28 @@ fn each_line_goes_from_surge_to_choke(points: &[Value], lines: &BTreeSet<i64>) {
 
 #[test]
 fn identification_of_the_run_directory_gives_the_points_of_the_run() {
-    let scratch = scratch();
-    let out = scratch.path().join("runs");
-    let of_run = run_into(&out).json();
-    let run = only_run(&out);
+    let MadeOnce { run, result: of_run, .. } = shipped();
     let of_directory = mapper(["identify".as_ref(), run.as_os_str(), "--json".as_ref()]).exits(0).json();
     assert_eq!(of_directory["points"], of_run["points"]);
     let file = run.join("recording.mcap");
     let of_file = mapper(["identify".as_ref(), file.as_os_str(), "--json".as_ref()]).exits(0).json();
     assert_eq!(of_file["points"], of_run["points"]);
+}
+
+/// One time, however it is asked for: soak, warm-up, repeats and the way back included. The plan is the one that the run made.
+#[test]
+fn check_tells_the_time_of_the_plan_and_has_nothing_to_warn_of() {
+    let checked = mapper(["check", SHIPPED, "--json"]).exits(0).json();
+    let plan = std::fs::read_to_string(shipped().run.join("plan.json")).unwrap();
+    // A stored plan begins behind the soak, which is the campaign's.
+    tells_the_time_of(&checked, &serde_json::from_str(&plan).unwrap(), 30.0);
+}
+
+/// What `mapper check --json` says of a campaign is what its plan and its soak say, without a warning.
+pub(crate) fn tells_the_time_of(checked: &Value, plan: &Value, soak_min: f64) {
+    let planned_min = soak_min + plan["figures"]["minutes"].as_f64().unwrap();
+    let minutes = checked["minutes"].as_f64().unwrap();
+    assert!((minutes - planned_min).abs() < 1e-6, "{minutes} min and {planned_min} min");
+    assert_eq!(checked["steps"].as_u64().unwrap() as usize, plan["steps"].as_array().unwrap().len());
+    assert_eq!(checked["warnings"].as_array().unwrap().len(), 0, "{checked}");
 }

@@ -1,6 +1,6 @@
 //! Recordings identified afterwards: what `run` leaves, and several as one map.
 
-use mapper_tests::{CampaignFile, Finished, SHORT_GRID, mapper, only_run, scratch};
+use mapper_tests::{CampaignFile, Finished, SHORT_GRID, made_once, mapper, scratch};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -9,9 +9,7 @@ const SPEEDS: &str = "speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125
 const OPENINGS: &str = "openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]";
 
 fn run(campaign: &CampaignFile) -> PathBuf {
-    let out = campaign.runs();
-    mapper(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), out.as_os_str()]).exits(0);
-    only_run(&out)
+    made_once(campaign).run
 }
 
 fn identify(recordings: &[&Path], more: &[&str]) -> Finished {
@@ -29,8 +27,7 @@ fn points(json: &Value) -> &Vec<Value> {
 
 #[test]
 fn a_recording_identified_again_leaves_what_its_run_has_left() {
-    let campaign = CampaignFile::shipped_with(SHORT_GRID);
-    let (run, scratch) = (run(&campaign), scratch());
+    let (run, scratch) = (run(&CampaignFile::shipped_with(SHORT_GRID)), scratch());
     let out = scratch.path().join("again");
     identify(&[&run], &["--out", out.to_str().unwrap()]).exits(0);
     for file in ["points.json", "map.csv", "map.json", "map.svg"] {

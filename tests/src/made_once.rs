@@ -1,0 +1,73 @@
+//! Runs that several tests look at: made by the first that asks, kept below the target folder for the others.
+//!
+//! Tests are processes of their own, so that nothing in memory is shared. A test of what a run does makes its own one.
+
+use crate::{CampaignFile, Finished, mapper_command, only_run, repository};
+use serde_json::Value;
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+
+/// A finished run: to be looked at, not to be written into.
+#[derive(Debug)]
+pub struct MadeOnce {
+    /// Its directory.
+    pub run: PathBuf,
+    /// What it printed with `--json`.
+    pub result: Value,
+    /// What it said on standard error.
+    pub stderr: String,
+}
+
+/// The run of this campaign, which names no files, by this program. It has to end well.
+pub fn made_once(campaign: &CampaignFile) -> MadeOnce {
+    let program = hash(|hasher| {
+        let program = mapper_command([""; 0]).get_program().to_owned();
+        let built = fs::metadata(&program).unwrap();
+        (program, built.len(), built.modified().unwrap()).hash(hasher);
+    });
+    let all = repository().join("target/made-once");
+    let folder = all.join(program).join(hash(|hasher| campaign.text.hash(hasher)));
+    fs::create_dir_all(&all).unwrap();
+    remove_others(&all, folder.parent().unwrap());
+    fs::create_dir_all(&folder).unwrap();
+    // Who comes second waits until it is there.
+    let lock = fs::File::create(folder.join("lock")).unwrap();
+    lock.lock().unwrap();
+    let (runs, printed, said) = (folder.join("runs"), folder.join("printed.json"), folder.join("said.txt"));
+    // What is printed is kept last.
+    if !printed.exists() {
+        let _ = fs::remove_dir_all(&runs);
+        let file = folder.join("campaign.yaml");
+        fs::write(&file, &campaign.text).unwrap();
+        let arguments =
+            ["run".as_ref(), file.as_os_str(), "--json".as_ref(), "--out".as_ref(), runs.as_os_str()];
+        let mut command = mapper_command(arguments);
+        // Locks and latches of its own.
+        command.env("MAPPER_STATE_DIR", folder.join("states"));
+        let finished = Finished::from(command.output().unwrap()).exits(0);
+        fs::write(&said, finished.stderr).unwrap();
+        let unfinished = folder.join("printing.json");
+        fs::write(&unfinished, finished.stdout).unwrap();
+        fs::rename(&unfinished, &printed).unwrap();
+    }
+    MadeOnce {
+        run: only_run(&runs),
+        result: serde_json::from_slice(&fs::read(&printed).unwrap()).unwrap(),
+        stderr: fs::read_to_string(&said).unwrap(),
+    }
+}
+
+fn hash(of: impl FnOnce(&mut DefaultHasher)) -> String {
+    let mut hasher = DefaultHasher::new();
+    of(&mut hasher);
+    format!("{:016x}", hasher.finish())
+}
+
+/// What earlier programs have made is of no use to anybody.
+fn remove_others(all: &Path, ours: &Path) {
+    for entry in fs::read_dir(all).unwrap().flatten().filter(|entry| entry.path() != ours) {
+        // Another test may be at it.
+        let _ = fs::remove_dir_all(entry.path());
+    }
+}

@@ -34,7 +34,10 @@ pub(crate) fn forecast(
     dwell_s: f64,
     has_jump: bool,
 ) -> Result<Forecast, SimulationError> {
-    let step = forecast_step(request.model, state, boundary, dwell_s)?;
+    let step = match request.simulations {
+        Some(simulations) => simulations.step(request.model, state, boundary, dwell_s)?,
+        None => forecast_step(request.model, state, boundary, dwell_s)?,
+    };
     let mut predicted = step.predicted(&request.window, &request.settle_bands, has_jump);
     if has_jump && request.method.is_some_and(|method| !method.is_joint()) {
         with_errors(request, &step, dwell_s, &mut predicted);

@@ -31,6 +31,7 @@ mod request;
 mod rest;
 mod retimed;
 mod search;
+mod simulations;
 mod stage;
 mod walk;
 
@@ -47,3 +48,4 @@ pub use request::{PlanError, PlanRequest, UnreachablePoint};
 pub use rest::{Now, Reordering, Walked, after_step, before_first_step, walk_on};
 pub use retimed::{Retimed, forecast_longer, with_dwells};
 pub use search::{Effort, search, search_worst};
+pub use simulations::Simulations;

@@ -165,6 +165,7 @@ mod tests {
                 surge_margin_min_ratio: None,
                 housing_gradient_max_k: None,
             },
+            simulations: None,
             repeats: None,
             return_to_first: false,
             appended: None,

@@ -95,7 +95,7 @@ fn plan_with(
     let mut made = stage.made(first, rough, None)?;
     let dwell_s = |made: &Made| {
         let dwells_s: Vec<f64> = made.steps().iter().map(|step| step.dwell_s).collect();
-        mean(&dwells_s).unwrap_or(longest_s)
+        mean(&dwells_s).unwrap_or(longest_s).round()
     };
     if !informed {
         made = stage.made(first, Sought { dwell_s: dwell_s(&made), ..usual }, None)?;

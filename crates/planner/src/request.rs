@@ -1,6 +1,7 @@
 //! What a plan is made from.
 
 use crate::method::PredictedMethod;
+use crate::simulations::Simulations;
 use mapper_core::{Jump, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::model::Model;
@@ -43,6 +44,8 @@ pub struct PlanRequest<'a> {
     pub required_sigma_eta: Option<f64>,
     /// The identification method; without one no errors are predicted.
     pub method: Option<&'a dyn PredictedMethod>,
+    /// Where simulated steps are kept, made for this model and the longest of the dwells; without one each is simulated anew.
+    pub simulations: Option<&'a Simulations>,
     /// Work of the search, 1 for the usual; larger searches longer, 0 hardly at all.
     pub effort: f64,
     /// Seed of the search, passed on to simulated rigs.

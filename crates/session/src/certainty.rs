@@ -246,16 +246,15 @@ impl DwellPrices {
         } else {
             rested_dwell_s(&planned.step, SHORTEST_S.min(longest_s), longest_s)
         };
-        let apart_s = APART_S.max((longest_s - shortest_s) / MOST_TRIED);
+        // Whole seconds, as all dwells are.
+        let apart_s = APART_S.max(((longest_s - shortest_s) / MOST_TRIED).ceil());
         let last_s = if as_planned { shortest_s } else { longest_s };
         let back = (LAST_S / apart_s).ceil().max(1.0) as usize;
         let first_s = shortest_s - back as f64 * apart_s;
         let times_s = (0..).map(|i: u32| first_s + f64::from(i) * apart_s);
         let times_s: Vec<f64> = times_s.take_while(|s| *s <= last_s + 1e-6).collect();
-        let tells: Vec<Option<StepInformation>> = times_s
-            .iter()
-            .map(|s| self.information.of_forecast(&planned.forecast(*s), &self.forecast_config))
-            .collect();
+        let whole = planned.forecast(longest_s.max(last_s));
+        let tells = self.information.of_forecast_ended(&whole, &times_s, &self.forecast_config);
         let of = |now: usize| {
             let (earlier, tells) = (tells[now - back].as_ref()?, tells[now].clone()?);
             let took_s = times_s[now] - times_s[now - back];

@@ -7,7 +7,7 @@ use mapper_campaign::Campaign;
 use mapper_core::{JointSettings, Method};
 use mapper_identify::{IdentifyConfig, ZeroSettings, expected_after_zero};
 use mapper_physics::model::Model;
-use mapper_planner::{PlanRequest, PredictedMethod};
+use mapper_planner::{PlanRequest, PredictedMethod, Simulations};
 
 /// The nominal model of a campaign.
 ///
@@ -34,15 +34,20 @@ pub fn with_plan_request<T, E: From<SessionError>>(
 pub(crate) struct PlanMaterial {
     canonical: String,
     method: Option<Box<dyn PredictedMethod>>,
+    simulations: Simulations,
 }
 
 impl PlanMaterial {
     pub(crate) fn of(campaign: &Campaign) -> Result<Self, SessionError> {
         let canonical = serde_json::to_string(campaign)?;
-        Ok(PlanMaterial { canonical, method: predicted_method(campaign) })
+        Ok(PlanMaterial {
+            canonical,
+            method: predicted_method(campaign),
+            simulations: Simulations::new(campaign.timing.dwell_s, campaign.points.len()),
+        })
     }
 
-    /// `campaign`: the one that this was made of.
+    /// `campaign`: the one that this was made of, and `model` always the same.
     pub(crate) fn request<'a>(&'a self, campaign: &'a Campaign, model: &'a Model) -> PlanRequest<'a> {
         PlanRequest {
             campaign_name: &campaign.name,
@@ -61,6 +66,7 @@ impl PlanMaterial {
             return_to_first: campaign.return_to_first && self.method.is_some(),
             required_sigma_eta: campaign.required_sigma_eta,
             method: self.method.as_deref(),
+            simulations: Some(&self.simulations),
             effort: 1.0,
             seed: campaign.seed,
         }

@@ -245,7 +245,7 @@ pub(crate) fn reordering(
     prices: &DwellPrices,
 ) -> Result<Reordering<StepInformation>, SessionError> {
     let dwells_s: Vec<f64> = plan.steps.iter().map(|step| step.dwell_s).collect();
-    let dwell_s = mean(&dwells_s).unwrap_or(request.timing.dwell_s);
+    let dwell_s = mean(&dwells_s).unwrap_or(request.timing.dwell_s).round();
     Ok(Reordering::of(request, &plan.steps, dwell_s, |rows| prices.tells(plan.steps.first()?, rows))?)
 }
 

@@ -8,8 +8,10 @@
 use crate::IdentifyConfig;
 use crate::end_state::end_state;
 use crate::findings::Findings;
-use crate::joint::expected::{ExpectedStep, condensed as condensed_forecast};
+use crate::joint::as_it_lasts::End;
+use crate::joint::expected::{ExpectedStep, condensed as condensed_forecast, end_at};
 use crate::joint::rows::{StepRows, condensed};
+use crate::joint::solve::Fisher;
 use crate::joint::start::START_WITH_NOISE_S;
 use crate::joint::worth::StepWorth;
 use crate::samples::Samples;
@@ -85,6 +87,23 @@ impl CampaignInformation {
         self.of_rows(condensed_forecast(0, step, config)?, step)
     }
 
+    /// What a forecast step tells if it ends at each of these times, s after its jump, rising; about the whole step, so that what
+    /// small differences between its ends do to the model is left out.
+    pub fn of_forecast_ended(
+        &self,
+        step: &ExpectedStep<'_>,
+        ends_s: &[f64],
+        config: &IdentifyConfig,
+    ) -> Vec<Option<StepInformation>> {
+        let nothing = || vec![None; ends_s.len()];
+        let Some(rows) = condensed_forecast(0, step, config).map(|rows| [rows]) else { return nothing() };
+        let ends: Vec<Option<End>> =
+            ends_s.iter().map(|end_s| end_at(&rows[0], step, *end_s, config)).collect();
+        let known: Vec<End> = ends.iter().flatten().copied().collect();
+        let mut told = self.worth.fisher_at_ends(&rows, &step.estimate(), &known).into_iter();
+        ends.iter().map(|end| end.and_then(|_| self.information_of(told.next()??))).collect()
+    }
+
     /// What the one step of a recording tells up to its end; `None` where its readings are too few, or none. `forecast` is the
     /// step as it was expected.
     pub fn of_readings(&self, recording: &Recording, forecast: &ExpectedStep<'_>) -> Option<StepSoFar> {
@@ -107,7 +126,10 @@ impl CampaignInformation {
     }
 
     fn of_rows(&self, rows: StepRows, forecast: &ExpectedStep<'_>) -> Option<StepInformation> {
-        let fisher = self.worth.fisher(&[rows], &forecast.estimate())?;
+        self.information_of(self.worth.fisher(&[rows], &forecast.estimate())?)
+    }
+
+    fn information_of(&self, fisher: Fisher) -> Option<StepInformation> {
         let (variance, answer) = fisher.steps.into_iter().next()?;
         let finite = variance.is_finite() && fisher.information.iter().all(|x| x.is_finite());
         (finite && answer.len() == self.beforehand.len()).then_some(StepInformation {

@@ -7,6 +7,7 @@ use crate::IdentifyConfig;
 use crate::config::coloured;
 use crate::dynamic::Estimate;
 use crate::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow};
+use crate::joint::as_it_lasts::End;
 use crate::joint::rows::{Row, StepRows, block_s_after, place};
 use crate::joint::solve::{Problem, ROUGHLY};
 use crate::joint::start::{self, START_S};
@@ -99,7 +100,23 @@ pub(crate) fn condensed(
     step: &ExpectedStep<'_>,
     config: &IdentifyConfig,
 ) -> Option<StepRows> {
-    let row = |expected: &ExpectedRow, block_s: f64| Row {
+    let first = step.rows.partition_point(|expected| expected.t_s < START_S);
+    let first_s = step.rows.get(first)?.t_s;
+    let mut rows: Vec<Row> = Vec::new();
+    for expected in &step.rows[first..] {
+        let block_s = COARSER * block_s_after(expected.t_s - first_s, config);
+        // Half a nanosecond: times are rounded.
+        if rows.last().is_none_or(|last| expected.t_s - last.t_s >= block_s - 5e-10) {
+            rows.push(row(expected, noise(block_s, config), config));
+        }
+    }
+    let end = row(step.rows.last()?, rows.last()?.noise, config);
+    let usable = rows.len() >= FEWEST_ROWS && end.place.0 > 0.0 && end.place.1 > 0.0;
+    usable.then_some(StepRows { position, rows, end })
+}
+
+fn row(expected: &ExpectedRow, noise: BlockNoise, config: &IdentifyConfig) -> Row {
+    Row {
         t_s: expected.t_s,
         t1_k: expected.t1_k,
         t2_k: expected.t2_k,
@@ -108,19 +125,27 @@ pub(crate) fn condensed(
         p2_pa: expected.p2_pa,
         flow_kg_s: expected.flow_kg_s,
         place: place(config, expected.speed_rpm, expected.flow_kg_s, expected.t1_k, expected.p1_pa),
-        noise: BlockNoise::of_mean(coloured(config.noise_colour), block_s / DECLARED_INTERVAL_S, block_s),
-    };
-    let first = step.rows.partition_point(|expected| expected.t_s < START_S);
-    let first_s = step.rows.get(first)?.t_s;
-    let mut rows: Vec<Row> = Vec::new();
-    for expected in &step.rows[first..] {
-        let block_s = COARSER * block_s_after(expected.t_s - first_s, config);
-        // Half a nanosecond: times are rounded.
-        if rows.last().is_none_or(|last| expected.t_s - last.t_s >= block_s - 5e-10) {
-            rows.push(row(expected, block_s));
-        }
+        noise,
     }
-    let end = Row { noise: rows.last()?.noise, ..row(step.rows.last()?, 0.0) };
-    let usable = rows.len() >= FEWEST_ROWS && end.place.0 > 0.0 && end.place.1 > 0.0;
-    usable.then_some(StepRows { position, rows, end })
+}
+
+fn noise(block_s: f64, config: &IdentifyConfig) -> BlockNoise {
+    BlockNoise::of_mean(coloured(config.noise_colour), block_s / DECLARED_INTERVAL_S, block_s)
+}
+
+/// The end that a condensed step would have at `end_s`; `None` where too little of it lies before.
+pub(crate) fn end_at(
+    condensed: &StepRows,
+    step: &ExpectedStep<'_>,
+    end_s: f64,
+    config: &IdentifyConfig,
+) -> Option<End> {
+    // Half a nanosecond: times are rounded.
+    let latest_s = end_s + 5e-10;
+    let before = step.rows.partition_point(|expected| expected.t_s <= latest_s);
+    let last = step.rows.get(before.checked_sub(1)?)?;
+    let rows = condensed.rows.partition_point(|row| row.t_s <= latest_s);
+    let noise = condensed.rows.get(rows.checked_sub(1)?)?.noise;
+    let row = row(last, noise, config);
+    (rows >= FEWEST_ROWS && row.place.0 > 0.0 && row.place.1 > 0.0).then_some(End { rows, row })
 }

@@ -5,6 +5,7 @@
 //! the map) is found once, from all of them. Why that is needed, what it assumes and what it can not do stands in
 //! `docs/identification.md`.
 
+pub(crate) mod as_it_lasts;
 pub(crate) mod campaign_information;
 pub(crate) mod common_part;
 pub(crate) mod expected;

@@ -76,6 +76,7 @@ struct Normal {
 }
 
 /// See [`Problem::fisher`].
+#[derive(Debug, Clone)]
 pub(crate) struct Fisher {
     pub(crate) unknown: Vec<usize>,
     pub(crate) information: DMatrix<f64>,
@@ -116,7 +117,7 @@ impl Covariance {
 
 impl Problem<'_> {
     /// All shared parameters that are not known, offsets last.
-    fn unknown(&self) -> Vec<usize> {
+    pub(crate) fn unknown(&self) -> Vec<usize> {
         let (carried, mut sought): (Vec<usize>, Vec<usize>) = (0..SHARED)
             .filter(|index| self.active[*index])
             .partition(|index| (OFFSETS..SURFACE).contains(index));
@@ -227,12 +228,10 @@ impl Problem<'_> {
                 block.right[i] += product(column, &residual);
                 if i != ETA {
                     let prior = member.priors[i];
-                    block.own[(i, i)] += prior.weight();
                     block.right[i] += prior.weight() * (prior.mean - member.local[i]);
                 }
             }
             let off = member.off_surface(&self.shared, &member.local);
-            block.own[(ETA, ETA)] += surface_weight;
             block.right[ETA] -= surface_weight * off;
             if member.shares {
                 normal.cost += residual.iter().map(|r| r * r).sum::<f64>() + off * off * surface_weight;
@@ -246,7 +245,6 @@ impl Problem<'_> {
                     block.mixed[(i, a)] += product(&columns[SHARED + i], &columns[*index]);
                 }
                 let term = |index: usize| member.coupling[index];
-                block.mixed[(ETA, a)] -= surface_weight * term(*index);
                 if !member.shares {
                     continue;
                 }
@@ -261,9 +259,45 @@ impl Problem<'_> {
                     }
                 }
             }
+            self.add_known(member, &member.coupling, fitted, &mut block.own, &mut block.mixed);
             equations.blocks.push(block);
         }
         normal
+    }
+
+    /// Adds what is known of a step beside its readings: the priors of its own parameters, and that its efficiency lies about the
+    /// surface.
+    pub(crate) fn add_known(
+        &self,
+        member: &Member<'_>,
+        coupling: &SharedVector,
+        fitted: &[usize],
+        own: &mut Matrix4<f64>,
+        mixed: &mut Matrix4xX<f64>,
+    ) {
+        let surface_weight = 1.0 / (self.surface_sigma * self.surface_sigma);
+        for i in (0..LOCAL).filter(|i| *i != ETA) {
+            own[(i, i)] += member.priors[i].weight();
+        }
+        own[(ETA, ETA)] += surface_weight;
+        for (a, index) in fitted.iter().enumerate() {
+            mixed[(ETA, a)] -= surface_weight * coupling[*index];
+        }
+    }
+
+    /// The same of the shared parameters, by a step whose efficiency answers to them by `coupling`.
+    pub(crate) fn add_surface(
+        &self,
+        coupling: &SharedVector,
+        fitted: &[usize],
+        information: &mut DMatrix<f64>,
+    ) {
+        let surface_weight = 1.0 / (self.surface_sigma * self.surface_sigma);
+        for (a, index) in fitted.iter().enumerate() {
+            for (b, other) in fitted.iter().enumerate() {
+                information[(a, b)] += surface_weight * coupling[*index] * coupling[*other];
+            }
+        }
     }
 
     fn cost(&self, shared: &SharedVector, locals: &[LocalVector]) -> f64 {

@@ -265,6 +265,13 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
     }
 }
 
+/// How the efficiency that is found answers to the offsets, by how T2 answers to the readings and to the efficiency; `None` where it
+/// does not.
+pub(crate) fn coupled(slopes: &[f64; 6], by_eta: f64) -> Option<[f64; OFFSET_CHANNELS.len()]> {
+    let coupled = std::array::from_fn(|i| -slopes[i] / by_eta);
+    coupled.iter().all(|x: &f64| x.is_finite()).then_some(coupled)
+}
+
 /// The noise of each step, and how its efficiency answers to offsets, where the parameters stand.
 pub(crate) fn weigh(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
     let channels = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
@@ -292,9 +299,7 @@ pub(crate) fn weigh(problem: &mut Problem<'_>, steps: &[StepRows], config: &Iden
             (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(3e-4)
         };
         let by_eta = problem.setting.by_efficiency(&step.end, &problem.shared, &member.local);
-        let coupled: Vec<f64> =
-            slopes.iter().take(OFFSET_CHANNELS.len()).map(|slope| -slope / by_eta).collect();
-        if problem.setting.shaped && coupled.iter().all(|x| x.is_finite()) {
+        if let Some(coupled) = coupled(&slopes, by_eta).filter(|_| problem.setting.shaped) {
             problem.members[i].coupling[OFFSETS..FLOW_GAIN].copy_from_slice(&coupled);
         }
         let white_sigma_k = if expected > 0.0 { declared[1].max(0.1 * sigma_k) } else { sigma_k };

@@ -92,6 +92,16 @@ impl StepWorth {
 
     /// What one step tells, where the campaign's shared numbers stand. `about`: where its own ones do.
     pub(crate) fn fisher(&self, rows: &[StepRows; 1], about: &Estimate) -> Option<Fisher> {
+        self.alone(rows, about).fisher()
+    }
+
+    /// Where the surface lies.
+    pub(crate) fn scale(&self) -> &SurfaceScale {
+        &self.scale
+    }
+
+    /// The fit of one step by itself.
+    pub(crate) fn alone<'a>(&self, rows: &'a [StepRows; 1], about: &Estimate) -> Problem<'a> {
         let mut member = start::member(&rows[0], Some(about), &self.scale, self.mean_eta, &self.config);
         if self.setting.with_law {
             member.priors[LN_DEVIATION].sigma = self.law_sigma;
@@ -111,7 +121,7 @@ impl StepWorth {
             inlet: None,
         };
         start::weigh(&mut problem, rows, &self.config);
-        problem.fisher()
+        problem
     }
 
     /// What is known beforehand of the numbers that [`StepWorth::fisher`] speaks of: one over the variance of each.

@@ -44,6 +44,7 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
         appended: None,
         required_sigma_eta: None,
         method: None,
+        simulations: None,
         effort: 0.3,
         seed: 1,
     }

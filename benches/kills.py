@@ -99,6 +99,9 @@ def listed(folder, short):
         ("speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]", "speeds: [80 krpm, 110 krpm, 140 krpm]"),
         ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.0, 1.4]"),
         ("method: joint ", "method: dynamic "),
+        ("soak: 30 min", "soak: 5 min"),
+        ("  dwell: 120 s ", "  dwell: 60 s "),
+        ("  formats: [csv, json, svg]\n", "  formats: [csv]\n"),
     ]
     for before, after in (shorter if short else []) + [("order: information ", "order: listed "), ("required_sigma_eta: 0.5 %\n", "")]:
         assert before in text, before
@@ -114,7 +117,7 @@ def main():
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--minutes", type=float, default=math.inf, help="begins no further one after so long")
-    parser.add_argument("--short", action="store_true", help="nine points, each step by itself")
+    parser.add_argument("--short", action="store_true", help="nine points of a minute, each step by itself, after a short soak")
     parser.add_argument("--jobs", type=int, default=2)
     arguments = parser.parse_args()
     mapper = str(Path(arguments.mapper).resolve())

@@ -8,7 +8,6 @@ Pictures of the page (390 and 1400 px wide, light and dark) and of its head are 
 import atexit
 import json
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -21,7 +20,9 @@ from pathlib import Path
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import sync_playwright
 
-chromium, folder, command = shutil.which(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:]
+from chromium import launched, serious_findings, watched
+
+chromium, folder, command = sys.argv[1], Path(sys.argv[2]), sys.argv[3:]
 said, serious, requests, result = [], [], [], {}
 
 run = subprocess.Popen(
@@ -83,10 +84,7 @@ SEEN = """() => {
 
 def opened(browser, width, height, scheme):
     context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
-    page = context.new_page()
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda request: requests.append(request.url))
+    page = watched(context.new_page(), said, requests)
     page.goto(url)
     page.wait_for_selector("html[data-connected=true]")
     page.wait_for_selector("#readings tr")
@@ -108,7 +106,7 @@ def press(page, button):
 
 
 with sync_playwright() as playwright:
-    browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+    browser = launched(playwright, chromium)
     context, page = opened(browser, 1400, 1000, "light")
     page.evaluate(SEEN)
     since = time.time()
@@ -130,9 +128,7 @@ with sync_playwright() as playwright:
             small.screenshot(path=folder / f"live-{width}-{scheme}.png", full_page=True)
             if (width, scheme) == (1400, "light"):
                 small.screenshot(path=folder / "live.png")
-            for violation in Axe().run(small).response["violations"]:
-                if violation["impact"] in ("serious", "critical"):
-                    serious.append(f"{width} {scheme}: {violation['id']}: {violation['nodes'][0]['html'][:200]}")
+            serious.extend(serious_findings(Axe(), small, f"{width} {scheme}"))
             result[f"overflow_{width}_{scheme}"] = small.evaluate(
                 "document.documentElement.scrollWidth - document.documentElement.clientWidth"
             )

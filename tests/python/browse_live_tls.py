@@ -11,7 +11,6 @@ import http.client
 import ipaddress
 import json
 import re
-import shutil
 import socket
 import ssl
 import subprocess
@@ -25,7 +24,9 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 from playwright.sync_api import sync_playwright
 
-chromium, folder, command = shutil.which(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:]
+from chromium import launched
+
+chromium, folder, command = sys.argv[1], Path(sys.argv[2]), sys.argv[3:]
 result = {}
 
 
@@ -127,7 +128,7 @@ except ssl.SSLCertVerificationError:
     result["unknown"] = "refused"
 
 with sync_playwright() as playwright:
-    browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+    browser = launched(playwright, chromium)
     page = browser.new_context(ignore_https_errors=True).new_page()
     page.goto(f"https://127.0.0.1:{port}/#token={token}")
     page.wait_for_selector("html[data-connected=true]", timeout=20_000)

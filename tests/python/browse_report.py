@@ -6,37 +6,34 @@ Pictures of the page (390 and 1400 px wide, light and dark), of its head, and th
 """
 
 import json
-import shutil
 import sys
 from pathlib import Path
 
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import sync_playwright
 
-chromium, page_file, folder = shutil.which(sys.argv[1]), Path(sys.argv[2]), Path(sys.argv[3])
+from chromium import launched, serious_findings, watched
+
+chromium, page_file, folder = sys.argv[1], Path(sys.argv[2]).resolve(), Path(sys.argv[3])
 said, requests, serious = [], [], []
 result = {}
 
 
 def opened(browser, width, height, scheme):
     page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda request: requests.append(request.url))
+    watched(page, said, requests)
     page.goto(page_file.as_uri())
     page.wait_for_selector("html[data-drawn=true]")
     return page
 
 
 with sync_playwright() as playwright:
-    browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+    browser = launched(playwright, chromium)
     for width, height in [(1400, 1000), (390, 844)]:
         for scheme in ["light", "dark"]:
             page = opened(browser, width, height, scheme)
             page.screenshot(path=folder / f"report-{width}-{scheme}.png", full_page=True)
-            for violation in Axe().run(page).response["violations"]:
-                if violation["impact"] in ("serious", "critical"):
-                    serious.append(f"{width} {scheme}: {violation['id']}: {violation['nodes'][0]['html'][:200]}")
+            serious.extend(serious_findings(Axe(), page, f"{width} {scheme}"))
             # Tables may be wider than a phone, the page may not.
             result[f"overflow_{width}_{scheme}"] = page.evaluate(
                 "document.documentElement.scrollWidth - document.documentElement.clientWidth"

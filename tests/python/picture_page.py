@@ -3,15 +3,16 @@
     python picture_page.py CHROMIUM PAGE PICTURE.png
 """
 
-import shutil
 import sys
 from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-chromium, page_file, picture = shutil.which(sys.argv[1]), Path(sys.argv[2]).resolve(), Path(sys.argv[3])
+from chromium import launched
+
+chromium, page_file, picture = sys.argv[1], Path(sys.argv[2]).resolve(), Path(sys.argv[3])
 with sync_playwright() as playwright:
-    browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+    browser = launched(playwright, chromium)
     page = browser.new_page(viewport={"width": 1400, "height": 1000})
     page.goto(page_file.as_uri())
     page.screenshot(path=picture)

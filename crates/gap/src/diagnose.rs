@@ -28,6 +28,7 @@ use mapper_core::Recording;
 use mapper_numerics::parallel;
 use mapper_observe::declared::Declared;
 use mapper_observe::table::Table;
+use mapper_observe::told::as_told;
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use std::sync::Arc;
@@ -104,14 +105,21 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     let Question { recording, declared, model, effects, tolerances_declared, jumps, calibration, progress } =
         question;
     progress(0.0, "reading");
+    let recording = &as_told(recording);
     let table = Table::new(recording).ok_or(Problem::Empty)?;
-    let warnings = usable(recording, &table, &declared)?;
+    let mut warnings = usable(recording, &table, &declared)?;
     let actuators = if tolerances_declared {
         Actuators::declared(&table, recording, &declared)
     } else {
         Actuators::undeclared(&table, recording, &declared)
     };
     let mut study = Study::with_actuators(recording, table, declared, model, effects, actuators);
+    if study.scatter_s > 0.0 {
+        warnings.push(format!(
+            "the times of the samples are off by {:.0} ms, as P3 tells where it jumps: readings that move count for as much less",
+            1e3 * study.scatter_s
+        ));
+    }
     progress(0.02, "tolerances");
     let linearised = Linearised::new(&study)?;
     another_machine(&study, &linearised.base.values)?;

@@ -17,6 +17,7 @@ use mapper_observe::schedule::Schedule;
 use mapper_observe::smoothed_inputs::SmoothedInputs;
 use mapper_observe::start::state_as_read;
 use mapper_observe::table::Table;
+use mapper_observe::told::{Times, as_told};
 use mapper_physics::driven::{DriveError, FrozenGrid, drive, settle};
 use mapper_physics::effect::{Effect, EffectError, EffectParameter, Rig, add};
 use mapper_physics::inputs::Inputs;
@@ -114,6 +115,8 @@ pub struct Study {
     pub inputs: SmoothedInputs,
     /// How P3 and the valve follow their commands, as recorded.
     pub actuators: Actuators,
+    /// Scatter of the times of its samples, s: what moves is known by so much less.
+    pub scatter_s: f64,
     /// Whether the metal rested when the recording began.
     rested: bool,
     grid: FrozenGrid,
@@ -168,6 +171,9 @@ impl Study {
         effects: Vec<Arc<dyn Effect>>,
         actuators: Actuators,
     ) -> Study {
+        let recording = &as_told(recording);
+        let times = Times::read(&table, recording, actuators.p3, declared.noise_sigma(Channel::P3));
+        let timed = times.timed(recording);
         let mut nominal = Rig::new(model);
         nominal.instruments.p3_lag_s = declared.tolerances.actuator_lag_s;
         let many = recording.steps.len() > MANY_STEPS;
@@ -187,7 +193,7 @@ impl Study {
                 StudyStep { marker: *marker, jumped, blocks: blocks(&table, start_s, end_s, &schedule) }
             })
             .collect();
-        let inputs = SmoothedInputs::read(&table, recording, &declared, (actuators.p3, actuators.valve));
+        let inputs = SmoothedInputs::read(&table, &timed, &declared, (actuators.p3, actuators.valve));
         let mut groups = Vec::new();
         let mut measured = Vec::new();
         let mut rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>> =
@@ -221,7 +227,7 @@ impl Study {
         let mut reads: Vec<(f64, Option<(usize, usize)>)> = Vec::new();
         for (step_index, step) in steps.iter().enumerate() {
             if step.jumped {
-                reads.push((step.marker.start_s, None));
+                reads.push((times.starts_s[step_index], None));
             }
             for (block_index, block) in step.blocks.iter().enumerate() {
                 // The mean of the two ends of one standard deviation has the mean and the spread of the samples.
@@ -236,13 +242,14 @@ impl Study {
         let start_s = reads.first().map_or(first_s, |(t_s, _)| *t_s) - 0.5;
         let end_s = reads.last().map_or(start_s + 1.0, |(t_s, _)| t_s + 0.1);
         let jumps_s: Vec<f64> =
-            steps.iter().filter(|step| step.jumped).map(|step| step.marker.start_s).collect();
+            times.starts_s.iter().zip(&steps).filter(|(_, step)| step.jumped).map(|(s, _)| *s).collect();
         let (times_s, places): (Vec<f64>, Vec<_>) = reads.into_iter().unzip();
         Study {
             nuisances: nuisances(&declared),
             courses: vec![Course::Throughout; effects.len()],
             catalogue: effects.len(),
             actuators,
+            scatter_s: times.scatter_s,
             rested: rested(&table, start_s),
             grid: FrozenGrid::new(start_s, end_s, &jumps_s, &times_s),
             declared,

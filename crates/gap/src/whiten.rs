@@ -33,7 +33,7 @@ impl Linearised {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
         let changes = changes(study, &nothing, &base);
-        let factors = Arc::new(factors(study, &nothing, &changes));
+        let factors = Arc::new(factors(study, &nothing, &base, &changes));
         Ok(Linearised::with(study, base, changes, factors))
     }
 
@@ -44,7 +44,7 @@ impl Linearised {
     pub fn of_noise_alone(study: &Study) -> Result<Linearised, PredictError> {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
-        let factors = Arc::new(factors(study, &nothing, &[]));
+        let factors = Arc::new(factors(study, &nothing, &base, &[]));
         Ok(Linearised { base, factors, columns: Vec::new(), products: Vec::new() })
     }
 
@@ -170,7 +170,12 @@ fn surge_jumps(study: &Study, nothing: &Hypothesis) -> Vec<bool> {
     (0..study.steps.len()).map(|step| near(step) || (step > 0 && near(step - 1))).collect()
 }
 
-fn factors(study: &Study, nothing: &Hypothesis, changes: &[Vec<f64>]) -> Vec<WhiteningFactor> {
+fn factors(
+    study: &Study,
+    nothing: &Hypothesis,
+    base: &Prediction,
+    changes: &[Vec<f64>],
+) -> Vec<WhiteningFactor> {
     let surge_jumps = surge_jumps(study, nothing);
     // Response of every value to a unit of each input, from that of its offset.
     let responses: Vec<(InputNoise, &Vec<f64>, f64)> = DRIVERS
@@ -212,6 +217,11 @@ fn factors(study: &Study, nothing: &Hypothesis, changes: &[Vec<f64>]) -> Vec<Whi
                         }
                     }
                 }
+            }
+            // What moves is as uncertain as the times of its samples.
+            for (i, (block, row)) in blocks.iter().zip(group.rows.clone()).enumerate() {
+                let samples = block.samples.len().max(1) as f64;
+                covariance[(i, i)] += (base.slopes[row] * study.scatter_s).powi(2) / samples;
             }
             if surge_jumps[group.step]
                 && matches!(OUTPUTS[group.output], Channel::CompressorFlow | Channel::P2)

@@ -34,6 +34,27 @@ fn record_of(rig: &Rig, seed: u64) -> Recording {
     common::record_of(rig, &VISITS, seed)
 }
 
+/// A run in real time through a controller: told its steps up to 0.4 s late, its samples taken 8 ms off their times. A shaft that loses 50 krpm
+/// in a second is 400 rpm off then, and nothing is wrong with it.
+#[test]
+fn a_run_in_real_time_is_late_and_its_rig_is_not_to_blame() {
+    let late_s = [0.0, 0.41, 0.07, 0.03, 0.15, 0.05, 0.26];
+    let recording = common::record_late(&Rig::new(Model::nominal()), &VISITS, 5, &late_s, 8e-3);
+    let diagnosed = ask(&recording).unwrap();
+    assert_eq!(diagnosed.diagnosis.verdict, Verdict::WithinTolerance, "{:?}", diagnosed.diagnosis.r#where);
+    assert!((diagnosed.study.scatter_s / 8e-3 - 1.0).abs() < 0.4, "{}", diagnosed.study.scatter_s);
+
+    // What is wrong with a rig is seen all the same.
+    let mut rig = Rig::new(Model::nominal());
+    add(&mut rig, mapper_effects::find("bearing_friction").unwrap().as_ref(), &[1e-6]).unwrap();
+    let diagnosed = ask(&common::record_late(&rig, &VISITS, 5, &late_s, 8e-3)).unwrap();
+    let first = &diagnosed.diagnosis.candidates[0];
+    assert_eq!(
+        (diagnosed.diagnosis.verdict, first.effects.as_slice()),
+        (Verdict::Explained, ["bearing_friction".to_owned()].as_slice())
+    );
+}
+
 /// Another night of the same rig: other points.
 const NEXT: Visits = Visits { speeds_rpm: &[100e3, 65e3, 125e3, 85e3, 110e3], dwell_s: 60.0 };
 

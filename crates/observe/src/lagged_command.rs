@@ -125,7 +125,7 @@ impl LaggedCommand {
 }
 
 /// The level that a step begins with, and those to which a loop that holds the speed moves it.
-fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Level> {
+pub(crate) fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Level> {
     let (mut start_s, mut p3_pa) = (step.start_s, step.p3_pa);
     let level = |start_s, p3_pa| Level { start_s, p3_pa, valve_opening_ratio: step.valve_opening_ratio };
     let mut levels = vec![level(start_s, p3_pa)];
@@ -134,13 +134,18 @@ fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Level> {
     // The first sample may have been taken before the change, and a change lies behind the sample before it.
     for (pair_s, value) in t_s.windows(2).zip(values.iter().skip(1)) {
         // The read-back of a command that is held moves in its last digits.
-        let moved = p3_pa.is_nan() || (value / p3_pa - 1.0).abs() > HELD_RATIO;
+        let moved = p3_pa.is_nan() || !alike(*value, p3_pa);
         if moved && value.is_finite() && pair_s[0] > start_s {
             (start_s, p3_pa) = (pair_s[0], *value);
             levels.push(level(start_s, p3_pa));
         }
     }
     levels
+}
+
+/// Whether two commands are the same.
+pub(crate) fn alike(value: f64, other: f64) -> bool {
+    (value / other - 1.0).abs() <= HELD_RATIO
 }
 
 /// Responses that are tried before the closer search: lags, and rates in jumps of the median size per second.

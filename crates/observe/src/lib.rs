@@ -24,6 +24,7 @@ pub mod smoothed_inputs;
 pub mod smoother;
 pub mod start;
 pub mod table;
+pub mod told;
 
 pub use declared::{Declared, declared_uncertainties};
 pub use element_fault::{Contradiction, Fault, FaultyElement, FusedChannel};

@@ -177,15 +177,15 @@ fn a_lab_server_says_what_is_missing_and_serves_nobody_else_unasked() {
     assert!(half.contains("PLC_USER") && !half.contains(PASSWORD), "{half}");
 }
 
-/// What a browser that looks on is told.
-fn live_page(url: &str) -> Vec<u8> {
-    // This computer alone: no token.
-    let address = url.trim_start_matches("http://").trim_end_matches('/');
+/// What a browser that looks on is told, and the token that it has to show.
+fn live_page(url: &str) -> (Vec<u8>, String) {
+    let (address, token) = url.trim_start_matches("http://").split_once("/#token=").unwrap();
     let mut all = Vec::new();
     for path in ["/", "/events"] {
         let mut stream = TcpStream::connect(address).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(3))).unwrap();
-        write!(stream, "GET {path} HTTP/1.1\r\nHost: {address}\r\n\r\n").unwrap();
+        write!(stream, "GET {path} HTTP/1.1\r\nHost: {address}\r\nAuthorization: Bearer {token}\r\n\r\n")
+            .unwrap();
         // Events come without end: what came until nothing came for three seconds, or enough.
         let mut bytes = [0; 65536];
         while let Ok(count) = stream.read(&mut bytes) {
@@ -195,7 +195,7 @@ fn live_page(url: &str) -> Vec<u8> {
             }
         }
     }
-    all
+    (all, token.to_owned())
 }
 
 fn files(directory: &Path) -> Vec<PathBuf> {
@@ -211,8 +211,8 @@ fn holds(bytes: &[u8], word: &str) -> bool {
     bytes.windows(word.len()).any(|window| window == word.as_bytes())
 }
 
-/// A run against asyncua with user and password, looked at by its live page, ended by a guard; then one with a wrong password. Neither name nor
-/// password is in anything that was written or said.
+/// A run against asyncua with user and password, looked at by its live page with its token, ended by a guard; then one with a wrong password. Neither
+/// name nor password is in anything that was written or said, and the token in nothing but the line that tells it.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn secrets_stand_nowhere() {
@@ -226,8 +226,13 @@ fn secrets_stand_nowhere() {
         of_the_guide("opcua", &[(":4840", &format!(":{port}")), ("timeout: 300 ms", "timeout: 800 ms")]);
     let campaign = CampaignFile::of(format!("{}\nguards: {{overspeed: {{above: 40 krpm}}}}\n", guide.text));
     let runs = campaign.runs();
-    let arguments =
-        ["run".as_ref(), campaign.path.as_os_str(), "--live".as_ref(), "--out".as_ref(), runs.as_os_str()];
+    let arguments = [
+        "run".as_ref(),
+        campaign.path.as_os_str(),
+        "--live=0.0.0.0:0".as_ref(),
+        "--out".as_ref(),
+        runs.as_os_str(),
+    ];
     let said = scratch.path().join("said.txt");
     // Another state: the guard has latched the rig of the first.
     let other_state = scratch.path().join("other-state");
@@ -244,10 +249,11 @@ fn secrets_stand_nowhere() {
         let line = told.next().expect("the live page is named").unwrap();
         words += &line;
         if let Some(url) = line.strip_prefix("live page: ") {
+            words = words.replace(url, "");
             break url.trim().to_owned();
         }
     };
-    let page = live_page(&url);
+    let (page, token) = live_page(&url);
     assert!(holds(&page, "event-stream") && page.len() > 10_000, "{}", page.len());
     words.extend(told.map(|line| line.unwrap() + "\n"));
     let output = running.wait_with_output().unwrap();
@@ -278,7 +284,7 @@ fn secrets_stand_nowhere() {
     assert!(looked_at.iter().any(|path| path.ends_with("plan.json")), "{looked_at:?}");
     for path in looked_at {
         let bytes = std::fs::read(&path).unwrap();
-        for secret in [USER, PASSWORD, "wrong-one"] {
+        for secret in [USER, PASSWORD, "wrong-one", &token] {
             assert!(!holds(&bytes, secret), "{} holds {secret}", path.display());
         }
     }
@@ -309,4 +315,20 @@ fn a_plan_of_a_rig_that_has_changed_since_is_refused() {
     let refused = run(&["--plan", plan.to_str().unwrap()]);
     assert!(refused.stderr.contains("what the rig says of itself changed since"), "{}", refused.stderr);
     assert_ne!(refused.code, Some(0));
+
+    // Broken off behind its second step, the run does not go on there either; on its own rig it does.
+    let broken = plan.parent().unwrap();
+    std::fs::remove_file(broken.join("points.json")).unwrap();
+    let journal = broken.join("journal.jsonl");
+    let lines = std::fs::read_to_string(&journal).unwrap();
+    let saved = lines.lines().position(|line| line.contains("\"step_saved\":1")).unwrap();
+    let until_then: String = lines.split_inclusive('\n').take(saved + 1).collect();
+    std::fs::write(&journal, until_then).unwrap();
+    let resume =
+        || done(with_drivers(&["run".as_ref(), "--resume".as_ref(), broken.as_os_str(), "--json".as_ref()]));
+    let refused = resume().exits(4);
+    assert!(refused.stderr.contains("what the rig says of itself"), "{}", refused.stderr);
+    std::fs::write(&built_in.path, &built_in.text).unwrap();
+    let points = resume().exits(0).json()["points"].as_array().unwrap().len();
+    assert_eq!(points, 5, "four points and the first again");
 }

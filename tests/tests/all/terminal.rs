@@ -55,6 +55,80 @@ fn a_failure_is_one_object_too() {
     failed(&["run", SHIPPED, "--live=nowhere"], 3);
 }
 
+/// Whatever fails: one object on standard output, its code that of the process.
+#[test]
+fn failures_of_every_kind_are_told_alike() {
+    let folder = scratch();
+    let file = |name: &str, text: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let (empty, junk) = (file("empty", b""), file("junk.mcap", b"\x89no recording at all"));
+    let (not_yaml, table) = (file("bad.yaml", b"campaign: [1, 2"), file("m.csv", b"a,b\n1,2\n"));
+    let there = file("there.map", b"kept");
+    let nowhere = CampaignFile::shipped_with(&[("  virtual_lab: {}", "  nosuch: {}")]);
+    let hot = CampaignFile::shipped_with(&[("temperature: 500 degC", "temperature: 5000 degC")]);
+    let failures: [(i32, &[&str]); 24] = [
+        (1, &["run", "nosuch.yaml"]),
+        (3, &["run", &not_yaml]),
+        (3, &["run", nowhere.path.to_str().unwrap()]),
+        (3, &["check", hot.path.to_str().unwrap()]),
+        (3, &["check", &empty]),
+        (1, &["plan", "."]),
+        (1, &["run", SHIPPED, "--plan", "nosuch.json"]),
+        (4, &["run", SHIPPED, "--plan", &empty]),
+        (1, &["run", "--resume", "nosuch"]),
+        (2, &["run"]),
+        (2, &["nosuch"]),
+        (1, &["identify", "nosuch"]),
+        (6, &["identify", &junk]),
+        (6, &["identify", &empty]),
+        (1, &["report", "nosuch", "-o", "never.html"]),
+        (6, &["gap", "diagnose", SHIPPED, "--recording", &junk]),
+        (1, &["gap", "effects", "--signatures", "nosuch"]),
+        (6, &["drift", &junk]),
+        (1, &["nightly", "nosuch.yaml"]),
+        (3, &["map", "fit", &table]),
+        (3, &["map", "convert", "nosuch.csv", &there]),
+        (6, &["log", "inspect", &empty]),
+        (3, &["fleet", "status", "nosuch"]),
+        (1, &["man", "--out", "/proc/nosuch"]),
+    ];
+    for (code, arguments) in failures {
+        let finished = mapper(arguments.iter().chain(&["--json"])).exits(code);
+        let told = finished.json();
+        assert_eq!(told["code"], code, "{arguments:?}: {told}");
+        assert!(told["message"].as_str().is_some_and(|text| !text.is_empty()), "{arguments:?}: {told}");
+        assert!(told.as_object().unwrap().contains_key("help"), "{arguments:?}: {told}");
+    }
+}
+
+/// On a terminal, which `script` makes, mistakes are coloured unless somebody does not want it; `--color` outranks `NO_COLOR`.
+#[test]
+#[cfg(target_os = "linux")]
+fn colour_is_there_where_it_is_wanted() {
+    let campaign = CampaignFile::shipped_with(&[("seed: 1 ", "sed: 1 ")]);
+    let coloured = |when: &str, no_color: bool| {
+        let program = mapper_command(["check", campaign.path.to_str().unwrap(), "--color", when]);
+        let words: Vec<String> = std::iter::once(program.get_program())
+            .chain(program.get_args())
+            .map(|word| format!("'{}'", word.to_str().unwrap()))
+            .collect();
+        let mut terminal = std::process::Command::new("script");
+        terminal.args(["-qec", &words.join(" "), "/dev/null"]).stdin(std::process::Stdio::null());
+        terminal.env_remove("NO_COLOR").env("TERM", "xterm");
+        if no_color {
+            terminal.env("NO_COLOR", "1");
+        }
+        let said = String::from_utf8(terminal.output().unwrap().stdout).unwrap();
+        assert!(said.contains("there is no key"), "{said}");
+        said.contains("\u{1b}[")
+    };
+    let wanted = [("auto", false), ("auto", true), ("always", true), ("never", false)];
+    assert_eq!(wanted.map(|(when, no_color)| coloured(when, no_color)), [true, false, true, false]);
+}
+
 #[test]
 fn a_file_that_is_there_is_named_and_replaced_only_by_force() {
     let folder = scratch();

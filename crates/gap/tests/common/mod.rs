@@ -48,6 +48,11 @@ pub fn boundary() -> BoundaryConditions {
 
 /// A recording of a rig, noise and offsets drawn from what is declared.
 pub fn record_of(rig: &Rig, visits: &Visits, seed: u64) -> Recording {
+    record_late(rig, visits, seed, &[], 0.0)
+}
+
+/// The same of a run in real time: told each step so much late, s, its samples taken off their times by so much, one sigma.
+pub fn record_late(rig: &Rig, visits: &Visits, seed: u64, late_s: &[f64], scatter_s: f64) -> Recording {
     let Visits { speeds_rpm, dwell_s } = *visits;
     let nominal = Model::nominal();
     let p3_pa: Vec<f64> =
@@ -55,16 +60,24 @@ pub fn record_of(rig: &Rig, visits: &Visits, seed: u64) -> Recording {
     let end_s = dwell_s * speeds_rpm.len() as f64;
     let times_s: Vec<f64> = (0..(end_s / 0.1) as usize).map(|i| 0.1 * i as f64).collect();
     let mut held_pa = p3_pa[0];
-    let lagged: Vec<f64> = times_s
+    // Of a run in real time each hundredth of a second.
+    let pieces = if late_s.is_empty() { 1 } else { 10 };
+    let fine_s: Vec<f64> = (0..times_s.len() * pieces).map(|i| 0.1 / pieces as f64 * i as f64).collect();
+    let told_pa = |t: f64| {
+        let step = (((t - 1e-6) / dwell_s).max(0.0) as usize).min(p3_pa.len() - 1);
+        let begun = t - 1e-6 >= dwell_s * step as f64 + late_s.get(step).copied().unwrap_or(0.0);
+        p3_pa[if begun { step } else { step.saturating_sub(1) }]
+    };
+    let lagged: Vec<f64> = fine_s
         .iter()
         .map(|t| {
-            let wanted = p3_pa[(((t - 1e-6) / dwell_s).max(0.0) as usize).min(p3_pa.len() - 1)];
-            held_pa = wanted + (held_pa - wanted) * (-0.1 / rig.instruments.p3_lag_s).exp();
+            let wanted = told_pa(*t);
+            held_pa = wanted + (held_pa - wanted) * (-0.1 / pieces as f64 / rig.instruments.p3_lag_s).exp();
             held_pa
         })
         .collect();
     let rows = lagged.iter().map(|p3_pa| BoundaryConditions { p3_pa: *p3_pa, ..boundary() }).collect();
-    let inputs = InterpolatedInputs::new(times_s.clone(), rows).unwrap();
+    let inputs = InterpolatedInputs::new(fine_s, rows).unwrap();
     let at_rest = BoundaryConditions { p3_pa: p3_pa[0], ..boundary() };
     let guess = hold_speed(&nominal, speeds_rpm[0], &boundary()).unwrap().state;
     let start = mapper_physics::driven::settle(&rig.model, &at_rest, guess).unwrap();
@@ -87,11 +100,22 @@ pub fn record_of(rig: &Rig, visits: &Visits, seed: u64) -> Recording {
                 values[i].push(seen + offsets[i] + noise * (0.8 * normal() + 0.6 * slow[i]));
             }
         };
-    simulator.run_to(end_s, &inputs, times_s.iter().copied(), sample, |_| {}).unwrap();
+    let mut off = Pcg64::seed_from_u64(!seed);
+    let mut taken_s = |t_s: &f64| {
+        let off: f64 = off.sample(StandardNormal);
+        (t_s + scatter_s * off).clamp(t_s - 0.04, t_s + 0.04).max(0.0)
+    };
+    let taken: Vec<f64> =
+        if scatter_s > 0.0 { times_s.iter().map(&mut taken_s).collect() } else { times_s.clone() };
+    simulator.run_to(end_s, &inputs, taken.into_iter(), sample, |_| {}).unwrap();
+    let told: Vec<f64> = times_s.iter().map(|t| told_pa(*t)).collect();
+    let command =
+        (!late_s.is_empty()).then(|| (Channel::P3Command, Series { t_s: times_s.clone(), values: told }));
     let series: BTreeMap<Channel, Series> = SENSORS
         .iter()
         .zip(values)
         .map(|((channel, ..), values)| (*channel, Series { t_s: times_s.clone(), values }))
+        .chain(command)
         .collect();
     let steps = (0..speeds_rpm.len())
         .map(|index| StepMarker {

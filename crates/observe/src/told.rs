@@ -1,0 +1,291 @@
+//! When a rig was told what each step begins with, and how far the times of its samples scatter: a run in real time is late where a
+//! disk or a busy computer kept it, and a controller answers when it comes to it.
+//!
+//! The recorded command says it to a sample. What is left of one shows in the measured P3, which runs by tens of kPa a second after a
+//! jump. Where all jumps are late alike that is the actuator's, and stays with its response; where they differ, it is the run's.
+
+use crate::lagged_command::{LaggedCommand, Level, Response, alike, levels_of_step};
+use crate::table::Table;
+use mapper_core::{Channel, Recording, StepMarker};
+use mapper_numerics::minimise::minimise;
+use mapper_numerics::statistics::median;
+use std::ops::Range;
+
+/// A step's command that comes later than this behind its begin is not taken for it, s.
+const LATE_MAX_S: f64 = 2.0;
+/// Around a jump of P3 its time shows from so long before to so long after, s.
+const AROUND_S: (f64, f64) = (1.0, 3.0);
+/// Jumps are timed where they are apart by so many of their errors, and by so much, s.
+const APART_ERRORS: f64 = 3.0;
+const APART_S: f64 = 3e-3;
+/// Scatter of the samples' times below this counts as none, s.
+const SCATTER_MIN_S: f64 = 1e-3;
+/// Samples tell a time where P3 runs by so many of its noise's sigmas a second.
+const RUNS_PER_S: f64 = 50.0;
+
+/// The recording with each step from the last sample before its command was changed, so that a step holds what belongs to it.
+pub fn as_told(recording: &Recording) -> Recording {
+    let mut told = recording.clone();
+    for index in 0..told.steps.len() {
+        let (before_s, start_s) =
+            (recording.steps[index].start_s, told_s(recording, &recording.steps[index]));
+        told.steps[index].start_s = start_s;
+        // Where steps follow each other they still do.
+        if let Some(last) = index.checked_sub(1).map(|last| &mut told.steps[last])
+            && last.end_s >= before_s - 1e-9
+        {
+            last.end_s = start_s;
+        }
+    }
+    told
+}
+
+fn told_s(recording: &Recording, step: &StepMarker) -> f64 {
+    let commands = [(Channel::P3Command, step.p3_pa), (Channel::ValveCommand, step.valve_opening_ratio)];
+    let late = |(channel, told): (Channel, f64)| {
+        let command = recording.series.get(&channel)?;
+        let before = command.held(step.start_s)?;
+        let (t_s, values) = command.slice(step.start_s, (step.start_s + LATE_MAX_S).min(step.end_s));
+        let still = values.iter().take_while(|value| alike(**value, before)).count();
+        let then = values.get(still)?;
+        (still > 0 && !alike(before, told) && alike(*then, told)).then(|| t_s[still - 1])
+    };
+    commands.into_iter().find_map(late).map_or(step.start_s, |late_s| late_s.max(step.start_s))
+}
+
+/// What the measured P3 says of times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Times {
+    /// When each step's command reached the rig, s.
+    pub starts_s: Vec<f64>,
+    /// Scatter of the samples' own times, one standard deviation, s.
+    pub scatter_s: f64,
+}
+
+impl Times {
+    /// Of a recording [as it was told](as_told), whose P3 follows its command so.
+    pub fn read(table: &Table, recording: &Recording, p3: Response, noise_sigma: f64) -> Times {
+        let steps = &recording.steps;
+        let mut times = Times { starts_s: steps.iter().map(|step| step.start_s).collect(), scatter_s: 0.0 };
+        let Some(values) = table.column(Channel::P3) else { return times };
+        let jumps = Jump::of_recording(table, recording, p3, noise_sigma);
+        let found: Vec<(f64, f64)> = jumps.iter().map(|jump| jump.shift_s(table, values)).collect();
+        let Some(common_s) = median(found.iter().map(|(shift_s, _)| *shift_s)) else { return times };
+        let mean_square = |of: &dyn Fn(&(f64, f64)) -> f64| {
+            (found.iter().map(|one| of(one).powi(2)).sum::<f64>() / found.len() as f64).sqrt()
+        };
+        let apart = mean_square(&|(shift_s, error_s)| (shift_s - common_s) / error_s);
+        if apart > APART_ERRORS && mean_square(&|(shift_s, _)| shift_s - common_s) > APART_S {
+            for (jump, (shift_s, _)) in jumps.iter().zip(&found) {
+                times.starts_s[jump.step] += shift_s;
+            }
+        }
+        times.scatter_s = scatter_s(table, values, &jumps, &found);
+        times
+    }
+
+    /// The recording with its steps from when their commands reached the rig.
+    pub fn timed(&self, recording: &Recording) -> Recording {
+        let mut timed = recording.clone();
+        for (step, start_s) in timed.steps.iter_mut().zip(&self.starts_s) {
+            step.start_s = *start_s;
+        }
+        timed
+    }
+}
+
+/// A jump of P3 at the begin of a step.
+struct Jump {
+    step: usize,
+    levels: Vec<Level>,
+    /// Place of the level that the step begins with.
+    at: usize,
+    p3: Response,
+    noise_sigma: f64,
+    interval_s: f64,
+    samples: Range<usize>,
+}
+
+impl Jump {
+    fn of_recording(table: &Table, recording: &Recording, p3: Response, noise_sigma: f64) -> Vec<Jump> {
+        let steps = &recording.steps;
+        let jump = |step: usize| {
+            let (before, marker) = (&steps[step - 1], &steps[step]);
+            let mut levels = levels_of_step(recording, before);
+            let at = levels.len();
+            levels.extend(levels_of_step(recording, marker));
+            let from_pa = levels[at - 1].p3_pa;
+            let samples = table.range(marker.start_s - AROUND_S.0, marker.start_s + AROUND_S.1);
+            ((marker.p3_pa - from_pa).abs() > 100.0 * noise_sigma && samples.len() > 10).then(|| Jump {
+                step,
+                levels,
+                at,
+                p3,
+                noise_sigma,
+                interval_s: table.interval_s,
+                samples,
+            })
+        };
+        (1..steps.len()).filter_map(jump).collect()
+    }
+
+    /// P3 by its command, told later by so much.
+    fn command(&self, shift_s: f64) -> LaggedCommand {
+        let mut levels = self.levels.clone();
+        levels[self.at].start_s += shift_s;
+        LaggedCommand::new(levels, self.p3, Response::lag(0.0))
+    }
+
+    /// What is left of the measured P3, about its mean: no offset enters.
+    fn rest(&self, table: &Table, values: &[f64], shift_s: f64) -> Vec<f64> {
+        let command = self.command(shift_s);
+        let rest: Vec<f64> = self.samples.clone().map(|i| values[i] - command.p3_pa(table.t_s[i])).collect();
+        let seen = || rest.iter().filter(|rest| rest.is_finite());
+        let mean = seen().sum::<f64>() / seen().count().max(1) as f64;
+        rest.iter().map(|rest| rest - mean).collect()
+    }
+
+    /// How P3 runs at each sample, Pa/s.
+    fn slopes(&self, table: &Table, shift_s: f64) -> Vec<f64> {
+        let (command, by_s) = (self.command(shift_s), 1e-3);
+        let start_s = self.levels[self.at].start_s + shift_s;
+        let slope = |t_s: f64| (command.p3_pa(t_s + by_s) - command.p3_pa(t_s)) / by_s;
+        self.samples.clone().map(|i| if table.t_s[i] > start_s { slope(table.t_s[i]) } else { 0.0 }).collect()
+    }
+
+    /// By how much it was told later than the sample says, and the error of that, s.
+    fn shift_s(&self, table: &Table, values: &[f64]) -> (f64, f64) {
+        let cost = |shift_s: f64| {
+            let rest = self.rest(table, values, shift_s);
+            rest.iter().filter(|rest| rest.is_finite()).map(|rest| rest * rest).sum::<f64>()
+        };
+        // Told between two samples, and at work within a sample of that.
+        let (low_s, high_s) = (-0.5 * self.interval_s, 2.0 * self.interval_s);
+        let shift_s = minimise(low_s, high_s, 1e-5, cost).at;
+        let information: f64 = self.slopes(table, shift_s).iter().map(|slope| slope * slope).sum();
+        (shift_s, self.noise_sigma / information.max(1e-12).sqrt())
+    }
+}
+
+/// Scatter of the samples' times, from how unevenly P3 runs after its jumps: each sample beside its two neighbours, so that whatever is
+/// smooth (another response than the one assumed) does not count.
+fn scatter_s(table: &Table, values: &[f64], jumps: &[Jump], found: &[(f64, f64)]) -> f64 {
+    let (mut sum, mut weights, mut chi, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for (jump, (shift_s, _)) in jumps.iter().zip(found) {
+        let (rest, slopes) = (jump.rest(table, values, *shift_s), jump.slopes(table, *shift_s));
+        let noise_sigma = jump.noise_sigma;
+        for (rest, slopes) in rest.windows(3).zip(slopes.windows(3)) {
+            if slopes.iter().any(|slope| slope.abs() < RUNS_PER_S * noise_sigma) {
+                continue;
+            }
+            let late_s = |i: usize| -rest[i] / slopes[i];
+            let uneven_s = late_s(1) - 0.5 * (late_s(0) + late_s(2));
+            let variance = |i: usize, share: f64| (share * noise_sigma / slopes[i]).powi(2);
+            let noise = variance(0, 0.5) + variance(1, 1.0) + variance(2, 0.5);
+            if uneven_s.is_finite() {
+                let weight = 1.0 / noise;
+                sum += weight * (uneven_s * uneven_s - noise);
+                weights += 1.5 * weight;
+                chi += uneven_s * uneven_s / noise;
+                count += 1.0;
+            }
+        }
+    }
+    // Neighbours share samples: twice the scatter of independent ones.
+    let chance = count + 5.0 * 2.0 * f64::sqrt(2.0 * count);
+    let scatter_s = f64::sqrt(f64::max(sum / f64::max(weights, 1e-30), 0.0));
+    if count > 0.0 && chi > chance && scatter_s > SCATTER_MIN_S { scatter_s } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{Series, StepKind};
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64;
+
+    const NOISE_PA: f64 = 80.0;
+    const LAG: Response = Response { lag_s: 0.3, slew_per_s: f64::INFINITY };
+
+    /// Twelve steps of 20 s between 150 and 200 kPa at 10 Hz, each told so much late, each sample taken off its time by so much.
+    fn recorded(late_s: &[f64; 12], scatter_s: f64) -> Recording {
+        let mut random = Pcg64::seed_from_u64(4);
+        let steps: Vec<StepMarker> = (0..12)
+            .map(|index| {
+                let (kind, start_s, up) = (StepKind::Point, 20.0 * index as f64, (index % 2) as f64);
+                StepMarker {
+                    index,
+                    kind,
+                    start_s,
+                    end_s: start_s + 20.0,
+                    from: None,
+                    to: None,
+                    p3_pa: 150e3 + 50e3 * up,
+                    valve_opening_ratio: 0.7,
+                }
+            })
+            .collect();
+        let levels: Vec<Level> = steps
+            .iter()
+            .zip(late_s)
+            .map(|(step, late_s)| {
+                let (start_s, p3_pa) = (step.start_s + late_s, step.p3_pa);
+                Level { start_s, p3_pa, valve_opening_ratio: step.valve_opening_ratio }
+            })
+            .collect();
+        let truth = LaggedCommand::new(levels, LAG, Response::lag(0.0));
+        let t_s: Vec<f64> = (0..2400).map(|i| f64::from(i) / 10.0).collect();
+        // What a driver says that it was told: known to it at once, seen with its next sample.
+        let told = t_s.iter().map(|t| truth.levels()[truth.level(t - 1e-9)].p3_pa).collect();
+        let read = t_s
+            .iter()
+            .map(|t| {
+                let (off, noise): (f64, f64) = (random.sample(StandardNormal), random.sample(StandardNormal));
+                truth.p3_pa(t + scatter_s * off) + NOISE_PA * noise + 150.0
+            })
+            .collect();
+        let series = [
+            (Channel::P3, Series { t_s: t_s.clone(), values: read }),
+            (Channel::P3Command, Series { t_s, values: told }),
+        ];
+        Recording { series: series.into(), steps, ..Recording::default() }
+    }
+
+    fn read(recording: &Recording) -> (Recording, Times) {
+        let told = as_told(recording);
+        let table = Table::new(&told).unwrap();
+        let times = Times::read(&table, &told, LAG, NOISE_PA);
+        (told, times)
+    }
+
+    #[test]
+    fn a_run_in_simulated_time_is_left_as_it_is() {
+        let recording = recorded(&[0.0; 12], 0.0);
+        let (told, times) = read(&recording);
+        assert_eq!(told, recording);
+        assert_eq!(times.scatter_s, 0.0);
+        assert_eq!(times.timed(&told), recording);
+    }
+
+    #[test]
+    fn when_a_late_run_was_told_its_steps_is_read_off_command_and_p3() {
+        let late_s = [0.0, 0.412, 0.02, 0.07, 0.0, 0.133, 0.25, 0.04, 0.01, 0.09, 0.055, 0.003];
+        for scatter_s in [0.0, 0.012] {
+            let recording = recorded(&late_s, scatter_s);
+            let (told, times) = read(&recording);
+            assert_eq!(told.steps[1].start_s, 20.4, "the last sample before the change");
+            assert_eq!(told.steps[0].end_s, 20.4);
+            // A dozen samples of each jump tell its time.
+            let error_s = (2.0 * scatter_s).max(3e-3);
+            for index in 1..12 {
+                let off_s = times.starts_s[index] - (recording.steps[index].start_s + late_s[index]);
+                assert!(off_s.abs() < error_s, "{scatter_s}: step {index} by {off_s}");
+            }
+            let found_s = times.scatter_s;
+            let right =
+                if scatter_s == 0.0 { found_s == 0.0 } else { (found_s / scatter_s - 1.0).abs() < 0.35 };
+            assert!(right, "{found_s} for {scatter_s}");
+        }
+    }
+}

@@ -1,0 +1,24 @@
+"""Chromium as these scripts drive it."""
+
+import shutil
+
+
+def launched(playwright, name):
+    """The browser of this name on PATH."""
+    # Tests may run as root, where Chromium has no sandbox.
+    return playwright.chromium.launch(executable_path=shutil.which(name), args=["--no-sandbox", "--disable-gpu"])
+
+
+def watched(page, said, requests):
+    """The page; what it says to its console and asks of anybody is kept."""
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    return page
+
+
+def serious_findings(axe, page, where):
+    """What axe-core finds serious or critical, in words."""
+    violations = axe.run(page).response["violations"]
+    grave = [violation for violation in violations if violation["impact"] in ("serious", "critical")]
+    return [f"{where}: {violation['id']}: {violation['nodes'][0]['html'][:200]}" for violation in grave]

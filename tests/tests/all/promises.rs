@@ -2,7 +2,7 @@
 //! a copy of the tree, counted, built, and seen in the program.
 
 use mapper_tests::{repository, scratch};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -65,7 +65,9 @@ fn what_is_promised_is_one_file_and_one_line() {
     }
 }
 
-/// A copy of the tree with all patches, kept from run to run: only what differs is written, so that only that is built.
+/// A copy of the tree with all patches, kept from run to run: only what differs is written, so that only that is built. What is
+/// not patched has the times of the tree, so that its libraries are those that the tests have; what is patched has a version of
+/// its own, so that it does not take their place.
 fn patched_tree() -> PathBuf {
     let (root, tree) = (repository(), target().join("promises/tree"));
     // The files that patches change, apart, so that their times in the copy stay.
@@ -83,6 +85,13 @@ fn patched_tree() -> PathBuf {
         // A line of context on each side: what others change nearby is no matter.
         git(inside, ["apply".as_ref(), "-C1".as_ref(), patch.as_os_str()]);
     }
+    for package in patched() {
+        let manifest = std::fs::read_to_string(root.join(&package).join("Cargo.toml")).unwrap();
+        let shared = "version.workspace = true\n";
+        assert_eq!(manifest.matches(&format!("\n{shared}")).count(), 1, "{package}");
+        let own = manifest.replacen(&format!("\n{shared}"), "\nversion = \"0.1.0-promised\"\n", 1);
+        std::fs::write(inside.join(&package).join("Cargo.toml"), own).unwrap();
+    }
     let mut wanted: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
     let listed = git(&root, ["ls-files", "--cached", "--others", "--exclude-standard"].map(AsRef::as_ref));
     for file in listed.lines().filter(|file| root.join(file).is_file()) {
@@ -97,6 +106,12 @@ fn patched_tree() -> PathBuf {
             std::fs::create_dir_all(to.parent().unwrap()).unwrap();
             std::fs::write(&to, content).unwrap();
         }
+        if !from.starts_with(inside) {
+            let time = |path: &Path| path.metadata().unwrap().modified().unwrap();
+            if time(&to) != time(from) {
+                std::fs::File::options().append(true).open(&to).unwrap().set_modified(time(from)).unwrap();
+            }
+        }
     }
     for file in files_below(&tree) {
         if !wanted.contains_key(file.strip_prefix(&tree).unwrap()) {
@@ -105,6 +120,14 @@ fn patched_tree() -> PathBuf {
     }
     remove_empty_folders(&tree);
     tree
+}
+
+/// Folders of the packages that are patched.
+fn patched() -> BTreeSet<String> {
+    let files = PROMISES.iter().flat_map(|Promise { patch, .. }| {
+        changes(&repository().join("tests/promises").join(patch)).into_keys()
+    });
+    files.map(|file| file.split_once("/src/").unwrap().0.to_owned()).collect()
 }
 
 /// What a folder is left with when its last file has gone would still be a crate to Cargo.
@@ -140,21 +163,23 @@ fn target() -> PathBuf {
 fn what_is_promised_is_built_and_seen() {
     let tree = patched_tree();
     let programs = target().join("promises/programs");
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let built = Command::new(cargo)
-        // One small test as well: with it the libraries of others have the features that all tests gave them, and none
-        // of them is built again.
-        .args(["build", "--quiet", "--offline", "--workspace", "--bin", "mapper", "--test", "turbine"])
-        // Unoptimised: it is looked at, not used. Libraries of others are the ones that the tests have.
-        .args([
-            "--config",
-            "profile.dev.opt-level=0",
-            "--config",
-            "profile.dev.package.mapper-assemble.opt-level=0",
-        ])
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    // What a test is told of its own package: build scripts that look at it would make their libraries again, here and with
+    // the next command outside.
+    for (name, _) in std::env::vars_os() {
+        let text = name.to_string_lossy();
+        if text == "OUT_DIR" || ["CARGO_PKG_", "CARGO_MANIFEST_"].iter().any(|start| text.starts_with(start))
+        {
+            cargo.env_remove(&name);
+        }
+    }
+    let built = cargo
+        // One small test as well: with it libraries have the features that all tests gave them, and none of them is built
+        // again but what is patched and what uses that.
+        .args(["build", "--quiet", "--offline", "--workspace", "--all-features"])
+        .args(["--bin", "mapper", "--test", "turbine"])
         .env("CARGO_BUILD_BUILD_DIR", target())
         .env("CARGO_TARGET_DIR", &programs)
-        .env("CARGO_INCREMENTAL", "0")
         .current_dir(&tree)
         .output()
         .unwrap();

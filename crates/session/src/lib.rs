@@ -121,3 +121,7 @@ pub use surge::{SurgeForecast, surge_forecast};
 pub use transient::write_transient;
 pub use twin_campaign::{Twin, twin_campaign};
 pub use twin_files::{SealedForecast, found_in};
+
+#[cfg(test)]
+#[path = "../tests/common/shipped.rs"]
+mod shipped;

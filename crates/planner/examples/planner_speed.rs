@@ -73,6 +73,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         appended: None,
         required_sigma_eta: None,
         method: None,
+        simulations: None,
         effort,
         seed,
     };

@@ -123,3 +123,7 @@ pub use transient::write_transient;
 pub use twin_campaign::{Twin, twin_campaign};
 pub use twin_files::{SealedForecast, found_in};
 pub use variant::{Variant, VariantError};
+
+#[cfg(test)]
+#[path = "../tests/common/shipped.rs"]
+mod shipped;

@@ -8,19 +8,12 @@
 use crate::dynamic::Estimate;
 use crate::joint::model::surface_of;
 use crate::joint::parameters::{ETA, FLOW_GAIN, LOCAL, OFFSETS, SHARED, SLOPE, SURFACE};
-use crate::joint::rows::{Row, StepRows};
+use crate::joint::rows::{End, StepRows};
 use crate::joint::solve::Fisher;
 use crate::joint::start;
 use crate::joint::surface::{TERM_COUNT, dot};
 use crate::joint::worth::StepWorth;
 use nalgebra::{DMatrix, Matrix4, Matrix4xX};
-
-/// One end that a step may have: how many of its rows come before it, and what is read there.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct End {
-    pub(crate) rows: usize,
-    pub(crate) row: Row,
-}
 
 /// Sums of products of the derivatives, those of the step itself behind those by what is shared.
 struct Products(DMatrix<f64>);

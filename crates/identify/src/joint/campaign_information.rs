@@ -8,7 +8,6 @@
 use crate::IdentifyConfig;
 use crate::end_state::end_state;
 use crate::findings::Findings;
-use crate::joint::as_it_lasts::End;
 use crate::joint::expected::{ExpectedStep, condensed as condensed_forecast, end_at};
 use crate::joint::rows::{StepRows, condensed};
 use crate::joint::solve::Fisher;

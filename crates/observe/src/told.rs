@@ -116,7 +116,7 @@ impl Jump {
             levels.extend(levels_of_step(recording, marker));
             let from_pa = levels[at - 1].p3_pa;
             let samples = table.range(marker.start_s - AROUND_S.0, marker.start_s + AROUND_S.1);
-            ((marker.p3_pa - from_pa).abs() > 100.0 * noise_sigma && samples.len() > 10).then(|| Jump {
+            ((marker.p3_pa - from_pa).abs() > 100.0 * noise_sigma && samples.len() > 10).then_some(Jump {
                 step,
                 levels,
                 at,

@@ -372,8 +372,8 @@ fn main() {
     let load_of_machine = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     eprintln!("load of the machine: {}", load_of_machine.trim());
     println!("| what | measured |\n|---|---|");
-    let parts: [(&str, fn(&Path)); 4] =
-        [("load", load), ("clock", clock), ("trip", trip), ("resume", resume)];
+    type Part = (&'static str, fn(&Path));
+    let parts: [Part; 4] = [("load", load), ("clock", clock), ("trip", trip), ("resume", resume)];
     for (name, part) in parts {
         if only.as_deref().is_none_or(|only| only == name) {
             let folder = tempfile::tempdir().unwrap();

@@ -87,6 +87,8 @@ pub fn calibrate(
     made_by: String,
     engine: &Engine<'_>,
 ) -> Result<Option<(Calibration, Vec<Observed>)>, BlindError> {
+    // Drawing takes some seconds, in which nobody shall wonder.
+    (engine.told)(0, plan.nulls + plan.others);
     let cases = cases(campaign, catalogue, plan)?;
     let diagnosis = Calibrated::new(campaign, catalogue)?;
     let observed = engine.each(&cases, |_, case| diagnosis.observe(case))?;

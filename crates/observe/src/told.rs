@@ -116,7 +116,7 @@ impl Jump {
             levels.extend(levels_of_step(recording, marker));
             let from_pa = levels[at - 1].p3_pa;
             let samples = table.range(marker.start_s - AROUND_S.0, marker.start_s + AROUND_S.1);
-            ((marker.p3_pa - from_pa).abs() > 100.0 * noise_sigma && samples.len() > 10).then(|| Jump {
+            ((marker.p3_pa - from_pa).abs() > 100.0 * noise_sigma && samples.len() > 10).then_some(Jump {
                 step,
                 levels,
                 at,
@@ -278,8 +278,8 @@ mod tests {
             assert_eq!(told.steps[0].end_s, 20.4);
             // A dozen samples of each jump tell its time.
             let error_s = (2.0 * scatter_s).max(3e-3);
-            for index in 1..12 {
-                let off_s = times.starts_s[index] - (recording.steps[index].start_s + late_s[index]);
+            for (index, late_s) in late_s.iter().enumerate().skip(1) {
+                let off_s = times.starts_s[index] - (recording.steps[index].start_s + late_s);
                 assert!(off_s.abs() < error_s, "{scatter_s}: step {index} by {off_s}");
             }
             let found_s = times.scatter_s;

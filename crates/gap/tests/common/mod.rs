@@ -107,7 +107,7 @@ pub fn record_late(rig: &Rig, visits: &Visits, seed: u64, late_s: &[f64], scatte
     };
     let taken: Vec<f64> =
         if scatter_s > 0.0 { times_s.iter().map(&mut taken_s).collect() } else { times_s.clone() };
-    simulator.run_to(end_s, &inputs, taken.into_iter(), sample, |_| {}).unwrap();
+    simulator.run_to(end_s, &inputs, taken, sample, |_| {}).unwrap();
     let told: Vec<f64> = times_s.iter().map(|t| told_pa(*t)).collect();
     let command =
         (!late_s.is_empty()).then(|| (Channel::P3Command, Series { t_s: times_s.clone(), values: told }));

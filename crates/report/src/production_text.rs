@@ -112,7 +112,7 @@ fn of_outlier(outlier: &Outlier) -> String {
         Sign::HeatTransfer => format!("h {:+.2} % everywhere", 100.0 * outlier.h_ratio),
     };
     format!(
-        "  {}: {shown} ({:.1} robust standard deviations); probable cause: {}\n",
+        "  {}: {shown} ({:.1} robust standard deviations)\n    probable cause: {}\n",
         outlier.machine,
         outlier.sigmas.abs(),
         outlier.sign.causes()

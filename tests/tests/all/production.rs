@@ -62,7 +62,7 @@ fn machines_that_cannot_be_are_told_before_anything_runs() {
         std::fs::write(scratch.path().join("machines.csv"), table).unwrap();
         let night = mapper_in(scratch.path(), ["nightly", "nightly.yaml"]);
         assert!(!night.stdout.contains("eta_mean"));
-        night.exits(2).stderr
+        night.exits(3).stderr
     };
     let unknown = told("serial_number,deviations.wings\nB-1,1 %\n");
     assert!(unknown.contains("wings") && unknown.contains("valve_area"), "{unknown}");
@@ -71,7 +71,7 @@ fn machines_that_cannot_be_are_told_before_anything_runs() {
     let missing = told("serial_number,deviations.valve_area\nB-1,much\n");
     assert!(missing.contains("deviations.valve_area"), "{missing}");
     write(scratch.path(), "machines: machines.csv, drawn_machines: 3");
-    let both = mapper_in(scratch.path(), ["nightly", "nightly.yaml"]).exits(2).stderr;
+    let both = mapper_in(scratch.path(), ["nightly", "nightly.yaml"]).exits(3).stderr;
     assert!(both.contains("keep `machines` or `drawn_machines`"), "{both}");
 }
 

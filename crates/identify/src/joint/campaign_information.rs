@@ -9,7 +9,7 @@ use crate::IdentifyConfig;
 use crate::end_state::end_state;
 use crate::findings::Findings;
 use crate::joint::expected::{ExpectedStep, condensed as condensed_forecast, end_at};
-use crate::joint::rows::{StepRows, condensed};
+use crate::joint::rows::{End, StepRows, condensed};
 use crate::joint::solve::Fisher;
 use crate::joint::start::START_WITH_NOISE_S;
 use crate::joint::worth::StepWorth;

@@ -340,3 +340,18 @@ fn where_nothing_was_measured_no_efficiency_is_better_than_the_best_that_was() {
         assert!(nodes().filter(|n| n.extrapolated).all(|n| n.eta < best + 0.002));
     }
 }
+
+/// The low-speed end: the slowest line left out, and found from the faster ones. The efficiency is within its band; the place of
+/// the closed form's slowest line is not (its flow at choke rises over speed as no machine's does), so only its size is held.
+#[test]
+fn the_slowest_line_is_found_from_the_faster_ones() {
+    for seed in 201..=203 {
+        let lines = leave_out(&MapFit::new(&turbo_a(0.003, seed)).unwrap());
+        let slowest = lines.first().unwrap();
+        assert!(slowest.outermost && slowest.distance_ratio < 0.06, "{seed}: {slowest:?}");
+        assert!(slowest.eta.unwrap() < 0.06 && slowest.eta_held_ratio.unwrap() > 0.85, "{seed}: {slowest:?}");
+    }
+    let lines = leave_out(&MapFit::new(&sample()).unwrap());
+    let slowest = lines.first().unwrap();
+    assert!(slowest.distance_ratio < 0.02 && slowest.eta.unwrap() < 0.005, "{slowest:?}");
+}

@@ -34,6 +34,10 @@ pub enum ErrorKind {
     Interrupted,
 }
 
+fn in_doubt_text(rigs: &[String]) -> String {
+    if rigs.is_empty() { "no rig is in doubt".to_owned() } else { format!("in doubt: {}", rigs.join(", ")) }
+}
+
 /// Why a session could not do what it was asked.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
@@ -183,6 +187,14 @@ pub enum SessionError {
         reason: String,
         /// The run.
         run: PathBuf,
+    },
+    /// A rig without latch and without a runner that died, or no rig of that name.
+    #[error("nothing was acknowledged: the rig `{rig}` is in no doubt, or its name is another; {}", in_doubt_text(.in_doubt))]
+    NothingToAcknowledge {
+        /// The rig.
+        rig: String,
+        /// Those that are in doubt.
+        in_doubt: Vec<String>,
     },
     /// The run cannot begin as things are.
     #[error("the run was not begun: {0}")]
@@ -410,6 +422,7 @@ impl SessionError {
             | E::EffectUnread { .. }
             | E::ChannelMap(ChannelMapError::Mistakes(_))
             | E::MachineUnknown { .. }
+            | E::NothingToAcknowledge { .. }
             | E::Import { .. }
             | E::UnknownFormat { .. }
             | E::UnknownExtension { .. }

@@ -6,6 +6,7 @@
 use crate::SessionError;
 use crate::files::json_text;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -137,18 +138,45 @@ impl RigStates {
     /// # Errors
     /// [`SessionError::File`] as the system says.
     pub fn status(&self, rig: &str) -> Result<RigStatus, SessionError> {
+        if !self.file(rig, "lock").exists() {
+            return Ok(RigStatus {
+                rig: rig.to_owned(),
+                owner: None,
+                in_use: false,
+                latch: self.latch_of(rig),
+            });
+        }
         let (mut lock, _) = self.open(rig)?;
         let in_use = matches!(lock.try_lock(), Err(TryLockError::WouldBlock));
         let owner = read_json(&mut lock);
         Ok(RigStatus { rig: rig.to_owned(), owner, in_use, latch: self.latch_of(rig) })
     }
 
+    /// The rigs that wait for somebody to look at them, as their files are named.
+    fn in_doubt(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.directory).into_iter().flatten().flatten();
+        let name = |file: String| {
+            let (name, kind) = file.strip_prefix("rig-")?.rsplit_once('.')?;
+            let status = self.status(name).ok().filter(|_| matches!(kind, "lock" | "latch"))?;
+            (status.latch.is_some() || (status.owner.is_some() && !status.in_use)).then(|| name.to_owned())
+        };
+        let files = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        files.filter_map(name).collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
     /// Somebody has looked at the rig: the next run may begin.
     ///
     /// # Errors
-    /// [`SessionError::RigInUse`] where a run is under way; [`SessionError::File`] as the system says.
+    /// [`SessionError::RigInUse`] where a run is under way; [`SessionError::NothingToAcknowledge`] where the rig is in no doubt;
+    /// [`SessionError::File`] as the system says.
     pub fn acknowledge(&self, rig: &str) -> Result<RigStatus, SessionError> {
         let status = self.status(rig)?;
+        if status.owner.is_none() && status.latch.is_none() && !status.in_use {
+            return Err(SessionError::NothingToAcknowledge {
+                rig: rig.to_owned(),
+                in_doubt: self.in_doubt(),
+            });
+        }
         if status.in_use {
             let owner = status.owner.map_or("another runner".to_owned(), |owner| owner.to_string());
             return Err(SessionError::RigInUse { rig: rig.to_owned(), owner });
@@ -264,7 +292,11 @@ mod tests {
                 "{refused}"
             );
         }
+        let typo = states.acknowledge("bensh").unwrap_err().to_string();
+        assert!(typo.contains("`bensh`") && typo.contains("in doubt: bench"), "{typo}");
         assert_eq!(states.acknowledge("bench").unwrap().latch.unwrap().reason, "overspeed");
+        let again = states.acknowledge("bench").unwrap_err().to_string();
+        assert!(again.contains("no rig is in doubt"), "{again}");
         assert!(states.claim("bench", None).is_ok());
     }
 }

@@ -15,9 +15,9 @@ pub fn tests(profile: &str) -> Command {
             ["nextest", "run", "--workspace", "--all-features", "--no-fail-fast", "--profile", profile];
         let mut command =
             step::command(workspace::cargo(), &[&arguments[..], &["--color", "never"]].concat());
-        // One more than there are cores: a test in real time mostly waits.
+        // Two more than there are cores: tests in real time mostly wait, and two of them run at a time.
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        command.arg("--test-threads").arg((cores + 1).to_string());
+        command.arg("--test-threads").arg((cores + 2).to_string());
         command
     } else {
         step::command(

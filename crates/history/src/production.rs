@@ -293,7 +293,7 @@ fn deviations(
         let stand = fitted.of_stand(observed.nights[i], observed.days[i]);
         of_machine[observed.machines[i]].push(value - fitted.mean() - stand);
     }
-    of_machine.iter().map(|values| mean(values)).collect()
+    of_machine.iter().map(mean).collect()
 }
 
 /// What the places say together of the stand. Its errors are shared by all places, so that their errors do not shrink with the number

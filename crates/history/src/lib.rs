@@ -21,7 +21,7 @@ pub use error::HistoryError;
 pub use mapper_numerics::statistics::median;
 pub use metric::Metric;
 pub use night::{Night, PointRow, RunKey, RunRow};
-pub use outlier::{Outlier, Sign};
+pub use outlier::{MACHINES_FOR_OUTLIERS, Outlier, Sign};
 pub use production::{Drift, Place, Production, Spread, Stand, productions};
 pub use quantity::PointQuantity;
 pub use store::{DEFAULT_NIGHTS, Filter, History, ListedRun, ObservedPoint, StoredNight};

@@ -6,7 +6,7 @@ use serde::Serialize;
 /// Robust standard deviations from which a machine is an outlier (Iglewicz and Hoaglin, How to Detect and Handle Outliers, 1993).
 const OUTLYING_SIGMAS: f64 = 3.5;
 /// Machines from which on the middle half says what is usual.
-const MACHINES_FOR_OUTLIERS: usize = 8;
+pub const MACHINES_FOR_OUTLIERS: usize = 8;
 
 /// How far each machine lies off the average one at one place; `None` where it was not measured.
 pub(crate) struct Deviations {

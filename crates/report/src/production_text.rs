@@ -2,7 +2,7 @@
 
 use crate::history_text::time;
 use crate::{number, table};
-use mapper_history::{Drift, Outlier, Place, Production, Sign, Spread, Stand};
+use mapper_history::{Drift, MACHINES_FOR_OUTLIERS, Outlier, Place, Production, Sign, Spread, Stand};
 
 /// Everything, a table and a few sentences for each campaign and method.
 pub fn production_text(productions: &[Production]) -> String {
@@ -46,7 +46,7 @@ fn one(production: &Production) -> String {
         text.push_str(&of_stand(stand, production));
     }
     text.push_str(&match &production.outliers {
-        None => "too few machines to say which one stands out\n".to_owned(),
+        None => format!("fewer than {MACHINES_FOR_OUTLIERS} machines: which one stands out is not told\n"),
         Some(outliers) if outliers.is_empty() => "no machine stands out\n".to_owned(),
         Some(outliers) => {
             let lines: String = outliers.iter().map(of_outlier).collect();

@@ -75,6 +75,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         method: None,
         simulations: None,
         effort,
+        draft: false,
         seed,
     };
     let started = Instant::now();

@@ -172,6 +172,7 @@ mod tests {
             required_sigma_eta: None,
             method: None,
             effort: 0.1,
+            draft: false,
             seed: 1,
         }
     }

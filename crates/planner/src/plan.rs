@@ -18,6 +18,10 @@ const ROUGH_FORECASTS: usize = 3;
 /// The same of one by what steps are worth: that is known to a few percent only, and thirty times the effort, or what
 /// steps are worth worked out again about the order that was found, finds plans that cost some 3 % less (docs/performance.md).
 const INFORMED_RATIO: f64 = 0.1;
+/// The same where dwells are found by price behind it, and the dwell for which its order is sought then, over the longest: such steps
+/// are short or long, and half of the longest on average (docs/planner.md).
+const DRAFTED_RATIO: f64 = 0.03;
+const DRAFTED_DWELL_RATIO: f64 = 0.5;
 /// Jumps tried for repeats where the request names none.
 const USUAL_JUMPS: usize = 3;
 /// Orders the points and forecasts every step.
@@ -92,6 +96,11 @@ fn plan_with(
     // An order is sought for the dwells that it will have, and what steps are worth is known about a campaign: both come from
     // a rough first one.
     let rough = Sought { effort: ROUGHLY_RATIO * request.effort, forecasts: ROUGH_FORECASTS, ..usual };
+    let drafted = informed && request.draft && request.required_sigma_eta.is_some();
+    let rough = match drafted {
+        true => Sought { dwell_s: (DRAFTED_DWELL_RATIO * longest_s).round(), forecasts: 1, ..rough },
+        false => rough,
+    };
     let mut made = stage.made(first, rough, None)?;
     let dwell_s = |made: &Made| {
         let dwells_s: Vec<f64> = made.steps().iter().map(|step| step.dwell_s).collect();
@@ -104,8 +113,8 @@ fn plan_with(
     if let Some(method) = request.method {
         let rows: Vec<_> = made.rows().iter().take(MOST_TOGETHER).map(Vec::as_slice).collect();
         if let Some(worth) = method.worth_to(&rows) {
-            let effort = INFORMED_RATIO * request.effort;
-            let sought = Sought { dwell_s: dwell_s(&made), effort, ..usual };
+            let (ratio, forecasts) = if drafted { (DRAFTED_RATIO, 1) } else { (INFORMED_RATIO, FORECASTS) };
+            let sought = Sought { dwell_s: dwell_s(&made), effort: ratio * request.effort, forecasts };
             let other = stage.made(request.order, sought, Some(worth.as_ref()))?;
             let cost = |made: &Made| {
                 cost_of(open_rms_error_eta(made.steps()), duration_s(request, made.steps()) / 60.0)

@@ -48,6 +48,9 @@ pub struct PlanRequest<'a> {
     pub simulations: Option<&'a Simulations>,
     /// Work of the search, 1 for the usual; larger searches longer, 0 hardly at all.
     pub effort: f64,
+    /// Whether whoever asks finds the dwells himself: steps then last about as long as each other, errors are the open ones alone, and
+    /// an order by what steps tell is sought with less effort.
+    pub draft: bool,
     /// Seed of the search, passed on to simulated rigs.
     pub seed: u64,
 }

@@ -152,7 +152,7 @@ impl<'a> Stage<'a> {
     pub(crate) fn plan(&self, made: Made) -> Plan {
         let Made { order, housing, ordered, visits, walk } = made;
         let request = &PlanRequest { order, ..self.request.clone() };
-        let steps = walk.thorough(request).steps;
+        let steps = if request.draft { walk.steps } else { walk.thorough(request).steps };
         finished(request, &housing, &ordered, &visits, self.repeated, steps)
     }
 }

@@ -31,7 +31,7 @@ const APART_S: f64 = 2.0;
 const LAST_S: f64 = 6.0;
 const MOST_TRIED: f64 = 60.0;
 /// How often dwells and the errors that they are forecast to give are brought together.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 6;
 /// So close to the required error they are no further.
 const CLOSE_RATIO: f64 = 0.01;
 /// Halvings of the logarithm of the price, and the prices between which it is sought, fraction^2/s.
@@ -104,7 +104,7 @@ pub(crate) struct DwellPrices {
 }
 
 /// The plan with dwells that reach the required error at one price of a second, whether its steps end as planned or when enough is
-/// known; unchanged where no error is required, or nothing can be forecast.
+/// known, and with open errors alone; unchanged where no error is required, or nothing can be forecast.
 ///
 /// # Errors
 /// [`SessionError`] where the forecast fails.
@@ -112,24 +112,32 @@ pub fn retimed(campaign: &Campaign, request: &PlanRequest<'_>, plan: Plan) -> Re
     let joint = campaign.identification.method == Method::Joint && campaign.sequence.is_none();
     let Some(required) = campaign.required_sigma_eta.filter(|_| joint) else { return Ok(plan) };
     let reaches = |error: Option<f64>| error.is_some_and(|error| error <= REACHED_RATIO * required);
-    let (mut now, mut between) = (plan.clone(), None);
+    let mut now = Retimed { plan: plan.clone(), forbidden: Vec::new() };
+    let mut last = None;
     // One dwell for all is a choice that prices have too.
-    let mut shortest = Some(plan.clone()).filter(|plan| reaches(plan.figures.open_rms_error_eta));
-    for _ in 0..ROUNDS {
-        let Some(prices) = DwellPrices::about(campaign, request, &now, Some(required))? else { break };
-        between = Some([LESS_NOISE_RATIO, MORE_NOISE_RATIO].map(|ratio| prices.with_noise(ratio)));
-        now = with_dwells(request, &now, &prices.dwells_s(prices.price), false)?.plan;
-        let error = now.figures.open_rms_error_eta;
-        if reaches(error) && shortest.as_ref().is_none_or(|plan| now.figures.minutes < plan.figures.minutes) {
+    let mut shortest = Some(now.clone()).filter(|now| reaches(now.plan.figures.open_rms_error_eta));
+    for round in 0..ROUNDS {
+        let Some(prices) = DwellPrices::about(campaign, request, &now.plan, Some(required))? else { break };
+        let priced_s = prices.dwells_s(prices.price);
+        // A shorter step leaves less of a gradient to the next, which prices do not see: without meeting them half-way dwells
+        // swing between too long and too short.
+        let half_way = |(s, step): (&f64, &PlanStep)| (s * step.dwell_s).sqrt().round();
+        let dwells_s = match round {
+            0 => priced_s,
+            _ => priced_s.iter().zip(&now.plan.steps).map(half_way).collect(),
+        };
+        last = Some(prices);
+        now = with_dwells(request, &now.plan, &dwells_s, false)?;
+        let figures = &now.plan.figures;
+        let shorter = |than: &Retimed| figures.minutes < than.plan.figures.minutes;
+        if reaches(figures.open_rms_error_eta) && shortest.as_ref().is_none_or(shorter) {
             shortest = Some(now.clone());
         }
-        if error.is_some_and(|error| (error / required - 1.0).abs() <= CLOSE_RATIO) {
+        if figures.open_rms_error_eta.is_some_and(|error| (error / required - 1.0).abs() <= CLOSE_RATIO) {
             break;
         }
     }
-    let retimed = shortest.unwrap_or(now);
-    let dwells_s: Vec<f64> = retimed.steps.iter().map(|step| step.dwell_s).collect();
-    let Retimed { plan: mut retimed, forbidden } = with_dwells(request, &retimed, &dwells_s, true)?;
+    let Retimed { plan: mut retimed, forbidden } = shortest.unwrap_or(now);
     if let Some(why) = forbidden.first() {
         // The order was held against the limits with the dwells that it was made with.
         let mut plan = plan;
@@ -139,7 +147,7 @@ pub fn retimed(campaign: &Campaign, request: &PlanRequest<'_>, plan: Plan) -> Re
     }
     if wanted(campaign).is_some() {
         retimed.remarks.retain(|remark| !remark.starts_with(ENDS_REMARK));
-        let said = between.map(|between| remark(campaign, &retimed, between));
+        let said = last.map(|prices| remark(campaign, &retimed, &prices));
         retimed.remarks.extend(said);
     }
     Ok(retimed)
@@ -154,16 +162,19 @@ fn wanted(campaign: &Campaign) -> Option<f64> {
     campaign.required_sigma_eta.filter(|_| certain)
 }
 
-fn remark(campaign: &Campaign, plan: &Plan, [low_s, high_s]: [f64; 2]) -> String {
+/// `prices`: about a plan that is much the same.
+fn remark(campaign: &Campaign, plan: &Plan, prices: &DwellPrices) -> String {
     let around_s = plan.warm_up_s + plan.cool_down_s;
     let minutes = |steps_s: f64| (around_s + steps_s) / 60.0;
+    let steps_s: f64 = plan.steps.iter().map(|step| step.dwell_s).sum();
+    let with_noise = |ratio| steps_s * prices.with_noise(ratio) / prices.with_noise(1.0);
     let most_s = plan.steps.iter().map(|step| longest_s(step, campaign)).sum::<f64>();
     format!(
         "{ENDS_REMARK}: forecast {:.0} min, between {:.0} and {:.0} min where noise is a fifth less or \
          more than declared, and never more than {:.0} min",
-        minutes(plan.steps.iter().map(|step| step.dwell_s).sum()),
-        minutes(low_s),
-        minutes(high_s),
+        minutes(steps_s),
+        minutes(with_noise(LESS_NOISE_RATIO)),
+        minutes(with_noise(MORE_NOISE_RATIO)),
         minutes(most_s)
     )
 }
@@ -439,5 +450,23 @@ mod tests {
         }
         // 0.4 % of what a step is worth and 0.03 % of its standard error, as it stands.
         assert!(seen > 100 && off[0] < 0.01 && off[1] < 1e-3, "{seen} {off:?}");
+    }
+
+    /// Dwells that follow prices and prices that follow dwells swing if nothing holds them: with seeds 2, 3 and 6 they ended with
+    /// steps of 80, 74 and 84 min, where seed 4 took 51.
+    #[test]
+    fn the_required_error_is_reached_in_about_the_same_time_whatever_the_seed() {
+        let minutes = [2, 3, 4, 6].map(|seed: u64| {
+            let campaign = shipped::campaign(&[("seed: 1  ", &format!("seed: {seed}  "))]);
+            let plan = plan(&campaign, &nominal_model(&campaign).unwrap()).unwrap();
+            let required = campaign.required_sigma_eta.unwrap();
+            let error = plan.figures.open_rms_error_eta.unwrap();
+            assert!(error <= REACHED_RATIO * required, "seed {seed}: {error} of {required}");
+            plan.steps.iter().map(|step| step.dwell_s).sum::<f64>() / 60.0
+        });
+        let longest = minutes.into_iter().fold(0.0, f64::max);
+        let shortest = minutes.into_iter().fold(f64::INFINITY, f64::min);
+        // 46 to 53 min over twelve seeds; the orders that are found differ.
+        assert!(longest < 1.3 * shortest, "{minutes:?}");
     }
 }

@@ -11,6 +11,7 @@ use mapper_core::{Plan, VisitOrder};
 use mapper_physics::model::Model;
 use mapper_planner::{
     Comparison, Now, PlanRequest, after_step, before_first_step, best, clearly_cheaper, compare, make_plan,
+    with_dwells,
 };
 
 /// Most steps of a plan that is ordered again: that goes through all of them several times.
@@ -54,7 +55,19 @@ fn priced(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, Sessio
     if request.order == VisitOrder::Best && request.method.is_some() {
         return best(request, |request| priced(campaign, request));
     }
-    let plan = retimed(campaign, request, make_plan(request)?)?;
+    let is_joint = request.method.is_some_and(|method| method.is_joint());
+    if !is_joint || request.required_sigma_eta.is_none() {
+        return Ok(make_plan(request)?);
+    }
+    let plan = priced_openly(campaign, request)?;
+    let dwells_s: Vec<f64> = plan.steps.iter().map(|step| step.dwell_s).collect();
+    Ok(with_dwells(request, &plan, &dwells_s, true)?.plan)
+}
+
+/// The same with open errors alone, by which plans are held against each other.
+fn priced_openly(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, SessionError> {
+    let draft = make_plan(&PlanRequest { draft: true, ..request.clone() })?;
+    let plan = retimed(campaign, request, draft)?;
     if !request.order.needs_method() || request.appended.is_some() || plan.steps.len() > MOST_STEPS {
         return Ok(plan);
     }
@@ -107,7 +120,9 @@ fn beaten(campaign: &Campaign, request: &PlanRequest<'_>, plan: &Plan) -> Option
     let others = [VisitOrder::Information, VisitOrder::SpeedLines];
     let others = others.into_iter().filter(|order| *order != request.order);
     let mut better: Vec<Plan> = others
-        .filter_map(|order| priced(campaign, &PlanRequest { order, appended: None, ..request.clone() }).ok())
+        .filter_map(|order| {
+            priced_openly(campaign, &PlanRequest { order, appended: None, ..request.clone() }).ok()
+        })
         .filter(|other| clearly_cheaper(other, plan, BEATEN_RATIO))
         .collect();
     better.sort_by(|a, b| {

@@ -68,6 +68,7 @@ impl PlanMaterial {
             method: self.method.as_deref(),
             simulations: Some(&self.simulations),
             effort: 1.0,
+            draft: false,
             seed: campaign.seed,
         }
     }

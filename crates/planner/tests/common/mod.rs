@@ -46,6 +46,7 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
         method: None,
         simulations: None,
         effort: 0.3,
+        draft: false,
         seed: 1,
     }
 }

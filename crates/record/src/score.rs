@@ -4,11 +4,9 @@
 
 pub use crate::truth::{Truth, read_truth};
 
-use crate::RecordError;
 use mapper_core::{Channel, IdentifiedPoint, Recording, ReferenceState, StepMarker, SurgeMark};
 use mapper_numerics::statistics::{mean, median};
 use serde::Serialize;
-use std::path::Path;
 
 /// True values at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -51,23 +49,13 @@ pub struct ScoreSummary {
 }
 
 /// Puts the truth of a recording beside its identified points; `truth` is `None` everywhere on a real rig.
-///
-/// # Errors
-/// [`RecordError`] where the recording cannot be read.
-pub fn score(
-    recording: &Path,
-    steps: &[StepMarker],
-    points: Vec<IdentifiedPoint>,
-) -> Result<Vec<ScoredPoint>, RecordError> {
-    let truth = read_truth(recording)?;
-    Ok(points
-        .into_iter()
-        .map(|point| {
-            let marker = steps.iter().find(|marker| marker.index == point.step);
-            let truth = marker.and_then(|marker| truth_at(&truth, marker.end_s));
-            ScoredPoint { point, truth }
-        })
-        .collect())
+pub fn score(truth: &Truth, steps: &[StepMarker], points: Vec<IdentifiedPoint>) -> Vec<ScoredPoint> {
+    let scored = |point: IdentifiedPoint| {
+        let marker = steps.iter().find(|marker| marker.index == point.step);
+        let truth = marker.and_then(|marker| truth_at(truth, marker.end_s));
+        ScoredPoint { point, truth }
+    };
+    points.into_iter().map(scored).collect()
 }
 
 /// Truth at the last sample at or before `t_s`.
@@ -91,16 +79,12 @@ pub struct ScoredMark {
 const MARK_TRUTH_S: f64 = 10.0;
 
 /// Puts the truth of a recording beside its surge marks; `approaches` says the inlet's state, which corrects the true flow.
-///
-/// # Errors
-/// [`RecordError`] where the recording cannot be read.
 pub fn score_marks(
-    recording: &Path,
+    truth: &Truth,
     approaches: &Recording,
     reference: ReferenceState,
     marks: Vec<SurgeMark>,
-) -> Result<Vec<ScoredMark>, RecordError> {
-    let truth = read_truth(recording)?;
+) -> Vec<ScoredMark> {
     let scored = |mark: SurgeMark| {
         let (start_s, end_s) = (mark.closest_end_s - MARK_TRUTH_S, mark.closest_end_s);
         let true_flow_kg_s = || {
@@ -115,7 +99,7 @@ pub fn score_marks(
         };
         ScoredMark { mark, truth_flow_corrected_kg_s: corrected() }
     };
-    Ok(marks.into_iter().map(scored).collect())
+    marks.into_iter().map(scored).collect()
 }
 
 /// The errors of all points in a few numbers; `None` where no point has both a number and a truth.

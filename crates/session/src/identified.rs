@@ -10,8 +10,8 @@ use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{IdentifiedPoint, Method, Recording, StepMarker, StepOrigin, ThermalModel, joined};
 use mapper_identify::{IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, identify_beside, method_for};
 use mapper_observe::FusedChannel;
-use mapper_record::ChannelMap;
-use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};
+use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint, Truth, read_truth, score, score_marks};
+use mapper_record::{ChannelMap, RecordError};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -106,6 +106,22 @@ impl Session<'_> {
         map: &ChannelMap,
         method: Option<Method>,
     ) -> Result<Identified, SessionError> {
+        let paths: Vec<PathBuf> = recorded.iter().map(|one| one.path.clone()).collect();
+        std::thread::scope(|scope| {
+            let read = scope.spawn(move || paths.iter().map(|path| read_truth(path)).collect());
+            // What scoring alone may see is not there before it is asked for.
+            let truths = || read.join().unwrap_or_else(|panicked| std::panic::resume_unwind(panicked));
+            self.identify_and_score(recorded, map, method, truths)
+        })
+    }
+
+    fn identify_and_score(
+        &self,
+        recorded: Vec<Recorded>,
+        map: &ChannelMap,
+        method: Option<Method>,
+        truths: impl FnOnce() -> Result<Vec<Truth>, RecordError>,
+    ) -> Result<Identified, SessionError> {
         let campaign = same_campaign(&recorded)?.cloned();
         let campaign = campaign.as_ref();
         let mut config = match (campaign, &map.machine) {
@@ -128,8 +144,8 @@ impl Session<'_> {
         });
         let soak = campaign.and_then(|campaign| campaign.zero);
         let (mut recordings, mut sources) = (Vec::new(), Vec::new());
-        for Recorded { path, read, approaches, .. } in recorded {
-            sources.push(Source { path, steps: read.recording.steps.clone(), approaches });
+        for Recorded { read, approaches, .. } in recorded {
+            sources.push(Source { steps: read.recording.steps.clone(), approaches });
             recordings.push(read.recording);
         }
         let fused = fused(recordings, config, campaign, map);
@@ -148,8 +164,9 @@ impl Session<'_> {
         for point in &points {
             self.tell(SessionEvent::PointIdentified(Box::new(point.clone())));
         }
-        let surge = sought(&sources, off, campaign, &config)?;
-        let points = scored(&sources, &recording, &origins, points)?;
+        let truths = truths()?;
+        let surge = sought(&sources, &truths, off, campaign, &config);
+        let points = scored(&sources, &truths, &recording, &origins, points);
         let score = mapper_record::score::summarise(&points);
         Ok(Identified {
             recording,
@@ -169,7 +186,6 @@ impl Session<'_> {
 
 /// What is kept of each recording beside what is identified.
 struct Source {
-    path: PathBuf,
     steps: Vec<StepMarker>,
     approaches: Option<Recording>,
 }
@@ -199,44 +215,46 @@ fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionErro
 /// The points beside their truth, each from the recording that it comes from.
 fn scored(
     sources: &[Source],
+    truths: &[Truth],
     recording: &Recording,
     origins: &[StepOrigin],
     points: Vec<IdentifiedPoint>,
-) -> Result<Vec<ScoredPoint>, SessionError> {
+) -> Vec<ScoredPoint> {
     let origin_of = |index: usize| {
         let position = recording.steps.iter().position(|step| step.index == index)?;
         origins.get(position)
     };
     let mut scored: Vec<(usize, ScoredPoint)> = Vec::new();
-    for (number, source) in sources.iter().enumerate() {
+    for (number, (source, truth)) in sources.iter().zip(truths).enumerate() {
         let theirs = points.iter().enumerate().filter_map(|(place, point)| {
             let origin = origin_of(point.step).filter(|origin| origin.recording == number)?;
             Some((place, point.step, IdentifiedPoint { step: origin.step, ..point.clone() }))
         });
         let (places, alone): (Vec<(usize, usize)>, Vec<IdentifiedPoint>) =
             theirs.map(|(place, step, point)| ((place, step), point)).unzip();
-        let found = mapper_record::score::score(&source.path, &source.steps, alone)?;
+        let found = score(truth, &source.steps, alone);
         scored.extend(places.into_iter().zip(found).map(|((place, step), mut found)| {
             found.point.step = step;
             (place, found)
         }));
     }
     scored.sort_by_key(|(place, _)| *place);
-    Ok(scored.into_iter().map(|(_, found)| found).collect())
+    scored.into_iter().map(|(_, found)| found).collect()
 }
 
 /// The marks of all approaches beside their truth; `None` where surge was not sought.
 fn sought(
     sources: &[Source],
+    truths: &[Truth],
     off: impl Fn(Recording) -> Recording,
     campaign: Option<&Campaign>,
     config: &IdentifyConfig,
-) -> Result<Option<SoughtSurge>, SessionError> {
+) -> Option<SoughtSurge> {
     let mut all: Option<SoughtSurge> = None;
-    for Source { path, approaches, .. } in sources {
+    for (Source { approaches, .. }, truth) in sources.iter().zip(truths) {
         let Some(approaches) = approaches.clone().map(&off) else { continue };
         let SurgeMarks { marks, remarks, surges } = marks_of(&approaches, campaign, config);
-        let marks = mapper_record::score::score_marks(path, &approaches, config.reference, marks)?;
+        let marks = score_marks(truth, &approaches, config.reference, marks);
         let together =
             all.get_or_insert_with(|| SoughtSurge { marks: Vec::new(), remarks: Vec::new(), surges: 0 });
         together.marks.extend(marks);
@@ -246,5 +264,5 @@ fn sought(
     if let Some(all) = &mut all {
         all.marks.sort_by(|a, b| a.mark.speed_corrected_rpm.total_cmp(&b.mark.speed_corrected_rpm));
     }
-    Ok(all)
+    all
 }

@@ -93,6 +93,9 @@ pub struct Campaign {
     /// The script that says which step comes next, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sequence: Option<SequenceSource>,
+    /// Share of the largest sum of gradients that an order by what steps tell has to keep, fraction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gradient_share: Option<f64>,
     /// Error of the efficiency that `order: time` has to reach, fraction.
     pub required_sigma_eta: Option<f64>,
     /// The jump that is repeated, if any.
@@ -188,6 +191,9 @@ pub(crate) struct CampaignFile {
     /// A rhai script that says which step comes next, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/sequences.md says what it may call.
     #[schemars(regex(pattern = r"\.rhai$"), example = &"scripts/zigzag.rhai")]
     sequence: Option<String>,
+    /// Share of the largest sum of the housing's temperature changes that `order: information` has to keep: of the orders that do, the one is taken that tells most for its time. `mapper plan --compare` shows what shares cost.
+    #[schemars(extend("x-above" = "0 %", "x-max" = "100 %"), example = &"75 %")]
+    gradient_share: Option<Quantity<Fraction>>,
     /// Error of the efficiency (standard error and bias of the method, one standard deviation) that `order: time` has to reach at each point.
     #[schemars(extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.5 %")]
     required_sigma_eta: Option<Quantity<Fraction>>,
@@ -273,6 +279,7 @@ impl CampaignFile {
             order: self.order,
             replan: self.replan,
             sequence: sequence(self.sequence.as_deref(), origin, files)?,
+            gradient_share: self.gradient_share.map(|share| share.inside),
             required_sigma_eta: self.required_sigma_eta.map(|error| error.inside),
             repeats: repeats(self.repeats),
             return_to_first: self.return_to_first.unwrap_or(true),

@@ -76,6 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         simulations: None,
         effort,
         draft: false,
+        gradient_share: None,
         seed,
     };
     let started = Instant::now();

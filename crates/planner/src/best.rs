@@ -31,11 +31,31 @@ pub fn clearly_cheaper(one: &Plan, other: &Plan, ratio: f64) -> bool {
 }
 
 /// The plan under each order that allows one, the cheapest first; `make` makes one.
-pub(crate) fn all<E: Send>(
+fn all<E: Send>(
     request: &PlanRequest<'_>,
     make: impl Fn(&PlanRequest<'_>) -> Result<Plan, E> + Sync,
 ) -> Result<Vec<Plan>, E> {
-    let made = parallel::map(&ORDERS, |order| make(&PlanRequest { order: *order, ..request.clone() }));
+    let ways: Vec<(VisitOrder, Option<f64>)> =
+        ORDERS.into_iter().map(|order| (order, request.gradient_share)).collect();
+    each(request, &ways, make)
+}
+
+/// The plan under each order and share of the gradients that allow one, the cheapest first; `make` makes one.
+pub(crate) fn each<E: Send>(
+    request: &PlanRequest<'_>,
+    ways: &[(VisitOrder, Option<f64>)],
+    make: impl Fn(&PlanRequest<'_>) -> Result<Plan, E> + Sync,
+) -> Result<Vec<Plan>, E> {
+    let made = parallel::map(ways, |(order, gradient_share)| {
+        let request = PlanRequest { order: *order, gradient_share: *gradient_share, ..request.clone() };
+        let plan = make(&request)?;
+        Ok(match gradient_share {
+            Some(share) if order.needs_method() => {
+                Plan { objective: keeping(&plan.objective, *share), ..plan }
+            }
+            _ => plan,
+        })
+    });
     let (mut plans, mut failed) = (Vec::new(), None);
     for made in made {
         match made {
@@ -48,6 +68,11 @@ pub(crate) fn all<E: Send>(
         Some(error) if plans.is_empty() => Err(error),
         _ => Ok(plans),
     }
+}
+
+/// Name of an order that keeps a share of the gradients.
+fn keeping(order: &str, share: f64) -> String {
+    format!("{order}, gradients {:.0} %", 1e2 * share)
 }
 
 /// The cheapest of them, with what it was chosen from; `make` makes the plan of each order.

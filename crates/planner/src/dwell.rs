@@ -21,6 +21,13 @@ pub const REACHED_RATIO: f64 = 1.02;
 /// How the error falls with the time, if nothing better is known: a half by averaging, a half by the larger gradients.
 const FALL: f64 = -0.8;
 
+/// How long steps have to last by what is left of error after `tried_s`, s.
+pub(crate) fn needed_s(request: &PlanRequest<'_>, tried_s: f64, error: f64) -> f64 {
+    let longest_s = request.timing.dwell_s;
+    let needed_s = |required: f64| tried_s * (required / error).powf(1.0 / FALL);
+    request.required_sigma_eta.map_or(longest_s, needed_s).clamp(SHORTEST_S.min(longest_s), longest_s)
+}
+
 /// Goes through a route with steps that last until the points are certain enough, about `guess_s`, found by that many forecasts at most; with the request's where
 /// no error is required, or each step is identified by itself.
 pub(crate) fn walk_until_certain(

@@ -36,7 +36,7 @@ pub(crate) fn finished(
         made_from: made_from(request),
         warm_up_s: request.timing.warm_up_s,
         cool_down_s: request.timing.cool_down_s,
-        remarks: remarks(request, &steps, repeated_to),
+        remarks: remarks(request, ordered, &steps, repeated_to),
         figures,
         bound_remark: bound_remark(request, bound.as_ref()),
         bound,
@@ -66,8 +66,20 @@ fn bound_remark(request: &PlanRequest<'_>, bound: Option<&PlanBound>) -> Option<
     Some(text.to_owned())
 }
 
-fn remarks(request: &PlanRequest<'_>, steps: &[PlanStep], repeated: Option<OperatingPoint>) -> Vec<String> {
+fn remarks(
+    request: &PlanRequest<'_>,
+    ordered: &Ordered,
+    steps: &[PlanStep],
+    repeated: Option<OperatingPoint>,
+) -> Vec<String> {
     let mut remarks = Vec::new();
+    if let (Some(ratio), Some(share)) = (ordered.gradient_ratio, request.gradient_share) {
+        remarks.push(format!(
+            "where all steps last equally long, the order keeps {:.0} % of the largest sum of gradients, of which {:.0} % are asked for",
+            1e2 * ratio,
+            1e2 * share
+        ));
+    }
     let repeats: Vec<&PlanStep> =
         steps.iter().filter(|step| step.kind == StepKind::Repeat && Some(step.to) == repeated).collect();
     if let Some(PlanStep { from: Some(from), to, .. }) = repeats.first() {

@@ -19,6 +19,7 @@ mod figures;
 mod fingerprint;
 mod finish;
 mod forecast;
+mod gradient_share;
 mod graph;
 mod housing;
 mod method;

@@ -3,6 +3,7 @@
 use crate::bound::Optimistic;
 use crate::chain::{Chain, gradients_k};
 use crate::exact::{self, Figure, branch_and_bound};
+use crate::gradient_share::keeping;
 use crate::housing::Housing;
 use crate::objective::Objective;
 use crate::reach::reachable;
@@ -24,6 +25,14 @@ pub(crate) struct Ordered {
     pub(crate) order: Vec<usize>,
     /// Whether it is the best within [`PROOF_TOLERANCE_RATIO`] on the reduced housing.
     pub(crate) proven: bool,
+    /// Share of the largest sum of gradients that it keeps, where one was asked for.
+    pub(crate) gradient_ratio: Option<f64>,
+}
+
+impl Ordered {
+    fn unproven(order: Vec<usize>) -> Self {
+        Ordered { order, proven: false, gradient_ratio: None }
+    }
 }
 
 /// Along speed lines: by speed, on each line from the widest opening to the narrowest.
@@ -52,6 +61,11 @@ pub(crate) fn order_on(
 ) -> Ordered {
     // A campaign that is to know much is one with a large sum of what its steps are worth.
     if let (true, Some(by_worth)) = (request.order.needs_method(), housing.by_worth()) {
+        if let Some(share) = request.gradient_share {
+            let effort = Effort::usual(given.len(), request.effort);
+            let kept = keeping(housing, &by_worth, given, share, effort, request.seed);
+            return Ordered { gradient_ratio: Some(kept.ratio), ..Ordered::unproven(kept.order) };
+        }
         let request = PlanRequest { order: VisitOrder::SumGradient, ..request.clone() };
         return order_on(&by_worth, points, given, &request);
     }
@@ -60,14 +74,14 @@ pub(crate) fn order_on(
     let within = |effort, given: &[usize], objective| search(housing, given, objective, effort, request.seed);
     let search = |given: &[usize], objective| within(effort, given, objective);
     let (order, figure) = match request.order {
-        VisitOrder::Listed => return Ordered { order: given.to_vec(), proven: false },
+        VisitOrder::Listed => return Ordered::unproven(given.to_vec()),
         VisitOrder::SpeedLines => {
             let mut order = given.to_vec();
             order.sort_by(|a, b| by_speed_line(&points[*a], &points[*b]));
-            return Ordered { order, proven: false };
+            return Ordered::unproven(order);
         }
         VisitOrder::Greedy => {
-            return Ordered { order: greedy(housing, given, Objective::Sum), proven: false };
+            return Ordered::unproven(greedy(housing, given, Objective::Sum));
         }
         VisitOrder::SumGradient => {
             // Few points: begin with the best order as if the housing settled at each.
@@ -84,7 +98,7 @@ pub(crate) fn order_on(
             (order, Figure::Worst)
         }
         VisitOrder::Information | VisitOrder::Time | VisitOrder::Best => {
-            return Ordered { order: search(given, Objective::Information), proven: false };
+            return Ordered::unproven(search(given, Objective::Information));
         }
     };
     let optimistic =
@@ -93,9 +107,9 @@ pub(crate) fn order_on(
         Some(optimistic) => {
             let proof =
                 branch_and_bound(housing, &order, &optimistic, figure, PROOF_TOLERANCE_RATIO, PROOF_NODES);
-            Ordered { order: proof.order, proven: proof.proven }
+            Ordered { proven: proof.proven, ..Ordered::unproven(proof.order) }
         }
-        None => Ordered { order, proven: false },
+        None => Ordered::unproven(order),
     }
 }
 
@@ -173,23 +187,28 @@ mod tests {
             method: None,
             effort: 0.1,
             draft: false,
+            gradient_share: None,
             seed: 1,
         }
     }
 
-    /// All orders of `rest` behind `order`.
-    fn largest(housing: &Housing, order: &mut Vec<usize>, rest: &[usize]) -> f64 {
+    /// What is said of all orders of the points.
+    fn of_all<T>(order: &mut Vec<usize>, rest: &[usize], said: &mut Vec<T>, say: &impl Fn(&[usize]) -> T) {
         if rest.is_empty() {
-            return Objective::Sum.figure(housing, order);
+            said.push(say(order));
         }
-        let mut best = f64::NEG_INFINITY;
         for (place, next) in rest.iter().enumerate() {
             let others: Vec<usize> = rest[..place].iter().chain(&rest[place + 1..]).copied().collect();
             order.push(*next);
-            best = best.max(largest(housing, order, &others));
+            of_all(order, &others, said, say);
             order.pop();
         }
-        best
+    }
+
+    fn largest(housing: &Housing, given: &[usize]) -> f64 {
+        let mut figures = Vec::new();
+        of_all(&mut Vec::new(), given, &mut figures, &|order| Objective::Sum.figure(housing, order));
+        figures.into_iter().fold(f64::NEG_INFINITY, f64::max)
     }
 
     proptest! {
@@ -218,13 +237,53 @@ mod tests {
             let given: Vec<usize> = (0..points.len()).collect();
             let found = order_on(&housing, &points, &given, &request);
             let by_worth = housing.by_worth().unwrap();
-            let best = largest(&by_worth, &mut Vec::new(), &given);
+            let best = largest(&by_worth, &given);
             let value = Objective::Sum.figure(&by_worth, &found.order);
             prop_assert!(value >= best - 2.0 * PROOF_TOLERANCE_RATIO * best.abs(), "{value} {best}");
             if let Some(optimistic) = Optimistic::of(&by_worth, &given) {
                 let bound = optimistic.bound(given.len(), None, returns).sum_k;
                 prop_assert!(bound >= best - 1e-9 * best.abs(), "{bound} below {best}");
             }
+        }
+
+        /// An order that keeps a share of the gradients does, and no order has larger gradients and is worth more.
+        #[test]
+        fn brute_force_agrees_on_orders_that_keep_gradients(
+            weights in prop::array::uniform3(-1.0..1.0f64),
+            places in prop::sample::subsequence((0..18usize).collect::<Vec<_>>(), 3..=6),
+            share in 0.3..1.0f64,
+        ) {
+            let model = Model::nominal();
+            let points: Vec<OperatingPoint> = places
+                .iter()
+                .map(|place| OperatingPoint {
+                    speed_rpm: 50e3 + 20e3 * (place / 3) as f64,
+                    valve_opening_ratio: [0.5, 0.7, 1.0][place % 3],
+                })
+                .collect();
+            let request = PlanRequest { gradient_share: Some(share), ..request(&model, &points) };
+            let targets = reachable(&request, &points).unwrap();
+            let worth = AnyWorth(weights);
+            let housing = Housing::of(&request, &points, &targets, None, Some(&worth)).unwrap();
+            let by_worth = housing.by_worth().unwrap();
+            let given: Vec<usize> = (0..points.len()).collect();
+            let both = |order: &[usize]| {
+                (gradients_k(&housing, order).iter().sum::<f64>(), Objective::Sum.figure(&by_worth, order))
+            };
+            let mut all = Vec::new();
+            of_all(&mut Vec::new(), &given, &mut all, &both);
+            let over = |value: fn(&(f64, f64)) -> f64| {
+                let values = || all.iter().map(value);
+                (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
+            };
+            let ((least_k, most_k), (worst, best)) = (over(|both| both.0), over(|both| both.1));
+            let (kept_k, kept) = both(&order_on(&housing, &points, &given, &request).order);
+            prop_assert!(kept_k >= (share - 2.0 * PROOF_TOLERANCE_RATIO) * most_k, "{kept_k} of {most_k}");
+            // Hundredths of what there is: the weight is found in six halvings.
+            let beaten = |(gradient_k, worth): &(f64, f64)| {
+                gradient_k - kept_k > 0.02 * (most_k - least_k) && worth - kept > 0.02 * (best - worst)
+            };
+            prop_assert!(!all.iter().any(beaten), "{kept_k} K and {kept}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! From a request to a plan.
 
 use crate::best::{best, cost_of};
-use crate::dwell::FORECASTS;
+use crate::dwell::{FORECASTS, needed_s};
 use crate::figures::{duration_s, open_rms_error_eta};
 use crate::forecast::MOST_TOGETHER;
 use crate::reach::reachable;
@@ -18,10 +18,12 @@ const ROUGH_FORECASTS: usize = 3;
 /// The same of one by what steps are worth: that is known to a few percent only, and thirty times the effort, or what
 /// steps are worth worked out again about the order that was found, finds plans that cost some 3 % less (docs/performance.md).
 const INFORMED_RATIO: f64 = 0.1;
-/// The same where dwells are found by price behind it, and the dwell for which its order is sought then, over the longest: such steps
-/// are short or long, and half of the longest on average (docs/planner.md).
+/// The same where dwells are found by price behind it.
 const DRAFTED_RATIO: f64 = 0.03;
+/// The dwell for which an order is sought then: at most so much of the longest, and so much of what equal steps would need, which
+/// priced ones undercut (decision 0048).
 const DRAFTED_DWELL_RATIO: f64 = 0.5;
+const UNDERCUT_RATIO: f64 = 0.85;
 /// Jumps tried for repeats where the request names none.
 const USUAL_JUMPS: usize = 3;
 /// Orders the points and forecasts every step.
@@ -106,6 +108,13 @@ fn plan_with(
         let dwells_s: Vec<f64> = made.steps().iter().map(|step| step.dwell_s).collect();
         mean(&dwells_s).unwrap_or(longest_s).round()
     };
+    if let (true, Some(error)) = (drafted, open_rms_error_eta(made.steps())) {
+        // Where shorter steps will do, what steps are worth is known about those.
+        let needed_s = (UNDERCUT_RATIO * needed_s(request, dwell_s(&made), error)).round();
+        if needed_s < dwell_s(&made) {
+            made = stage.made(first, Sought { dwell_s: needed_s, ..rough }, None)?;
+        }
+    }
     if !informed {
         made = stage.made(first, Sought { dwell_s: dwell_s(&made), ..usual }, None)?;
         return Ok(stage.plan(made));

@@ -48,6 +48,8 @@ pub struct PlanRequest<'a> {
     pub simulations: Option<&'a Simulations>,
     /// Work of the search, 1 for the usual; larger searches longer, 0 hardly at all.
     pub effort: f64,
+    /// An order by what steps tell keeps this share of the largest sum of gradients, 0 to 1.
+    pub gradient_share: Option<f64>,
     /// Whether whoever asks finds the dwells himself: steps then last about as long as each other, errors are the open ones alone, and
     /// an order by what steps tell is sought with less effort.
     pub draft: bool,

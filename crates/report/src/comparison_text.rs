@@ -45,7 +45,7 @@ pub fn comparison_text(comparison: &Comparison) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,
-            "  {name:<32}{:>6.0} min   rms {:>5}   open {:>5}   worst {:>5}   gradients {gradient:>5} K",
+            "  {name:<36}{:>6.0} min   rms {:>5}   open {:>5}   worst {:>5}   gradients {gradient:>5} K",
             way.minutes,
             percent(way.rms_error_eta, 2),
             percent(way.open_rms_error_eta, 2),
@@ -66,7 +66,7 @@ pub fn comparison_text(comparison: &Comparison) -> String {
         let _ = writeln!(
             text,
             "No other order beats these in gradients, open error and minutes at once, the largest gradients first: {}.",
-            front.join(", ")
+            front.join("; ")
         );
     }
     if let Some((name, way)) = comparison.beaten_by() {

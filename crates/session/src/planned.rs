@@ -68,7 +68,8 @@ fn priced(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, Sessio
 fn priced_openly(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, SessionError> {
     let draft = make_plan(&PlanRequest { draft: true, ..request.clone() })?;
     let plan = retimed(campaign, request, draft)?;
-    if !request.order.needs_method() || request.appended.is_some() || plan.steps.len() > MOST_STEPS {
+    let is_sought = request.order.needs_method() && request.gradient_share.is_none();
+    if !is_sought || request.appended.is_some() || plan.steps.len() > MOST_STEPS {
         return Ok(plan);
     }
     // Once: about the plan that this gives, nothing better was found on any campaign that was tried.

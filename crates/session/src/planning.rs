@@ -69,6 +69,7 @@ impl PlanMaterial {
             simulations: Some(&self.simulations),
             effort: 1.0,
             draft: false,
+            gradient_share: campaign.gradient_share,
             seed: campaign.seed,
         }
     }

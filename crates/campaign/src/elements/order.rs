@@ -1,5 +1,5 @@
-//! `order:` and `required_sigma_eta:`, by which the dwell of each step is chosen. The orders themselves stand in
-//! [`mapper_core::VisitOrder`].
+//! `order:` and what goes with it: `required_sigma_eta:`, by which the dwell of each step is chosen, and `gradient_share:`. The
+//! orders themselves stand in [`mapper_core::VisitOrder`].
 
 use crate::checking::Check;
 use mapper_core::VisitOrder;
@@ -13,6 +13,16 @@ pub(crate) fn check(check: &mut Check<'_>) {
     if order == VisitOrder::Time.name() && check.get(&steps!["required_sigma_eta"]).is_none() {
         let message = "`order: time` needs the error that it has to reach".to_owned();
         check.note(FindingKind::MissingKey, &path, message, "add e.g. `required_sigma_eta: 1 %`");
+    }
+    let share = steps!["gradient_share"];
+    if order != VisitOrder::Information.name() && check.get(&share).is_some() {
+        let message = format!("`gradient_share` holds for `order: information`, and the order is `{order}`");
+        check.note(
+            FindingKind::Conflict,
+            &share,
+            message,
+            "write `order: information`, or leave the share out",
+        );
     }
     let steady = check.text(&steps!["identification", "method"]) == Some("steady");
     let counts_on_method = [VisitOrder::Information, VisitOrder::Time, VisitOrder::Best]

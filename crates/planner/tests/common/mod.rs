@@ -47,6 +47,7 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
         simulations: None,
         effort: 0.3,
         draft: false,
+        gradient_share: None,
         seed: 1,
     }
 }

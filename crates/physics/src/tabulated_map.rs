@@ -99,20 +99,28 @@ pub enum MapError {
     },
 }
 
+/// A speed line as it is kept.
 #[derive(Debug, Clone)]
-struct Line {
-    speed_corrected_rpm: f64,
-    choke_pressure_ratio: f64,
-    surge_pressure_ratio: f64,
-    /// x rising from 0 to 1, with flow and efficiency.
-    nodes: Vec<Node>,
+pub struct Line {
+    /// Mean corrected speed of its points, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Pressure ratio at the choke end.
+    pub choke_pressure_ratio: f64,
+    /// Pressure ratio at the surge end.
+    pub surge_pressure_ratio: f64,
+    /// At least two, x rising from 0 to 1.
+    pub nodes: Vec<Node>,
 }
 
+/// A place on a speed line.
 #[derive(Debug, Clone, Copy)]
-struct Node {
-    x: f64,
-    flow_kg_s: f64,
-    efficiency: f64,
+pub struct Node {
+    /// Pressure ratio above the choke end's, over the line's whole span: 0 there, 1 at the surge end.
+    pub x: f64,
+    /// Corrected flow, kg/s.
+    pub flow_kg_s: f64,
+    /// Isentropic efficiency, total to total, fraction.
+    pub efficiency: f64,
 }
 
 /// A map made of a table.
@@ -196,6 +204,11 @@ impl TabulatedMap {
         }
         let fingerprint = format!("table {reference} {sorted:?}");
         Ok(TabulatedMap { reference, lines, fingerprint })
+    }
+
+    /// The speed lines in order of speed: at least two.
+    pub fn lines(&self) -> &[Line] {
+        &self.lines
     }
 
     /// Corrected speeds of the lines, rpm, rising.

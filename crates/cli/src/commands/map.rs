@@ -17,6 +17,7 @@ subcommands! { MapCommand:
     convert::Convert,
     compare::Compare,
     rig::Rig,
+    fmu::Fmu,
 }
 
 impl Map {

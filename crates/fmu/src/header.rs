@@ -87,10 +87,13 @@ fn value_references(text: &mut String, variables: &[Variable], switches: &[Switc
     Ok(())
 }
 
+/// A column of a table: its name in C, and where it stands.
+type Column<T> = (&'static str, fn(&T) -> f64);
+
 fn table(text: &mut String, map: &TabulatedMap) -> Result<(), FmuError> {
     let lines = map.lines();
     let _ = writeln!(text, "#define MAP_LINES {}", lines.len());
-    let line_columns: [(&str, fn(&Line) -> f64); 3] = [
+    let line_columns: [Column<Line>; 3] = [
         ("map_speed_rpm", |line| line.speed_corrected_rpm),
         ("map_choke_pr", |line| line.choke_pressure_ratio),
         ("map_surge_pr", |line| line.surge_pressure_ratio),
@@ -104,7 +107,7 @@ fn table(text: &mut String, map: &TabulatedMap) -> Result<(), FmuError> {
     }
     let first: Vec<String> = first.iter().map(usize::to_string).collect();
     let _ = writeln!(text, "static const int map_first_node[] = {{{}}};", first.join(", "));
-    let columns: [(&str, fn(&Node) -> f64); 3] = [
+    let columns: [Column<Node>; 3] = [
         ("map_x", |node| node.x),
         ("map_flow_kg_s", |node| node.flow_kg_s),
         ("map_efficiency", |node| node.efficiency),

@@ -132,7 +132,7 @@ impl Session<'_> {
                 "identified by the {} method: fitted map of {} points on {} speed lines, compressor's heat transfer {law}; \
                  turbine, bearing and masses as declared",
                 config.method,
-                points.len(),
+                map.lines.iter().map(|line| line.points.len()).sum::<usize>(),
                 map.lines.len()
             ),
             params: thermal

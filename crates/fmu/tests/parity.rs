@@ -16,8 +16,11 @@ use std::sync::Arc;
 
 const CLOSED_FORM: ClosedFormMap = ClosedFormMap { wheel_diameter_m: 0.052 };
 
+/// A value of the model.
+type Value = fn(&State, &Outputs) -> f64;
+
 /// Every output of the FMU that the model has too.
-const OUTPUTS: &[(&str, fn(&State, &Outputs) -> f64)] = &[
+const OUTPUTS: &[(&str, Value)] = &[
     ("N", |state, _| state.shaft_speed_rpm()),
     ("P2", |state, _| state.p2_pa),
     ("Tc", |state, _| state.tc_k),

@@ -148,12 +148,12 @@ fn with_found(declared: &Params, found: &ThermalModel) -> Params {
     let mut params = *declared;
     let compressor = &mut params.compressor;
     compressor.internal_area_m2 = found.internal_area_m2;
-    if let Some(law) = &found.convection {
-        if let Some((a, b)) = law.coefficient.value.zip(law.exponent.value) {
-            compressor.nusselt_coefficient = a;
-            compressor.nusselt_exponent = b;
-            compressor.outlet_diameter_m = law.diameter_m;
-        }
+    if let Some(law) = &found.convection
+        && let Some((a, b)) = law.coefficient.value.zip(law.exponent.value)
+    {
+        compressor.nusselt_coefficient = a;
+        compressor.nusselt_exponent = b;
+        compressor.outlet_diameter_m = law.diameter_m;
     }
     if let Some(alpha) = found.alpha_area_ratio.value {
         compressor.alpha_area_ratio = alpha;

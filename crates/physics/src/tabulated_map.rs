@@ -6,7 +6,7 @@
 //! extrapolation, good enough to run a machine up, not to be read as a measurement.
 
 use crate::characteristic::{CharacteristicPoint, CompressorCharacteristic};
-use crate::inlet_limit::{SLOWEST_TOP_SPEED_RPM, largest_flow_kg_s};
+use crate::inlet_limit::{FASTEST_SPEED_RPM, SLOWEST_TOP_SPEED_RPM, largest_flow_kg_s};
 use crate::similarity::{head_ratio as head, pressure_ratio_of_head};
 use mapper_core::{ReferenceState, with_unit};
 
@@ -80,12 +80,23 @@ pub enum MapError {
         /// The fastest corrected speed, rpm.
         speed_corrected_rpm: f64,
     },
+    /// A line faster than any turbocharger.
+    #[error(
+        "row {row} of the map: no turbocharger turns at {} (2e6 rpm at most); if the table has rpm, its heading must not say krpm",
+        with_unit(speed_corrected_rpm, "rpm")
+    )]
+    Fast {
+        /// Row, from 1, header not counted.
+        row: usize,
+        /// Corrected speed, rpm.
+        speed_corrected_rpm: f64,
+    },
     /// More flow than an inlet passes.
     #[error(
         "row {row} of the map: no compressor passes {} at {} ({} at most); if the table has g/s, kg/h or lb/min, say so in its heading (`flow [g/s]`)",
         with_unit(flow_corrected_kg_s, "kg/s"),
         with_unit(speed_corrected_rpm, "rpm"),
-        with_unit(most_kg_s, "kg/s")
+        with_unit(format_args!("{most_kg_s:.2}"), "kg/s")
     )]
     Flow {
         /// Row, from 1, header not counted.
@@ -163,6 +174,11 @@ impl TabulatedMap {
                     return Err(MapError::Value { row: index + 1, quantity, value, unit, needed });
                 }
             }
+        }
+        if let Some((index, row)) =
+            rows.iter().enumerate().find(|(_, row)| row.speed_corrected_rpm > FASTEST_SPEED_RPM)
+        {
+            return Err(MapError::Fast { row: index + 1, speed_corrected_rpm: row.speed_corrected_rpm });
         }
         let fastest_rpm = rows.iter().map(|row| row.speed_corrected_rpm).fold(0.0, f64::max);
         if !rows.is_empty() && fastest_rpm < SLOWEST_TOP_SPEED_RPM {

@@ -16,6 +16,7 @@ subcommands! { MapCommand:
     fit::Fit,
     convert::Convert,
     compare::Compare,
+    correct::Correct,
     rig::Rig,
     fmu::Fmu,
 }

@@ -1,9 +1,9 @@
 //! `modelDescription.xml` of the FMI standard, version 2.0.
 
 use crate::c_text::number;
-use crate::files::SOURCES;
 use crate::header::DEFAULT_TOLERANCE;
 use crate::machine::{FmuError, FmuMachine};
+use crate::sources::SOURCES;
 use crate::variable::{Causality, Switch, UNITS, Variable};
 use quick_xml::escape::escape;
 use std::fmt::Write;

@@ -3,22 +3,10 @@
 use crate::description::description;
 use crate::header::{header, with_guid};
 use crate::machine::{FmuError, FmuMachine};
+use crate::sources::SOURCES;
 use crate::variables::{switches, variables};
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
-
-/// Sources that are equal for every machine.
-pub const SOURCES: &[(&str, &str)] = &[
-    ("fmu.c", include_str!("../c/fmu.c")),
-    ("machine.c", include_str!("../c/machine.c")),
-    ("machine.h", include_str!("../c/machine.h")),
-    ("map.c", include_str!("../c/map.c")),
-    ("rodas5p.c", include_str!("../c/rodas5p.c")),
-    // The standard's own headers (2-clause BSD, Modelica Association), as they are.
-    ("fmi2Functions.h", include_str!("../c/fmi2/fmi2Functions.h")),
-    ("fmi2FunctionTypes.h", include_str!("../c/fmi2/fmi2FunctionTypes.h")),
-    ("fmi2TypesPlatform.h", include_str!("../c/fmi2/fmi2TypesPlatform.h")),
-];
 
 /// A file of an FMU.
 #[derive(Debug, Clone, PartialEq, Eq)]

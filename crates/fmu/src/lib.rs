@@ -13,6 +13,7 @@ mod files;
 mod fitted;
 mod header;
 mod machine;
+mod sources;
 mod variable;
 mod variables;
 

@@ -360,7 +360,7 @@ pub enum SessionError {
     },
     /// A machine is no FMU.
     #[error(transparent)]
-    Fmu(#[from] crate::fmu_file::FmuExportError),
+    Fmu(#[from] crate::fmu_error::FmuExportError),
     /// A file is there already.
     #[error("{} is there already and is kept; choose another name", .path.display())]
     Exists {

@@ -1,6 +1,6 @@
 //! The sources of an FMU, compiled for this computer by its own C compiler.
 
-use crate::fmu_file::FmuExportError;
+use crate::fmu_error::FmuExportError;
 use crate::{SessionError, files};
 use mapper_fmu::FmuFile;
 use std::path::Path;

@@ -2,18 +2,18 @@
 
 use crate::files::{Existing, write_file};
 use crate::fmu_binary::with_binary;
+use crate::fmu_error::FmuExportError;
 use crate::recorded::Recorded;
 use crate::{Session, SessionError};
 use mapper_assemble::{Grouping, MapFitOptions, assemble, fit_map};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
 use mapper_core::{CompressorMap, IdentifiedPoint, ThermalModel};
-use mapper_fmu::{FmuError, FmuMachine, FmuMap, archive, files, table_of_fit};
+use mapper_fmu::{FmuMachine, FmuMap, archive, files, table_of_fit};
 use mapper_physics::closed_form_map::ClosedFormMap;
 use mapper_physics::model::Model;
 use mapper_physics::params::Params;
 use mapper_physics::steady::{SteadyError, SteadyState, hold_speed};
-use mapper_physics::tabulated_map::MapError;
 use mapper_record::ChannelMap;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -30,31 +30,6 @@ pub struct WrittenFmu {
     pub start_speed_rpm: f64,
     /// Folder of the library for this computer; `None` where it holds sources alone.
     pub binary: Option<String>,
-}
-
-/// Why a machine is no FMU.
-#[derive(Debug, thiserror::Error)]
-pub enum FmuExportError {
-    /// The recording gives no map of enough lines.
-    #[error("an FMU needs a map of the whole machine: {0}")]
-    NoMap(String),
-    /// The map is none that a model can run on.
-    #[error("the map is none that a model can run on: {0}")]
-    Map(#[from] MapError),
-    /// It has nowhere to begin.
-    #[error("there is no steady state to begin at: {0}")]
-    Start(#[from] SteadyError),
-    /// The archive cannot be made.
-    #[error(transparent)]
-    Fmu(#[from] FmuError),
-    /// No compiler, or one that refuses.
-    #[error("the sources cannot be compiled with `{compiler}`: {why}")]
-    Compiler {
-        /// The program that was called.
-        compiler: String,
-        /// What it said.
-        why: String,
-    },
 }
 
 /// A machine on the way into an FMU.

@@ -60,10 +60,13 @@ pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
             // Units may have a row of their own.
             let second = records.next().map(record).transpose()?;
             let names: Vec<&str> = first.iter().collect();
-            let below = second.as_ref().and_then(|row| with_units_row(&names, &row.iter().collect::<Vec<_>>()));
+            let below =
+                second.as_ref().and_then(|row| with_units_row(&names, &row.iter().collect::<Vec<_>>()));
             match below {
                 Some(joined) => (named(&first, &joined)?, None),
-                None => (named(&first, &names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>())?, second),
+                None => {
+                    (named(&first, &names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>())?, second)
+                }
             }
         }
     };

@@ -40,7 +40,8 @@ impl Correct {
     /// Corrects a map.
     pub fn run(&self) -> Result<(), Failure> {
         let registry = registry::registry();
-        let format = self.out.as_ref().map(|path| registry.format_of(path, self.to.as_deref())).transpose()?;
+        let format =
+            self.out.as_ref().map(|path| registry.format_of(path, self.to.as_deref())).transpose()?;
         let map = registry.read_map(&self.map, reference(self.reference.as_deref())?)?;
         let (map, correction) = correct_for_heat(map, self.heat)
             .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", self.map.display())))?;

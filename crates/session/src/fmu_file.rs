@@ -83,7 +83,12 @@ impl Session<'_> {
     ) -> Result<WrittenFmu, SessionError> {
         let campaign = recorded.known("Give `--campaign FILE`")?.clone();
         let identified = self.identify(vec![recorded], channels, None)?;
-        let points: Vec<IdentifiedPoint> = identified.points_alone().cloned().collect();
+        // Points without a place are no part of a map, and no reason to have none.
+        let has_place = |point: &&IdentifiedPoint| {
+            let place = [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm];
+            place.iter().all(|value| value.is_finite())
+        };
+        let points: Vec<IdentifiedPoint> = identified.points_alone().filter(has_place).cloned().collect();
         let config = &identified.config;
         let name = &campaign.machine.name;
         let no_map = |why: String| FmuExportError::NoMap(why);

@@ -2,7 +2,9 @@
 
 use mapper_core::{MAP_COLUMNS, ReferenceState};
 use mapper_physics::tabulated_map::{MapError, MapRow, TabulatedMap};
-use mapper_yaml::units::{FoundColumn, HeadingError, Kind, WantedColumn, find_columns};
+use mapper_yaml::units::{
+    FoundColumn, HeadingError, Kind, TableText, WantedColumn, find_columns, with_units_row,
+};
 
 /// What the four columns measure.
 const KINDS: [Kind; 4] = [Kind::Speed, Kind::MassFlow, Kind::Fraction, Kind::Fraction];
@@ -35,48 +37,56 @@ pub enum NominalTableError {
     Map(#[from] MapError),
 }
 
-/// Reads separated text (`,`, `;` or tab). A first line without numbers names the columns and their units, in any order and
-/// among others; without it they are corrected rpm, corrected kg/s, pressure ratio and efficiency. `#` starts a comment.
+/// Reads separated text (`,`, or `;` or tab with decimal point or comma). A first line without numbers names the columns and their
+/// units, in any order and among others; units may have a line of their own below it. Without names they are corrected rpm, corrected
+/// kg/s, pressure ratio and efficiency. `#` starts a comment.
 ///
 /// # Errors
 /// [`NominalTableError`] with the line of the file.
 pub fn nominal_table(text: &str, reference: ReferenceState) -> Result<TabulatedMap, NominalTableError> {
-    let bare = |index| FoundColumn { index, unit: None };
-    let mut columns: Option<[FoundColumn; 4]> = None;
-    let mut rows = Vec::new();
-    for (index, line) in text.lines().enumerate() {
+    let content = text.lines().enumerate().filter_map(|(index, line)| {
         let content = line.split('#').next().unwrap_or_default().trim().trim_start_matches('\u{feff}');
-        if content.is_empty() {
-            continue;
+        (!content.is_empty()).then_some((index + 1, content))
+    });
+    let mut content = content.peekable();
+    let table = TableText::of(content.peek().map_or("", |(_, line)| line));
+    let has_number = |line: &str| table.fields(line).into_iter().any(|field| table.number(field).is_some());
+    let bare = |index| FoundColumn { index, unit: None };
+    let mut columns = [bare(0), bare(1), bare(2), bare(3)];
+    if let Some((line, names)) = content.next_if(|(_, first)| !has_number(first)) {
+        let names: Vec<String> = table.fields(names).into_iter().map(str::to_owned).collect();
+        let plain: Vec<&str> = names.iter().map(String::as_str).collect();
+        let below = content.peek().and_then(|(_, below)| with_units_row(&plain, &table.fields(below)));
+        if below.is_some() {
+            content.next();
         }
-        let fields: Vec<&str> = content.split([',', ';', '\t']).map(str::trim).collect();
-        let found = match columns {
-            Some(found) => found,
-            None if fields.iter().any(|field| field.parse::<f64>().is_ok()) => {
-                *columns.insert([bare(0), bare(1), bare(2), bare(3)])
-            }
-            None => {
-                let wanted: [WantedColumn<'_>; 4] = std::array::from_fn(|i| WantedColumn {
-                    quantity: MAP_COLUMNS[i].0,
-                    names: MAP_COLUMNS[i].1,
-                    kind: KINDS[i],
-                });
-                let heading = |source| NominalTableError::Heading { line: index + 1, source };
-                columns = Some(find_columns(&fields, wanted).map_err(heading)?);
-                continue;
-            }
-        };
-        let number = |column: FoundColumn| {
-            fields.get(column.index)?.parse::<f64>().ok().map(|value| column.inside(value))
-        };
+        columns = columns_of(&below.unwrap_or(names))
+            .map_err(|source| NominalTableError::Heading { line, source })?;
+    }
+    let mut rows = Vec::new();
+    for (line, content) in content {
+        let fields = table.fields(content);
+        let number =
+            |column: FoundColumn| table.number(fields.get(column.index)?).map(|value| column.inside(value));
         let [Some(speed_corrected_rpm), Some(flow_corrected_kg_s), Some(pressure_ratio), Some(efficiency)] =
-            found.map(number)
+            columns.map(number)
         else {
-            return Err(NominalTableError::Row { line: index + 1, text: content.chars().take(60).collect() });
+            return Err(NominalTableError::Row { line, text: content.chars().take(60).collect() });
         };
         rows.push(MapRow { speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, efficiency });
     }
     Ok(TabulatedMap::new(&rows, reference)?)
+}
+
+/// The four columns by their names and units.
+fn columns_of(names: &[String]) -> Result<[FoundColumn; 4], HeadingError> {
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let wanted: [WantedColumn<'_>; 4] = std::array::from_fn(|i| WantedColumn {
+        quantity: MAP_COLUMNS[i].0,
+        names: MAP_COLUMNS[i].1,
+        kind: KINDS[i],
+    });
+    find_columns(&names, wanted)
 }
 
 #[cfg(test)]
@@ -120,6 +130,10 @@ mod tests {
             assert!((a.flow_corrected_kg_s / b.flow_corrected_kg_s - 1.0).abs() < 1e-12);
             assert!((a.efficiency / b.efficiency - 1.0).abs() < 1e-12);
         }
+        // The units below the names, and decimal commas.
+        let (_, below) = text.split_once('\n').unwrap();
+        let german = format!("eta;remark;flow;N;PR\n%;;g/s;krpm;-\n{}", below.replace('.', ","));
+        assert_eq!(read(&german).unwrap().fingerprint(), named.fingerprint());
         assert!(matches!(
             read(&text.replace("g/s", "slugs")),
             Err(NominalTableError::Heading { line: 1, .. })
@@ -127,6 +141,11 @@ mod tests {
         assert!(matches!(
             read(&text.replace("krpm", "rpm")),
             Err(NominalTableError::Map(MapError::Slow { .. }))
+        ));
+        // rpm under a heading of krpm.
+        assert!(matches!(
+            read(&SAMPLE.replace("RPM", "N [krpm]")),
+            Err(NominalTableError::Map(MapError::Fast { .. }))
         ));
     }
 

@@ -13,6 +13,8 @@ const T_K: f64 = 298.0;
 const P_PA: f64 = 100e3;
 /// Slowest top speed of a turbocharger's map, rpm: the largest, on ships' engines, turn at some 9000.
 pub const SLOWEST_TOP_SPEED_RPM: f64 = 1000.0;
+/// No turbocharger turns faster, rpm: the smallest ones end at some 400 000.
+pub const FASTEST_SPEED_RPM: f64 = 2e6;
 
 /// Largest corrected flow that any compressor passes at a corrected speed (rpm, > 0), kg/s.
 pub fn largest_flow_kg_s(speed_corrected_rpm: f64) -> f64 {

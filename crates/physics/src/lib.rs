@@ -32,6 +32,7 @@ pub mod outputs;
 pub mod params;
 pub mod pressure_tap;
 pub mod reach;
+pub mod rodas5p;
 pub mod rosenbrock;
 pub mod settled;
 pub mod similarity;

@@ -6,7 +6,7 @@
 //! extrapolation, good enough to run a machine up, not to be read as a measurement.
 
 use crate::characteristic::{CharacteristicPoint, CompressorCharacteristic};
-use crate::inlet_limit::{SLOWEST_TOP_SPEED_RPM, largest_flow_kg_s};
+use crate::inlet_limit::{FASTEST_SPEED_RPM, SLOWEST_TOP_SPEED_RPM, largest_flow_kg_s};
 use crate::similarity::{head_ratio as head, pressure_ratio_of_head};
 use mapper_core::{ReferenceState, with_unit};
 
@@ -80,12 +80,23 @@ pub enum MapError {
         /// The fastest corrected speed, rpm.
         speed_corrected_rpm: f64,
     },
+    /// A line faster than any turbocharger.
+    #[error(
+        "row {row} of the map: no turbocharger turns at {} (2e6 rpm at most); if the table has rpm, its heading must not say krpm",
+        with_unit(speed_corrected_rpm, "rpm")
+    )]
+    Fast {
+        /// Row, from 1, header not counted.
+        row: usize,
+        /// Corrected speed, rpm.
+        speed_corrected_rpm: f64,
+    },
     /// More flow than an inlet passes.
     #[error(
         "row {row} of the map: no compressor passes {} at {} ({} at most); if the table has g/s, kg/h or lb/min, say so in its heading (`flow [g/s]`)",
         with_unit(flow_corrected_kg_s, "kg/s"),
         with_unit(speed_corrected_rpm, "rpm"),
-        with_unit(most_kg_s, "kg/s")
+        with_unit(format_args!("{most_kg_s:.2}"), "kg/s")
     )]
     Flow {
         /// Row, from 1, header not counted.
@@ -99,20 +110,28 @@ pub enum MapError {
     },
 }
 
+/// A speed line as it is kept.
 #[derive(Debug, Clone)]
-struct Line {
-    speed_corrected_rpm: f64,
-    choke_pressure_ratio: f64,
-    surge_pressure_ratio: f64,
-    /// x rising from 0 to 1, with flow and efficiency.
-    nodes: Vec<Node>,
+pub struct Line {
+    /// Mean corrected speed of its points, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Pressure ratio at the choke end.
+    pub choke_pressure_ratio: f64,
+    /// Pressure ratio at the surge end.
+    pub surge_pressure_ratio: f64,
+    /// At least two, x rising from 0 to 1.
+    pub nodes: Vec<Node>,
 }
 
+/// A place on a speed line.
 #[derive(Debug, Clone, Copy)]
-struct Node {
-    x: f64,
-    flow_kg_s: f64,
-    efficiency: f64,
+pub struct Node {
+    /// Pressure ratio above the choke end's, over the line's whole span: 0 there, 1 at the surge end.
+    pub x: f64,
+    /// Corrected flow, kg/s.
+    pub flow_kg_s: f64,
+    /// Isentropic efficiency, total to total, fraction.
+    pub efficiency: f64,
 }
 
 /// A map made of a table.
@@ -156,6 +175,11 @@ impl TabulatedMap {
                 }
             }
         }
+        if let Some((index, row)) =
+            rows.iter().enumerate().find(|(_, row)| row.speed_corrected_rpm > FASTEST_SPEED_RPM)
+        {
+            return Err(MapError::Fast { row: index + 1, speed_corrected_rpm: row.speed_corrected_rpm });
+        }
         let fastest_rpm = rows.iter().map(|row| row.speed_corrected_rpm).fold(0.0, f64::max);
         if !rows.is_empty() && fastest_rpm < SLOWEST_TOP_SPEED_RPM {
             return Err(MapError::Slow { speed_corrected_rpm: fastest_rpm });
@@ -196,6 +220,11 @@ impl TabulatedMap {
         }
         let fingerprint = format!("table {reference} {sorted:?}");
         Ok(TabulatedMap { reference, lines, fingerprint })
+    }
+
+    /// The speed lines in order of speed: at least two.
+    pub fn lines(&self) -> &[Line] {
+        &self.lines
     }
 
     /// Corrected speeds of the lines, rpm, rising.

@@ -358,6 +358,9 @@ pub enum SessionError {
         /// Why.
         source: mapper_assemble::MapFitError,
     },
+    /// A machine is no FMU.
+    #[error(transparent)]
+    Fmu(#[from] crate::fmu_error::FmuExportError),
     /// A file is there already.
     #[error("{} is there already and is kept; choose another name", .path.display())]
     Exists {
@@ -428,6 +431,7 @@ impl SessionError {
             | E::UnknownExtension { .. }
             | E::FormatUnsaid { .. }
             | E::Fit { .. }
+            | E::Fmu(_)
             | E::Drift(DriftError::NoRun)
             | E::Export(ExportError::NeedsFit { .. })
             | E::Script(_) => ErrorKind::BadInput,

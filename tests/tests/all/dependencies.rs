@@ -15,6 +15,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-fleet",     &["numerics", "yaml"]),
     ("mapper-physics",   &["core", "numerics"]),
     ("mapper-mesh",      &["core", "chart"]),
+    ("mapper-fmu",       &["core", "physics"]),
     ("mapper-campaign",  &["core", "physics", "yaml"]),
     ("mapper-planner",   &["core", "numerics", "physics"]),
     ("mapper-surge",     &["core", "numerics", "physics"]),
@@ -47,7 +48,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // The page of a run, for a browser.
     ("mapper-page",      &["core", "chart", "mesh", "campaign", "assemble", "identify", "numerics", "observe", "record", "report"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics", "fleet"]),
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics", "fleet", "fmu"]),
     // What fleets work on: one file a kind, above the application and the blind cases.
     ("mapper-studies",   &["blind", "campaign", "core", "fleet", "history", "record", "session"]),
     // What a terminal, a pipe or another program sees; what a browser sees while a run goes on.

@@ -13,6 +13,7 @@ mod drift_watched;
 mod drivers;
 mod fleet;
 mod fleet_cluster;
+mod fmu;
 mod full_disk;
 mod help;
 mod interrupted;

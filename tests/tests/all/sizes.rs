@@ -8,8 +8,9 @@ const MEDIAN_LINES: usize = 120;
 /// No file has more, unless its first comment says why.
 const LONGEST_LINES: usize = 500;
 /// All of the program's own crate, tests included: what decides anything lies below it.
-/// Raised from 3000 for the eight commands of `mapper fleet` and for `mapper history fleet`, each options, one call and its words.
-const CLI_LINES: usize = 3_700;
+/// Raised from 3000 for the eight commands of `mapper fleet` and for `mapper history fleet`, each options, one call and its words;
+/// from 3700 for `mapper map fmu` and `mapper map correct`.
+const CLI_LINES: usize = 3_800;
 /// Files that are longer without saying why: to be emptied.
 const KNOWN: &[&str] = &[];
 

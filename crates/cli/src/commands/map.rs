@@ -16,7 +16,9 @@ subcommands! { MapCommand:
     fit::Fit,
     convert::Convert,
     compare::Compare,
+    correct::Correct,
     rig::Rig,
+    fmu::Fmu,
 }
 
 impl Map {

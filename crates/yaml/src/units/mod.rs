@@ -10,6 +10,7 @@ mod heading;
 mod kind;
 mod parse;
 mod quantity;
+mod table_text;
 
 pub use header_unit::{HeaderUnit, Reference, header_unit, split_unit};
 pub use heading::{FoundColumn, HeadingError, WantedColumn, find_columns};
@@ -20,3 +21,4 @@ pub use quantity::{
     MassFlow, Pressure, PressureDifference, PressureRate, Quantity, RatioRate, Speed, Temperature,
     TemperatureDifference, TemperatureRate, Volume,
 };
+pub use table_text::{TableText, with_units_row};

@@ -8,7 +8,7 @@ use mapper_core::{
     CommonErrors, CompressorMap, ImportError, MAP_COLUMNS, MapPoint, Method, ReferenceState, SpeedShift,
     Verdict, Warning,
 };
-use mapper_yaml::units::{FoundColumn, Kind, WantedColumn, find_columns};
+use mapper_yaml::units::{FoundColumn, Kind, TableText, WantedColumn, find_columns, with_units_row};
 
 /// What the four columns measure.
 const KINDS: [Kind; 4] = [Kind::Speed, Kind::MassFlow, Kind::Fraction, Kind::Fraction];
@@ -41,9 +41,10 @@ pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
             method = method_of(name);
         }
     }
+    let table = table_text(text);
     let mut reader = ReaderBuilder::new()
         .comment(Some(b'#'))
-        .delimiter(delimiter(text))
+        .delimiter(table.separator as u8)
         .has_headers(false)
         .trim(Trim::All)
         .flexible(true)
@@ -53,9 +54,21 @@ pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
         return Err(ImportError::Empty);
     };
     let first = record(first)?;
-    let (columns, mut pending) = match numeric(&first) {
+    let (columns, mut pending) = match numeric(&first, table) {
         true => (Columns { names: Vec::new(), four: [0, 1, 2, 3].map(bare) }, Some(first)),
-        false => (named(&first)?, None),
+        false => {
+            // Units may have a row of their own.
+            let second = records.next().map(record).transpose()?;
+            let names: Vec<&str> = first.iter().collect();
+            let below =
+                second.as_ref().and_then(|row| with_units_row(&names, &row.iter().collect::<Vec<_>>()));
+            match below {
+                Some(joined) => (named(&first, &joined)?, None),
+                None => {
+                    (named(&first, &names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>())?, second)
+                }
+            }
+        }
     };
     let head = Head { reference, machine, method, columns };
     let mut rows: Vec<(Row, StringRecord)> = Vec::new();
@@ -65,7 +78,7 @@ pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
             continue;
         }
         room_for_one_more(rows.len(), at(&next))?;
-        rows.push((row(&next, &head.columns)?, next));
+        rows.push((row(&next, &head.columns, table)?, next));
     }
     if head.columns.find("line_speed_corrected_rpm").is_some() {
         own(&head, &rows, given)
@@ -86,18 +99,14 @@ fn at(record: &StringRecord) -> usize {
     record.position().map_or(1, |position| position.line() as usize)
 }
 
-/// The separator that the first line of content has most of; a comma where there is none.
-fn delimiter(text: &str) -> u8 {
+/// How the first line of content is separated.
+fn table_text(text: &str) -> TableText {
     let line = text.lines().find(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
-    let count = |c: char| line.map_or(0, |line| line.matches(c).count());
-    [(',', b','), (';', b';'), ('\t', b'\t')]
-        .into_iter()
-        .max_by_key(|(c, _)| (count(*c), *c == ','))
-        .map_or(b',', |(_, b)| b)
+    TableText::of(line.unwrap_or_default())
 }
 
-fn numeric(record: &StringRecord) -> bool {
-    record.len() >= 4 && record.iter().take(4).all(|field| field.parse::<f64>().is_ok())
+fn numeric(record: &StringRecord, table: TableText) -> bool {
+    record.len() >= 4 && record.iter().take(4).all(|field| table.number(field).is_some())
 }
 
 /// A column without a heading: in the unit used inside.
@@ -105,15 +114,15 @@ fn bare(index: usize) -> FoundColumn {
     FoundColumn { index, unit: None }
 }
 
-fn named(record: &StringRecord) -> Result<Columns, ImportError> {
-    let headings: Vec<&str> = record.iter().collect();
+fn named(record: &StringRecord, names: &[String]) -> Result<Columns, ImportError> {
+    let headings: Vec<&str> = names.iter().map(String::as_str).collect();
     let wanted: [WantedColumn<'_>; 4] = std::array::from_fn(|i| {
         let (quantity, names) = MAP_COLUMNS[i];
         WantedColumn { quantity, names, kind: KINDS[i] }
     });
     let four = find_columns(&headings, wanted)
         .map_err(|source| ImportError::Row { line: at(record), source: source.into() })?;
-    Ok(Columns { names: headings.iter().map(|heading| (*heading).to_owned()).collect(), four })
+    Ok(Columns { names: names.to_vec(), four })
 }
 
 impl Columns {
@@ -146,12 +155,12 @@ fn finite(text: &str, record: &StringRecord, name: &str) -> Result<f64, ImportEr
     })
 }
 
-fn row(record: &StringRecord, columns: &Columns) -> Result<Row, ImportError> {
+fn row(record: &StringRecord, columns: &Columns, table: TableText) -> Result<Row, ImportError> {
     let field = |index: usize, what: &str| {
         let column = columns.four[index];
         let text = record.get(column.index).unwrap_or_default();
         let shown: String = text.chars().take(40).collect();
-        text.parse::<f64>().map(|value| column.inside(value)).map_err(|_| ImportError::NotANumber {
+        table.number(text).map(|value| column.inside(value)).ok_or_else(|| ImportError::NotANumber {
             line: at(record),
             quantity: what.to_owned(),
             text: shown,

@@ -1,0 +1,100 @@
+//! The one heat that makes all speed lines one curve.
+
+use super::error::HeatCorrectionError;
+use super::work::WorkPoint;
+use nalgebra::{DMatrix, DVector};
+
+/// Residuals beyond so many robust standard deviations lose weight (Huber).
+const HUBER: f64 = 1.5;
+/// Rounds of weights.
+const ROUNDS: usize = 8;
+/// Least points, lines, and ratio of speeds.
+const LEAST_POINTS: usize = 8;
+const LEAST_LINES: usize = 3;
+const LEAST_SPEED_RATIO: f64 = 1.5;
+/// Smallest over largest singular value below which nothing is determined.
+const RANK: f64 = 1e-5;
+
+/// The heat of a map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Heat to the gas at the reference state, W; negative where slow lines take less work than fast ones.
+    pub heat_w: f64,
+    /// Its standard error: leaving each line out in turn, W.
+    pub standard_error_w: f64,
+    /// Robust scatter of the work coefficients about the curve, ratio.
+    pub scatter_ratio: f64,
+}
+
+/// Finds it.
+pub fn estimate(points: &[WorkPoint]) -> Result<Estimate, HeatCorrectionError> {
+    let mut lines: Vec<usize> = points.iter().map(|point| point.line).collect();
+    lines.dedup();
+    if points.len() < LEAST_POINTS || lines.len() < LEAST_LINES {
+        return Err(HeatCorrectionError::TooFew { points: points.len(), lines: lines.len() });
+    }
+    let speeds = || points.iter().map(|point| point.speed_ratio);
+    let ratio = speeds().fold(0.0, f64::max) / speeds().fold(f64::INFINITY, f64::min);
+    if ratio < LEAST_SPEED_RATIO {
+        return Err(HeatCorrectionError::OneSpeed { ratio });
+    }
+    let (heat_w, scatter_ratio) = fitted(points).ok_or(HeatCorrectionError::Singular)?;
+    // Errors of a line (its speed, its day) are shared by its points, so lines are what is left out.
+    let without = |line: &usize| {
+        let others: Vec<WorkPoint> = points.iter().filter(|point| point.line != *line).copied().collect();
+        fitted(&others).map(|(heat_w, _)| heat_w)
+    };
+    let left_out: Vec<f64> = lines.iter().filter_map(without).collect();
+    if left_out.len() < LEAST_LINES {
+        return Err(HeatCorrectionError::Singular);
+    }
+    let count = left_out.len() as f64;
+    let mean_w = left_out.iter().sum::<f64>() / count;
+    let spread = left_out.iter().map(|heat_w| (heat_w - mean_w).powi(2)).sum::<f64>();
+    Ok(Estimate { heat_w, standard_error_w: ((count - 1.0) / count * spread).sqrt(), scatter_ratio })
+}
+
+/// Heat, W, and scatter, ratio.
+fn fitted(points: &[WorkPoint]) -> Option<(f64, f64)> {
+    // Relative residuals: every row over its own work coefficient.
+    let mut rows = DMatrix::from_fn(points.len(), 4, |row, column| {
+        let point = &points[row];
+        let value = match column {
+            0 => 1.0,
+            1 => point.exit_flow,
+            2 => 1.0 / point.inlet_flow,
+            _ => point.per_watt(),
+        };
+        value / point.work_coefficient
+    });
+    // Columns of one size, so that the rank is judged without units.
+    let sizes: Vec<f64> = (0..4).map(|column| rows.column(column).norm()).collect();
+    for (column, size) in sizes.iter().enumerate() {
+        if *size <= 0.0 || !size.is_finite() {
+            return None;
+        }
+        rows.column_mut(column).scale_mut(1.0 / size);
+    }
+    let mut weights = vec![1.0; points.len()];
+    let mut found = None;
+    for _ in 0..ROUNDS {
+        let root = |row: usize| f64::sqrt(weights[row]);
+        let weighted = DMatrix::from_fn(points.len(), 4, |row, column| root(row) * rows[(row, column)]);
+        let right = DVector::from_fn(points.len(), |row, _| root(row));
+        let svd = weighted.svd(true, true);
+        if svd.singular_values.min() < RANK * svd.singular_values.max() {
+            return None;
+        }
+        let solution = svd.solve(&right, 0.0).ok()?;
+        let residuals = &rows * &solution - DVector::from_element(points.len(), 1.0);
+        let mut sizes_of: Vec<f64> = residuals.iter().map(|residual| residual.abs()).collect();
+        sizes_of.sort_by(f64::total_cmp);
+        // The median of a normal variable's size is 0.6745 standard deviations.
+        let scatter = (sizes_of.get(sizes_of.len() / 2)? / 0.6745).max(1e-9);
+        for (weight, residual) in weights.iter_mut().zip(residuals.iter()) {
+            *weight = (HUBER * scatter / residual.abs().max(1e-300)).min(1.0);
+        }
+        found = Some((solution[3] / sizes[3], scatter));
+    }
+    found.filter(|(heat_w, _)| heat_w.is_finite())
+}

@@ -1,0 +1,80 @@
+//! Work and flow coefficients of a map's points, with the apparent work.
+
+use mapper_core::{CompressorMap, ReferenceState};
+use mapper_physics::air;
+use mapper_physics::compression::isentropic_rise_ratio;
+
+/// Speed by which coefficients are made: it scales them and drops out, as the wheel's diameter does, rpm.
+const UNIT_SPEED_RPM: f64 = 100_000.0;
+/// Share of the stage's temperature rise that the wheel's exit has: its degree of reaction, as radial wheels have it.
+const REACTION: f64 = 0.6;
+/// Density over temperature along the wheel: 1/(n - 1) of a polytrope with n = 1.5.
+const DENSITY_EXPONENT: f64 = 2.0;
+/// Points on the choke side of a line's best efficiency count down to this share of it: beyond, the inlet decides.
+const OUTSIDE_CHOKE: f64 = 0.85;
+
+/// A point as the estimate sees it, at the map's reference state.
+#[derive(Debug, Clone, Copy)]
+pub struct WorkPoint {
+    /// Speed line of the map.
+    pub line: usize,
+    /// Corrected speed of the line over [`UNIT_SPEED_RPM`].
+    pub speed_ratio: f64,
+    /// Corrected flow, kg/s.
+    pub flow_kg_s: f64,
+    /// Apparent specific work over the square of speed, J/kg.
+    pub work_coefficient: f64,
+    /// Flow over speed at the inlet, kg/s.
+    pub inlet_flow: f64,
+    /// The same at the wheel's exit, where the gas is denser, kg/s.
+    pub exit_flow: f64,
+}
+
+impl WorkPoint {
+    /// What one watt of heat adds to the work coefficient.
+    pub fn per_watt(&self) -> f64 {
+        1.0 / (self.flow_kg_s * self.speed_ratio * self.speed_ratio)
+    }
+}
+
+/// Isentropic specific work at the map's reference state, J/kg.
+pub fn isentropic_work_j_kg(reference: ReferenceState, pressure_ratio: f64) -> f64 {
+    let t_k = reference.t_ref_k;
+    air::heat_capacity_j_kgk(t_k) * t_k * isentropic_rise_ratio(pressure_ratio, t_k)
+}
+
+/// The points with an efficiency that lie outside choke.
+pub fn work_points(map: &CompressorMap) -> Vec<WorkPoint> {
+    let reference = map.reference;
+    let mut points = Vec::new();
+    for (index, line) in map.lines.iter().enumerate() {
+        let usable = || {
+            line.points.iter().filter_map(|point| {
+                let eta = point.eta.filter(|eta| *eta > 0.0)?;
+                (point.pressure_ratio > 1.0 && point.flow_corrected_kg_s > 0.0).then_some((point, eta))
+            })
+        };
+        let best = usable().max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((best, best_eta)) = best else { continue };
+        for (point, eta) in usable() {
+            let flow_kg_s = point.flow_corrected_kg_s;
+            if flow_kg_s > best.flow_corrected_kg_s && eta < OUTSIDE_CHOKE * best_eta {
+                continue;
+            }
+            let speed_ratio = line.speed_corrected_rpm / UNIT_SPEED_RPM;
+            let work_j_kg = isentropic_work_j_kg(reference, point.pressure_ratio) / eta;
+            let t_k = reference.t_ref_k;
+            let rise_ratio = work_j_kg / (air::heat_capacity_j_kgk(t_k) * t_k);
+            let inlet_flow = flow_kg_s / speed_ratio;
+            points.push(WorkPoint {
+                line: index,
+                speed_ratio,
+                flow_kg_s,
+                work_coefficient: work_j_kg / (speed_ratio * speed_ratio),
+                inlet_flow,
+                exit_flow: inlet_flow / (1.0 + REACTION * rise_ratio).powf(DENSITY_EXPONENT),
+            });
+        }
+    }
+    points
+}

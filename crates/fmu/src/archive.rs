@@ -1,0 +1,25 @@
+//! The archive: a zip file whose bytes depend on its files alone.
+
+use crate::files::FmuFile;
+use crate::machine::FmuError;
+use std::io::{Cursor, Write};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+/// The archive of an FMU's files.
+///
+/// # Errors
+/// [`FmuError::Archive`] or [`FmuError::File`] where the archive cannot hold them.
+pub fn archive(files: &[FmuFile]) -> Result<Vec<u8>, FmuError> {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    // No time of the clock: equal files, equal bytes.
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default())
+        .unix_permissions(0o644);
+    for file in files {
+        zip.start_file(file.path.as_str(), options)?;
+        zip.write_all(&file.bytes)?;
+    }
+    Ok(zip.finish()?.into_inner())
+}

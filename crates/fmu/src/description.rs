@@ -1,0 +1,97 @@
+//! `modelDescription.xml` of the FMI standard, version 2.0.
+
+use crate::c_text::number;
+use crate::header::DEFAULT_TOLERANCE;
+use crate::machine::{FmuError, FmuMachine};
+use crate::sources::SOURCES;
+use crate::variable::{Causality, Switch, UNITS, Variable};
+use quick_xml::escape::escape;
+use std::fmt::Write;
+
+/// The description, with a GUID that stands in the sources too.
+pub fn description(
+    machine: &FmuMachine<'_>,
+    variables: &[Variable],
+    switches: &[Switch],
+    guid: &str,
+) -> Result<String, FmuError> {
+    let identifier = machine.identifier();
+    let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        xml,
+        "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"{}\" guid=\"{guid}\" description=\"{}\" generationTool=\"mapper {}\" \
+         variableNamingConvention=\"structured\" numberOfEventIndicators=\"0\">",
+        escape(machine.name),
+        escape(machine.origin),
+        env!("CARGO_PKG_VERSION"),
+    );
+    let _ = writeln!(
+        xml,
+        "  <CoSimulation modelIdentifier=\"{identifier}\" canHandleVariableCommunicationStepSize=\"true\" \
+         canGetAndSetFMUstate=\"true\">\n    <SourceFiles>"
+    );
+    for (name, _) in SOURCES.iter().filter(|(name, _)| name.ends_with(".c")) {
+        let _ = writeln!(xml, "      <File name=\"{name}\"/>");
+    }
+    xml += "    </SourceFiles>\n  </CoSimulation>\n  <UnitDefinitions>\n";
+    for unit in UNITS {
+        let _ = writeln!(xml, "    <Unit name=\"{}\"><BaseUnit {}/></Unit>", unit.name, unit.base);
+    }
+    xml += "  </UnitDefinitions>\n  <LogCategories>\n    <Category name=\"logStatusWarning\"/>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n";
+    let _ = writeln!(
+        xml,
+        "  <DefaultExperiment startTime=\"0\" stopTime=\"110\" tolerance=\"{DEFAULT_TOLERANCE:e}\" stepSize=\"0.1\"/>\n  <ModelVariables>"
+    );
+    for (reference, variable) in variables.iter().enumerate() {
+        scalar(&mut xml, reference, variable)?;
+    }
+    for (reference, switch) in switches.iter().enumerate() {
+        let _ = writeln!(
+            xml,
+            "    <ScalarVariable name=\"{}\" valueReference=\"{reference}\" causality=\"parameter\" variability=\"fixed\" description=\"{}\">\
+             <Boolean start=\"{}\"/></ScalarVariable>",
+            switch.name,
+            escape(switch.description),
+            switch.start
+        );
+    }
+    xml += "  </ModelVariables>\n  <ModelStructure>\n";
+    // Indices of the standard count from 1. Every output may depend on every input, which is what no list of them says.
+    let outputs: Vec<usize> = variables
+        .iter()
+        .enumerate()
+        .filter(|(_, variable)| variable.causality == Causality::Output)
+        .map(|(index, _)| index + 1)
+        .collect();
+    for list in ["Outputs", "InitialUnknowns"] {
+        let _ = writeln!(xml, "    <{list}>");
+        for index in &outputs {
+            let _ = writeln!(xml, "      <Unknown index=\"{index}\"/>");
+        }
+        let _ = writeln!(xml, "    </{list}>");
+    }
+    xml += "  </ModelStructure>\n</fmiModelDescription>\n";
+    Ok(xml)
+}
+
+fn scalar(xml: &mut String, reference: usize, variable: &Variable) -> Result<(), FmuError> {
+    let (causality, variability) = match variable.causality {
+        Causality::Parameter => ("parameter", "fixed"),
+        Causality::Input => ("input", "continuous"),
+        Causality::Output => ("output", "continuous"),
+    };
+    let start = match variable.start {
+        Some(value) => format!(" start=\"{}\"", number(variable.name, value)?),
+        None => String::new(),
+    };
+    let _ = writeln!(
+        xml,
+        "    <ScalarVariable name=\"{}\" valueReference=\"{reference}\" causality=\"{causality}\" variability=\"{variability}\" \
+         description=\"{}\"><Real unit=\"{}\"{start}/></ScalarVariable>",
+        variable.name,
+        escape(variable.description),
+        variable.unit,
+    );
+    Ok(())
+}

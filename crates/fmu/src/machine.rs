@@ -1,0 +1,83 @@
+//! What is exported: a machine with its map, and where it begins.
+
+use mapper_physics::closed_form_map::ClosedFormMap;
+use mapper_physics::params::{BoundaryConditions, Params};
+use mapper_physics::state::State;
+use mapper_physics::tabulated_map::TabulatedMap;
+
+/// The compressor map of an FMU.
+#[derive(Debug, Clone)]
+pub enum FmuMap {
+    /// The nominal machine's closed form.
+    ClosedForm(ClosedFormMap),
+    /// Speed lines.
+    Table(TabulatedMap),
+}
+
+/// A machine to export.
+#[derive(Debug, Clone)]
+pub struct FmuMachine<'a> {
+    /// Its name, as people wrote it.
+    pub name: &'a str,
+    /// One sentence on where its numbers come from.
+    pub origin: &'a str,
+    /// Parameters.
+    pub params: &'a Params,
+    /// The map.
+    pub map: &'a FmuMap,
+    /// Start values of the inputs.
+    pub boundary: &'a BoundaryConditions,
+    /// Where it begins unless the importer says otherwise.
+    pub start: &'a State,
+}
+
+impl FmuMachine<'_> {
+    /// The name as the standard's model identifier: a C identifier of at most 60 characters.
+    pub fn identifier(&self) -> String {
+        let mut text: String =
+            self.name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(60).collect();
+        if !text.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            text.insert_str(0, "machine_");
+        }
+        text
+    }
+}
+
+/// Why no FMU can be made.
+#[derive(Debug, thiserror::Error)]
+pub enum FmuError {
+    /// A number that C cannot be told.
+    #[error("{name} = {value}: an FMU needs a finite number there")]
+    NotFinite {
+        /// Which number.
+        name: String,
+        /// Its value.
+        value: f64,
+    },
+    /// The archive cannot be written.
+    #[error("the archive cannot be written: {0}")]
+    Archive(#[from] zip::result::ZipError),
+    /// Nor a file in it.
+    #[error("a file of the archive cannot be written: {0}")]
+    File(#[from] std::io::Error),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_name_becomes_a_c_identifier() {
+        let params = Params::default();
+        let map = FmuMap::ClosedForm(ClosedFormMap { wheel_diameter_m: 0.052 });
+        let (boundary, start) = (BoundaryConditions::default(), State::new(1e4, 2e5, 300.0, 400.0, 300.0));
+        let identifier = |name: &str| {
+            FmuMachine { name, origin: "", params: &params, map: &map, boundary: &boundary, start: &start }
+                .identifier()
+        };
+        assert_eq!(identifier("turbo_a"), "turbo_a");
+        assert_eq!(identifier("2 Lader/ä"), "machine_2_Lader__");
+        assert_eq!(identifier(""), "machine_");
+        assert!(identifier(&"x".repeat(1000)).len() <= 60);
+    }
+}

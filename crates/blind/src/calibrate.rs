@@ -148,7 +148,7 @@ impl<'a> Calibrated<'a> {
         let recording = Schedule::new(self.campaign, &self.nominal)?.record(case)?;
         let diagnosed = diagnose(Question {
             tolerances_declared: true,
-            jumps: Vec::new(),
+            experiments: Vec::new(),
             recording: &recording,
             declared: declared(self.campaign),
             model: self.nominal.clone(),

@@ -39,7 +39,7 @@ fn ask(rig: &Rig, seed: u64) -> Diagnosed {
     let candidates = ["tip_diameter", "flowmeter_gain"];
     diagnose(Question {
         tolerances_declared: true,
-        jumps: Vec::new(),
+        experiments: Vec::new(),
         recording: &recording,
         declared: declared(),
         model: Model::nominal(),

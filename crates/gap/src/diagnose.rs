@@ -6,13 +6,13 @@ use crate::adequacy::{Adequacy, adequacy};
 use crate::another_machine::another_machine;
 use crate::assumed::assumed;
 use crate::calibration::Calibration;
+use crate::experiment::Experiment;
 use crate::fit::{Effort, Fit, fit};
 use crate::folds::Folds;
 use crate::how_far::{Compared, how_far};
 use crate::late::late;
 use crate::more::extend;
-use crate::next::{look_beside, next};
-use crate::outlook::AllowedJump;
+use crate::next::{Suggested, look_beside, next};
 use crate::place::{Gain, places};
 use crate::problem::Problem;
 use crate::report::{Diagnosis, Verdict};
@@ -57,8 +57,8 @@ pub struct Question<'a> {
     /// Whether the campaign declares its tolerances; where it does not, the usual ones hold, and its actuators follow as the
     /// recording says.
     pub tolerances_declared: bool,
-    /// Jumps that the planner allows on this machine, for what to do next; those of the recording where there are none.
-    pub jumps: Vec<AllowedJump>,
+    /// What may be done on this machine to tell causes apart; where there is no jump among it, those of the recording.
+    pub experiments: Vec<Experiment>,
     /// Numbers behind the probabilities.
     pub calibration: Calibration,
     /// Told the share done, and what comes.
@@ -102,8 +102,16 @@ const MOST: f64 = 0.5;
 /// # Errors
 /// [`GapError`] with a clear word where no diagnosis can be made.
 pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
-    let Question { recording, declared, model, effects, tolerances_declared, jumps, calibration, progress } =
-        question;
+    let Question {
+        recording,
+        declared,
+        model,
+        effects,
+        tolerances_declared,
+        experiments,
+        calibration,
+        progress,
+    } = question;
     progress(0.0, "reading");
     let recording = &as_told(recording);
     let table = Table::new(recording).ok_or(Problem::Empty)?;
@@ -240,10 +248,14 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         places(&study, &linearised, &null, &gains, named)
     };
     progress(0.95, "what next");
-    let next = match verdict {
-        Verdict::WithinTolerance => None,
-        Verdict::Unexplained | Verdict::PartlyExplained => Some(look_beside(&r#where)),
-        Verdict::Explained => rivals(&weighed, &fits).and_then(|rivals| next(&study, rivals, &jumps)),
+    let Suggested { next, experiments } = match verdict {
+        Verdict::WithinTolerance => Suggested::default(),
+        Verdict::Unexplained | Verdict::PartlyExplained => {
+            Suggested { next: Some(look_beside(&r#where)), experiments: Vec::new() }
+        }
+        Verdict::Explained => rivals(&weighed, &fits)
+            .map(|rivals| next(&study, rivals, &experiments, calibration.temperature))
+            .unwrap_or_default(),
     };
     let smallest_seen = if verdict == Verdict::WithinTolerance {
         smallest_seen(&study, &linearised, &calibration)
@@ -261,6 +273,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         forces: Vec::new(),
         gap,
         next,
+        experiments,
         smallest_seen,
         assumed: if tolerances_declared { Vec::new() } else { assumed(&study) },
         warnings,

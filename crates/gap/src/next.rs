@@ -1,19 +1,32 @@
-//! What to do next: the jump that separates the remaining candidates best, or the sensor that would.
+//! What to do next: what a stand can do to tell the remaining candidates apart, or the sensor that would.
 
+use crate::experiment::{AllowedJump, Beside, Experiment};
 use crate::fit::Fit;
-use crate::outlook::{AllowedJump, apart, apart_at_first_sight, recorded_jumps, recorded_points};
-use crate::report::{JumpPoint, Next, Place};
+use crate::nuisance::OUTPUTS;
+use crate::odds::{Odds, entropy_bit, odds};
+use crate::outlook::{apart, apart_at_first_sight, recorded_jumps, recorded_points};
+use crate::report::{JumpPoint, Kind, Next, Place, Suggestion};
 use crate::study::Study;
-use mapper_core::OperatingPoint;
+use mapper_core::{Channel, OperatingPoint};
 use mapper_numerics::parallel;
 use mapper_physics::effect::Submodel;
 
-/// A further jump of which one learns less than this, in squared sigmas, is not worth its minutes.
-const LEAST_DISCRIMINATION: f64 = 1.0;
-/// Jumps that are looked at closely.
+/// Share of the first among the causes that are open from which on it is settled.
+pub const SETTLED: f64 = 0.95;
+/// What answers less than this of what is open is not worth its minutes.
+const LEAST_ANSWER: f64 = 0.1;
+/// Jumps that are looked at closely, and experiments of each other kind.
 const CLOSE_LOOKS: usize = 6;
+const CLOSE_LOOKS_BESIDE: usize = 2;
+/// Experiments that are told, and of one kind.
+const SHOWN: usize = 5;
+const SHOWN_OF_KIND: usize = 2;
 /// Candidates that are told apart.
 const RIVALS: usize = 4;
+/// Every experiment is judged by the same draws.
+const SEED: u64 = 1;
+/// Time at the start of a step in a script, s: housings settle in minutes.
+const START_S: u32 = 300;
 
 /// The candidates that are still open, best first, and their probabilities.
 pub struct Rivals<'a> {
@@ -23,54 +36,137 @@ pub struct Rivals<'a> {
     pub probabilities: Vec<f64>,
 }
 
-/// The jump that tells the rivals apart best for each minute.
+/// What to do next, and what else could be done.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Suggested {
+    /// The first of `experiments`, or a sensor that the model knows nothing of; `None` where nothing is known to help.
+    pub next: Option<Next>,
+    /// What the stand can do, best first.
+    pub experiments: Vec<Suggestion>,
+}
+
+/// What tells the rivals apart best for each minute.
 ///
-/// `U = sum over k, j of p_k p_j d_kj^2 / minutes`, with `d_kj^2` by how much the jump would raise the misfit of `j`,
-/// fitted again, were `k` true. All `allowed` jumps are looked at with the candidates as they stand, the most promising
-/// of them with each rival fitted again. Without allowed jumps those of the recording are taken, to be repeated. Where
-/// no jump shows enough, the sensor beside the part in which the first candidate sits is named.
-pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[AllowedJump]) -> Option<Next> {
+/// All `allowed` experiments are looked at with the candidates as they stand, by `U = sum over k, j of p_k p_j d_kj^2 / minutes`, with
+/// `d_kj^2` by how much the experiment would raise the misfit of `j`, fitted again, were `k` true. The most promising of each kind are
+/// looked at with each rival fitted again, and ranked by how much of the open question they are expected to answer for each minute
+/// ([`odds`]). Without allowed jumps those of the recording are taken, to be repeated; channels of the model that were not recorded are
+/// tried beside the most promising jump. Where nothing answers enough, the sensor beside the part in which the first candidate sits is named.
+/// `temperature` is that of the diagnosis.
+pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], temperature: f64) -> Suggested {
     rivals.fits.truncate(RIVALS);
     rivals.probabilities.truncate(RIVALS);
-    let first = *rivals.fits.first()?;
-    let recorded;
-    let jumps = if allowed.is_empty() {
-        recorded = recorded_jumps(study, &recorded_points(study, &first.hypothesis));
-        recorded.as_slice()
-    } else {
-        allowed
+    let Some(first) = rivals.fits.first() else { return Suggested::default() };
+    let mut all = allowed.to_vec();
+    let jumps_known = all.iter().any(|experiment| Kind::of(experiment) == Kind::Jump);
+    if !jumps_known {
+        let recorded = recorded_jumps(study, &recorded_points(study, &first.hypothesis));
+        all.extend(recorded.into_iter().map(Experiment::jump));
+    }
+    let rate = |experiment: &Experiment, apart: &[Vec<f64>]| {
+        gain(&rivals.probabilities, apart) / experiment.minutes()
     };
-    let rate = |jump: &AllowedJump, apart: &[Vec<f64>]| gain(&rivals.probabilities, apart) / minutes(jump);
-    let looks = parallel::map(jumps, |jump| {
-        let apart = apart_at_first_sight(study, jump, &rivals.fits)?;
-        Some((rate(jump, &apart), *jump))
+    let looks = parallel::map(&all, |experiment| {
+        let apart = apart_at_first_sight(study, experiment, &rivals.fits)?;
+        Some((rate(experiment, &apart), *experiment))
     });
-    let mut looks: Vec<(f64, AllowedJump)> = looks.into_iter().flatten().collect();
+    let mut looks: Vec<(f64, Experiment)> = looks.into_iter().flatten().collect();
     looks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let close: Vec<AllowedJump> = looks.into_iter().take(CLOSE_LOOKS).map(|(_, jump)| jump).collect();
-    let looked = parallel::map(&close, |jump| Some((*jump, apart(study, jump, &rivals.fits)?)));
-    let best = looked.into_iter().flatten().max_by(|a, b| rate(&a.0, &a.1).total_cmp(&rate(&b.0, &b.1)));
-    let nearest = |apart: &[Vec<f64>]| apart[0].iter().skip(1).copied().fold(f64::INFINITY, f64::min);
-    match best {
-        Some((jump, apart)) if nearest(&apart) >= LEAST_DISCRIMINATION => Some(Next::Jump {
-            from: point(jump.from),
-            to: point(jump.to),
-            expected_probability: settled(&rivals.probabilities, &apart),
-            minutes: minutes(&jump),
-        }),
-        other => {
-            let (effect, _) = rivals.fits.iter().find_map(|fit| fit.hypothesis.effects.first())?;
-            let sigma = other.map_or(0.0, |(_, apart)| nearest(&apart).sqrt());
-            let among = if allowed.is_empty() { "recorded" } else { "allowed" };
-            Some(Next::Sensor {
-                sensor: sensor_for(study.effects[*effect].info().submodel).to_owned(),
-                reason: format!(
-                    "none of the {} {among} jumps separates the first candidates by more than {sigma:.1} sigma",
-                    jumps.len()
-                ),
-            })
+    let mut close: Vec<Experiment> = Vec::new();
+    for kind in Kind::ALL {
+        let most = if kind == Kind::Jump { CLOSE_LOOKS } else { CLOSE_LOOKS_BESIDE };
+        let of_kind = looks.iter().map(|(_, experiment)| *experiment).filter(|e| Kind::of(e) == kind);
+        close.extend(of_kind.take(most));
+    }
+    if let Some(jump) = close.first().filter(|experiment| experiment.beside == Beside::Nothing) {
+        let missing = OUTPUTS.into_iter().filter(|c| *c != Channel::P3 && study.table.column(*c).is_none());
+        let added: Vec<Experiment> =
+            missing.map(|channel| Experiment { jump: jump.jump, beside: Beside::Sensor(channel) }).collect();
+        close.extend(added);
+    }
+    let looked = parallel::map(&close, |experiment| {
+        let apart = apart(study, experiment, &rivals.fits)?;
+        let odds = odds(&rivals.probabilities, &apart, temperature, SETTLED, SEED);
+        Some((*experiment, odds, rate(experiment, &apart)))
+    });
+    let mut looked: Vec<(Experiment, Odds, f64)> = looked.into_iter().flatten().collect();
+    // What answers all of it answers no more by being plainer; then the plainest.
+    let of_minute =
+        |(experiment, odds, _): &(Experiment, Odds, f64)| odds.entropy_drop_bit / experiment.minutes();
+    looked.sort_by(|a, b| of_minute(b).total_cmp(&of_minute(a)).then(b.2.total_cmp(&a.2)));
+    let open_bit = entropy_bit(&rivals.probabilities);
+    let answers = |odds: &Odds| odds.entropy_drop_bit / open_bit.max(f64::MIN_POSITIVE);
+    let most = looked.iter().map(|(_, odds, _)| answers(odds)).fold(0.0, f64::max);
+    looked.retain(|(_, odds, _)| answers(odds) >= LEAST_ANSWER);
+    let mut experiments: Vec<Suggestion> = Vec::new();
+    for (experiment, odds, _) in &looked {
+        let kind = Kind::of(experiment);
+        if experiments.len() < SHOWN && experiments.iter().filter(|e| e.kind == kind).count() < SHOWN_OF_KIND
+        {
+            experiments.push(suggestion(kind, experiment, odds, open_bit));
         }
     }
+    let next = experiments.first().map(Suggestion::as_next).or_else(|| {
+        let (effect, _) = rivals.fits.iter().find_map(|fit| fit.hypothesis.effects.first())?;
+        let among = if jumps_known { "allowed" } else { "recorded" };
+        Some(Next::Sensor {
+            sensor: sensor_for(study.effects[*effect].info().submodel).to_owned(),
+            reason: format!(
+                "none of the {} {among} steps answers more than {:.0} % of what is open between the first candidates",
+                all.len(),
+                100.0 * most
+            ),
+        })
+    });
+    Suggested { next, experiments }
+}
+
+fn suggestion(kind: Kind, experiment: &Experiment, odds: &Odds, open_bit: f64) -> Suggestion {
+    let (from, to) = (experiment.jump.from, experiment.jump.to);
+    Suggestion {
+        kind,
+        from: point(from),
+        to: point(to),
+        t3_k: if let Beside::T3 { from_k, to_k } = experiment.beside { Some([from_k, to_k]) } else { None },
+        oil_temperature_k: if let Beside::Oil { from_k, to_k } = experiment.beside {
+            Some([from_k, to_k])
+        } else {
+            None
+        },
+        sensor: if let Beside::Sensor(channel) = experiment.beside {
+            Some(channel.symbol().to_owned())
+        } else {
+            None
+        },
+        minutes: experiment.minutes(),
+        probability_settled: odds.settles,
+        expected_probability: odds.share,
+        entropy_drop_bit: odds.entropy_drop_bit,
+        entropy_bit: open_bit,
+        script: script(experiment),
+    }
+}
+
+/// The lines of a sequence that run a step.
+fn script(experiment: &Experiment) -> Vec<String> {
+    let place = |point: OperatingPoint| {
+        format!("point(\"{} krpm\", {})", round(point.speed_rpm / 1e3), round(point.valve_opening_ratio))
+    };
+    let celsius = |k: f64| round(k - 273.15);
+    let AllowedJump { from, to, dwell_s, .. } = experiment.jump;
+    let change = match experiment.beside {
+        Beside::Nothing | Beside::Sensor(_) => None,
+        Beside::T3 { to_k, .. } => Some(format!("t3(\"{} degC\");", celsius(to_k))),
+        Beside::Oil { to_k, .. } => Some(format!("oil(\"{} degC\");", celsius(to_k))),
+    };
+    let go = [format!("jump({}, \"{} s\");", place(to), round(dwell_s))];
+    let start = [format!("jump({}, \"{START_S} s\");", place(from))];
+    start.into_iter().chain(change).chain(go).collect()
+}
+
+/// To three places after the point, without the rest of a sum.
+fn round(value: f64) -> f64 {
+    (1e3 * value).round() / 1e3
 }
 
 /// The step that is left where the catalogue does not explain the gap: the sensor that would look into the part where most of it
@@ -96,28 +192,12 @@ fn point(point: OperatingPoint) -> JumpPoint {
     JumpPoint { speed_rpm: point.speed_rpm, valve: point.valve_opening_ratio }
 }
 
-fn minutes(jump: &AllowedJump) -> f64 {
-    (jump.dwell_s / 60.0).max(0.1)
-}
-
 /// `sum p_k p_j d_kj^2`.
 fn gain(probabilities: &[f64], apart: &[Vec<f64>]) -> f64 {
     let row = |(p, row): (&f64, &Vec<f64>)| -> f64 {
         row.iter().zip(probabilities).map(|(d2, q)| p * q * d2).sum::<f64>()
     };
     probabilities.iter().zip(apart).map(row).sum()
-}
-
-/// Probability that the true one of the rivals is expected to have after the jump: the odds of `k` over `j` grow by
-/// `exp(d_kj^2/2)` if `k` is true.
-fn settled(probabilities: &[f64], apart: &[Vec<f64>]) -> f64 {
-    let total: f64 = probabilities.iter().sum();
-    let after = |(k, p): (usize, &f64)| {
-        let weights: f64 =
-            probabilities.iter().zip(&apart[k]).map(|(q, d2)| q * (-0.5 * d2).exp()).sum::<f64>();
-        p / total * (p / weights)
-    };
-    probabilities.iter().enumerate().map(after).sum::<f64>().clamp(0.0, 1.0)
 }
 
 /// A sensor that would look into a part directly.
@@ -134,23 +214,5 @@ fn sensor_for(part: Submodel) -> &'static str {
             "a second thermocouple in the compressor housing, near the gas"
         }
         Submodel::TurbineHousing => "thermocouples on both sides of the bearing housing",
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_jump_that_shows_nothing_settles_nothing_and_one_that_shows_all_settles_all() {
-        let probabilities = [0.6, 0.3, 0.1];
-        let apart = |d2: f64| -> Vec<Vec<f64>> {
-            (0..3).map(|k| (0..3).map(|j| if k == j { 0.0 } else { d2 }).collect()).collect()
-        };
-        // Without news the true one keeps its own probability: sum of p^2.
-        assert!((settled(&probabilities, &apart(0.0)) - 0.46).abs() < 1e-12);
-        assert!(settled(&probabilities, &apart(100.0)) > 1.0 - 1e-9);
-        let some = settled(&probabilities, &apart(4.0));
-        assert!(some > 0.46 && some < 1.0);
     }
 }

@@ -1,8 +1,9 @@
-//! What a jump that was not made would show: the candidates' predictions of it, and how far apart they are once each
+//! What an experiment that was not made would show: the candidates' predictions of it, and how far apart they are once each
 //! is fitted again.
 
 use crate::actuators::Actuators;
 use crate::coordinate::coordinates;
+use crate::experiment::{AllowedJump, Beside, Experiment};
 use crate::fit::{Fit, effect_changes};
 use crate::nuisance::{NuisanceKind, OUTPUTS};
 use crate::study::{Hypothesis, Study};
@@ -17,21 +18,6 @@ use mapper_physics::params::BoundaryConditions;
 use mapper_physics::steady::hold_speed;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
-
-/// A jump that may be run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AllowedJump {
-    /// Where it starts, settled.
-    pub from: OperatingPoint,
-    /// Where it goes.
-    pub to: OperatingPoint,
-    /// Turbine inlet total pressure commanded at the start, Pa.
-    pub from_p3_pa: f64,
-    /// Turbine inlet total pressure commanded by the jump, Pa.
-    pub to_p3_pa: f64,
-    /// Time at the target, s.
-    pub dwell_s: f64,
-}
 
 /// Time at the start of a jump that is looked at as well, s.
 const HOLD_S: f64 = 30.0;
@@ -56,12 +42,14 @@ pub struct Alike {
     pub actuators: Actuators,
 }
 
-/// Steps made ready like a recording, with nothing in it but the inputs: `rest` is where they begin.
+/// Steps made ready like a recording, with nothing in it but the inputs: `rest` is where they begin, `driven` an input that
+/// does not stay what the campaign has, at the times given.
 pub(crate) fn imagined_steps(
     like: Alike,
     steps: Vec<StepMarker>,
     rest: &OperatingPoint,
     interval_s: f64,
+    driven: impl Fn(&[f64]) -> Option<(Channel, Series)>,
 ) -> Option<Study> {
     let end_s = steps.last()?.end_s;
     let t_s: Vec<f64> = (0..(end_s / interval_s) as usize).map(|i| interval_s * i as f64).collect();
@@ -79,16 +67,21 @@ pub(crate) fn imagined_steps(
     };
     let series =
         |channel: Channel| (channel, Series { t_s: t_s.clone(), values: vec![level(channel); t_s.len()] });
-    // What drives the model comes from the campaign; what the rig measured would be measured again.
+    // What drives the model comes from the campaign but for what is changed; what the rig measured would be measured again.
     let measured =
         OUTPUTS.into_iter().filter(|channel| *channel != Channel::P3 && like.channels.contains(channel));
-    let recording = Recording { series: measured.map(series).collect(), steps, ..Recording::default() };
+    let recording = Recording {
+        series: measured.map(series).chain(driven(&t_s)).collect(),
+        steps,
+        ..Recording::default()
+    };
     let table = Table::new(&recording)?;
     Some(Study::with_actuators(&recording, table, like.declared, like.model, like.effects, like.actuators))
 }
 
-/// A jump made ready like a recording, of rest at its start and its dwell. What began in the recording is there.
-fn imagined(recorded: &Study, jump: &AllowedJump, interval_s: f64) -> Option<Study> {
+/// An experiment made ready like a recording, of rest at its start and its dwell. What began in the recording is there.
+fn imagined(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Option<Study> {
+    let jump = &experiment.jump;
     let dwell_s = jump.dwell_s.clamp(10.0, MOST_S);
     let marker = |index: usize, from: f64, to: f64, p3_pa: f64, point: OperatingPoint| StepMarker {
         index,
@@ -104,14 +97,16 @@ fn imagined(recorded: &Study, jump: &AllowedJump, interval_s: f64) -> Option<Stu
         marker(0, 0.0, HOLD_S, jump.from_p3_pa, jump.from),
         marker(1, HOLD_S, HOLD_S + dwell_s, jump.to_p3_pa, jump.to),
     ];
+    let added = if let Beside::Sensor(channel) = experiment.beside { Some(channel) } else { None };
     let like = Alike {
         declared: recorded.declared.clone(),
         model: recorded.nominal.model.clone(),
         effects: recorded.effects.clone(),
-        channels: recorded.table.columns.keys().copied().collect(),
+        channels: recorded.table.columns.keys().copied().chain(added).collect(),
         actuators: recorded.actuators,
     };
-    let mut study = imagined_steps(like, steps, &jump.from, interval_s)?;
+    let driven = |t_s: &[f64]| experiment.driven(t_s, HOLD_S);
+    let mut study = imagined_steps(like, steps, &jump.from, interval_s, driven)?;
     study.catalogue = recorded.catalogue;
     Some(study)
 }
@@ -131,11 +126,15 @@ fn is_start(kind: NuisanceKind) -> bool {
     matches!(kind, NuisanceKind::Knob(Knob::StartTc | Knob::StartTt))
 }
 
-/// How far apart two candidates' predictions of a jump are, in squared sigmas of the noise alone: a first look.
+/// How far apart two candidates' predictions of an experiment are, in squared sigmas of the noise alone: a first look.
 ///
-/// `None` where the model cannot make the jump.
-pub fn apart_at_first_sight(recorded: &Study, jump: &AllowedJump, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
-    let study = imagined(recorded, jump, COARSE_S)?;
+/// `None` where the model cannot make the step.
+pub fn apart_at_first_sight(
+    recorded: &Study,
+    experiment: &Experiment,
+    fits: &[&Fit],
+) -> Option<Vec<Vec<f64>>> {
+    let study = imagined(recorded, experiment, COARSE_S)?;
     let linearised = Linearised::of_noise_alone(&study).ok()?;
     let predictions: Option<Vec<Vec<f64>>> = fits
         .iter()
@@ -150,13 +149,13 @@ pub fn apart_at_first_sight(recorded: &Study, jump: &AllowedJump, fits: &[&Fit])
     Some(predictions.iter().map(|a| predictions.iter().map(|b| distance(a, b)).collect()).collect())
 }
 
-/// The same with each rival fitted again to what the jump would show: row `k`, column `j` is by how much the jump would
+/// The same with each rival fitted again to what the experiment would show: row `k`, column `j` is by how much it would
 /// raise the misfit of `j` if `k` is true, in squared sigmas.
 ///
 /// With `D` the difference of the predictions, `J` the derivatives of `j`'s prediction by its nuisances and parameters
 /// and `L` the precision in which the recording leaves them: `D'D - D'J (L + J'J)^-1 J'D`, all whitened.
-pub fn apart(recorded: &Study, jump: &AllowedJump, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
-    let study = imagined(recorded, jump, FINE_S)?;
+pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
+    let study = imagined(recorded, experiment, FINE_S)?;
     let nominal = Linearised::new(&study).ok()?;
     let mut predicted = Vec::new();
     for fit in fits {

@@ -1,5 +1,6 @@
 //! What a diagnosis says, as machines read it.
 
+use crate::experiment::{Beside, Experiment};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -38,6 +39,8 @@ pub struct Diagnosis {
     pub gap: Gap,
     /// What to do next; `None` where nothing is left to settle.
     pub next: Option<Next>,
+    /// What the stand can do to tell the open causes apart, best first for each minute; `next` is the first of it.
+    pub experiments: Vec<Suggestion>,
     /// Where nothing is named: how small each effect would have been seen.
     pub smallest_seen: Vec<SmallestSeen>,
     /// What was assumed because the campaign does not declare it; one sentence each.
@@ -272,10 +275,16 @@ pub enum Next {
         from: JumpPoint,
         /// Where it goes.
         to: JumpPoint,
-        /// Probability expected for the best candidate after it.
+        /// Probability expected for the true candidate after it.
         expected_probability: f64,
         /// Its length, min.
         minutes: f64,
+        /// T3 before and after, where the step changes it, K.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        t3_k: Option<[f64; 2]>,
+        /// Oil temperature before and after, where the step changes it, K.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        oil_temperature_k: Option<[f64; 2]>,
     },
     /// The sensor that would.
     Sensor {
@@ -284,6 +293,90 @@ pub enum Next {
         /// Why.
         reason: String,
     },
+}
+
+/// What kind of experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// To another speed, at any opening.
+    Jump,
+    /// To another opening at one speed.
+    ValveStep,
+    /// Another turbine inlet temperature at one point.
+    T3Step,
+    /// Another oil temperature at one point.
+    OilStep,
+    /// A jump with a channel measured that was not.
+    Sensor,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Kind; 5] = [Kind::Jump, Kind::ValveStep, Kind::T3Step, Kind::OilStep, Kind::Sensor];
+
+    /// That of an experiment.
+    pub fn of(experiment: &Experiment) -> Kind {
+        match experiment.beside {
+            Beside::T3 { .. } => Kind::T3Step,
+            Beside::Oil { .. } => Kind::OilStep,
+            Beside::Sensor(_) => Kind::Sensor,
+            Beside::Nothing if experiment.is_valve_step() => Kind::ValveStep,
+            Beside::Nothing => Kind::Jump,
+        }
+    }
+}
+
+/// An experiment and what is expected of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Suggestion {
+    /// What kind.
+    pub kind: Kind,
+    /// Where it starts, settled.
+    pub from: JumpPoint,
+    /// Where it goes.
+    pub to: JumpPoint,
+    /// T3 before and after, where the step changes it, K.
+    pub t3_k: Option<[f64; 2]>,
+    /// Oil temperature before and after, where the step changes it, K.
+    pub oil_temperature_k: Option<[f64; 2]>,
+    /// Channel that is measured as well.
+    pub sensor: Option<String>,
+    /// Its length, min; for a sensor with half an hour to mount it.
+    pub minutes: f64,
+    /// Probability that the true one of the open causes has 95 % of what these have afterwards.
+    pub probability_settled: f64,
+    /// Mean of what it has afterwards.
+    pub expected_probability: f64,
+    /// By how much the entropy of the open causes is expected to drop, bit.
+    pub entropy_drop_bit: f64,
+    /// That entropy before, bit.
+    pub entropy_bit: f64,
+    /// The lines of a sequence that run it.
+    pub script: Vec<String>,
+}
+
+impl Suggestion {
+    /// As what to do next.
+    pub fn as_next(&self) -> Next {
+        if let Some(sensor) = &self.sensor {
+            return Next::Sensor {
+                sensor: format!("a sensor for {sensor}"),
+                reason: format!(
+                    "with it one jump answers {:.0} % of what is open between the first candidates",
+                    100.0 * self.entropy_drop_bit / self.entropy_bit.max(f64::MIN_POSITIVE)
+                ),
+            };
+        }
+        Next::Jump {
+            from: self.from,
+            to: self.to,
+            expected_probability: self.expected_probability,
+            minutes: self.minutes,
+            t3_k: self.t3_k,
+            oil_temperature_k: self.oil_temperature_k,
+        }
+    }
 }
 
 /// The law that is more probable than not; `None` where none is.

@@ -254,7 +254,7 @@ pub fn forecast_steps(
     found: &Found,
 ) -> Result<Vec<Expected>, TwinError> {
     let rest = steps.first().and_then(|step| step.to);
-    let study = rest.and_then(|rest| imagined_steps(like, steps, &rest, INTERVAL_S));
+    let study = rest.and_then(|rest| imagined_steps(like, steps, &rest, INTERVAL_S, |_| None));
     study.map_or_else(|| Ok(Vec::new()), |study| forecast(&study, found))
 }
 

@@ -6,7 +6,7 @@ use crate::coordinate::{coordinates, parameters};
 use crate::course::Course;
 use crate::fit::Fit;
 use crate::in_words;
-use crate::next::Rivals;
+use crate::next::{Rivals, SETTLED};
 use crate::report::{Candidate, Estimate, Onset};
 use crate::study::Study;
 use mapper_core::half_width_95;
@@ -193,9 +193,6 @@ pub(crate) fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> 
     }
     estimates
 }
-
-/// Share of the first among the causes that are open from which on it is settled.
-const SETTLED: f64 = 0.95;
 
 /// The causes that are still open, best first; `None` where the first is settled.
 pub(crate) fn rivals<'a>(weighed: &Weighed, fits: &'a [Fit]) -> Option<Rivals<'a>> {

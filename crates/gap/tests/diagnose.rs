@@ -8,8 +8,9 @@ use common::{Visits, boundary, declared};
 use mapper_core::{Channel, OperatingPoint, Recording};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
+use mapper_gap::experiment::{AllowedJump, Experiment};
 use mapper_gap::joint::{Fate, Value, over_recordings};
-use mapper_gap::outlook::{AllowedJump, apart, apart_at_first_sight};
+use mapper_gap::outlook::{apart, apart_at_first_sight};
 use mapper_gap::report::Verdict;
 use mapper_gap::study::Study;
 use mapper_gap::twin::{Found, hold};
@@ -78,7 +79,7 @@ fn ask_beside(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Di
         candidates.iter().map(|id| mapper_effects::find(id).unwrap()).chain(more).collect();
     diagnose(Question {
         tolerances_declared: true,
-        jumps: Vec::new(),
+        experiments: Vec::new(),
         recording,
         declared: declared(),
         model: Model::nominal(),
@@ -217,12 +218,14 @@ fn a_jump_tells_a_slow_probe_from_its_rival_and_from_itself_nothing() {
     let nominal = Model::nominal();
     let p3_pa = |n_rpm: f64| hold_speed(&nominal, n_rpm, &boundary()).unwrap().boundary.p3_pa;
     let point = |speed_rpm: f64| OperatingPoint { speed_rpm, valve_opening_ratio: 0.9 };
-    let jump = |from_rpm: f64, to_rpm: f64| AllowedJump {
-        from: point(from_rpm),
-        to: point(to_rpm),
-        from_p3_pa: p3_pa(from_rpm),
-        to_p3_pa: p3_pa(to_rpm),
-        dwell_s: 60.0,
+    let jump = |from_rpm: f64, to_rpm: f64| {
+        Experiment::jump(AllowedJump {
+            from: point(from_rpm),
+            to: point(to_rpm),
+            from_p3_pa: p3_pa(from_rpm),
+            to_p3_pa: p3_pa(to_rpm),
+            dwell_s: 60.0,
+        })
     };
     let long = apart(&diagnosed.study, &jump(60e3, 140e3), &fits).unwrap();
     let short = apart(&diagnosed.study, &jump(90e3, 91e3), &fits).unwrap();
@@ -267,7 +270,7 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
     let effects = |ids: &[&str]| ids.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
     let question = |recording, model, ids: &[&str]| Question {
         tolerances_declared: true,
-        jumps: Vec::new(),
+        experiments: Vec::new(),
         recording,
         declared: declared(),
         model,

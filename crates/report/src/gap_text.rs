@@ -1,8 +1,9 @@
 //! A diagnosis as a page for a terminal.
 
+use crate::gap_next::next_text;
 use crate::number::four_figures;
 use mapper_core::with_unit;
-use mapper_gap::report::{Candidate, Diagnosis, Estimate, Next, PointGap, SmallestSeen, Verdict, law_found};
+use mapper_gap::report::{Candidate, Diagnosis, Estimate, PointGap, SmallestSeen, Verdict, law_found};
 
 /// Causes shown.
 const CAUSES: usize = 5;
@@ -45,24 +46,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     text += &format!("  {:>5.1} %  a cause outside the catalogue\n", 100.0 * diagnosis.probability_outside);
     text += &laws(diagnosis);
     text += &how_far(diagnosis);
-    if let Some(next) = &diagnosis.next {
-        text += "\nwhat next\n";
-        text += &match next {
-            Next::Jump { from, to, expected_probability, minutes } => format!(
-                "  jump from {:.0} krpm at opening {} to {:.0} krpm at {}: {minutes:.1} min, after which the true cause should reach {:.0} %\n  mapper plan CAMPAIGN --append {:.0}krpm@{} {:.0}krpm@{} --out PLAN puts it after the points\n",
-                from.speed_rpm / 1e3,
-                from.valve,
-                to.speed_rpm / 1e3,
-                to.valve,
-                100.0 * expected_probability,
-                from.speed_rpm / 1e3,
-                from.valve,
-                to.speed_rpm / 1e3,
-                to.valve,
-            ),
-            Next::Sensor { sensor, reason } => format!("  {sensor}: {reason}\n"),
-        };
-    }
+    text += &next_text(diagnosis);
     if !diagnosis.assumed.is_empty() {
         text += "\nassumed\n";
         for assumption in &diagnosis.assumed {

@@ -13,6 +13,7 @@ mod doubts;
 mod drift_text;
 mod duration;
 mod fleet_text;
+mod gap_next;
 mod gap_page;
 mod gap_text;
 mod heat_correction_text;

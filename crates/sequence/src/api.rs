@@ -107,6 +107,18 @@ table! {
                 Ok(())
             });
         };
+        "t3(temperature)", "Turbine inlet temperature of the steps that follow; the campaign's until then. Speed is held: P3 is what the nominal machine needs with it." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("t3", move |temperature: &str| -> Result<(), Thrown> {
+                lock(&session).hold_t3(quantity(Kind::Temperature, temperature)?)
+            });
+        };
+        "oil(temperature)", "Oil inlet temperature of the steps that follow; the campaign's until then." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("oil", move |temperature: &str| -> Result<(), Thrown> {
+                lock(&session).hold_oil(quantity(Kind::Temperature, temperature)?)
+            });
+        };
         "jump(p)", "Goes to `p`, stays there, and returns the step's result. A point that was visited before counts as a repeat." => |engine, session| {
             let session = session.clone();
             engine.register_fn("jump", move |point: Point| {

@@ -145,6 +145,29 @@ impl Session {
         })
     }
 
+    /// Turbine inlet temperature of what follows, K.
+    pub fn hold_t3(&mut self, t3_k: f64) -> Result<(), Thrown> {
+        if self.request.follow_outlet.turbine_inlet {
+            return Err(follows("turbine inlet temperature"));
+        }
+        if let Some(limit_k) = self.request.limits.t3_max_k.filter(|limit_k| t3_k > *limit_k) {
+            let message =
+                format!("a turbine inlet temperature of {t3_k:.2} K is above the limit of {limit_k:.2} K");
+            return Err(throw(message, "stay below `limits.turbine_inlet_temperature`"));
+        }
+        self.request.boundary.t3_k = plausible("turbine inlet temperature", t3_k)?;
+        Ok(())
+    }
+
+    /// Oil inlet temperature of what follows, K.
+    pub fn hold_oil(&mut self, oil_k: f64) -> Result<(), Thrown> {
+        if self.request.follow_outlet.oil {
+            return Err(follows("oil temperature"));
+        }
+        self.request.boundary.oil_temperature_k = plausible("oil temperature", oil_k)?;
+        Ok(())
+    }
+
     /// Goes to a point and comes back when the step has been run.
     pub fn step(&mut self, to: OperatingPoint, dwell_s: f64, hold: Hold) -> Result<StepResult, Thrown> {
         let (index, start_s) = (self.results.len(), self.now_s());
@@ -212,6 +235,22 @@ impl Session {
         let rule = SettleRule { rate_max_k_s, bands: self.request.settle_bands };
         self.step(to, max_s, Hold::UntilSettled(rule))
     }
+}
+
+/// Temperatures that the model is asked for, K; what a rig accepts is checked before it is touched.
+const PLAUSIBLE_K: std::ops::RangeInclusive<f64> = 250.0..=1400.0;
+
+fn plausible(what: &str, value_k: f64) -> Result<f64, Thrown> {
+    if PLAUSIBLE_K.contains(&value_k) {
+        return Ok(value_k);
+    }
+    let message = format!("the {what} cannot be {value_k:.2} K");
+    Err(throw(message, "give a temperature such as \"70 degC\""))
+}
+
+fn follows(what: &str) -> Thrown {
+    let message = format!("the {what} follows the compressor's outlet in this campaign");
+    throw(message, "take it out of `boundary.follow_outlet`")
 }
 
 /// The caller has gone: the script ends, and cannot catch it.

@@ -1,9 +1,10 @@
 //! The gap between nominal model and rig: drift is looked for first, a zero subtracted, then the diagnosis.
 
 use crate::declared::identification_with;
+use crate::experiments::experiments;
 use crate::fusing::{Fused, fused, recordings};
 use crate::planned::plan;
-use crate::planning::{nominal_model, with_plan_request};
+use crate::planning::nominal_model;
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
@@ -14,7 +15,7 @@ use mapper_gap::actuators::Actuators;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
 use mapper_gap::next::look_beside;
-use mapper_gap::outlook::{Alike, AllowedJump};
+use mapper_gap::outlook::Alike;
 use mapper_gap::problem::Problem;
 use mapper_gap::report::{Diagnosis, Next, Verdict, law_found};
 use mapper_gap::study::Study;
@@ -26,7 +27,6 @@ use mapper_observe::table::Table;
 use mapper_observe::{Declared, FusedChannel};
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
-use mapper_planner::PlanRequest;
 use mapper_record::ChannelMap;
 use serde_json::{Value, json};
 use std::slice;
@@ -99,13 +99,13 @@ impl Session<'_> {
             move |done_ratio: f64, what: &str| progress(from + (to - from) * done_ratio, what)
         };
         let (in_catalogue, beyond) = (between(DRIFT_SHARE, CATALOGUE_END), between(CATALOGUE_END, 1.0));
-        progress(DRIFT_SHARE, "jumps that are allowed");
+        progress(DRIFT_SHARE, "steps that are allowed");
         let calibration = Calibration::shipped().map_err(SessionError::Calibration)?;
         let mut diagnosed = diagnose(Question {
             recording: &recording,
             declared,
             tolerances_declared: campaign.tolerances_declared,
-            jumps: allowed_jumps(campaign, &model)?,
+            experiments: experiments(self.registry, campaign, &model)?,
             model,
             effects,
             calibration: calibration.clone(),
@@ -245,32 +245,6 @@ const DRIFT_SHARE: f64 = 0.15;
 /// Share after which the catalogue is done, and what lies beyond it begins.
 const CATALOGUE_END: f64 = 0.7;
 
-/// Points up to which every jump between them is simulated to see whether it is allowed.
-const MAX_POINTS: usize = 40;
-
-/// The jumps that the planner allows between the points of the campaign; none for grids too large to simulate them all,
-/// and for campaigns that are no grid.
-fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<AllowedJump>, SessionError> {
-    if campaign.points.len() > MAX_POINTS {
-        return Ok(Vec::new());
-    }
-    with_plan_request(campaign, model, |request| {
-        // Whether a jump is allowed does not hang on what it would tell.
-        let request = PlanRequest { method: None, ..request.clone() };
-        let Ok(graph) = mapper_planner::jump_graph(&request) else { return Ok(Vec::new()) };
-        let allowed = graph.edge_weights().filter(|jump| jump.rejections.is_empty());
-        Ok(allowed
-            .map(|jump| AllowedJump {
-                from: jump.from,
-                to: jump.to,
-                from_p3_pa: jump.p3_pa - jump.p3_change_pa,
-                to_p3_pa: jump.p3_pa,
-                dwell_s: request.timing.dwell_s,
-            })
-            .collect())
-    })
-}
-
 /// The recording to be diagnosed: the drift of a sensor is subtracted.
 fn taken_off(recording: Recording, drift: Option<&DriftReport>) -> Recording {
     drift.and_then(|drift| without_drift(&recording, drift)).unwrap_or(recording)
@@ -300,11 +274,13 @@ fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
         diagnosis.r#where.clear();
         diagnosis.forces.clear();
         diagnosis.next = None;
+        diagnosis.experiments.clear();
     }
     // What changes with time is in no law.
     diagnosis.laws.clear();
     if !taken_off && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
         diagnosis.verdict = Verdict::Unexplained;
+        diagnosis.experiments.clear();
         diagnosis.next.get_or_insert_with(|| look_beside(&diagnosis.r#where));
     }
 }

@@ -42,6 +42,7 @@ mod error;
 mod estimates;
 mod event;
 mod executed;
+mod experiments;
 mod files;
 mod fmu_binary;
 mod fmu_error;

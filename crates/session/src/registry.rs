@@ -3,7 +3,7 @@
 use crate::SessionError;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::BackendChoice;
-use mapper_core::{Backend, BackendError, MapFormats};
+use mapper_core::{Backend, BackendError, MapFormats, SetpointRanges};
 use mapper_logs::LogFormats;
 use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::effect::Effect;
@@ -63,6 +63,13 @@ impl Registry {
     /// [`SessionError::Backend`] where the name is unknown or the settings are wrong.
     pub fn make_backend(&self, campaign: &Campaign, model: &Model) -> Result<Box<dyn Backend>, SessionError> {
         self.made(&campaign.backend, campaign, model).map_err(SessionError::Backend)
+    }
+
+    /// What the rig of a campaign accepts, where that is known without starting a driver.
+    pub(crate) fn accepts(&self, campaign: &Campaign, model: &Model) -> Option<SetpointRanges> {
+        let BackendChoice { name, settings, .. } = &campaign.backend;
+        let nominal = nominal_rig(campaign, model, &self.effects);
+        BackendPlugin::make_by_name(&self.backends, name, &nominal, settings).ok()?.describe().accepts
     }
 
     /// One backend by its name.

@@ -1,0 +1,108 @@
+//! What a stand may do to tell causes apart: the planner's jumps, and steps of T3 and oil that limits and rig accept.
+
+use crate::planning::with_plan_request;
+use crate::{Registry, SessionError};
+use mapper_campaign::Campaign;
+use mapper_core::{OperatingPoint, RigMode, SetpointRanges, Setpoints};
+use mapper_gap::experiment::{AllowedJump, Beside, Experiment};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::reach::reach;
+use mapper_planner::PlanRequest;
+
+/// Points up to which every jump between them is simulated to see whether it is allowed.
+const MAX_POINTS: usize = 40;
+/// Changes of the turbine inlet and of the oil temperature that are tried, K.
+const T3_STEPS_K: [f64; 3] = [100.0, 50.0, -100.0];
+const OIL_STEPS_K: [f64; 2] = [40.0, -20.0];
+/// Time of such a step, s: housings follow in minutes.
+const DWELL_S: f64 = 300.0;
+
+/// All that may be done.
+///
+/// # Errors
+/// As [`with_plan_request`].
+pub(crate) fn experiments(
+    registry: &Registry,
+    campaign: &Campaign,
+    model: &Model,
+) -> Result<Vec<Experiment>, SessionError> {
+    let mut all: Vec<Experiment> =
+        allowed_jumps(campaign, model)?.into_iter().map(Experiment::jump).collect();
+    // What nobody says is accepted is not offered.
+    if let Some(accepts) = registry.accepts(campaign, model) {
+        let places = corners(&campaign.points);
+        all.extend(places.iter().flat_map(|point| temperature_steps(campaign, model, *point, &accepts)));
+    }
+    Ok(all)
+}
+
+/// The jumps that the planner allows between the points of the campaign; none for grids too large to simulate them all,
+/// and for campaigns that are no grid.
+fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<AllowedJump>, SessionError> {
+    if campaign.points.len() > MAX_POINTS {
+        return Ok(Vec::new());
+    }
+    with_plan_request(campaign, model, |request| {
+        // Whether a jump is allowed does not hang on what it would tell.
+        let request = PlanRequest { method: None, ..request.clone() };
+        let Ok(graph) = mapper_planner::jump_graph(&request) else { return Ok(Vec::new()) };
+        let allowed = graph.edge_weights().filter(|jump| jump.rejections.is_empty());
+        Ok(allowed
+            .map(|jump| AllowedJump {
+                from: jump.from,
+                to: jump.to,
+                from_p3_pa: jump.p3_pa - jump.p3_change_pa,
+                to_p3_pa: jump.p3_pa,
+                dwell_s: request.timing.dwell_s,
+            })
+            .collect())
+    })
+}
+
+/// The slowest and the fastest points, each with the smallest and the largest opening.
+fn corners(points: &[OperatingPoint]) -> Vec<OperatingPoint> {
+    let mut sorted = points.to_vec();
+    let key = |p: &OperatingPoint| (p.speed_rpm, p.valve_opening_ratio);
+    sorted.sort_by(|a, b| key(a).0.total_cmp(&key(b).0).then(key(a).1.total_cmp(&key(b).1)));
+    let lines: Vec<&[OperatingPoint]> = sorted.chunk_by(|a, b| a.speed_rpm == b.speed_rpm).collect();
+    let ends = [lines.first(), lines.last()].into_iter().flatten();
+    let mut corners: Vec<OperatingPoint> =
+        ends.flat_map(|line| [line.first(), line.last()]).flatten().copied().collect();
+    corners.dedup();
+    corners
+}
+
+/// Steps of T3 and of the oil at a point, speed and opening held, that leave no limit and are accepted.
+fn temperature_steps(
+    campaign: &Campaign,
+    model: &Model,
+    point: OperatingPoint,
+    accepts: &SetpointRanges,
+) -> Vec<Experiment> {
+    let now = campaign.boundary;
+    let held = |boundary: &BoundaryConditions| {
+        let steady = reach(model, point, boundary, campaign.follow_outlet, &campaign.limits).ok()?;
+        let BoundaryConditions { p3_pa, t3_k, oil_temperature_k, .. } = steady.boundary;
+        let valve_opening_ratio = point.valve_opening_ratio;
+        let setpoints =
+            Setpoints { mode: RigMode::Running, p3_pa, t3_k, valve_opening_ratio, oil_temperature_k };
+        accepts.check(&setpoints).is_ok().then_some(p3_pa)
+    };
+    let Some(from_p3_pa) = held(&now) else { return Vec::new() };
+    let step = |to_p3_pa: f64, beside: Beside| Experiment {
+        jump: AllowedJump { from: point, to: point, from_p3_pa, to_p3_pa, dwell_s: DWELL_S },
+        beside,
+    };
+    let (t3_k, oil_k) = (now.t3_k, now.oil_temperature_k);
+    let t3_steps = T3_STEPS_K.iter().filter(|_| !campaign.follow_outlet.turbine_inlet).filter_map(|by_k| {
+        let to_k = t3_k + by_k;
+        Some(step(held(&BoundaryConditions { t3_k: to_k, ..now })?, Beside::T3 { from_k: t3_k, to_k }))
+    });
+    let oil_steps = OIL_STEPS_K.iter().filter(|_| !campaign.follow_outlet.oil).filter_map(|by_k| {
+        let to_k = oil_k + by_k;
+        let held_pa = held(&BoundaryConditions { oil_temperature_k: to_k, ..now })?;
+        Some(step(held_pa, Beside::Oil { from_k: oil_k, to_k }))
+    });
+    t3_steps.chain(oil_steps).collect()
+}

@@ -20,6 +20,7 @@ const ROUGH_FORECASTS: usize = 3;
 const INFORMED_RATIO: f64 = 0.1;
 /// The same where dwells are found by price behind it.
 const DRAFTED_RATIO: f64 = 0.03;
+const FEW_POINTS: usize = 40;
 /// The dwell for which an order is sought then: at most so much of the longest, and so much of what equal steps would need, which
 /// priced ones undercut (decision 0048).
 const DRAFTED_DWELL_RATIO: f64 = 0.5;
@@ -98,7 +99,9 @@ fn plan_with(
     // An order is sought for the dwells that it will have, and what steps are worth is known about a campaign: both come from
     // a rough first one.
     let rough = Sought { effort: ROUGHLY_RATIO * request.effort, forecasts: ROUGH_FORECASTS, ..usual };
-    let drafted = informed && request.draft && request.required_sigma_eta.is_some();
+    // Of few points an order is sought thoroughly in no time.
+    let many = request.points.len() > FEW_POINTS;
+    let drafted = informed && request.draft && many && request.required_sigma_eta.is_some();
     let rough = match drafted {
         true => Sought { dwell_s: (DRAFTED_DWELL_RATIO * longest_s).round(), forecasts: 1, ..rough },
         false => rough,

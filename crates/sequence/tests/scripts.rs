@@ -343,3 +343,42 @@ fn a_script_that_never_takes_no_for_an_answer_ends() {
     let error = error_of("loop { reachable(point(\"175 krpm\", 0.2)); }");
     assert!(error.to_string().contains("has checked"), "{error}");
 }
+
+/// What a script sets of T3 and oil is in the steps that follow, P3 is what holds the speed with it, and what is beyond a limit is refused.
+#[test]
+fn t3_and_oil_hold_from_where_they_are_set() {
+    let text = r#"
+        let p = point("110 krpm", 1.0);
+        jump(p);
+        oil("90 degC");
+        jump(p, "5 min");
+        t3("400 degC");
+        jump(p);
+    "#;
+    let run = |text: &str, limits: Limits| {
+        let script = Script { path: "test.rhai".into(), text: text.to_owned() };
+        let mut runner = SequenceRunner::start(script, SequenceRequest { limits, ..request() }).unwrap();
+        let (mut steps, mut last) = (Vec::new(), None);
+        while let Some(step) = runner.next_step(last.take()).map_err(|error| error.to_string())? {
+            last = Some(answer(&step));
+            steps.push(step.step);
+        }
+        Ok::<_, String>(steps)
+    };
+    let steps = run(text, request().limits).unwrap();
+    let own = BoundaryConditions::default();
+    let set: Vec<(f64, f64)> = steps.iter().map(|s| (s.t3_k, s.oil_temperature_k)).collect();
+    let (oil_k, t3_k) = (273.15 + 90.0, 273.15 + 400.0);
+    assert_eq!(set, [(own.t3_k, own.oil_temperature_k), (own.t3_k, oil_k), (t3_k, oil_k)]);
+    // Speed is held: a colder turbine needs more pressure for the same power.
+    let boundary = BoundaryConditions { t3_k, oil_temperature_k: oil_k, valve_opening_ratio: 1.0, ..own };
+    let held = mapper_physics::steady::hold_speed(&Model::nominal(), 110e3, &boundary).unwrap();
+    assert!((steps[2].p3_pa / held.boundary.p3_pa - 1.0).abs() < 1e-9 && steps[2].p3_pa > steps[1].p3_pa);
+    let limits = Limits { t3_max_k: Some(own.t3_k + 10.0), ..request().limits };
+    let said = run("t3(\"550 degC\"); jump(point(\"110 krpm\", 1.0));", limits).unwrap_err();
+    assert!(said.contains("823.15 K") && said.contains("limit"), "{said}");
+    let said = run("oil(\"900 krpm\");", request().limits).unwrap_err();
+    assert!(said.contains("krpm"), "{said}");
+    let said = run("oil(\"-80 degC\");", request().limits).unwrap_err();
+    assert!(said.contains("193.15 K"), "{said}");
+}

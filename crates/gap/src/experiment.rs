@@ -76,7 +76,7 @@ impl Experiment {
     }
 
     /// The driver that its step changes, as it would be recorded at `t_s` (rising) if the step began at `start_s`.
-    pub(crate) fn driven(&self, t_s: &[f64], start_s: f64) -> Option<(Channel, Series)> {
+    pub fn driven(&self, t_s: &[f64], start_s: f64) -> Option<(Channel, Series)> {
         let (channel, from_k, to_k, lag_s) = match self.beside {
             Beside::Nothing | Beside::Sensor(_) => return None,
             Beside::T3 { from_k, to_k } => (Channel::T3, from_k, to_k, T3_LAG_S),

@@ -47,6 +47,8 @@ pub fn odds(probabilities: &[f64], apart: &[Vec<f64>], temperature: f64, settled
             left_bit += weight * entropy_bit(&after);
         }
     }
+    // Sums of weights end a rounding beyond 1.
+    let (settles, share) = (settles.min(1.0), share.min(1.0));
     Odds { settles, share, entropy_drop_bit: (entropy_bit(&p) - left_bit).max(0.0) }
 }
 

@@ -15,6 +15,8 @@ const MAX_POINTS: usize = 40;
 /// Changes of the turbine inlet and of the oil temperature that are tried, K.
 const T3_STEPS_K: [f64; 3] = [100.0, 50.0, -100.0];
 const OIL_STEPS_K: [f64; 2] = [40.0, -20.0];
+/// Distance that such a step keeps from the highest T3, K: the cell wanders and sensors read high, and a guard watches that limit.
+const T3_ROOM_K: f64 = 15.0;
 /// Time of such a step, s: housings follow in minutes.
 const DWELL_S: f64 = 300.0;
 
@@ -81,6 +83,7 @@ fn temperature_steps(
     accepts: &SetpointRanges,
 ) -> Vec<Experiment> {
     let now = campaign.boundary;
+    let room = |to_k: &f64| campaign.limits.t3_max_k.is_none_or(|limit_k| *to_k <= limit_k - T3_ROOM_K);
     let held = |boundary: &BoundaryConditions| {
         let steady = reach(model, point, boundary, campaign.follow_outlet, &campaign.limits).ok()?;
         let BoundaryConditions { p3_pa, t3_k, oil_temperature_k, .. } = steady.boundary;
@@ -95,8 +98,9 @@ fn temperature_steps(
         beside,
     };
     let (t3_k, oil_k) = (now.t3_k, now.oil_temperature_k);
-    let t3_steps = T3_STEPS_K.iter().filter(|_| !campaign.follow_outlet.turbine_inlet).filter_map(|by_k| {
-        let to_k = t3_k + by_k;
+    let t3_follows = campaign.follow_outlet.turbine_inlet;
+    let to_k = T3_STEPS_K.iter().filter(|_| !t3_follows).map(|by_k| t3_k + by_k).filter(room);
+    let t3_steps = to_k.filter_map(|to_k| {
         Some(step(held(&BoundaryConditions { t3_k: to_k, ..now })?, Beside::T3 { from_k: t3_k, to_k }))
     });
     let oil_steps = OIL_STEPS_K.iter().filter(|_| !campaign.follow_outlet.oil).filter_map(|by_k| {

@@ -5,13 +5,16 @@ use mapper_core::{Plan, VisitOrder};
 use mapper_numerics::parallel;
 
 /// Orders that are tried.
-pub(crate) const ORDERS: [VisitOrder; 5] = [
+const ORDERS: [VisitOrder; 5] = [
     VisitOrder::SumGradient,
     VisitOrder::WorstGradient,
     VisitOrder::Information,
     VisitOrder::SpeedLines,
     VisitOrder::Greedy,
 ];
+
+/// Shares of the largest sum of gradients that orders are made to keep, for the front between gradients and what steps tell.
+const SHARES: [f64; 3] = [0.9, 0.75, 0.6];
 
 /// Mean square error of the efficiency times the minutes of the run: what a campaign costs whose errors fall with the time
 /// that is spent on it. The error is that where nothing is as declared: no order is worth anything that holds only on the
@@ -30,23 +33,18 @@ pub fn clearly_cheaper(one: &Plan, other: &Plan, ratio: f64) -> bool {
     cost(one) < ratio * cost(other)
 }
 
-/// The plan under each order that allows one, the cheapest first; `make` makes one.
-fn all<E: Send>(
+/// The plan under each order that allows one, those that keep a share of the gradients among them, the cheapest first; `make` makes
+/// one.
+pub(crate) fn all<E: Send>(
     request: &PlanRequest<'_>,
     make: impl Fn(&PlanRequest<'_>) -> Result<Plan, E> + Sync,
 ) -> Result<Vec<Plan>, E> {
-    let ways: Vec<(VisitOrder, Option<f64>)> =
-        ORDERS.into_iter().map(|order| (order, request.gradient_share)).collect();
-    each(request, &ways, make)
-}
-
-/// The plan under each order and share of the gradients that allow one, the cheapest first; `make` makes one.
-pub(crate) fn each<E: Send>(
-    request: &PlanRequest<'_>,
-    ways: &[(VisitOrder, Option<f64>)],
-    make: impl Fn(&PlanRequest<'_>) -> Result<Plan, E> + Sync,
-) -> Result<Vec<Plan>, E> {
-    let made = parallel::map(ways, |(order, gradient_share)| {
+    let mut ways: Vec<(VisitOrder, Option<f64>)> = ORDERS.into_iter().map(|order| (order, None)).collect();
+    if request.method.is_some_and(|method| method.is_joint()) {
+        let asked = request.gradient_share.filter(|share| !SHARES.contains(share));
+        ways.extend(SHARES.into_iter().chain(asked).map(|share| (VisitOrder::Information, Some(share))));
+    }
+    let made = parallel::map(&ways, |(order, gradient_share)| {
         let request = PlanRequest { order: *order, gradient_share: *gradient_share, ..request.clone() };
         let plan = make(&request)?;
         Ok(match gradient_share {

@@ -1,11 +1,11 @@
 //! What the plan is held against: conventional mapping with its waits, and the same points under all other orders.
 
-use crate::best::{ORDERS, each};
+use crate::best::all;
 use crate::method::ForecastRow;
 use crate::order::by_speed_line;
 use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest};
-use mapper_core::{OperatingPoint, Plan, VisitOrder};
+use mapper_core::{OperatingPoint, Plan};
 use mapper_numerics::statistics::rms;
 use mapper_physics::forecast::{self, hold};
 use mapper_physics::model::{Outputs, State};
@@ -15,8 +15,6 @@ use mapper_physics::steady::SteadyState;
 pub const STABLE_DRIFT_K_MIN: f64 = 0.5;
 /// Interval at which that is looked at, s.
 const LOOK_S: f64 = 10.0;
-/// Shares of the largest sum of gradients that orders are made to keep, for the front between gradients and what steps tell.
-const SHARES: [f64; 3] = [0.9, 0.75, 0.6];
 /// Longest wait at a point, s.
 const LONGEST_WAIT_S: f64 = 3600.0;
 
@@ -110,12 +108,7 @@ pub fn compare<E: From<PlanError> + Send>(
 ) -> Result<Comparison, E> {
     let order = along_speed_lines(request.points);
     let targets = reachable(request, &order)?;
-    let mut ways: Vec<(VisitOrder, Option<f64>)> = ORDERS.into_iter().map(|order| (order, None)).collect();
-    if request.method.is_some_and(|method| method.is_joint()) {
-        let shares = SHARES.into_iter().chain(request.gradient_share.filter(|share| !SHARES.contains(share)));
-        ways.extend(shares.map(|share| (VisitOrder::Information, Some(share))));
-    }
-    let plans = each(&PlanRequest { appended: None, ..request.clone() }, &ways, make)?;
+    let plans = all(&PlanRequest { appended: None, ..request.clone() }, make)?;
     Ok(Comparison {
         proposed: planned(plan),
         conventional: conventional(request, &order, &targets)?,

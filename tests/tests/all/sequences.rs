@@ -183,3 +183,43 @@ fn a_stored_forecast_is_stale_when_its_script_changes() {
     let stale = run(4);
     assert!(stale.stderr.contains("the sequence script changed"), "{}", stale.stderr);
 }
+
+/// What a script sets of T3 and oil is what the virtual lab then has, behind its actuators' lags of 20 and 30 s, and speed is held.
+#[test]
+fn the_lab_follows_t3_and_oil_of_a_script() {
+    let script = "let p = point(\"110 krpm\", 1.0);\njump(p, \"60 s\");\noil(\"85 degC\");\njump(p, \"200 s\");\nt3(\"400 degC\");\njump(p, \"200 s\");\n";
+    let campaign = scripted(script, &[]);
+    run_into(&campaign.path, &campaign.runs()).exits(0);
+    let run = only_run(&campaign.runs());
+    let read =
+        read_recording(&run.join("recording.mcap"), &ChannelMap::native(), &ReadOptions::default()).unwrap();
+    let recording = &read.recording;
+    let at_end = |channel: Channel, step: usize| {
+        let end_s = recording.steps[step].end_s;
+        let series = &recording.series[&channel];
+        let late = series.t_s.iter().zip(&series.values).filter(|(t, _)| (end_s - 5.0..end_s).contains(*t));
+        let values: Vec<f64> = late.map(|(_, value)| *value).collect();
+        values.iter().sum::<f64>() / values.len() as f64
+    };
+    let (oil_k, t3_k) = (273.15 + 85.0, 273.15 + 400.0);
+    // Offsets of the sensors, and what a lag leaves after 200 s.
+    for step in [1, 2] {
+        assert!((at_end(Channel::TOil, step) - oil_k).abs() < 3.0, "{}", at_end(Channel::TOil, step));
+    }
+    assert!(at_end(Channel::TOil, 0) < oil_k - 10.0);
+    assert!((at_end(Channel::T3, 2) - t3_k).abs() < 3.0, "{}", at_end(Channel::T3, 2));
+    assert!(at_end(Channel::T3, 1) > t3_k + 50.0);
+    for step in [0, 1, 2] {
+        let speed_rpm = at_end(Channel::ShaftSpeed, step);
+        assert!((speed_rpm / 110e3 - 1.0).abs() < 0.01, "{step}: {speed_rpm}");
+    }
+    // What no rig here accepts is refused before it is touched.
+    let campaign = scripted("oil(\"190 degC\");\njump(point(\"110 krpm\", 1.0));\n", &[]);
+    let refused = run_into(&campaign.path, &campaign.runs());
+    assert!(!campaign.runs().exists() || std::fs::read_dir(campaign.runs()).unwrap().next().is_none());
+    assert!(
+        refused.stderr.contains("T_oil = 463.15 K") && refused.stderr.contains("450 K"),
+        "{}",
+        refused.stderr
+    );
+}

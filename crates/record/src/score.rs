@@ -4,9 +4,12 @@
 
 pub use crate::truth::{Truth, read_truth};
 
+use crate::RecordError;
 use mapper_core::{Channel, IdentifiedPoint, Recording, ReferenceState, StepMarker, SurgeMark};
 use mapper_numerics::statistics::{mean, median};
 use serde::Serialize;
+use std::path::PathBuf;
+use std::thread::ScopedJoinHandle;
 
 /// True values at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -46,6 +49,26 @@ pub struct ScoreSummary {
     pub h_median_error_ratio: Option<f64>,
     /// Largest absolute relative error of h; `None` where no point has h.
     pub h_worst_error_ratio: Option<f64>,
+}
+
+/// Truths of recordings that are being read on another thread: not there before they are asked for.
+pub struct AwaitedTruths<'scope>(ScopedJoinHandle<'scope, Result<Vec<Truth>, RecordError>>);
+
+impl AwaitedTruths<'_> {
+    /// Waits until they are read.
+    ///
+    /// # Errors
+    /// As [`read_truth`].
+    pub fn wait(self) -> Result<Vec<Truth>, RecordError> {
+        self.0.join().unwrap_or_else(|panicked| std::panic::resume_unwind(panicked))
+    }
+}
+
+/// Does `work` while the truths of the recordings at `paths` are read, in that order.
+pub fn beside_truths<T>(paths: &[PathBuf], work: impl FnOnce(AwaitedTruths<'_>) -> T) -> T {
+    std::thread::scope(|scope| {
+        work(AwaitedTruths(scope.spawn(|| paths.iter().map(|path| read_truth(path)).collect())))
+    })
 }
 
 /// Puts the truth of a recording beside its identified points; `truth` is `None` everywhere on a real rig.

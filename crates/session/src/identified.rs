@@ -10,8 +10,10 @@ use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{IdentifiedPoint, Method, Recording, StepMarker, StepOrigin, ThermalModel, joined};
 use mapper_identify::{IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, identify_beside, method_for};
 use mapper_observe::FusedChannel;
-use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint, Truth, read_truth, score, score_marks};
-use mapper_record::{ChannelMap, RecordError};
+use mapper_record::ChannelMap;
+use mapper_record::score::{
+    AwaitedTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, beside_truths, score, score_marks,
+};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -107,12 +109,7 @@ impl Session<'_> {
         method: Option<Method>,
     ) -> Result<Identified, SessionError> {
         let paths: Vec<PathBuf> = recorded.iter().map(|one| one.path.clone()).collect();
-        std::thread::scope(|scope| {
-            let read = scope.spawn(move || paths.iter().map(|path| read_truth(path)).collect());
-            // What scoring alone may see is not there before it is asked for.
-            let truths = || read.join().unwrap_or_else(|panicked| std::panic::resume_unwind(panicked));
-            self.identify_and_score(recorded, map, method, truths)
-        })
+        beside_truths(&paths, |truths| self.identify_and_score(recorded, map, method, truths))
     }
 
     fn identify_and_score(
@@ -120,7 +117,7 @@ impl Session<'_> {
         recorded: Vec<Recorded>,
         map: &ChannelMap,
         method: Option<Method>,
-        truths: impl FnOnce() -> Result<Vec<Truth>, RecordError>,
+        truths: AwaitedTruths<'_>,
     ) -> Result<Identified, SessionError> {
         let campaign = same_campaign(&recorded)?.cloned();
         let campaign = campaign.as_ref();
@@ -164,7 +161,7 @@ impl Session<'_> {
         for point in &points {
             self.tell(SessionEvent::PointIdentified(Box::new(point.clone())));
         }
-        let truths = truths()?;
+        let truths = truths.wait()?;
         let surge = sought(&sources, &truths, off, campaign, &config);
         let points = scored(&sources, &truths, &recording, &origins, points);
         let score = mapper_record::score::summarise(&points);

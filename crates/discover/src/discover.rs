@@ -15,6 +15,7 @@ use mapper_gap::adequacy::adequacy;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, prior};
 use mapper_gap::fit::{Effort, Fit, fit};
+use mapper_gap::how_far::channels_on;
 use mapper_gap::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
 use mapper_gap::report::{Law, MissingForce, Place, Verdict};
 use mapper_gap::selection::Selection;
@@ -29,6 +30,8 @@ pub struct Discovered {
     pub forces: Vec<MissingForce>,
     /// Places of the gap; `None` where those of the diagnosis stand.
     pub places: Option<Vec<Place>>,
+    /// The first law fitted to all steps, where it is more probable than not.
+    pub settled: Option<Fit>,
 }
 
 /// Folds of steps, each left out once, in which a law must show again.
@@ -81,6 +84,8 @@ pub fn discover(
     let laws = propose(diagnosed, calibration, &bench, found.as_ref(), &training);
     // Where a law leaves nothing but noise, what a straight line makes of other parts counts for nothing.
     let settled = laws.first().filter(|law| law.probability > 0.5);
+    let best = found.as_ref().and_then(|found| found.fitted.first());
+    let settled_fit = settled.and(best).map(|best| best.fit.clone());
     let bend = if settled.is_some() { 0.0 } else { BEND };
     progress(0.7, "missing forces");
     let here = |balance: &Balance| settled.is_none_or(|law| law.submodel == balance.submodel().name());
@@ -91,6 +96,7 @@ pub fn discover(
         laws,
         forces: forces.into_iter().take(FORCES).map(told_force).collect(),
         places: Some(places),
+        settled: settled_fit,
     }
 }
 
@@ -246,10 +252,12 @@ fn propose(
     let Ok(before) = fit(&bench.study, linearised, &study.nothing(), training, Effort::default()) else {
         return Vec::new();
     };
-    let shrink = shrink(study, &before, &trained.fit, held_out_steps(diagnosed));
+    let held_out = held_out_steps(diagnosed);
+    let shrink = shrink(study, &before, &trained.fit, held_out);
     if shrink < LEAST_SHRINK || found.stability < LEAST_STABILITY {
         return Vec::new();
     }
+    let (channels, worse) = channels_on(study, linearised, [&before, &trained.fit], held_out);
     let everywhere = Selection::all(study);
     let (own, own_fit) = bench.alone(study, best);
     let one_more = additions(&own, linearised, &everywhere, &own_fit)
@@ -273,7 +281,10 @@ fn propose(
         sentence,
         terms,
         probability: (1.0 - left) / weights,
-        shrink,
+        shrink: if worse.is_empty() { shrink } else { 0.0 },
+        held_out_steps: held_out.len(),
+        channels,
+        worse,
         beside: names_beside(study, best),
         stability: found.stability,
         equivalent: equivalent.collect(),

@@ -87,6 +87,11 @@ fn a_coolant_passage_is_found_placed_and_written() {
         assert!((term.value - truth).abs() < half, "{}", law.sentence);
     }
     assert!(law.shrink > 0.8, "{}", law.shrink);
+    // Steps that neither the search nor the fit has seen: what tolerances make of the housing is put right, and nothing else spoilt.
+    let housing = &law.channels["Tc"];
+    assert!(law.held_out_steps > 0 && housing.after < 0.2 * housing.before, "{:?}", law.channels);
+    assert_eq!(law.worse, [""; 0]);
+    assert!(found.settled.is_some());
     // What was told beside it: the heat that the law gives at each step, by a force that knows no law.
     assert_eq!(found.forces[0].submodel, "compressor_housing");
     let script = ScriptEffect::new(law.script.as_ref().unwrap(), Path::new("law.rhai")).unwrap();

@@ -79,6 +79,9 @@ pub struct Diagnosed {
     pub without_cause: (Prediction, Vec<f64>),
     /// Best fits on all steps, best first.
     pub fits: Vec<Fit>,
+    /// The best fit, or that of a law that [accounts](Diagnosed::accounted_by) for the gap, with what people call it; `None`
+    /// where nothing was fitted.
+    pub with_cause: Option<(&'static str, Fit)>,
     /// What the best leaves.
     pub adequacy: Adequacy,
     /// Whitening and derivatives.
@@ -280,7 +283,18 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     };
     let without_cause = without_cause(&study, &linearised, fits.first().filter(|_| named))
         .unwrap_or_else(|| (null.prediction.clone(), null.residual.clone()));
-    Ok(Diagnosed { diagnosis, study, null, without_cause, fits, adequacy: left, linearised })
+    let with_cause = fits.first().map(|best| ("the first cause", best.clone()));
+    Ok(Diagnosed { diagnosis, study, null, without_cause, with_cause, fits, adequacy: left, linearised })
+}
+
+impl Diagnosed {
+    /// From here on pictures show what a law that was found leaves, not what the nearest of the catalogue does.
+    pub fn accounted_by(&mut self, law: Fit) {
+        if let Some(without) = without_cause(&self.study, &self.linearised, Some(&law)) {
+            self.without_cause = without;
+        }
+        self.with_cause = Some(("the law", law));
+    }
 }
 
 /// What one more effect would take off the cost at most.

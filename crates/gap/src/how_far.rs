@@ -11,6 +11,7 @@ use crate::study::{Hypothesis, Study};
 use crate::whiten::{Linearised, rows_of_step};
 use mapper_numerics::parallel;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// What is compared.
 #[derive(Clone, Copy)]
@@ -58,8 +59,7 @@ pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
     let (low, high) = carried.interval;
     let bare =
         Unseen { residual: nominal.residual(study, &nominal.base), values: nominal.base.values.clone() };
-    let channels = channels(study, &bare, &before, &after);
-    let worse = worse(study, &before, &after, &channels);
+    let (channels, worse) = by_channel(study, [&bare, &before, &after], &steps);
     let claimed = worse.is_empty() && !compared.causes.is_empty();
     Gap {
         nominal: mean(&misfit_of_steps(study, &bare.residual)),
@@ -118,58 +118,61 @@ fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
     (before, after)
 }
 
-/// Root mean square of measured minus predicted block means, for each channel, in its unit.
-fn channels(
+/// Channels on some steps by what each predicts of them, and those that the last makes worse than the one before.
+pub fn channels_on(
     study: &Study,
-    nominal: &Unseen,
-    before: &Unseen,
-    after: &Unseen,
-) -> BTreeMap<String, ChannelGap> {
-    let mut channels = BTreeMap::new();
-    for (output, channel) in OUTPUTS.iter().enumerate() {
-        let rows: Vec<usize> =
-            study.groups.iter().filter(|g| g.output == output).flat_map(|g| g.rows.clone()).collect();
-        if rows.is_empty() {
-            continue;
-        }
-        let rms = |told: &Unseen| {
-            let sum: f64 = rows.iter().map(|row| (study.measured[*row] - told.values[*row]).powi(2)).sum();
-            (sum / rows.len() as f64).sqrt()
-        };
-        let row = ChannelGap {
-            nominal: rms(nominal),
-            before: rms(before),
-            after: rms(after),
-            unit: channel.unit().to_owned(),
-        };
-        channels.insert(channel.symbol().to_owned(), row);
-    }
-    channels
+    linearised: &Linearised,
+    [before, after]: [&Fit; 2],
+    steps: &[usize],
+) -> (BTreeMap<String, ChannelGap>, Vec<String>) {
+    let nominal = Unseen {
+        residual: linearised.residual(study, &linearised.base),
+        values: linearised.base.values.clone(),
+    };
+    let of = |fit: &Fit| Unseen { residual: fit.residual.clone(), values: fit.prediction.values.clone() };
+    by_channel(study, [&nominal, &of(before), &of(after)], steps)
 }
 
 /// A channel is worse where its residual is larger by this share, and by more than chance makes of it, in standard deviations.
 const WORSE_RATIO: f64 = 1.1;
 const WORSE_SIGMAS: f64 = 3.0;
 
-/// Channels that the cause makes worse on steps that it did not see.
-fn worse(
+/// Root mean square of measured minus predicted block means of these steps, for each channel, in its unit, with the nominal
+/// model, with tolerances fitted, and with the cause; and the channels that the cause makes worse.
+fn by_channel(
     study: &Study,
-    before: &Unseen,
-    after: &Unseen,
-    channels: &BTreeMap<String, ChannelGap>,
-) -> Vec<String> {
-    let is_worse = |output: &usize| {
-        let Some(gap) = channels.get(OUTPUTS[*output].symbol()) else { return false };
-        let rows: Vec<_> =
-            study.groups.iter().filter(|g| g.output == *output).map(|g| g.rows.clone()).collect();
+    [nominal, before, after]: [&Unseen; 3],
+    steps: &[usize],
+) -> (BTreeMap<String, ChannelGap>, Vec<String>) {
+    let (mut channels, mut worse) = (BTreeMap::new(), Vec::new());
+    for (output, channel) in OUTPUTS.iter().enumerate() {
+        let groups = study.groups.iter().filter(|g| g.output == output && steps.contains(&g.step));
+        let rows: Vec<Range<usize>> = groups.map(|g| g.rows.clone()).collect();
+        let count: usize = rows.iter().map(Range::len).sum();
+        if count == 0 {
+            continue;
+        }
+        let rms = |told: &Unseen| {
+            let off: Vec<f64> = study.measured.iter().zip(&told.values).map(|(m, v)| m - v).collect();
+            (dot_over(&rows, &off, &off) / count as f64).sqrt()
+        };
+        let gap = ChannelGap {
+            nominal: rms(nominal),
+            before: rms(before),
+            after: rms(after),
+            unit: channel.unit().to_owned(),
+        };
         let squares = |of: &[f64]| dot_over(&rows, of, of);
         let apart: Vec<f64> = before.residual.iter().zip(&after.residual).map(|(b, a)| b - a).collect();
         let more = squares(&after.residual) - squares(&before.residual);
         // Of two predictions that are as good as each other the misfits differ by twice their distance, one sigma.
         let chance = 2.0 * squares(&apart).sqrt();
-        gap.after > WORSE_RATIO * gap.before && more > WORSE_SIGMAS * chance.max(WORSE_SIGMAS)
-    };
-    (0..OUTPUTS.len()).filter(is_worse).map(|output| OUTPUTS[output].symbol().to_owned()).collect()
+        if gap.after > WORSE_RATIO * gap.before && more > WORSE_SIGMAS * chance.max(WORSE_SIGMAS) {
+            worse.push(channel.symbol().to_owned());
+        }
+        channels.insert(channel.symbol().to_owned(), gap);
+    }
+    (channels, worse)
 }
 
 /// Efficiency and heat transfer at the end of each step: by the cause with the tolerances found beside it, by these tolerances

@@ -126,8 +126,14 @@ pub struct Law {
     pub terms: Vec<LawTerm>,
     /// Probability that it is this law, among all that were tried and none of them.
     pub probability: f64,
-    /// Share of the gap that it removes on steps used neither to find nor to fit it.
+    /// Share of the gap that it removes on steps used neither to find nor to fit it; 0 where a channel gets worse on them.
     pub shrink: f64,
+    /// Number of these steps.
+    pub held_out_steps: usize,
+    /// Each channel on these steps.
+    pub channels: BTreeMap<String, ChannelGap>,
+    /// Channels that it makes worse on them.
+    pub worse: Vec<String>,
     /// Effects of the catalogue beside which it was found; empty where it stands alone.
     pub beside: Vec<String>,
     /// Share of the folds of steps, each left out once, in which the others ask for the same part and for this law's terms or

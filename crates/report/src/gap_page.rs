@@ -93,12 +93,12 @@ fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
         (heading("Residuals without the cause, step by channel, in sigma"))
         p {
             "Each number is the root mean square of a step and channel in units of what is declared: 1 is noise. \
-             Tolerances are those fitted together with the first cause."
+             Tolerances are those fitted together with the cause or law."
         }
         (heat_map(done, &done.without_cause.1))
-        @if let Some(best) = done.fits.first() {
-            (heading("Residuals with the first cause"))
-            (heat_map(done, &best.residual))
+        @if let Some((what, fit)) = &done.with_cause {
+            (heading(&format!("Residuals with {what}")))
+            (heat_map(done, &fit.residual))
             (heading("Before and after"))
             (PreEscaped(traces(done)))
         }
@@ -188,8 +188,10 @@ const CLASSES: [(f64, Colour, &str); 4] = [
 /// Where on the compressor map the steps end, coloured by their residual, before and after.
 fn map_of_where(done: &Diagnosed) -> String {
     let mut figure = Figure::new("Where on the map").columns(2).panel_size_px(430.0, 300.0);
-    let after = done.fits.first().map(|fit| ("with the first cause", &fit.residual));
-    for (title, residual) in [("without the cause", &done.without_cause.1)].into_iter().chain(after) {
+    let after = done.with_cause.as_ref().map(|(what, fit)| (format!("with {what}"), &fit.residual));
+    for (title, residual) in
+        [("without the cause".to_owned(), &done.without_cause.1)].into_iter().chain(after)
+    {
         let mut classes: [Vec<(f64, f64)>; CLASSES.len()] = Default::default();
         for step in 0..done.study.steps.len() {
             let Some(place) = place_on_map(&done.study, step) else { continue };
@@ -265,7 +267,7 @@ fn heat_cell(done: &Diagnosed, residual: &[f64], step: usize, output: usize) -> 
 
 /// Measured minus predicted over time, before and after, for the four channels with the largest gap.
 fn traces(done: &Diagnosed) -> String {
-    let Some(best) = done.fits.first() else { return String::new() };
+    let Some((_, best)) = &done.with_cause else { return String::new() };
     let energy = |output: usize| {
         let groups = done.study.groups.iter().filter(|g| g.output == output);
         groups.flat_map(|g| &done.without_cause.1[g.rows.clone()]).map(|r| r * r).sum::<f64>()

@@ -3,7 +3,10 @@
 use crate::gap_next::next_text;
 use crate::number::four_figures;
 use mapper_core::with_unit;
-use mapper_gap::report::{Candidate, Diagnosis, Estimate, PointGap, SmallestSeen, Verdict, law_found};
+use mapper_gap::report::{
+    Candidate, ChannelGap, Diagnosis, Estimate, Law, PointGap, SmallestSeen, Verdict, law_found,
+};
+use std::collections::BTreeMap;
 
 /// Causes shown.
 const CAUSES: usize = 5;
@@ -84,10 +87,10 @@ fn laws(diagnosis: &Diagnosis) -> String {
     }
     for law in &diagnosis.laws {
         text += &format!(
-            "\nlaw\n  {}\n  {:.0} %; removes {:.0} % of the gap on held-out steps\n",
+            "\nlaw\n  {}\n  {:.0} %; {} on held-out steps\n",
             law.sentence,
             100.0 * law.probability,
-            100.0 * law.shrink
+            removed(law)
         );
         if law.probability < NOT_THE_TRUTH {
             text += "  what it leaves is more than noise: its form is not the true one\n";
@@ -100,6 +103,14 @@ fn laws(diagnosis: &Diagnosis) -> String {
         }
     }
     text
+}
+
+/// What a law does to the gap, in words.
+fn removed(law: &Law) -> String {
+    match law.worse.as_slice() {
+        [] => format!("removes {:.0} % of the gap", 100.0 * law.shrink),
+        worse => format!("the gap does not shrink: {} gets worse", worse.join(", ")),
+    }
 }
 
 /// One sentence: the most probable answer.
@@ -186,6 +197,9 @@ fn carried_by(gap: &mapper_gap::report::Gap) -> String {
 
 fn how_far(diagnosis: &Diagnosis) -> String {
     let gap = &diagnosis.gap;
+    if let Some(law) = law_found(diagnosis) {
+        return how_far_by(law, gap.folds.iter().map(Vec::len).sum());
+    }
     let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
     let mut text = match gap.folds.len() {
         0 | 1 => "\nhow far, on the steps that were fitted: too few to hold any out\n".to_owned(),
@@ -205,14 +219,30 @@ fn how_far(diagnosis: &Diagnosis) -> String {
     } else if !gap.worse.is_empty() {
         text += &format!("  the gap does not shrink: {} gets worse\n", gap.worse.join(", "));
     }
-    let heads = ["nominal", "tolerances fitted", "with the cause"];
-    let columns = if named { 3 } else { 2 };
-    text += &format!("  {:4}", "");
-    for head in heads.iter().take(columns) {
+    text += &by_channel(&gap.channels, "with the cause", if named { 3 } else { 2 });
+    if named {
+        text += &points(&gap.points);
+    }
+    text
+}
+
+/// How far with a law that no effect of the catalogue comes near.
+fn how_far_by(law: &Law, steps: usize) -> String {
+    let seen = match law.held_out_steps {
+        0 => "on the steps that were fitted: too few to hold any out".to_owned(),
+        held => format!("on {held} of {steps} steps, used neither to find the law nor to fit it"),
+    };
+    format!("\nhow far, {seen}\n  {}\n", removed(law)) + by_channel(&law.channels, "with the law", 3).as_str()
+}
+
+/// What is left of each channel in the first so many columns.
+fn by_channel(channels: &BTreeMap<String, ChannelGap>, with: &str, columns: usize) -> String {
+    let mut text = format!("  {:4}", "");
+    for head in ["nominal", "tolerances fitted", with].iter().take(columns) {
         text += &format!(" {head:>18}");
     }
     text += "\n";
-    for (channel, row) in &gap.channels {
+    for (channel, row) in channels {
         // Pascals are many.
         let (scale, unit) = if row.unit == "Pa" { (1e-3, "kPa") } else { (1.0, row.unit.as_str()) };
         text += &format!("  {channel:4}");
@@ -220,9 +250,6 @@ fn how_far(diagnosis: &Diagnosis) -> String {
             text += &format!(" {:>18}", four_figures(scale * value));
         }
         text += &format!(" {unit}\n");
-    }
-    if named {
-        text += &points(&gap.points);
     }
     text
 }

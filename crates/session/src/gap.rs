@@ -112,6 +112,9 @@ impl Session<'_> {
             progress: &in_catalogue,
         })?;
         let found = discover(&diagnosed, &calibration, &beyond);
+        if let Some(law) = found.settled {
+            diagnosed.accounted_by(law);
+        }
         let diagnosis = &mut diagnosed.diagnosis;
         (diagnosis.laws, diagnosis.forces) = (found.laws, found.forces);
         if let Some(places) = found.places {

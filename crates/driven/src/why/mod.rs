@@ -1,0 +1,17 @@
+//! Which cause explains what is judged on a side that its measured neighbours drive: gap diagnosis without steps.
+
+mod asked;
+mod calm;
+mod compressor;
+mod diagnose;
+mod diagnosis;
+mod fit;
+mod held_out;
+mod noise;
+mod phases;
+mod search;
+mod side;
+
+pub use diagnose::{Ask, diagnose};
+pub use diagnosis::{Beyond, Cause, Diagnosis, HeldOut, NotAsked, Phase, Unknown, Word};
+pub use side::Which;

@@ -118,6 +118,7 @@ impl Side for CompressorSide {
         let [mut t2_probe, mut tc_probe] =
             [Channel::T2, Channel::Tc].map(|channel| ChannelFollower::new(*rig.instruments.path(channel)));
         let mut state = self.start(rig, start_k, t2_offset_k);
+        let mut tip = Tip { start_k: state.t2_tip_k, last: None };
         for i in 0..rows.len() {
             // The turbine is asked nothing; it has some flow so that it has an answer.
             let (p1_pa, t1_k) = (p1s_pa[i], t1s_k[i]);
@@ -140,10 +141,8 @@ impl Side for CompressorSide {
             state.p2_pa = p2s_pa[i];
             let prepared = model.prepare_at(rows.t_s[i], &boundary);
             let outputs = prepared.evaluate(&state);
-            let tau_s = outputs.t2_probe_time_constant_s;
-            if tau_s <= 0.0 {
-                state.t2_tip_k = outputs.t2_probe_target_k;
-            }
+            state.t2_tip_k =
+                tip.follow(rows.t_s[i], outputs.t2_probe_target_k, outputs.t2_probe_time_constant_s);
             columns[0].push(t2_probe.read(rows.t_s[i], state.t2_tip_k) + t2_offset_k);
             columns[1].push(tc_probe.read(rows.t_s[i], state.tc_k));
             // All that follows relaxes exactly towards what holds now: bounded over any gap in the log.
@@ -152,10 +151,6 @@ impl Side for CompressorSide {
                 let share = -(-conductance_w_k * elapsed_s / capacity_j_k).exp_m1();
                 from_k + net_w / conductance_w_k * share
             };
-            if tau_s > 0.0 {
-                let share = -(-elapsed_s / tau_s).exp_m1();
-                state.t2_tip_k += (outputs.t2_probe_target_k - state.t2_tip_k) * share;
-            }
             let gas_w_k = outputs.h_w_m2k * compressor.internal_area_m2 + compressor.inlet_conductance_w_k;
             let gas_w = outputs.compressor_heat_w + outputs.added.inner_heat_w;
             let lost_w = loss_w_k * (state.tc_k - surroundings_k) - outputs.added.compressor_heat_w;
@@ -193,7 +188,7 @@ impl Side for CompressorSide {
             }
             Submodel::CompressorHousing => "the heat between housing and surroundings is free here",
             Submodel::TcProbe => "Tc is not recorded",
-            _ => "it changes nothing that is judged here",
+            _ => "nothing that is judged changes with it in this log",
         }
     }
 }
@@ -218,6 +213,35 @@ impl CompressorSide {
 fn flow_coefficient(speed_rpm: f64, flow_kg_s: f64, p1_pa: f64, t1_k: f64) -> f64 {
     flow_kg_s * t1_k / (p1_pa * speed_rpm)
 }
+
+/// The tip of a probe between rows: what it tends to is taken for a straight line, for which the lag is exact.
+struct Tip {
+    /// What it read first, K.
+    start_k: f64,
+    /// Time, what it tended to, and its temperature, at the row before.
+    last: Option<(f64, f64, f64)>,
+}
+
+impl Tip {
+    fn follow(&mut self, t_s: f64, target_k: f64, tau_s: f64) -> f64 {
+        let tip_k = match self.last {
+            _ if tau_s <= 0.0 => target_k,
+            // A slow one begins with what it read, a fast one knows nothing of that.
+            None => target_k + (self.start_k - target_k) * tau_s / (tau_s + FAST_S),
+            Some((before_s, before_k, tip_k)) => {
+                let elapsed_s = t_s - before_s;
+                let slope = (target_k - before_k) / elapsed_s.max(1e-9);
+                let follows_k = target_k - slope * tau_s;
+                follows_k + (tip_k - (before_k - slope * tau_s)) * (-elapsed_s / tau_s).exp()
+            }
+        };
+        self.last = Some((t_s, target_k, tip_k));
+        tip_k
+    }
+}
+
+/// A probe of this time constant begins half with what it read, s.
+const FAST_S: f64 = 0.3;
 
 /// A map that says what was measured, whatever it is asked.
 #[derive(Debug)]

@@ -3,12 +3,14 @@
 use super::asked::{audible, smallest};
 use super::calm::calm;
 use super::compressor::CompressorSide;
-use super::diagnosis::{Cause, Diagnosis, Unknown, Word};
+use super::diagnosis::{Cause, Course, Diagnosis, Unknown, Word};
 use super::fit::{Fit, Question};
 use super::held_out::{beyond, held_out, ids, off_k};
 use super::phases::phases;
 use super::search::{search, weigh};
 use super::side::{Side, Which};
+use super::turbine::TurbineSide;
+use super::turbine_sensors::turbine_sensors;
 use crate::DrivenError;
 use crate::outcome::TOLD_RATIO;
 use crate::rows::Rows;
@@ -61,7 +63,10 @@ pub struct Ask<'a> {
 pub fn diagnose(ask: &Ask<'_>, side: Which) -> Result<Diagnosis, DrivenError> {
     match side {
         Which::Compressor => of_side::<CompressorSide>(ask),
-        Which::Turbine => of_side::<CompressorSide>(ask),
+        Which::Turbine => {
+            let effects = [ask.effects, &turbine_sensors()].concat();
+            of_side::<TurbineSide>(&Ask { effects: &effects, ..*ask })
+        }
     }
 }
 
@@ -80,14 +85,6 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     question.white_k = white_k(&question, &all, ask).ok_or(DrivenError::NoAnswer)?;
     let (asked, mut not_asked) = audible(&question);
     let found = search(&question, &asked, &counts, calibration).ok_or(DrivenError::NoAnswer)?;
-    if std::env::var("DBG").is_ok() { eprintln!("DBG white {:?} NULL {:?}", question.white_k, found.null.score); for f in found.fits.iter().take(6) { eprintln!("DBG top {:?} {:.2}", ids(&question, &f.hypothesis), f.score) } }
-    if std::env::var("DUMP").is_ok() {
-        let rows = side.rows();
-        let a = found.fits.iter().find(|f| f.hypothesis.effects.len() == 1 && f.hypothesis.effects[0].0 == 0).unwrap_or(&found.null);
-        for i in 0..rows.len() {
-            eprintln!("DUMP {:.2} {:.0} {:.4} {:.3} {:.2} {:.3} {:.3}", rows.t_s[i], rows.drives[0].1[i], rows.drives[1].1[i], rows.drives[3].1[i] / rows.drives[2].1[i], rows.judged[0].1[i], rows.judged[0].1[i] - found.null.predicted[0][i], rows.judged[0].1[i] - a.predicted[0][i]);
-        }
-    }
     let weighed = weigh(calibration, asked.len(), &found);
     let fit_of = |place: usize| &found.fits[weighed.causes[place].0];
     let causes = weighed.causes.len().min(SHOWN);
@@ -133,8 +130,13 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
         asked: asked_for,
         not_asked,
         unknowns: unknowns::<S>(likeliest),
+        course: Course {
+            t_s: rows.t_s.clone(),
+            read_k: rows.judged[0].1.clone(),
+            before_k: found.null.predicted[0].clone(),
+            after_k: likeliest.predicted[0].clone(),
+        },
         lost_rows,
-        null_z: found.null.hypothesis.nuisances.clone(),
     })
 }
 

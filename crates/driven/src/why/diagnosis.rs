@@ -125,6 +125,19 @@ pub struct Unknown {
     pub told: bool,
 }
 
+/// The first judged channel over time, K.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Course {
+    /// Times, s.
+    pub t_s: Vec<f64>,
+    /// As read.
+    pub read_k: Vec<f64>,
+    /// As the side without a cause would have it.
+    pub before_k: Vec<f64>,
+    /// With the likeliest cause; as without where none is named.
+    pub after_k: Vec<f64>,
+}
+
 /// A diagnosis of one side of a machine, driven by its measured neighbours.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -161,9 +174,10 @@ pub struct Diagnosis {
     pub not_asked: Vec<NotAsked>,
     /// What is not known of the side, as the likeliest explanation leaves it.
     pub unknowns: Vec<Unknown>,
+    /// The first judged channel over time.
+    pub course: Course,
     /// Rows that could not be used.
     pub lost_rows: usize,
-    pub null_z: Vec<f64>,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]

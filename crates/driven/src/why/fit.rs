@@ -207,10 +207,6 @@ impl<S: Side> Question<'_, S> {
             misfit - off - half_ln_determinant + known.iter().map(|(_, over)| 0.5 * over.ln()).sum::<f64>()
         };
         let (score, score_outside) = (evidence(&inside), evidence(&outside));
-        if std::env::var("DBG").is_ok() {
-            let e = all_left(&residual, &inside);
-            eprintln!("DBG {:?} score {score:.2} misfit {:?} known {:.2} hld {half_ln_determinant:.2} left {left_k:?} z {:?}", hypothesis.effects, e.iter().map(|x| (x.1*100.0).round()/100.0).collect::<Vec<_>>(), hypothesis.nuisances.iter().map(|z| 0.5 * z * z).sum::<f64>(), hypothesis.nuisances.iter().map(|z| (z * 10.0).round() / 10.0).collect::<Vec<_>>());
-        }
         Some(Fit { score, score_outside, left_k, predicted, precision: normal.matrix, hypothesis })
     }
 

@@ -11,7 +11,10 @@ mod noise;
 mod phases;
 mod search;
 mod side;
+mod turbine;
+mod turbine_sensors;
 
 pub use diagnose::{Ask, diagnose};
-pub use diagnosis::{Beyond, Cause, Diagnosis, HeldOut, NotAsked, Phase, Unknown, Word};
+pub use diagnosis::{Beyond, Cause, Course, Diagnosis, HeldOut, NotAsked, Phase, Unknown, Word};
 pub use side::Which;
+pub use turbine_sensors::turbine_sensors;

@@ -74,20 +74,6 @@ pub(crate) fn search<S: Side>(
     calibration: &Calibration,
 ) -> Option<Found> {
     let null = question.fit(&question.nothing(), counts)?;
-    if std::env::var("DBG").is_ok() {
-        for z in [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [0.0, 2.0]] {
-            let mut h = question.nothing();
-            h.nuisances[5] = z[0];
-            h.nuisances[9] = z[1];
-            eprintln!("DBGALT");
-            question.fit(&h, counts);
-        }
-        for z in [[0.1, -1.1, 1.6, -0.2, 0.4, 0.1, 0.8, 0.0, -0.2, 0.5, 0.4, -0.2, -1.0, -0.2, 0.1, 0.0],[0.9, -0.9, 1.6, 0.0, 0.2, -0.5, -0.2, 0.3, 0.7, 0.7, 2.0, -0.5, -2.8, -0.7, 0.3, -0.3]] {
-            let h = Hypothesis { nuisances: z.to_vec(), effects: vec![] };
-            eprintln!("DBGALT");
-            question.fit(&h, counts);
-        }
-    }
     let by_weight = |fits: &mut Vec<Fit>| {
         let weight = |fit: &Fit| weight(calibration, asked.len(), fit);
         fits.sort_by(|a, b| weight(b).total_cmp(&weight(a)));

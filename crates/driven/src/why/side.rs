@@ -17,6 +17,11 @@ pub enum Which {
 }
 
 impl Which {
+    /// The one of this name.
+    pub fn named(name: &str) -> Option<Which> {
+        [Which::Compressor, Which::Turbine].into_iter().find(|which| which.name() == name)
+    }
+
     /// Its name for people.
     pub fn name(self) -> &'static str {
         match self {

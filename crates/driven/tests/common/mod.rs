@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test binary needs some of it")]
 
 use mapper_core::{Channel, Recording, Series};
+use mapper_driven::why::turbine_sensors;
 use mapper_effects::catalogue;
 use mapper_observe::Declared;
 use mapper_physics::driven::{FrozenGrid, drive};
@@ -22,7 +23,7 @@ pub const BRAKE_S: f64 = 13.2;
 const END_S: f64 = 18.0;
 
 /// What is recorded of each engine, with its noise in the channel's unit.
-const CHANNELS: [(Channel, f64); 12] = [
+const CHANNELS: [(Channel, f64); 13] = [
     (Channel::ShaftSpeed, 50.0),
     (Channel::CompressorFlow, 2e-4),
     (Channel::P1, 50.0),
@@ -35,6 +36,7 @@ const CHANNELS: [(Channel, f64); 12] = [
     (Channel::T3, 0.3),
     (Channel::P4, 50.0),
     (Channel::T4, 0.3),
+    (Channel::Tt, 0.5),
 ];
 
 /// Where an engine goes: times of the corners, and speed and valve at each.
@@ -75,7 +77,7 @@ pub fn engine(seed: u64, course: &Course, planted: &[(&str, f64)], own: impl Fn(
     let mut rig = Rig::new(Model::nominal());
     own(&mut rig.model.params, &mut normal);
     for (id, value) in planted {
-        let effects = catalogue();
+        let effects = [catalogue(), turbine_sensors()].concat();
         let effect = effects.iter().find(|effect| effect.info().id == *id).unwrap();
         add(&mut rig, effect.as_ref(), &[*value]).unwrap();
     }
@@ -83,7 +85,7 @@ pub fn engine(seed: u64, course: &Course, planted: &[(&str, f64)], own: impl Fn(
     let model = &rig.model;
     let at = |(speed_rpm, valve_opening_ratio): (f64, f64)| {
         let boundary =
-            BoundaryConditions { valve_opening_ratio, t3_k: 700.0, ..BoundaryConditions::default() };
+            BoundaryConditions { valve_opening_ratio, t3_k: 550.0 + 2e-3 * speed_rpm, ..BoundaryConditions::default() };
         hold_speed(model, speed_rpm, &boundary).unwrap()
     };
     let held: Vec<_> = course.places.iter().map(|place| at(*place)).collect();
@@ -121,6 +123,10 @@ pub fn healthy(params: &mut Params, normal: &mut dyn FnMut(f64) -> f64) {
     params.compressor.efficiency_scale_ratio = 1.0 + normal(0.04);
     params.compressor.nusselt_coefficient *= normal(0.3).exp();
     params.compressor.housing_mass_kg *= normal(0.3).exp();
+    params.turbine.peak_efficiency *= 1.0 + normal(0.05);
+    params.turbine.peak_blade_speed_ratio *= 1.0 + normal(0.03);
+    params.turbine.nusselt_coefficient *= normal(0.3).exp();
+    params.turbine.housing_mass_kg *= normal(0.3).exp();
 }
 
 /// The noise that the engines' sensors have.

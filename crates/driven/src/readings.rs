@@ -64,7 +64,9 @@ impl Readings {
 
 impl From<Rows> for Readings {
     fn from(rows: Rows) -> Self {
-        let column = |columns: &[(Channel, Vec<f64>)], place: usize| columns.get(place).map_or_else(Vec::new, |(_, v)| v.clone());
+        let column = |columns: &[(Channel, Vec<f64>)], place: usize| {
+            columns.get(place).map_or_else(Vec::new, |(_, v)| v.clone())
+        };
         let drive = |place: usize| column(&rows.drives, place);
         Readings {
             speed_rpm: drive(0),

@@ -28,6 +28,8 @@ pub(crate) struct Rows {
     pub(crate) t_s: Vec<f64>,
     /// What drives, in the order asked for.
     pub(crate) drives: Vec<(Channel, Vec<f64>)>,
+    /// How fast each of these goes, per second; empty where nobody asked.
+    pub(crate) rates: Vec<Vec<f64>>,
     /// What is judged, in the order asked for; NaN where it was not measured, which the first always was.
     pub(crate) judged: Vec<(Channel, Vec<f64>)>,
     /// Rows of the first judged channel that were left out.
@@ -41,18 +43,30 @@ impl Rows {
     /// [`DrivenError::Channel`] where one that drives, or the first that is judged, is missing.
     pub(crate) fn read(recording: &Recording, wanted: Wanted<'_>) -> Result<Self, DrivenError> {
         let Some(first) = wanted.judged.first() else {
-            return Ok(Rows { t_s: Vec::new(), drives: Vec::new(), judged: Vec::new(), lost: 0 });
+            return Ok(Rows {
+                t_s: Vec::new(),
+                drives: Vec::new(),
+                rates: Vec::new(),
+                judged: Vec::new(),
+                lost: 0,
+            });
         };
         let judged = recording.require(*first)?;
         let mut series = Vec::with_capacity(wanted.drives.len());
         for channel in wanted.drives {
             series.push((*channel, recording.require(*channel)?));
         }
-        let span_s = judged.t_s.last().zip(judged.t_s.first()).map_or(0.0, |(last_s, first_s)| last_s - first_s);
+        let span_s =
+            judged.t_s.last().zip(judged.t_s.first()).map_or(0.0, |(last_s, first_s)| last_s - first_s);
         let spacing_s = SPACING_S.max(span_s / MOST_ROWS as f64);
         let columns = |channels: &[Channel]| channels.iter().map(|channel| (*channel, Vec::new())).collect();
-        let mut rows =
-            Rows { t_s: Vec::new(), drives: columns(wanted.drives), judged: columns(wanted.judged), lost: 0 };
+        let mut rows = Rows {
+            t_s: Vec::new(),
+            drives: columns(wanted.drives),
+            rates: Vec::new(),
+            judged: columns(wanted.judged),
+            lost: 0,
+        };
         let mut row = Vec::with_capacity(series.len());
         for (t_s, value) in judged.t_s.iter().zip(&judged.values) {
             if rows.t_s.last().is_some_and(|last_s| t_s - last_s < 0.999 * spacing_s) {
@@ -100,6 +114,13 @@ impl Rows {
         let every = self.len().div_ceil(most.max(1)).max(1);
         let thin = |column: &[f64]| column.iter().copied().step_by(every).collect::<Vec<f64>>();
         let each = |columns: &[(Channel, Vec<f64>)]| columns.iter().map(|(c, v)| (*c, thin(v))).collect();
-        Rows { t_s: thin(&self.t_s), drives: each(&self.drives), judged: each(&self.judged), lost: self.lost }
+        let rates = self.rates.iter().map(|column| thin(column)).collect();
+        Rows {
+            t_s: thin(&self.t_s),
+            drives: each(&self.drives),
+            rates,
+            judged: each(&self.judged),
+            lost: self.lost,
+        }
     }
 }

@@ -25,8 +25,8 @@ pub fn why_figure(name: &str, found: &Diagnosis) -> Figure {
     let dots = celsius(&course.read_k).into_iter().map(dot).collect();
     readings.add(Scatter::new(dots, palette::INK).size_px(2.0).label("read"));
     rule(&mut readings);
-    let mut left = Panel::new(Axis::new("time, s"), Axis::new("read less predicted, K"))
-        .title("(b) what is left");
+    let mut left =
+        Panel::new(Axis::new("time, s"), Axis::new("read less predicted, K")).title("(b) what is left");
     let off = |said: &[f64]| over(&mut course.read_k.iter().zip(said).map(|(read, said)| read - said));
     left.add(Line::new(off(&course.before_k), palette::INK).label("without a cause"));
     left.add(Line::new(off(&course.after_k), palette::BLUE).label(named(found)));

@@ -37,11 +37,13 @@ pub fn why_text(found: &Diagnosis) -> String {
         unknowns(&mut text, found);
     }
     if !found.asked.is_empty() {
-        let sizes = found.asked.iter().filter_map(|seen| {
-            Some(format!("{} {}", seen.effect, seen.size.as_deref()?))
-        });
+        let sizes =
+            found.asked.iter().filter_map(|seen| Some(format!("{} {}", seen.effect, seen.size.as_deref()?)));
         let sizes = sizes.collect::<Vec<_>>().join(", ");
-        let _ = writeln!(text, "\nAsked, with the smallest size that a log like this one shows in 95 of 100: {sizes}.");
+        let _ = writeln!(
+            text,
+            "\nAsked, with the smallest size that a log like this one shows in 95 of 100: {sizes}."
+        );
     }
     if !found.not_asked.is_empty() {
         text.push_str("\nNot asked, for this side cannot say:\n");
@@ -95,8 +97,16 @@ fn causes(text: &mut String, found: &Diagnosis) {
         };
         let interval = each(&|e| {
             let scale = if e.unit == "m" { 1e3 } else { 1.0 };
-            let unit = if e.unit == "m" { "mm" } else if e.unit == "1" { "" } else { &e.unit };
-            format!("{} .. {} {unit}", significant(scale * e.low), significant(scale * e.high)).trim_end().to_owned()
+            let unit = if e.unit == "m" {
+                "mm"
+            } else if e.unit == "1" {
+                ""
+            } else {
+                &e.unit
+            };
+            format!("{} .. {} {unit}", significant(scale * e.low), significant(scale * e.high))
+                .trim_end()
+                .to_owned()
         });
         let end = if cause.at_the_end.is_empty() { "" } else { " (end of its range)" };
         rows.add_row([
@@ -133,12 +143,15 @@ fn phases(text: &mut String, held_out: &HeldOut, channel: &str) {
     );
     let named = held_out.phases.iter().any(|phase| !phase.chosen.is_empty());
     if named && held_out.after_k >= held_out.before_k {
-        text.push_str("          no shrink is claimed: on phases that it did not see the cause does not help\n");
+        text.push_str(
+            "          no shrink is claimed: on phases that it did not see the cause does not help\n",
+        );
     } else if named && held_out.shrink_low_k <= 0.0 {
         text.push_str("          so few phases do not show by themselves that it is more than chance\n");
     }
     for phase in &held_out.phases {
-        let chosen = if phase.chosen.is_empty() { String::new() } else { format!("  {}", phase.chosen.join(" + ")) };
+        let chosen =
+            if phase.chosen.is_empty() { String::new() } else { format!("  {}", phase.chosen.join(" + ")) };
         let _ = writeln!(
             text,
             "          {:6.1} .. {:5.1} s, {:3.0} to {:3.0} krpm: {:6.2} -> {:5.2} K{chosen}",
@@ -174,7 +187,9 @@ fn verdict(beyond: &Beyond, word: Word) -> &'static str {
         (true, Word::Named | Word::NotToldApart) => {
             "more is left than this cause lets expect: something acts there beside it, or it is another one"
         }
-        (true, _) => "more is left than the fitted part lets expect: something acts there that showed nowhere before",
+        (true, _) => {
+            "more is left than the fitted part lets expect: something acts there that showed nowhere before"
+        }
     }
 }
 

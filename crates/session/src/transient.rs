@@ -34,7 +34,8 @@ pub struct Transient {
 impl Transient {
     /// For people.
     pub fn text(&self) -> String {
-        let identified = self.identified.as_ref().map_or_else(String::new, |found| transient_text(found) + "\n");
+        let identified =
+            self.identified.as_ref().map_or_else(String::new, |found| transient_text(found) + "\n");
         identified + why_text(&self.why).as_str()
     }
 }

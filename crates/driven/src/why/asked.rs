@@ -31,9 +31,8 @@ pub(crate) fn audible<S: Side>(question: &Question<'_, S>) -> (Vec<usize>, Vec<N
             continue;
         }
         let changed = [1.0, -1.0].into_iter().any(|share| {
-            let values = info.parameters.iter().map(|p| {
-                (p.neutral + share * p.typical_step).clamp(p.low, p.high)
-            });
+            let values =
+                info.parameters.iter().map(|p| (p.neutral + share * p.typical_step).clamp(p.low, p.high));
             let there = Hypothesis { effects: vec![(place, values.collect())], ..question.nothing() };
             question.predict(&there).is_some_and(|said| largest(question, &said, &base) > NOTHING_K)
         });
@@ -79,14 +78,16 @@ pub(crate) fn smallest<S: Side>(
     let normal = Normal::new(&whitenings, &slopes, &none, &question.nothing().nuisances, &[]);
     let Some(cholesky) = normal.matrix.clone().cholesky() else { return (Vec::new(), Vec::new()) };
     let count = asked.len().max(2) as f64;
-    let against = calibration.threshold + calibration.prior_none.ln() - (calibration.prior_single / count).ln();
+    let against =
+        calibration.threshold + calibration.prior_none.ln() - (calibration.prior_single / count).ln();
     let looked = parallel::map(asked, |effect| {
         let info = question.effects[*effect].info();
         let (parameter, others) = info.parameters.split_last()?;
         let coordinate = Coordinate::new(parameter);
         let length = |value: f64| -> Option<(f64, usize)> {
             let beside = others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high));
-            let there = Hypothesis { effects: vec![(*effect, beside.chain([value]).collect())], ..base.clone() };
+            let there =
+                Hypothesis { effects: vec![(*effect, beside.chain([value]).collect())], ..base.clone() };
             let there = question.predict(&there)?;
             let change: Vec<Vec<f64>> =
                 there.iter().zip(&said).map(|(t, s)| t.iter().zip(s).map(|(t, s)| t - s).collect()).collect();
@@ -97,20 +98,22 @@ pub(crate) fn smallest<S: Side>(
             let right = nalgebra::DVector::from_fn(unknowns, |i, _| dot(&normal.columns[i]));
             let taken = cholesky.solve(&right);
             let whole = dot(&change);
-            let most = (0..unknowns).max_by(|a, b| {
-                (taken[*a] * right[*a]).total_cmp(&(taken[*b] * right[*b]))
-            })?;
+            let most =
+                (0..unknowns).max_by(|a, b| (taken[*a] * right[*a]).total_cmp(&(taken[*b] * right[*b])))?;
             Some(((whole - right.dot(&taken)).max(0.0).sqrt(), most))
         };
         // Of what spans decades its inverse tells how far from neutral it is.
-        let away = |value: f64| if coordinate.is_logarithmic() { 1.0 / value } else { value - parameter.neutral };
+        let away =
+            |value: f64| if coordinate.is_logarithmic() { 1.0 / value } else { value - parameter.neutral };
         let value_at = |away: f64| {
             let value = if coordinate.is_logarithmic() { 1.0 / away } else { parameter.neutral + away };
             value.clamp(parameter.low, parameter.high)
         };
         let typical = away((parameter.neutral + parameter.typical_step).clamp(parameter.low, parameter.high));
         let furthest = away(value_at(typical * 1e9));
-        let (mut here, mut seen, mut taker) = (typical, false, 0);
+        let (mut here, mut taker) = (typical, 0);
+        // The smallest of those that were looked at and are large enough.
+        let mut seen: Option<f64> = None;
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..LOOKS {
             let (sigma, most) = length(value_at(here))?;
@@ -123,7 +126,9 @@ pub(crate) fn smallest<S: Side>(
             let needed =
                 against + 0.5 * curvature.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln() + PRIOR_STEPS.ln();
             let wanted = (2.0 * needed.max(0.0)).sqrt() + SURELY;
-            seen = sigma > 0.9 * wanted;
+            if sigma > 0.9 * wanted && seen.is_none_or(|other| here.abs() < other.abs()) {
+                seen = Some(here);
+            }
             if (sigma / wanted).ln().abs() < NEAR {
                 break;
             }
@@ -134,14 +139,14 @@ pub(crate) fn smallest<S: Side>(
             let moved = here * (wanted / sigma).powf(1.0 / if power.is_finite() { power } else { 1.0 });
             here = if moved.abs() > furthest.abs() { furthest } else { moved };
         }
-        let value = value_at(here);
+        let value = seen.map(value_at);
         let smallest = SmallestSeen {
             effect: info.id.to_string(),
             name: info.name.to_string(),
             parameter: parameter.name.to_string(),
-            value: seen.then_some(value),
+            value,
             unit: parameter.unit.to_string(),
-            size: seen.then(|| in_words::size(parameter, value)),
+            size: value.map(|value| in_words::size(parameter, value)),
         };
         let largest = in_words::size(parameter, value_at(furthest));
         let unknown = &S::unknowns()[taker];

@@ -13,18 +13,30 @@ const NEIGHBOURS: [usize; 5] = [12, 8, 5, 3, 2];
 /// Readings are on a line where their mean square is below the sensor's by this factor: of six readings, one set in twenty of pure
 /// noise is not.
 const ON_A_LINE: f64 = 1.5;
+/// Rates are taken over twice so long, s.
+const RATE_S: f64 = 0.305;
 /// Neighbours further away than this, s, are none.
 const FURTHEST_S: f64 = 2.0;
 
-/// The rows with calm drives.
+/// The rows with calm drives, and how fast these go.
 pub(crate) fn calm(rows: &Rows, declared: &Declared) -> Rows {
     let mut calm = rows.clone();
+    calm.rates.clear();
     for (channel, column) in &mut calm.drives {
         let sigma = declared.noise_sigma(*channel);
         let read = rows.drive(*channel);
-        for (i, value) in column.iter_mut().enumerate() {
-            *value = calm_at(&rows.t_s, read, i, sigma);
-        }
+        let values: Vec<f64> = (0..rows.len()).map(|i| calm_at(&rows.t_s, read, i, sigma)).collect();
+        let rate = |i: usize| {
+            let near = |t_s: &f64| (t_s - rows.t_s[i]).abs() <= RATE_S;
+            let before =
+                (0..i).rev().take_while(|k| near(&rows.t_s[*k])).last().unwrap_or(i.saturating_sub(1));
+            let later = (i + 1..values.len()).take_while(|k| near(&rows.t_s[*k])).last();
+            let after = later.unwrap_or((i + 1).min(values.len() - 1));
+            let elapsed_s = rows.t_s[after] - rows.t_s[before];
+            if elapsed_s > 0.0 { (values[after] - values[before]) / elapsed_s } else { 0.0 }
+        };
+        calm.rates.push((0..rows.len()).map(rate).collect());
+        *column = values;
     }
     calm
 }
@@ -76,9 +88,19 @@ mod tests {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
         let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
         let read = truth.iter().map(|v| v + sigma * noise()).collect();
-        let rows = Rows { t_s, drives: vec![(Channel::ShaftSpeed, read)], judged: Vec::new(), lost: 0 };
+        let rows = Rows {
+            t_s,
+            drives: vec![(Channel::ShaftSpeed, read)],
+            rates: Vec::new(),
+            judged: Vec::new(),
+            lost: 0,
+        };
         let declared = Declared {
-            sensors: [(Channel::ShaftSpeed, DeclaredUncertainty { noise_sigma: sigma, ..Default::default() })].into(),
+            sensors: [(
+                Channel::ShaftSpeed,
+                DeclaredUncertainty { noise_sigma: sigma, ..Default::default() },
+            )]
+            .into(),
             noise_colour: Default::default(),
             tolerances: Default::default(),
             nominal: Default::default(),

@@ -2,9 +2,9 @@
 //! and as free as nobody knows them.
 
 use super::side::{Side, Smooth, Which, truth};
+use crate::parameters::Spread;
 use crate::readings::COMPRESSOR;
 use crate::rows::{Rows, Wanted};
-use crate::parameters::Spread;
 use crate::{PARAMETERS, Parameter};
 use mapper_core::{Channel, ReferenceState};
 use mapper_physics::air;
@@ -67,14 +67,15 @@ impl Side for CompressorSide {
     fn smooth() -> &'static [Smooth] {
         // T2: what a polynomial leaves of a map, and one node of a housing. Tc: one thermocouple for a whole housing.
         &[
-            Smooth { median_k: 0.25, width: 0.4, alike_s: 2.0 },
+            Smooth { median_k: 0.18, width: 0.25, alike_s: 2.0 },
             Smooth { median_k: 3.0, width: 0.0, alike_s: 60.0 },
         ]
     }
 
     fn of(rows: Rows) -> Self {
         let middle = |values: &mut dyn Iterator<Item = f64>| {
-            let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value: f64| (sum + value.ln(), count + 1.0));
+            let (sum, count) =
+                values.fold((0.0, 0.0), |(sum, count), value: f64| (sum + value.ln(), count + 1.0));
             if count > 0.0 { f64::exp(sum / count) } else { 1.0 }
         };
         let middle_speed_rpm = middle(&mut rows.drive(Channel::ShaftSpeed).iter().copied());
@@ -93,8 +94,24 @@ impl Side for CompressorSide {
     fn predict(&self, rig: &Rig, unknowns: &[f64]) -> Vec<Vec<f64>> {
         let rows = &self.rows;
         let mut columns = vec![Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len())];
-        let &[eta, eta_speed, eta_speed_2, eta_flow, eta_flow_2, h, capacity, loss_w_k, surroundings_k, start_k, t2_offset_k, sf, sss, ssf, sff, fff] =
-            unknowns
+        let &[
+            eta,
+            eta_speed,
+            eta_speed_2,
+            eta_flow,
+            eta_flow_2,
+            h,
+            capacity,
+            loss_w_k,
+            surroundings_k,
+            start_k,
+            t2_offset_k,
+            sf,
+            sss,
+            ssf,
+            sff,
+            fff,
+        ] = unknowns
         else {
             return columns;
         };
@@ -112,9 +129,8 @@ impl Side for CompressorSide {
         let params = model.params;
         let compressor = params.compressor;
         let inner_ratio = compressor.inner_capacity_ratio;
-        let moist_flow_ratio = (air::GAS_CONSTANT_J_KGK
-            / air::moist_gas_constant_j_kgk(compressor.humidity_kg_kg))
-        .sqrt();
+        let moist_flow_ratio =
+            (air::GAS_CONSTANT_J_KGK / air::moist_gas_constant_j_kgk(compressor.humidity_kg_kg)).sqrt();
         let [mut t2_probe, mut tc_probe] =
             [Channel::T2, Channel::Tc].map(|channel| ChannelFollower::new(*rig.instruments.path(channel)));
         let mut state = self.start(rig, start_k, t2_offset_k);
@@ -126,7 +142,8 @@ impl Side for CompressorSide {
             // The wheel of a compressor with recirculation has more flow than what leaves it.
             let wheel_kg_s = flows_kg_s[i].max(1e-4) * (1.0 + compressor.recirculation_ratio);
             let speed = (speeds_rpm[i] / self.middle_speed_rpm).ln();
-            let flow = (flow_coefficient(speeds_rpm[i], wheel_kg_s, p1s_pa[i], t1s_k[i]) / self.middle_flow).ln();
+            let flow =
+                (flow_coefficient(speeds_rpm[i], wheel_kg_s, p1s_pa[i], t1s_k[i]) / self.middle_flow).ln();
             let efficiency = (eta
                 + (eta_speed + eta_speed_2 * speed) * speed
                 + (eta_flow + eta_flow_2 * flow) * flow
@@ -134,8 +151,8 @@ impl Side for CompressorSide {
                 + sss * speed.powi(3)
                 + fff * flow.powi(3))
             .clamp(crate::side::EFFICIENCY.0, crate::side::EFFICIENCY.1);
-            let flow_corrected_kg_s =
-                wheel_kg_s / (MODEL_REFERENCE.physical_flow_kg_s(1.0, t1s_k[i], p1s_pa[i]) * moist_flow_ratio);
+            let flow_corrected_kg_s = wheel_kg_s
+                / (MODEL_REFERENCE.physical_flow_kg_s(1.0, t1s_k[i], p1s_pa[i]) * moist_flow_ratio);
             model.map = Arc::new(AsMeasured { flow_corrected_kg_s, efficiency });
             state.shaft_speed_rad_s = rad_s_of_rpm(speeds_rpm[i]);
             state.p2_pa = p2s_pa[i];
@@ -172,7 +189,9 @@ impl Side for CompressorSide {
 
     fn free(effect: &str) -> Option<&'static str> {
         match effect {
-            "efficiency_scale" => Some("efficiency is free here, whatever a map says: it stands among the unknowns (eta)"),
+            "efficiency_scale" => {
+                Some("efficiency is free here, whatever a map says: it stands among the unknowns (eta)")
+            }
             "htc_scale" => Some("h is free here within a factor of 1.6: it stands among the unknowns (h)"),
             _ => None,
         }
@@ -181,7 +200,9 @@ impl Side for CompressorSide {
     fn silent(&self, submodel: Submodel) -> &'static str {
         match submodel {
             Submodel::CompressorFlow => "flow is as measured here: no map is asked",
-            Submodel::Actuator | Submodel::Outlet => "P2 and flow are as measured here: nobody set P3 or a valve",
+            Submodel::Actuator | Submodel::Outlet => {
+                "P2 and flow are as measured here: nobody set P3 or a valve"
+            }
             Submodel::Shaft => "speed is as measured here: no balance of powers is asked",
             Submodel::TurbineFlow | Submodel::TurbineHousing => {
                 "it acts on the other side, or on the heat between housing and surroundings, which is free here"
@@ -287,8 +308,17 @@ mod tests {
     #[test]
     fn the_free_parameters_are_those_that_the_side_takes() {
         let names: Vec<&str> = UNKNOWNS.iter().map(|parameter| parameter.name).collect();
-        let first =
-            ["eta", "eta_speed", "eta_speed_2", "eta_flow", "eta_flow_2", "h", "capacity", "loss", "surroundings"];
+        let first = [
+            "eta",
+            "eta_speed",
+            "eta_speed_2",
+            "eta_flow",
+            "eta_flow_2",
+            "h",
+            "capacity",
+            "loss",
+            "surroundings",
+        ];
         assert_eq!(names[..9], first);
         assert_eq!(names[9..11], ["housing_start", "t2_offset"]);
     }

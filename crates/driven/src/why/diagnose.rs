@@ -18,7 +18,6 @@ use mapper_core::{Channel, Recording, half_width_95};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::coordinate::Coordinate;
 use mapper_gap::in_words;
-use mapper_gap::next::SETTLED;
 use mapper_gap::report::Estimate;
 use mapper_numerics::statistics::rms;
 use mapper_observe::Declared;
@@ -29,7 +28,7 @@ use rand_pcg::Pcg64Mcg;
 use std::sync::Arc;
 
 /// Rows a diagnosis goes through: more do not tell more, for what the model leaves is alike over seconds.
-const MOST_ROWS: usize = 1_000;
+const MOST_ROWS: usize = 800;
 /// Rows that are needed: some for each of what is not known.
 const FEWEST_ROWS: usize = 30;
 /// Causes among which each phase chooses.
@@ -81,7 +80,8 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     }
     let counts: Vec<bool> = (0..rows.len()).map(|i| i < fitted).collect();
     let side = S::of(rows);
-    let mut question = Question { side: &side, nominal: ask.nominal, effects: ask.effects, white_k: Vec::new() };
+    let mut question =
+        Question { side: &side, nominal: ask.nominal, effects: ask.effects, white_k: Vec::new() };
     question.white_k = white_k(&question, &all, ask).ok_or(DrivenError::NoAnswer)?;
     let (asked, mut not_asked) = audible(&question);
     let found = search(&question, &asked, &counts, calibration).ok_or(DrivenError::NoAnswer)?;
@@ -90,13 +90,7 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     let causes = weighed.causes.len().min(SHOWN);
     // What is named before it is weighed against something unknown: held-out phases judge it.
     let likeliest = if weighed.named && causes > 0 { fit_of(0) } else { &found.null };
-    let of_causes: f64 = weighed.causes.iter().map(|(_, probability)| probability).sum();
-    let mut open = 0;
-    let mut sum = 0.0;
-    while weighed.named && open < weighed.causes.len() && sum < SETTLED * of_causes {
-        sum += weighed.causes[open].1;
-        open += 1;
-    }
+    let open = weighed.open;
     let word = match open {
         _ if weighed.outside > 0.5 => Word::Outside,
         0 => Word::WithinTolerance,
@@ -109,7 +103,8 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     let phases = phases(rows, fitted, &drives);
     let (asked_for, silent) = smallest(&question, &asked, likeliest, &counts, calibration);
     not_asked.extend(silent);
-    let symbols = |columns: &[(Channel, Vec<f64>)]| columns.iter().map(|(channel, _)| channel.symbol()).collect();
+    let symbols =
+        |columns: &[(Channel, Vec<f64>)]| columns.iter().map(|(channel, _)| channel.symbol()).collect();
     let measured = |(_, column): &&(Channel, Vec<f64>)| column.iter().any(|k| k.is_finite());
     Ok(Diagnosis {
         side: S::WHICH,
@@ -163,8 +158,14 @@ fn white_k<S: Side>(question: &Question<'_, S>, all: &Rows, ask: &Ask<'_>) -> Op
     Some(judged.zip(quiet.iter().zip(&noisy)).map(of_channel).collect())
 }
 
-fn cause<S: Side>(question: &Question<'_, S>, calibration: &Calibration, fit: &Fit, probability: f64) -> Cause {
-    let infos: Vec<_> = fit.hypothesis.effects.iter().map(|(index, _)| question.effects[*index].info()).collect();
+fn cause<S: Side>(
+    question: &Question<'_, S>,
+    calibration: &Calibration,
+    fit: &Fit,
+    probability: f64,
+) -> Cause {
+    let infos: Vec<_> =
+        fit.hypothesis.effects.iter().map(|(index, _)| question.effects[*index].info()).collect();
     let covariance = fit.precision.clone().cholesky().map(|cholesky| cholesky.inverse());
     let mut place = fit.hypothesis.nuisances.len();
     let (mut parameters, mut at_the_end) = (std::collections::BTreeMap::new(), Vec::new());
@@ -210,7 +211,8 @@ fn unknowns<S: Side>(fit: &Fit) -> Vec<Unknown> {
     let each = S::unknowns().iter().zip(&fit.hypothesis.nuisances).enumerate();
     each.map(|(place, (unknown, z))| {
         let sigma = covariance.as_ref().map_or(1.0, |c| c[(place, place)].max(0.0).sqrt());
-        let ends = |middle: f64, sigma: f64| (unknown.at(middle - 1.96 * sigma), unknown.at(middle + 1.96 * sigma));
+        let ends =
+            |middle: f64, sigma: f64| (unknown.at(middle - 1.96 * sigma), unknown.at(middle + 1.96 * sigma));
         let ((low, high), (prior_low, prior_high)) = (ends(*z, sigma), ends(0.0, 1.0));
         let told = high - low < TOLD_RATIO * (prior_high - prior_low);
         let (name, description, unit) = (unknown.name, unknown.description, unknown.unit);

@@ -114,8 +114,12 @@ impl<S: Side> Question<'_, S> {
 
     fn whitening(&self, counts: &[bool], channel: usize, left_k: f64) -> Whitening {
         let rows = self.side.rows();
-        let looked: Vec<bool> =
-            rows.judged[channel].1.iter().zip(counts).map(|(read, counts)| *counts && read.is_finite()).collect();
+        let looked: Vec<bool> = rows.judged[channel]
+            .1
+            .iter()
+            .zip(counts)
+            .map(|(read, counts)| *counts && read.is_finite())
+            .collect();
         Whitening::new(&rows.t_s, &looked, self.white_k[channel], left_k, S::smooth()[channel].alike_s)
     }
 
@@ -149,14 +153,19 @@ impl<S: Side> Question<'_, S> {
         let known = self.known(start);
         let pulls = |hypothesis: &Hypothesis| -> Vec<(f64, f64)> {
             let values = parameters(hypothesis).into_iter().zip(coordinates.iter().zip(&known));
-            values.map(|(value, (coordinate, (middle, over)))| (coordinate.of(value) - middle, *over)).collect()
+            values
+                .map(|(value, (coordinate, (middle, over)))| (coordinate.of(value) - middle, *over))
+                .collect()
         };
-        let of_effects =
-            |hypothesis: &Hypothesis| pulls(hypothesis).iter().map(|(off, over)| over * off * off).sum::<f64>();
-        let all_left = |residual: &[Vec<f64>], prior: &dyn Fn(&Smooth) -> (f64, f64)| -> Vec<(f64, f64, f64)> {
-            let each = residual.iter().zip(S::smooth()).enumerate();
-            each.map(|(channel, (residual, smooth))| self.left(counts, channel, residual, prior(smooth))).collect()
+        let of_effects = |hypothesis: &Hypothesis| {
+            pulls(hypothesis).iter().map(|(off, over)| over * off * off).sum::<f64>()
         };
+        let all_left =
+            |residual: &[Vec<f64>], prior: &dyn Fn(&Smooth) -> (f64, f64)| -> Vec<(f64, f64, f64)> {
+                let each = residual.iter().zip(S::smooth()).enumerate();
+                each.map(|(channel, (residual, smooth))| self.left(counts, channel, residual, prior(smooth)))
+                    .collect()
+            };
         let inside = |smooth: &Smooth| (smooth.median_k, smooth.width);
         let mut residual = self.residual(&predicted);
         let mut left_k: Vec<f64> = all_left(&residual, &inside).into_iter().map(|(k, ..)| k).collect();
@@ -170,7 +179,8 @@ impl<S: Side> Question<'_, S> {
                     + of_effects(hypothesis)
             };
             let before = cost(&residual, &hypothesis);
-            let normal = Normal::new(&whitenings, &slopes, &residual, &hypothesis.nuisances, &pulls(&hypothesis));
+            let normal =
+                Normal::new(&whitenings, &slopes, &residual, &hypothesis.nuisances, &pulls(&hypothesis));
             let Some((step, promised)) = normal.bounded_step(&hypothesis, &coordinates) else { break };
             if promised < ENOUGH {
                 break;
@@ -195,15 +205,23 @@ impl<S: Side> Question<'_, S> {
             left_k = all_left(&residual, &inside).into_iter().map(|(k, ..)| k).collect();
             slopes = self.slopes(&hypothesis, &predicted, &coordinates);
         }
-        let normal = Normal::new(&self.whitenings(counts, &left_k), &slopes, &residual, &hypothesis.nuisances, &pulls(&hypothesis));
+        let normal = Normal::new(
+            &self.whitenings(counts, &left_k),
+            &slopes,
+            &residual,
+            &hypothesis.nuisances,
+            &pulls(&hypothesis),
+        );
         let half_ln_determinant = normal.half_ln_determinant()?;
         let outside = |smooth: &Smooth| match smooth.width {
             0.0 => (smooth.median_k, 0.0),
             _ => (OUTSIDE_RATIO * smooth.median_k, OUTSIDE_WIDTH),
         };
         let evidence = |prior: &dyn Fn(&Smooth) -> (f64, f64)| {
-            let misfit: f64 = all_left(&residual, prior).into_iter().map(|(_, misfit, width)| width - misfit).sum();
-            let off = 0.5 * (hypothesis.nuisances.iter().map(|z| z * z).sum::<f64>() + of_effects(&hypothesis));
+            let misfit: f64 =
+                all_left(&residual, prior).into_iter().map(|(_, misfit, width)| width - misfit).sum();
+            let off =
+                0.5 * (hypothesis.nuisances.iter().map(|z| z * z).sum::<f64>() + of_effects(&hypothesis));
             misfit - off - half_ln_determinant + known.iter().map(|(_, over)| 0.5 * over.ln()).sum::<f64>()
         };
         let (score, score_outside) = (evidence(&inside), evidence(&outside));
@@ -218,8 +236,14 @@ impl<S: Side> Question<'_, S> {
         coordinates: &[Coordinate],
     ) -> Vec<Vec<Vec<f64>>> {
         let of = |moved: &Hypothesis, by: f64| -> Vec<Vec<f64>> {
-            let Some(there) = self.predict(moved) else { return here.iter().map(|h| vec![0.0; h.len()]).collect() };
-            there.iter().zip(here).map(|(t, h)| t.iter().zip(h).map(|(t, h)| (t - h) / by).collect()).collect()
+            let Some(there) = self.predict(moved) else {
+                return here.iter().map(|h| vec![0.0; h.len()]).collect();
+            };
+            there
+                .iter()
+                .zip(here)
+                .map(|(t, h)| t.iter().zip(h).map(|(t, h)| (t - h) / by).collect())
+                .collect()
         };
         let mut slopes = Vec::with_capacity(hypothesis.nuisances.len() + coordinates.len());
         for place in 0..hypothesis.nuisances.len() {
@@ -272,7 +296,8 @@ impl Normal {
         let columns: Vec<_> = slopes.iter().map(|slope| whitened(whitenings, slope)).collect();
         let residual = whitened(whitenings, residual);
         // How far each stands from the middle of what is known, and its precision.
-        let known: Vec<(f64, f64)> = unknowns.iter().map(|z| (*z, 1.0)).chain(pulls.iter().copied()).collect();
+        let known: Vec<(f64, f64)> =
+            unknowns.iter().map(|z| (*z, 1.0)).chain(pulls.iter().copied()).collect();
         let matrix = DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
             dot(&columns[i], &columns[j]) + if i == j { known[i].1 } else { 0.0 }
         });
@@ -288,7 +313,11 @@ impl Normal {
 
     /// The step to the least cost within all bounds, and what it promises: what would leave its range is held at its end and the
     /// others are solved for again.
-    fn bounded_step(&self, hypothesis: &Hypothesis, coordinates: &[Coordinate]) -> Option<(DVector<f64>, f64)> {
+    fn bounded_step(
+        &self,
+        hypothesis: &Hypothesis,
+        coordinates: &[Coordinate],
+    ) -> Option<(DVector<f64>, f64)> {
         let within = |low: f64, high: f64, most: f64| (low.clamp(-most, 0.0), high.clamp(0.0, most));
         let mut room: Vec<(f64, f64)> = hypothesis
             .nuisances

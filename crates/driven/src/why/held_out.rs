@@ -38,7 +38,9 @@ pub(crate) fn held_out<S: Side>(
     let last = phases.last()?.end;
     let rows = question.side.rows();
     let jobs: Vec<(usize, Option<usize>)> = (0..phases.len())
-        .flat_map(|phase| std::iter::once((phase, None)).chain((0..causes.len()).map(move |c| (phase, Some(c)))))
+        .flat_map(|phase| {
+            std::iter::once((phase, None)).chain((0..causes.len()).map(move |c| (phase, Some(c))))
+        })
         .collect();
     let fitted = parallel::map(&jobs, |(phase, cause)| {
         let counts: Vec<bool> = (0..rows.len()).map(|i| i < last && !phases[*phase].contains(&i)).collect();

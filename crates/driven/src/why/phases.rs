@@ -16,7 +16,8 @@ const PHASES: (usize, usize) = (3, 8);
 /// Phases of the first `count` rows, in their order; none where there are too few rows for two.
 pub(crate) fn phases(rows: &Rows, count: usize, drives: &[Channel]) -> Vec<Range<usize>> {
     let count = count.min(rows.len());
-    let sums: Vec<Sums> = drives.iter().map(|channel| Sums::new(&rows.t_s[..count], rows.drive(*channel))).collect();
+    let sums: Vec<Sums> =
+        drives.iter().map(|channel| Sums::new(&rows.t_s[..count], rows.drive(*channel))).collect();
     let cost = |range: &Range<usize>| sums.iter().map(|sums| sums.off_a_line(range)).sum::<f64>();
     let mut phases: Vec<Range<usize>> = Vec::new();
     let mut from = 0;
@@ -73,7 +74,8 @@ impl Sums {
     }
 
     fn off_a_line(&self, range: &Range<usize>) -> f64 {
-        let [n, t, v, tt, tv, vv] = std::array::from_fn(|i| self.before[range.end][i] - self.before[range.start][i]);
+        let [n, t, v, tt, tv, vv] =
+            std::array::from_fn(|i| self.before[range.end][i] - self.before[range.start][i]);
         if n < 2.0 {
             return 0.0;
         }
@@ -96,11 +98,17 @@ mod tests {
             _ => 90e3,
         };
         let speeds = t_s.iter().map(|t| speed(*t)).collect();
-        let rows =
-            Rows { drives: vec![(Channel::ShaftSpeed, speeds)], judged: Vec::new(), lost: 0, t_s: t_s.clone() };
+        let rows = Rows {
+            drives: vec![(Channel::ShaftSpeed, speeds)],
+            rates: Vec::new(),
+            judged: Vec::new(),
+            lost: 0,
+            t_s: t_s.clone(),
+        };
         let found = phases(&rows, rows.len(), &[Channel::ShaftSpeed]);
         for begins_s in [6.0, 8.0, 13.0] {
-            let nearest = found.iter().map(|phase| (t_s[phase.start] - begins_s).abs()).fold(f64::MAX, f64::min);
+            let nearest =
+                found.iter().map(|phase| (t_s[phase.start] - begins_s).abs()).fold(f64::MAX, f64::min);
             assert!(nearest < 0.8, "{begins_s} s: {found:?}");
         }
         assert_eq!((found.first().unwrap().start, found.last().unwrap().end), (0, rows.len()));

@@ -4,6 +4,7 @@ use super::fit::{Fit, Question};
 use super::side::Side;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::coordinate::Coordinate;
+use mapper_gap::next::SETTLED;
 use mapper_gap::study::{Hypothesis, members};
 use mapper_numerics::parallel;
 use mapper_physics::effect::EffectInfo;
@@ -131,6 +132,8 @@ pub(crate) struct Weighed {
     pub(crate) outside: f64,
     /// Causes by their places among the fits, likeliest first; what only adds to a better one counts as that one.
     pub(crate) causes: Vec<(usize, f64)>,
+    /// How many of them, from the first, are not told apart.
+    pub(crate) open: usize,
     /// Whether a cause is likelier than nothing by more than chance makes one.
     pub(crate) named: bool,
 }
@@ -156,12 +159,38 @@ pub(crate) fn weigh(calibration: &Calibration, asked: usize, found: &Found) -> W
             None => causes.push((place, probability)),
         }
     }
+    let named = best_weight(calibration, asked, found) - weight(calibration, asked, &found.null)
+        > calibration.threshold;
+    let effects = |place: usize| members(&found.fits[place].hypothesis);
+    let within =
+        |part: usize, whole: usize| effects(part).iter().all(|effect| effects(whole).contains(effect));
     causes.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let best = found.fits.first().map_or(f64::NEG_INFINITY, |fit| weight(calibration, asked, fit));
-    Weighed {
-        none: share(inside(&found.null)) / total,
-        outside: outside / total,
-        named: best - weight(calibration, asked, &found.null) > calibration.threshold,
-        causes,
+    let mut open = if named { open_ones(&causes) } else { 0 };
+    // Where all that are open have one of them in common, it is that one: what stands beside it is too weak to tell.
+    let common = causes[..open]
+        .iter()
+        .position(|(part, _)| causes[..open].iter().all(|(whole, _)| within(*part, *whole)));
+    if let Some(common) = common.filter(|_| open > 1) {
+        let together = causes[..open].iter().map(|(_, probability)| probability).sum();
+        let cause = (causes[common].0, together);
+        causes.splice(..open, [cause]);
+        open = 1;
     }
+    Weighed { none: share(inside(&found.null)) / total, outside: outside / total, named, open, causes }
+}
+
+/// How many causes, from the first, have what settles it of all together.
+fn open_ones(causes: &[(usize, f64)]) -> usize {
+    let all: f64 = causes.iter().map(|(_, probability)| probability).sum();
+    let mut sum = 0.0;
+    let before = |(_, probability): &&(usize, f64)| {
+        let open = sum < SETTLED * all;
+        sum += probability;
+        open
+    };
+    causes.iter().take_while(before).count()
+}
+
+fn best_weight(calibration: &Calibration, asked: usize, found: &Found) -> f64 {
+    found.fits.first().map_or(f64::NEG_INFINITY, |fit| weight(calibration, asked, fit))
 }

@@ -81,31 +81,12 @@ pub(crate) fn truth(rows: &Rows, rig: &Rig, channel: Channel) -> Vec<f64> {
     let path = rig.instruments.path(channel);
     let read = rows.drive(channel);
     let straight = |value: f64| (value - path.offset) / path.gain_ratio;
-    if path.lag_s <= 0.0 {
-        return read.iter().map(|value| straight(*value)).collect();
+    let place = rows.drives.iter().position(|(of, _)| *of == channel);
+    match place.and_then(|place| rows.rates.get(place)) {
+        // Of a lag, y + lag dy/dt.
+        Some(rates) if path.lag_s > 0.0 => {
+            read.iter().zip(rates).map(|(value, rate)| straight(value + path.lag_s * rate)).collect()
+        }
+        _ => read.iter().map(|value| straight(*value)).collect(),
     }
-    // Of a lag, y + lag dy/dt; the slope over so long that noise does not drown it.
-    let half_s = (0.5 * path.lag_s).max(LEAST_SLOPE_S);
-    let t_s = &rows.t_s;
-    (0..rows.len())
-        .map(|i| {
-            let from = t_s.partition_point(|t| *t < t_s[i] - half_s);
-            let until = t_s.partition_point(|t| *t <= t_s[i] + half_s);
-            straight(read[i] + path.lag_s * slope(&t_s[from..until], &read[from..until]))
-        })
-        .collect()
-}
-
-/// Slopes are taken over at least twice so long, s.
-const LEAST_SLOPE_S: f64 = 0.3;
-
-/// Slope of a straight line through values, their unit per second.
-fn slope(t_s: &[f64], values: &[f64]) -> f64 {
-    let count = t_s.len() as f64;
-    let (t0, v0) = (t_s.iter().sum::<f64>() / count, values.iter().sum::<f64>() / count);
-    let (over, under) = t_s
-        .iter()
-        .zip(values)
-        .fold((0.0, 0.0), |(over, under), (t, v)| (over + (t - t0) * (v - v0), under + (t - t0).powi(2)));
-    if under > 0.0 { over / under } else { 0.0 }
 }

@@ -33,13 +33,55 @@ const fn unknown(
 /// housing are those of other turbines of its size.
 static UNKNOWNS: [Parameter; 9] = [
     unknown("eta_t", "", 1.0, 0.1, Spread::Normal, "best turbine efficiency, over the declared one"),
-    unknown("u_c", "", 1.0, 0.08, Spread::Normal, "blade-speed ratio of the best efficiency, over the declared one"),
-    unknown("eta_t_ratio", "", 0.0, 0.05, Spread::Normal, "change of the efficiency per unit of the logarithm of P3/P4"),
-    unknown("h_t", "", 1.0, 0.4, Spread::LogNormal, "heat transfer inside the housing, over Appendix A's law on the declared area"),
-    unknown("capacity", "", 1.0, 0.4, Spread::LogNormal, "heat capacity of the housing, over the declared one"),
-    unknown("loss", "W/K", 4.0, 0.8, Spread::LogNormal, "conductance from the housing to what surrounds it: oil, compressor, engine bay"),
+    unknown(
+        "u_c",
+        "",
+        1.0,
+        0.08,
+        Spread::Normal,
+        "blade-speed ratio of the best efficiency, over the declared one",
+    ),
+    unknown(
+        "eta_t_ratio",
+        "",
+        0.0,
+        0.05,
+        Spread::Normal,
+        "change of the efficiency per unit of the logarithm of P3/P4",
+    ),
+    unknown(
+        "h_t",
+        "",
+        1.0,
+        0.4,
+        Spread::LogNormal,
+        "heat transfer inside the housing, over Appendix A's law on the declared area",
+    ),
+    unknown(
+        "capacity",
+        "",
+        1.0,
+        0.4,
+        Spread::LogNormal,
+        "heat capacity of the housing, over the declared one",
+    ),
+    unknown(
+        "loss",
+        "W/K",
+        4.0,
+        0.8,
+        Spread::LogNormal,
+        "conductance from the housing to what surrounds it: oil, compressor, engine bay",
+    ),
     unknown("surroundings", "K", 345.0, 40.0, Spread::Normal, "temperature of what surrounds the housing"),
-    unknown("housing_start", "K", 0.0, 60.0, Spread::Normal, "housing at the start, over its reading or, without one, over T4 there"),
+    unknown(
+        "housing_start",
+        "K",
+        0.0,
+        60.0,
+        Spread::Normal,
+        "housing at the start, over its reading or, without one, over T4 there",
+    ),
     unknown("t4_offset", "K", 0.0, 2.0, Spread::Normal, "fixed offset of T4 less that of T3"),
 ];
 
@@ -70,7 +112,7 @@ impl Side for TurbineSide {
     fn smooth() -> &'static [Smooth] {
         // T4: what a parabola over the blade-speed ratio leaves of a turbine, of some hundred kelvin of drop.
         &[
-            Smooth { median_k: 0.6, width: 0.4, alike_s: 2.0 },
+            Smooth { median_k: 0.45, width: 0.25, alike_s: 2.0 },
             Smooth { median_k: 8.0, width: 0.0, alike_s: 60.0 },
         ]
     }
@@ -86,7 +128,8 @@ impl Side for TurbineSide {
     fn predict(&self, rig: &Rig, unknowns: &[f64]) -> Vec<Vec<f64>> {
         let rows = &self.rows;
         let mut columns = vec![Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len())];
-        let &[eta, u_c, eta_ratio, h, capacity, loss_w_k, surroundings_k, start_k, t4_offset_k] = unknowns else {
+        let &[eta, u_c, eta_ratio, h, capacity, loss_w_k, surroundings_k, start_k, t4_offset_k] = unknowns
+        else {
             return columns;
         };
         let read = |channel: Channel| truth(rows, rig, channel);

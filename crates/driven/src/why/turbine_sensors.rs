@@ -54,26 +54,86 @@ macro_rules! sensor {
 }
 
 sensor!(
-    T4Lag, "t4_lag", "slow T4 probe", "s", 0.0, 30.0, 0.0, 1.0, T4, |path, s| path.lag_s += s,
-    "the T4 probe follows the gas with a lag", "dT4_r/dt = (T4 - T4_r)/tau"
+    T4Lag,
+    "t4_lag",
+    "slow T4 probe",
+    "s",
+    0.0,
+    30.0,
+    0.0,
+    1.0,
+    T4,
+    |path, s| path.lag_s += s,
+    "the T4 probe follows the gas with a lag",
+    "dT4_r/dt = (T4 - T4_r)/tau"
 );
 sensor!(
-    T3Lag, "t3_lag", "slow T3 probe", "s", 0.0, 30.0, 0.0, 1.0, T3, |path, s| path.lag_s += s,
-    "the T3 probe, which drives, follows the gas with a lag", "dT3_r/dt = (T3 - T3_r)/tau"
+    T3Lag,
+    "t3_lag",
+    "slow T3 probe",
+    "s",
+    0.0,
+    30.0,
+    0.0,
+    1.0,
+    T3,
+    |path, s| path.lag_s += s,
+    "the T3 probe, which drives, follows the gas with a lag",
+    "dT3_r/dt = (T3 - T3_r)/tau"
 );
 sensor!(
-    T4Offset, "t4_offset", "offset of T4", "K", -60.0, 60.0, 0.0, 5.0, T4, |path, k| path.offset += k,
-    "the T4 probe reads too high", "T4_r = T4 + dT"
+    T4Offset,
+    "t4_offset",
+    "offset of T4",
+    "K",
+    -60.0,
+    60.0,
+    0.0,
+    5.0,
+    T4,
+    |path, k| path.offset += k,
+    "the T4 probe reads too high",
+    "T4_r = T4 + dT"
 );
 sensor!(
-    T3Offset, "t3_offset", "offset of T3", "K", -60.0, 60.0, 0.0, 5.0, T3, |path, k| path.offset += k,
-    "the T3 probe, which drives, reads too high", "T3_r = T3 + dT"
+    T3Offset,
+    "t3_offset",
+    "offset of T3",
+    "K",
+    -60.0,
+    60.0,
+    0.0,
+    5.0,
+    T3,
+    |path, k| path.offset += k,
+    "the T3 probe, which drives, reads too high",
+    "T3_r = T3 + dT"
 );
 sensor!(
-    TurbineFlowGain, "turbine_flow_gain", "gain of the turbine's flow", "1", 0.6, 1.5, 1.0, 0.05, TurbineFlow,
-    |path, gain| path.gain_ratio *= gain, "the turbine's flow reads too high", "m_r = g m"
+    TurbineFlowGain,
+    "turbine_flow_gain",
+    "gain of the turbine's flow",
+    "1",
+    0.6,
+    1.5,
+    1.0,
+    0.05,
+    TurbineFlow,
+    |path, gain| path.gain_ratio *= gain,
+    "the turbine's flow reads too high",
+    "m_r = g m"
 );
 sensor!(
-    TurbineFlowLag, "turbine_flow_lag", "slow flow of the turbine", "s", 0.0, 30.0, 0.0, 1.0, TurbineFlow,
-    |path, s| path.lag_s += s, "the turbine's flow follows with a lag", "dm_r/dt = (m - m_r)/tau"
+    TurbineFlowLag,
+    "turbine_flow_lag",
+    "slow flow of the turbine",
+    "s",
+    0.0,
+    30.0,
+    0.0,
+    1.0,
+    TurbineFlow,
+    |path, s| path.lag_s += s,
+    "the turbine's flow follows with a lag",
+    "dm_r/dt = (m - m_r)/tau"
 );

@@ -68,7 +68,12 @@ impl Course {
 }
 
 /// A log of a machine with its own efficiency, heat transfer and housing, and with `planted` effects; with its truth.
-pub fn engine(seed: u64, course: &Course, planted: &[(&str, f64)], own: impl Fn(&mut Params, &mut dyn FnMut(f64) -> f64)) -> (Recording, Params) {
+pub fn engine(
+    seed: u64,
+    course: &Course,
+    planted: &[(&str, f64)],
+    own: impl Fn(&mut Params, &mut dyn FnMut(f64) -> f64),
+) -> (Recording, Params) {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut normal = |width: f64| -> f64 {
         let z: f64 = StandardNormal.sample(&mut random);
@@ -84,8 +89,11 @@ pub fn engine(seed: u64, course: &Course, planted: &[(&str, f64)], own: impl Fn(
     let (flow_gain, t2_offset_k) = (1.0 + normal(0.01), normal(0.5));
     let model = &rig.model;
     let at = |(speed_rpm, valve_opening_ratio): (f64, f64)| {
-        let boundary =
-            BoundaryConditions { valve_opening_ratio, t3_k: 550.0 + 2e-3 * speed_rpm, ..BoundaryConditions::default() };
+        let boundary = BoundaryConditions {
+            valve_opening_ratio,
+            t3_k: 550.0 + 2e-3 * speed_rpm,
+            ..BoundaryConditions::default()
+        };
         hold_speed(model, speed_rpm, &boundary).unwrap()
     };
     let held: Vec<_> = course.places.iter().map(|place| at(*place)).collect();
@@ -99,15 +107,19 @@ pub fn engine(seed: u64, course: &Course, planted: &[(&str, f64)], own: impl Fn(
     let mut followers = CHANNELS.map(|(channel, _)| ChannelFollower::new(*rig.instruments.path(channel)));
     let mut noise = Pcg64Mcg::seed_from_u64(seed + 1000);
     drive(model, &engine, held[0].state, &grid, &times_s, |i, prepared, state, outputs| {
-        for ((channel, sigma), (column, follower)) in CHANNELS.iter().zip(columns.iter_mut().zip(&mut followers)) {
+        for ((channel, sigma), (column, follower)) in
+            CHANNELS.iter().zip(columns.iter_mut().zip(&mut followers))
+        {
             let z: f64 = StandardNormal.sample(&mut noise);
             let seen = true_value(*channel, prepared, state, outputs).unwrap();
             let read = follower.read(times_s[i], seen);
-            column.push(match channel {
-                Channel::CompressorFlow => flow_gain * read,
-                Channel::T2 => t2_offset_k + read,
-                _ => read,
-            } + sigma * z);
+            column.push(
+                match channel {
+                    Channel::CompressorFlow => flow_gain * read,
+                    Channel::T2 => t2_offset_k + read,
+                    _ => read,
+                } + sigma * z,
+            );
         }
     })
     .unwrap();
@@ -135,7 +147,10 @@ pub fn declared() -> Declared {
         sensors: CHANNELS
             .iter()
             .map(|(channel, noise_sigma)| {
-                (*channel, mapper_core::DeclaredUncertainty { noise_sigma: *noise_sigma, ..Default::default() })
+                (
+                    *channel,
+                    mapper_core::DeclaredUncertainty { noise_sigma: *noise_sigma, ..Default::default() },
+                )
             })
             .collect(),
         noise_colour: Default::default(),

@@ -1,6 +1,6 @@
 //! Causes planted in simulated engines, and what the diagnosis by measured neighbours says of them.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 mod common;
 
@@ -64,7 +64,7 @@ fn is_named(found: &Diagnosis, effect: &str) -> bool {
     found.word == Word::Named && open(found) == [effect]
 }
 
-/// A cause named once is a rival's tenth of the seeds.
+/// One seed in ten may go wrong.
 const ALMOST_ALL: usize = SEEDS as usize - 1;
 
 #[test]

@@ -118,6 +118,11 @@ fn causes(text: &mut String, found: &Diagnosis) {
         ]);
     }
     let _ = writeln!(text, "{rows}\n");
+    if found.causes[..found.open.min(found.causes.len())].iter().any(|cause| !cause.at_the_end.is_empty()) {
+        text.push_str(
+            "What stands at the end of its range is more than such an effect can be: rather something that the catalogue has not.\n\n",
+        );
+    }
 }
 
 /// Three figures.

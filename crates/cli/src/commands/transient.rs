@@ -23,7 +23,7 @@ pub struct Transient {
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub fit_until: Option<f64>,
     /// Side of the machine
-    #[arg(long, value_parser = side, default_value = "compressor")]
+    #[arg(long, default_value = "compressor")]
     pub side: Which,
     /// Also try a suspected effect written in rhai; may be repeated
     #[arg(long = "effect", value_name = "FILE")]
@@ -36,11 +36,6 @@ pub struct Transient {
     pub json: bool,
     #[command(flatten)]
     pub replace: Replace,
-}
-
-/// A side by its name.
-fn side(text: &str) -> Result<Which, String> {
-    Which::named(text).ok_or_else(|| "it is `compressor` or `turbine`".to_owned())
 }
 
 /// A time with its unit, s.

@@ -47,12 +47,13 @@ pub(crate) fn audible<S: Side>(question: &Question<'_, S>) -> (Vec<usize>, Vec<N
 
 /// Largest change of a channel that was measured, K.
 fn largest<S: Side>(question: &Question<'_, S>, said: &[Vec<f64>], base: &[Vec<f64>]) -> f64 {
-    let judged = &question.side.rows().judged;
-    let change = |((_, read), (said, base)): (&(_, Vec<f64>), (&Vec<f64>, &Vec<f64>))| {
-        let each = read.iter().zip(said.iter().zip(base)).filter(|(read, _)| read.is_finite());
-        each.map(|(_, (said, base))| (said - base).abs()).fold(0.0, f64::max)
-    };
-    judged.iter().zip(said.iter().zip(base)).map(change).fold(0.0, f64::max)
+    let mut largest: f64 = 0.0;
+    for ((_, read), (said, base)) in question.side.rows().judged.iter().zip(said.iter().zip(base)) {
+        for (_, (said, base)) in read.iter().zip(said.iter().zip(base)).filter(|(read, _)| read.is_finite()) {
+            largest = largest.max((said - base).abs());
+        }
+    }
+    largest
 }
 
 fn not_asked(info: &EffectInfo, reason: String) -> NotAsked {
@@ -60,11 +61,13 @@ fn not_asked(info: &EffectInfo, reason: String) -> NotAsked {
 }
 
 /// The smallest size of each effect that would have been named in 95 of 100 logs like this one, on the side of its typical step;
-/// those that none within their range would, with what takes their place. `found` is the likeliest explanation.
+/// those that none within their range would, with what takes their place, unless they are `open`: what has been seen can be asked.
+/// `found` is the likeliest explanation.
 pub(crate) fn smallest<S: Side>(
     question: &Question<'_, S>,
     asked: &[usize],
     found: &Fit,
+    open: &[usize],
     counts: &[bool],
     calibration: &Calibration,
 ) -> (Vec<SmallestSeen>, Vec<NotAsked>) {
@@ -154,11 +157,11 @@ pub(crate) fn smallest<S: Side>(
             "even {largest} would not be told from what is not known: {} ({}) takes its place",
             unknown.name, unknown.description
         );
-        Some((smallest, not_asked(info, reason)))
+        Some((open.contains(effect), smallest, not_asked(info, reason)))
     });
     let (mut smallest, mut silent) = (Vec::new(), Vec::new());
-    for (seen, why_not) in looked.into_iter().flatten() {
-        if seen.value.is_some() { smallest.push(seen) } else { silent.push(why_not) }
+    for (open, seen, why_not) in looked.into_iter().flatten() {
+        if open || seen.value.is_some() { smallest.push(seen) } else { silent.push(why_not) }
     }
     (smallest, silent)
 }

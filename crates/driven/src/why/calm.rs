@@ -45,8 +45,9 @@ fn calm_at(t_s: &[f64], read: &[f64], i: usize, sigma: f64) -> f64 {
     for count in NEIGHBOURS {
         let (first, last) = (i.saturating_sub(count), (i + count).min(read.len() - 1));
         // Both sides; where it bends there, the side that does not, as many.
-        let one_sided = [i.saturating_sub(2 * count)..i + 1, i..(i + 2 * count).min(read.len() - 1) + 1];
-        for range in [first..last + 1].into_iter().chain(one_sided) {
+        let ranges =
+            [first..last + 1, i.saturating_sub(2 * count)..i + 1, i..(i + 2 * count).min(read.len() - 1) + 1];
+        for range in ranges {
             if range.len() < 4 || t_s[range.end - 1] - t_s[range.start] > 2.0 * FURTHEST_S {
                 continue;
             }

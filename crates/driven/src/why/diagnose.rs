@@ -98,10 +98,13 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
         _ => Word::NotToldApart,
     };
     let choices: Vec<&Fit> = (0..if weighed.named { causes.min(CHOICES) } else { 0 }).map(fit_of).collect();
+    let open_effects: Vec<usize> = (0..open)
+        .flat_map(|place| fit_of(place).hypothesis.effects.iter().map(|(effect, _)| *effect))
+        .collect();
     let rows = side.rows();
     let drives = [S::wanted().drives[0], S::PRESSURE];
     let phases = phases(rows, fitted, &drives);
-    let (asked_for, silent) = smallest(&question, &asked, likeliest, &counts, calibration);
+    let (asked_for, silent) = smallest(&question, &asked, likeliest, &open_effects, &counts, calibration);
     not_asked.extend(silent);
     let symbols =
         |columns: &[(Channel, Vec<f64>)]| columns.iter().map(|(channel, _)| channel.symbol()).collect();

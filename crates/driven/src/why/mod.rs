@@ -16,5 +16,5 @@ mod turbine_sensors;
 
 pub use diagnose::{Ask, diagnose};
 pub use diagnosis::{Beyond, Cause, Course, Diagnosis, HeldOut, NotAsked, Phase, Unknown, Word};
-pub use side::Which;
+pub use side::{NoSide, Which};
 pub use turbine_sensors::turbine_sensors;

@@ -5,6 +5,7 @@ use crate::rows::{Rows, Wanted};
 use mapper_core::Channel;
 use mapper_physics::effect::{Rig, Submodel};
 use serde::{Deserialize, Serialize};
+use std::str::FromStr;
 
 /// One side of a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,17 +18,29 @@ pub enum Which {
 }
 
 impl Which {
-    /// The one of this name.
-    pub fn named(name: &str) -> Option<Which> {
-        [Which::Compressor, Which::Turbine].into_iter().find(|which| which.name() == name)
-    }
-
     /// Its name for people.
     pub fn name(self) -> &'static str {
         match self {
             Which::Compressor => "compressor",
             Which::Turbine => "turbine",
         }
+    }
+}
+
+/// A side that no machine has.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("a machine has a compressor and a turbine side; `{name}` is none")]
+pub struct NoSide {
+    /// What was asked for.
+    pub name: String,
+}
+
+impl FromStr for Which {
+    type Err = NoSide;
+
+    fn from_str(name: &str) -> Result<Self, NoSide> {
+        let found = [Which::Compressor, Which::Turbine].into_iter().find(|which| which.name() == name);
+        found.ok_or_else(|| NoSide { name: name.to_owned() })
     }
 }
 

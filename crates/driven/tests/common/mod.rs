@@ -8,7 +8,7 @@ use mapper_effects::catalogue;
 use mapper_observe::Declared;
 use mapper_physics::driven::{FrozenGrid, drive};
 use mapper_physics::effect::{Rig, add};
-use mapper_physics::inputs::{Inputs, InterpolatedInputs};
+use mapper_physics::inputs::InterpolatedInputs;
 use mapper_physics::instruments::{ChannelFollower, true_value};
 use mapper_physics::model::Model;
 use mapper_physics::params::{BoundaryConditions, Params};
@@ -123,7 +123,6 @@ pub fn engine(
         }
     })
     .unwrap();
-    let _ = engine.at(0.0);
     let series = CHANNELS.into_iter().zip(columns);
     let series =
         series.map(|((channel, _), values)| (channel, Series { t_s: times_s.clone(), values })).collect();

@@ -63,7 +63,6 @@ pub fn why_text(found: &Diagnosis) -> String {
 
 fn headline(found: &Diagnosis) -> String {
     let open = &found.causes[..found.open.min(found.causes.len())];
-    let percent = |p: f64| format!("{:.0} %", 100.0 * p);
     match found.word {
         Word::Named => format!(
             "{} explains it ({}).",
@@ -111,7 +110,7 @@ fn causes(text: &mut String, found: &Diagnosis) {
         let end = if cause.at_the_end.is_empty() { "" } else { " (end of its range)" };
         rows.add_row([
             cause.effects.join(" + "),
-            format!("{:.1} %", 100.0 * cause.probability),
+            percent(cause.probability),
             each(&|e| e.size.clone()) + end,
             interval,
             cause.left_k.first().map_or_else(String::new, |k| format!("{k:.2}")),
@@ -122,6 +121,15 @@ fn causes(text: &mut String, found: &Diagnosis) {
         text.push_str(
             "What stands at the end of its range is more than such an effect can be: rather something that the catalogue has not.\n\n",
         );
+    }
+}
+
+/// No log makes anything certain.
+fn percent(probability: f64) -> String {
+    match 100.0 * probability {
+        p if p > 99.0 => "over 99 %".to_owned(),
+        p if p < 1.0 => "below 1 %".to_owned(),
+        p => format!("{p:.0} %"),
     }
 }
 

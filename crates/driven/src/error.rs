@@ -21,4 +21,10 @@ pub enum DrivenError {
         /// How many are needed.
         needed: usize,
     },
+    /// The nominal machine has no answer.
+    #[error(
+        "the campaign's machine gives no temperatures under what drives it in this log: check its geometry, and the units of the \
+         channel map"
+    )]
+    NoAnswer,
 }

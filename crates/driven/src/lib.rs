@@ -15,7 +15,9 @@ mod error;
 mod outcome;
 mod parameters;
 mod readings;
+mod rows;
 mod side;
+pub mod why;
 
 pub use error::DrivenError;
 pub use outcome::{DrivenOutcome, FoundParameter, Judged, Moves, Trace, identify};

@@ -14,7 +14,7 @@ use serde::Serialize;
 /// Rows that are needed: twice the parameters.
 const FEWEST_ROWS: usize = 2 * COUNT;
 /// A log has told something of a parameter whose interval is narrower than this share of the prior's.
-const TOLD_RATIO: f64 = 0.7;
+pub(crate) const TOLD_RATIO: f64 = 0.7;
 
 /// A parameter as the log leaves it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -89,16 +89,20 @@ pub const PARAMETERS: [Parameter; COUNT] = [
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Values(pub [f64; COUNT]);
 
+impl Parameter {
+    /// Its value so many standard deviations of what is known beforehand above the middle.
+    pub fn at(&self, standard: f64) -> f64 {
+        match self.spread {
+            Spread::Normal => self.middle + self.width * standard,
+            Spread::LogNormal => self.middle * (self.width * standard).exp(),
+        }
+    }
+}
+
 impl Values {
     /// From standard normal numbers: what the search walks in.
     pub fn of_standard(standard: &[f64; COUNT]) -> Self {
-        Values(std::array::from_fn(|i| {
-            let Parameter { middle, width, spread, .. } = PARAMETERS[i];
-            match spread {
-                Spread::Normal => middle + width * standard[i],
-                Spread::LogNormal => middle * (width * standard[i]).exp(),
-            }
-        }))
+        Values(std::array::from_fn(|i| PARAMETERS[i].at(standard[i])))
     }
 
     /// The same with another value of one parameter; unchanged for a name that is none.

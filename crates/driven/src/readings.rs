@@ -1,18 +1,22 @@
 //! What drives the compressor side, and what is judged: one row a sample.
 
 use crate::DrivenError;
+use crate::rows::{Rows, Wanted};
 use mapper_core::{Channel, Recording};
-use mapper_observe::plausible::is_reading;
 
 /// A pressure ratio below which a compressor does hardly any work: its temperature rise says nothing of its efficiency.
 const WORKING_RATIO: f64 = 1.02;
 /// Smallest flow, kg/s, that eqs. 1-3 are evaluated at (they divide by it).
 const SMALLEST_FLOW_KG_S: f64 = 1e-3;
-/// Rows are taken no denser than this, s: nothing on the compressor side is faster than a probe.
-const SPACING_S: f64 = 0.1;
-/// Most rows that are kept, of longer logs spread over all of it: five minutes at 10 Hz. What is sought goes through them some
-/// hundred thousand times.
-const MOST_ROWS: usize = 3_000;
+/// What the compressor side asks of a log.
+pub(crate) const COMPRESSOR: Wanted<'_> = Wanted {
+    drives: &[Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::P2, Channel::T1],
+    judged: &[Channel::T2, Channel::Tc],
+    works: |row| {
+        let [speed_rpm, flow_kg_s, p1_pa, p2_pa, _] = *row else { return false };
+        p2_pa >= WORKING_RATIO * p1_pa && flow_kg_s >= SMALLEST_FLOW_KG_S && speed_rpm > 0.0
+    },
+};
 
 /// Complete rows, as columns of equal length. SI units.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -43,52 +47,8 @@ impl Readings {
     /// # Errors
     /// [`DrivenError::Channel`] where speed, flow, P1, P2, T1 or T2 is missing.
     pub fn of(recording: &Recording) -> Result<Self, DrivenError> {
-        let t2 = recording.require(Channel::T2)?;
-        let drives = [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::P2, Channel::T1];
-        let mut series = Vec::with_capacity(drives.len());
-        for channel in drives {
-            series.push((channel, recording.require(channel)?));
-        }
-        let housing = recording.series.get(&Channel::Tc);
-        let span_s = t2.t_s.last().zip(t2.t_s.first()).map_or(0.0, |(last_s, first_s)| last_s - first_s);
-        let spacing_s = SPACING_S.max(span_s / MOST_ROWS as f64);
-        let mut rows = Readings::default();
-        for (t_s, t2_k) in t2.t_s.iter().zip(&t2.values) {
-            if rows.t_s.last().is_some_and(|last_s| t_s - last_s < 0.999 * spacing_s) {
-                continue;
-            }
-            let at = |index: usize| {
-                let (channel, series) = series[index];
-                // Beyond the ends of a channel there is no reading.
-                let inside = series.t_s.first() <= Some(t_s) && series.t_s.last() >= Some(t_s);
-                series.interpolate(*t_s).filter(|value| inside && is_reading(channel, *value))
-            };
-            let row =
-                (at(0), at(1), at(2), at(3), at(4), Some(*t2_k).filter(|k| is_reading(Channel::T2, *k)));
-            let (Some(speed_rpm), Some(flow_kg_s), Some(p1_pa), Some(p2_pa), Some(t1_k), Some(t2_k)) = row
-            else {
-                rows.lost += 1;
-                continue;
-            };
-            if p2_pa < WORKING_RATIO * p1_pa || flow_kg_s < SMALLEST_FLOW_KG_S || speed_rpm <= 0.0 {
-                rows.lost += 1;
-                continue;
-            }
-            // Spread over the log there is one more at most.
-            if rows.t_s.len() > MOST_ROWS {
-                break;
-            }
-            let tc_k = housing.and_then(|tc| tc.interpolate(*t_s)).filter(|k| is_reading(Channel::Tc, *k));
-            rows.t_s.push(*t_s);
-            rows.speed_rpm.push(speed_rpm);
-            rows.flow_kg_s.push(flow_kg_s);
-            rows.p1_pa.push(p1_pa);
-            rows.p2_pa.push(p2_pa);
-            rows.t1_k.push(t1_k);
-            rows.t2_k.push(t2_k);
-            rows.tc_k.push(tc_k.unwrap_or(f64::NAN));
-        }
-        Ok(rows)
+        let rows = Rows::read(recording, COMPRESSOR)?;
+        Ok(Readings::from(rows))
     }
 
     /// Number of rows.
@@ -99,5 +59,25 @@ impl Readings {
     /// Whether there is no row.
     pub fn is_empty(&self) -> bool {
         self.t_s.is_empty()
+    }
+}
+
+impl From<Rows> for Readings {
+    fn from(rows: Rows) -> Self {
+        let column = |columns: &[(Channel, Vec<f64>)], place: usize| {
+            columns.get(place).map_or_else(Vec::new, |(_, v)| v.clone())
+        };
+        let drive = |place: usize| column(&rows.drives, place);
+        Readings {
+            speed_rpm: drive(0),
+            flow_kg_s: drive(1),
+            p1_pa: drive(2),
+            p2_pa: drive(3),
+            t1_k: drive(4),
+            t2_k: column(&rows.judged, 0),
+            tc_k: column(&rows.judged, 1),
+            lost: rows.lost,
+            t_s: rows.t_s,
+        }
     }
 }

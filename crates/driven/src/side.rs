@@ -7,7 +7,7 @@ use mapper_physics::params::Params;
 use mapper_physics::{nusselt, thermocouple};
 
 /// Efficiencies that the polynomial is held within: beyond, it has nothing to do with a compressor that works.
-const EFFICIENCY: (f64, f64) = (0.25, 0.90);
+pub(crate) const EFFICIENCY: (f64, f64) = (0.25, 0.90);
 
 /// What is declared of the machine, and the middle of the log about which its efficiency is described.
 #[derive(Debug, Clone, Copy)]

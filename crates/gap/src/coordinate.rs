@@ -30,6 +30,12 @@ impl Coordinate {
         if self.logarithmic { value.max(1e-300).ln() } else { value / self.scale }
     }
 
+    /// Coordinates of the ends of the parameter's range, the lower one first.
+    pub fn ends(&self) -> (f64, f64) {
+        let ends = (self.of(self.low), self.of(self.high));
+        (ends.0.min(ends.1), ends.0.max(ends.1))
+    }
+
     /// Value of a coordinate, within the parameter's range.
     pub fn value(&self, coordinate: f64) -> f64 {
         let value = if self.logarithmic { coordinate.exp() } else { coordinate * self.scale };

@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::ops::Range;
 
 /// Prior width of an effect's parameter, in typical steps.
-pub(crate) const PRIOR_STEPS: f64 = 10.0;
+pub const PRIOR_STEPS: f64 = 10.0;
 
 /// Products of the nuisances' columns over the steps that count.
 pub(crate) fn nuisance_products(

@@ -50,6 +50,8 @@ mod thermal_model;
 mod transient_picture;
 mod transient_text;
 mod turbine_file;
+mod why_picture;
+mod why_text;
 mod wrapped;
 mod zero_text;
 
@@ -98,5 +100,7 @@ pub use thermal_model::thermal_text;
 pub use transient_picture::transient_figure;
 pub use transient_text::transient_text;
 pub use turbine_file::{TurbinePoint, turbine_points, turbine_text};
+pub use why_picture::why_figure;
+pub use why_text::why_text;
 pub use wrapped::wrapped;
 pub use zero_text::zero_text;

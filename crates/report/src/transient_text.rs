@@ -53,10 +53,6 @@ pub fn transient_text(outcome: &DrivenOutcome) -> String {
         ]);
     }
     let _ = writeln!(text, "{rows}");
-    text.push_str(
-        "\nNot asked here: the turbine side, a map (no point rests), and causes that act on what drives (a wrong flow or pressure shows as \
-         another efficiency).\n",
-    );
     text
 }
 

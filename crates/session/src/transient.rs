@@ -1,20 +1,48 @@
-//! The compressor side of a log without steps.
+//! One side of a machine from a log without steps: what is found of it, and which cause explains what is left.
 
+use crate::declared::declared;
 use crate::files::{Existing, json_text, write_file};
+use crate::planning::nominal_model;
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError};
 use mapper_core::ExportError;
+use mapper_driven::why::{Ask, Diagnosis, Which, diagnose};
 use mapper_driven::{DrivenOutcome, Readings, identify};
-use mapper_report::{transient_figure, transient_text};
+use mapper_gap::calibration::Calibration;
+use mapper_observe::Declared;
+use mapper_physics::effect::{Effect, Rig};
+use mapper_record::ChannelMap;
+use mapper_report::{transient_figure, transient_text, why_figure, why_text};
+use serde::Serialize;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Name of the report's files.
 const STEM: &str = "transient";
 
+/// What a log without steps says of one side.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Transient {
+    /// What agrees with it, whatever the cause; of the compressor side.
+    #[serde(flatten)]
+    pub identified: Option<DrivenOutcome>,
+    /// Which cause explains it, against the campaign's machine.
+    pub why: Diagnosis,
+}
+
+impl Transient {
+    /// For people.
+    pub fn text(&self) -> String {
+        let identified =
+            self.identified.as_ref().map_or_else(String::new, |found| transient_text(found) + "\n");
+        identified + why_text(&self.why).as_str()
+    }
+}
+
 impl Session<'_> {
-    /// Finds what a log without steps says of the compressor side of its campaign's machine: fitted before `fit_until_s`
-    /// (time of the log, s; all of it where none is given), predicted from there on.
+    /// Finds what a log without steps says of one side of its campaign's machine, and which of `effects` explains it: fitted
+    /// before `fit_until_s` (time of the log, s; all of it where none is given), predicted from there on.
     ///
     /// # Errors
     /// [`SessionError::MachineUnknown`] where no campaign says what machine it is, [`SessionError::OtherMachine`] where it is
@@ -22,32 +50,61 @@ impl Session<'_> {
     pub fn transient(
         &self,
         recorded: &Recorded,
+        map: &ChannelMap,
+        side: Which,
         fit_until_s: Option<f64>,
-    ) -> Result<DrivenOutcome, SessionError> {
+        effects: &[Arc<dyn Effect>],
+    ) -> Result<Transient, SessionError> {
         let campaign = recorded.known("Give `--campaign FILE` with the machine and its geometry")?;
         same_machine(recorded, campaign)?;
-        let rows = Readings::of(&recorded.read.recording)?;
+        let recording = &recorded.read.recording;
         let fit_until_s = fit_until_s.unwrap_or(f64::INFINITY);
-        Ok(identify(&rows, campaign.machine.params, fit_until_s, campaign.seed)?)
+        let identified = match side {
+            Which::Compressor => {
+                let rows = Readings::of(recording)?;
+                Some(identify(&rows, campaign.machine.params, fit_until_s, campaign.seed)?)
+            }
+            Which::Turbine => None,
+        };
+        let why = diagnose(
+            &Ask {
+                recording,
+                nominal: &Rig::new(nominal_model(campaign)?),
+                effects,
+                declared: &Declared {
+                    sensors: declared(campaign, map),
+                    noise_colour: map.noise_colour.unwrap_or_default(),
+                    tolerances: campaign.tolerances,
+                    nominal: campaign.boundary,
+                },
+                calibration: &Calibration::shipped().map_err(SessionError::Calibration)?,
+                fit_until_s,
+                seed: campaign.seed,
+            },
+            side,
+        )?;
+        Ok(Transient { identified, why })
     }
 }
 
-/// Writes text, JSON and pictures of an outcome into a directory, which is made where it is missing; gives the files.
+/// Writes text, JSON and pictures of what was found into a directory, which is made where it is missing; gives the files.
 ///
 /// # Errors
 /// As [`write_file`].
 pub fn write_transient(
-    outcome: &DrivenOutcome,
+    found: &Transient,
     machine: &str,
     directory: &Path,
     existing: Existing,
 ) -> Result<Vec<PathBuf>, SessionError> {
-    let figure = transient_figure(machine, outcome);
+    let figure = match &found.identified {
+        Some(outcome) => transient_figure(machine, outcome),
+        None => why_figure(machine, &found.why),
+    };
     let png = figure.to_png(2.0).map_err(ExportError::failed("png"))?;
-    let text = transient_text(outcome);
     let contents: [(String, Vec<u8>); 4] = [
-        (format!("{STEM}.json"), json_text(&json!(outcome))?.into_bytes()),
-        (format!("{STEM}.txt"), text.into_bytes()),
+        (format!("{STEM}.json"), json_text(&json!(found))?.into_bytes()),
+        (format!("{STEM}.txt"), found.text().into_bytes()),
         (format!("{STEM}.svg"), figure.to_svg().into_bytes()),
         (format!("{STEM}.png"), png),
     ];

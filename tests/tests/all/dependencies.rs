@@ -27,7 +27,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-logs",      &["core", "yaml"]),
     ("mapper-record",    &["core", "logs", "numerics", "yaml"]),
     ("mapper-observe",   &["core", "numerics", "physics"]),
-    ("mapper-driven",    &["core", "numerics", "physics", "observe"]),
+    // Priors, coordinates and sizes of causes are those of the diagnosis with steps.
+    ("mapper-driven",    &["core", "numerics", "physics", "observe", "gap"]),
     ("mapper-identify",  &["core", "numerics", "physics", "observe"]),
     ("mapper-assemble",  &["core", "numerics", "physics", "identify"]),
     ("mapper-drift",     &["core", "numerics", "physics", "observe", "identify"]),

@@ -31,6 +31,27 @@ fn an_engine_is_fitted_and_what_it_does_not_explain_is_said() {
     }
 }
 
+/// The first 13.2 s against the campaign's machine: a slow probe is among what is open, phases were held out, what cannot be asked is
+/// listed; and no turbine side without its temperatures.
+#[test]
+fn an_engine_is_asked_why() {
+    let why = &transient(&["--fit-until", "13.2 s", "--json"]).exits(0).json()["why"];
+    let causes = why["causes"].as_array().unwrap();
+    let open = why["open"].as_u64().unwrap() as usize;
+    let slow =
+        |cause: &serde_json::Value| cause["effects"].as_array().unwrap().iter().any(|e| e == "tip_diameter");
+    assert!(open > 0 && causes[..open].iter().all(slow), "{causes:?}");
+    let held_out = &why["held_out"];
+    assert!(held_out["phases"].as_array().unwrap().len() >= 3);
+    assert!(held_out["after_k"].as_f64().unwrap() < held_out["before_k"].as_f64().unwrap());
+    let reasons: Vec<&str> =
+        why["not_asked"].as_array().unwrap().iter().map(|one| one["reason"].as_str().unwrap()).collect();
+    assert!(reasons.contains(&"Tc is not recorded"), "{reasons:?}");
+    let turbine = transient(&["--side", "turbine"]).exits(6);
+    assert!(turbine.stderr.contains("T4"), "{}", turbine.stderr);
+    transient(&["--side", "left"]).exits(2);
+}
+
 #[test]
 fn a_time_without_its_unit_and_too_little_to_fit_are_refused() {
     let bare = transient(&["--fit-until", "13.2"]).exits(2);

@@ -5,11 +5,10 @@ use crate::given::{channel_map, given_campaign};
 use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
-use mapper_report::transient_text;
-use mapper_session::{Recorded, Session, write_transient};
+use mapper_session::{Recorded, Session, Which, write_transient};
 use std::path::PathBuf;
 
-/// Identify the compressor side of a log without steps, driven by its measured speed, flow, pressures and inlet temperature
+/// Identify and diagnose one side of a machine from a log without steps, driven by its measured speed, flow, pressures and inlet temperature
 #[derive(Debug, Args)]
 pub struct Transient {
     /// Run directory, MCAP file, or log of another program (see `mapper log inspect`)
@@ -23,6 +22,12 @@ pub struct Transient {
     /// Fit what lies before this time of the log and predict the rest, e.g. "13.2 s" [default: fit everything]
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub fit_until: Option<f64>,
+    /// Side of the machine
+    #[arg(long, default_value = "compressor")]
+    pub side: Which,
+    /// Also try a suspected effect written in rhai; may be repeated
+    #[arg(long = "effect", value_name = "FILE")]
+    pub effects: Vec<PathBuf>,
     /// Leave text, JSON and pictures in this directory
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -40,22 +45,24 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 impl Transient {
-    /// Fits, predicts, and says what is left.
+    /// Fits, predicts, and says what is left and why.
     pub fn run(&self) -> Result<(), Failure> {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
         let registry = registry::registry();
         let recorded = Recorded::read(&registry, &self.recording, &map, given.as_ref())?;
-        let outcome = Session::new(&registry).transient(&recorded, self.fit_until)?;
+        let effects = registry.effects_with(&self.effects)?;
+        let found =
+            Session::new(&registry).transient(&recorded, &map, self.side, self.fit_until, &effects)?;
         let machine = recorded.campaign.as_ref().map_or("", |campaign| &campaign.machine.name);
         let files = match &self.out {
-            Some(directory) => write_transient(&outcome, machine, directory, self.replace.existing())?,
+            Some(directory) => write_transient(&found, machine, directory, self.replace.existing())?,
             None => Vec::new(),
         };
         if self.json {
-            return output::print_json(&outcome);
+            return output::print_json(&found);
         }
-        let mut text = transient_text(&outcome);
+        let mut text = found.text();
         for warning in &recorded.read.warnings {
             text.push_str(&format!("recording: {warning}\n"));
         }

@@ -1,0 +1,167 @@
+//! What of the catalogue can be asked on a side, how small it would be seen, and why the rest cannot be asked.
+
+use super::diagnosis::NotAsked;
+use super::fit::{Fit, Normal, Question, whitened};
+use super::side::Side;
+use mapper_gap::calibration::Calibration;
+use mapper_gap::coordinate::Coordinate;
+use mapper_gap::in_words;
+use mapper_gap::normal::PRIOR_STEPS;
+use mapper_gap::report::SmallestSeen;
+use mapper_gap::study::Hypothesis;
+use mapper_numerics::parallel;
+use mapper_physics::effect::EffectInfo;
+
+/// 95 % quantile of the standard normal distribution: so many sigmas above what is needed, an effect is seen in 95 of 100 logs.
+const SURELY: f64 = 1.645;
+/// Looks at a size, and how near in the logarithm is near enough.
+const LOOKS: usize = 6;
+const NEAR: f64 = 0.05;
+/// An effect that changes less than this, K, changes nothing.
+const NOTHING_K: f64 = 1e-6;
+
+/// Effects that change what is judged, by their places, and the others with the reason.
+pub(crate) fn audible<S: Side>(question: &Question<'_, S>) -> (Vec<usize>, Vec<NotAsked>) {
+    let Some(base) = question.predict(&question.nothing()) else { return (Vec::new(), Vec::new()) };
+    let (mut asked, mut silent) = (Vec::new(), Vec::new());
+    for (place, effect) in question.effects.iter().enumerate() {
+        let info = effect.info();
+        if let Some(reason) = S::free(&info.id) {
+            silent.push(not_asked(info, reason.to_owned()));
+            continue;
+        }
+        let changed = [1.0, -1.0].into_iter().any(|share| {
+            let values =
+                info.parameters.iter().map(|p| (p.neutral + share * p.typical_step).clamp(p.low, p.high));
+            let there = Hypothesis { effects: vec![(place, values.collect())], ..question.nothing() };
+            question.predict(&there).is_some_and(|said| largest(question, &said, &base) > NOTHING_K)
+        });
+        if changed {
+            asked.push(place);
+        } else {
+            silent.push(not_asked(info, question.side.silent(info.submodel).to_owned()));
+        }
+    }
+    (asked, silent)
+}
+
+/// Largest change of a channel that was measured, K.
+fn largest<S: Side>(question: &Question<'_, S>, said: &[Vec<f64>], base: &[Vec<f64>]) -> f64 {
+    let mut largest: f64 = 0.0;
+    for ((_, read), (said, base)) in question.side.rows().judged.iter().zip(said.iter().zip(base)) {
+        for (_, (said, base)) in read.iter().zip(said.iter().zip(base)).filter(|(read, _)| read.is_finite()) {
+            largest = largest.max((said - base).abs());
+        }
+    }
+    largest
+}
+
+fn not_asked(info: &EffectInfo, reason: String) -> NotAsked {
+    NotAsked { effect: info.id.to_string(), name: info.name.to_string(), reason }
+}
+
+/// The smallest size of each effect that would have been named in 95 of 100 logs like this one, on the side of its typical step;
+/// those that none within their range would, with what takes their place, unless they are `open`: what has been seen can be asked.
+/// `found` is the likeliest explanation.
+pub(crate) fn smallest<S: Side>(
+    question: &Question<'_, S>,
+    asked: &[usize],
+    found: &Fit,
+    open: &[usize],
+    counts: &[bool],
+    calibration: &Calibration,
+) -> (Vec<SmallestSeen>, Vec<NotAsked>) {
+    // Beside what was found of the unknowns, with no effect.
+    let unknowns = S::unknowns().len();
+    let base = Hypothesis { effects: Vec::new(), nuisances: found.hypothesis.nuisances.clone() };
+    let Some(said) = question.predict(&base) else { return (Vec::new(), Vec::new()) };
+    let whitenings = question.whitenings(counts, &found.left_k);
+    let slopes = question.slopes(&base, &said, &[]);
+    let none: Vec<Vec<f64>> = said.iter().map(|column| vec![0.0; column.len()]).collect();
+    let normal = Normal::new(&whitenings, &slopes, &none, &question.nothing().nuisances, &[]);
+    let Some(cholesky) = normal.matrix.clone().cholesky() else { return (Vec::new(), Vec::new()) };
+    let count = asked.len().max(2) as f64;
+    let against =
+        calibration.threshold + calibration.prior_none.ln() - (calibration.prior_single / count).ln();
+    let looked = parallel::map(asked, |effect| {
+        let info = question.effects[*effect].info();
+        let (parameter, others) = info.parameters.split_last()?;
+        let coordinate = Coordinate::new(parameter);
+        let length = |value: f64| -> Option<(f64, usize)> {
+            let beside = others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high));
+            let there =
+                Hypothesis { effects: vec![(*effect, beside.chain([value]).collect())], ..base.clone() };
+            let there = question.predict(&there)?;
+            let change: Vec<Vec<f64>> =
+                there.iter().zip(&said).map(|(t, s)| t.iter().zip(s).map(|(t, s)| t - s).collect()).collect();
+            let change = whitened(&whitenings, &change);
+            let dot = |column: &[Vec<f64>]| -> f64 {
+                column.iter().flatten().zip(change.iter().flatten()).map(|(a, b)| a * b).sum()
+            };
+            let right = nalgebra::DVector::from_fn(unknowns, |i, _| dot(&normal.columns[i]));
+            let taken = cholesky.solve(&right);
+            let whole = dot(&change);
+            let most =
+                (0..unknowns).max_by(|a, b| (taken[*a] * right[*a]).total_cmp(&(taken[*b] * right[*b])))?;
+            Some(((whole - right.dot(&taken)).max(0.0).sqrt(), most))
+        };
+        // Of what spans decades its inverse tells how far from neutral it is.
+        let away =
+            |value: f64| if coordinate.is_logarithmic() { 1.0 / value } else { value - parameter.neutral };
+        let value_at = |away: f64| {
+            let value = if coordinate.is_logarithmic() { 1.0 / away } else { parameter.neutral + away };
+            value.clamp(parameter.low, parameter.high)
+        };
+        let typical = away((parameter.neutral + parameter.typical_step).clamp(parameter.low, parameter.high));
+        let furthest = away(value_at(typical * 1e9));
+        let (mut here, mut taker) = (typical, 0);
+        // The smallest of those that were looked at and are large enough.
+        let mut seen: Option<f64> = None;
+        let mut before: Option<(f64, f64)> = None;
+        for _ in 0..LOOKS {
+            let (sigma, most) = length(value_at(here))?;
+            taker = most;
+            if sigma <= 1e-6 || here == 0.0 {
+                break;
+            }
+            let unit = coordinate.of(value_at(here)) - coordinate.of(parameter.neutral);
+            let curvature = (sigma / unit.abs().max(1e-9)).powi(2);
+            let needed =
+                against + 0.5 * curvature.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln() + PRIOR_STEPS.ln();
+            let wanted = (2.0 * needed.max(0.0)).sqrt() + SURELY;
+            if sigma > 0.9 * wanted && seen.is_none_or(|other| here.abs() < other.abs()) {
+                seen = Some(here);
+            }
+            if (sigma / wanted).ln().abs() < NEAR {
+                break;
+            }
+            let power = before.map_or(1.0, |(there, length): (f64, f64)| {
+                ((sigma / length).ln() / (here / there).ln()).clamp(0.6, 3.0)
+            });
+            before = Some((here, sigma));
+            let moved = here * (wanted / sigma).powf(1.0 / if power.is_finite() { power } else { 1.0 });
+            here = if moved.abs() > furthest.abs() { furthest } else { moved };
+        }
+        let value = seen.map(value_at);
+        let smallest = SmallestSeen {
+            effect: info.id.to_string(),
+            name: info.name.to_string(),
+            parameter: parameter.name.to_string(),
+            value,
+            unit: parameter.unit.to_string(),
+            size: value.map(|value| in_words::size(parameter, value)),
+        };
+        let largest = in_words::size(parameter, value_at(furthest));
+        let unknown = &S::unknowns()[taker];
+        let reason = format!(
+            "even {largest} would not be told from what is not known: {} ({}) takes its place",
+            unknown.name, unknown.description
+        );
+        Some((open.contains(effect), smallest, not_asked(info, reason)))
+    });
+    let (mut smallest, mut silent) = (Vec::new(), Vec::new());
+    for (open, seen, why_not) in looked.into_iter().flatten() {
+        if open || seen.value.is_some() { smallest.push(seen) } else { silent.push(why_not) }
+    }
+    (smallest, silent)
+}

@@ -1,0 +1,225 @@
+//! The diagnosis of one side of a machine from a log without steps.
+
+use super::asked::{audible, smallest};
+use super::calm::calm;
+use super::compressor::CompressorSide;
+use super::diagnosis::{Cause, Course, Diagnosis, Unknown, Word};
+use super::fit::{Fit, Question};
+use super::held_out::{beyond, held_out, ids, off_k};
+use super::phases::phases;
+use super::search::{search, weigh};
+use super::side::{Side, Which};
+use super::turbine::TurbineSide;
+use super::turbine_sensors::turbine_sensors;
+use crate::DrivenError;
+use crate::outcome::TOLD_RATIO;
+use crate::rows::Rows;
+use mapper_core::{Channel, Recording, half_width_95};
+use mapper_gap::calibration::Calibration;
+use mapper_gap::coordinate::Coordinate;
+use mapper_gap::in_words;
+use mapper_gap::report::Estimate;
+use mapper_numerics::statistics::rms;
+use mapper_observe::Declared;
+use mapper_physics::effect::{Effect, Rig};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64Mcg;
+use std::sync::Arc;
+
+/// Rows a diagnosis goes through: more do not tell more, for what the model leaves is alike over seconds.
+const MOST_ROWS: usize = 800;
+/// Rows that are needed: some for each of what is not known.
+const FEWEST_ROWS: usize = 30;
+/// Causes among which each phase chooses.
+const CHOICES: usize = 4;
+/// Causes that are shown.
+const SHOWN: usize = 8;
+
+/// What is asked.
+pub struct Ask<'a> {
+    /// The log.
+    pub recording: &'a Recording,
+    /// The nominal machine behind ideal sensors.
+    pub nominal: &'a Rig,
+    /// Candidate effects.
+    pub effects: &'a [Arc<dyn Effect>],
+    /// Noise of the sensors.
+    pub declared: &'a Declared,
+    /// Priors of causes and the evidence that one needs.
+    pub calibration: &'a Calibration,
+    /// Rows before this time of the log are looked at, s; the others are predicted.
+    pub fit_until_s: f64,
+    /// Same seed, same answer.
+    pub seed: u64,
+}
+
+/// Diagnoses a side.
+///
+/// # Errors
+/// [`DrivenError::Channel`] where a channel is missing that the side needs, [`DrivenError::TooFewRows`] where there is too little
+/// to fit, [`DrivenError::NoAnswer`] where the nominal machine has no answer under what drives.
+pub fn diagnose(ask: &Ask<'_>, side: Which) -> Result<Diagnosis, DrivenError> {
+    match side {
+        Which::Compressor => of_side::<CompressorSide>(ask),
+        Which::Turbine => {
+            let effects = [ask.effects, &turbine_sensors()].concat();
+            of_side::<TurbineSide>(&Ask { effects: &effects, ..*ask })
+        }
+    }
+}
+
+fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
+    let all = Rows::read(ask.recording, S::wanted())?;
+    let (calibration, lost_rows) = (ask.calibration, all.lost);
+    let rows = calm(&all, ask.declared).thinned(MOST_ROWS);
+    let fitted = rows.t_s.partition_point(|t_s| *t_s < ask.fit_until_s);
+    if fitted < FEWEST_ROWS {
+        let (rows, until_s) = (fitted, ask.fit_until_s);
+        return Err(DrivenError::TooFewRows { rows, until_s, needed: FEWEST_ROWS });
+    }
+    let counts: Vec<bool> = (0..rows.len()).map(|i| i < fitted).collect();
+    let side = S::of(rows);
+    let mut question =
+        Question { side: &side, nominal: ask.nominal, effects: ask.effects, white_k: Vec::new() };
+    question.white_k = white_k(&question, &all, ask).ok_or(DrivenError::NoAnswer)?;
+    let (asked, mut not_asked) = audible(&question);
+    let found = search(&question, &asked, &counts, calibration).ok_or(DrivenError::NoAnswer)?;
+    let weighed = weigh(calibration, asked.len(), &found);
+    let fit_of = |place: usize| &found.fits[weighed.causes[place].0];
+    let causes = weighed.causes.len().min(SHOWN);
+    // What is named before it is weighed against something unknown: held-out phases judge it.
+    let likeliest = if weighed.named && causes > 0 { fit_of(0) } else { &found.null };
+    let open = weighed.open;
+    let word = match open {
+        _ if weighed.outside > 0.5 => Word::Outside,
+        0 => Word::WithinTolerance,
+        1 => Word::Named,
+        _ => Word::NotToldApart,
+    };
+    let choices: Vec<&Fit> = (0..if weighed.named { causes.min(CHOICES) } else { 0 }).map(fit_of).collect();
+    let open_effects: Vec<usize> = (0..open)
+        .flat_map(|place| fit_of(place).hypothesis.effects.iter().map(|(effect, _)| *effect))
+        .collect();
+    let rows = side.rows();
+    let drives = [S::wanted().drives[0], S::PRESSURE];
+    let phases = phases(rows, fitted, &drives);
+    let (asked_for, silent) = smallest(&question, &asked, likeliest, &open_effects, &counts, calibration);
+    not_asked.extend(silent);
+    let symbols =
+        |columns: &[(Channel, Vec<f64>)]| columns.iter().map(|(channel, _)| channel.symbol()).collect();
+    let measured = |(_, column): &&(Channel, Vec<f64>)| column.iter().any(|k| k.is_finite());
+    Ok(Diagnosis {
+        side: S::WHICH,
+        driven_by: symbols(&rows.drives),
+        judged: rows.judged.iter().filter(measured).map(|(channel, _)| channel.symbol()).collect(),
+        fitted_until_s: ask.fit_until_s,
+        word,
+        probability_none: weighed.none,
+        probability_outside: weighed.outside,
+        causes: (0..causes)
+            .map(|place| cause(&question, calibration, fit_of(place), weighed.causes[place].1))
+            .collect(),
+        open: open.min(causes),
+        before_k: off_k(&question, &found.null.predicted, 0..fitted),
+        after_k: off_k(&question, &likeliest.predicted, 0..fitted),
+        held_out: held_out(&question, &phases, &found.null, &choices, calibration, asked.len()),
+        beyond: beyond(&question, fitted, &found.null, likeliest, ask.seed),
+        asked: asked_for,
+        not_asked,
+        unknowns: unknowns::<S>(likeliest),
+        course: Course {
+            t_s: rows.t_s.clone(),
+            read_k: rows.judged[0].1.clone(),
+            before_k: found.null.predicted[0].clone(),
+            after_k: likeliest.predicted[0].clone(),
+        },
+        lost_rows,
+    })
+}
+
+/// White noise of each judged channel: the sensor's, and what is left of the drives' noise makes of it.
+fn white_k<S: Side>(question: &Question<'_, S>, all: &Rows, ask: &Ask<'_>) -> Option<Vec<f64>> {
+    let declared = ask.declared;
+    let mut random = Pcg64Mcg::seed_from_u64(ask.seed.wrapping_add(2));
+    let mut noisy = calm(all, declared);
+    for (channel, column) in &mut noisy.drives {
+        let sigma = declared.noise_sigma(*channel);
+        for value in column {
+            let z: f64 = StandardNormal.sample(&mut random);
+            *value += sigma * z;
+        }
+    }
+    let noisy = calm(&noisy, declared).thinned(MOST_ROWS);
+    let there = Question { side: &S::of(noisy), white_k: Vec::new(), ..*question };
+    let (quiet, noisy) = (question.predict(&question.nothing())?, there.predict(&question.nothing())?);
+    let judged = question.side.rows().judged.iter();
+    let of_channel = |((channel, _), (quiet, noisy)): (&(Channel, _), (&Vec<f64>, &Vec<f64>))| {
+        let by_drives_k = rms(quiet.iter().zip(noisy).map(|(q, n)| n - q)).unwrap_or(0.0);
+        declared.noise_sigma(*channel).hypot(by_drives_k)
+    };
+    Some(judged.zip(quiet.iter().zip(&noisy)).map(of_channel).collect())
+}
+
+fn cause<S: Side>(
+    question: &Question<'_, S>,
+    calibration: &Calibration,
+    fit: &Fit,
+    probability: f64,
+) -> Cause {
+    let infos: Vec<_> =
+        fit.hypothesis.effects.iter().map(|(index, _)| question.effects[*index].info()).collect();
+    let covariance = fit.precision.clone().cholesky().map(|cholesky| cholesky.inverse());
+    let mut place = fit.hypothesis.nuisances.len();
+    let (mut parameters, mut at_the_end) = (std::collections::BTreeMap::new(), Vec::new());
+    for (info, (_, values)) in infos.iter().zip(&fit.hypothesis.effects) {
+        for (parameter, value) in info.parameters.iter().zip(values) {
+            let coordinate = Coordinate::new(parameter);
+            let at = coordinate.of(*value);
+            let variance = covariance.as_ref().map_or(f64::INFINITY, |c| c[(place, place)]);
+            let away = half_width_95(calibration.interval_factor * variance.max(0.0).sqrt());
+            let (a, b) = (coordinate.value(at - away), coordinate.value(at + away));
+            let name = if info.parameters.len() == 1 {
+                info.id.to_string()
+            } else {
+                format!("{}.{}", info.id, parameter.name)
+            };
+            if [parameter.low, parameter.high].contains(value) && *value != parameter.neutral {
+                at_the_end.push(name.clone());
+            }
+            let estimate = Estimate {
+                value: *value,
+                low: a.min(b),
+                high: a.max(b),
+                unit: parameter.unit.to_string(),
+                neutral: parameter.neutral,
+                size: in_words::size(parameter, *value),
+            };
+            parameters.insert(name, estimate);
+            place += 1;
+        }
+    }
+    Cause {
+        effects: ids(question, &fit.hypothesis),
+        names: infos.iter().map(|info| info.name.to_string()).collect(),
+        probability,
+        parameters,
+        at_the_end,
+        left_k: fit.left_k.clone(),
+    }
+}
+
+fn unknowns<S: Side>(fit: &Fit) -> Vec<Unknown> {
+    let covariance = fit.precision.clone().cholesky().map(|cholesky| cholesky.inverse());
+    let each = S::unknowns().iter().zip(&fit.hypothesis.nuisances).enumerate();
+    each.map(|(place, (unknown, z))| {
+        let sigma = covariance.as_ref().map_or(1.0, |c| c[(place, place)].max(0.0).sqrt());
+        let ends =
+            |middle: f64, sigma: f64| (unknown.at(middle - 1.96 * sigma), unknown.at(middle + 1.96 * sigma));
+        let ((low, high), (prior_low, prior_high)) = (ends(*z, sigma), ends(0.0, 1.0));
+        let told = high - low < TOLD_RATIO * (prior_high - prior_low);
+        let (name, description, unit) = (unknown.name, unknown.description, unknown.unit);
+        Unknown { name, description, unit, value: unknown.at(*z), low, high, told }
+    })
+    .collect()
+}

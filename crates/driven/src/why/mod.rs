@@ -1,0 +1,20 @@
+//! Which cause explains what is judged on a side that its measured neighbours drive: gap diagnosis without steps.
+
+mod asked;
+mod calm;
+mod compressor;
+mod diagnose;
+mod diagnosis;
+mod fit;
+mod held_out;
+mod noise;
+mod phases;
+mod search;
+mod side;
+mod turbine;
+mod turbine_sensors;
+
+pub use diagnose::{Ask, diagnose};
+pub use diagnosis::{Beyond, Cause, Course, Diagnosis, HeldOut, NotAsked, Phase, Unknown, Word};
+pub use side::{NoSide, Which};
+pub use turbine_sensors::turbine_sensors;

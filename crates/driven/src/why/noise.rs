@@ -1,0 +1,88 @@
+//! Residuals made white: noise of a sensor, and beside it what the model leaves, which is alike for a while.
+//!
+//! What is left is taken for a first-order process seen through white noise; the Kalman filter's innovations over their own
+//! spread are then independent and of unit variance. Its gains depend on times and spreads alone, so that they are made once
+//! and whiten residuals and slopes alike.
+
+/// Gains of the filter for one channel.
+#[derive(Debug, Clone)]
+pub(crate) struct Whitening {
+    /// For each row: what the state keeps since the row before, its gain, and one over the spread of the innovation; `None`
+    /// where the row is not looked at.
+    rows: Vec<(f64, Option<(f64, f64)>)>,
+    /// Sum of the logarithms of the innovations' spreads.
+    pub(crate) ln_spreads: f64,
+}
+
+impl Whitening {
+    /// For rows at `t_s` of which those that `counts` says are looked at; white noise, smooth noise and how long that is alike.
+    pub(crate) fn new(t_s: &[f64], counts: &[bool], white: f64, smooth: f64, alike_s: f64) -> Self {
+        let (white, smooth) = (white.max(1e-6).powi(2), smooth.powi(2));
+        let mut variance = smooth;
+        let mut ln_spreads = 0.0;
+        let mut before_s: Option<f64> = None;
+        let rows = t_s
+            .iter()
+            .zip(counts)
+            .map(|(t_s, counts)| {
+                let keep = before_s.map_or(0.0, |before_s| (-(t_s - before_s) / alike_s).exp());
+                before_s = Some(*t_s);
+                variance = keep * keep * variance + (1.0 - keep * keep) * smooth;
+                if !counts {
+                    return (keep, None);
+                }
+                let spread = variance + white;
+                let gain = variance / spread;
+                variance *= 1.0 - gain;
+                ln_spreads += 0.5 * spread.ln();
+                (keep, Some((gain, 1.0 / spread.sqrt())))
+            })
+            .collect();
+        Whitening { rows, ln_spreads }
+    }
+
+    /// Whitens a column in place: rows that are not looked at become 0.
+    pub(crate) fn whiten(&self, column: &mut [f64]) {
+        let mut state = 0.0;
+        for (value, (keep, row)) in column.iter_mut().zip(&self.rows) {
+            state *= keep;
+            *value = match row {
+                Some((gain, over_spread)) => {
+                    let news = *value - state;
+                    state += gain * news;
+                    news * over_spread
+                }
+                None => 0.0,
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DMatrix;
+
+    /// Against the dense covariance `smooth^2 exp(-|dt|/alike) + white^2`: the same quadratic form and determinant.
+    #[test]
+    fn it_is_the_dense_covariance() {
+        let t_s = [0.0, 0.1, 0.35, 0.4, 2.0, 2.1, 7.0];
+        let counts = [true, true, false, true, true, false, true];
+        let (white, smooth, alike_s) = (0.2, 0.7, 1.5);
+        let column = [0.3, -0.2, 9.0, 0.5, 1.1, 9.0, -0.4];
+        let seen: Vec<usize> = (0..t_s.len()).filter(|i| counts[*i]).collect();
+        let covariance = DMatrix::from_fn(seen.len(), seen.len(), |i, j| {
+            let apart: f64 = t_s[seen[i]] - t_s[seen[j]];
+            smooth * smooth * (-apart.abs() / alike_s).exp() + if i == j { white * white } else { 0.0 }
+        });
+        let values = DMatrix::from_fn(seen.len(), 1, |i, _| column[seen[i]]);
+        let inverse = covariance.clone().try_inverse().unwrap();
+        let expected = (values.transpose() * inverse * &values)[(0, 0)];
+        let whitening = Whitening::new(&t_s, &counts, white, smooth, alike_s);
+        let mut white_column = column;
+        whitening.whiten(&mut white_column);
+        let squares: f64 = white_column.iter().map(|w| w * w).sum();
+        assert!((squares / expected - 1.0).abs() < 1e-12, "{squares} {expected}");
+        assert!((whitening.ln_spreads - 0.5 * covariance.determinant().ln()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,196 @@
+//! Which effects, alone or two together, explain what is judged, and how likely each is.
+
+use super::fit::{Fit, Question};
+use super::side::Side;
+use mapper_gap::calibration::Calibration;
+use mapper_gap::coordinate::Coordinate;
+use mapper_gap::next::SETTLED;
+use mapper_gap::study::{Hypothesis, members};
+use mapper_numerics::parallel;
+use mapper_physics::effect::EffectInfo;
+
+/// What was fitted.
+pub(crate) struct Found {
+    /// Nothing but what is not known.
+    pub(crate) null: Fit,
+    /// Singles and pairs, likeliest first.
+    pub(crate) fits: Vec<Fit>,
+}
+
+/// A single has to take so much off the evidence against it before pairs are looked at.
+const WORTH: f64 = 3.0;
+/// Singles beside which a second effect is looked for.
+const BASES: usize = 3;
+/// Pairs that are fitted are those of the first so many singles.
+const PARTNERS: usize = 8;
+/// Prior of something outside the catalogue, beside any of it: as rare as what the catalogue's priors leave.
+pub(crate) const PRIOR_OUTSIDE: f64 = 0.1;
+
+/// Logarithm of what is known of a cause before any data.
+pub(crate) fn prior(calibration: &Calibration, asked: usize, fit: &Fit) -> f64 {
+    let count = asked.max(2) as f64;
+    match fit.hypothesis.effects.len() {
+        0 => calibration.prior_none.ln(),
+        1 => (calibration.prior_single / count).ln(),
+        _ => (calibration.prior_pair / (0.5 * count * (count - 1.0))).ln(),
+    }
+}
+
+/// Evidence of a fit, prior included.
+pub(crate) fn weight(calibration: &Calibration, asked: usize, fit: &Fit) -> f64 {
+    fit.score + prior(calibration, asked, fit)
+}
+
+/// Values from which the search for an effect begins: one and three typical steps off, to either side where it has two.
+fn starts(info: &EffectInfo) -> Vec<Vec<f64>> {
+    let at = |share: f64| -> Vec<f64> {
+        let value = |p: &mapper_physics::effect::EffectParameter| {
+            let coordinate = Coordinate::new(p);
+            // Of what spans decades a step is a factor.
+            let value = if coordinate.is_logarithmic() {
+                coordinate.value(coordinate.of(p.neutral + p.typical_step))
+            } else {
+                p.neutral + share * p.typical_step
+            };
+            value.clamp(p.low, p.high)
+        };
+        info.parameters.iter().map(value).collect()
+    };
+    let neutral: Vec<f64> = info.parameters.iter().map(|p| p.neutral).collect();
+    let mut starts: Vec<Vec<f64>> = Vec::new();
+    for share in [1.0, 3.0, -1.0] {
+        let start = at(share);
+        if start != neutral && !starts.contains(&start) {
+            starts.push(start);
+        }
+    }
+    starts
+}
+
+/// Fits nothing, each of the effects `asked`, and pairs of the best.
+pub(crate) fn search<S: Side>(
+    question: &Question<'_, S>,
+    asked: &[usize],
+    counts: &[bool],
+    calibration: &Calibration,
+) -> Option<Found> {
+    let null = question.fit(&question.nothing(), counts)?;
+    let by_weight = |fits: &mut Vec<Fit>| {
+        let weight = |fit: &Fit| weight(calibration, asked.len(), fit);
+        fits.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+    };
+    let beside = |base: &Hypothesis, effect: usize| -> Vec<Hypothesis> {
+        let with = |values: Vec<f64>| {
+            let mut start = base.clone();
+            start.effects.push((effect, values));
+            start
+        };
+        starts(question.effects[effect].info()).into_iter().map(with).collect()
+    };
+    let tried: Vec<Hypothesis> =
+        asked.iter().flat_map(|effect| beside(&question.nothing(), *effect)).collect();
+    let mut fits = best_of_each(fitted(question, &tried, counts));
+    by_weight(&mut fits);
+    let worth = fits.first().is_some_and(|best| best.score - null.score > WORTH);
+    if worth {
+        let mut tried: Vec<Hypothesis> = Vec::new();
+        for base in fits.iter().take(BASES) {
+            let partners = fits.iter().take(PARTNERS).map(|fit| fit.hypothesis.effects[0].0);
+            for partner in partners.filter(|partner| members(&base.hypothesis) != [*partner]) {
+                tried.extend(beside(&base.hypothesis, partner));
+            }
+        }
+        let pairs = best_of_each(fitted(question, &tried, counts));
+        fits.extend(pairs);
+        by_weight(&mut fits);
+    }
+    Some(Found { null, fits })
+}
+
+fn fitted<S: Side>(question: &Question<'_, S>, tried: &[Hypothesis], counts: &[bool]) -> Vec<Fit> {
+    parallel::map(tried, |start| question.fit(start, counts)).into_iter().flatten().collect()
+}
+
+/// Of fits with the same effects the best.
+fn best_of_each(fits: Vec<Fit>) -> Vec<Fit> {
+    let mut best: Vec<Fit> = Vec::new();
+    for fit in fits {
+        match best.iter_mut().find(|other| members(&other.hypothesis) == members(&fit.hypothesis)) {
+            Some(other) if other.score >= fit.score => {}
+            Some(other) => *other = fit,
+            None => best.push(fit),
+        }
+    }
+    best
+}
+
+/// Scores turned into probabilities.
+pub(crate) struct Weighed {
+    /// Of nothing.
+    pub(crate) none: f64,
+    /// Of something outside the catalogue.
+    pub(crate) outside: f64,
+    /// Causes by their places among the fits, likeliest first; what only adds to a better one counts as that one.
+    pub(crate) causes: Vec<(usize, f64)>,
+    /// How many of them, from the first, are not told apart.
+    pub(crate) open: usize,
+    /// Whether a cause is likelier than nothing by more than chance makes one.
+    pub(crate) named: bool,
+}
+
+/// Weighs what was found.
+pub(crate) fn weigh(calibration: &Calibration, asked: usize, found: &Found) -> Weighed {
+    let all: Vec<&Fit> = std::iter::once(&found.null).chain(&found.fits).collect();
+    let inside = |fit: &Fit| weight(calibration, asked, fit) + (1.0 - PRIOR_OUTSIDE).ln();
+    let beyond = |fit: &Fit| fit.score_outside + prior(calibration, asked, fit) + PRIOR_OUTSIDE.ln();
+    let top = all.iter().flat_map(|fit| [inside(fit), beyond(fit)]).fold(f64::NEG_INFINITY, f64::max);
+    let share = |ln: f64| ((ln - top) / calibration.temperature).exp();
+    let outside: f64 = all.iter().map(|fit| share(beyond(fit))).sum();
+    let total = outside + all.iter().map(|fit| share(inside(fit))).sum::<f64>();
+    let mut causes: Vec<(usize, f64)> = Vec::new();
+    for (place, fit) in found.fits.iter().enumerate() {
+        let probability = share(inside(fit)) / total;
+        let effects = members(&fit.hypothesis);
+        let holds = |other: usize| {
+            members(&found.fits[other].hypothesis).iter().all(|effect| effects.contains(effect))
+        };
+        match causes.iter_mut().find(|(other, _)| holds(*other)) {
+            Some((_, sum)) => *sum += probability,
+            None => causes.push((place, probability)),
+        }
+    }
+    let named = best_weight(calibration, asked, found) - weight(calibration, asked, &found.null)
+        > calibration.threshold;
+    let effects = |place: usize| members(&found.fits[place].hypothesis);
+    let within =
+        |part: usize, whole: usize| effects(part).iter().all(|effect| effects(whole).contains(effect));
+    causes.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut open = if named { open_ones(&causes) } else { 0 };
+    // Where all that are open have one of them in common, it is that one: what stands beside it is too weak to tell.
+    let common = causes[..open]
+        .iter()
+        .position(|(part, _)| causes[..open].iter().all(|(whole, _)| within(*part, *whole)));
+    if let Some(common) = common.filter(|_| open > 1) {
+        let together = causes[..open].iter().map(|(_, probability)| probability).sum();
+        let cause = (causes[common].0, together);
+        causes.splice(..open, [cause]);
+        open = 1;
+    }
+    Weighed { none: share(inside(&found.null)) / total, outside: outside / total, named, open, causes }
+}
+
+/// How many causes, from the first, have what settles it of all together.
+fn open_ones(causes: &[(usize, f64)]) -> usize {
+    let all: f64 = causes.iter().map(|(_, probability)| probability).sum();
+    let mut sum = 0.0;
+    let before = |(_, probability): &&(usize, f64)| {
+        let open = sum < SETTLED * all;
+        sum += probability;
+        open
+    };
+    causes.iter().take_while(before).count()
+}
+
+fn best_weight(calibration: &Calibration, asked: usize, found: &Found) -> f64 {
+    found.fits.first().map_or(f64::NEG_INFINITY, |fit| weight(calibration, asked, fit))
+}

@@ -27,7 +27,10 @@ fn diagnosis(recording: &Recording, side: Which, fit_until_s: f64) -> Diagnosis 
 }
 
 const COMPRESSOR: Which = Which::Compressor;
-const SEEDS: u64 = 10;
+/// Three; docs/real-data.md has ten.
+fn seeds() -> u64 {
+    std::env::var("MAPPER_WHY_SEEDS").map_or(3, |seeds| seeds.parse().unwrap())
+}
 
 /// Ids of what is open, one string a cause.
 fn open(found: &Diagnosis) -> Vec<String> {
@@ -36,7 +39,7 @@ fn open(found: &Diagnosis) -> Vec<String> {
 
 /// Diagnoses an engine of each seed with a planted cause, all of its log fitted. `without` is not recorded.
 fn all_of(side: Which, course: &Course, planted: &[(&str, f64)], without: &[Channel]) -> Vec<Diagnosis> {
-    let each = (0..SEEDS).map(|seed| {
+    let each = (0..seeds()).map(|seed| {
         let (mut recording, _) = engine(seed, course, planted, healthy);
         recording.series.retain(|channel, _| !without.contains(channel));
         diagnosis(&recording, side, f64::INFINITY)
@@ -64,20 +67,18 @@ fn is_named(found: &Diagnosis, effect: &str) -> bool {
     found.word == Word::Named && open(found) == [effect]
 }
 
-/// One seed in ten may go wrong.
-const ALMOST_ALL: usize = SEEDS as usize - 1;
+/// One seed may go wrong.
+fn almost_all() -> usize {
+    seeds() as usize - 1
+}
 
 #[test]
 fn without_a_cause_none_is_named() {
     let nothing = |found: &Diagnosis| found.word == Word::WithinTolerance && found.open == 0;
-    for course in [Course::brake(), Course::hills()] {
-        for without in [&[][..], &[Channel::Tc, Channel::Tt]] {
-            for side in [COMPRESSOR, Which::Turbine] {
-                assert!(
-                    count(&all_of(side, &course, &[], without), nothing) >= ALMOST_ALL,
-                    "{side:?} {without:?}"
-                );
-            }
+    for (course, without) in [(Course::brake(), &[][..]), (Course::hills(), &[Channel::Tc, Channel::Tt])] {
+        for side in [COMPRESSOR, Which::Turbine] {
+            let found = all_of(side, &course, &[], without);
+            assert!(count(&found, nothing) >= almost_all(), "{side:?} {without:?}");
         }
     }
 }
@@ -86,11 +87,11 @@ fn without_a_cause_none_is_named() {
 #[test]
 fn a_slow_probe_is_named_with_its_size() {
     let found = all_of(COMPRESSOR, &Course::brake(), &[("tip_diameter", 2.5e-3)], &[Channel::Tc]);
-    assert!(count(&found, |found| is_named(found, "tip_diameter")) >= ALMOST_ALL);
+    assert!(count(&found, |found| is_named(found, "tip_diameter")) >= almost_all());
     let held = |found: &Diagnosis| {
         found.causes[0].parameters.get("tip_diameter").is_some_and(|d| (d.low..=d.high).contains(&2.5e-3))
     };
-    assert!(count(&found, held) >= ALMOST_ALL);
+    assert!(count(&found, held) >= almost_all());
     for found in &found {
         let held_out = found.held_out.as_ref().unwrap();
         assert!(held_out.phases.len() >= 3);
@@ -102,14 +103,14 @@ fn a_slow_probe_is_named_with_its_size() {
 #[test]
 fn the_brake_is_predicted_with_the_cause_that_was_named_before_it() {
     let mut held = 0;
-    for seed in 0..SEEDS {
+    for seed in 0..seeds() {
         let (recording, _) = engine(seed, &Course::brake(), &[("tip_diameter", 2.5e-3)], healthy);
         let found = diagnosis(&recording, COMPRESSOR, common::BRAKE_S);
         let brake = found.beyond.unwrap();
         held += usize::from((brake.expected_low_k..=brake.expected_high_k).contains(&brake.after_k));
         assert!(brake.after_k < 0.2 * brake.before_k, "{brake:?}");
     }
-    assert!(held >= 8, "{held} of {SEEDS}");
+    assert!(held >= almost_all(), "{held} of {}", seeds());
 }
 
 #[test]
@@ -118,23 +119,23 @@ fn what_four_minutes_show_is_named_or_said_to_be_alike() {
     let no_tc = &[Channel::Tc];
     for (effect, size) in [("inlet_preheat", 4.0), ("flowmeter_lag", 2.0)] {
         let found = all_of(COMPRESSOR, &hills, &[(effect, size)], no_tc);
-        assert!(count(&found, |found| is_named(found, effect)) >= ALMOST_ALL, "{effect}");
+        assert!(count(&found, |found| is_named(found, effect)) >= almost_all(), "{effect}");
     }
     // The area before the wheel and h that depends on the direction both tie T2 to the metal.
     let found = all_of(COMPRESSOR, &hills, &[("area_split", 0.3)], no_tc);
-    assert!(count(&found, |found| open(found).contains(&"area_split".to_owned())) >= ALMOST_ALL);
+    assert!(count(&found, |found| open(found).contains(&"area_split".to_owned())) >= almost_all());
     // An offset of T2, one of T1 the other way, and one of P2 look alike where efficiency is free.
     let found = all_of(COMPRESSOR, &hills, &[("t2_offset", 10.0)], no_tc);
     let alike =
         |found: &Diagnosis| found.word == Word::NotToldApart && open(found).contains(&"t2_offset".to_owned());
-    assert!(count(&found, alike) >= 8);
+    assert!(count(&found, alike) >= almost_all());
 }
 
 /// A gain of the flow meter is another efficiency over flow: nothing is named, and it is said that it cannot be asked.
 #[test]
 fn what_cannot_be_asked_is_said() {
     let found = all_of(COMPRESSOR, &Course::brake(), &[("flowmeter_gain", 1.15)], &[Channel::Tc]);
-    assert!(count(&found, |found| found.open == 0) >= ALMOST_ALL);
+    assert!(count(&found, |found| found.open == 0) >= almost_all());
     let catalogue: Vec<String> = catalogue().iter().map(|effect| effect.info().id.to_string()).collect();
     for found in &found {
         let not_asked = |effect: &str| found.not_asked.iter().find(|one| one.effect == effect);
@@ -164,7 +165,7 @@ fn what_cannot_be_asked_is_said() {
 /// A loose contact: now and then T2 reads too little for a second or two, which no effect of the catalogue does.
 #[test]
 fn a_cause_outside_the_catalogue_is_said_to_be_outside() {
-    let outside = (0..SEEDS).map(|seed| {
+    let outside = (0..seeds()).map(|seed| {
         let (mut recording, _) = engine(seed, &Course::brake(), &[], healthy);
         let t2 = recording.series.get_mut(&Channel::T2).unwrap();
         for (t_s, k) in t2.t_s.iter().zip(&mut t2.values) {
@@ -174,37 +175,34 @@ fn a_cause_outside_the_catalogue_is_said_to_be_outside() {
         diagnosis(&recording, COMPRESSOR, f64::INFINITY)
     });
     let outside: Vec<Diagnosis> = outside.collect();
-    assert!(count(&outside, |found| found.word == Word::Outside) >= ALMOST_ALL);
+    assert!(count(&outside, |found| found.word == Word::Outside) >= almost_all());
 }
 
 #[test]
 fn slow_probes_of_the_turbine_side_are_named() {
-    for without in [&[][..], &[Channel::Tt]] {
-        let near = |found: &Diagnosis, effect: &str, share: f64| {
-            found.causes[0].parameters.get(effect).is_some_and(|s| (s.value / 1.5 - 1.0).abs() < share)
-        };
-        let found = all_of(Which::Turbine, &Course::hills(), &[("t4_lag", 1.5)], without);
-        assert!(
-            count(&found, |found| is_named(found, "t4_lag") && near(found, "t4_lag", 0.05)) >= ALMOST_ALL
-        );
-        // T3 drives: what its lag did cannot be taken off it to the last, and what is left looks like a short lag of T4 beside it.
-        let found = all_of(Which::Turbine, &Course::hills(), &[("t3_lag", 1.5)], without);
-        assert!(count(&found, |found| found.open == 1 && near(found, "t3_lag", 0.15)) >= ALMOST_ALL);
-        // Two probes whose difference alone is seen.
-        let found = all_of(Which::Turbine, &Course::hills(), &[("t4_offset", 30.0)], without);
-        let alike = |found: &Diagnosis| {
-            let mut open = open(found);
-            open.sort();
-            open == ["t3_offset", "t4_offset"]
-        };
-        assert!(count(&found, alike) >= ALMOST_ALL, "{without:?}");
-        // A gain of the flow is another heat transfer.
-        let found = all_of(Which::Turbine, &Course::hills(), &[("turbine_flow_gain", 1.2)], without);
-        assert!(count(&found, |found| found.open == 0) >= ALMOST_ALL, "{without:?}");
-        for found in &found {
-            assert!(found.not_asked.iter().any(|one| one.effect == "turbine_flow_gain"), "{found:?}");
-            assert!(found.not_asked.iter().any(|one| one.effect == "turbine_efficiency"));
-        }
+    let without = &[Channel::Tt];
+    let near = |found: &Diagnosis, effect: &str, share: f64| {
+        found.causes[0].parameters.get(effect).is_some_and(|s| (s.value / 1.5 - 1.0).abs() < share)
+    };
+    let found = all_of(Which::Turbine, &Course::hills(), &[("t4_lag", 1.5)], without);
+    assert!(count(&found, |found| is_named(found, "t4_lag") && near(found, "t4_lag", 0.05)) >= almost_all());
+    // T3 drives: what its lag did cannot be taken off it to the last, and what is left looks like a short lag of T4 beside it.
+    let found = all_of(Which::Turbine, &Course::hills(), &[("t3_lag", 1.5)], without);
+    assert!(count(&found, |found| found.open == 1 && near(found, "t3_lag", 0.15)) >= almost_all());
+    // Two probes whose difference alone is seen.
+    let found = all_of(Which::Turbine, &Course::hills(), &[("t4_offset", 30.0)], without);
+    let alike = |found: &Diagnosis| {
+        let mut open = open(found);
+        open.sort();
+        open == ["t3_offset", "t4_offset"]
+    };
+    assert!(count(&found, alike) >= almost_all(), "{without:?}");
+    // A gain of the flow is another heat transfer.
+    let found = all_of(Which::Turbine, &Course::hills(), &[("turbine_flow_gain", 1.2)], without);
+    assert!(count(&found, |found| found.open == 0) >= almost_all(), "{without:?}");
+    for found in &found {
+        assert!(found.not_asked.iter().any(|one| one.effect == "turbine_flow_gain"), "{found:?}");
+        assert!(found.not_asked.iter().any(|one| one.effect == "turbine_efficiency"));
     }
     assert_eq!(turbine_sensors().len(), 6);
 }
@@ -213,7 +211,7 @@ fn slow_probes_of_the_turbine_side_are_named() {
 #[test]
 fn the_turbine_is_identified() {
     let mut held = 0;
-    for seed in 0..SEEDS {
+    for seed in 0..seeds() {
         let (recording, truth) = engine(seed, &Course::hills(), &[], healthy);
         let found = diagnosis(&recording, Which::Turbine, f64::INFINITY);
         let eta = found.unknowns.iter().find(|unknown| unknown.name == "eta_t").unwrap();
@@ -221,7 +219,7 @@ fn the_turbine_is_identified() {
         held += usize::from((eta.low..=eta.high).contains(&ratio));
         assert!(eta.told && (eta.value / ratio - 1.0).abs() < 0.03, "{eta:?} {ratio}");
     }
-    assert!(held >= 8, "{held} of {SEEDS}");
+    assert!(held >= almost_all(), "{held} of {}", seeds());
 }
 
 #[test]

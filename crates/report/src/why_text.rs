@@ -73,6 +73,10 @@ fn headline(found: &Diagnosis) -> String {
             "{} explain it alike and are not told apart.",
             open.iter().map(|cause| cause.names.join(" and ")).collect::<Vec<_>>().join("; or ")
         ),
+        Word::NotBorneOut => format!(
+            "No cause is named: {} would explain what was fitted, but phases that it did not see get no better.",
+            open.first().map_or_else(String::new, |cause| cause.names.join(" and "))
+        ),
         Word::WithinTolerance => format!(
             "Nothing is seen beyond what nobody knows of such a machine anyway (no cause: {}).",
             percent(found.probability_none)

@@ -91,12 +91,6 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     // What is named before it is weighed against something unknown: held-out phases judge it.
     let likeliest = if weighed.named && causes > 0 { fit_of(0) } else { &found.null };
     let open = weighed.open;
-    let word = match open {
-        _ if weighed.outside > 0.5 => Word::Outside,
-        0 => Word::WithinTolerance,
-        1 => Word::Named,
-        _ => Word::NotToldApart,
-    };
     let choices: Vec<&Fit> = (0..if weighed.named { causes.min(CHOICES) } else { 0 }).map(fit_of).collect();
     let open_effects: Vec<usize> = (0..open)
         .flat_map(|place| fit_of(place).hypothesis.effects.iter().map(|(effect, _)| *effect))
@@ -104,6 +98,16 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     let rows = side.rows();
     let drives = [S::wanted().drives[0], S::PRESSURE];
     let phases = phases(rows, fitted, &drives);
+    let held_out = held_out(&question, &phases, &found.null, &choices, calibration, asked.len());
+    // Steps of noise that drives leave can look like an effect in the part that was fitted, but not in what no fit saw.
+    let borne_out = held_out.as_ref().is_none_or(|phases| phases.after_k < phases.before_k);
+    let word = match open {
+        _ if weighed.outside > 0.5 => Word::Outside,
+        0 => Word::WithinTolerance,
+        _ if !borne_out => Word::NotBorneOut,
+        1 => Word::Named,
+        _ => Word::NotToldApart,
+    };
     let (asked_for, silent) = smallest(&question, &asked, likeliest, &open_effects, &counts, calibration);
     not_asked.extend(silent);
     let symbols =
@@ -123,7 +127,7 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
         open: open.min(causes),
         before_k: off_k(&question, &found.null.predicted, 0..fitted),
         after_k: off_k(&question, &likeliest.predicted, 0..fitted),
-        held_out: held_out(&question, &phases, &found.null, &choices, calibration, asked.len()),
+        held_out,
         beyond: beyond(&question, fitted, &found.null, likeliest, ask.seed),
         asked: asked_for,
         not_asked,

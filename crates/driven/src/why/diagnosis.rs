@@ -15,6 +15,8 @@ pub enum Word {
     Named,
     /// Several causes explain it as well as each other.
     NotToldApart,
+    /// A cause explains what was fitted, and makes phases that no fit saw no better: it is not named.
+    NotBorneOut,
     /// Nothing of the catalogue explains it.
     Outside,
 }

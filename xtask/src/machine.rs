@@ -84,6 +84,18 @@ pub fn has_slurm() -> bool {
     is_root() && (works(&SLURM) || (install().is_ok() && works(&SLURM)))
 }
 
+/// Slurm, or what to do for it.
+pub fn need_slurm() -> Result<(), Error> {
+    if has_slurm() {
+        return Ok(());
+    }
+    let install = match is_root() {
+        true => by_hand(&SLURM.source),
+        false => "its daemons need root: sudo --preserve-env=PATH cargo xtask fleet-test".to_owned(),
+    };
+    Err(missing_tool(&SLURM, install))
+}
+
 /// Whether npm is there and reaches its registry. Nothing of the build needs it.
 pub fn has_npm() -> bool {
     step::succeeds("npm", &["ping"])

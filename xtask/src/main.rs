@@ -1,7 +1,8 @@
-//! Chores of the repository: `cargo xtask quick`, `test`, `fmt`, `docs` and `performance`.
+//! Chores of the repository: `cargo xtask quick`, `test`, `fleet-test`, `fmt`, `docs` and `performance`.
 
 mod docs;
 mod error;
+mod fleet_test;
 mod formatting;
 mod machine;
 mod offered;
@@ -21,6 +22,7 @@ usage: cargo xtask COMMAND
 
   quick          formatting, lints and the tests that are fast: while working; names what it leaves out
   test           run every test of the repository; installs what they need, skips nothing
+  fleet-test     the tests of fleets alone, on Slurm with them: as root, which Slurm's daemons need
   fmt            format every file, those included that a macro declares and `cargo fmt` does not see
   docs           make the generated documents again
   docs --check   fail where a generated document is not what the program makes now
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
     let done = match arguments.as_slice() {
         ["quick"] => quick::quick(),
         ["test"] => test::test(),
+        ["fleet-test"] => fleet_test::fleet_test(),
         ["fmt"] => formatting::formatting(formatting::Mode::Write),
         ["docs"] => docs::docs(docs::Mode::Write),
         ["docs", "--check"] => docs::docs(docs::Mode::Check),

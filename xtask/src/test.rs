@@ -67,9 +67,7 @@ pub fn test() -> Result<(), Error> {
         );
     }
     if !offered.slurm {
-        say(
-            "\nLEFT OUT: the test on a cluster. It runs Slurm as root: apt-get install slurm-wlm, then `cargo xtask test` as root.\n",
-        );
+        say("\nLEFT OUT: the test on a cluster. It runs Slurm as root: `cargo xtask fleet-test` as root.\n");
     }
     if !knows_licences {
         say(

@@ -57,6 +57,12 @@ pub fn night_text(night: &Night, comparison: &Comparison, path: &Path) -> String
         path.display()
     );
     let _ = match comparison.nights {
+        0 if !comparison.missing.is_empty() => {
+            writeln!(
+                text,
+                "Nothing of tonight was there on the nights before: there is nothing to compare with."
+            )
+        }
         0 => writeln!(text, "The first night: there is nothing to compare with yet."),
         count if comparison.is_quiet() => {
             writeln!(text, "Every figure lies in the band of the last {count} {}.", nights(count))

@@ -92,23 +92,35 @@ impl Variant {
 
     fn from_text(text: &str, path: &Path) -> Result<Vec<Variant>, VariantError> {
         let wrong = |problem: String| VariantError::Table { path: path.to_owned(), problem };
-        let form = |source| VariantError::Form { path: path.to_owned(), source };
-        let header = text.lines().find(|line| !line.starts_with('#')).unwrap_or_default();
-        let delimiter = if header.contains(';') { b';' } else { b',' };
+        let (at, header) =
+            (1..).zip(text.lines()).find(|(_, line)| !line.starts_with('#')).unwrap_or((1, ""));
+        let delimiter = if header.contains(';') { ';' } else { ',' };
+        let wrong_at = |line: u64, column: usize, problem: &str| {
+            wrong(format!("{problem}\n{}", shown(text, line, column, delimiter)))
+        };
+        // A row is too short or too long behind its last cell.
+        let form = |error: csv::Error| match error.kind() {
+            csv::ErrorKind::UnequalLengths { pos: Some(at), expected_len, len } => wrong_at(
+                at.line(),
+                usize::try_from(*expected_len.min(len)).unwrap_or(usize::MAX),
+                &format!("line {}: {len} cells below a header of {expected_len}", at.line()),
+            ),
+            _ => VariantError::Form { path: path.to_owned(), source: error },
+        };
         let mut reader = csv::ReaderBuilder::new()
-            .delimiter(delimiter)
+            .delimiter(delimiter as u8)
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
             .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
         let columns: Vec<String> = reader.headers().map_err(form)?.iter().map(str::to_owned).collect();
         let Some(name) = columns.iter().position(|column| column == NAME) else {
-            return Err(wrong(format!("no column is called `{NAME}`; name each machine in one")));
+            return Err(wrong_at(at, 0, &format!("no column is called `{NAME}`; name each machine in one")));
         };
         if columns.len() > COLUMNS_LIMIT {
             return Err(wrong(format!("{} columns; at most {COLUMNS_LIMIT} are allowed", columns.len())));
         }
         if let Some(twice) = columns.iter().enumerate().find(|(i, column)| columns[..*i].contains(column)) {
-            return Err(wrong(format!("the column `{}` appears twice", twice.1)));
+            return Err(wrong_at(at, twice.0, &format!("the column `{}` appears twice", twice.1)));
         }
         let (mut machines, mut names) = (Vec::new(), BTreeSet::new());
         for row in reader.records() {
@@ -116,10 +128,11 @@ impl Variant {
             let line = row.position().map_or(0, csv::Position::line);
             let serial_number = row.get(name).unwrap_or_default().to_owned();
             if serial_number.is_empty() {
-                return Err(wrong(format!("line {line}: the machine has no `{NAME}`")));
+                return Err(wrong_at(line, name, &format!("line {line}: the machine has no `{NAME}`")));
             }
             if !names.insert(serial_number.clone()) {
-                return Err(wrong(format!("line {line}: the machine {serial_number} appears twice")));
+                let twice = format!("line {line}: the machine {serial_number} appears twice");
+                return Err(wrong_at(line, name, &twice));
             }
             let settings = columns.iter().zip(&row).enumerate();
             let settings = settings
@@ -173,6 +186,16 @@ impl Variant {
     }
 }
 
+/// A line of the table with a caret below the begin of one of its cells, or behind the last.
+fn shown(text: &str, line: u64, column: usize, delimiter: char) -> String {
+    let number = line.to_string();
+    let index = usize::try_from(line.saturating_sub(1)).unwrap_or(usize::MAX);
+    let line = text.lines().nth(index).unwrap_or_default();
+    let before: usize = line.split(delimiter).take(column).map(|cell| cell.chars().count() + 1).sum();
+    let before = before.min(line.chars().count());
+    format!("{number} | {line}\n{:width$} | {:before$}^", "", "", width = number.len())
+}
+
 /// A cell as YAML would read it: a number, or text.
 fn value(text: &str) -> Value {
     if let Ok(whole) = text.parse::<u64>() {
@@ -205,10 +228,14 @@ mod tests {
     fn mistakes_say_their_line() {
         for (text, expected) in [
             ("name,x\nA,1\n", "no column is called `serial_number`"),
-            ("serial_number,x,x\nA,1,2\n", "the column `x` appears twice"),
-            ("serial_number,x\nA,1\nA,2\n", "line 3: the machine A appears twice"),
-            ("serial_number,x\nA,1\n,2\n", "line 3: the machine has no `serial_number`"),
-            ("serial_number,x\nA,1,2\n", "line: 2"),
+            (
+                "# of May\nserial_number,x,x\nA,1,2\n",
+                "the column `x` appears twice\n2 | serial_number,x,x\n  |                 ^",
+            ),
+            ("x;serial_number\n1;A\n2;A\n", "line 3: the machine A appears twice\n3 | 2;A\n  |   ^"),
+            ("serial_number,x\nA,1\n,2\n", "line 3: the machine has no `serial_number`\n3 | ,2\n  | ^"),
+            ("serial_number,x\nA,1,2\n", "line 2: 3 cells below a header of 2\n2 | A,1,2\n  |     ^"),
+            ("serial_number,x,y\nA,1\n", "line 2: 2 cells below a header of 3\n2 | A,1\n  |    ^"),
             ("serial_number,x\n", "no machine stands below the header"),
             ("", "no column is called `serial_number`"),
         ] {

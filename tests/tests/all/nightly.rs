@@ -164,6 +164,17 @@ fn two_nights_at_once_are_both_kept() {
     let db = scratch.path().join("history.db");
     let listed = mapper(["history", "--json", "--db", db.to_str().unwrap()]).exits(0).json();
     assert_eq!(listed["runs"].as_array().unwrap().len(), 4);
+    // A night with other seeds misses the runs of these, and is no first night.
+    let nightly = scratch.path().join("nightly.yaml");
+    let other = std::fs::read_to_string(&nightly).unwrap().replace("seeds: [1]", "seeds: [2]");
+    std::fs::write(&nightly, other).unwrap();
+    let other = night(scratch.path(), &[]).exits(7);
+    assert!(
+        other.stdout.contains("missing  small") && other.stdout.contains("dynamic seed 1:"),
+        "{}",
+        other.stdout
+    );
+    assert!(!other.stdout.contains("first night"), "{}", other.stdout);
 }
 
 #[test]

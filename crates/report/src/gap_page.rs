@@ -267,7 +267,7 @@ fn heat_cell(done: &Diagnosed, residual: &[f64], step: usize, output: usize) -> 
 
 /// Measured minus predicted over time, before and after, for the four channels with the largest gap.
 fn traces(done: &Diagnosed) -> String {
-    let Some((_, best)) = &done.with_cause else { return String::new() };
+    let Some((what, best)) = &done.with_cause else { return String::new() };
     let energy = |output: usize| {
         let groups = done.study.groups.iter().filter(|g| g.output == output);
         groups.flat_map(|g| &done.without_cause.1[g.rows.clone()]).map(|r| r * r).sum::<f64>()
@@ -293,7 +293,7 @@ fn traces(done: &Diagnosed) -> String {
                 Line::new(points(&done.without_cause.0.values), palette::VERMILLION)
                     .label("without the cause"),
             )
-            .with(Line::new(points(&best.prediction.values), palette::BLUE).label("with the first cause"));
+            .with(Line::new(points(&best.prediction.values), palette::BLUE).label(format!("with {what}")));
         figure = figure.panel(panel);
     }
     figure.to_svg()

@@ -66,12 +66,12 @@ fn headline(found: &Diagnosis) -> String {
     match found.word {
         Word::Named => format!(
             "{} explains it ({}).",
-            open.first().map_or_else(String::new, |cause| cause.names.join(" and ")),
+            open.first().map_or_else(String::new, |cause| begun(&cause.names.join(" and "))),
             open.first().map_or_else(String::new, |cause| percent(cause.probability))
         ),
         Word::NotToldApart => format!(
             "{} explain it alike and are not told apart.",
-            open.iter().map(|cause| cause.names.join(" and ")).collect::<Vec<_>>().join("; or ")
+            begun(&open.iter().map(|cause| cause.names.join(" and ")).collect::<Vec<_>>().join("; or "))
         ),
         Word::NotBorneOut => format!(
             "No cause is named: {} would explain what was fitted, but phases that it did not see get no better.",
@@ -86,6 +86,12 @@ fn headline(found: &Diagnosis) -> String {
             percent(found.probability_outside)
         ),
     }
+}
+
+/// As a sentence begins.
+fn begun(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn causes(text: &mut String, found: &Diagnosis) {

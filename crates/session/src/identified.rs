@@ -112,7 +112,8 @@ impl Session<'_> {
         beside_truths(&paths, |truths| self.identify_and_score(recorded, map, method, truths))
     }
 
-    fn identify_and_score(
+    /// As [`identify`](Session::identify), with the truths that are being read.
+    pub(crate) fn identify_and_score(
         &self,
         recorded: Vec<Recorded>,
         map: &ChannelMap,

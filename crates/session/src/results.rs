@@ -12,7 +12,7 @@ use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Method, Plan, The
 use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_observe::FusedChannel;
 use mapper_page::{OtherRun, RunPage, run_page};
-use mapper_record::score::{ScoreSummary, ScoredPoint};
+use mapper_record::score::{ScoreSummary, ScoredPoint, beside_truths};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::{ReportSource, RunReport, SurgeReport, gap_part, instant, run_report};
 use serde::Serialize;
@@ -123,19 +123,24 @@ impl Session<'_> {
         directory: &Path,
         parts: &[RunPart],
     ) -> Result<Results, SessionError> {
-        let (mut together, mut remarks) = (Vec::new(), Vec::new());
-        for part in parts {
-            let mut read = read_recording(&part.recording, &ChannelMap::native(), &ReadOptions::default())?;
-            remarks.extend(read.warnings.iter().map(ToString::to_string));
-            if let Some(saved) = &part.saved {
-                read.recording.steps.retain(|step| saved.contains(&step.index));
+        let paths: Vec<PathBuf> = parts.iter().map(|part| part.recording.clone()).collect();
+        let mut remarks = Vec::new();
+        let identified = beside_truths(&paths, |truths| {
+            let mut together = Vec::new();
+            for part in parts {
+                let mut read =
+                    read_recording(&part.recording, &ChannelMap::native(), &ReadOptions::default())?;
+                remarks.extend(read.warnings.iter().map(ToString::to_string));
+                if let Some(saved) = &part.saved {
+                    read.recording.steps.retain(|step| saved.contains(&step.index));
+                }
+                together.push(Recorded::of(part.recording.clone(), read, Some(campaign.clone())));
             }
-            together.push(Recorded::of(part.recording.clone(), read, Some(campaign.clone())));
-        }
-        let mut files = parts.iter().map(|part| part.recording.clone());
+            self.identify_and_score(together, &ChannelMap::native(), None, truths)
+        })?;
+        let mut files = paths.into_iter();
         let recording = files.next().ok_or(SessionError::NoRecording)?;
         let further: Vec<PathBuf> = files.collect();
-        let identified = self.identify(together, &ChannelMap::native(), None)?;
         let told = Told {
             campaign: Some(campaign.clone()),
             plan: Some(plan.clone()),

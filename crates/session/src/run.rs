@@ -1,5 +1,6 @@
 //! A whole run: plan, drive the rig, record, identify, assemble, report.
 
+use crate::aside::Aside;
 use crate::certainty::DwellPrices;
 use crate::declared::identification;
 use crate::drive::{Pace, drive_paced, soak_s};
@@ -33,7 +34,8 @@ use mapper_core::{Clock, Plan, RigDescription, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
 use mapper_runner::{
-    Deadlined, Deadlines, PlanSteps, RunObserver, StepSource, StepSourceError, SurgeSearch, UntilCertain,
+    Deadlined, Deadlines, PlanSteps, RunError, RunObserver, StepSource, StepSourceError, SurgeSearch,
+    UntilCertain,
 };
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -334,7 +336,7 @@ impl PreparedRun<'_> {
     fn drive_and_record(
         &mut self,
         session: &Session<'_>,
-        mut recorder: Recorder,
+        recorder: Recorder,
         pace: Pace<'_>,
     ) -> (Ended, Result<(), SessionError>, Option<String>) {
         let mut planned = PlanSteps::new(&self.plan);
@@ -399,9 +401,10 @@ impl PreparedRun<'_> {
             duration_s: soak_s(campaign) + self.plan.duration_s(),
         };
         let (model, backend) = (&self.model, self.sources.backend.as_mut());
-        let ((end, held, later_s), drifted) = std::thread::scope(|scope| {
+        let ((end, held, later_s), drifted, recorder) = std::thread::scope(|scope| {
             let begin = || Estimates::begin(scope, identification(campaign), session.on_event);
             let mut estimates = session.estimates.then(begin);
+            let mut recorder = Aside::begin(scope, recorder, if pace.each_sample { 1 } else { 64 });
             let mut observers: Vec<&mut dyn RunObserver> =
                 vec![&mut recorder, &mut teller, &mut self.steps_made];
             observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
@@ -410,10 +413,14 @@ impl PreparedRun<'_> {
                     drive_paced(campaign, model, steps, backend, &mut observers, pace)
                 })
             };
-            match drift_watch(campaign, steps) {
+            let ((end, held, later_s), drifted) = match drift_watch(campaign, steps) {
                 Ok(mut watch) => (go(&mut watch), watch.ended_by_drift().map(str::to_owned)),
                 Err(steps) => (go(steps), None),
-            }
+            };
+            let (recorder, recorded) = recorder.end();
+            // What could not be written of the very end is told after it.
+            let end = end.and_then(|end| recorded.map(|()| end).map_err(RunError::from));
+            ((end, held, later_s), drifted, recorder)
         });
         self.steps_made.go_on(held, later_s);
         self.replanned = replanned.map(|replanned| replanned.handed_out());

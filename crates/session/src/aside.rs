@@ -1,0 +1,196 @@
+//! An observer on a thread of its own: a disk that stalls for a moment holds up neither the rig nor its guards.
+
+use mapper_core::{Event, SampleBatch, StepMarker};
+use mapper_runner::{ObserverError, RunObserver};
+use std::panic::resume_unwind;
+use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
+use std::thread::{Scope, ScopedJoinHandle};
+
+/// Rounds that may wait for the observer. Beyond them the run waits, and nothing is lost.
+const WAITING_MAX: usize = 8;
+
+/// What an observer is told.
+enum Told {
+    StepStart(StepMarker),
+    Batch(SampleBatch),
+    Event(Event),
+    StepAbandoned(StepMarker),
+    StepEnd(StepMarker),
+    StepHeld(StepMarker),
+}
+
+/// The observer takes no more.
+#[derive(Debug, thiserror::Error)]
+#[error("nothing is recorded any more, after an error that was told before")]
+struct Gone;
+
+/// Passes what it is told on to an observer elsewhere, in order, until that one fails. Its error is told by the next call; after
+/// that every call fails.
+pub(crate) struct Aside<'scope, O> {
+    /// What is handed over with the next round.
+    round: Vec<Told>,
+    round_max: usize,
+    to_thread: SyncSender<Vec<Told>>,
+    thread: ScopedJoinHandle<'scope, O>,
+    failed: Receiver<ObserverError>,
+}
+
+impl<'scope, O: RunObserver + Send + 'scope> Aside<'scope, O> {
+    /// Begins. `round_max`, 1 at least: what is handed over at a time; 1 where the observer is to see all at once, more where
+    /// time is simulated and waking a thread for each second of it would take longer than the second.
+    pub(crate) fn begin<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O, round_max: usize) -> Self {
+        let (to_thread, told) = sync_channel::<Vec<Told>>(WAITING_MAX);
+        let (fail, failed) = channel();
+        let thread = scope.spawn(move || {
+            // The error is there before the end of the thread shows.
+            if let Err(error) = told.iter().flatten().try_for_each(|told| observe(&mut observer, told)) {
+                let _ = fail.send(error);
+            }
+            observer
+        });
+        Aside { round: Vec::new(), round_max, to_thread, thread, failed }
+    }
+
+    /// Waits until the observer has seen everything, and gives it back, with its error where no call has told that.
+    pub(crate) fn end(mut self) -> (O, Result<(), ObserverError>) {
+        // Where the thread has gone, its error is there.
+        let _ = self.to_thread.send(std::mem::take(&mut self.round));
+        drop(self.to_thread);
+        let observer = self.thread.join().unwrap_or_else(|panicked| resume_unwind(panicked));
+        (observer, self.failed.try_recv().map_or(Ok(()), Err))
+    }
+}
+
+impl<O> Aside<'_, O> {
+    fn tell(&mut self, told: Told) -> Result<(), ObserverError> {
+        self.round.push(told);
+        if self.round.len() < self.round_max {
+            return Ok(());
+        }
+        match self.to_thread.send(std::mem::take(&mut self.round)) {
+            Ok(()) => Ok(()),
+            Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::of(Gone))),
+        }
+    }
+}
+
+fn observe(observer: &mut impl RunObserver, told: Told) -> Result<(), ObserverError> {
+    match told {
+        Told::StepStart(marker) => observer.on_step_start(&marker),
+        Told::Batch(batch) => observer.on_batch(&batch),
+        Told::Event(event) => observer.on_event(&event),
+        Told::StepAbandoned(marker) => observer.on_step_abandoned(&marker),
+        Told::StepEnd(marker) => observer.on_step_end(&marker),
+        Told::StepHeld(marker) => observer.on_step_held(&marker),
+    }
+}
+
+impl<O> RunObserver for Aside<'_, O> {
+    fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.tell(Told::StepStart(*marker))
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        self.tell(Told::Batch(batch.clone()))
+    }
+
+    fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
+        self.tell(Told::Event(event.clone()))
+    }
+
+    fn on_step_abandoned(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.tell(Told::StepAbandoned(*marker))
+    }
+
+    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.tell(Told::StepEnd(*marker))
+    }
+
+    fn on_step_held(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.tell(Told::StepHeld(*marker))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::EventKind;
+    use std::io;
+    use std::thread::scope;
+
+    /// Counts what it is told, and fails at a certain count.
+    struct Counts {
+        told: Vec<f64>,
+        fails_at: usize,
+    }
+
+    impl RunObserver for Counts {
+        fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
+            if self.told.len() == self.fails_at {
+                return Err(ObserverError::of(io::Error::from(io::ErrorKind::StorageFull)));
+            }
+            self.told.push(event.t_s);
+            Ok(())
+        }
+    }
+
+    fn event(t_s: f64) -> Event {
+        Event { t_s, kind: EventKind::Note, message: String::new() }
+    }
+
+    #[test]
+    fn all_is_seen_in_order_before_the_end() {
+        let times: Vec<f64> = (0..1000).map(f64::from).collect();
+        for round_max in [1, 7, 1000, 2000] {
+            let (observer, error) = scope(|scope| {
+                let counts = Counts { told: Vec::new(), fails_at: usize::MAX };
+                let mut aside = Aside::begin(scope, counts, round_max);
+                times.iter().for_each(|t_s| aside.on_event(&event(*t_s)).unwrap());
+                aside.end()
+            });
+            assert_eq!(observer.told, times, "{round_max}");
+            error.unwrap();
+        }
+    }
+
+    /// Wherever it fails, the error is told once, and nothing that is told later passes for seen.
+    #[test]
+    fn an_error_is_told_and_nothing_after_it_passes() {
+        for fails_at in [0, 1, 50, 99] {
+            let (observer, errors) = scope(|scope| {
+                let mut aside = Aside::begin(scope, Counts { told: Vec::new(), fails_at }, 1);
+                let told: Vec<_> = (0..100).map(|t_s| aside.on_event(&event(f64::from(t_s)))).collect();
+                let (observer, untold) = aside.end();
+                let errors = told.into_iter().chain([untold]).skip_while(Result::is_ok).collect::<Vec<_>>();
+                (observer, errors)
+            });
+            assert_eq!(observer.told.len(), fails_at);
+            let full = io::Error::from(io::ErrorKind::StorageFull).to_string();
+            let [first, later @ ..] = errors.as_slice() else { panic!("no error") };
+            assert_eq!(first.as_ref().unwrap_err().to_string(), full, "{fails_at}");
+            // The end has nothing to say where a call has said it.
+            if let [calls @ .., end] = later {
+                assert!(calls.iter().all(Result::is_err) && end.is_ok(), "{fails_at}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_observer_that_panics_is_not_written_on() {
+        struct Panics;
+        impl RunObserver for Panics {
+            fn on_event(&mut self, _event: &Event) -> Result<(), ObserverError> {
+                panic!("on purpose")
+            }
+        }
+        let ended = std::panic::catch_unwind(|| {
+            scope(|scope| {
+                let mut aside = Aside::begin(scope, Panics, 1);
+                let refused = (0..1000).any(|t_s| aside.on_event(&event(f64::from(t_s))).is_err());
+                assert!(refused, "a thousand events for nobody");
+                aside.end().1
+            })
+        });
+        assert_eq!(ended.unwrap_err().downcast_ref::<&str>(), Some(&"on purpose"));
+    }
+}

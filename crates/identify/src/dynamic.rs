@@ -10,6 +10,7 @@ use crate::samples::Samples;
 use crate::window;
 use crate::{IdentifyConfig, commands, width};
 use mapper_core::{EstimateUncertainty, Recording, Window};
+use mapper_numerics::parallel;
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 
 /// Isentropic temperature rise over inlet temperature below which there is nothing to compress.
@@ -42,17 +43,21 @@ pub(crate) struct Estimate {
     pub(crate) dtc_k: Option<f64>,
 }
 
-/// Identifies each step that has a state; the others get nothing.
-pub(crate) fn alone<S, E>(
+/// Identifies each step that has a state, with what speaks against it; the others get nothing.
+pub(crate) fn alone<S: Sync, E: Sync>(
     recording: &Recording,
     states: &[Result<S, E>],
     config: &IdentifyConfig,
-) -> Vec<Estimate> {
-    let of = |(position, state): (usize, &Result<S, E>)| match state {
-        Ok(_) => estimate(recording, position, config, &mut Findings::new()),
-        Err(_) => Estimate::default(),
+) -> (Vec<Estimate>, Vec<Findings>) {
+    let positions: Vec<usize> = (0..states.len()).collect();
+    let of = |position: &usize| {
+        let mut own = Findings::new();
+        match &states[*position] {
+            Ok(_) => (estimate(recording, *position, config, &mut own), own),
+            Err(_) => (Estimate::default(), own),
+        }
     };
-    states.iter().enumerate().map(of).collect()
+    parallel::map(&positions, of).into_iter().unzip()
 }
 
 /// Identifies the step at `position`.

@@ -142,10 +142,10 @@ fn identified(
             Ok(state)
         })
         .collect();
-    let alone = if recording.require(Channel::Tc).is_ok() {
+    let (alone, told) = if recording.require(Channel::Tc).is_ok() {
         dynamic::alone(recording, &states, config)
     } else {
-        Vec::new()
+        Default::default()
     };
     let objections = objections(recording, &alone, config, nominal);
     let (mut thermal, mut two_parameter) = (None, Vec::new());
@@ -157,18 +157,21 @@ fn identified(
                 && (0..known.len())
                     .all(|step| objections.iter().any(|objection| objection.steps.contains(&step)));
             let known = without_the_refused(known, &objections, &mut findings);
-            let joint = joint::estimate(recording, &known, config, condemned, &mut findings);
+            let joint = joint::estimate(recording, &known, (alone, told), config, condemned, &mut findings);
             thermal = joint.thermal;
             two_parameter = joint.two_parameter;
             joint.estimates
         }
-        method => findings
+        Method::Dynamic | Method::Imported => {
+            findings.iter_mut().zip(told).for_each(|(findings, told)| findings.take(told));
+            alone
+        }
+        Method::Steady => findings
             .iter_mut()
             .enumerate()
-            .map(|(position, findings)| match (&states[position], method) {
-                (Err(_), _) => Estimate::default(),
-                (Ok(_), Method::Steady) => steady::estimate(recording, position, config, findings),
-                (Ok(_), _) => dynamic::estimate(recording, position, config, findings),
+            .map(|(position, findings)| match &states[position] {
+                Err(_) => Estimate::default(),
+                Ok(_) => steady::estimate(recording, position, config, findings),
             })
             .collect(),
     };

@@ -103,6 +103,11 @@ impl Unpacker {
     }
 }
 
+/// What a chunk claims to unpack to, bytes; `None` where its header is incomplete.
+pub(crate) fn claimed_bytes(body: &[u8]) -> Option<u64> {
+    Some(parse_header(body)?.0)
+}
+
 /// Uncompressed size, checksum, compression, data.
 fn parse_header(body: &[u8]) -> Option<(u64, u32, &[u8], &[u8])> {
     let mut body = Body(body);

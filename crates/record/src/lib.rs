@@ -8,6 +8,7 @@
 //! saved is returned beside a list of [`ReadWarning`]s.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod batch;
 mod channel_map;
 mod channel_map_schema;
 mod channel_map_yaml;
@@ -33,6 +34,7 @@ mod scan;
 mod schema;
 pub mod score;
 mod series_builder;
+mod sink;
 mod steps;
 mod steps_found;
 mod topics;
@@ -47,7 +49,7 @@ pub use error::{BadBatch, RecordError};
 pub use format::FormatVersion;
 pub use mapper_yaml::Findings;
 pub use mapper_yaml::units::{Kind, Unit, UnitError};
-pub use read::{ReadReport, read_recording, read_recording_from};
+pub use read::{ReadReport, read_recording, read_recording_from, read_steps};
 pub use read_options::ReadOptions;
 pub use recording_file::RecordingHeader;
 pub use topics::{StepPhase, Topic, event_message, readings_message, step_message};

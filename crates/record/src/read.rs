@@ -64,6 +64,16 @@ pub fn read_recording(
     }
 }
 
+/// Reads the steps of a recording of this program by their marks, and nothing else: one that has no end, and no step after it, ends
+/// where it begins.
+///
+/// # Errors
+/// As [`read_recording`].
+pub fn read_steps(path: &Path, options: &ReadOptions) -> Result<Vec<StepMarker>, RecordError> {
+    let map = ChannelMap { channels: BTreeMap::new(), elements: BTreeMap::new(), ..ChannelMap::native() };
+    Ok(read(path, &map, options, &|| open(path))?.recording.steps)
+}
+
 /// Reads a recording from memory; `name` stands for the file in messages. Otherwise as [`read_recording`].
 ///
 /// # Errors
@@ -126,14 +136,15 @@ fn read(
     if let Some(error) = sink.failure.take() {
         return Err(error);
     }
+    let builders = sink.take_builders();
     // A command alone is a chance likeness of names: nothing can be made of a recording without measurements.
-    let measured = sink.builders.keys().any(|reads| reads.channel().info().group != Group::Command);
+    let measured = builders.keys().any(|reads| reads.channel().info().group != Group::Command);
     let has_rig_topics = sink.topic_names.iter().any(|topic| !is_own(topic));
     if !measured && sink.format.is_none() && has_rig_topics {
         let topics = sink.topic_names.into_iter().collect();
         return Err(RecordError::NothingMapped { path: path.to_owned(), topics });
     }
-    report(map, sink, scanned)
+    report(map, sink, builders, scanned)
 }
 
 /// What only logs allow.
@@ -163,21 +174,26 @@ fn is_own(topic: &str) -> bool {
     topic == STEP_TOPIC || topic == EVENT_TOPIC || topic.starts_with(TRUTH_PREFIX)
 }
 
-fn report(map: &ChannelMap, mut sink: RigSink<'_>, scanned: Scanned) -> Result<ReadReport, RecordError> {
+fn report(
+    map: &ChannelMap,
+    mut sink: RigSink<'_>,
+    mut builders: BTreeMap<Reads, SeriesBuilder>,
+    scanned: Scanned,
+) -> Result<ReadReport, RecordError> {
     let mut warnings = scanned.warnings;
     warnings.append(&mut sink.warnings);
     warnings.extend(sink.damaged_messages());
     if !map.is_native() {
-        warnings.extend(missing(map, &sink.builders));
+        warnings.extend(missing(map, &builders));
     }
-    let strays: Vec<(u64, u64)> = sink.builders.values_mut().filter_map(SeriesBuilder::drop_strays).collect();
-    let first_sample_ns = sink.builders.values().filter_map(SeriesBuilder::first_time_ns).min();
+    let strays: Vec<(u64, u64)> = builders.values_mut().filter_map(SeriesBuilder::drop_strays).collect();
+    let first_sample_ns = builders.values().filter_map(SeriesBuilder::first_time_ns).min();
     let zero_ns = sink.start_time_ns.or(first_sample_ns).unwrap_or(0);
     if let Some((_, first_ns)) = strays.first() {
         let count = strays.iter().map(|(count, _)| count).sum();
         warnings.push(ReadWarning::StrayTimes { count, first_s: run_time_s(*first_ns, zero_ns) });
     }
-    let mut gathered = gather(map, sink.builders, zero_ns, None, &mut warnings);
+    let mut gathered = gather(map, builders, zero_ns, None, &mut warnings);
     complete(map, &mut gathered, &sink.units, None)?;
     let steps = if sink.format.is_some() || !sink.steps.is_empty() {
         let markers = sink.steps.into_iter().map(|(log_time_ns, mut message)| {

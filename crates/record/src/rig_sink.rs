@@ -7,8 +7,8 @@ use crate::format::{
 use crate::message::{FieldValue, read_fields};
 use crate::provenance::{OriginMessage, read_origins};
 use crate::records::ChannelDefinition;
-use crate::scan::Sink;
 use crate::series_builder::SeriesBuilder;
+use crate::sink::Sink;
 use crate::steps::StepMessage;
 use crate::{ChannelMap, FormatVersion, ReadWarning, RecordError};
 use mapper_core::Event;
@@ -18,10 +18,34 @@ use std::path::Path;
 
 /// What a topic means to this reader.
 enum Topic {
-    Mapped(MappedTopic),
+    /// With the position of each of its outputs among the series.
+    Mapped(MappedTopic, Vec<usize>),
     Step,
     Event,
     Provenance,
+}
+
+impl Topic {
+    fn name(&self) -> &str {
+        match self {
+            Topic::Mapped(mapped, _) => &mapped.topic,
+            Topic::Step => STEP_TOPIC,
+            Topic::Event => EVENT_TOPIC,
+            Topic::Provenance => PROVENANCE_TOPIC,
+        }
+    }
+}
+
+/// What a message says.
+pub(crate) enum Told {
+    /// A value for each output of its topic, in the units used inside.
+    Samples(Vec<FieldValue>),
+    Step(StepMessage),
+    /// With the bytes of the message, as below.
+    Origins(OriginMessage, usize),
+    Event(Event, usize),
+    /// Nothing that can be read.
+    Damaged,
 }
 
 /// See the module.
@@ -30,7 +54,8 @@ pub(crate) struct RigSink<'a> {
     map: &'a ChannelMap,
     topics: BTreeMap<u16, Topic>,
     pub(crate) topic_names: BTreeSet<String>,
-    pub(crate) builders: BTreeMap<Reads, SeriesBuilder>,
+    /// What is read, in the order in which the file defines it.
+    series: Vec<(Reads, SeriesBuilder)>,
     /// Unit of each field that was mapped.
     pub(crate) units: BTreeMap<Reads, &'static Unit>,
     pub(crate) steps: Vec<(u64, StepMessage)>,
@@ -44,7 +69,6 @@ pub(crate) struct RigSink<'a> {
     pub(crate) warnings: Vec<ReadWarning>,
     pub(crate) failure: Option<RecordError>,
     damaged: BTreeMap<String, u64>,
-    values: Vec<FieldValue>,
     kept: u64,
 }
 
@@ -55,7 +79,7 @@ impl<'a> RigSink<'a> {
             map,
             topics: BTreeMap::new(),
             topic_names: BTreeSet::new(),
-            builders: BTreeMap::new(),
+            series: Vec::new(),
             units: BTreeMap::new(),
             steps: Vec::new(),
             events: Vec::new(),
@@ -68,7 +92,6 @@ impl<'a> RigSink<'a> {
             warnings: Vec::new(),
             failure: None,
             damaged: BTreeMap::new(),
-            values: Vec::new(),
             kept: 0,
         }
     }
@@ -80,12 +103,28 @@ impl<'a> RigSink<'a> {
             .map(|(topic, count)| ReadWarning::DamagedMessages { topic: topic.clone(), count: *count })
     }
 
+    /// The samples of everything that has some.
+    pub(crate) fn take_builders(&mut self) -> BTreeMap<Reads, SeriesBuilder> {
+        std::mem::take(&mut self.series).into_iter().filter(|(_, builder)| !builder.is_empty()).collect()
+    }
+
+    /// Where the samples of a channel or sensor are collected, which several topics may have.
+    fn builder(&mut self, reads: Reads) -> usize {
+        let known = self.series.iter().position(|(known, _)| *known == reads);
+        known.unwrap_or_else(|| {
+            self.series.push((reads, SeriesBuilder::default()));
+            self.series.len() - 1
+        })
+    }
+
     fn mapped(&mut self, definition: &ChannelDefinition) -> Option<Topic> {
         match map_topic(self.path, self.map, definition, &mut self.warnings) {
             Ok(mapped) => {
                 let outputs = mapped.iter().flat_map(|topic| &topic.outputs);
                 self.units.extend(outputs.map(|(_, reads, unit)| (*reads, *unit)));
-                mapped.map(Topic::Mapped)
+                let mapped = mapped?;
+                let builders = mapped.outputs.iter().map(|(_, reads, _)| self.builder(*reads)).collect();
+                Some(Topic::Mapped(mapped, builders))
             }
             Err(error) => {
                 self.failure.get_or_insert(error);
@@ -96,6 +135,8 @@ impl<'a> RigSink<'a> {
 }
 
 impl Sink for RigSink<'_> {
+    type Told = Told;
+
     fn define(&mut self, definition: &ChannelDefinition) {
         self.topic_names.insert(definition.topic.clone());
         let topic = match definition.topic.as_str() {
@@ -113,49 +154,58 @@ impl Sink for RigSink<'_> {
         self.topics.insert(definition.id, topic);
     }
 
-    fn message(&mut self, channel_id: u16, log_time_ns: u64, data: &[u8]) {
-        let whole = match self.topics.get(&channel_id) {
-            None => return,
-            Some(Topic::Mapped(mapped)) => {
-                let whole = read_fields(data, &mapped.fields, &mut self.values);
-                for (index, reads, unit) in mapped.outputs.iter().filter(|_| whole) {
-                    let builder = self.builders.entry(*reads).or_default();
-                    match self.values.get(*index) {
-                        Some(FieldValue::Number(value)) => {
-                            self.kept += 1;
-                            builder.push(log_time_ns, unit.to_inside(*value));
-                        }
-                        Some(FieldValue::Other) => {
-                            self.kept += 1;
+    fn read(&self, channel_id: u16, data: &[u8]) -> Option<Told> {
+        let told = match self.topics.get(&channel_id)? {
+            Topic::Mapped(mapped, _) => {
+                let mut values = Vec::new();
+                read_fields(data, &mapped.fields, &mut values).then(|| {
+                    let inside = |(index, _, unit): &(usize, Reads, &'static Unit)| match values.get(*index) {
+                        Some(FieldValue::Number(value)) => FieldValue::Number(unit.to_inside(*value)),
+                        Some(other) => *other,
+                        None => FieldValue::Absent,
+                    };
+                    Told::Samples(mapped.outputs.iter().map(inside).collect())
+                })
+            }
+            Topic::Step => serde_json::from_slice(data).map(Told::Step).ok(),
+            Topic::Provenance => read_origins(data).map(|origins| Told::Origins(origins, data.len())),
+            Topic::Event => serde_json::from_slice(data).map(|event| Told::Event(event, data.len())).ok(),
+        };
+        Some(told.unwrap_or(Told::Damaged))
+    }
+
+    fn take(&mut self, channel_id: u16, log_time_ns: u64, told: Told) {
+        let Some(topic) = self.topics.get(&channel_id) else { return };
+        match (told, topic) {
+            (Told::Samples(values), Topic::Mapped(_, builders)) => {
+                for (value, builder) in values.iter().zip(builders) {
+                    let Some((_, builder)) = self.series.get_mut(*builder) else { continue };
+                    match value {
+                        FieldValue::Number(value) => builder.push(log_time_ns, *value),
+                        FieldValue::Other => {
                             builder.push(log_time_ns, f64::NAN);
                             builder.not_numbers += 1;
                         }
-                        Some(FieldValue::Absent) | None => {}
+                        FieldValue::Absent => continue,
                     }
+                    self.kept += 1;
                 }
-                if whole { Ok(()) } else { Err(mapped.topic.clone()) }
             }
-            Some(Topic::Step) => {
+            (Told::Step(step), _) => {
                 self.kept += values_of(size_of::<StepMessage>());
-                serde_json::from_slice(data)
-                    .map(|step| self.steps.push((log_time_ns, step)))
-                    .map_err(|_| STEP_TOPIC.to_owned())
+                self.steps.push((log_time_ns, step));
             }
-            Some(Topic::Provenance) => {
-                let origins = read_origins(data);
-                self.kept += values_of(data.len());
-                let whole = origins.ok_or_else(|| PROVENANCE_TOPIC.to_owned());
-                whole.map(|origins| self.origins.push((log_time_ns, origins)))
+            (Told::Origins(origins, bytes), _) => {
+                self.kept += values_of(bytes);
+                self.origins.push((log_time_ns, origins));
             }
-            Some(Topic::Event) => {
-                self.kept += values_of(size_of::<Event>() + data.len());
-                serde_json::from_slice(data)
-                    .map(|event| self.events.push((log_time_ns, event)))
-                    .map_err(|_| EVENT_TOPIC.to_owned())
+            (Told::Event(event, bytes), _) => {
+                self.kept += values_of(size_of::<Event>() + bytes);
+                self.events.push((log_time_ns, event));
             }
-        };
-        if let Err(topic) = whole {
-            *self.damaged.entry(topic).or_default() += 1;
+            (Told::Damaged | Told::Samples(_), topic) => {
+                *self.damaged.entry(topic.name().to_owned()).or_default() += 1;
+            }
         }
     }
 

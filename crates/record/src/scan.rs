@@ -1,11 +1,13 @@
 //! One pass over a recording: finds what can be saved, and hands it on.
 
+use crate::batch::{Batch, Item, Opened};
 use crate::chunk::{ChunkError, Unpacker};
 use crate::framing::{Frame, FrameReader, split_record};
 use crate::records::{
     ChannelDefinition, MAGIC, op, parse_attachment, parse_channel, parse_message, parse_metadata,
     parse_schema,
 };
+use crate::sink::Sink;
 use crate::{DamagedPart, ReadOptions, ReadWarning, RecordError};
 use std::collections::BTreeMap;
 use std::io::{self, Read};
@@ -19,20 +21,6 @@ const DEFINITIONS_LIMIT_BYTES: usize = 64 << 20;
 
 /// Damaged chunks and records that are listed; more are counted.
 const LISTED_DAMAGE: u64 = 100;
-
-/// Takes what a recording holds.
-pub(crate) trait Sink {
-    /// A topic, before its first message.
-    fn define(&mut self, definition: &ChannelDefinition);
-    /// A message on a defined topic.
-    fn message(&mut self, channel_id: u16, log_time_ns: u64, data: &[u8]);
-    /// A metadata record.
-    fn metadata(&mut self, name: String, pairs: BTreeMap<String, String>);
-    /// An attachment.
-    fn attachment(&mut self, name: String, data: &[u8]);
-    /// Values that it keeps by now.
-    fn kept(&self) -> u64;
-}
 
 /// What a pass found apart from what it handed on.
 #[derive(Default)]
@@ -68,12 +56,12 @@ pub(crate) fn scan<S: Sink>(
     Ok((sink, second))
 }
 
-fn pass(
+fn pass<S: Sink>(
     path: &Path,
     open: &dyn Fn() -> io::Result<Box<dyn Read>>,
     options: &ReadOptions,
     known: &BTreeMap<u16, ChannelDefinition>,
-    sink: &mut dyn Sink,
+    sink: &mut S,
 ) -> Result<Scanned, RecordError> {
     let failed = |source| RecordError::Read { path: path.to_owned(), source };
     let mut source = open().map_err(failed)?;
@@ -85,10 +73,17 @@ fn pass(
     known.values().for_each(|definition| sink.define(definition));
     let mut scanned = Scanned { definitions: known.clone(), ..Scanned::default() };
     let mut frames = FrameReader::new(source, MAGIC.len() as u64);
-    let mut unpacker = Unpacker::new();
+    let (mut unpacker, mut batch) = (Unpacker::new(), Batch::default());
     let mut end = MAGIC.len() as u64;
     loop {
-        match frames.next_frame().map_err(failed)? {
+        let frame = frames.next_frame().map_err(failed)?;
+        let joins = matches!(&frame, Frame::Record { opcode: op::CHUNK, body, .. } if Batch::takes(body));
+        // Where the messages of the chunk before lie stands behind it; everything else has its turn after the chunks before it.
+        let index = matches!(&frame, Frame::Record { opcode: op::MESSAGE_INDEX, .. });
+        if !(joins || index) || batch.is_full() {
+            scanned.batch(&mut batch, options, sink);
+        }
+        match frame {
             Frame::Record { opcode: op::FOOTER, .. } => break,
             // No record has opcode 0: the file goes on in zeros, as it may after a loss of power.
             Frame::Record { offset, opcode: 0, .. } | Frame::Truncated { offset } => {
@@ -98,6 +93,10 @@ fn pass(
             Frame::End => {
                 scanned.warnings.push(ReadWarning::Truncated { offset: end });
                 break;
+            }
+            Frame::Record { offset, opcode: op::CHUNK, body } if joins => {
+                end = offset + 9 + body.len() as u64;
+                batch.push(offset, body);
             }
             Frame::Record { offset, opcode: op::CHUNK, body } => {
                 end = offset + 9 + body.len() as u64;
@@ -145,13 +144,45 @@ impl Scanned {
         fits
     }
 
-    fn chunk(
+    /// Chunks that were read several at a time.
+    fn batch<S: Sink>(&mut self, batch: &mut Batch, options: &ReadOptions, sink: &mut S) {
+        let known = |channel_id| self.definitions.contains_key(&channel_id);
+        for Opened { offset, items } in batch.open(sink, known, options.max_chunk_bytes) {
+            match items {
+                Ok(items) => items.into_iter().for_each(|item| self.item(offset, item, options, sink)),
+                Err(source) => self.damage(ReadWarning::DamagedChunk { offset, source }),
+            }
+        }
+    }
+
+    fn item<S: Sink>(&mut self, offset: u64, item: Item<S::Told>, options: &ReadOptions, sink: &mut S) {
+        match item {
+            Item::Record { opcode, body } => self.record(offset, opcode, &body, options, sink),
+            Item::Cut if self.goes_on(options, sink) => {
+                self.damage(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
+            }
+            Item::Cut => {}
+            Item::Message { channel_id, log_time_ns, told } => {
+                self.records += 1;
+                if let Some(told) = told.filter(|_| self.goes_on(options, sink)) {
+                    sink.take(channel_id, log_time_ns, told);
+                }
+            }
+        }
+    }
+
+    /// Whether there is room for more.
+    fn goes_on(&self, options: &ReadOptions, sink: &impl Sink) -> bool {
+        self.records <= options.max_messages && sink.kept() <= options.max_values
+    }
+
+    fn chunk<S: Sink>(
         &mut self,
         offset: u64,
         body: &[u8],
         options: &ReadOptions,
         unpacker: &mut Unpacker,
-        sink: &mut dyn Sink,
+        sink: &mut S,
     ) {
         let mut rest = match unpacker.unpack(body, options.max_chunk_bytes) {
             Ok(content) => content,
@@ -160,7 +191,7 @@ impl Scanned {
                 return;
             }
         };
-        while !rest.is_empty() && self.records <= options.max_messages && sink.kept() <= options.max_values {
+        while !rest.is_empty() && self.goes_on(options, sink) {
             let Some((opcode, body, after)) = split_record(rest) else {
                 self.damage(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
                 return;
@@ -170,15 +201,15 @@ impl Scanned {
         }
     }
 
-    fn record(&mut self, offset: u64, opcode: u8, body: &[u8], options: &ReadOptions, sink: &mut dyn Sink) {
+    fn record<S: Sink>(&mut self, offset: u64, opcode: u8, body: &[u8], options: &ReadOptions, sink: &mut S) {
         self.records += 1;
-        if self.records > options.max_messages || sink.kept() > options.max_values {
+        if !self.goes_on(options, sink) {
             return;
         }
         let whole = match opcode {
             op::MESSAGE => {
                 parse_message(body).map(|(id, log_time_ns, data)| match self.definitions.contains_key(&id) {
-                    true => sink.message(id, log_time_ns, data),
+                    true => sink.read(id, data).into_iter().for_each(|told| sink.take(id, log_time_ns, told)),
                     false => *self.undefined.entry(id).or_default() += 1,
                 })
             }

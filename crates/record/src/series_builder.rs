@@ -18,6 +18,10 @@ impl SeriesBuilder {
         self.values.push(value);
     }
 
+    pub(crate) fn is_empty(&self) -> bool {
+        self.times_ns.is_empty()
+    }
+
     pub(crate) fn first_time_ns(&self) -> Option<u64> {
         self.times_ns.iter().copied().min()
     }

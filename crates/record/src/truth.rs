@@ -5,8 +5,9 @@ use crate::log_read::is_mcap;
 use crate::message::{FieldValue, read_fields};
 use crate::read::open;
 use crate::records::ChannelDefinition;
-use crate::scan::{Sink, scan};
+use crate::scan::scan;
 use crate::series_builder::run_time_s;
+use crate::sink::Sink;
 use crate::{ReadOptions, ReadWarning, RecordError};
 use mapper_core::TruthColumn;
 use mapper_logs::LogFile;
@@ -62,10 +63,11 @@ struct TruthSink {
     times_ns: Vec<u64>,
     /// Unit and values by name; padded where a message had none.
     columns: BTreeMap<String, (String, Vec<f64>)>,
-    values: Vec<FieldValue>,
 }
 
 impl Sink for TruthSink {
+    type Told = Vec<FieldValue>;
+
     fn define(&mut self, definition: &ChannelDefinition) {
         if definition.topic != TRUTH_TOPIC || definition.encoding != "json" {
             return;
@@ -76,14 +78,16 @@ impl Sink for TruthSink {
         }
     }
 
-    fn message(&mut self, channel_id: u16, log_time_ns: u64, data: &[u8]) {
+    fn read(&self, channel_id: u16, data: &[u8]) -> Option<Vec<FieldValue>> {
+        let (fields, mut values) = (self.fields.get(&channel_id)?, Vec::new());
+        read_fields(data, fields, &mut values).then_some(values)
+    }
+
+    fn take(&mut self, channel_id: u16, log_time_ns: u64, told: Vec<FieldValue>) {
         let Some(fields) = self.fields.get(&channel_id) else { return };
-        if !read_fields(data, fields, &mut self.values) {
-            return;
-        }
         let row = self.times_ns.len();
         self.times_ns.push(log_time_ns);
-        for (field, value) in fields.iter().zip(&self.values) {
+        for (field, value) in fields.iter().zip(&told) {
             if let (Some((_, values)), FieldValue::Number(value)) = (self.columns.get_mut(field), value) {
                 values.resize(row, f64::NAN);
                 values.push(*value);

@@ -6,8 +6,8 @@ use std::panic::resume_unwind;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{Scope, ScopedJoinHandle};
 
-/// Rounds that may wait for the observer. Beyond them the run waits, and nothing is lost.
-const WAITING_MAX: usize = 8;
+/// What may wait for the observer: some seconds of a rig's samples. Beyond them the run waits, and nothing is lost.
+const WAITING_MAX: usize = 32;
 
 /// What an observer is told.
 enum Told {
@@ -27,34 +27,28 @@ struct Gone;
 /// Passes what it is told on to an observer elsewhere, in order, until that one fails. Its error is told by the next call; after
 /// that every call fails.
 pub(crate) struct Aside<'scope, O> {
-    /// What is handed over with the next round.
-    round: Vec<Told>,
-    round_max: usize,
-    to_thread: SyncSender<Vec<Told>>,
+    to_thread: SyncSender<Told>,
     thread: ScopedJoinHandle<'scope, O>,
     failed: Receiver<ObserverError>,
 }
 
 impl<'scope, O: RunObserver + Send + 'scope> Aside<'scope, O> {
-    /// Begins. `round_max`, 1 at least: what is handed over at a time; 1 where the observer is to see all at once, more where
-    /// time is simulated and waking a thread for each second of it would take longer than the second.
-    pub(crate) fn begin<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O, round_max: usize) -> Self {
-        let (to_thread, told) = sync_channel::<Vec<Told>>(WAITING_MAX);
+    /// Begins.
+    pub(crate) fn begin<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O) -> Self {
+        let (to_thread, told) = sync_channel(WAITING_MAX);
         let (fail, failed) = channel();
         let thread = scope.spawn(move || {
             // The error is there before the end of the thread shows.
-            if let Err(error) = told.iter().flatten().try_for_each(|told| observe(&mut observer, told)) {
+            if let Err(error) = told.iter().try_for_each(|told| observe(&mut observer, told)) {
                 let _ = fail.send(error);
             }
             observer
         });
-        Aside { round: Vec::new(), round_max, to_thread, thread, failed }
+        Aside { to_thread, thread, failed }
     }
 
     /// Waits until the observer has seen everything, and gives it back, with its error where no call has told that.
-    pub(crate) fn end(mut self) -> (O, Result<(), ObserverError>) {
-        // Where the thread has gone, its error is there.
-        let _ = self.to_thread.send(std::mem::take(&mut self.round));
+    pub(crate) fn end(self) -> (O, Result<(), ObserverError>) {
         drop(self.to_thread);
         let observer = self.thread.join().unwrap_or_else(|panicked| resume_unwind(panicked));
         (observer, self.failed.try_recv().map_or(Ok(()), Err))
@@ -63,11 +57,7 @@ impl<'scope, O: RunObserver + Send + 'scope> Aside<'scope, O> {
 
 impl<O> Aside<'_, O> {
     fn tell(&mut self, told: Told) -> Result<(), ObserverError> {
-        self.round.push(told);
-        if self.round.len() < self.round_max {
-            return Ok(());
-        }
-        match self.to_thread.send(std::mem::take(&mut self.round)) {
+        match self.to_thread.send(told) {
             Ok(()) => Ok(()),
             Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::of(Gone))),
         }
@@ -111,6 +101,32 @@ impl<O> RunObserver for Aside<'_, O> {
     }
 }
 
+/// An observer here or aside.
+pub(crate) enum Placed<'scope, O> {
+    /// Where time is simulated: nothing can be late, and handing each second of it over would take longer than the second.
+    Here(O),
+    /// Beside a rig.
+    Aside(Aside<'scope, O>),
+}
+
+impl<'scope, O: RunObserver + Send + 'scope> Placed<'scope, O> {
+    /// The observer in its place.
+    pub(crate) fn observer(&mut self) -> &mut dyn RunObserver {
+        match self {
+            Placed::Here(observer) => observer,
+            Placed::Aside(aside) => aside,
+        }
+    }
+
+    /// As [`Aside::end`].
+    pub(crate) fn end(self) -> (O, Result<(), ObserverError>) {
+        match self {
+            Placed::Here(observer) => (observer, Ok(())),
+            Placed::Aside(aside) => aside.end(),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -141,16 +157,13 @@ mod tests {
     #[test]
     fn all_is_seen_in_order_before_the_end() {
         let times: Vec<f64> = (0..1000).map(f64::from).collect();
-        for round_max in [1, 7, 1000, 2000] {
-            let (observer, error) = scope(|scope| {
-                let counts = Counts { told: Vec::new(), fails_at: usize::MAX };
-                let mut aside = Aside::begin(scope, counts, round_max);
-                times.iter().for_each(|t_s| aside.on_event(&event(*t_s)).unwrap());
-                aside.end()
-            });
-            assert_eq!(observer.told, times, "{round_max}");
-            error.unwrap();
-        }
+        let (observer, error) = scope(|scope| {
+            let mut aside = Aside::begin(scope, Counts { told: Vec::new(), fails_at: usize::MAX });
+            times.iter().for_each(|t_s| aside.on_event(&event(*t_s)).unwrap());
+            aside.end()
+        });
+        assert_eq!(observer.told, times);
+        error.unwrap();
     }
 
     /// Wherever it fails, the error is told once, and nothing that is told later passes for seen.
@@ -158,7 +171,7 @@ mod tests {
     fn an_error_is_told_and_nothing_after_it_passes() {
         for fails_at in [0, 1, 50, 99] {
             let (observer, errors) = scope(|scope| {
-                let mut aside = Aside::begin(scope, Counts { told: Vec::new(), fails_at }, 1);
+                let mut aside = Aside::begin(scope, Counts { told: Vec::new(), fails_at });
                 let told: Vec<_> = (0..100).map(|t_s| aside.on_event(&event(f64::from(t_s)))).collect();
                 let (observer, untold) = aside.end();
                 let errors = told.into_iter().chain([untold]).skip_while(Result::is_ok).collect::<Vec<_>>();
@@ -185,7 +198,7 @@ mod tests {
         }
         let ended = std::panic::catch_unwind(|| {
             scope(|scope| {
-                let mut aside = Aside::begin(scope, Panics, 1);
+                let mut aside = Aside::begin(scope, Panics);
                 let refused = (0..1000).any(|t_s| aside.on_event(&event(f64::from(t_s))).is_err());
                 assert!(refused, "a thousand events for nobody");
                 aside.end().1

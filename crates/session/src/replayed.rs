@@ -5,7 +5,9 @@
 
 use crate::SessionError;
 use crate::resume::{AGAIN_FROM, BrokenOff};
-use mapper_core::{ChannelColumn, ElementColumn, PlanStep, Recording, SampleBatch, StepKind, StepMarker};
+use mapper_core::{
+    ChannelColumn, ElementColumn, Event, PlanStep, Recording, SampleBatch, Series, StepKind, StepMarker,
+};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_runner::{RunEnd, RunError, StepSource, StepSourceError};
 
@@ -232,6 +234,8 @@ struct Pieces {
     recording: Recording,
     /// Times of all channels.
     t_s: Vec<f64>,
+    /// Where each series stands.
+    cursors: Vec<usize>,
     /// Samples and events told.
     done: usize,
     events_done: usize,
@@ -245,11 +249,18 @@ impl Pieces {
             *t_s += later_s;
         }
         recording.events.iter_mut().for_each(|event| event.t_s += later_s);
-        let series = recording.series.values().chain(recording.elements.values());
-        let mut t_s: Vec<f64> = series.flat_map(|series| series.t_s.iter().copied()).collect();
+        // Most channels are sampled together.
+        let mut clocks: Vec<&[f64]> = Vec::new();
+        for series in recording.series.values().chain(recording.elements.values()) {
+            if !clocks.contains(&series.t_s.as_slice()) {
+                clocks.push(&series.t_s);
+            }
+        }
+        let mut t_s = clocks.concat();
         t_s.sort_by(f64::total_cmp);
         t_s.dedup();
-        Pieces { recording, t_s, done: 0, events_done: 0, until_s: later_s }
+        let cursors = vec![0; recording.series.len() + recording.elements.len()];
+        Pieces { recording, t_s, cursors, done: 0, events_done: 0, until_s: later_s }
     }
 
     /// Tells all up to a time, a second at a time.
@@ -260,27 +271,37 @@ impl Pieces {
             let end_s = piece_s + ROUNDED_S;
             let to = self.t_s.partition_point(|t_s| *t_s <= end_s).max(self.done);
             let t_s = self.t_s.get(self.done..to).unwrap_or_default().to_vec();
-            let values = |series: &mapper_core::Series| -> Vec<f64> {
-                t_s.iter()
-                    .map(|t_s| match series.t_s.binary_search_by(|own_s| own_s.total_cmp(t_s)) {
-                        Ok(at) => series.values.get(at).copied().unwrap_or(f64::NAN),
-                        Err(_) => f64::NAN,
-                    })
-                    .collect()
+            // Each series is gone through once, for all pieces together.
+            let values = |(series, at): (&Series, &mut usize)| -> Vec<f64> {
+                let value = |t_s: &f64| {
+                    while series.t_s.get(*at).is_some_and(|own_s| own_s < t_s) {
+                        *at += 1;
+                    }
+                    let here = series.t_s.get(*at) == Some(t_s);
+                    series.values.get(*at).copied().filter(|_| here).unwrap_or(f64::NAN)
+                };
+                t_s.iter().map(value).collect()
             };
-            let columns = self.recording.series.iter();
-            let elements = self.recording.elements.iter();
-            let due = |event: &mapper_core::Event| event.t_s <= end_s;
+            let mut cursors = self.cursors.iter_mut();
+            let columns = self.recording.series.iter().zip(cursors.by_ref());
+            let columns = columns.map(|((channel, series), at)| ChannelColumn {
+                channel: *channel,
+                values: values((series, at)),
+            });
+            let columns = columns.collect();
+            let elements = self.recording.elements.iter().zip(cursors);
+            let elements = elements.map(|((element, series), at)| ElementColumn {
+                element: *element,
+                values: values((series, at)),
+            });
+            let elements = elements.collect();
+            let due = |event: &Event| event.t_s <= end_s;
             let events_to = self.recording.events.partition_point(due).max(self.events_done);
             let events = self.recording.events.get(self.events_done..events_to).unwrap_or_default().to_vec();
             let batch = SampleBatch {
                 first_sequence: self.done as u64,
-                columns: columns
-                    .map(|(channel, series)| ChannelColumn { channel: *channel, values: values(series) })
-                    .collect(),
-                elements: elements
-                    .map(|(element, series)| ElementColumn { element: *element, values: values(series) })
-                    .collect(),
+                columns,
+                elements,
                 events,
                 t_s,
                 ..SampleBatch::default()

@@ -4,7 +4,7 @@ use crate::journal::{Identity, JournalPart, read_journal};
 use crate::{SessionError, run_directory};
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, PlanStep, StepKind, StepMarker};
-use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_record::{ReadOptions, read_steps};
 use mapper_runner::{StepSource, StepSourceError};
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
@@ -63,9 +63,9 @@ impl BrokenOff {
             return Ok(());
         };
         let path = self.directory.join(&part.recording);
-        let read = read_recording(&path, &ChannelMap::native(), &ReadOptions::default())?;
+        let steps = read_steps(&path, &ReadOptions::default())?;
         let holds = |step: &&StepMarker| step.index < AGAIN_FROM && part.saved.contains(&step.index);
-        let held: Vec<StepMarker> = read.recording.steps.iter().filter(holds).copied().collect();
+        let held: Vec<StepMarker> = steps.iter().filter(holds).copied().collect();
         let speed = |step: &StepMarker| step.to.map(|to| to.speed_rpm.to_bits());
         let line = held.last().and_then(speed);
         let sought = |step: &&StepMarker| step.kind == StepKind::Approach && speed(step) == line;
@@ -83,13 +83,13 @@ impl BrokenOff {
         let mut saved = BTreeSet::new();
         for part in &self.parts {
             let path = self.directory.join(&part.recording);
-            let read = read_recording(&path, &ChannelMap::native(), &ReadOptions::default())?;
+            let steps = read_steps(&path, &ReadOptions::default())?;
             // A step before the first missing one is made once more by a run that goes on.
             let holds = |step: &&StepMarker| {
                 part.saved.contains(&step.index)
                     && !(step.kind == StepKind::Repeat && step.index >= plan.steps.len())
             };
-            for marker in read.recording.steps.iter().filter(holds) {
+            for marker in steps.iter().filter(holds) {
                 let same = |step: &&PlanStep| {
                     Some(step.to) == marker.to && step.kind == marker.kind && !saved.contains(&step.index)
                 };

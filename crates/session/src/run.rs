@@ -1,6 +1,6 @@
 //! A whole run: plan, drive the rig, record, identify, assemble, report.
 
-use crate::aside::Aside;
+use crate::aside::{Aside, Placed};
 use crate::certainty::DwellPrices;
 use crate::declared::identification;
 use crate::drive::{Pace, drive_paced, soak_s};
@@ -404,9 +404,12 @@ impl PreparedRun<'_> {
         let ((end, held, later_s), drifted, recorder) = std::thread::scope(|scope| {
             let begin = || Estimates::begin(scope, identification(campaign), session.on_event);
             let mut estimates = session.estimates.then(begin);
-            let mut recorder = Aside::begin(scope, recorder, if pace.each_sample { 1 } else { 64 });
+            let mut recorder = match pace.each_sample {
+                true => Placed::Aside(Aside::begin(scope, recorder)),
+                false => Placed::Here(recorder),
+            };
             let mut observers: Vec<&mut dyn RunObserver> =
-                vec![&mut recorder, &mut teller, &mut self.steps_made];
+                vec![recorder.observer(), &mut teller, &mut self.steps_made];
             observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
             let go = |steps: &mut dyn StepSource| {
                 going_on(told_again, steps, |steps| {

@@ -29,7 +29,7 @@ pub(crate) mod start;
 pub(crate) mod surface;
 pub(crate) mod worth;
 
-use crate::dynamic::{self, Estimate};
+use crate::dynamic::Estimate;
 use crate::end_state::EndState;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{FLOW_GAIN, OFFSETS, PROBE_MM2, SHARED};
@@ -63,34 +63,27 @@ pub(crate) struct Joint {
     pub(crate) two_parameter: Vec<TwoParameter>,
 }
 
-/// Identifies all steps. `end_states` and `findings`: one for each step; no end state, no estimate. `condemned`: the readings are
+/// Identifies all steps. `end_states` and `findings`: one for each step; no end state, no estimate. `alone`: each step by
+/// itself, with what speaks against it. `condemned`: the readings are
 /// refused already, so it is of no use to look for what else they may be.
 pub(crate) fn estimate(
     recording: &Recording,
     end_states: &[Option<EndState>],
+    alone: (Vec<Estimate>, Vec<Findings>),
     config: &IdentifyConfig,
     condemned: bool,
     findings: &mut [Findings],
 ) -> Joint {
+    let (alone, told) = alone;
     let mut two_parameter = Vec::new();
-    let alone: Vec<Estimate> = recording
-        .steps
-        .iter()
-        .enumerate()
-        .map(|(position, step)| {
-            let mut own = Findings::new();
-            let estimate = dynamic::estimate(recording, position, config, &mut own);
-            if let (Some((eta, Some(error))), true) = (estimate.eta, own.verdict != Verdict::Unusable) {
-                let (eta_low, eta_high) = confidence_interval_95(eta, error.combined_standard_error());
-                two_parameter.push(TwoParameter { step: step.index, eta, eta_low, eta_high });
-            }
-            if config.joint == JointSettings::all_off() {
-                findings[position].take(own);
-            }
-            estimate
-        })
-        .collect();
+    for ((step, estimate), own) in recording.steps.iter().zip(&alone).zip(&told) {
+        if let (Some((eta, Some(error))), true) = (estimate.eta, own.verdict != Verdict::Unusable) {
+            let (eta_low, eta_high) = confidence_interval_95(eta, error.combined_standard_error());
+            two_parameter.push(TwoParameter { step: step.index, eta, eta_low, eta_high });
+        }
+    }
     if config.joint == JointSettings::all_off() {
+        findings.iter_mut().zip(told).for_each(|(findings, told)| findings.take(told));
         return Joint { estimates: alone, thermal: None, two_parameter: Vec::new() };
     }
     let steps = start::steps(recording, end_states, config, findings);

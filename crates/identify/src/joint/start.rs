@@ -21,6 +21,7 @@ use crate::window;
 use crate::{IdentifyConfig, WindowRule, commands};
 use mapper_core::{Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, Window};
 use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
+use mapper_numerics::parallel;
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 use mapper_physics::air;
 
@@ -49,40 +50,60 @@ pub(crate) fn steps(
     config: &IdentifyConfig,
     findings: &mut [Findings],
 ) -> Vec<StepRows> {
+    let states: Vec<(usize, &EndState)> = end_states
+        .iter()
+        .enumerate()
+        .filter_map(|(position, state)| Some((position, state.as_ref()?)))
+        .collect();
+    let found = parallel::map(&states, |(position, state)| {
+        let mut own = Findings::new();
+        (rows_of(recording, *position, state, config, &mut own), own)
+    });
     let mut steps = Vec::new();
-    for (position, step) in recording.steps.iter().enumerate() {
-        let (Some(Some(end_state)), Some(own)) = (end_states.get(position), findings.get_mut(position))
-        else {
-            continue;
-        };
-        let after_s = if config.declared.is_empty() { START_S } else { START_WITH_NOISE_S };
-        let start_s = commands::at_rest_s(recording, step).max(step.start_s) + after_s;
-        let window = Window { start_s, end_s: step.end_s };
-        if start_s.is_nan() || start_s >= step.end_s {
-            let message =
-                format!("the commands changed until {:.1} s before the step's end", step.end_s - start_s);
-            own.refuse(code::TOO_FEW_SAMPLES, message);
-            continue;
+    for ((position, _), (rows, own)) in states.into_iter().zip(found) {
+        if let Some(findings) = findings.get_mut(position) {
+            findings.take(own);
+            steps.extend(rows);
         }
-        let samples = cleaned(Samples::of(recording, window, config, true), config, own);
-        if !dynamic::enough(&samples, config, own) {
-            continue;
-        }
-        if !config.declared.is_empty() {
-            // What varies is followed; but a point is where a step settles.
-            let rest = window::rest(recording, step, &config.settle_bands);
-            let needed_s = WindowRule::rest_at_end_s(step.end_s - step.start_s);
-            if let Some(rest) = rest.filter(|rest| !rest.whole && rest.settled_s < needed_s.floor()) {
-                let message = format!(
-                    "the {} still varies beyond its limit {:.0} s before the step's end (needed: {needed_s:.0} s)",
-                    rest.slowest, rest.settled_s
-                );
-                own.doubt(code::NOT_STABILISED, message);
-            }
-        }
-        steps.extend(condensed(recording, position, &samples, end_state, config));
     }
     steps
+}
+
+/// Condenses one step.
+fn rows_of(
+    recording: &Recording,
+    position: usize,
+    end_state: &EndState,
+    config: &IdentifyConfig,
+    own: &mut Findings,
+) -> Option<StepRows> {
+    let step = recording.steps.get(position)?;
+    let after_s = if config.declared.is_empty() { START_S } else { START_WITH_NOISE_S };
+    let start_s = commands::at_rest_s(recording, step).max(step.start_s) + after_s;
+    let window = Window { start_s, end_s: step.end_s };
+    if start_s.is_nan() || start_s >= step.end_s {
+        let message =
+            format!("the commands changed until {:.1} s before the step's end", step.end_s - start_s);
+        own.refuse(code::TOO_FEW_SAMPLES, message);
+        return None;
+    }
+    let samples = cleaned(Samples::of(recording, window, config, true), config, own);
+    if !dynamic::enough(&samples, config, own) {
+        return None;
+    }
+    if !config.declared.is_empty() {
+        // What varies is followed; but a point is where a step settles.
+        let rest = window::rest(recording, step, &config.settle_bands);
+        let needed_s = WindowRule::rest_at_end_s(step.end_s - step.start_s);
+        if let Some(rest) = rest.filter(|rest| !rest.whole && rest.settled_s < needed_s.floor()) {
+            let message = format!(
+                "the {} still varies beyond its limit {:.0} s before the step's end (needed: {needed_s:.0} s)",
+                rest.slowest, rest.settled_s
+            );
+            own.doubt(code::NOT_STABILISED, message);
+        }
+    }
+    condensed(recording, position, &samples, end_state, config)
 }
 
 /// The fit with its start values.

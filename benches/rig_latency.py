@@ -1,10 +1,13 @@
 """How fast a rig behind a PLC is made safe, seen at the PLC's own door: a relay in front of the server stamps what passes.
 
-    python3 benches/rig_latency.py --bin target/release [--runs 10] [--python target/python-env/bin/python]
+    python3 benches/rig_latency.py --bin target/release [--runs 10] [--python target/python-env/bin/python] [--security basic256_sha256]
 
 Needs mapper, its drivers and mapper-lab-server built in --bin, and the packages of tests/python/requirements.txt for asyncua and pymodbus. For each
 server, ms: from the answer that carries a speed above the guard's limit, to the first command of the way into the safe state; then, on the lab
 server, s: from kill -9 of the runner to that command, and from the return of a server that was killed to its first answered read.
+
+With --security basic256_sha256 OPC UA alone, signed and encrypted: a relay cannot read it, so asyncua stamps inside, before it encrypts the answer and after it has decrypted
+the command. Its own cryptography (in Python) is part of the figure then. `none (inside)`: in the clear, from the same place, to be held against it.
 """
 
 import argparse
@@ -36,13 +39,13 @@ PARTS = [
 GUARD = "guards: {overspeed: {above: 60 krpm, dwell: 0 s}}\n"
 
 
-def campaign(driver, port, directory, guard, security="none"):
+def campaign(driver, port, directory, guard, security):
     text = (ROOT / "campaigns/turbo_a.yaml").read_text()
     guide = (ROOT / "docs/rig.md").read_text().split(f"```yaml\nbackend:\n  {driver}:\n")[1].split("\n```")[0]
     guide = guide.replace(":5020 ", f":{port} ").replace(":4840", f":{port}")
     if driver == "opcua":
         lines = guide.replace("basic256_sha256 ", f"{security} ").splitlines()
-        guide = "\n".join(line for line in lines if "{env:" not in line)
+        guide = "\n".join(line for line in lines if security != "none" or "{env:" not in line)
     for old, new in [*PARTS, ("  virtual_lab: {}", f"  {driver}:\n{guide}")]:
         assert text.count(old) == 1, old
         text = text.replace(old, new)
@@ -53,6 +56,8 @@ def campaign(driver, port, directory, guard, security="none"):
 
 class Relay:
     """Between a driver and its server; keeps (seconds, word, number)."""
+
+    security = "none"
 
     def __init__(self, driver, target):
         self.parse = self.modbus if driver == "modbus" else self.opcua
@@ -119,6 +124,32 @@ class Relay:
         return data
 
 
+class Inside:
+    """asyncua with stamps of its own, which `seen` has as a relay's."""
+
+    def __init__(self, python, directory, security, port=0):
+        self.security, self.seen = security, []
+        secure = [] if security == "none" else ["--secure", str(directory / "server")]
+        script = [python, str(ROOT / "tests/python/opcua_rig.py"), str(port), "--stamps", *secure]
+        self.process = subprocess.Popen(script, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.port = int(self.process.stdout.readline())
+        threading.Thread(target=self.listen, daemon=True).start()
+
+    def listen(self):
+        for line in self.process.stdout:
+            at, word, what = line.split()
+            self.seen.append((float(at), word, float(what) if word == "read" else what))
+
+    def again(self):
+        """What comes from now on."""
+        self.seen = []
+        return self
+
+    def end(self):
+        self.process.kill()
+        self.process.wait()
+
+
 def lab(bins, directory, driver, port=0):
     arguments = [bins / "mapper-lab-server", ROOT / "campaigns/turbo_a.yaml", f"--{driver}", f"127.0.0.1:{port}"]
     arguments += ["--clear"] if driver == "opcua" else []
@@ -133,10 +164,16 @@ def third_party(python, driver):
     return process, int(process.stdout.readline())
 
 
-def run(bins, file, directory):
+def run(bins, driver, watch, directory, guard):
+    """A run whose driver talks to what `watch` watches."""
+    file = campaign(driver, watch.port, directory, guard, watch.security)
     state = directory / f"state-{time.monotonic_ns()}"
+    environment = {**os.environ, "MAPPER_STATE_DIR": str(state), "PLC_USER": "lab", "PLC_PASSWORD": "hunter2"}
+    if watch.security != "none":
+        trust = [str(bins / "mapper-backend-opcua"), "trust", f"opc.tcp://127.0.0.1:{watch.port}"]
+        subprocess.run(trust, check=True, stdout=subprocess.DEVNULL, env=environment)
     return subprocess.Popen([str(bins / "mapper"), "run", str(file), "--out", str(state / "runs")], stdout=subprocess.DEVNULL,
-                            stderr=subprocess.PIPE, text=True, env={**os.environ, "MAPPER_STATE_DIR": str(state)})
+                            stderr=subprocess.PIPE, text=True, env=environment)
 
 
 def wait(relay, holds, what, within_s=90.0):
@@ -152,47 +189,114 @@ def first(seen, word, after=0.0, holds=lambda _: True):
     return next((at for at, kind, number in seen if kind == word and at > after and holds(number)), None)
 
 
-def violation(bins, directory, driver, port):
-    relay = Relay(driver, port)
-    process = run(bins, campaign(driver, relay.port, directory, True), directory)
+def violation(bins, directory, driver, watch):
+    process = run(bins, driver, watch, directory, True)
     try:
-        above = wait(relay, lambda seen: first(seen, "read", holds=lambda rpm: rpm > LIMIT_RPM), "the violation")
-        told = wait(relay, lambda seen: first(seen, "told", above), "the command")
+        above = wait(watch, lambda seen: first(seen, "read", holds=lambda rpm: rpm > LIMIT_RPM), "the violation")
+        told = wait(watch, lambda seen: first(seen, "told", above), "the command")
     finally:
         process.wait()
     return 1e3 * (told - above)
 
 
-def killed(bins, directory, driver, port):
-    relay = Relay(driver, port)
-    process = run(bins, campaign(driver, relay.port, directory, False), directory)
-    wait(relay, lambda seen: first(seen, "read", holds=lambda rpm: rpm > 30e3), "a shaft that turns")
+def killed(bins, directory, driver, watch):
+    process = run(bins, driver, watch, directory, False)
+    wait(watch, lambda seen: first(seen, "read", holds=lambda rpm: rpm > 30e3), "a shaft that turns")
     at = time.monotonic()
     process.send_signal(signal.SIGKILL)
     process.wait()
-    told = wait(relay, lambda seen: first(seen, "told", at), "the command")
-    wait(relay, lambda seen: seen and time.monotonic() - seen[-1][0] > 1.0, "the end of the driver")
+    told = wait(watch, lambda seen: first(seen, "told", at), "the command")
+    silent(watch)
     return told - at
 
 
-def restarted(bins, directory, driver, server, port):
-    relay = Relay(driver, port)
-    process = run(bins, campaign(driver, relay.port, directory, False), directory)
-    wait(relay, lambda seen: first(seen, "read", holds=lambda rpm: rpm > 30e3), "a shaft that turns")
-    server.kill()
-    server.wait()
+def silent(watch):
+    wait(watch, lambda seen: seen and time.monotonic() - seen[-1][0] > 1.0, "the end of the driver")
+
+
+def restarted(bins, directory, driver, watch, kill, start):
+    """`start` gives what watches the server then."""
+    process = run(bins, driver, watch, directory, False)
+    wait(watch, lambda seen: first(seen, "read", holds=lambda rpm: rpm > 30e3), "a shaft that turns")
+    kill()
     time.sleep(0.5)
-    server, _ = lab(bins, directory, driver, port)
+    watch = start()
     at = time.monotonic()
-    back = wait(relay, lambda seen: first(seen, "read", at), "a read")
+    back = wait(watch, lambda seen: first(seen, "read", at), "a read")
     process.send_signal(signal.SIGKILL)
     process.wait()
-    wait(relay, lambda seen: seen and time.monotonic() - seen[-1][0] > 1.0, "the end of the driver")
-    return back - at, server
+    silent(watch)
+    return back - at
 
 
 def row(name, values, unit):
     print(f"| {name} | {statistics.median(values):.1f} | {max(values):.1f} | {unit} | {len(values)} |", flush=True)
+
+
+def in_the_clear(bins, python, directory, runs):
+    fewer = max(1, runs // 2)
+    for driver, other in [("modbus", "pymodbus"), ("opcua", "asyncua")]:
+        server, port = third_party(python, driver)
+        values = [violation(bins, directory, driver, Relay(driver, port)) for _ in range(runs)]
+        row(f"violation to command, {driver}, {other}", values, "ms")
+        server.kill()
+        values = []
+        for _ in range(runs):
+            # Another stand each time, at rest.
+            server, port = lab(bins, directory, driver)
+            values.append(violation(bins, directory, driver, Relay(driver, port)))
+            server.kill()
+        row(f"violation to command, {driver}, lab server", values, "ms")
+        values = []
+        for _ in range(fewer):
+            server, port = lab(bins, directory, driver)
+            values.append(killed(bins, directory, driver, Relay(driver, port)))
+            server.kill()
+        row(f"kill -9 of the runner to command, {driver}, lab server", values, "s")
+        values = []
+        for _ in range(fewer):
+            servers = [lab(bins, directory, driver)]
+            port = servers[0][1]
+            relay = Relay(driver, port)
+
+            def kill():
+                servers[0][0].kill()
+                servers[0][0].wait()
+
+            def start():
+                servers.append(lab(bins, directory, driver, port))
+                return relay
+
+            values.append(restarted(bins, directory, driver, relay, kill, start))
+            servers[1][0].kill()
+        row(f"server back to samples, {driver}, lab server", values, "s")
+
+
+def inside(bins, python, directory, runs, security):
+    """OPC UA by the stamps of asyncua itself."""
+    fewer = max(1, runs // 2)
+    for security in ["none", security]:
+        server = Inside(python, directory, security)
+        name = f"opcua, asyncua, {security} (inside)"
+        row(f"violation to command, {name}", [violation(bins, directory, "opcua", server.again()) for _ in range(runs)], "ms")
+        server.end()
+    values = []
+    for _ in range(fewer):
+        server = Inside(python, directory, security)
+        values.append(killed(bins, directory, "opcua", server))
+        server.end()
+    row(f"kill -9 of the runner to command, {name}", values, "s")
+    values = []
+    for _ in range(fewer):
+        servers = [Inside(python, directory, security)]
+
+        def start():
+            servers.append(Inside(python, directory, security, servers[0].port))
+            return servers[1]
+
+        values.append(restarted(bins, directory, "opcua", servers[0], servers[0].end, start))
+        servers[1].end()
+    row(f"server back to samples, {name}", values, "s")
 
 
 def main():
@@ -200,36 +304,15 @@ def main():
     parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "target/release")
     parser.add_argument("--python", default=sys.executable)
     parser.add_argument("--runs", type=int, default=10)
+    parser.add_argument("--security", choices=["none", "basic256_sha256"], default="none")
     arguments = parser.parse_args()
-    bins, runs = arguments.bin.resolve(), arguments.runs
     print("| | median | largest | | runs |\n|---|---:|---:|---|---:|")
     with tempfile.TemporaryDirectory() as scratch:
-        directory = pathlib.Path(scratch)
-        for driver, other in [("modbus", "pymodbus"), ("opcua", "asyncua")]:
-            server, port = third_party(arguments.python, driver)
-            values = [violation(bins, directory, driver, port) for _ in range(runs)]
-            row(f"violation to command, {driver}, {other}", values, "ms")
-            server.kill()
-            values = []
-            for _ in range(runs):
-                # Another stand each time, at rest.
-                server, port = lab(bins, directory, driver)
-                values.append(violation(bins, directory, driver, port))
-                server.kill()
-            row(f"violation to command, {driver}, lab server", values, "ms")
-            values = []
-            for _ in range(max(1, runs // 2)):
-                server, port = lab(bins, directory, driver)
-                values.append(killed(bins, directory, driver, port))
-                server.kill()
-            row(f"kill -9 of the runner to command, {driver}, lab server", values, "s")
-            values = []
-            for _ in range(max(1, runs // 2)):
-                server, port = lab(bins, directory, driver)
-                value, server = restarted(bins, directory, driver, server, port)
-                values.append(value)
-                server.kill()
-            row(f"server back to samples, {driver}, lab server", values, "s")
+        common = (arguments.bin.resolve(), arguments.python, pathlib.Path(scratch), arguments.runs)
+        if arguments.security == "none":
+            in_the_clear(*common)
+        else:
+            inside(*common, arguments.security)
 
 
 main()

@@ -24,6 +24,7 @@ HEATER_OFF_K = 293.15
 ATMOSPHERE_PA = 105e3
 PATIENCE_S = 20.0  # how long a driver that nobody listens to goes on behind the longest way
 WAITING = 256  # messages for a host that does not read; samples beyond are dropped, which the host sees
+KEPT = 64  # places beyond those for answers and remarks alone: a rig is in doubt as long as its answer has not come
 ROWS = 500  # samples in one message
 
 UNITS = {
@@ -349,7 +350,7 @@ def read_frame(stream):
 
 def serve(name, version, open_rig):
     """Serves one host on standard input and output. open_rig(settings) makes the Rig; the file of the driver is mapper-backend-NAME."""
-    news, to_write = queue.Queue(WAITING), queue.Queue(WAITING)
+    news, to_write = queue.Queue(WAITING), queue.Queue(WAITING + KEPT)
     stdin, stdout = sys.stdin.buffer, sys.stdout.buffer
     sys.stdout = sys.stderr  # a print() of the author must not get between the frames
 
@@ -387,10 +388,12 @@ def serve(name, version, open_rig):
 
     def send():
         for message in server.out:
+            if message.get("method") in ("samples", "lost") and to_write.qsize() >= WAITING:
+                continue  # it will be missed by its number, or comes again
             try:
                 to_write.put_nowait(json.dumps(message, allow_nan=False).encode())
             except queue.Full:
-                pass  # it will be missed: by its number, or by the deadline of who asked
+                pass  # it will be missed by the deadline of who asked
             except Exception as error:  # numpy's numbers, say: json does not know them
                 print(f"not sent: {error!r}; give plain numbers and texts", file=sys.stderr)
         server.out.clear()

@@ -1,11 +1,12 @@
 """The small rig of drivers/python in real time behind asyncua, an OPC UA server that shares no code with the driver.
 
-Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD]] [--seed N]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
+Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD]] [--seed N] [--stamps]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
 reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean). As a PLC has to, it cuts the
 air by itself where the heartbeat stands still. Values that no stand could bear are refused with BadOutOfRange.
 
 With --secure it takes signed and encrypted sessions alone, of the user `lab` with the password `hunter2` if nothing else is said; the certificate is made in the directory
-where there is none yet.
+where there is none yet. With --stamps it prints `SECONDS read RPM` for each speed that it hands out and `SECONDS told NAMES` for each set-point that it
+takes, on the clock of time.monotonic(): behind its decryption, so that a session may be encrypted.
 """
 
 import argparse
@@ -106,6 +107,29 @@ def refuse_what_is_too_much(server, index):
     service.write = checked
 
 
+def stamp(server, index):
+    """What was read and told, when, as the server itself sees it: before it encrypts the answer, after it has decrypted the request."""
+    service = server.iserver.attribute_service
+    read, write = service.read, service.write
+    speed = ua.NodeId("N", index)
+
+    def stamped_read(params):
+        results = read(params)
+        for one, result in zip(params.NodesToRead, results):
+            if one.NodeId == speed and one.AttributeId == ua.AttributeIds.Value:
+                print(f"{time.monotonic():.6f} read {result.Value.Value}", flush=True)
+        return results
+
+    async def stamped_write(params, user):
+        now = time.monotonic()
+        names = [one.NodeId.Identifier for one in params.NodesToWrite if one.NodeId.NamespaceIndex == index]
+        if told := [name for name in names if name in SETPOINTS or name == "air"]:
+            print(f"{now:.6f} told {','.join(told)}", flush=True)
+        return await write(params, user)
+
+    service.read, service.write = stamped_read, stamped_write
+
+
 async def live(nodes, seed):
     """The rig follows its nodes, and fills them."""
 
@@ -140,6 +164,7 @@ async def main():
     parser.add_argument("port", nargs="?", type=int, default=0)
     parser.add_argument("--secure")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--stamps", action="store_true")
     parser.add_argument("--user", default="lab")
     parser.add_argument("--password", default="hunter2")
     arguments = parser.parse_args()
@@ -152,6 +177,8 @@ async def main():
     async with server:
         living = asyncio.create_task(live(nodes, arguments.seed))
         print(arguments.port, flush=True)
+        if arguments.stamps:
+            stamp(server, 2)
         await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
         living.cancel()
 

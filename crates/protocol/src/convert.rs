@@ -61,7 +61,7 @@ pub enum Unusable {
         t_s: f64,
     },
     /// Samples that are missing, or come again.
-    #[error("sample {expected} was expected and sample {found} came")]
+    #[error("sample {expected} was expected and sample {found} came{}", missing(*expected, *found))]
     Sequence {
         /// Number of the next sample.
         expected: u64,
@@ -71,6 +71,13 @@ pub enum Unusable {
     /// More than anybody has asked for.
     #[error("it sends more samples than anybody has asked for")]
     TooMany,
+}
+
+fn missing(expected: u64, found: u64) -> String {
+    match found.saturating_sub(expected) {
+        0 => String::new(),
+        count => format!("; {count} are missing: a driver drops what is not read in time"),
+    }
 }
 
 /// What a driver says of its rig. `backend` and `version`: of its hello.

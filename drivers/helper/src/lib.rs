@@ -15,6 +15,7 @@
 
 mod armed;
 mod descent;
+mod outlet;
 mod pipes;
 mod refusal;
 mod secret;

@@ -1,14 +1,15 @@
 //! Standard input and output, signals, and the clock.
 
 use crate::Open;
+use crate::outlet::Outlet;
 use crate::server::Server;
-use mapper_protocol::{Encoding, FRAME_LIMIT_BYTES, Message, decode, encode, read_frame, write_frame};
+use mapper_protocol::{FRAME_LIMIT_BYTES, Message, decode, read_frame};
 use std::io::Read;
 use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Messages that wait for a host that does not read: some seconds of samples. Samples beyond are dropped, which the host sees.
+/// Messages of the host that wait for a rig that is busy; more wait in its pipe.
 const WAITING: usize = 256;
 /// Longest wait, s.
 const LONGEST_S: f64 = 3600.0;
@@ -31,7 +32,7 @@ pub fn serve(name: &'static str, version: &'static str, open: impl Open + 'stati
     if listen(std::io::stdin(), tell.clone()).and_then(|()| heed_signals(tell)).is_err() {
         return ExitCode::FAILURE;
     }
-    let Ok(outlet) = writer() else { return ExitCode::FAILURE };
+    let Ok(outlet) = Outlet::into_pipe(std::io::stdout()) else { return ExitCode::FAILURE };
     let mut server = Server::new(name, version, session(), Box::new(open));
     while !server.is_over() {
         // What has come while the rig was busy has come in time.
@@ -73,29 +74,11 @@ fn wait(news: &Receiver<Came>, next_s: Option<f64>) -> Option<Came> {
     }
 }
 
-/// What goes out waits in a queue: a host that has stopped must not stop the driver.
-fn send(server: &mut Server, outlet: &SyncSender<Vec<u8>>) {
-    let limit = server.frame_limit_bytes() as usize;
+fn send(server: &mut Server, outlet: &Outlet) {
+    let limit_bytes = server.frame_limit_bytes() as usize;
     for message in std::mem::take(&mut server.out) {
-        let Ok(body) = encode(&message, Encoding::MessagePack) else { continue };
-        if body.len() <= limit {
-            // Where it finds no place it will be missed: by its number, or by the deadline of who asked.
-            let _ = outlet.try_send(body);
-        }
+        outlet.send(&message, limit_bytes);
     }
-}
-
-fn writer() -> std::io::Result<SyncSender<Vec<u8>>> {
-    let (send, to_write) = sync_channel::<Vec<u8>>(WAITING);
-    std::thread::Builder::new().name("to host".to_owned()).spawn(move || {
-        let mut stdout = std::io::stdout();
-        for body in to_write {
-            if write_frame(&mut stdout, &body, u32::MAX).is_err() {
-                break;
-            }
-        }
-    })?;
-    Ok(send)
 }
 
 fn listen(mut stdin: impl Read + Send + 'static, tell: SyncSender<Came>) -> std::io::Result<()> {

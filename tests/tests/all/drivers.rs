@@ -2,6 +2,8 @@
 #![cfg(unix)]
 
 use crate::interrupted::Running;
+use mapper_core::EventKind;
+use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_tests::{
     BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_drivers, made_once, mapper_command, repository,
 };
@@ -124,12 +126,12 @@ fn a_model_keeps_every_rule_and_gives_the_points_of_its_rig() {
     }
 }
 
-/// The helper in Python, held by a clock of its own: lease, way down, tries again, limits, bytes that are nothing.
+/// The helper in Python, held by a clock of its own: lease, way down, tries again, limits, bytes that are nothing, a pipe that is full.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python: run `cargo xtask test`")]
 fn the_helper_in_python_keeps_what_the_protocol_promises() {
     let held = mapper_tests::python("driver_rules.py", [""; 0]);
-    assert_eq!(held["held"].as_array().unwrap().len(), 11, "{held}");
+    assert_eq!(held["held"].as_array().unwrap().len(), 12, "{held}");
 }
 
 #[test]
@@ -185,8 +187,12 @@ fn told(file: &Path, reached: impl Fn(&str) -> bool) -> (String, Duration) {
 
 /// A run on the lab in real time, with its gas on.
 fn flying() -> (Running, CampaignFile, CampaignFile, std::path::PathBuf) {
+    flying_at("10 Hz")
+}
+
+fn flying_at(rate: &str) -> (Running, CampaignFile, CampaignFile, std::path::PathBuf) {
     build_drivers();
-    let built_in = short("  virtual_lab: {}");
+    let built_in = short(&format!("  virtual_lab: {{sample_rate: {rate}}}"));
     let file = built_in.directory().join("told.txt");
     let campaign = lab(&built_in, &format!(", real_time: true, told: {}", file.display()));
     let running = Running::start_with(&campaign, &[]);
@@ -222,6 +228,25 @@ fn a_runner_that_stands_still_loses_its_lease() {
     flew_its_way(&text);
     running.kill();
     told(&file, |text| text.contains("disarm"));
+}
+
+/// It goes on when more has been dropped than pipe and queue hold: the run is over, the rig safe, and the recording says why.
+#[test]
+fn a_runner_that_stood_still_records_what_it_missed() {
+    let (running, campaign, _built_in, file) = flying_at("500 Hz");
+    running.signal("STOP");
+    told(&file, |text| text.contains("make safe"));
+    running.signal("CONT");
+    let finished = running.finished();
+    assert_eq!(finished.code, Some(5), "{}", finished.stderr);
+    let recording = mapper_tests::only_run(&campaign.runs()).join("recording.mcap");
+    let report = read_recording(&recording, &ChannelMap::native(), &ReadOptions::default()).unwrap();
+    let events: Vec<_> = report.recording.events.iter().map(|event| (event.kind, &*event.message)).collect();
+    let missing = events
+        .iter()
+        .position(|(_, words)| words.contains("the rig was lost") && words.contains("are missing"));
+    let safe = events.iter().position(|(kind, _)| *kind == EventKind::SafeState);
+    assert!(missing.is_some() && missing < safe, "{events:#?}");
 }
 
 /// What docs/rig.md shows for a driver, at another port, in the words of a server that shares its machine with tests.

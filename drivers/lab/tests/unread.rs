@@ -1,0 +1,248 @@
+//! A host that reads nothing: neither the pipe nor the queue before it may hold up the rig. A real driver, at a rate that fills both
+//! within a second, and real pipes.
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_core::{Backend, BackendError, RigMode, Setpoints};
+use mapper_host::{Driver, PATIENCE, Patience};
+use mapper_protocol::{
+    Encoding, FRAME_LIMIT_BYTES, LEASE_S, MAGIC, Message, VERSION, decode, encode, read_frame,
+    setpoints_on_the_wire, write_frame,
+};
+use notify::{RecommendedWatcher, RecursiveMode, Watcher};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_mapper-backend-lab");
+/// What waits at most before the pipe, docs/protocol.md.
+const QUEUE: usize = 256;
+/// What a pipe takes on Linux, bytes. Elsewhere less.
+const PIPE_BYTES: usize = 65_536;
+
+const SETPOINTS: Setpoints = Setpoints {
+    mode: RigMode::Running,
+    p3_pa: 150e3,
+    t3_k: 773.15,
+    valve_opening_ratio: 0.7,
+    oil_temperature_k: 323.15,
+};
+
+/// The lab of the shipped campaign a hundred times as fast, and the file that says what it was told.
+struct Lab {
+    settings: Value,
+    told: PathBuf,
+    news: Receiver<notify::Result<notify::Event>>,
+    _watcher: RecommendedWatcher,
+    _scratch: tempfile::TempDir,
+}
+
+impl Lab {
+    fn new() -> Lab {
+        let scratch = tempfile::tempdir().unwrap();
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns/turbo_a.yaml");
+        let text = std::fs::read_to_string(shipped).unwrap();
+        assert_eq!(text.matches("virtual_lab: {}").count(), 1);
+        let campaign = scratch.path().join("fast.yaml");
+        std::fs::write(&campaign, text.replace("virtual_lab: {}", "virtual_lab: {sample_rate: 1000 Hz}"))
+            .unwrap();
+        let told = scratch.path().join("told.txt");
+        let settings = json!({"campaign": campaign, "real_time": true, "told": told});
+        let (tell, news) = channel();
+        let mut watcher = notify::recommended_watcher(tell).unwrap();
+        watcher.watch(scratch.path(), RecursiveMode::NonRecursive).unwrap();
+        Lab { settings, told, news, _watcher: watcher, _scratch: scratch }
+    }
+
+    /// What the rig was told, as soon as these words are among it.
+    fn told(&self, words: &str) -> String {
+        loop {
+            let text = std::fs::read_to_string(&self.told).unwrap_or_default();
+            if text.contains(words) {
+                return text;
+            }
+            self.news.recv_timeout(Duration::from_secs(60)).expect("the rig is told something").unwrap();
+        }
+    }
+
+    /// The heater off at once, P3 down at its slew, then the air, at the times of the rig's own clock.
+    fn flew_its_way(&self) {
+        let text = self.told("make safe");
+        let at_s = |line: &str| line.split_once(" s:").unwrap().0.parse::<f64>().unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        let set = lines.iter().position(|line| line.contains("set air on")).unwrap();
+        let way: Vec<&str> = lines[set + 1..].to_vec();
+        assert!(way.len() > 3 && way[..way.len() - 1].iter().all(|line| line.contains("T3 293 K")), "{text}");
+        assert!(way.last().unwrap().contains("make safe"), "{text}");
+        let steps_s: Vec<f64> = way.windows(2).map(|pair| at_s(pair[1]) - at_s(pair[0])).collect();
+        // A tenth of a second each; the file has tenths.
+        assert!(steps_s.iter().all(|step_s| (0.0..0.45).contains(step_s)), "{text}");
+    }
+}
+
+/// The host's end of two pipes.
+struct Pipes {
+    child: Child,
+    stdin: ChildStdin,
+    stdout: ChildStdout,
+    session: Option<String>,
+    asked: u64,
+}
+
+impl Pipes {
+    fn to(settings: &Value) -> Pipes {
+        let mut child =
+            Command::new(PROGRAM).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect(PROGRAM);
+        let (stdin, stdout) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+        let mut pipes = Pipes { child, stdin, stdout, session: None, asked: 0 };
+        let hello = json!({
+            "magic": MAGIC, "protocol": VERSION, "name": "mapper", "version": "1", "frame_limit_bytes": FRAME_LIMIT_BYTES,
+        });
+        let welcome = pipes.ask("hello", hello);
+        pipes.session = welcome["session"].as_str().map(str::to_owned);
+        pipes.ask("configure", json!({ "settings": settings }));
+        pipes.ask("describe", json!({}));
+        pipes.ask("arm", json!({}));
+        pipes
+    }
+
+    /// Asks, and reads nothing.
+    fn tell(&mut self, method: &str, params: Value) -> u64 {
+        self.asked += 1;
+        let (id, method, session) = (Some(self.asked), Some(method.to_owned()), self.session.clone());
+        let request = Message { id, session, method, params, ..Message::default() };
+        write_frame(&mut self.stdin, &encode(&request, Encoding::Json).unwrap(), FRAME_LIMIT_BYTES).unwrap();
+        self.asked
+    }
+
+    fn next(&mut self) -> (Message, usize) {
+        let body = read_frame(&mut self.stdout, FRAME_LIMIT_BYTES).unwrap().expect("the driver is there");
+        (decode(&body).unwrap(), body.len() + 4)
+    }
+
+    fn ask(&mut self, method: &str, params: Value) -> Value {
+        let id = self.tell(method, params);
+        loop {
+            let (message, _) = self.next();
+            if message.id == Some(id) {
+                assert!(message.error.is_none(), "{method}: {:?}", message.error);
+                return message.result.unwrap_or_default();
+            }
+        }
+    }
+}
+
+impl Drop for Pipes {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// What came out of a driver, from the first message on.
+#[derive(Default)]
+struct Read {
+    /// Samples that came, and that are missing between them.
+    samples: u64,
+    missing: u64,
+    /// Messages and bytes before the first gap.
+    messages_before: usize,
+    bytes_before: usize,
+    notes: Vec<String>,
+    answers: Vec<u64>,
+    expected: Option<u64>,
+}
+
+impl Read {
+    fn take(&mut self, message: Message, bytes: usize) {
+        if self.missing == 0 {
+            self.messages_before += 1;
+            self.bytes_before += bytes;
+        }
+        self.answers.extend(message.id);
+        match message.method.as_deref() {
+            Some("samples") => {
+                let sequence = message.params["sequence"].as_u64().unwrap();
+                self.missing += sequence - self.expected.unwrap_or(sequence);
+                let count = message.params["t_s"].as_array().unwrap().len() as u64;
+                self.samples += count;
+                self.expected = Some(sequence + count);
+            }
+            Some("note") => self.notes.push(message.params["message"].as_str().unwrap().to_owned()),
+            _ => {}
+        }
+    }
+}
+
+/// Nothing is read and nothing said: the lease ends and the way is flown on time, what goes beyond the queue is dropped, and its
+/// numbers are missing. What the host asks then is done and answered, however full the queue is.
+#[test]
+fn a_pipe_that_nobody_reads_holds_up_no_rig() {
+    let lab = Lab::new();
+    let mut pipes = Pipes::to(&lab.settings);
+    let set = pipes.tell("set", serde_json::to_value(setpoints_on_the_wire(&SETPOINTS)).unwrap());
+    lab.told("set air on");
+    let last_word = Instant::now();
+    lab.told("T3 293 K");
+    let began_s = last_word.elapsed().as_secs_f64();
+    // 2.5 s is what docs/safety.md promises.
+    assert!((LEASE_S - 0.1..2.5).contains(&began_s), "{began_s} s");
+    lab.flew_its_way();
+    let again = pipes.tell("set", serde_json::to_value(setpoints_on_the_wire(&SETPOINTS)).unwrap());
+    let safe = pipes.tell("make_safe", json!({}));
+    let mut read = Read::default();
+    while read.missing == 0 || !read.answers.contains(&safe) {
+        let (message, bytes) = pipes.next();
+        read.take(message, bytes);
+        assert!(read.samples < 10_000, "no answer, or no gap, in {} samples", read.samples);
+    }
+    assert_eq!(read.answers, [set, again, safe]);
+    assert!(read.notes.iter().any(|words| words.contains("nothing was heard")), "{:?}", read.notes);
+    // Queue, pipe, one in the hand of who writes, and what has no other place: three answers and the note.
+    let per_message = read.bytes_before / read.messages_before;
+    let most = QUEUE + PIPE_BYTES / per_message + 1 + 4;
+    assert!((QUEUE..=most).contains(&read.messages_before), "{} of {most}", read.messages_before);
+    assert!(read.missing > 100, "{} of {} samples", read.missing, read.samples);
+    pipes.ask("disarm", json!({}));
+}
+
+/// The host goes while its pipe is full: the driver makes the rig safe, and ends.
+#[test]
+fn a_driver_that_is_left_with_a_full_pipe_ends() {
+    let lab = Lab::new();
+    let mut pipes = Pipes::to(&lab.settings);
+    pipes.tell("set", serde_json::to_value(setpoints_on_the_wire(&SETPOINTS)).unwrap());
+    lab.flew_its_way();
+    // Its output stays open and full.
+    drop(std::mem::replace(
+        &mut pipes.stdin,
+        Command::new("true").stdin(Stdio::piped()).spawn().unwrap().stdin.unwrap(),
+    ));
+    lab.told("disarm");
+    assert!(pipes.child.wait().unwrap().success());
+}
+
+/// The same through the host: what it missed is the loss of the rig, in words that say how much, and the rig can still be let go.
+#[test]
+fn a_host_that_reads_nothing_is_told_what_it_missed() {
+    let lab = Lab::new();
+    let patience = Patience { silence: Duration::from_millis(300), ..PATIENCE };
+    let mut driver = Driver::of_program(Path::new(PROGRAM), "lab", &lab.settings, patience).unwrap();
+    driver.arm().unwrap();
+    driver.set(&SETPOINTS).unwrap();
+    lab.flew_its_way();
+    // The first thing that it does is to make sure, with everything unread before the answer.
+    driver.make_safe().unwrap();
+    match driver.poll(3.0) {
+        Err(BackendError::Lost { source, .. }) => {
+            let words = source.to_string();
+            assert!(words.contains("are missing") && words.contains("read"), "{words}");
+        }
+        other => panic!("{other:?}"),
+    }
+    assert!(driver.set(&SETPOINTS).unwrap_err().to_string().contains("lease"));
+    driver.make_safe().unwrap();
+    driver.disarm().unwrap();
+}

@@ -26,6 +26,7 @@ PATIENCE_S = 20.0  # how long a driver that nobody listens to goes on behind the
 WAITING = 256  # messages for a host that does not read; samples beyond are dropped, which the host sees
 KEPT = 64  # places beyond those for answers and remarks alone: a rig is in doubt as long as its answer has not come
 ROWS = 500  # samples in one message
+LATEST_S = 1e9  # run time that a simulated rig is polled for: beyond it the steps of a way down are lost in rounding
 
 UNITS = {
     "N": "rpm", "m_c": "kg/s", "P1": "Pa", "T1": "K", "P2": "Pa", "T2": "K", "Tc": "K", "m_t": "kg/s", "P3": "Pa", "T3": "K",
@@ -185,8 +186,8 @@ class Server:
         armed, until_s = self.held(), params.get("until_s")
         if not self.about["simulated_time"]:
             raise Refused("unknown_method", "this rig is in real time: its samples come by themselves")
-        if not isinstance(until_s, (int, float)):
-            raise Refused("params", "until_s is not a number")
+        if not isinstance(until_s, (int, float)) or not abs(until_s) <= LATEST_S:
+            raise Refused("params", f"until_s is no number, or beyond {LATEST_S} s")
         self.measure(until_s)
         armed["polled_s"] = max(armed["polled_s"], until_s)
         return {"next_sequence": armed["sequence"]}

@@ -204,11 +204,11 @@ def no_bytes_end_it_or_make_it_take_memory():
 
 
 def drive_fast():
-    """A rig in real time of a thousand samples a second, which says on standard error what it is told."""
+    """A rig in real time that fills a pipe at once, five messages a hundredth of a second, and says on standard error what it is told."""
 
     class Fast(mapper_driver.Rig):
         def describe(self):
-            return description(["N", "P3"], 1000.0, False, ACCEPTS, {"p3_slew_pa_s": 100e3, "valve_opening_ratio": 1.0, "within_s": 20.0}, [])
+            return description(["N", "P3"], 100.0, False, ACCEPTS, {"p3_slew_pa_s": 100e3, "valve_opening_ratio": 1.0, "within_s": 20.0}, [])
 
         def set(self, setpoints):
             print("set", setpoints["t3_k"], file=sys.stderr, flush=True)
@@ -217,7 +217,8 @@ def drive_fast():
             print("safe", file=sys.stderr, flush=True)
 
         def poll(self, until_s):
-            return [until_s], {"N": [1.0], "P3": [1.0]}, [(until_s, "note", "x" * 1000)]
+            rows = 5 * mapper_driver.ROWS
+            return [until_s + 1e-6 * row for row in range(rows)], {"N": [1.0] * rows, "P3": [1.0] * rows}, []
 
     mapper_driver.serve("fast", "1", lambda _: Fast())
 
@@ -258,7 +259,7 @@ def a_pipe_that_nobody_reads_holds_up_no_rig():
     assert 256 <= len(samples) <= 256 + 65536 // 1000 + 2, len(samples)
     tell(7, "poll")
     later = [one for one in answer(7) if one.get("method") == "samples"] or [json.loads(read_frame(child.stdout))]
-    assert later[0]["params"]["sequence"] - samples[-1]["params"]["sequence"] > 100, "what was dropped is missing by its number"
+    assert later[0]["params"]["sequence"] - samples[-1]["params"]["sequence"] > mapper_driver.ROWS, "what was dropped is missing by its number"
     child.stdin.close()
     child.stdout.read()
     assert child.wait() == 0

@@ -10,7 +10,14 @@ use crate::{machine, python_env, test_programs, workspace};
 use std::process::Command;
 
 /// Examples that a test or the documents run.
-const EXAMPLES: &[&str] = &["--example", "mapper-backend-misbehaving", "--example", docs::EXAMPLE];
+const EXAMPLES: &[&str] = &[
+    "--example",
+    "mapper-backend-misbehaving",
+    "--example",
+    "mapper-backend-faulty",
+    "--example",
+    docs::EXAMPLE,
+];
 
 /// Formatting, lints, dependencies, documentation, tests, generated documents. All are run even where one fails; only
 /// preparations end it early.

@@ -76,7 +76,7 @@ pub enum Unusable {
 fn missing(expected: u64, found: u64) -> String {
     match found.saturating_sub(expected) {
         0 => String::new(),
-        count => format!("; {count} are missing: a driver drops what is not read in time"),
+        count => format!("; {count} are missing, lost by the driver or not read in time"),
     }
 }
 

@@ -14,6 +14,9 @@ use sha2::{Digest, Sha256};
 /// Makes the rig.
 pub(crate) type Opened = Box<dyn FnOnce(&Value) -> Result<Box<dyn Backend>, BackendError>>;
 
+/// Latest run time that a simulated rig is polled for, s: beyond it the steps of a way down would be lost in rounding.
+const LATEST_S: f64 = 1e9;
+
 /// A driver, from hello to the end.
 pub(crate) struct Server {
     name: &'static str,
@@ -160,6 +163,9 @@ impl Server {
 
     fn poll(&mut self, params: &Value) -> Result<Value, Refusal> {
         let Poll { until_s } = read(params)?;
+        if !until_s.is_finite() || until_s.abs() > LATEST_S {
+            return Err(refused(Code::Params, format!("until_s is {until_s} s; at most {LATEST_S} s")));
+        }
         let limit = self.frame_limit_bytes;
         let (rig, description, armed) = self.held()?;
         if !description.simulated_time {
@@ -284,6 +290,7 @@ mod tests {
     use super::*;
     use mapper_core::{Channel, ChannelColumn, RigMode, SafeTrajectory, SampleBatch, Setpoints};
     use mapper_protocol::Failure;
+    use proptest::prelude::*;
     use std::sync::{Arc, Mutex};
 
     type Log = Arc<Mutex<Vec<String>>>;
@@ -475,5 +482,49 @@ mod tests {
         let polled = after.iter().take_while(|told| *told != "safe").filter(|told| *told == "poll").count();
         assert_eq!(polled, 0, "{after:?}");
         assert!(after.contains(&"safe".to_owned()));
+    }
+
+    /// Values that no host sends, beside those that it does.
+    fn thing() -> impl Strategy<Value = Value> {
+        prop_oneof![
+            Just(Value::Null),
+            any::<f64>().prop_map(|number| json!(number)),
+            Just(json!({"magic": MAGIC, "protocol": {"major": -1}})),
+            Just(json!({"until_s": 1e308})),
+            Just(json!({"settings": [{"x": []}]})),
+            Just(setpoints_on_the_wire()),
+            prop::collection::vec(any::<bool>(), 0..4)
+                .prop_map(|bits| json!({"p3_pa": bits, "until_s": "x"})),
+        ]
+    }
+
+    proptest! {
+        /// Whatever comes in whatever order: one answer to each request, no panic, and a rig that nobody talks to any more becomes safe.
+        #[test]
+        fn no_messages_keep_a_rig_from_becoming_safe(
+            steps in prop::collection::vec((0usize..9, any::<bool>(), thing(), 0.0f64..3.0), 0..60), simulated: bool,
+        ) {
+            const METHODS: [&str; 9] =
+                ["hello", "configure", "describe", "arm", "set", "poll", "make_safe", "disarm", "__class__"];
+            let (mut server, log) = refusing(simulated, 1_000, 3);
+            let mut now_s = 0.0;
+            for (id, (method, known, params, later_s)) in steps.into_iter().enumerate() {
+                now_s += later_s;
+                server.tick(now_s);
+                server.out.clear();
+                let session = Some(if known { "s" } else { "another" }.to_owned());
+                let (id, method) = (Some(id as u64), Some(METHODS[method].to_owned()));
+                server.take(now_s, Message { id, session, method, params, ..Message::default() });
+                prop_assert_eq!(server.out.iter().filter(|message| message.id == id).count(), 1);
+            }
+            let held = server.armed.is_some();
+            log.lock().unwrap().clear();
+            server.leave(now_s);
+            for tenth in 0..300 {
+                server.tick(now_s + f64::from(tenth) / 10.0);
+            }
+            prop_assert!(server.is_over());
+            prop_assert!(!held || log.lock().unwrap().contains(&"safe".to_owned()));
+        }
     }
 }

@@ -1,22 +1,22 @@
 //! Every fault that a rig may have, on the virtual lab behind a backend that misbehaves on demand: what the run makes of it, and
 //! that the rig ends safe.
 
+mod behind;
+#[cfg(unix)]
+mod over_protocol;
+
 use super::{Notebook, Recorded, plan};
-use mapper_backends::virtual_lab::{LabSettings, SensorErrors, VirtualLab};
+use behind::{FAULT_S, lab};
+use mapper_backends::virtual_lab::VirtualLab;
 use mapper_conformance::{Fault, Misbehaving};
 use mapper_core::{
-    Channel, EventKind, GuardName, GuardSet, Plan, Reaction, SafeTrajectory, SignalGuard, SpeedBand,
+    Backend, Channel, EventKind, GuardName, GuardSet, Plan, Reaction, SafeTrajectory, SignalGuard, SpeedBand,
     SurgeVariation, UnpacedClock,
 };
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
 use mapper_runner::{
     BatchWatch, Guard, PlanSteps, Protection, RigWatch, RunEnd, RunError, Runner, SignalWatch, SurgeWatch,
 };
 use std::sync::atomic::AtomicBool;
-
-/// A fault in the middle of the second step, s.
-const FAULT_S: f64 = 70.0;
 
 /// Two steps of a minute after 10 s of warm-up.
 fn minutes() -> Plan {
@@ -25,21 +25,6 @@ fn minutes() -> Plan {
         (step.dwell_s, step.start_s) = (60.0, 10.0 + 60.0 * index as f64);
     }
     plan
-}
-
-fn lab() -> VirtualLab {
-    let noise = |white_sigma| SensorErrors {
-        white_sigma,
-        coloured_sigma: 0.0,
-        coloured_time_constant_s: 1.0,
-        offset: 0.0,
-        gain_ratio: 0.0,
-    };
-    let sensors = [(Channel::ShaftSpeed, noise(30.0)), (Channel::P2, noise(60.0)), (Channel::T2, noise(0.1))];
-    VirtualLab::new(LabSettings {
-        sensors: sensors.into(),
-        ..LabSettings::ideal(Model::nominal(), BoundaryConditions::default())
-    })
 }
 
 fn guard(name: GuardName, channel: Channel, above: Option<f64>) -> SignalGuard {
@@ -84,8 +69,13 @@ struct Night {
 }
 
 fn night(faults: &[(f64, Fault)], set: &GuardSet) -> Night {
-    let plan = minutes();
     let mut rig = Misbehaving::new(lab(), faults.to_vec());
+    let (end, notebook) = night_on(&mut rig, set);
+    Night { end, notebook, rig }
+}
+
+fn night_on(rig: &mut dyn Backend, set: &GuardSet) -> (Result<RunEnd, RunError>, Notebook) {
+    let plan = minutes();
     let mut notebook = Notebook::default();
     let mut guards: Vec<Box<dyn Guard>> =
         vec![Box::new(BatchWatch::default()), Box::new(RigWatch::default())];
@@ -99,7 +89,7 @@ fn night(faults: &[(f64, Fault)], set: &GuardSet) -> Night {
     };
     let end = Runner {
         steps: &mut PlanSteps::new(&plan),
-        backend: &mut rig,
+        backend: rig,
         clock: &mut UnpacedClock,
         guards,
         observer: &mut notebook,
@@ -107,7 +97,7 @@ fn night(faults: &[(f64, Fault)], set: &GuardSet) -> Night {
         stop: &AtomicBool::new(false),
     }
     .run_under(&protection);
-    Night { end, notebook, rig }
+    (end, notebook)
 }
 
 #[test]

@@ -1,0 +1,24 @@
+//! The rig of the runner's tests as a driver that misbehaves on demand: its settings are the place of a fault in the table.
+
+#[allow(dead_code, reason = "how a run ends, only the test asks")]
+#[path = "../tests/faults/behind.rs"]
+mod behind;
+
+use mapper_conformance::Misbehaving;
+use mapper_core::{Backend, BackendError};
+
+fn main() -> std::process::ExitCode {
+    mapper_driver::serve("faulty", env!("CARGO_PKG_VERSION"), |settings| {
+        let place = settings.as_u64().and_then(|place| usize::try_from(place).ok());
+        let row = place.and_then(|place| behind::OVER_THE_PROTOCOL.get(place));
+        let Some((begin_s, fault, _)) = row else {
+            let (backend, path) = ("faulty".to_owned(), String::new());
+            return Err(BackendError::Settings {
+                backend,
+                path,
+                source: "write the place of a fault".into(),
+            });
+        };
+        Ok(Box::new(Misbehaving::new(behind::lab(), vec![(*begin_s, fault.clone())])) as Box<dyn Backend>)
+    })
+}

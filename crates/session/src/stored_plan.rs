@@ -10,6 +10,9 @@ use std::path::Path;
 const FILE_MAX_BYTES: u64 = 32 << 20;
 /// Steps at most.
 const STEPS_MAX: usize = 20_000;
+/// Shortest step, s, and slowest point, rpm: less is none.
+const DWELL_MIN_S: f64 = 0.1;
+const SPEED_MIN_RPM: f64 = 1.0;
 /// Longest step, warm-up or cool-down, s: a day, as in campaigns.
 const STEP_MAX_S: f64 = 86_400.0;
 /// Longest run, s: two weeks.
@@ -80,17 +83,19 @@ fn of_step(place: usize, step: &PlanStep, campaign: &Campaign) -> Option<String>
     let hottest_k = limits.t3_max_k.unwrap_or(1400.0);
     let openings = 0.05..=OperatingPoint::OPENING_MAX_RATIO;
     for (what, value, low, high, unit) in [
-        ("dwell", step.dwell_s, f64::MIN_POSITIVE, STEP_MAX_S, "s"),
-        ("speed", step.to.speed_rpm, f64::MIN_POSITIVE, limits.speed_max_rpm, "rpm"),
+        ("dwell", step.dwell_s, DWELL_MIN_S, STEP_MAX_S, " s"),
+        ("speed", step.to.speed_rpm, SPEED_MIN_RPM, limits.speed_max_rpm, " rpm"),
         ("valve opening", step.to.valve_opening_ratio, *openings.start(), *openings.end(), ""),
-        ("P3", step.p3_pa, limits.p3_min_pa, limits.p3_max_pa, "Pa"),
-        ("T3", step.t3_k, coldest_k, hottest_k, "K"),
-        ("T_oil", step.oil_temperature_k, coldest_k, 450.0, "K"),
-        ("start", step.start_s, 0.0, RUN_MAX_S, "s"),
+        ("P3", step.p3_pa, limits.p3_min_pa, limits.p3_max_pa, " Pa"),
+        ("T3", step.t3_k, coldest_k, hottest_k, " K"),
+        ("T_oil", step.oil_temperature_k, coldest_k, 450.0, " K"),
+        ("start", step.start_s, 0.0, RUN_MAX_S, " s"),
     ] {
         let (lowest, highest) = (low * (1.0 - ROUNDING_RATIO), high * (1.0 + ROUNDING_RATIO));
         if !(lowest..=highest).contains(&value) {
-            return Some(format!("asks for {what} = {value} {unit}, outside {low} to {high} {unit}"));
+            // As digits, 1e300 would fill the screen.
+            let value = if value.abs() < 1e15 { format!("{value}") } else { format!("{value:e}") };
+            return Some(format!("asks for {what} = {value}{unit}, outside {low} to {high}{unit}"));
         }
     }
     let from = step.from.is_some_and(|from| {

@@ -211,6 +211,7 @@ fn hostile_plans_are_refused() {
         std::fs::write(&file, plan.to_string()).unwrap();
         let refused = done(run_of(&campaign, &["--plan", file.to_str().unwrap()])).exits(4);
         assert!(refused.stderr.contains(words), "{what}: {}", refused.stderr);
+        assert!(refused.stderr.len() < 400, "{what}: nobody reads that much: {}", refused.stderr);
     }
     let many = Value::Array(vec![made["steps"][0].clone(); 20_001]);
     let mut plan = made.clone();

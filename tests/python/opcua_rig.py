@@ -1,11 +1,11 @@
 """The small rig of drivers/python in real time behind asyncua, an OPC UA server that shares no code with the driver.
 
-Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD]] [--seed N] [--stamps]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
+Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
 reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean). As a PLC has to, it cuts the
 air by itself where the heartbeat stands still. Values that no stand could bear are refused with BadOutOfRange.
 
 With --secure it takes signed and encrypted sessions alone, of the user `lab` with the password `hunter2` if nothing else is said; the certificate is made in the directory
-where there is none yet. With --stamps it prints `SECONDS read RPM` for each speed that it hands out and `SECONDS told NAMES` for each set-point that it
+where there is none yet, valid for a year or as many days as said. With --stamps it prints `SECONDS read RPM` for each speed that it hands out and `SECONDS told NAMES` for each set-point that it
 takes, on the clock of time.monotonic(): behind its decryption, so that a session may be encrypted.
 """
 
@@ -21,9 +21,11 @@ import sys
 import time
 
 from asyncua import Server, ua
-from asyncua.crypto.cert_gen import setup_self_signed_certificate
+from asyncua.crypto.cert_gen import dump_private_key_as_pem, generate_private_key, generate_self_signed_app_certificate
 from asyncua.server.user_managers import UserManager
 from asyncua.crypto.permission_rules import User, UserRole
+from cryptography import x509
+from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 CHANNELS = ["N", "m_c", "P1", "T1", "P2", "T2", "Tc", "m_t", "P3", "T3", "P4", "T4", "Tt", "T_oil", "T_amb"]
@@ -48,12 +50,17 @@ class Users(UserManager):
         return User(role=UserRole.User) if (username, password) == self.only else None
 
 
-async def certificate(directory):
+def certificate(directory, days):
     """The files of a certificate of the server's own."""
     key, cert = directory / "key.pem", directory / "cert.der"
     directory.mkdir(parents=True, exist_ok=True)
-    await setup_self_signed_certificate(
-        key, cert, APPLICATION, "localhost", [ExtendedKeyUsageOID.CLIENT_AUTH, ExtendedKeyUsageOID.SERVER_AUTH], {"commonName": "stand"})
+    if not cert.exists():
+        secret = generate_private_key()
+        names = [x509.UniformResourceIdentifier(APPLICATION), x509.DNSName("localhost")]
+        both = [ExtendedKeyUsageOID.CLIENT_AUTH, ExtendedKeyUsageOID.SERVER_AUTH]
+        made = generate_self_signed_app_certificate(secret, "stand", {}, names, both, days)
+        key.write_bytes(dump_private_key_as_pem(secret))
+        cert.write_bytes(made.public_bytes(Encoding.DER))
     return key, cert
 
 
@@ -63,7 +70,7 @@ async def make(arguments):
     await server.set_application_uri(APPLICATION)
     server.set_endpoint(f"opc.tcp://127.0.0.1:{arguments.port}/")
     if arguments.secure:
-        key, cert = await certificate(pathlib.Path(arguments.secure))
+        key, cert = certificate(pathlib.Path(arguments.secure), arguments.days)
         await server.load_certificate(str(cert))
         await server.load_private_key(str(key))
         server.set_security_policy([ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt])
@@ -167,6 +174,7 @@ async def main():
     parser.add_argument("--stamps", action="store_true")
     parser.add_argument("--user", default="lab")
     parser.add_argument("--password", default="hunter2")
+    parser.add_argument("--days", type=int, default=365)
     arguments = parser.parse_args()
     logging.disable(logging.ERROR)
     if not arguments.port:

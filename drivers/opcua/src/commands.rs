@@ -1,7 +1,7 @@
 //! What the program does for people.
 
 use crate::link::{LinkError, endpoints};
-use crate::store::{Store, StoreError, fingerprint};
+use crate::store::{Store, StoreError, fingerprint, valid};
 use clap::{Parser, Subcommand};
 use opcua::crypto::X509;
 use std::io::Write;
@@ -87,6 +87,7 @@ fn trust(store: &Store, endpoint: &str, wanted: Option<String>, replace: bool) -
         say(&format!("valid        {} to {}", from.format("%Y-%m-%d"), to.format("%Y-%m-%d")))?;
     }
     say(&format!("fingerprint  SHA-256 {found}"))?;
+    valid(endpoint, &certificate)?;
     let plain = |text: &str| text.replace([':', ' '], "").to_ascii_uppercase();
     if let Some(wanted) = wanted.filter(|wanted| plain(wanted) != plain(&found)) {
         return Err(CommandError::OtherFingerprint { found, wanted });

@@ -96,14 +96,7 @@ impl Store {
         let Some(certificate) = self.trusted(endpoint)? else {
             return Err(StoreError::NotTrusted(endpoint.to_owned()));
         };
-        let expired = |error: opcua::types::Error| StoreError::Expired {
-            server: server(endpoint).to_owned(),
-            words: match certificate.not_after() {
-                Ok(day) => format!("is not valid now (until {})", day.format("%Y-%m-%d")),
-                Err(_) => format!("is not valid: {error}"),
-            },
-        };
-        certificate.is_time_valid(&opcua::types::DateTime::now().as_chrono()).map_err(expired)?;
+        valid(endpoint, &certificate)?;
         Ok(certificate)
     }
 
@@ -124,6 +117,18 @@ impl Store {
         std::fs::write(&path, der).map_err(|source| StoreError::File { path: path.clone(), source })?;
         Ok(path)
     }
+}
+
+/// That this certificate holds today.
+pub(crate) fn valid(endpoint: &str, certificate: &X509) -> Result<(), StoreError> {
+    let refused = |error: opcua::types::Error| StoreError::Expired {
+        server: server(endpoint).to_owned(),
+        words: match certificate.not_after() {
+            Ok(day) => format!("is not valid now (until {})", day.format("%Y-%m-%d %H:%M UTC")),
+            Err(_) => format!("is not valid: {error}"),
+        },
+    };
+    certificate.is_time_valid(&opcua::types::DateTime::now().as_chrono()).map_err(refused).map(|_| ())
 }
 
 /// What stands in a certificate of ours.

@@ -29,14 +29,19 @@ struct Stand {
 impl Stand {
     fn new() -> Stand {
         let scratch = tempfile::tempdir().unwrap();
-        let (server, port) = serve("0", &scratch.path().join("pki"));
+        let (server, port) = serve("0", &scratch.path().join("pki"), "365");
         Stand { server, port, scratch }
     }
 
     /// The same stand, whose server has stopped and begun again, with the certificate of this directory.
     fn restart(&mut self, certificate: &str) {
+        self.restart_valid(certificate, "365");
+    }
+
+    /// The same, with one that is valid for so many days if it has to be made.
+    fn restart_valid(&mut self, certificate: &str, days: &str) {
         self.kill();
-        (self.server, self.port) = serve(&self.port, &self.scratch.path().join(certificate));
+        (self.server, self.port) = serve(&self.port, &self.scratch.path().join(certificate), days);
     }
 
     fn kill(&mut self) {
@@ -116,11 +121,12 @@ impl Drop for Stand {
 }
 
 /// A server on this port, or on any; it is there when this returns.
-fn serve(port: &str, certificate: &Path) -> (Child, String) {
+fn serve(port: &str, certificate: &Path, days: &str) -> (Child, String) {
     let mut server = Command::new(option_env!("MAPPER_TEST_PYTHON").unwrap_or("python3"))
         .arg(repository().join("tests/python/opcua_rig.py"))
         .args([port, "--secure"])
         .arg(certificate)
+        .args(["--days", days])
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -199,6 +205,24 @@ fn a_trusted_server_is_read_and_written() {
     assert!(!kept.status.success() && String::from_utf8_lossy(&kept.stderr).contains("--replace"));
 }
 
+/// Neither to be trusted nor talked to, even where it was pinned when it still held; the day is said.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_server_whose_certificate_has_expired_is_not_talked_to() {
+    let mut stand = Stand::new();
+    stand.restart_valid("expired", "0");
+    let refused = stand.command(&["trust", &stand.endpoint()]);
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(!refused.status.success() && said.contains("is not valid now (until 2"), "{said}");
+    let pins = stand.scratch.path().join("state/opcua/servers");
+    std::fs::create_dir_all(&pins).unwrap();
+    let pin = pins.join(format!("127.0.0.1_{}.der", stand.port));
+    assert!(!pin.exists());
+    std::fs::copy(stand.scratch.path().join("expired/cert.der"), pin).unwrap();
+    let refused = words(stand.driver(PASSWORD).arm().unwrap_err());
+    assert!(refused.contains("is not valid now (until 2") && refused.contains("give the server a new one"), "{refused}");
+}
+
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_wrong_password_and_a_refused_setpoint_are_said_with_their_codes() {
@@ -228,7 +252,7 @@ fn a_server_that_restarts_is_read_within_three_seconds() {
     until(&mut rig, &mut t_s, reads_nothing);
     // Starting takes the server some seconds; the lease is renewed by polls alone.
     let (certificate, port) = (stand.scratch.path().join("pki"), stand.port.clone());
-    let starting = std::thread::spawn(move || serve(&port, &certificate));
+    let starting = std::thread::spawn(move || serve(&port, &certificate, "365"));
     until(&mut rig, &mut t_s, |_| starting.is_finished());
     (stand.server, stand.port) = starting.join().unwrap();
     let took_s = until(&mut rig, &mut t_s, reads);

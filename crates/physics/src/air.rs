@@ -23,10 +23,19 @@ pub fn viscosity_pa_s(temperature_k: f64) -> f64 {
     1.458e-6 * temperature_k * temperature_k.sqrt() / (temperature_k + 110.4)
 }
 
+/// Thermal conductivity at 300 K, W/(m K).
+pub const CONDUCTIVITY_AT_300_K_W_MK: f64 = 0.02624;
+
 /// Thermal conductivity `0.02624 (T/300)^0.8646`, W/(m K).
 #[inline]
 pub fn conductivity_w_mk(temperature_k: f64) -> f64 {
-    0.02624 * (temperature_k / 300.0).powf(0.8646)
+    CONDUCTIVITY_AT_300_K_W_MK * ln_conductivity_ratio(temperature_k).exp()
+}
+
+/// ln of the thermal conductivity over that at 300 K.
+#[inline]
+pub fn ln_conductivity_ratio(temperature_k: f64) -> f64 {
+    0.8646 * (temperature_k / 300.0).ln()
 }
 
 /// Exponent `kappa = R/cp(T)` of the isentropic temperature ratio `PR^kappa`.

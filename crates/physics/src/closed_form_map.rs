@@ -5,6 +5,7 @@
 //! ranges that the paper plots: 50 to 170 krpm, corrected to SAE's reference state. Beyond, the forms go on smoothly.
 
 use crate::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+use crate::power::power;
 use mapper_core::ReferenceState;
 
 /// Closed-form map of turbo_a.
@@ -35,7 +36,7 @@ impl ClosedFormMap {
         let n_125 = n * n.sqrt().sqrt();
         SpeedLineEnds {
             zero_slope_pressure_ratio,
-            zero_slope_flow_kg_s: 0.0265 * n.powf(1.35),
+            zero_slope_flow_kg_s: 0.0265 * power(n, 1.35),
             choke_pressure_ratio: 1.0 + 0.15 * (zero_slope_pressure_ratio - 1.0),
             choke_flow_kg_s: 0.052 + 0.058 * n_125,
             speed_ratio: n,
@@ -67,7 +68,7 @@ impl CompressorCharacteristic for ClosedFormMap {
         let unscaled = if x <= 0.0 {
             m_ch
         } else if x < 1.0 {
-            m_zs + (m_ch - m_zs) * (1.0 - x.powf(2.2)).sqrt()
+            m_zs + (m_ch - m_zs) * (1.0 - power(x, 2.2)).sqrt()
         } else {
             m_zs - 2.0 * m_zs * (x - 1.0)
         };

@@ -8,6 +8,7 @@
 //! one-node form of a heat exchanger: the gas never passes the metal's temperature.
 
 use crate::air;
+use crate::power::power;
 
 /// What the gas meets on its way through the compressor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,7 +51,7 @@ pub struct Compression {
 /// `PR^kappa - 1` with `kappa = R/cp(T1)`: the isentropic temperature rise over the inlet temperature.
 #[inline]
 pub fn isentropic_rise_ratio(pressure_ratio: f64, t1_k: f64) -> f64 {
-    pressure_ratio.powf(air::isentropic_exponent(t1_k)) - 1.0
+    power(pressure_ratio, air::isentropic_exponent(t1_k)) - 1.0
 }
 
 /// Gas temperature after adiabatic compression from `inlet_k` (eq. 2), K.

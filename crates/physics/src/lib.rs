@@ -30,6 +30,7 @@ pub mod nusselt;
 pub mod orifice;
 pub mod outputs;
 pub mod params;
+mod power;
 pub mod pressure_tap;
 pub mod reach;
 pub mod rodas5p;

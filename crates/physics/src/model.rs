@@ -8,6 +8,7 @@ use crate::compression;
 use crate::hooks::{HookList, Hooks, Site};
 pub use crate::outputs::{Added, Outputs};
 use crate::params::Params;
+use crate::power::power;
 use crate::state::MAX_STATES;
 pub use crate::state::{State, rad_s_of_rpm};
 use crate::turbine::TurbineInlet;
@@ -157,7 +158,7 @@ impl PreparedModel<'_> {
             site.efficiency = efficiency;
         }
 
-        let isentropic_rise_ratio = pressure_ratio.powf(self.kappa1) - 1.0;
+        let isentropic_rise_ratio = power(pressure_ratio, self.kappa1) - 1.0;
         // Bulk temperature of the properties: compression from T1 without heat transfer.
         let bulk_k = compression::compressed_k(boundary.t1_k, isentropic_rise_ratio, efficiency);
         let mut h_w_m2k = nusselt::coefficient_w_m2k(

@@ -23,15 +23,14 @@ pub fn coefficient_w_m2k(
     wall_k: f64,
 ) -> f64 {
     let mu = air::viscosity_pa_s(bulk_k);
-    let k = air::conductivity_w_mk(bulk_k);
+    let ln_k_ratio = air::ln_conductivity_ratio(bulk_k);
     let reynolds = 4.0 * flow_kg_s / (std::f64::consts::PI * diameter_m * mu);
-    let prandtl = air::heat_capacity_j_kgk(bulk_k) * mu / k;
-    // Three powers as one exponential of a sum of logarithms: half the time, and this is the model's hottest line.
-    let ln_shape = exponent * reynolds.ln()
-        + prandtl.ln() / 3.0
-        + WALL_EXPONENT * (mu / air::viscosity_pa_s(wall_k)).ln();
-    let nusselt = coefficient * ln_shape.exp();
-    nusselt * k / diameter_m
+    // All powers as one exponential of a sum of logarithms: half the time, and this is the model's hottest line.
+    let ln_prandtl =
+        (air::heat_capacity_j_kgk(bulk_k) * mu / air::CONDUCTIVITY_AT_300_K_W_MK).ln() - ln_k_ratio;
+    let ln_nusselt =
+        exponent * reynolds.ln() + ln_prandtl / 3.0 + WALL_EXPONENT * (mu / air::viscosity_pa_s(wall_k)).ln();
+    coefficient * (ln_nusselt + ln_k_ratio).exp() * air::CONDUCTIVITY_AT_300_K_W_MK / diameter_m
 }
 
 #[cfg(test)]

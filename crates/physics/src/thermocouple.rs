@@ -18,12 +18,14 @@ pub fn time_constant_s(tip_diameter_m: f64, pipe_diameter_m: f64, flow_kg_s: f64
         return 0.0;
     }
     let mu = air::viscosity_pa_s(t2_k);
-    let k = air::conductivity_w_mk(t2_k);
-    let prandtl = air::heat_capacity_j_kgk(t2_k) * mu / k;
+    let ln_k_ratio = air::ln_conductivity_ratio(t2_k);
+    let k = air::CONDUCTIVITY_AT_300_K_W_MK * ln_k_ratio.exp();
+    let ln_prandtl =
+        (air::heat_capacity_j_kgk(t2_k) * mu / air::CONDUCTIVITY_AT_300_K_W_MK).ln() - ln_k_ratio;
     let reynolds =
         4.0 * flow_kg_s * tip_diameter_m / (std::f64::consts::PI * pipe_diameter_m * pipe_diameter_m * mu);
     let third_root = reynolds.cbrt();
-    let nusselt = 2.0 + (0.4 * reynolds.sqrt() + 0.06 * third_root * third_root) * prandtl.powf(0.4);
+    let nusselt = 2.0 + (0.4 * reynolds.sqrt() + 0.06 * third_root * third_root) * (0.4 * ln_prandtl).exp();
     TIP_HEAT_CAPACITY_J_M3K * tip_diameter_m * tip_diameter_m / (6.0 * nusselt * k)
 }
 

@@ -7,6 +7,7 @@
 use crate::air::{self, GAS_CONSTANT_J_KGK};
 use crate::nusselt;
 use crate::params::{BoundaryConditions, TurbineParams};
+use crate::power::power;
 
 /// State of the ISA day to which the swallowing curve is corrected.
 const FLOW_REFERENCE_K: f64 = 288.15;
@@ -86,7 +87,7 @@ impl TurbineInlet {
     #[inline]
     pub fn at(&self, tt_k: f64, shaft_speed_rad_s: f64) -> TurbineState {
         let params = &self.params;
-        let h_w_m2k = self.h_unit_wall_w_m2k * air::viscosity_pa_s(tt_k).powf(-nusselt::WALL_EXPONENT);
+        let h_w_m2k = self.h_unit_wall_w_m2k * power(air::viscosity_pa_s(tt_k), -nusselt::WALL_EXPONENT);
         let conductance_w_k = h_w_m2k * params.internal_area_m2;
         let transfer_units = conductance_w_k / (self.flow_kg_s * self.cp3_j_kgk);
         let t3_prime_k = (self.t3_k + transfer_units * tt_k) / (1.0 + transfer_units);

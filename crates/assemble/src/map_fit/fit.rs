@@ -3,6 +3,7 @@
 use super::MapFitError;
 use super::crossing::crossings;
 use super::observations::Observations;
+use super::solution::Solution;
 use super::solve::solve;
 use super::surface::MapFit;
 use super::table::{MapFitOptions, table};
@@ -19,13 +20,14 @@ impl MapFit {
     /// # Errors
     /// [`MapFitError`] where there is too little, too much or nothing sensible to fit.
     pub fn new(map: &CompressorMap) -> Result<Self, MapFitError> {
-        MapFit::of(Observations::of(map)?)
+        MapFit::of(Observations::of(map)?, None)
     }
 
-    pub(crate) fn of(data: Observations) -> Result<Self, MapFitError> {
+    /// `near`: a fit of nearly the same points, from which the search may start.
+    pub(crate) fn of(data: Observations, near: Option<&Solution>) -> Result<Self, MapFitError> {
         let mut best: Option<(usize, MapFit)> = None;
         for stiffness in STIFFNESSES {
-            let fit = MapFit { solution: solve(&data, stiffness)?, data: data.clone() };
+            let fit = MapFit { solution: solve(&data, stiffness, near)?, data: data.clone() };
             let crossings = crossings(&fit.lines_for_check());
             if best.as_ref().is_none_or(|(least, _)| crossings < *least) {
                 best = Some((crossings, fit));

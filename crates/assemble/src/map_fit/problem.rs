@@ -40,16 +40,14 @@ pub(super) struct Unknowns {
 }
 
 impl<'a> Problem<'a> {
-    pub(super) fn new(data: &'a Observations) -> Self {
+    /// `frame`: that of another fit, so that its parameters mean the same here; `None` for one of its own.
+    pub(super) fn new(data: &'a Observations, frame: Option<FlowFrame>) -> Self {
         let mut ratios: Vec<f64> =
             data.lines_rpm.iter().map(|speed| speed / data.nominal_speed_rpm).collect();
         ratios.dedup_by(|b, a| *b < *a * 1.02);
         let splines = Splines::new(&if ratios.len() <= MOST_KNOTS { ratios } else { thinned(&ratios) });
         let rows = data.points.iter().map(|p| splines.rows(p.speed_ratio)).collect();
-        let flows: Vec<f64> = data.points.iter().map(Observation::flow).collect();
-        let (low, high) = (quantile(&flows, 0.0).unwrap_or(0.0), quantile(&flows, 1.0).unwrap_or(1.0));
-        let middle = median(&flows).unwrap_or(0.5);
-        let frame = FlowFrame { middle_kg_s: middle, half_range_kg_s: (0.5 * (high - low)).max(1e-6 * high) };
+        let frame = frame.unwrap_or_else(|| frame_of(data));
         let mut problem = Problem { data, frame, splines, rows, start: [0.0; PARAMETERS] };
         problem.start = problem.starting_level();
         problem
@@ -271,6 +269,13 @@ impl<'a> Problem<'a> {
         let sum = |c: usize| residuals.iter().map(|r| r[c] * r[c]).sum::<f64>();
         [(sum(0) / residuals.len().max(1) as f64).sqrt(), (sum(1) / with_eta as f64).sqrt()]
     }
+}
+
+fn frame_of(data: &Observations) -> FlowFrame {
+    let flows: Vec<f64> = data.points.iter().map(Observation::flow).collect();
+    let (low, high) = (quantile(&flows, 0.0).unwrap_or(0.0), quantile(&flows, 1.0).unwrap_or(1.0));
+    let middle_kg_s = median(&flows).unwrap_or(0.5);
+    FlowFrame { middle_kg_s, half_range_kg_s: (0.5 * (high - low)).max(1e-6 * high) }
 }
 
 /// Units of distance of a point's line.

@@ -19,6 +19,8 @@ pub(crate) struct Solution {
     pub(super) roughness_variance: Parameters,
     /// Standard deviations of the line offsets, logarithms.
     pub line_scatter: [f64; 3],
+    /// Scales of distance and efficiency that the residuals were weighed by.
+    pub(super) scales: [f64; 2],
     /// Root mean squares of distance and efficiency.
     pub rms: [f64; 2],
     /// Minus twice the logarithm of the marginal likelihood by Laplace's approximation, but for a constant of the data.

@@ -1,9 +1,9 @@
 //! The rounds of a fit: steps of Levenberg and Marquardt, and between them the variances.
 
 use super::MapFitError;
-use super::line_shape::{Parameters, WORK};
+use super::line_shape::{FlowFrame, Parameters, WORK};
 use super::observations::Observations;
-use super::precisions::Precisions;
+use super::precisions::{Precisions, ROUGHNESS_REACH};
 use super::problem::{LINE_OFFSETS, Problem, Unknowns};
 use super::solution::Solution;
 use mapper_numerics::least_squares::{Damping, DampingRule, damped_step, inverse};
@@ -34,6 +34,15 @@ const DAMPING: DampingRule = DampingRule {
     tries: 6,
 };
 
+/// Where a search starts.
+#[derive(Clone, Copy)]
+enum Start<'a> {
+    /// From the points alone, with this scale of the residuals.
+    Scale(f64),
+    /// Where another fit ended.
+    Near(&'a Solution),
+}
+
 /// What a round of the fit is for.
 enum Phase {
     /// The parameters come near, the variances stand.
@@ -48,12 +57,20 @@ enum Phase {
 ///
 /// Where the points end far from their lines, the estimation may have settled on scatter where there is shape, or on
 /// outliers where there are none: then it is made again from other scales, and the most probable is kept.
-pub(crate) fn solve(data: &Observations, stiffness: f64) -> Result<Solution, MapFitError> {
-    let [first, others @ ..] = START_SCALES;
-    let mut best = solve_from(data, stiffness, first)?;
+///
+/// `near`: a fit of nearly the same points, from which the search may start.
+pub(crate) fn solve(
+    data: &Observations,
+    stiffness: f64,
+    near: Option<&Solution>,
+) -> Result<Solution, MapFitError> {
+    let frame = near.map(|near| near.frame);
+    let from = |start: Start<'_>| solve_from(data, stiffness, frame, start);
+    let [first, others @ ..] = START_SCALES.map(Start::Scale);
+    let mut best = from(near.map_or(first, Start::Near))?;
     if best.rms[0] > FAR || best.rms[1] > FAR {
-        for scale in others {
-            if let Ok(other) = solve_from(data, stiffness, scale)
+        for start in near.map(|_| first).into_iter().chain(others) {
+            if let Ok(other) = from(start)
                 && other.improbability < best.improbability
             {
                 best = other;
@@ -63,14 +80,33 @@ pub(crate) fn solve(data: &Observations, stiffness: f64) -> Result<Solution, Map
     Ok(best)
 }
 
-fn solve_from(data: &Observations, stiffness: f64, start_scale: f64) -> Result<Solution, MapFitError> {
-    let mut problem = Problem::new(data);
+fn solve_from(
+    data: &Observations,
+    stiffness: f64,
+    frame: Option<FlowFrame>,
+    start: Start<'_>,
+) -> Result<Solution, MapFitError> {
+    let mut problem = Problem::new(data, frame);
     let start_rough: Parameters = ROUGHNESS.map(|r| stiffness / (r * r));
-    let mut precisions =
-        Precisions { rough: start_rough, lines: [1.0 / SCATTER.powi(2); 3], scales: [start_scale; 2] };
     let mut unknowns = problem.initial()?;
     problem.start =
         std::array::from_fn(|q| if q < WORK { problem.start[q] } else { unknowns.values[(q, 0)] });
+    let mut precisions = match start {
+        Start::Scale(scale) => {
+            Precisions { rough: start_rough, lines: [1.0 / SCATTER.powi(2); 3], scales: [scale; 2] }
+        }
+        Start::Near(near) => {
+            unknowns.values = problem.splines.values(|speed_ratio| near.parameters(speed_ratio));
+            Precisions {
+                rough: std::array::from_fn(|q| {
+                    let [least, most] = ROUGHNESS_REACH.map(|ratio| ratio * start_rough[q]);
+                    (1.0 / near.roughness_variance[q]).clamp(least, most)
+                }),
+                lines: near.line_scatter.map(|sigma| 1.0 / (sigma * sigma)),
+                scales: near.scales,
+            }
+        }
+    };
     let mut feet = problem.feet(&unknowns, None);
     let mut damping = Damping::new(DAMPING);
     let [free, estimate, settle] = ROUNDS;
@@ -140,5 +176,6 @@ fn solve_from(data: &Observations, stiffness: f64, start_scale: f64) -> Result<S
         covariance,
         roughness_variance: precisions.rough.map(|p| 1.0 / p),
         line_scatter: precisions.lines.map(|p| 1.0 / p.sqrt()),
+        scales: precisions.scales,
     })
 }

@@ -1,8 +1,8 @@
 //! The splines over speed that all parameters share, and their weights at a speed.
 
-use super::line_shape::WORK;
+use super::line_shape::{PARAMETERS, Parameters, WORK};
 use super::speed_spline::{Coordinate, SpeedSpline};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// Splines over speed with equal knots.
 #[derive(Debug, Clone)]
@@ -11,6 +11,8 @@ pub(crate) struct Splines {
     pub shape: SpeedSpline,
     /// Of the work coefficient.
     pub work: SpeedSpline,
+    /// Of the knots.
+    speed_ratios: Vec<f64>,
 }
 
 impl Splines {
@@ -18,6 +20,7 @@ impl Splines {
         Splines {
             shape: SpeedSpline::new(Coordinate::Speed, speed_ratios),
             work: SpeedSpline::new(Coordinate::Slowness, speed_ratios),
+            speed_ratios: speed_ratios.to_vec(),
         }
     }
 
@@ -27,6 +30,15 @@ impl Splines {
 
     pub(crate) fn rows(&self, speed_ratio: f64) -> Rows {
         Rows { shape: self.shape.row(speed_ratio), work: self.work.row(speed_ratio) }
+    }
+
+    /// Knot values, one row per parameter, of parameters that are known at any speed.
+    pub(crate) fn values(&self, at: impl Fn(f64) -> Parameters) -> DMatrix<f64> {
+        let mut values = DMatrix::zeros(PARAMETERS, self.len());
+        for (k, speed_ratio) in self.speed_ratios.iter().enumerate() {
+            values.set_column(k, &DVector::from_row_slice(&at(*speed_ratio)));
+        }
+        values
     }
 
     pub(crate) fn len(&self) -> usize {

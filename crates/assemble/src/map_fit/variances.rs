@@ -6,7 +6,7 @@
 //! followed, the rest stays straight over speed.
 
 use super::line_shape::{PARAMETERS, Parameters};
-use super::precisions::{Precisions, ROBUST};
+use super::precisions::{Precisions, ROBUST, ROUGHNESS_REACH};
 use super::problem::{Problem, Unknowns};
 use nalgebra::DMatrix;
 
@@ -57,9 +57,8 @@ impl Problem<'_> {
             let free = (knots.saturating_sub(2) as f64 - used).max(1e-2);
             let wanted = free / (values.dot(&(&self.splines.of(q).penalty * &values)) + 1e-9);
             let step = (wanted / precisions.rough[q]).clamp(0.3, 3.0);
-            // Twenty times stiffer than where it starts is a straight line to the eye; more would only make errors too
-            // sure beyond the measured lines.
-            let next = (precisions.rough[q] * step).clamp(0.03 * start, 20.0 * start);
+            let [least, most] = ROUGHNESS_REACH.map(|ratio| ratio * start);
+            let next = (precisions.rough[q] * step).clamp(least, most);
             set(&mut precisions.rough[q], next);
         }
         for (index, precision) in precisions.lines.iter_mut().enumerate() {

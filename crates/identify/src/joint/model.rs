@@ -64,7 +64,54 @@ struct Convection {
     inlet_h_ratio: f64,
 }
 
+/// How convection answers to the gas, first order: what it costs to move one more quantity is then a few products.
+#[derive(Debug, Clone, Copy)]
+struct Answer {
+    /// ln h by the temperature of its properties, 1/K.
+    ln_h_by_bulk: f64,
+    /// The same of h before the wheel over that after it, of its value, 1/K.
+    inlet_by_bulk: f64,
+    /// ln h by the metal's temperature, 1/K.
+    ln_h_by_metal: f64,
+    /// ln h by ln of the flow.
+    ln_h_by_ln_flow: f64,
+}
+
+impl Answer {
+    /// Convection where the gas has moved a little from `gas`, at the same inlet temperature.
+    fn moved(&self, from: &Convection, gas: &Gas, to: &Gas) -> Convection {
+        let bulk_k = compressed_k(to.t1_k, to.rise_ratio, to.eta);
+        let by_k = bulk_k - from.bulk_k;
+        let ln_h = self.ln_h_by_bulk * by_k
+            + self.ln_h_by_metal * (to.tc_k - gas.tc_k)
+            + self.ln_h_by_ln_flow * (to.flow_kg_s / gas.flow_kg_s - 1.0);
+        Convection {
+            h_w_m2k: from.h_w_m2k * (1.0 + ln_h),
+            bulk_k,
+            inlet_h_ratio: from.inlet_h_ratio + self.inlet_by_bulk * by_k,
+        }
+    }
+}
+
 impl Setting {
+    /// How convection, which is `here` at `gas`, answers to it.
+    fn answer(&self, gas: &Gas, here: &Convection, shared: &SharedVector, ln_deviation: f64) -> Answer {
+        let step_k = here.bulk_k * STEP_RATIO;
+        // Of the law the pressure moves the bulk temperature and nothing else.
+        let rise_ratio = gas.eta * ((here.bulk_k + step_k) / gas.t1_k - 1.0);
+        let hotter = self.h(&Gas { rise_ratio, ..*gas }, shared, ln_deviation);
+        let by_k = hotter.bulk_k - here.bulk_k;
+        let metal_k = gas.tc_k * (1.0 + STEP_RATIO);
+        let viscosity_ratio = air::viscosity_pa_s(gas.tc_k) / air::viscosity_pa_s(metal_k);
+        let law = if self.with_law { 1.0 } else { 0.0 };
+        Answer {
+            ln_h_by_bulk: (hotter.h_w_m2k / here.h_w_m2k - 1.0) / by_k,
+            inlet_by_bulk: (hotter.inlet_h_ratio - here.inlet_h_ratio) / by_k,
+            ln_h_by_metal: law * nusselt::WALL_EXPONENT * (viscosity_ratio - 1.0) / (metal_k - gas.tc_k),
+            ln_h_by_ln_flow: law * shared[EXPONENT],
+        }
+    }
+
     /// Heat-transfer coefficients by the law.
     fn h(&self, gas: &Gas, shared: &SharedVector, ln_deviation: f64) -> Convection {
         let bulk_k = compressed_k(gas.t1_k, gas.rise_ratio, gas.eta);
@@ -220,8 +267,9 @@ impl Setting {
             if !derivatives {
                 continue;
             }
-            let full = |moved: Gas, step: f64| {
-                (self.t2_k(&moved, self.h(&moved, shared, deviation), alpha, ln_direction) - t2_k) / step
+            let answer = self.answer(&gas, &h, shared, deviation);
+            let full = |to: Gas, step: f64| {
+                (self.t2_k(&to, answer.moved(&h, &gas, &to), alpha, ln_direction) - t2_k) / step
             };
             let by_eta = full(Gas { eta: gas.eta + STEP_RATIO, ..gas }, STEP_RATIO);
             let by_ln_h = (self.t2_k(
@@ -274,7 +322,8 @@ impl Setting {
                 let (step, t1_k) = (gas.t1_k * STEP_RATIO, gas.t1_k * (1.0 + STEP_RATIO));
                 let pressure_ratio = (row.p2_pa - shared[OFFSETS + 4]) / (row.p1_pa - shared[OFFSETS + 3]);
                 let moved = Gas { t1_k, rise_ratio: isentropic_rise_ratio(pressure_ratio, t1_k), ..gas };
-                put(OFFSETS, -full(moved, step));
+                let convection = self.h(&moved, shared, deviation);
+                put(OFFSETS, -(self.t2_k(&moved, convection, alpha, ln_direction) - t2_k) / step);
             }
             put(OFFSETS + 1, 1.0);
             if active[OFFSETS + 2] {

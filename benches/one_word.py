@@ -74,7 +74,7 @@ def main():
     fmu = subprocess.run([str(python), str(ROOT / "tests/python/build_fmu.py"), str(out / "small.fmu")], capture_output=True, text=True, check=True).stdout
     files = {
         "virtual_lab": lab,
-        "opcua": campaign(out / "opcua.yaml", of_the_guide("opcua", ("opc.tcp://127.0.0.1:4840", places["opcua"]), ("rig: cell 3 ", "rig: cell 4 "))),
+        "opcua": campaign(out / "opcua.yaml", of_the_guide("opcua", ("opc.tcp://127.0.0.1:4840", places["opcua"]), ("rig: cell_3 ", "rig: cell_4 "))),
         "modbus": campaign(out / "modbus.yaml", of_the_guide("modbus", ("127.0.0.1:5020", places["modbus"]))),
         "python_rig": campaign(out / "python_rig.yaml", "  python_rig: {noise: 1}"),
         "fmu": campaign(out / "fmu.yaml", "  fmu: " + fmu.strip()),

@@ -47,6 +47,10 @@ pub struct RigDescription {
     /// which each run has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exclusive: Option<String>,
+    /// Where it is reached, e.g. host and port of its controller: no two runs may be there at once either, whatever they call
+    /// the rig.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reached_at: Option<String>,
     /// Guards that must be there, and end the run, before it is armed.
     #[serde(default)]
     pub needs_guarded: Vec<GuardName>,

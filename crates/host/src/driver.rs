@@ -325,6 +325,7 @@ impl Backend for Driver {
             simulated_time: true,
             controls: false,
             exclusive: None,
+            reached_at: None,
             needs_guarded: Vec::new(),
             accepts: None,
             safe: mapper_core::SafeTrajectory::default(),

@@ -7,6 +7,8 @@ use serde_json::Value;
 const SECRET: [&str; 5] = ["password", "passphrase", "secret", "token", "private_key_text"];
 /// What stands in place of a secret.
 const HIDDEN: &str = "[secret]";
+/// Letters below which a secret is only looked for as a word: as a part of others it would blot out whole sentences.
+const SHORT: usize = 6;
 /// Deepest nesting of settings that is looked into: YAML is read less deep.
 const DEEPEST: usize = 64;
 
@@ -66,8 +68,27 @@ impl Secrets {
 
     /// A driver's words without them.
     pub(crate) fn hide(&self, text: &str) -> String {
-        self.0.iter().fold(text.to_owned(), |text, secret| text.replace(secret.as_str(), HIDDEN))
+        self.0.iter().fold(text.to_owned(), |text, secret| match secret.chars().count() < SHORT {
+            true => without_word(&text, secret),
+            false => text.replace(secret.as_str(), HIDDEN),
+        })
     }
+}
+
+/// A text without a word.
+fn without_word(text: &str, word: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut from = 0;
+    for (at, found) in text.match_indices(word) {
+        let end = at + found.len();
+        let before = text[..at].chars().next_back().is_some_and(char::is_alphanumeric);
+        let after = text[end..].chars().next().is_some_and(char::is_alphanumeric);
+        out.push_str(&text[from..at]);
+        out.push_str(if before || after { found } else { HIDDEN });
+        from = end;
+    }
+    out.push_str(&text[from..]);
+    out
 }
 
 /// The variable that `{env: NAME}` names.
@@ -90,6 +111,12 @@ mod tests {
         let two = |name: &str| Some(if name == "A" { "hunter" } else { "hunter2" }.to_owned());
         let secrets = Secrets::of(&json!([{"env": "A"}, {"env": "B"}]), &two).ok().unwrap();
         assert_eq!(secrets.hide("hunter2, hunter"), "[secret], [secret]");
+        let short = |_: &str| Some("me".to_owned());
+        let secrets = Secrets::of(&json!({"env": "A"}), &short).ok().unwrap();
+        assert_eq!(
+            secrets.hide("message for me: (me) meets me"),
+            "message for [secret]: ([secret]) meets [secret]"
+        );
         let (path, error) = read(json!({"security": [{"Password": "hunter2"}]})).err().unwrap();
         assert_eq!(path, "security.0.Password");
         assert!(!error.to_string().contains("hunter2"));

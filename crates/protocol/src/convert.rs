@@ -117,6 +117,7 @@ pub fn description(wire: &Description, backend: &str, version: &str) -> Result<R
         simulated_time: wire.simulated_time,
         controls: wire.controls,
         exclusive: wire.exclusive.clone(),
+        reached_at: wire.reached_at.clone(),
         needs_guarded: wire.needs_guarded.iter().map(guard).collect::<Result<_, _>>()?,
         accepts: wire.accepts.as_ref().map(ranges),
         safe: SafeTrajectory {
@@ -160,6 +161,7 @@ pub fn description_on_the_wire(rig: &RigDescription) -> Description {
         simulated_time: rig.simulated_time,
         controls: rig.controls,
         exclusive: rig.exclusive.clone(),
+        reached_at: rig.reached_at.clone(),
         needs_guarded: rig.needs_guarded.iter().map(ToString::to_string).collect(),
         accepts: rig.accepts.map(|accepts| Ranges {
             p3_pa: range(accepts.p3_pa),

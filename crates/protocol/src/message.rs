@@ -182,6 +182,9 @@ pub struct Description {
     /// Name of the one rig that this is; no two runs may have it at once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exclusive: Option<String>,
+    /// Where it is reached, e.g. host and port of its controller; no two runs may be there at once, whatever they call the rig.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reached_at: Option<String>,
     /// Guards that the run must have, by their keys in campaigns.
     #[serde(default)]
     pub needs_guarded: Vec<String>,

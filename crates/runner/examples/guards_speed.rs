@@ -36,6 +36,7 @@ impl Backend for Hour {
             simulated_time: false,
             controls: true,
             exclusive: None,
+            reached_at: None,
             needs_guarded: Vec::new(),
             accepts: None,
             safe: SafeTrajectory::default(),

@@ -146,6 +146,7 @@ mod tests {
                 simulated_time: false,
                 controls: true,
                 exclusive: None,
+                reached_at: None,
                 needs_guarded: Vec::new(),
                 accepts: None,
                 safe: SafeTrajectory::default(),

@@ -6,7 +6,8 @@ use crate::observer::{ObserverError, RunObserver};
 use crate::operator::Operator;
 use crate::protection::Protection;
 use crate::reached::Reached;
-use crate::source::{StepSource, StepSourceError};
+use crate::run_error::RunError;
+use crate::source::StepSource;
 use crate::speed_control::SpeedControl;
 use mapper_core::{
     Backend, BackendError, Clock, Event, EventKind, GuardName, PlanStep, Reaction, RigMode, SampleBatch,
@@ -41,51 +42,6 @@ pub enum RunEnd {
     },
     /// A guard tripped; the rig is safe.
     Tripped(Trip),
-}
-
-/// Why a run could not go on. The rig was asked to become safe before this is returned.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The rig failed.
-    #[error("the rig failed: {0}")]
-    Backend(#[from] BackendError),
-    /// Recording or another observer failed.
-    #[error("{0}")]
-    Observer(#[from] ObserverError),
-    /// What yields the steps failed.
-    #[error("{0}")]
-    Source(#[from] StepSourceError),
-    /// The program itself failed.
-    #[error(
-        "the program failed on the way ({message}); the rig is safe. Please report this as a fault of the program"
-    )]
-    Panicked {
-        /// What it said.
-        message: String,
-    },
-    /// The rig did not confirm its safe state.
-    #[error(
-        "THE RIG DID NOT CONFIRM ITS SAFE STATE: {source}. Cut its air by hand. The run had ended because: {why}"
-    )]
-    NotSafe {
-        /// Why the run had ended.
-        why: String,
-        /// What the rig answered.
-        source: BackendError,
-    },
-}
-
-impl RunError {
-    /// Whether nobody knows in which state the rig is.
-    pub fn leaves_doubt(&self) -> bool {
-        match self {
-            RunError::NotSafe { .. } | RunError::Panicked { .. } => true,
-            RunError::Backend(error) => {
-                matches!(error, BackendError::Lost { .. } | BackendError::Deadline { .. })
-            }
-            RunError::Observer(_) | RunError::Source(_) => false,
-        }
-    }
 }
 
 /// Steps, a rig and everything around them.
@@ -135,6 +91,8 @@ pub(crate) struct Run<'a, 'p> {
     skipped: u32,
     /// The step that a guard has cut short, until its end is told.
     pub(crate) open: Option<StepMarker>,
+    /// Whether it was told that the run ends with the step.
+    pub(crate) stop_told: bool,
 }
 
 impl Runner<'_> {
@@ -153,7 +111,7 @@ impl Runner<'_> {
     /// # Errors
     /// [`RunError`] where the rig or an observer failed.
     pub fn run_under(self, protection: &Protection<'_>) -> Result<RunEnd, RunError> {
-        self.backend.arm()?;
+        self.backend.arm().map_err(RunError::NotArmed)?;
         let sample_s = 1.0 / self.backend.describe().sample_rate_hz;
         let mut run = Run {
             with: self,
@@ -165,6 +123,7 @@ impl Runner<'_> {
             reached: Reached::default(),
             skipped: 0,
             open: None,
+            stop_told: false,
         };
         // What a panic leaves half done is not used again but for making the rig safe.
         let end = match catch_unwind(AssertUnwindSafe(|| run.forward())) {
@@ -400,10 +359,7 @@ impl Run<'_, '_> {
     fn watch(&mut self, mut until_s: f64, in_step: bool, hold_speed: bool) -> Result<(), Halt> {
         let (mut held_s, mut operator_held_s) = (0.0, 0.0);
         while self.now_s < until_s {
-            let stop_now = !in_step && self.protection.stop_after_step.load(Ordering::Relaxed);
-            if stop_now || self.with.stop.load(Ordering::Relaxed) {
-                return Err(Halt::Interrupted);
-            }
+            self.look_for_a_stop(in_step, until_s)?;
             let before_s = self.now_s;
             let (batch, trips) = self.acquire(until_s)?;
             if let Some(trip) = trips.iter().find(|trip| trip.reaction.ends_the_run()) {

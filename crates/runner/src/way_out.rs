@@ -2,7 +2,8 @@
 
 use crate::guard::Told;
 use crate::protection::Protection;
-use crate::run::{Halt, Run, RunEnd, RunError, words_of};
+use crate::run::{Halt, Run, RunEnd, words_of};
+use crate::run_error::RunError;
 use mapper_core::{BackendError, Event, EventKind, GuardName, SampleBatch, Setpoints};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 

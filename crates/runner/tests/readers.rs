@@ -30,6 +30,7 @@ impl Backend for Beside {
             simulated_time: self.simulated_time,
             controls: false,
             exclusive: None,
+            reached_at: None,
             needs_guarded: Vec::new(),
             accepts: None,
             safe: SafeTrajectory::default(),

@@ -98,6 +98,7 @@ impl Backend for Stand {
             simulated_time: !self.real_time,
             controls: self.controls,
             exclusive: None,
+            reached_at: None,
             needs_guarded: Vec::new(),
             accepts: None,
             safe: SafeTrajectory { p3_slew_pa_s: Some(50e3), valve_opening_ratio: 1.0, within_s: 5.0 },

@@ -34,6 +34,12 @@ pub enum ErrorKind {
     Interrupted,
 }
 
+/// A name as a shell takes it for one word.
+fn word(name: &str) -> String {
+    let plain = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || "-_./:@".contains(c));
+    if plain { name.to_owned() } else { format!("'{}'", name.replace('\'', r"'\''")) }
+}
+
 fn in_doubt_text(rigs: &[String]) -> String {
     if rigs.is_empty() { "no rig is in doubt".to_owned() } else { format!("in doubt: {}", rigs.join(", ")) }
 }
@@ -164,8 +170,8 @@ pub enum SessionError {
     },
     /// A runner died with the rig in its hands.
     #[error(
-        "the rig `{rig}` was left by {owner}, which ended without making it safe. Look at the rig; then go on with \
-         `mapper run --resume {}`, or clear it with `mapper rig acknowledge {rig}`", .run.display()
+        "the rig `{rig}` was left by {owner}, which ended with the rig in its hands; a driver makes it safe by itself then. Look at the rig; then go on with \
+         `mapper run --resume {}`, or clear it with `mapper rig acknowledge {}`", .run.display(), word(.rig)
     )]
     RigAbandoned {
         /// The rig.
@@ -177,8 +183,8 @@ pub enum SessionError {
     },
     /// A rig that nobody has looked at since it was in doubt.
     #[error(
-        "the rig `{rig}` is latched since the run {}: {reason}. Look at the rig; then clear it with `mapper rig acknowledge {rig}`",
-        .run.display()
+        "the rig `{rig}` is latched since the run {}: {reason}. Look at the rig; then clear it with `mapper rig acknowledge {}`",
+        .run.display(), word(.rig)
     )]
     RigLatched {
         /// The rig.
@@ -196,6 +202,9 @@ pub enum SessionError {
         /// Those that are in doubt.
         in_doubt: Vec<String>,
     },
+    /// The rig was never had: there is no run.
+    #[error(transparent)]
+    NotArmed(RunError),
     /// The run cannot begin as things are.
     #[error("the run was not begun: {0}")]
     Preflight(String),
@@ -440,6 +449,7 @@ impl SessionError {
             | E::RigInUse { .. }
             | E::RigAbandoned { .. }
             | E::RigLatched { .. }
+            | E::NotArmed(_)
             | E::Preflight(_) => ErrorKind::Rig,
             E::Plan(_)
             | E::NotAPlan { .. }
@@ -449,7 +459,7 @@ impl SessionError {
             | E::RehearsalTripped { .. }
             | E::NoSteps { .. } => ErrorKind::NoPlan,
             E::Run { source, .. } => match source {
-                RunError::Backend(_) => ErrorKind::Rig,
+                RunError::Backend(_) | RunError::NotArmed(_) => ErrorKind::Rig,
                 RunError::Source(_) => ErrorKind::BadInput,
                 RunError::Observer(_) | RunError::Panicked { .. } => ErrorKind::Failure,
                 RunError::NotSafe { .. } => ErrorKind::Rig,

@@ -9,7 +9,8 @@ use std::path::Path;
 pub(crate) struct Held {
     /// The rig, where it is one that can be had but once.
     rig: Option<Claim>,
-    /// Readers: a lock each. A runner that died with one leaves nothing behind: nobody was driving it.
+    /// Readers, and where the rig is reached: a lock each. A runner that died with one leaves nothing behind: the rig's own
+    /// name says what there is to say.
     readers: Vec<Claim>,
 }
 
@@ -51,5 +52,24 @@ fn owner(run: &Path, started: &str) -> Owner {
         host: host.trim().to_owned(),
         run: std::path::absolute(run).unwrap_or_else(|_| run.to_owned()),
         started: started.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two campaigns may call one controller by two names.
+    #[test]
+    fn one_controller_is_one_rig_whatever_it_is_called() {
+        let directory = tempfile::tempdir().unwrap();
+        let states = RigStates::new(directory.path());
+        let place = ["at 10.0.0.3:502 unit 255".to_owned()];
+        let first = Held::take(&states, Some("cell 3"), &place, None).unwrap();
+        let refused = Held::take(&states, Some("cell three"), &place, None).map(drop).unwrap_err();
+        assert!(matches!(refused, SessionError::RigInUse { .. }), "{refused}");
+        assert!(Held::take(&states, Some("cell 4"), &["at 10.0.0.4:502 unit 255".to_owned()], None).is_ok());
+        first.give_back(None, Path::new("runs/a")).unwrap();
+        assert!(Held::take(&states, Some("cell three"), &place, None).is_ok());
     }
 }

@@ -14,6 +14,9 @@ use std::path::{Path, PathBuf};
 /// Largest of these files that is read, bytes.
 const READ_MAX: u64 = 64 << 10;
 
+/// How the lock of a place is named, as a file, where a rig is reached.
+const PLACE: &str = "at_";
+
 /// Who runs, or ran, a rig.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Owner {
@@ -152,16 +155,22 @@ impl RigStates {
         Ok(RigStatus { rig: rig.to_owned(), owner, in_use, latch: self.latch_of(rig) })
     }
 
-    /// The rigs that wait for somebody to look at them, as their files are named.
-    fn in_doubt(&self) -> Vec<String> {
+    /// All rigs that a run has had, as their files are named.
+    pub fn known(&self) -> Vec<RigStatus> {
         let entries = std::fs::read_dir(&self.directory).into_iter().flatten().flatten();
         let name = |file: String| {
             let (name, kind) = file.strip_prefix("rig-")?.rsplit_once('.')?;
-            let status = self.status(name).ok().filter(|_| matches!(kind, "lock" | "latch"))?;
-            (status.latch.is_some() || (status.owner.is_some() && !status.in_use)).then(|| name.to_owned())
+            (matches!(kind, "lock" | "latch") && !name.starts_with(PLACE)).then(|| name.to_owned())
         };
         let files = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        files.filter_map(name).collect::<BTreeSet<_>>().into_iter().collect()
+        let names = files.filter_map(name).collect::<BTreeSet<_>>();
+        names.iter().filter_map(|name| self.status(name).ok()).collect()
+    }
+
+    /// Those that wait for somebody to look at them.
+    fn in_doubt(&self) -> Vec<String> {
+        let waits = |status: &RigStatus| status.latch.is_some() || (status.owner.is_some() && !status.in_use);
+        self.known().into_iter().filter(waits).map(|status| status.rig).collect()
     }
 
     /// Somebody has looked at the rig: the next run may begin.

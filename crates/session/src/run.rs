@@ -252,6 +252,9 @@ impl PreparedRun<'_> {
         };
         let (end, finished, doubt) = self.drive_and_record(session, recorder, pace);
         held.give_back(doubt, &directory)?;
+        if let Ended::Failed(error @ RunError::NotArmed(_)) = end {
+            return Err(self.never_begun(error, &directory));
+        }
         // A run that failed has its own reason; one that did not must have a whole file.
         if !matches!(end, Ended::Failed(_) | Ended::Interrupted { .. } | Ended::Tripped { .. }) {
             finished?;
@@ -261,6 +264,15 @@ impl PreparedRun<'_> {
         let executed = self.executed(&results_directory);
         let results = self.results(session, executed, &end, &results_directory, &parts);
         Ok(RunOutcome { directory, recording, end, results })
+    }
+
+    /// A rig that was not had leaves no run: what was made for it goes again.
+    fn never_begun(&self, error: RunError, directory: &Path) -> SessionError {
+        if self.request.resume.is_none() && !error.leaves_doubt() {
+            // What cannot be removed is in nobody's way.
+            let _ = std::fs::remove_dir_all(directory);
+        }
+        SessionError::NotArmed(error)
     }
 
     fn results(
@@ -296,7 +308,9 @@ impl PreparedRun<'_> {
         let usual = self.request.parent.join(".rigs");
         let states = RigStates::new(self.request.rig_states.unwrap_or(&usual));
         let resumes = self.request.resume.as_ref().map(|broken_off| broken_off.directory.as_path());
-        Held::take(&states, rig.exclusive.as_deref(), &self.sources.exclusive, resumes)
+        let place = rig.reached_at.iter().map(|place| format!("at {place}"));
+        let shared: Vec<String> = self.sources.exclusive.iter().cloned().chain(place).collect();
+        Held::take(&states, rig.exclusive.as_deref(), &shared, resumes)
     }
 
     /// The directory of the run: a new one with what the run is made from, or that of the run that goes on.

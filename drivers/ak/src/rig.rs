@@ -108,6 +108,7 @@ impl Backend for Instrument {
             simulated_time: false,
             controls: false,
             exclusive: Some(format!("ak {}", self.settings.address)),
+            reached_at: None,
             needs_guarded: Vec::new(),
             accepts: Some(PLAUSIBLE),
             safe: SafeTrajectory { p3_slew_pa_s: None, valve_opening_ratio: 1.0, within_s: 1.0 },

@@ -41,6 +41,8 @@ pub struct Stand {
     pub version: &'static str,
     /// Name of the rig, of which there is one.
     pub rig: String,
+    /// Where its controller is reached: host and port.
+    pub reached_at: String,
     /// Samples per second, Hz.
     pub rate_hz: f64,
     /// What is read.
@@ -169,6 +171,7 @@ impl<C: Controller> Backend for Rig<C> {
             simulated_time: false,
             controls: true,
             exclusive: Some(self.stand.rig.clone()),
+            reached_at: Some(self.stand.reached_at.clone()),
             needs_guarded: NEEDS.map(|(guard, _)| guard).to_vec(),
             accepts: Some(self.stand.accepts.ranges()),
             safe: self.stand.safe.trajectory(),

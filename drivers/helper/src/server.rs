@@ -323,6 +323,7 @@ mod tests {
                 simulated_time: self.simulated_time,
                 controls: true,
                 exclusive: None,
+                reached_at: None,
                 needs_guarded: Vec::new(),
                 accepts: None,
                 safe: SafeTrajectory { p3_slew_pa_s: Some(100e3), valve_opening_ratio: 1.5, within_s: 5.0 },

@@ -142,6 +142,8 @@ impl Settings {
             backend: NAME,
             version: env!("CARGO_PKG_VERSION"),
             rig: self.rig.clone().unwrap_or_else(|| format!("modbus {}", self.address)),
+            // Behind a gateway each unit is a stand of its own.
+            reached_at: format!("{} unit {}", self.address, self.unit),
             rate_hz: self.rate.as_ref().map_or(10.0, |rate| rate.inside),
             channels: self.read.keys().copied().collect(),
             accepts: self.accepts,

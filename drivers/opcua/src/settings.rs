@@ -255,6 +255,7 @@ impl Settings {
             backend: NAME,
             version: env!("CARGO_PKG_VERSION"),
             rig: self.rig.clone().unwrap_or_else(|| format!("opcua {}", self.endpoint)),
+            reached_at: crate::store::server(&self.endpoint).to_ascii_lowercase(),
             rate_hz: self.rate.as_ref().map_or(10.0, |rate| rate.inside),
             channels: self.read.keys().copied().collect(),
             accepts: self.accepts,

@@ -220,7 +220,10 @@ fn a_server_whose_certificate_has_expired_is_not_talked_to() {
     assert!(!pin.exists());
     std::fs::copy(stand.scratch.path().join("expired/cert.der"), pin).unwrap();
     let refused = words(stand.driver(PASSWORD).arm().unwrap_err());
-    assert!(refused.contains("is not valid now (until 2") && refused.contains("give the server a new one"), "{refused}");
+    assert!(
+        refused.contains("is not valid now (until 2") && refused.contains("give the server a new one"),
+        "{refused}"
+    );
 }
 
 #[test]

@@ -166,6 +166,7 @@ impl Backend for ReplayBackend {
             simulated_time: true,
             controls: false,
             exclusive: None,
+            reached_at: None,
             needs_guarded: Vec::new(),
             accepts: Some(setpoint_limits::ACCEPTED),
             safe: SafeTrajectory::default(),

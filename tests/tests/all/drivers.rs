@@ -301,6 +301,37 @@ impl Drop for Server {
     }
 }
 
+/// A controller that nobody reaches: said as that, twice alike. Nothing moved, so that no latch waits for anybody, and no empty run
+/// is left.
+#[test]
+fn a_rig_that_is_never_reached_leaves_neither_latch_nor_run() {
+    mapper_tests::build_driver("mapper-backend-modbus");
+    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let campaign = of_the_guide("modbus", &[(":5020 ", &format!(":{port} "))]);
+    let states = mapper_tests::scratch();
+    let with = |arguments: &[&std::ffi::OsStr]| {
+        let mut command = with_drivers(arguments);
+        command.env("MAPPER_STATE_DIR", states.path());
+        done(command)
+    };
+    let runs = campaign.runs();
+    let run: [&std::ffi::OsStr; 4] =
+        ["run".as_ref(), campaign.path.as_ref(), "--out".as_ref(), runs.as_ref()];
+    for _ in 0..2 {
+        let finished = with(&run).exits(5);
+        assert!(finished.stderr.contains("the rig could not be armed"), "{}", finished.stderr);
+        assert!(!finished.stderr.contains("identifying"), "{}", finished.stderr);
+    }
+    assert_eq!(runs.read_dir().map_or(0, Iterator::count), 0);
+    let known = with(&["rig", "status", "--json"].map(AsRef::as_ref)).exits(0).json();
+    assert!(
+        known["rigs"].as_array().unwrap().iter().all(|rig| rig["latch"].is_null() && rig["owner"].is_null()),
+        "{known}"
+    );
+    let typo = with(&["rig", "status", "no such rig"].map(AsRef::as_ref)).exits(0).stdout;
+    assert!(typo.contains("nobody has it") && typo.contains("rigs that runs have had from here: "), "{typo}");
+}
+
 /// Behind a server that shares no code with the driver, with the settings of the guide, in real time.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]

@@ -164,6 +164,12 @@ fn one_interrupt_makes_the_rig_safe_and_keeps_what_is_done() {
         .map(|event| serde_json::to_value(event.kind).unwrap().as_str().unwrap().to_owned())
         .collect();
     let place = |kind: &str| events.iter().position(|event| event == kind);
+    let asked = report
+        .recording
+        .events
+        .iter()
+        .position(|event| event.message.starts_with("asked to stop: the run ends with this step, in "));
+    assert!(asked.is_some() && asked < place("interrupted"), "{:#?}", report.recording.events);
     let (interrupted, safe) = (place("interrupted"), place("safe_state"));
     assert!(interrupted.is_some() && safe.is_some(), "{events:?}");
     assert!(only_run(&campaign.runs()).join("points.json").is_file());

@@ -99,7 +99,7 @@ fn two_runners_on_one_rig_and_one_that_was_killed_with_it() {
     assert!(second.stderr.contains(&format!("in use by process {}", first.id())), "{}", second.stderr);
     first.kill();
     let stale = done(run_of(&campaign, &[])).exits(5);
-    assert!(stale.stderr.contains("ended without making it safe"), "{}", stale.stderr);
+    assert!(stale.stderr.contains("ended with the rig in its hands"), "{}", stale.stderr);
     let run = recording.parent().unwrap();
     assert!(stale.stderr.contains(&format!("mapper run --resume {}", run.display())), "{}", stale.stderr);
     // Killed in its soak: all of it is made, with a soak, and the rig is free afterwards.

@@ -23,10 +23,10 @@ pub struct Rig {
 /// What to do with a rig.
 #[derive(Debug, Subcommand)]
 enum RigCommand {
-    /// Say who has the rig, and why it is latched
+    /// Say who has a rig, and why it is latched; without a name, of each that a run has had
     Status {
         /// Name of the rig, as its backend says it
-        rig: String,
+        rig: Option<String>,
     },
     /// Say that somebody has looked at the rig: the next run may begin
     Acknowledge {
@@ -40,13 +40,30 @@ impl Rig {
     pub fn run(&self) -> Result<(), Failure> {
         let states = RigStates::new(&rig_states::directory(self.states.as_deref()));
         let (status, cleared) = match &self.command {
-            RigCommand::Status { rig } => (states.status(rig)?, false),
+            RigCommand::Status { rig: None } => return self.tell_all(&states.known()),
+            RigCommand::Status { rig: Some(rig) } => (states.status(rig)?, false),
             RigCommand::Acknowledge { rig } => (states.acknowledge(rig)?, true),
         };
         if self.json {
             return output::print_json(&status);
         }
-        output::print(&text(&status, cleared))
+        let text = text(&status, cleared);
+        if status.owner.is_some() || status.latch.is_some() {
+            return output::print(&text);
+        }
+        // A name that is not quite the rig's would say that all is well.
+        let known: Vec<String> = states.known().into_iter().map(|status| status.rig).collect();
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        output::print(&format!("{text}rigs that runs have had from here: {known}\n"))
+    }
+
+    fn tell_all(&self, known: &[RigStatus]) -> Result<(), Failure> {
+        if self.json {
+            return output::print_json(&serde_json::json!({"rigs": known}));
+        }
+        let lines: String = known.iter().map(|status| text(status, false)).collect();
+        let none = "no run has had a rig from here\n";
+        output::print(if lines.is_empty() { none } else { &lines })
     }
 }
 
@@ -54,7 +71,9 @@ fn text(status: &RigStatus, cleared: bool) -> String {
     let mut lines = Vec::new();
     match (&status.owner, status.in_use) {
         (Some(owner), true) => lines.push(format!("in use by {owner}")),
-        (Some(owner), false) => lines.push(format!("left by {owner}, which ended without making it safe")),
+        (Some(owner), false) => lines.push(format!(
+            "left by {owner}, which ended with the rig in its hands (a driver makes it safe by itself then); look at the rig"
+        )),
         (None, _) => lines.push("nobody has it".to_owned()),
     }
     if let Some(latch) = &status.latch {

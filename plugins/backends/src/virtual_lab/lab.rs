@@ -100,6 +100,7 @@ impl Backend for VirtualLab {
             simulated_time: true,
             controls: true,
             exclusive: self.settings.rig.clone(),
+            reached_at: None,
             needs_guarded: vec![GuardName::Overspeed, GuardName::TurbineInletPressure],
             accepts: Some(setpoint_limits::ACCEPTED),
             // As fast as a usual air supply closes.

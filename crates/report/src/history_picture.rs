@@ -53,8 +53,8 @@ pub fn history_svg(
         .map_or_else(|_| String::new(), |time| time.strftime("%Y-%m-%d").to_string());
     let nights: BTreeSet<i64> = runs.iter().map(|listed| listed.night.id).collect();
     let mut picture = Picture::new("Nightly runs").subtitle(format!(
-        "{} nights since {since}; medians over the seeds; rings: nights on which a figure left its band",
-        nights.len()
+        "{} since {since}; medians over the seeds; rings: nights on which a figure left its band",
+        if nights.len() == 1 { "1 night".to_owned() } else { format!("{} nights", nights.len()) }
     ));
     for figure in figures {
         let (unit, factor) = figure.shown_unit();

@@ -65,6 +65,48 @@ fn shards_give_the_rows_of_a_night() {
     assert_eq!(rows, night("fleet.db", &["--fleet", directory.to_str().unwrap()]));
 }
 
+/// Another queue in ten lines: the shell, which does one task after the other.
+const SHELL: &str = r#"
+#states: true
+set -eu
+for range in $(echo "$ARRAY" | tr , ' '); do
+    for task in $(seq "${range%-*}" "${range#*-}"); do
+        sh "$TASK" "$task" > "$LOGS/work-$task.txt" 2>&1 || true
+    done
+done
+sh "$MERGE" > "$LOGS/merge.txt" 2>&1
+echo "work shell-1"
+echo "merge shell-2"
+"#;
+
+#[test]
+#[cfg(unix)]
+fn a_template_hands_a_study_to_another_queue() {
+    let scratch = scratch();
+    let folder = scratch.path().canonicalize().unwrap();
+    let study = write_study(&folder, 3);
+    let (here, there, template) = (folder.join("here"), folder.join("there"), folder.join("shell.sh"));
+    make(&study, &here);
+    make(&study, &there);
+    std::fs::write(&template, SHELL).unwrap();
+    let given = ["--template", template.to_str().unwrap(), "--task", "0.001", "--array-limit", "3", "--json"];
+    let sent = mapper(fleet("submit", &there, &given)).exits(0).json();
+    assert_eq!(
+        (&sent["work"], &sent["merge"], &sent["tasks"]),
+        (&"shell-1".into(), &"shell-2".into(), &3.into())
+    );
+    let status = mapper(fleet("status", &there, &["--json"])).exits(0).json();
+    assert_eq!(status["status"]["missing"].as_array().unwrap().len(), 0, "{status}");
+    mapper(fleet("run", &here, &[])).exits(0);
+    let result = |directory: &Path| std::fs::read(directory.join("result/runs.json")).unwrap();
+    assert!(result(&here) == result(&there), "the result of a queue is that of one machine");
+    // A template that says no numbers is named.
+    std::fs::write(&template, "exit 3\n").unwrap();
+    make(&study, &folder.join("third"));
+    let refused = mapper(fleet("submit", &folder.join("third"), &given[..2]));
+    assert!(refused.code != Some(0) && refused.stderr.contains("shell"), "{}", refused.stderr);
+}
+
 #[test]
 fn an_item_that_fails_says_why_and_is_done_again() {
     let scratch = scratch();

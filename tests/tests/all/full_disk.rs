@@ -1,6 +1,9 @@
 //! A disk that fills up in the middle of a run: a small tmpfs in a mount name space of its own, gone with the process.
 
-use mapper_tests::{BY_ITSELF, CampaignFile, Finished, SHORT_GRID, mapper, mapper_command, only_run};
+use crate::fleet::{fleet, make, write_study};
+use mapper_tests::{
+    BY_ITSELF, CampaignFile, Finished, SHORT_GRID, mapper, mapper_command, only_run, scratch,
+};
 use std::process::Command;
 
 /// Mounts 2 MB on $1, runs the rest there, and keeps what was written in $2.
@@ -42,4 +45,54 @@ fn a_full_disk_is_said_and_what_was_flushed_can_be_read() {
     let points = result["points"].as_array().unwrap();
     assert!(points.len() >= 2, "{} points", points.len());
     assert!(points[1]["eta"].is_f64(), "{}", points[1]);
+}
+
+/// Mounts 16 kB on $1, runs the rest, and copies what was written there to $2.
+const PARTS: &str = r#"
+parts="$1"; kept="$2"; shift 2
+mount -t tmpfs -o size=16k tmpfs "$parts" || exit 99
+"$@"; code=$?
+cp -r "$parts"/. "$kept" || exit 98
+exit $code
+"#;
+
+/// The task says where there was no room; what it had written is whole, the rest is made by another task, and the result is that of
+/// one machine.
+#[test]
+#[cfg_attr(not(with_tmpfs), ignore = "mounts a small tmpfs: run `cargo xtask test` as root")]
+fn a_full_disk_costs_a_fleet_one_task() {
+    let scratch = scratch();
+    let folder = scratch.path();
+    let study = write_study(folder, 3);
+    let (here, there, kept) = (folder.join("here"), folder.join("there"), folder.join("kept"));
+    make(&study, &here);
+    make(&study, &there);
+    std::fs::create_dir(&kept).unwrap();
+    let parts = there.join("parts");
+    let work = mapper_command(fleet("work", &there, &["--shard", "1/1"]));
+    let output = Command::new("unshare")
+        .args(["--mount", "sh", "-c", PARTS, "sh"])
+        .args([&parts, &kept])
+        .arg(work.get_program())
+        .args(work.get_args())
+        .current_dir(mapper_tests::repository())
+        .output()
+        .unwrap();
+    let finished = Finished::from(output).exits(1);
+    assert!(finished.stderr.contains("No space left on device"), "{}", finished.stderr);
+    assert!(finished.stderr.contains(parts.to_str().unwrap()), "{}", finished.stderr);
+    for entry in kept.read_dir().unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), parts.join(entry.file_name())).unwrap();
+    }
+    let status = mapper(fleet("status", &there, &["--json"])).exits(0).json();
+    let missing = status["status"]["missing"].as_array().unwrap().len();
+    assert!((1..6).contains(&missing), "{status}");
+    assert_eq!(status["status"]["refused"].as_array().unwrap().len(), 0, "{status}");
+    mapper(fleet("merge", &there, &[])).exits(8);
+    for directory in [&here, &there] {
+        mapper(fleet("run", directory, &[])).exits(0);
+    }
+    let result = |directory: &std::path::Path| std::fs::read(directory.join("result/runs.json")).unwrap();
+    assert!(result(&here) == result(&there), "the result is that of one machine");
 }

@@ -1,6 +1,7 @@
 //! What the program does for people.
 
 use crate::link::{LinkError, endpoints};
+use crate::settings::{SettingError, is_endpoint};
 use crate::store::{Store, StoreError, fingerprint, valid};
 use clap::{Parser, Subcommand};
 use opcua::crypto::X509;
@@ -42,6 +43,8 @@ enum CommandError {
     Store(#[from] StoreError),
     #[error("{0}")]
     Io(#[from] std::io::Error),
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     #[error("{0} has no certificate: it offers no encryption")]
     NoCertificate(String),
     #[error("the certificate has the fingerprint {found}, not {wanted}; nothing was pinned")]
@@ -76,6 +79,9 @@ fn say(words: &str) -> Result<(), CommandError> {
 }
 
 fn trust(store: &Store, endpoint: &str, wanted: Option<String>, replace: bool) -> Result<(), CommandError> {
+    if !is_endpoint(endpoint) {
+        return Err(SettingError::Endpoint(endpoint.to_owned()).into());
+    }
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let offered = runtime.block_on(endpoints(store, endpoint))?;
     let der = offered.iter().map(|one| one.server_certificate.as_ref()).find(|der| !der.is_empty());

@@ -5,11 +5,11 @@ use crate::failure::Failure;
 use crate::{drivers, output, registry, rig_states};
 use clap::{Args, Subcommand};
 use mapper_conformance::{Candidate, RULES};
-use mapper_core::{RigMode, Setpoints};
+use mapper_core::{BackendError, RigMode, Setpoints};
 use mapper_host::Found;
 use mapper_session::{RigStates, nominal_model};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// List the backends, or hold one against the rules that every backend keeps
 #[derive(Debug, Args)]
@@ -83,13 +83,19 @@ impl Backend {
         output::print(&all.iter().map(line).collect::<String>())
     }
 
-    fn check(&self, name: &str, path: &std::path::Path) -> Result<(), Failure> {
+    fn check(&self, name: &str, path: &Path) -> Result<(), Failure> {
         let mut campaign = mapper_campaign::load(path).map_err(Failure::of_campaign)?;
-        if campaign.backend.name != name {
+        let registry = registry::registry();
+        let named = campaign.backend.name.clone();
+        if named != name {
+            // What is built in does without settings; a driver has an address at least, which another one's are not.
+            if !registry.backends.iter().any(|plugin| plugin.name == name) {
+                return Err(Failure::new(Code::BadInput, other_backend(path, &named, name)));
+            }
             campaign.backend =
                 mapper_campaign::campaign::BackendChoice { name: name.to_owned(), settings: json!({}) };
         }
-        let (registry, model) = (registry::registry(), nominal_model(&campaign)?);
+        let model = nominal_model(&campaign)?;
         // Mistakes in the settings are told as those of a campaign.
         let rig = registry
             .make_backend(&campaign, &model)
@@ -113,10 +119,15 @@ impl Backend {
             oil_temperature_k: campaign.boundary.oil_temperature_k,
         };
         let candidate = Candidate { name, make: &make, setpoints, lasts_s: None };
+        let reached = candidate.reach();
+        let rules = if reached.is_ok() { RULES } else { &[] };
         let found: Vec<(&str, Result<(), String>)> =
-            RULES.iter().map(|(rule, check)| (*rule, check(&candidate))).collect();
+            rules.iter().map(|(rule, check)| (*rule, check(&candidate))).collect();
         if let Some(claim) = claim {
             claim.release()?;
+        }
+        if let Err(error) = reached {
+            return self.not_reached(name, &error);
         }
         let broken = found.iter().filter(|(_, kept)| kept.is_err()).count();
         if self.json {
@@ -136,4 +147,27 @@ impl Backend {
             _ => Err(Failure::new(Code::Rig, format!("`{name}` breaks {broken} of {} rules", RULES.len()))),
         }
     }
+
+    /// Of a rig that cannot be armed nothing is known.
+    fn not_reached(&self, name: &str, error: &BackendError) -> Result<(), Failure> {
+        let why = match error {
+            // It was never had, so that it cannot have been lost.
+            BackendError::Lost { source, .. } => source.to_string(),
+            other => other.to_string(),
+        };
+        if self.json {
+            let rules: [Value; 0] = [];
+            output::print_json(&json!({"backend": name, "rules": rules, "not_armed": why}))?;
+        }
+        let words = format!("`{name}` cannot be armed, so that none of its {} rules was judged: {why}", RULES.len());
+        Err(Failure::new(Code::Rig, words))
+    }
+}
+
+fn other_backend(campaign: &Path, named: &str, wanted: &str) -> String {
+    let file = campaign.display();
+    format!(
+        "this campaign names `{named}`, not `{wanted}`, and has no settings for that: `mapper backend check {named} --campaign {file}`, or a \
+         campaign with `backend: {{{wanted}: ...}}`"
+    )
 }

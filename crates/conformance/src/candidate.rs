@@ -18,19 +18,6 @@ pub struct Candidate<'a> {
 }
 
 impl Candidate<'_> {
-    /// Takes hold of the rig once and lets it go, before any rule is judged: of a rig that nobody can reach no rule says anything, and rules that
-    /// ask for nothing would seem to be kept.
-    ///
-    /// # Errors
-    /// Why it cannot be made or armed.
-    pub fn reach(&self) -> Result<(), BackendError> {
-        let mut rig = (self.make)()?;
-        rig.arm()?;
-        // Whether it lets itself be given back is for the rules.
-        let _ = rig.disarm();
-        Ok(())
-    }
-
     /// A backend that has not been armed.
     ///
     /// # Errors

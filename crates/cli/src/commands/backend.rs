@@ -4,8 +4,8 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::{drivers, output, registry, rig_states};
 use clap::{Args, Subcommand};
-use mapper_conformance::{Candidate, RULES};
-use mapper_core::{BackendError, RigMode, Setpoints};
+use mapper_conformance::{Candidate, judge};
+use mapper_core::{RigMode, Setpoints};
 use mapper_host::Found;
 use mapper_session::{RigStates, nominal_model};
 use serde_json::{Value, json};
@@ -90,7 +90,9 @@ impl Backend {
         if named != name {
             // What is built in does without settings; a driver has an address at least, which another one's are not.
             if !registry.backends.iter().any(|plugin| plugin.name == name) {
-                return Err(Failure::new(Code::BadInput, other_backend(path, &named, name)));
+                let remedy = format!("`mapper backend check {named} --campaign {}`", path.display());
+                let words = format!("this campaign names `{named}`, not `{name}`, and has no settings for that: {remedy}");
+                return Err(Failure::new(Code::BadInput, words));
             }
             campaign.backend =
                 mapper_campaign::campaign::BackendChoice { name: name.to_owned(), settings: json!({}) };
@@ -119,16 +121,11 @@ impl Backend {
             oil_temperature_k: campaign.boundary.oil_temperature_k,
         };
         let candidate = Candidate { name, make: &make, setpoints, lasts_s: None };
-        let reached = candidate.reach();
-        let rules = if reached.is_ok() { RULES } else { &[] };
-        let found: Vec<(&str, Result<(), String>)> =
-            rules.iter().map(|(rule, check)| (*rule, check(&candidate))).collect();
+        let found = judge(&candidate);
         if let Some(claim) = claim {
             claim.release()?;
         }
-        if let Err(error) = reached {
-            return self.not_reached(name, &error);
-        }
+        let found = found.map_err(|error| Failure::new(Code::Rig, error))?;
         let broken = found.iter().filter(|(_, kept)| kept.is_err()).count();
         if self.json {
             let rules = found.iter().map(
@@ -144,30 +141,7 @@ impl Backend {
         }
         match broken {
             0 => Ok(()),
-            _ => Err(Failure::new(Code::Rig, format!("`{name}` breaks {broken} of {} rules", RULES.len()))),
+            _ => Err(Failure::new(Code::Rig, format!("`{name}` breaks {broken} of {} rules", found.len()))),
         }
     }
-
-    /// Of a rig that cannot be armed nothing is known.
-    fn not_reached(&self, name: &str, error: &BackendError) -> Result<(), Failure> {
-        let why = match error {
-            // It was never had, so that it cannot have been lost.
-            BackendError::Lost { source, .. } => source.to_string(),
-            other => other.to_string(),
-        };
-        if self.json {
-            let rules: [Value; 0] = [];
-            output::print_json(&json!({"backend": name, "rules": rules, "not_armed": why}))?;
-        }
-        let words = format!("`{name}` cannot be armed, so that none of its {} rules was judged: {why}", RULES.len());
-        Err(Failure::new(Code::Rig, words))
-    }
-}
-
-fn other_backend(campaign: &Path, named: &str, wanted: &str) -> String {
-    let file = campaign.display();
-    format!(
-        "this campaign names `{named}`, not `{wanted}`, and has no settings for that: `mapper backend check {named} --campaign {file}`, or a \
-         campaign with `backend: {{{wanted}: ...}}`"
-    )
 }

@@ -2,9 +2,7 @@
 //! setpoints too.
 
 use crate::Controller;
-use crate::rig::Reading;
 use mapper_core::{Channel, measurable};
-use std::collections::BTreeMap;
 
 /// Readings that no sensor gives.
 #[derive(Debug, thiserror::Error)]
@@ -60,23 +58,22 @@ pub fn can_be_read(channel: Channel, value: f64) -> bool {
     !value.is_finite() || measurable(channel.info().dimension).contains(&value)
 }
 
-/// Judges the first readings.
+/// Judges the first readings, SI.
 pub(crate) fn check(
     controller: &impl Controller,
-    readings: &BTreeMap<Channel, Reading>,
+    readings: impl Iterator<Item = (Channel, f64)>,
 ) -> Result<(), Box<Absurd>> {
-    let absurd = |(channel, reading): &(&Channel, &Reading)| !can_be_read(**channel, reading.value);
-    let mut found = readings.iter().filter(absurd);
-    let Some((channel, reading)) = found.next() else { return Ok(()) };
+    let mut found = readings.filter(|(channel, value)| !can_be_read(*channel, *value));
+    let Some((channel, value)) = found.next() else { return Ok(()) };
     let range = measurable(channel.info().dimension);
     Err(Box::new(Absurd {
-        channel: *channel,
-        value: reading.value,
+        channel,
+        value,
         unit: channel.unit(),
         low: *range.start(),
         high: *range.end(),
-        place: controller.place(*channel),
-        others: found.map(|(channel, _)| *channel).collect(),
+        place: controller.place(channel),
+        others: found.map(|(channel, _)| channel).collect(),
         remedy: controller.remedy(),
     }))
 }

@@ -185,7 +185,8 @@ impl<C: Controller> Backend for Rig<C> {
         }
         // What is read wrongly would be written wrongly.
         let readings = self.controller.read(0.0);
-        if let Err(absurd) = absurd::check(&self.controller, &readings) {
+        let readings = readings.iter().map(|(channel, reading)| (*channel, reading.value));
+        if let Err(absurd) = absurd::check(&self.controller, readings) {
             self.controller.close();
             let (backend, path) = (self.stand.backend.to_owned(), format!("read.{}", absurd.channel));
             return Err(BackendError::Settings { backend, path, source: absurd });

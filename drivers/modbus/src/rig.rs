@@ -69,7 +69,7 @@ enum RegisterError {
         "{source}. It was {key} = {value} (SI), which goes over the wire as {registers}: look at `words` and `bytes`, at `type`, `scale` and `offset` \
          of `write.{key}`, and at what the controller itself takes there"
     )]
-    Written { source: LinkError, key: &'static str, value: f64, registers: String },
+    Written { source: Box<LinkError>, key: &'static str, value: f64, registers: String },
 }
 
 impl RegisterError {
@@ -79,7 +79,12 @@ impl RegisterError {
             return source.into();
         }
         let registers: Vec<_> = registers.iter().map(|word| format!("{word:#06x}")).collect();
-        RegisterError::Written { source, key: target.key(), value, registers: registers.join(" ") }
+        RegisterError::Written {
+            source: Box::new(source),
+            key: target.key(),
+            value,
+            registers: registers.join(" "),
+        }
     }
 }
 

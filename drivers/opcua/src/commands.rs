@@ -8,7 +8,8 @@ use opcua::crypto::X509;
 use std::io::Write;
 use std::process::ExitCode;
 
-/// Driver of gas stands that speak OPC UA. `mapper` starts it without arguments; these are for people.
+/// A gas stand behind a PLC or another controller that speaks OPC UA. This is a driver: `mapper` starts it by itself, without arguments, where a
+/// campaign says `backend: {opcua: ...}`; docs/rig.md, "Over OPC UA", has its settings. The commands below are for people.
 #[derive(Parser)]
 #[command(name = "mapper-backend-opcua", version)]
 struct Arguments {

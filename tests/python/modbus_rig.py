@@ -37,8 +37,8 @@ def number(registers):
     return struct.unpack(">f", struct.pack(">2H", *registers))[0]
 
 
-async def live(server):
-    """The rig follows its registers, and fills them."""
+async def live(server, filled):
+    """The rig follows its registers, and fills them; says when it has done so first."""
 
     async def get(register, count):
         return await server.async_getValues(1, READ_HOLDING, register, count)
@@ -63,6 +63,7 @@ async def live(server):
         times, columns, _ = rig.poll(now - begun)
         if times:
             await put(0, [word for name in CHANNELS for word in words(columns[name][-1])])
+            filled.set()
         await asyncio.sleep(0.02)
 
 
@@ -74,7 +75,10 @@ async def main():
     address = ("127.0.0.1", int(sys.argv[1]) if len(sys.argv) > 1 else 0)
     server = ModbusTcpServer(device, address=address)
     await server.serve_forever(background=True)
-    living = asyncio.create_task(live(server))
+    filled = asyncio.Event()
+    living = asyncio.create_task(live(server, filled))
+    # Whoever arms it looks at its readings first.
+    await filled.wait()
     print(server.transport.sockets[0].getsockname()[1], flush=True)
     await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
     living.cancel()

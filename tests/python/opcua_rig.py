@@ -1,12 +1,13 @@
 """The small rig of drivers/python in real time behind asyncua, an OPC UA server that shares no code with the driver.
 
-Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
+Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps] [--sessions N]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
 reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean). As a PLC has to, it cuts the
 air by itself where the heartbeat stands still. Values that no stand could bear are refused with BadOutOfRange.
 
 With --secure it takes signed and encrypted sessions alone, of the user `lab` with the password `hunter2` if nothing else is said; the certificate is made in the directory
 where there is none yet, valid for a year or as many days as said. With --stamps it prints `SECONDS read RPM` for each speed that it hands out and `SECONDS told NAMES` for each set-point that it
-takes, on the clock of time.monotonic(): behind its decryption, so that a session may be encrypted.
+takes, on the clock of time.monotonic(): behind its decryption, so that a session may be encrypted. With --sessions it holds so many sessions at a time and
+refuses others with BadTooManySessions, as small PLCs do: a session, also one that nobody was let into, is held until its client closes it.
 """
 
 import argparse
@@ -22,6 +23,8 @@ import time
 
 from asyncua import Server, ua
 from asyncua.crypto.cert_gen import dump_private_key_as_pem, generate_private_key, generate_self_signed_app_certificate
+from asyncua.common.utils import ServiceError
+from asyncua.server.uaprocessor import UaProcessor
 from asyncua.server.user_managers import UserManager
 from asyncua.crypto.permission_rules import User, UserRole
 from cryptography import x509
@@ -91,7 +94,37 @@ async def make(arguments):
     for name in [*SETPOINTS, "air", "heartbeat"]:
         await nodes[name].set_writable()
     refuse_what_is_too_much(server, index)
+    if arguments.sessions is not None:
+        hold_at_most(server.iserver, arguments.sessions)
     return server, nodes
+
+
+def hold_at_most(iserver, most):
+    """No more sessions than these, each held until its client closes it: what asyncua itself drops with the connection, many PLCs keep for minutes."""
+    create, lost, held = iserver.create_session, UaProcessor.close, set()
+
+    async def close_of_connection(processor):
+        if processor.session:
+            processor.session.is_left_behind = True
+        await lost(processor)
+
+    def limited(*args, external=False, **kwargs):
+        if external and len(held) >= most:
+            raise ServiceError(ua.StatusCodes.BadTooManySessions)
+        session = create(*args, external=external, **kwargs)
+        if external:
+            held.add(session)
+            close = session.close_session
+
+            async def closed(*args):
+                if not getattr(session, "is_left_behind", False):
+                    held.discard(session)
+                await close(*args)
+
+            session.close_session = closed
+        return session
+
+    iserver.create_session, UaProcessor.close = limited, close_of_connection
 
 
 def refuse_what_is_too_much(server, index):
@@ -137,8 +170,8 @@ def stamp(server, index):
     service.read, service.write = stamped_read, stamped_write
 
 
-async def live(nodes, seed):
-    """The rig follows its nodes, and fills them."""
+async def live(nodes, seed, filled):
+    """The rig follows its nodes, and fills them; says when it has done so first."""
 
     async def put(name, value, kind):
         now = datetime.datetime.now(datetime.timezone.utc)
@@ -163,6 +196,7 @@ async def live(nodes, seed):
         if times:
             for name in CHANNELS:
                 await put(name, columns[name][-1], ua.VariantType.Double)
+            filled.set()
         await asyncio.sleep(0.02)
 
 
@@ -175,6 +209,7 @@ async def main():
     parser.add_argument("--user", default="lab")
     parser.add_argument("--password", default="hunter2")
     parser.add_argument("--days", type=int, default=365)
+    parser.add_argument("--sessions", type=int)
     arguments = parser.parse_args()
     logging.disable(logging.ERROR)
     if not arguments.port:
@@ -183,7 +218,10 @@ async def main():
             arguments.port = free.getsockname()[1]
     server, nodes = await make(arguments)
     async with server:
-        living = asyncio.create_task(live(nodes, arguments.seed))
+        filled = asyncio.Event()
+        living = asyncio.create_task(live(nodes, arguments.seed, filled))
+        # Whoever arms it looks at its readings first.
+        await filled.wait()
         print(arguments.port, flush=True)
         if arguments.stamps:
             stamp(server, 2)

@@ -8,4 +8,4 @@ mod rules;
 
 pub use candidate::{Candidate, Checked};
 pub use misbehaving::{Fault, Misbehaving};
-pub use rules::{RULES, Rule};
+pub use rules::{NotArmed, RULES, Rule, judge};

@@ -24,6 +24,36 @@ pub const RULES: &[Rule] = &[
     ("the end of what it has is the loss of the rig, after which it can be made safe", ends_with_its_loss),
 ];
 
+/// A rig that nobody can take hold of: no rule says anything of it, and those that ask for nothing would seem to be kept.
+#[derive(Debug, thiserror::Error)]
+#[error("`{name}` cannot be armed, so that none of its {} rules was judged: {why}", RULES.len())]
+pub struct NotArmed {
+    name: String,
+    why: String,
+}
+
+/// What each rule found, once the rig has been armed and given back.
+///
+/// # Errors
+/// [`NotArmed`] with what the rig said.
+pub fn judge(candidate: &Candidate<'_>) -> Result<Vec<(&'static str, Checked)>, NotArmed> {
+    let armed = (candidate.make)().and_then(|mut rig| {
+        rig.arm()?;
+        // Whether it can be given back is for the rules.
+        let _ = rig.disarm();
+        Ok(())
+    });
+    let said = armed.err().map(|error| match error {
+        // It was never had, so that it cannot have been lost.
+        BackendError::Lost { source, .. } => source.to_string(),
+        other => other.to_string(),
+    });
+    match said {
+        Some(why) => Err(NotArmed { name: candidate.name.to_owned(), why }),
+        None => Ok(RULES.iter().map(|(rule, check)| (*rule, check(candidate))).collect()),
+    }
+}
+
 macro_rules! ensure {
     ($condition:expr, $($message:tt)+) => {
         match $condition {

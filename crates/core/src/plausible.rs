@@ -47,3 +47,17 @@ pub fn plausible(channel: Channel) -> Plausible {
     };
     Plausible { running, any }
 }
+
+/// What a sensor of a gas stand that is wired and scaled rightly can read at all, standstill included, in the unit of the dimension: beyond
+/// it an order of bytes, a unit or a scale is wrong, or the sensor. Narrower than [`Plausible::any`], which bears spikes; wider than
+/// [`Plausible::running`], since a stand may rest.
+pub fn measurable(dimension: Dimension) -> RangeInclusive<f64> {
+    match dimension {
+        // Around 0 there is noise.
+        Dimension::RotationalSpeed => -1e3..=1e6,
+        Dimension::MassFlow => -1.0..=20.0,
+        Dimension::Pressure => 1e3..=5e6,
+        Dimension::Temperature => 200.0..=1600.0,
+        Dimension::Ratio => f64::MIN..=f64::MAX,
+    }
+}

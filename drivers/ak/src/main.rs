@@ -4,5 +4,11 @@ mod rig;
 mod settings;
 
 fn main() -> std::process::ExitCode {
-    mapper_driver::serve(settings::NAME, env!("CARGO_PKG_VERSION"), rig::open)
+    let about = mapper_driver::About {
+        name: settings::NAME,
+        version: env!("CARGO_PKG_VERSION"),
+        summary: "Instruments of a test bed that speak the AK telegram over TCP; they are read alone.",
+        settings: r#"docs/rig.md, "Instruments beside the PLC""#,
+    };
+    about.serve(rig::open)
 }

@@ -18,12 +18,14 @@ const MOST_HZ: f64 = 10.0;
 #[serde(deny_unknown_fields)]
 pub(crate) struct Settings {
     /// Address and port of the instrument, in numbers: a name would have to be looked up, which may hang.
+    #[serde(deserialize_with = "mapper_driver::address")]
     pub(crate) address: SocketAddr,
     /// How often it is asked; 2 Hz if not said.
     rate: Option<Quantity<Frequency>>,
     /// Time for each answer; 300 ms if not said.
     timeout: Option<Quantity<Duration>>,
     /// Where each channel stands.
+    #[serde(deserialize_with = "mapper_driver::by_channel")]
     pub(crate) read: BTreeMap<Channel, Place>,
 }
 

@@ -1,12 +1,15 @@
 //! What drivers of a gas stand behind a controller share, whatever it speaks: an author implements [`Controller`], and [`rig`] makes a
 //! rig of it. It keeps the heartbeat, writes setpoints in the order that is safe, and gives a sample without readings where
-//! the controller does not answer, so that the guards count how long.
+//! the controller does not answer, so that the guards count how long. Before it writes anything it looks at the readings: what no sensor can
+//! read is refused.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod absurd;
 mod limits;
 mod rig;
 
+pub use absurd::{can_be_read, short};
 pub use limits::{Accepts, LimitError, NEEDS, Safe, Target, within};
 pub use rig::{Reading, Stand, rig};
 
@@ -32,6 +35,12 @@ pub trait Controller: Send {
     /// # Errors
     /// Where one was not written.
     fn write(&mut self, values: &[(Target, f64)]) -> Result<(), Self::Error>;
+
+    /// Where a channel stands, and how its number is read there, for people.
+    fn place(&self, channel: Channel) -> String;
+
+    /// What to look at where what was read last cannot be, a sentence without its point.
+    fn remedy(&self) -> String;
 
     /// Something to be said to people since the last call.
     fn remark(&mut self) -> Option<String> {

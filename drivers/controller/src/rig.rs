@@ -1,7 +1,7 @@
 //! The rig behind a controller.
 
-use crate::Controller;
 use crate::limits::{Accepts, HEARTBEAT_MAX, LimitError, NEEDS, Safe, Target, within};
+use crate::{Controller, absurd};
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Provenance, Quality, RigDescription,
     RigMode, SampleBatch, Setpoints,
@@ -182,10 +182,23 @@ impl<C: Controller> Backend for Rig<C> {
         if self.armed.is_some() {
             return Err(BackendError::OutOfOrder { call: "arm", state: "armed", needed: "not armed" });
         }
-        let (heater_off_k, opened) = (self.heater_off_k(), self.controller.open());
+        if let Err(error) = self.controller.open() {
+            self.controller.close();
+            return Err(self.lost(error));
+        }
+        // What is read wrongly would be written wrongly.
+        let readings = self.controller.read(0.0);
+        let readings = readings.iter().map(|(channel, reading)| (*channel, reading.value));
+        if let Err(absurd) = absurd::check(&self.controller, readings) {
+            self.controller.close();
+            let (backend, path) = (self.stand.backend.to_owned(), format!("read.{}", absurd.channel));
+            return Err(BackendError::Settings { backend, path, source: absurd });
+        }
+        let heater_off_k = self.heater_off_k();
         // A driver that was killed left the air on; a heartbeat must not bring it back.
-        let begun = opened
-            .and_then(|()| self.controller.write(&[(Target::Air, 0.0), (Target::T3, heater_off_k)]))
+        let begun = self
+            .controller
+            .write(&[(Target::Air, 0.0), (Target::T3, heater_off_k)])
             .and_then(|()| self.controller.write(&[(Target::Heartbeat, 0.0)]));
         if let Err(error) = begun {
             self.controller.close();

@@ -1,9 +1,15 @@
-//! What every driver needs: an author writes a [`Backend`] and calls [`serve`]; frames, hello, lease and the
+//! What every driver needs: an author writes a [`Backend`] and calls [`About::serve`], or [`serve`] where nobody starts it by hand; frames, hello, lease and the
 //! safe trajectory when nobody is there any more are done here. docs/protocol.md says what goes over the pipes.
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
-//!     mapper_driver::serve("my_rig", env!("CARGO_PKG_VERSION"), |settings| my_rig(settings))
+//!     let about = mapper_driver::About {
+//!         name: "my_rig",
+//!         version: env!("CARGO_PKG_VERSION"),
+//!         summary: "My rig.",
+//!         settings: "its README",
+//!     };
+//!     about.serve(|settings| my_rig(settings))
 //! }
 //! # fn my_rig(_: &serde_json::Value) -> Result<Box<dyn mapper_core::Backend>, mapper_core::BackendError> { unimplemented!() }
 //! ```
@@ -13,16 +19,22 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod address;
 mod armed;
+mod by_channel;
 mod descent;
 mod outlet;
 mod pipes;
 mod refusal;
 mod secret;
 mod server;
+mod words;
 
+pub use address::address;
+pub use by_channel::by_channel;
 pub use pipes::serve;
 pub use secret::{SecretError, secret};
+pub use words::About;
 
 use mapper_core::{Backend, BackendError};
 

@@ -131,11 +131,15 @@ fn serve(
 ) -> Result<Vec<JoinHandle<Result<(), LabError>>>, LabError> {
     let mut serving = Vec::new();
     let mut out = std::io::stdout();
+    // Programs read the places from the first lines; what people have to know comes after all of them.
+    let mut notes = Vec::new();
     if let Some(at) = arguments.modbus {
         let (listener, at) = listen(runtime, arguments, at)?;
         let served = modbus::serve(listener, shared.stand.clone());
         serving.push(runtime.spawn(async { Ok(served.await?) }));
         writeln!(out, "modbus {at}")?;
+        let [own, other] = modbus::UNITS;
+        notes.push(format!("modbus: `unit: {own}` (or {other}), no other; anybody who reaches it may write, without a password"));
     }
     if let Some(at) = arguments.opcua {
         let (listener, at) = listen(runtime, arguments, at)?;
@@ -145,12 +149,17 @@ fn serve(
         drop(entered);
         serving.push(runtime.spawn(async { server.run_with(listener).await.map_err(LabError::OpcUa) }));
         writeln!(out, "opcua opc.tcp://{at}")?;
+        notes.push(format!("opcua: {}", opcua_nodes::who(protection)?));
     }
     if let Some(at) = arguments.ak {
         let (listener, at) = listen(runtime, arguments, at)?;
         let served = ak::serve(listener, shared.stand.clone());
         serving.push(runtime.spawn(async { Ok(served.await?) }));
         writeln!(out, "ak {at}")?;
+        notes.push("ak: read alone, by anybody, without a password".to_owned());
+    }
+    for note in notes {
+        writeln!(out, "{note}")?;
     }
     Ok(serving)
 }

@@ -1,11 +1,12 @@
 //! The stand as holding registers, as the example of docs/rig.md has them: readings from 0 and setpoints from 100 as singles of two registers,
-//! air 110, heartbeat 111, tripped 112, acknowledge 113.
+//! air 110, heartbeat 111, tripped 112, acknowledge 113. As a device of its own it answers as unit 255 or 0 (Modbus Messaging on TCP/IP 1.0b, 4.4.1.2);
+//! behind it there is no other unit, and it says so as a gateway does.
 
 use crate::stand::{SETPOINTS as SETPOINTS_IN_ORDER, Stand, Target, measured};
 use std::future::{Ready, ready};
 use std::sync::{Arc, Mutex};
 use tokio::net::TcpListener;
-use tokio_modbus::prelude::{ExceptionCode, Request, Response};
+use tokio_modbus::prelude::{ExceptionCode, Request, Response, SlaveRequest};
 use tokio_modbus::server::Service;
 use tokio_modbus::server::tcp::{Server, accept_tcp_connection};
 
@@ -15,6 +16,8 @@ const HEARTBEAT: u16 = 111;
 const TRIPPED: u16 = 112;
 const ACKNOWLEDGE: u16 = 113;
 const END: u16 = 200;
+/// The units that it answers as.
+pub const UNITS: [u8; 2] = [255, 0];
 
 #[derive(Clone)]
 struct Registers(Arc<Mutex<Stand>>);
@@ -74,13 +77,16 @@ impl Registers {
 }
 
 impl Service for Registers {
-    type Request = Request<'static>;
+    type Request = SlaveRequest<'static>;
     type Response = Response;
     type Exception = ExceptionCode;
     type Future = Ready<Result<Response, ExceptionCode>>;
 
-    fn call(&self, request: Request<'static>) -> Self::Future {
-        ready(match request {
+    fn call(&self, request: SlaveRequest<'static>) -> Self::Future {
+        if !UNITS.contains(&request.slave) {
+            return ready(Err(ExceptionCode::GatewayTargetDevice));
+        }
+        ready(match request.request {
             Request::ReadHoldingRegisters(start, count) => {
                 self.read(start, count).map(Response::ReadHoldingRegisters)
             }

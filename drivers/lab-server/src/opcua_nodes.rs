@@ -111,6 +111,27 @@ pub enum Protection {
     Clear,
 }
 
+/// Who is let in, for people; no name and no password.
+///
+/// # Errors
+/// [`ServeError::HalfAUser`]
+pub fn who(protection: Protection) -> Result<String, ServeError> {
+    Ok(match (protection, user()?) {
+        (Protection::Clear, _) => {
+            "in the clear (`security: none`), for anybody without user and password".to_owned()
+        }
+        (Protection::Encrypted, Some(_)) => {
+            format!("signed and encrypted, for the user in ${} with the password in ${}", USER.0, USER.1)
+        }
+        (Protection::Encrypted, None) => {
+            format!(
+                "signed and encrypted, without user and password: ${} and ${} are not set",
+                USER.0, USER.1
+            )
+        }
+    })
+}
+
 fn builder(at: SocketAddr, pki: &Path, protection: Protection) -> Result<ServerBuilder, ServeError> {
     let users: BTreeMap<String, ServerUserToken> = match (user()?, protection) {
         (Some((name, password)), Protection::Encrypted) => {

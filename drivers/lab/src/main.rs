@@ -8,5 +8,11 @@ mod told;
 use settings::open;
 
 fn main() -> std::process::ExitCode {
-    mapper_driver::serve(settings::NAME, env!("CARGO_PKG_VERSION"), open)
+    let about = mapper_driver::About {
+        name: settings::NAME,
+        version: env!("CARGO_PKG_VERSION"),
+        summary: "The virtual lab of another campaign behind the protocol of drivers, to rehearse on; an example of a driver.",
+        settings: r#"campaign: FILE; also real_time: true, told: FILE (what it was told). docs/protocol.md has the protocol"#,
+    };
+    about.serve(open)
 }

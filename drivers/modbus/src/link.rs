@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use tokio::time::timeout;
 use tokio_modbus::client::{Context, tcp};
-use tokio_modbus::prelude::{Reader, Slave, Writer};
+use tokio_modbus::prelude::{ExceptionCode, Reader, Slave, Writer};
 
 /// Why a call failed.
 #[derive(Debug, thiserror::Error)]
@@ -100,6 +100,16 @@ impl Link {
         }
     }
 
+    /// What an exception says, and where it is about the unit.
+    fn words(&self, code: ExceptionCode) -> String {
+        match code {
+            ExceptionCode::GatewayPathUnavailable | ExceptionCode::GatewayTargetDevice => {
+                format!("{code}: it has no unit {}; look at `unit`", self.unit)
+            }
+            code => code.to_string(),
+        }
+    }
+
     fn call<T>(
         &mut self,
         what: String,
@@ -122,7 +132,7 @@ impl Link {
             Some(Err(error)) => Err(LinkError::Failed { address, words: error.to_string() }),
             Some(Ok(answer)) => {
                 self.connection = Some(connection);
-                answer.map_err(|code| LinkError::Refused { address, what, words: code.to_string() })
+                answer.map_err(|code| LinkError::Refused { address, what, words: self.words(code) })
             }
         }
     }

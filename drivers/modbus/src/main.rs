@@ -9,5 +9,11 @@ mod rig;
 mod settings;
 
 fn main() -> std::process::ExitCode {
-    mapper_driver::serve(settings::NAME, env!("CARGO_PKG_VERSION"), rig::open)
+    let about = mapper_driver::About {
+        name: settings::NAME,
+        version: env!("CARGO_PKG_VERSION"),
+        summary: "A gas stand behind a PLC or another controller that speaks Modbus TCP.",
+        settings: r#"docs/rig.md, "The campaign", has an example of all of them"#,
+    };
+    about.serve(rig::open)
 }

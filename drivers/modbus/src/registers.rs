@@ -26,7 +26,29 @@ pub(crate) enum Order {
     Little,
 }
 
+impl Order {
+    /// As campaigns write it.
+    pub(crate) fn key(self) -> &'static str {
+        match self {
+            Order::Big => "big",
+            Order::Little => "little",
+        }
+    }
+}
+
 impl Form {
+    /// As campaigns write it.
+    pub(crate) fn key(self) -> &'static str {
+        match self {
+            Form::U16 => "u16",
+            Form::I16 => "i16",
+            Form::U32 => "u32",
+            Form::I32 => "i32",
+            Form::F32 => "f32",
+            Form::F64 => "f64",
+        }
+    }
+
     /// How many registers.
     pub(crate) fn count(self) -> u16 {
         match self {

@@ -2,8 +2,9 @@
 
 use crate::blocks::{Block, blocks};
 use crate::link::{Link, LinkError, Table};
-use crate::settings::{SettingError, Settings, wrong};
-use mapper_controller::{Controller, Reading, Target, rig};
+use crate::registers::Order;
+use crate::settings::{Place, SettingError, Settings, wrong};
+use mapper_controller::{Controller, Reading, Target, can_be_read, rig};
 use mapper_core::{Backend, BackendError, Channel};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -22,13 +23,36 @@ pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
         blocks(&pieces.collect::<Vec<_>>()).into_iter().map(move |block| (table, block))
     };
     let blocks = tables.into_iter().flat_map(pieces).collect();
-    Ok(rig(settings.stand(), Registers { settings, link, blocks }))
+    Ok(rig(settings.stand(), Registers { settings, link, blocks, last: BTreeMap::new() }))
 }
 
 struct Registers {
     settings: Settings,
     link: Link,
     blocks: Vec<(Table, Block)>,
+    /// What stood in the registers when they were read last.
+    last: BTreeMap<(Table, u16), u16>,
+}
+
+impl Registers {
+    fn words(&self, place: &Place) -> Vec<u16> {
+        (place.register..place.register + place.form.count())
+            .filter_map(|at| self.last.get(&(place.table, at)).copied())
+            .collect()
+    }
+
+    /// An order in which everything that was read last could be.
+    fn order_that_fits(&self) -> Option<(Order, Order)> {
+        let both = [Order::Big, Order::Little];
+        let orders = both.into_iter().flat_map(|words| both.map(|bytes| (words, bytes)));
+        let fits = |(words, bytes): &(Order, Order)| {
+            self.settings.read.iter().all(|(channel, place)| {
+                let value = place.value(&self.words(place), *words, *bytes);
+                value.is_finite() && can_be_read(*channel, value)
+            })
+        };
+        orders.into_iter().find(fits)
+    }
 }
 
 /// Time for the values of one call, second tries included: the host waits for 2 s.
@@ -41,6 +65,27 @@ enum RegisterError {
     Link(#[from] LinkError),
     #[error(transparent)]
     Setting(#[from] SettingError),
+    #[error(
+        "{source}. It was {key} = {value} (SI), which goes over the wire as {registers}: look at `words` and `bytes`, at `type`, `scale` and `offset` \
+         of `write.{key}`, and at what the controller itself takes there"
+    )]
+    Written { source: Box<LinkError>, key: &'static str, value: f64, registers: String },
+}
+
+impl RegisterError {
+    /// A controller that refuses a value may be right to: what was written may not be what was meant.
+    fn of_write(source: LinkError, target: Target, value: f64, registers: &[u16]) -> RegisterError {
+        if !matches!(source, LinkError::Refused { .. }) {
+            return source.into();
+        }
+        let registers: Vec<_> = registers.iter().map(|word| format!("{word:#06x}")).collect();
+        RegisterError::Written {
+            source: Box::new(source),
+            key: target.key(),
+            value,
+            registers: registers.join(" "),
+        }
+    }
 }
 
 impl Controller for Registers {
@@ -65,11 +110,9 @@ impl Controller for Registers {
                 Err(_) => break,
             }
         }
-        let reading = |(channel, place): (&Channel, &crate::settings::Place)| {
-            let words: Vec<u16> = (place.register..place.register + place.form.count())
-                .filter_map(|at| all.get(&(place.table, at)).copied())
-                .collect();
-            (*channel, Reading::good(self.settings.value(place, &words)))
+        self.last = all;
+        let reading = |(channel, place): (&Channel, &Place)| {
+            (*channel, Reading::good(self.settings.value(place, &self.words(place))))
         };
         self.settings.read.iter().map(reading).collect()
     }
@@ -81,10 +124,39 @@ impl Controller for Registers {
                 let place = settings.place(*target);
                 let registers = settings.registers(&place, *value);
                 let registers = registers.ok_or(SettingError::DoesNotFit { value: *value })?;
-                link.write(place.register, &registers)?;
+                let refused = |source| RegisterError::of_write(source, *target, *value, &registers);
+                link.write(place.register, &registers).map_err(refused)?;
             }
             Ok(())
         })
+    }
+
+    fn place(&self, channel: Channel) -> String {
+        let Some(place) = self.settings.read.get(&channel) else { return "no register".to_owned() };
+        let (words, bytes) = (self.settings.words.key(), self.settings.bytes.key());
+        let order = format!("`words: {words}`, `bytes: {bytes}`");
+        let holds: Vec<_> = self.words(place).iter().map(|word| format!("{word:#06x}")).collect();
+        format!(
+            "register {} ({}, as {} with {order}, scale {}, offset {})",
+            place.register,
+            holds.join(" "),
+            place.form.key(),
+            place.scale,
+            place.offset
+        )
+    }
+
+    fn remedy(&self) -> String {
+        match self.order_that_fits() {
+            Some((words, bytes)) => {
+                let (words, bytes) = (words.key(), bytes.key());
+                format!("With `words: {words}` and `bytes: {bytes}` every channel could be")
+            }
+            None => {
+                "Look at `words` and `bytes`, and at `register`, `type`, `scale` and `offset` of the channel"
+                    .to_owned()
+            }
+        }
     }
 
     fn close(&mut self) {

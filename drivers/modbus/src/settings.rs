@@ -18,6 +18,7 @@ pub(crate) const NAME: &str = "modbus";
 #[serde(deny_unknown_fields)]
 pub(crate) struct Settings {
     /// Address and port of the controller, in numbers: a name would have to be looked up, which may hang.
+    #[serde(deserialize_with = "mapper_driver::address")]
     pub(crate) address: SocketAddr,
     /// Number of the unit behind it; 255 for the controller itself.
     #[serde(default = "own_unit")]
@@ -35,6 +36,7 @@ pub(crate) struct Settings {
     #[serde(default)]
     pub(crate) bytes: Order,
     /// Where each channel stands.
+    #[serde(deserialize_with = "mapper_driver::by_channel")]
     pub(crate) read: BTreeMap<Channel, Place>,
     /// Where each setpoint goes.
     pub(crate) write: Writes,
@@ -193,8 +195,15 @@ impl Settings {
 
     /// The value in registers, SI; NaN where there is none.
     pub(crate) fn value(&self, place: &Place, registers: &[u16]) -> f64 {
-        let number = place.form.number(registers, self.words, self.bytes).unwrap_or(f64::NAN);
-        let value = number * place.scale + place.offset;
+        place.value(registers, self.words, self.bytes)
+    }
+}
+
+impl Place {
+    /// The value in registers of this order, SI; NaN where there is none.
+    pub(crate) fn value(&self, registers: &[u16], words: Order, bytes: Order) -> f64 {
+        let number = self.form.number(registers, words, bytes).unwrap_or(f64::NAN);
+        let value = number * self.scale + self.offset;
         if value.is_finite() { value } else { f64::NAN }
     }
 }

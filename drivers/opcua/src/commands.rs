@@ -1,13 +1,15 @@
 //! What the program does for people.
 
 use crate::link::{LinkError, endpoints};
+use crate::settings::{SettingError, is_endpoint};
 use crate::store::{Store, StoreError, fingerprint, valid};
 use clap::{Parser, Subcommand};
 use opcua::crypto::X509;
 use std::io::Write;
 use std::process::ExitCode;
 
-/// Driver of gas stands that speak OPC UA. `mapper` starts it without arguments; these are for people.
+/// A gas stand behind a PLC or another controller that speaks OPC UA. This is a driver: `mapper` starts it by itself, without arguments, where a
+/// campaign says `backend: {opcua: ...}`; docs/rig.md, "Over OPC UA", has its settings. The commands below are for people.
 #[derive(Parser)]
 #[command(name = "mapper-backend-opcua", version)]
 struct Arguments {
@@ -42,6 +44,8 @@ enum CommandError {
     Store(#[from] StoreError),
     #[error("{0}")]
     Io(#[from] std::io::Error),
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     #[error("{0} has no certificate: it offers no encryption")]
     NoCertificate(String),
     #[error("the certificate has the fingerprint {found}, not {wanted}; nothing was pinned")]
@@ -76,6 +80,9 @@ fn say(words: &str) -> Result<(), CommandError> {
 }
 
 fn trust(store: &Store, endpoint: &str, wanted: Option<String>, replace: bool) -> Result<(), CommandError> {
+    if !is_endpoint(endpoint) {
+        return Err(SettingError::Endpoint(endpoint.to_owned()).into());
+    }
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let offered = runtime.block_on(endpoints(store, endpoint))?;
     let der = offered.iter().map(|one| one.server_certificate.as_ref()).find(|der| !der.is_empty());

@@ -1,5 +1,6 @@
 //! The session with a server. It is polled with Read; the library connects again by itself, within a second of the server's return.
 
+use crate::login::{reach, try_login};
 use crate::settings::{Security, User};
 use crate::store::{APPLICATION_URI, Store, StoreError, fingerprint, server};
 use crate::value::words;
@@ -12,6 +13,7 @@ use opcua::types::{
     AttributeId, DataValue, DateTime, EndpointDescription, Error, MessageSecurityMode, NodeId, NumericRange,
     QualifiedName, ReadValueId, StatusCode, TimestampsToReturn, Variant, WriteValue,
 };
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
@@ -19,8 +21,10 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
-/// For the list of endpoints, and for the session: both are within the 10 s that a host waits for arming.
+/// For the list of endpoints, for the first login and for the session, each.
 const CONNECTING: Duration = Duration::from_secs(4);
+/// For all of them: less than the 10 s that a host waits for arming.
+const OPENING: Duration = Duration::from_secs(9);
 /// For values to be written, a connection that comes back included: less than the 2 s that a host waits.
 const WRITING: Duration = Duration::from_millis(1500);
 /// First and longest pause between two tries to connect.
@@ -39,11 +43,23 @@ pub(crate) enum LinkError {
         "{server} does not let this program in: {words}. Look at user and password, and whether the server trusts {own}"
     )]
     NotLetIn { server: String, words: String, own: String },
+    #[error(
+        "nobody answers at {server}: {source}. Is the server on, and is this its address and port? (`mapper-lab-server` with --opcua prints where it is)"
+    )]
+    Away { server: String, source: std::io::Error },
+    #[error(
+        "{server} has no session left: {words}. Other programs hold them, or left them behind: close those, wait until the server drops them \
+         (often a minute, up to an hour), or start it again"
+    )]
+    Full { server: String, words: String },
     #[error("{server} has no endpoint with {policy}; it offers {offered}")]
     NoEndpoint { server: String, policy: String, offered: String },
     #[error("the node {node} {words}")]
     Node { node: NodeId, words: String },
-    #[error("{server} refuses {value} for the node {node}: {words}")]
+    #[error(
+        "{server} refuses {value} for the node {node}: {words}. Look at its `unit`, or `scale` and `offset`, below `write`, and at what the server \
+         itself takes there"
+    )]
     Refused { server: String, node: NodeId, value: f64, words: String },
     #[error("the node {node} cannot hold {value}")]
     DoesNotFit { node: NodeId, value: f64 },
@@ -123,9 +139,11 @@ fn client(store: &Store, tries: i32) -> Result<Client, String> {
 pub(crate) async fn endpoints(store: &Store, endpoint: &str) -> Result<Vec<EndpointDescription>, LinkError> {
     let failed = |words: String| LinkError::Failed { server: server(endpoint).to_owned(), words };
     let client = client(store, 0).map_err(failed)?;
+    let late = || LinkError::Late { server: server(endpoint).to_owned(), within: CONNECTING };
+    let away = |source| LinkError::Away { server: server(endpoint).to_owned(), source };
+    timeout(CONNECTING, reach(server(endpoint))).await.map_err(|_| late())?.map_err(away)?;
     let asked = timeout(CONNECTING, client.get_server_endpoints_from_url(endpoint));
-    let late = LinkError::Late { server: server(endpoint).to_owned(), within: CONNECTING };
-    asked.await.map_err(|_| late)?.map_err(|error| failed(error.to_string()))
+    asked.await.map_err(|_| late())?.map_err(|error| failed(error.to_string()))
 }
 
 /// Codes by which a server says that it will not have us: to ask again would lock an account.
@@ -206,6 +224,7 @@ impl Link {
     /// Makes the session.
     pub(crate) fn open(&mut self) -> Result<(), LinkError> {
         self.close();
+        let until = Instant::now() + OPENING;
         let store = Store::of_environment()?;
         let own = match self.security {
             Security::None => None,
@@ -217,6 +236,13 @@ impl Link {
         let identity = self.user.as_ref().map_or(IdentityToken::Anonymous, |user| {
             IdentityToken::new_user_name(user.name.as_str(), user.password.as_str())
         });
+        let left = CONNECTING.min(until.saturating_duration_since(Instant::now()));
+        let tried = try_login(&client, &endpoint, identity.clone());
+        match self.runtime.block_on(async { timeout(left, tried).await }) {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => return Err(self.not_let_in(error.status(), own)),
+            Err(_) => return Err(LinkError::Late { server: self.server(), within: left }),
+        }
         let built = client
             .session_builder()
             .user_identity_token(identity)
@@ -240,19 +266,28 @@ impl Link {
             }
         });
         self.open = Some(Open { session, state, task });
-        let connected = self.wait(CONNECTING);
+        let left = CONNECTING.min(until.saturating_duration_since(Instant::now()));
+        let connected = self.wait(left);
         connected.map_err(|error| {
             self.close();
             match error {
-                Some(status) if is_refusal(status) => LinkError::NotLetIn {
-                    server: self.server(),
-                    words: words(status),
-                    own: own.map_or_else(|| "it".to_owned(), |own| own.display().to_string()),
-                },
-                Some(status) => self.failed(words(status)),
-                None => LinkError::Late { server: self.server(), within: CONNECTING },
+                Some(status) => self.not_let_in(status, own),
+                None => LinkError::Late { server: self.server(), within: left },
             }
         })
+    }
+
+    /// Why there is no session.
+    fn not_let_in(&self, status: StatusCode, own: Option<PathBuf>) -> LinkError {
+        let (server, words) = (self.server(), words(status));
+        match status {
+            StatusCode::BadTooManySessions => LinkError::Full { server, words },
+            status if is_refusal(status) => {
+                let own = own.map_or_else(|| "it".to_owned(), |own| own.display().to_string());
+                LinkError::NotLetIn { server, words, own }
+            }
+            _ => LinkError::Failed { server, words },
+        }
     }
 
     /// Waits for the connection; what was wrong last, where it does not come.

@@ -6,6 +6,7 @@
 
 mod commands;
 mod link;
+mod login;
 mod rig;
 mod settings;
 mod store;
@@ -17,5 +18,11 @@ fn main() -> ExitCode {
     if std::env::args_os().len() > 1 {
         return commands::run();
     }
-    mapper_driver::serve(settings::NAME, env!("CARGO_PKG_VERSION"), rig::open)
+    let about = mapper_driver::About {
+        name: settings::NAME,
+        version: env!("CARGO_PKG_VERSION"),
+        summary: "A gas stand behind a PLC or another controller that speaks OPC UA.",
+        settings: r#"docs/rig.md, "Over OPC UA", has an example of all of them"#,
+    };
+    about.serve(rig::open)
 }

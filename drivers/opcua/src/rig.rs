@@ -213,6 +213,16 @@ impl Controller for Nodes {
         self.remark.take().or_else(|| self.link.remark())
     }
 
+    fn place(&self, channel: Channel) -> String {
+        let node = self.checked.reads.iter().find(|(one, ..)| *one == channel);
+        let Some((_, node, _)) = node else { return "no node".to_owned() };
+        format!("the node {node} (with {})", self.checked.unit(channel))
+    }
+
+    fn remedy(&self) -> String {
+        "Look at `node` and `unit`, or `scale` and `offset`, of the channel".to_owned()
+    }
+
     fn close(&mut self) {
         self.link.close();
     }

@@ -38,6 +38,7 @@ pub(crate) struct Settings {
     #[serde(default)]
     pub(crate) timestamps: Timestamps,
     /// Where each channel stands.
+    #[serde(deserialize_with = "mapper_driver::by_channel")]
     pub(crate) read: BTreeMap<Channel, Place>,
     /// Where each setpoint goes.
     pub(crate) write: Writes,
@@ -45,6 +46,11 @@ pub(crate) struct Settings {
     pub(crate) accepts: Accepts,
     /// Its way into the safe state.
     pub(crate) safe: Safe,
+}
+
+/// Whether this can be the address of a server.
+pub(crate) fn is_endpoint(text: &str) -> bool {
+    text.strip_prefix("opc.tcp://").is_some_and(|server| !server.is_empty())
 }
 
 /// Signed and encrypted, or by name in the clear.
@@ -116,7 +122,7 @@ pub(crate) enum SettingError {
     Limit(#[from] LimitError),
     #[error(transparent)]
     Secret(#[from] SecretError),
-    #[error("an endpoint is written as opc.tcp://HOST:PORT, not `{0}`")]
+    #[error("an endpoint begins with opc.tcp:// and is written as opc.tcp://HOST:PORT, not `{0}`")]
     Endpoint(String),
     #[error("{channel} is not given in `{unit}`; its units are {units}")]
     Unit { channel: Channel, unit: String, units: String },
@@ -211,7 +217,7 @@ impl Settings {
     }
 
     fn check(self) -> Result<Checked, BackendError> {
-        if !self.endpoint.starts_with("opc.tcp://") || self.endpoint.len() <= "opc.tcp://".len() {
+        if !is_endpoint(&self.endpoint) {
             return Err(wrong("endpoint", SettingError::Endpoint(self.endpoint.clone())));
         }
         within(self.timeout_s(), "s", 0.01, 0.8).map_err(|error| wrong("timeout", error))?;
@@ -279,6 +285,17 @@ impl Writes {
 }
 
 impl Checked {
+    /// How the number of a channel is read, as the campaign says it.
+    pub(crate) fn unit(&self, channel: Channel) -> String {
+        let Some(place) = self.settings.read.get(&channel) else { return String::new() };
+        match &place.unit {
+            Some(unit) => format!("`unit: {unit}`"),
+            None => {
+                format!("scale {}, offset {}", place.scale.unwrap_or(1.0), place.offset.unwrap_or(0.0))
+            }
+        }
+    }
+
     /// Where a value goes, and how it becomes the number there. All targets are there.
     pub(crate) fn write(&self, target: Target) -> Option<&(NodeId, Scale)> {
         self.writes.get(&target)
@@ -332,7 +349,14 @@ mod tests {
         assert_eq!(path(&|value| value["endpoint"] = json!("127.0.0.1:4840")).0, "endpoint");
         assert_eq!(path(&|value| value["security"] = json!("weak")).0, "security");
         assert_eq!(path(&|value| value["rate"] = json!("1 Hz")).0, "rate");
-        assert!(path(&|value| value["read"]["N"]["node"] = json!("N")).1.contains("ns=2;s=Stand.P3"));
+        let (at, said) = path(&|value| value["read"]["P3"]["node"] = json!("N"));
+        assert!(at == "read.P3.node" && said.contains("ns=2;s=Stand.P3"), "{at}: {said}");
+        assert_eq!(
+            path(&|value| drop(value["read"]["P3"].as_object_mut().unwrap().remove("node"))).0,
+            "read.P3"
+        );
+        let (at, said) = path(&|value| value["read"]["P9"] = json!({"node": "ns=2;s=P9"}));
+        assert!(at == "read.P9" && said.contains("no channel is called `P9`"), "{at}: {said}");
         assert!(path(&|value| value["read"]["P3"]["unit"] = json!("degC")).1.contains("kPa"));
         assert_eq!(path(&|value| value["write"]["t3"] = json!({"node": "ns=2;s=p3"})).0, "write.t3");
         assert_eq!(path(&|value| value["user"] = json!("plain")).0, "user");

@@ -28,8 +28,14 @@ struct Stand {
 
 impl Stand {
     fn new() -> Stand {
+        Stand::with(&[])
+    }
+
+    /// One whose server is told more.
+    fn with(more: &[&str]) -> Stand {
         let scratch = tempfile::tempdir().unwrap();
-        let (server, port) = serve("0", &scratch.path().join("pki"), "365");
+        let more = [&["--days", "365"], more].concat();
+        let (server, port) = serve_with("0", &scratch.path().join("pki"), &more);
         Stand { server, port, scratch }
     }
 
@@ -122,11 +128,15 @@ impl Drop for Stand {
 
 /// A server on this port, or on any; it is there when this returns.
 fn serve(port: &str, certificate: &Path, days: &str) -> (Child, String) {
+    serve_with(port, certificate, &["--days", days])
+}
+
+fn serve_with(port: &str, certificate: &Path, more: &[&str]) -> (Child, String) {
     let mut server = Command::new(option_env!("MAPPER_TEST_PYTHON").unwrap_or("python3"))
         .arg(repository().join("tests/python/opcua_rig.py"))
         .args([port, "--secure"])
         .arg(certificate)
-        .args(["--days", days])
+        .args(more)
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -305,4 +315,65 @@ fn a_server_that_is_gone_for_good_is_said_within_two_seconds() {
     until(&mut rig, &mut t_s, reads_nothing);
     // What has not confirmed its safe state is not let go.
     assert!(matches!(rig.disarm(), Err(BackendError::Lost { .. })));
+}
+
+/// A wrong unit shows before anything is written.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn readings_that_cannot_be_are_refused_with_their_node_and_unit() {
+    let stand = Stand::new();
+    stand.trust();
+    let mut settings = stand.settings();
+    settings["read"]["P2"]["unit"] = json!("kPa");
+    let mut rig = Driver::of_program(&stand.program(PASSWORD), "opcua", &settings, PATIENCE).unwrap();
+    let refused = words(rig.arm().unwrap_err());
+    // 1 bar within its noise, a thousand times: few digits, and what could be.
+    let (_, said) = refused.split_once("at `read.P2`: P2 reads ").unwrap();
+    let (number, rest) = said.split_once(" Pa from the node ns=2;s=P2 (with `unit: kPa`)").unwrap();
+    assert!((9e7..1.1e8).contains(&number.parse::<f64>().unwrap()) && number.len() < 9, "{refused}");
+    assert!(rest.contains("1000 to 5000000 Pa") && rest.contains("Look at `node` and `unit`"), "{refused}");
+    stand.armed().disarm().unwrap();
+}
+
+/// A server for two sessions: seven wrong passwords leave none behind, so that the right one is let in. One that has none left says so.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn wrong_passwords_use_up_no_sessions() {
+    let stand = Stand::with(&["--sessions", "2"]);
+    stand.trust();
+    let mut wrong = stand.driver("wrong");
+    for _ in 0..7 {
+        let refused = words(wrong.arm().unwrap_err());
+        assert!(
+            refused.contains("BadUserAccessDenied") && refused.contains("user and password"),
+            "{refused}"
+        );
+    }
+    let mut rigs = [stand.armed(), stand.armed()];
+    let refused = words(stand.driver(PASSWORD).arm().unwrap_err());
+    assert!(refused.contains("no session left: BadTooManySessions (0x80560000)"), "{refused}");
+    for rig in &mut rigs {
+        rig.make_safe().unwrap();
+        rig.disarm().unwrap();
+    }
+    stand.armed().disarm().unwrap();
+}
+
+/// What people type first, and a server that is off: no status code and no error of a program is shown to them.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_server_is_trusted_by_its_whole_address_and_only_where_it_is() {
+    let mut stand = Stand::new();
+    let said = |stand: &Stand, endpoint: &str| {
+        let output = stand.command(&["trust", endpoint]);
+        assert!(!output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let place = format!("127.0.0.1:{}", stand.port);
+    let words = said(&stand, &place);
+    assert!(words.contains("begins with opc.tcp://") && words.contains(&place), "{words}");
+    stand.kill();
+    let words = said(&stand, &stand.endpoint());
+    assert!(words.contains(&format!("nobody answers at {place}: Connection refused")), "{words}");
+    assert!(!words.contains("Os {") && words.contains("Is the server on"), "{words}");
 }

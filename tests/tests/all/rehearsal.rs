@@ -21,6 +21,8 @@ fn program(name: &str) -> PathBuf {
 struct Lab {
     process: Child,
     places: Vec<String>,
+    /// What it says of each of them.
+    notes: Vec<String>,
 }
 
 impl Lab {
@@ -41,9 +43,10 @@ impl Lab {
             line.strip_prefix(&format!("{server} ")).unwrap().to_owned()
         };
         let places = servers.iter().map(place).collect();
+        let notes = servers.iter().map(|_| lines.next().unwrap().unwrap()).collect();
         // Whatever it says later is read by nobody, and nobody ends it by not reading.
         std::thread::spawn(move || lines.count());
-        Lab { process, places }
+        Lab { process, places, notes }
     }
 }
 
@@ -54,13 +57,17 @@ impl Drop for Lab {
     }
 }
 
-/// Twelve rules, all kept, by a user with a state of his own.
-fn keeps_every_rule(name: &str, campaign: &CampaignFile, state: &Path) {
+fn checked(name: &str, campaign: &CampaignFile, state: &Path, password: &str) -> mapper_tests::Finished {
     let arguments = ["backend", "check", name, "--campaign"].map(std::ffi::OsStr::new);
     let arguments: Vec<_> = arguments.into_iter().chain([campaign.path.as_os_str()]).collect();
     let mut command = with_drivers(&arguments);
-    command.env("MAPPER_STATE_DIR", state).env("PLC_USER", USER).env("PLC_PASSWORD", PASSWORD);
-    let finished = done(command);
+    command.env("MAPPER_STATE_DIR", state).env("PLC_USER", USER).env("PLC_PASSWORD", password);
+    done(command)
+}
+
+/// Twelve rules, all kept, by a user with a state of his own.
+fn keeps_every_rule(name: &str, campaign: &CampaignFile, state: &Path) {
+    let finished = checked(name, campaign, state, PASSWORD);
     assert!(!finished.stdout.contains("BROKEN"), "{}", finished.stdout);
     assert_eq!(finished.exits(0).stdout.lines().count(), 12);
 }
@@ -102,6 +109,57 @@ fn a_program_of_others_drives_the_lab_over_opcua() {
     );
     assert!(seen["tripped"] == true && seen["air_after"] == false, "{seen}");
     assert!(seen["air_before_acknowledge"] == false && seen["tripped_after_acknowledge"] == false, "{seen}");
+}
+
+/// A rig that cannot be armed is not judged: a server that is off, a wrong password (more often than the server has sessions), an order of words
+/// that is wrong, a unit that is not there. One sentence says why, and no rule is said to be kept.
+#[test]
+fn a_rig_that_cannot_be_armed_is_not_judged() {
+    let scratch = scratch();
+    let lab = Lab::start(&["modbus", "opcua"], Some((USER, PASSWORD)), scratch.path());
+    let [modbus, opcua] = &lab.places[..] else { panic!("{:?}", lab.places) };
+    let not_judged = |name: &str, campaign: &CampaignFile, password: &str, reasons: &[&str]| {
+        let finished = checked(name, campaign, scratch.path(), password).exits(5);
+        assert_eq!(finished.stdout, "");
+        assert_eq!(finished.stderr.trim_end().lines().count(), 1, "{}", finished.stderr);
+        let begun = format!("mapper: `{name}` cannot be armed, so that none of its 12 rules was judged: ");
+        assert!(finished.stderr.starts_with(&begun), "{}", finished.stderr);
+        for reason in reasons {
+            assert!(finished.stderr.contains(reason), "{reason}: {}", finished.stderr);
+        }
+    };
+    // It says what it expects, and not the secrets themselves.
+    assert!(lab.notes[0].contains("`unit: 255` (or 0), no other"), "{:?}", lab.notes);
+    assert!(
+        lab.notes[1].contains("for the user in $PLC_USER with the password in $PLC_PASSWORD"),
+        "{:?}",
+        lab.notes
+    );
+    let at = format!("{modbus} ");
+    let of_modbus = |old: &str, new: &str| {
+        of_the_guide(
+            "modbus",
+            &[("127.0.0.1:5020 ", &*at), ("timeout: 200 ms", "timeout: 800 ms"), (old, new)],
+        )
+    };
+    let wrong_words = of_modbus("words: big ", "words: little ");
+    let fits = "With `words: big` and `bytes: big` every channel could be";
+    not_judged("modbus", &wrong_words, PASSWORD, &["`read.P1`", "P1 reads ", "register 4 (0x", fits]);
+    let no_unit = of_modbus("unit: 255", "unit: 7");
+    not_judged("modbus", &no_unit, PASSWORD, &["it has no unit 7; look at `unit`"]);
+    let off = of_the_guide("modbus", &[("127.0.0.1:5020 ", "127.0.0.1:9 ")]);
+    not_judged("modbus", &off, PASSWORD, &["127.0.0.1:9: Connection refused"]);
+    trust(opcua, scratch.path());
+    let campaign =
+        of_the_guide("opcua", &[("opc.tcp://127.0.0.1:4840", opcua), ("timeout: 300 ms", "timeout: 800 ms")]);
+    // The server has 20 sessions: the last ones would hear of those.
+    for _ in 0..22 {
+        not_judged("opcua", &campaign, "wrong", &["does not let this program in", "user and password"]);
+    }
+
+    // A campaign of another backend.
+    let finished = checked("modbus", &campaign, scratch.path(), PASSWORD).exits(3);
+    assert!(finished.stderr.contains("this campaign names `opcua`, not `modbus`"), "{}", finished.stderr);
 }
 
 /// One stand behind three servers at once, with the settings of the guide.
@@ -331,4 +389,72 @@ fn a_plan_of_a_rig_that_has_changed_since_is_refused() {
     std::fs::write(&built_in.path, &built_in.text).unwrap();
     let points = resume().exits(0).json()["points"].as_array().unwrap().len();
     assert_eq!(points, 5, "four points and the first again");
+}
+
+fn said(program_name: &str, arguments: &[&str]) -> mapper_tests::Finished {
+    let mut command = Command::new(program(program_name));
+    command.args(arguments).stdin(Stdio::null());
+    done(command)
+}
+
+/// Whoever starts a driver by hand learns what it is; before, it said nothing at all.
+#[test]
+fn a_driver_that_is_started_by_hand_says_what_it_is() {
+    for name in ["modbus", "opcua", "ak", "lab"] {
+        let file = format!("mapper-backend-{name}");
+        build_driver(&file);
+        let help = said(&file, &["--help"]).exits(0).stdout;
+        assert!(help.contains("`mapper` starts it") && help.contains("docs/"), "{help}");
+        let version = said(&file, &["--version"]).exits(0).stdout;
+        assert_eq!(version.trim(), format!("{file} {}", env!("CARGO_PKG_VERSION")));
+        let wrong = said(&file, &["--hlep"]).exits(2);
+        assert!(wrong.stderr.contains("--hlep") && wrong.stdout.is_empty(), "{wrong:?}");
+    }
+}
+
+/// A mistake in one channel of many is told at that channel, with its line.
+#[test]
+fn a_mistake_below_read_names_its_channel_and_its_line() {
+    for (driver, old, new, at, words) in [
+        (
+            "opcua",
+            "P2:    {node: ns=2;s=P2}",
+            "P2:    {nod: ns=2;s=P2}",
+            "backend.opcua.read.P2",
+            "unknown field `nod`",
+        ),
+        (
+            "opcua",
+            "P2:    {node: ns=2;s=P2}",
+            "P2:    {node: P2}",
+            "backend.opcua.read.P2.node",
+            "`P2` is not a node id",
+        ),
+        (
+            "modbus",
+            "P2:    {register: 8}",
+            "P2:    {register: x}",
+            "backend.modbus.read.P2.register",
+            "expected u16",
+        ),
+        (
+            "modbus",
+            "P2:    {register: 8}",
+            "P9:    {register: 8}",
+            "backend.modbus.read.P9",
+            "no channel is called `P9`",
+        ),
+        ("modbus", "127.0.0.1:5020 ", "localhost:5020 ", "backend.modbus.address", "here 127.0.0.1:5020"),
+    ] {
+        build_driver(&format!("mapper-backend-{driver}"));
+        let campaign = of_the_guide(driver, &[(old, new)]);
+        let text = std::fs::read_to_string(&campaign.path).unwrap();
+        let line = 1 + text.lines().position(|line| line.contains(new.trim())).unwrap();
+        let mut command = with_drivers(&["check".as_ref(), campaign.path.as_os_str()]);
+        command.env("PLC_USER", USER).env("PLC_PASSWORD", PASSWORD);
+        let stderr = done(command).exits(3).stderr;
+        for part in [at, words, &format!(":{line}:")] {
+            assert!(stderr.contains(part), "{part}: {stderr}");
+        }
+    }
 }

@@ -4,12 +4,12 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::{drivers, output, registry, rig_states};
 use clap::{Args, Subcommand};
-use mapper_conformance::{Candidate, RULES};
+use mapper_conformance::{Candidate, judge};
 use mapper_core::{RigMode, Setpoints};
 use mapper_host::Found;
 use mapper_session::{RigStates, nominal_model};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// List the backends, or hold one against the rules that every backend keeps
 #[derive(Debug, Args)]
@@ -83,13 +83,21 @@ impl Backend {
         output::print(&all.iter().map(line).collect::<String>())
     }
 
-    fn check(&self, name: &str, path: &std::path::Path) -> Result<(), Failure> {
+    fn check(&self, name: &str, path: &Path) -> Result<(), Failure> {
         let mut campaign = mapper_campaign::load(path).map_err(Failure::of_campaign)?;
-        if campaign.backend.name != name {
+        let registry = registry::registry();
+        let named = campaign.backend.name.clone();
+        if named != name {
+            // What is built in does without settings; a driver has an address at least, which another one's are not.
+            if !registry.backends.iter().any(|plugin| plugin.name == name) {
+                let remedy = format!("`mapper backend check {named} --campaign {}`", path.display());
+                let words = format!("this campaign names `{named}`, not `{name}`, and has no settings for that: {remedy}");
+                return Err(Failure::new(Code::BadInput, words));
+            }
             campaign.backend =
                 mapper_campaign::campaign::BackendChoice { name: name.to_owned(), settings: json!({}) };
         }
-        let (registry, model) = (registry::registry(), nominal_model(&campaign)?);
+        let model = nominal_model(&campaign)?;
         // Mistakes in the settings are told as those of a campaign.
         let rig = registry
             .make_backend(&campaign, &model)
@@ -113,11 +121,11 @@ impl Backend {
             oil_temperature_k: campaign.boundary.oil_temperature_k,
         };
         let candidate = Candidate { name, make: &make, setpoints, lasts_s: None };
-        let found: Vec<(&str, Result<(), String>)> =
-            RULES.iter().map(|(rule, check)| (*rule, check(&candidate))).collect();
+        let found = judge(&candidate);
         if let Some(claim) = claim {
             claim.release()?;
         }
+        let found = found.map_err(|error| Failure::new(Code::Rig, error))?;
         let broken = found.iter().filter(|(_, kept)| kept.is_err()).count();
         if self.json {
             let rules = found.iter().map(
@@ -133,7 +141,7 @@ impl Backend {
         }
         match broken {
             0 => Ok(()),
-            _ => Err(Failure::new(Code::Rig, format!("`{name}` breaks {broken} of {} rules", RULES.len()))),
+            _ => Err(Failure::new(Code::Rig, format!("`{name}` breaks {broken} of {} rules", found.len()))),
         }
     }
 }

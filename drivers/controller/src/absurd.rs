@@ -1,0 +1,100 @@
+//! A first look at what is read, before anything is written: an order of words, a unit or a scale that is wrong for the readings is wrong for the
+//! setpoints too.
+
+use crate::Controller;
+use mapper_core::{Channel, measurable};
+
+/// Readings that no sensor gives.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{channel} reads {} {unit} from {place}; what a stand can read is {} to {} {unit}{}. {remedy}. No setpoint was written",
+    short(*.value),
+    short(*.low),
+    short(*.high),
+    also(.others)
+)]
+pub(crate) struct Absurd {
+    /// The first of them.
+    pub(crate) channel: Channel,
+    value: f64,
+    unit: &'static str,
+    low: f64,
+    high: f64,
+    place: String,
+    /// The others.
+    others: Vec<Channel>,
+    remedy: String,
+}
+
+fn also(others: &[Channel]) -> String {
+    match others {
+        [] => String::new(),
+        _ => {
+            let symbols: Vec<_> = others.iter().map(|channel| channel.symbol()).collect();
+            format!("; nor can {} be as they read", symbols.join(", "))
+        }
+    }
+}
+
+/// Four digits; a power of ten where there would be many zeros.
+pub fn short(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".to_owned(),
+        size if (1e-3..1e7).contains(&size) => {
+            // Digits before the point stay, whatever they are.
+            let behind = (3.0 - size.log10().floor()).max(0.0);
+            let text = format!("{value:.0$}", behind as usize);
+            match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+                false => text,
+            }
+        }
+        _ => format!("{value:.3e}"),
+    }
+}
+
+/// Whether a sensor can read this, SI. What is no number is judged by the guards, which count how long.
+pub fn can_be_read(channel: Channel, value: f64) -> bool {
+    !value.is_finite() || measurable(channel.info().dimension).contains(&value)
+}
+
+/// Judges the first readings, SI.
+pub(crate) fn check(
+    controller: &impl Controller,
+    readings: impl Iterator<Item = (Channel, f64)>,
+) -> Result<(), Box<Absurd>> {
+    let mut found = readings.filter(|(channel, value)| !can_be_read(*channel, *value));
+    let Some((channel, value)) = found.next() else { return Ok(()) };
+    let range = measurable(channel.info().dimension);
+    Err(Box::new(Absurd {
+        channel,
+        value,
+        unit: channel.unit(),
+        low: *range.start(),
+        high: *range.end(),
+        place: controller.place(channel),
+        others: found.map(|(channel, _)| channel).collect(),
+        remedy: controller.remedy(),
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_said_in_few_digits() {
+        for (value, words) in [
+            (128_426_750.014_884_53, "1.284e8"),
+            (2.26e-27, "2.260e-27"),
+            (101_325.25, "101325"),
+            (298.15, "298.1"),
+            (-1000.0, "-1000"),
+            (5e6, "5000000"),
+            (0.5, "0.5"),
+            (0.0, "0"),
+        ] {
+            assert_eq!(short(value), words);
+        }
+    }
+}

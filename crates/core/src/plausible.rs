@@ -58,6 +58,6 @@ pub fn measurable(dimension: Dimension) -> RangeInclusive<f64> {
         Dimension::MassFlow => -1.0..=20.0,
         Dimension::Pressure => 1e3..=5e6,
         Dimension::Temperature => 200.0..=1600.0,
-        Dimension::Ratio => f64::MIN..=f64::MAX,
+        Dimension::Ratio => -0.1..=10.0,
     }
 }

@@ -1,7 +1,7 @@
 //! The first seconds of a run, looked at before anything is driven far: every channel alive, in range, and in time.
 
 use crate::guard::{Guard, Told, Trip};
-use mapper_core::{Channel, Dimension, GuardName, Reaction, SampleBatch};
+use mapper_core::{Channel, GuardName, Reaction, SampleBatch, measurable};
 
 /// How long is looked, s.
 const LOOK_S: f64 = 5.0;
@@ -40,11 +40,15 @@ impl FirstLook {
         let mut faults: Vec<(bool, String)> = Vec::new();
         for (channel, seen) in self.channels.iter().zip(&self.seen) {
             let needed = NEEDED.contains(channel);
-            let (low, high) = plausible(channel.info().dimension);
+            let range = measurable(channel.info().dimension);
             match seen {
                 None => faults.push((needed, format!("{channel} gives no reading"))),
-                Some(value) if !(low..=high).contains(value) => {
-                    faults.push((needed, format!("{channel} reads {value} {}", channel.unit())));
+                Some(value) if !range.contains(value) => {
+                    let (low, high, unit) = (range.start(), range.end(), channel.unit());
+                    let words = format!(
+                        "{channel} reads {value:.3e} {unit}, where a sensor reads {low:e} to {high:e} {unit}"
+                    );
+                    faults.push((needed, words));
                 }
                 Some(_) => {}
             }
@@ -53,17 +57,6 @@ impl FirstLook {
             faults.push((true, format!("the source's clock is off by {:.1} s", self.clock_off_s)));
         }
         faults
-    }
-}
-
-/// What a sensor of a gas stand can read at all.
-fn plausible(dimension: Dimension) -> (f64, f64) {
-    match dimension {
-        Dimension::RotationalSpeed => (-1e3, 1e6),
-        Dimension::MassFlow => (-1.0, 20.0),
-        Dimension::Pressure => (1e3, 5e6),
-        Dimension::Temperature => (200.0, 1600.0),
-        Dimension::Ratio => (-0.1, 10.0),
     }
 }
 

@@ -144,7 +144,12 @@ fn a_rig_that_cannot_be_armed_is_not_judged() {
     };
     let wrong_words = of_modbus("words: big ", "words: little ");
     let fits = "With `words: big` and `bytes: big` every channel could be";
-    not_judged("modbus", &wrong_words, PASSWORD, &["are wrong at `read.", " reads ", " from register ", fits]);
+    not_judged(
+        "modbus",
+        &wrong_words,
+        PASSWORD,
+        &["are wrong at `read.", " reads ", " from register ", fits],
+    );
     let no_unit = of_modbus("unit: 255", "unit: 7");
     not_judged("modbus", &no_unit, PASSWORD, &["it has no unit 7; look at `unit`"]);
     let off = of_the_guide("modbus", &[("127.0.0.1:5020 ", "127.0.0.1:9 ")]);

@@ -91,7 +91,9 @@ impl Backend {
             // What is built in does without settings; a driver has an address at least, which another one's are not.
             if !registry.backends.iter().any(|plugin| plugin.name == name) {
                 let remedy = format!("`mapper backend check {named} --campaign {}`", path.display());
-                let words = format!("this campaign names `{named}`, not `{name}`, and has no settings for that: {remedy}");
+                let words = format!(
+                    "this campaign names `{named}`, not `{name}`, and has no settings for that: {remedy}"
+                );
                 return Err(Failure::new(Code::BadInput, words));
             }
             campaign.backend =

@@ -202,8 +202,9 @@ fn polling_changes_nothing(candidate: &Candidate<'_>) -> Checked {
         let cut = pieces.iter().flat_map(|piece| of_piece(piece).unwrap_or_default());
         let scale = column.values.iter().map(|value| value.abs()).fold(0.0, f64::max);
         for ((t_s, cut), whole) in times.iter().zip(cut).zip(&column.values) {
-            // A solver ends its step where a poll ends: a hundred times its relative tolerance of 1e-6.
-            let agrees = (cut - whole).abs() <= 1e-4 * scale || (cut.is_nan() && whole.is_nan());
+            // A solver ends its step where a poll ends. Pressures and speeds then agree to its relative tolerance of 1e-6 or two;
+            // the flow of a machine that just leaves standstill is some hundred times as steep in pressure, relatively.
+            let agrees = (cut - whole).abs() <= 3e-4 * scale || (cut.is_nan() && whole.is_nan());
             ensure!(agrees, "{} at {t_s} s: {cut} in pieces, {whole} in one", column.channel);
         }
     }

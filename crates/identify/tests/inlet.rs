@@ -81,39 +81,39 @@ fn with_noise_either_law_before_the_wheel_lies_in_the_intervals() {
     }
 }
 
-/// A share that is held as declared lets the recording tell the laws apart: one h behind and before the wheel is points off
-/// where the machine has two, and no worse than before where it has one.
+/// A share that is held as declared: the readings are then some hundredths of alpha_A apart, for which small faults of the model
+/// pass as well. What is declared is kept, the right declaration is as good as not asking at all, and the intervals reach to the
+/// other reading: eta lies in them whichever was declared. Offsets as after a zero: what is looked at is the law.
 #[test]
-fn with_a_declared_share_the_law_before_the_wheel_is_told_through_noise() {
+fn with_a_held_share_the_intervals_reach_to_the_other_law_before_the_wheel() {
     let held = JointSettings { alpha_area: Choice::Fixed, ..JointSettings::default() };
     let unasked = JointSettings { inlet_h: Choice::Fixed, ..held };
     for inlet in [InletConvection::Shared, InletConvection::Own] {
         let campaign = campaign(&eighteen(), 120.0, Machine { alpha: 0.2, inlet, ..Machine::default() });
-        for seed in 0..4 {
+        for (seed, declared_inlet) in [(0, InletConvection::Shared), (1, InletConvection::Own)] {
             let mut rng = Pcg64::seed_from_u64(seed);
-            // Offsets as after a zero: what is looked at is the law.
             let (recording, declared) = measured(&campaign.recording, 1.0, 0.2, &mut rng);
-            let off = |joint_settings: JointSettings| {
+            let of = |joint_settings: JointSettings| {
                 let config = IdentifyConfig {
                     declared: declared.clone(),
                     alpha_area_ratio: 0.2,
+                    inlet_convection: declared_inlet,
                     joint: joint_settings,
                     ..joint()
                 };
-                let (points, thermal) = found(&recording, &config);
-                let square: f64 = points
-                    .iter()
-                    .zip(&campaign.truth)
-                    .map(|(point, truth)| (point.eta.unwrap() - truth.eta).powi(2))
-                    .sum();
-                ((square / points.len() as f64).sqrt(), thermal.inlet.unwrap())
+                found(&recording, &config)
             };
-            let ((asked, told), (unasked, _)) = (off(held), off(unasked));
-            assert_eq!((told.convection, told.origin), (inlet, Origin::Fitted), "seed {seed}: {told:?}");
-            match inlet {
-                InletConvection::Shared => assert!(asked < unasked + 1e-4, "seed {seed}: {asked} {unasked}"),
-                InletConvection::Own => assert!(asked < 0.5 * unasked, "seed {seed}: {asked} {unasked}"),
+            let ((points, thermal), (unasked, _)) = (of(held), of(unasked));
+            let told = thermal.inlet.unwrap();
+            assert_eq!((told.convection, told.origin), (declared_inlet, Origin::NotIdentifiable), "{told:?}");
+            assert!(told.probability > 0.05 && told.probability < 0.95, "{told:?}");
+            let mut eta = Honesty::default();
+            for ((point, unasked), truth) in points.iter().zip(&unasked).zip(&campaign.truth) {
+                assert!((point.eta.unwrap() - unasked.eta.unwrap()).abs() < 1e-4);
+                eta.add(point.eta, point.eta_low, point.eta_high, truth.eta);
             }
+            // Eighteen points that share their errors: one may miss.
+            assert!(eta.held() > 0.9, "{inlet:?} declared {declared_inlet:?}: {}", eta.held());
         }
     }
 }

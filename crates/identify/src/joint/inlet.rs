@@ -3,11 +3,13 @@
 //! Both readings have the same numbers to find, and nearly the same T2: a recording sees `h alpha_A` before the wheel and
 //! `h (1 - alpha_A)` behind it, so with another h before it alpha_A and h come out otherwise, and the efficiencies do not.
 //! The ratio of the two laws varies by a few percent over a map (with the gas temperature behind the wheel), which is all
-//! that a recording can tell them by, unless alpha_A is held as declared. So both are fitted and weighed; where the recording
-//! does not decide, what is declared stays, and the difference is carried on as an error of everything that it moves.
+//! that a recording can tell them by, unless alpha_A is held as declared. Then the readings differ by some hundredths of alpha_A,
+//! for which small faults of the model pass as well: a map that drops more steeply than the surface that is fitted was seen
+//! to speak for the wrong one by a factor of a thousand, with every draw of noise. So both are fitted and weighed, such faults
+//! counted in; where the recording does not decide, the difference is carried on as an error of everything that it moves.
 
 use crate::joint::parameters::{ALPHA, INLET, LN_COEFFICIENT, Prior};
-use crate::joint::parsimony::DECLARED_HOLDS;
+use crate::joint::parsimony::{ALPHA_FLOOR, DECLARED_HOLDS};
 use crate::joint::solve::{Covariance, FULLY, Problem};
 use mapper_core::{FoundInlet, InletConvection, Origin};
 
@@ -52,9 +54,12 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Covariance> {
     let Some(mut other) = problem.inlet_sought.then(|| otherwise(problem)).flatten() else {
         return Some(covariance);
     };
-    let ln_odds = 0.5 * (problem.square() - other.square()) + ((1.0 - DECLARED_HOLDS) / DECLARED_HOLDS).ln();
+    let seen = 0.5 * (problem.square() - other.square()) * share_of_noise(problem)?;
+    let ln_odds = seen + ((1.0 - DECLARED_HOLDS) / DECLARED_HOLDS).ln();
     let mut left = 1.0 / (1.0 + (-ln_odds).exp());
-    if left > 0.5 {
+    // With alpha_A fitted the likelier reading is taken. With alpha_A held, so is this, unless the recording decides.
+    let enough = if problem.active[ALPHA] { 0.5 } else { 1.0 - DECIDED };
+    if left > enough {
         std::mem::swap(problem, &mut other);
         left = 1.0 - left;
     }
@@ -72,6 +77,22 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Covariance> {
     let covariance = problem.covariance()?;
     problem.priors[INLET].sigma *= stretch(problem, &other, &covariance);
     problem.covariance()
+}
+
+/// By how much less the readings are told apart than noise alone says: its share of the variance, noise and faults of the model, of a
+/// power between 0 and 1 by which h before the wheel follows its own law. 1 where alpha_A is fitted and takes up such faults.
+fn share_of_noise(problem: &Problem<'_>) -> Option<f64> {
+    if problem.active[ALPHA] {
+        return Some(1.0);
+    }
+    let by_noise = problem.information(INLET)?.powf(-0.5);
+    let alpha = problem.shared[ALPHA];
+    let ln_ratio = mapper_numerics::statistics::mean(&problem.ln_inlet_ratios())?;
+    // The change of alpha_A that passes for the whole way from one reading to the other.
+    let way = (alpha * (1.0 - alpha) * ln_ratio).abs();
+    let by_faults = ALPHA_FLOOR / way;
+    let share = (by_noise / by_noise.hypot(by_faults)).powi(2);
+    share.is_finite().then_some(share)
 }
 
 /// How much farther apart the two fits are than the straight line from one towards the other says: alpha_A and the level of

@@ -18,9 +18,11 @@ use crate::joint::solve::{Covariance, FULLY, Problem};
 use mapper_numerics::statistics::mean;
 use nalgebra::{DMatrix, DVector};
 
-/// The refinements, and for each what small faults of the model can pass for: a clearance that grows by a percent as the
-/// housing warms up by 100 K looks like 0.06 of alpha_A.
-const REFINEMENTS: [(usize, f64); 3] = [(PROBE_MM2, 0.1), (LN_DIRECTION, 0.015), (ALPHA, 0.025)];
+/// What small faults of the model can pass for, as a change of alpha_A: a clearance that grows by a percent as the housing warms up
+/// by 100 K looks like 0.06.
+pub(crate) const ALPHA_FLOOR: f64 = 0.025;
+/// The refinements, and for each what small faults of the model can pass for.
+const REFINEMENTS: [(usize, f64); 3] = [(PROBE_MM2, 0.1), (LN_DIRECTION, 0.015), (ALPHA, ALPHA_FLOOR)];
 /// Standard errors outside its range up to which a refinement is there by chance.
 const BY_CHANCE_SIGMAS: f64 = 3.0;
 /// Probability beforehand that a refinement is not at work.

@@ -400,10 +400,13 @@ impl Problem<'_> {
         Some(Fisher { unknown, information, steps })
     }
 
-    /// What the recording alone knows of a shared parameter when all others are free: one over its variance by least
-    /// squares, minus the prior's part.
+    /// What the recording alone knows of a shared parameter when all that are fitted are free: one over its variance by least
+    /// squares, minus the prior's part. It need not be fitted itself.
     pub(crate) fn information(&self, index: usize) -> Option<f64> {
-        let fitted = self.fitted();
+        let mut fitted = self.fitted();
+        if !fitted.contains(&index) {
+            fitted.push(index);
+        }
         let row = fitted.iter().position(|other| *other == index)?;
         let reduced = self.normal(&fitted).equations.reduced(0.0)?.matrix;
         let variance = reduced.cholesky()?.inverse()[(row, row)];

@@ -6,6 +6,12 @@ const TIME_CONSTANTS_S: [f64; 5] = [400.0, 550.0, 700.0, 900.0, 1200.0];
 /// How far it may be from there at the beginning, one standard deviation beforehand, K.
 const START_SIGMA_K: f64 = 3.0;
 
+/// How far a usual housing is from there after `t_s` of rest, K: a kelvin at the beginning, with the middle time constant. From the
+/// readings of one that has long come to rest no time constant follows, and none is needed; this one's limit is known least.
+pub(crate) fn usual_k(t_s: f64) -> f64 {
+    (-t_s / TIME_CONSTANTS_S[TIME_CONSTANTS_S.len() / 2]).exp()
+}
+
 /// The limit of `values` (at `t_s`, each with the standard error `sigma`) under `limit + start exp(-t/tau)`, and its
 /// standard error. Limit and start are found by least squares for each time constant; these are averaged over with the weights
 /// that the values give them. `None` for fewer than six values.
@@ -72,6 +78,31 @@ mod tests {
         // 200 draws know their standard deviation to 5 %; the weights of five time constants are no exact posterior.
         let ratio = (squares / claimed).sqrt();
         assert!((0.75..1.25).contains(&ratio), "errors are {ratio} of what is claimed");
+    }
+
+    /// What is forecast of a usual housing, from readings without noise, is what draws of it claim: after half an hour four times as
+    /// much as after an hour.
+    #[test]
+    fn the_error_of_a_usual_housing_is_that_of_readings_without_noise() {
+        let mut random = Pcg64::seed_from_u64(2);
+        let sigma_k = 0.03;
+        let mut forecasts = Vec::new();
+        for soak_s in [1800.0, 3600.0] {
+            let blocks = (2.0 / 3.0 * soak_s / 30.0) as usize;
+            let t_s: Vec<f64> = (0..blocks).map(|i| soak_s / 3.0 + 30.0 * (i as f64 + 0.5)).collect();
+            let still: Vec<f64> = t_s.iter().map(|t_s| usual_k(*t_s)).collect();
+            let (_, forecast) = limit(&t_s, &still, sigma_k).unwrap();
+            let claimed = (0..100).map(|_| {
+                let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
+                let values: Vec<f64> = still.iter().map(|value| value + sigma_k * noise()).collect();
+                limit(&t_s, &values, sigma_k).unwrap().1
+            });
+            let claimed = claimed.sum::<f64>() / 100.0;
+            // Draws weigh the time constants each in its own way.
+            assert!((0.8..1.25).contains(&(claimed / forecast)), "{soak_s} s: {claimed} K of {forecast} K");
+            forecasts.push(forecast);
+        }
+        assert!((3.0..6.0).contains(&(forecasts[0] / forecasts[1])), "{forecasts:?}");
     }
 
     #[test]

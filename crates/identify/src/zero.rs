@@ -288,12 +288,13 @@ fn expected_limit_error(noise_sigma: f64, soak_s: f64, config: &IdentifyConfig) 
         return None;
     }
     let used_s = (2.0 / 3.0 * soak_s).min(LONGEST_RELAXATION_S);
-    let t_s: Vec<f64> =
-        (0..(used_s / BLOCK_S) as usize).map(|block| (block as f64 + 0.5) * BLOCK_S).collect();
+    let t_s: Vec<f64> = (0..(used_s / BLOCK_S) as usize)
+        .map(|block| soak_s - used_s + (block as f64 + 0.5) * BLOCK_S)
+        .collect();
     let samples = (BLOCK_S / DECLARED_INTERVAL_S) as usize;
     let variance = coloured(config.noise_colour).variance_of_mean(samples, BLOCK_S);
-    let resting = vec![0.0; t_s.len()];
-    relaxation::limit(&t_s, &resting, noise_sigma * variance.sqrt()).map(|(_, error)| error)
+    let relaxing: Vec<f64> = t_s.iter().map(|t_s| relaxation::usual_k(*t_s)).collect();
+    relaxation::limit(&t_s, &relaxing, noise_sigma * variance.sqrt()).map(|(_, error)| error)
 }
 
 struct SoakMean {

@@ -90,6 +90,7 @@ mod transient;
 mod twin_campaign;
 mod twin_files;
 mod variant;
+mod zero_forecast;
 
 pub use declared::identification;
 pub use drift::Drift;

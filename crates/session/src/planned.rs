@@ -6,6 +6,7 @@ use crate::planning::with_plan_request;
 use crate::replanned::reordering;
 use crate::surge::count_surge_search;
 use crate::thought::Question;
+use crate::zero_forecast;
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, VisitOrder};
 use mapper_physics::model::Model;
@@ -34,6 +35,7 @@ pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
 pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, SessionError> {
     let mut plan = priced(campaign, request)?;
     plan.remarks.extend(beaten(campaign, request, &plan));
+    plan.remarks.extend(zero_forecast::sentence(campaign));
     count_surge_search(campaign, request.model, &mut plan);
     Ok(plan)
 }

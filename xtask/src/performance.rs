@@ -121,7 +121,7 @@ fn whole_run(page: &mut String, mapper: &Path) -> Result<(), Error> {
     fs::remove_dir_all(&out).map_err(|source| Error::File { path: out.clone(), source })?;
     let _ = writeln!(
         page,
-        "## The whole job: `mapper run {CAMPAIGN}`\n\n48 points and 9 repeats, 2 h 34 min of the rig's time at 10 Hz, soak \
+        "## The whole job: `mapper run {CAMPAIGN}`\n\n48 points, 9 repeats and the first point again, 1 h 25 min of the rig's time at 10 Hz, soak \
          included: plan, run, record, zero, identify (`joint`), map, report.\n\n| | |\n|---|---:|\n| wall | {:.2} s |\n| peak memory | {:.0} MB |\n",
         median(&mut seconds),
         median(&mut megabytes),

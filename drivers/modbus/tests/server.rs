@@ -51,7 +51,7 @@ impl Stand {
 
     fn settings(&self) -> Value {
         json!({
-            "address": format!("127.0.0.1:{}", self.port), "timeout": "400 ms",
+            "address": format!("127.0.0.1:{}", self.port), "timeout": "800 ms",
             "read": {"N": {"register": 0}, "T2": {"register": 10}, "P3": {"register": 16}},
             "write": {
                 "p3": {"register": 100}, "t3": {"register": 102}, "valve": {"register": 104}, "oil_temperature": {"register": 106},

@@ -1,9 +1,10 @@
 """One campaign on five rigs, `backend:` changed by one word: virtual lab, the lab behind OPC UA and behind Modbus, the rig in Python, an FMU.
 
-    python3 benches/one_word.py --bin target/release [--python target/python-env/bin/python] [--out DIRECTORY]
+    python3 benches/one_word.py --bin target/release [--python target/python-env/bin/python] [--out DIRECTORY] [--real-time 'chrt -f 5']
 
 Needs mapper, its drivers and mapper-lab-server in --bin and the packages of tests/python/requirements.txt. The two behind servers go on in real time,
-signed and encrypted where it is OPC UA: twelve minutes. Prints the efficiency of each point by each rig, and what `identify`, `gap` and `drift` say
+signed and encrypted where it is OPC UA: twelve minutes. What --real-time says is put before those and their servers: on a computer that has other things
+to do they have the processor first. Prints the efficiency of each point by each rig, and what `identify`, `gap` and `drift` say
 of each recording.
 """
 
@@ -50,6 +51,7 @@ def main():
     parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "target/release")
     parser.add_argument("--python", type=pathlib.Path, default=sys.executable)
     parser.add_argument("--out", type=pathlib.Path)
+    parser.add_argument("--real-time", type=str.split, default=[])
     arguments = parser.parse_args()
     bins, out = arguments.bin.resolve(), arguments.out or pathlib.Path(tempfile.mkdtemp())
     out.mkdir(parents=True, exist_ok=True)
@@ -67,7 +69,7 @@ def main():
     lab = campaign(out / "virtual_lab.yaml", "  virtual_lab: {}")
     servers, places = [], {}
     for name in ("opcua", "modbus"):
-        server = subprocess.Popen([str(bins / "mapper-lab-server"), str(lab), f"--{name}", "127.0.0.1:0"], stdout=subprocess.PIPE, text=True, env=environment)
+        server = subprocess.Popen([*arguments.real_time, str(bins / "mapper-lab-server"), str(lab), f"--{name}", "127.0.0.1:0"], stdout=subprocess.PIPE, text=True, env=environment)
         servers.append(server)
         places[name] = server.stdout.readline().split()[1]
     call("mapper-backend-opcua", "trust", places["opcua"])
@@ -79,7 +81,8 @@ def main():
         "python_rig": campaign(out / "python_rig.yaml", "  python_rig: {noise: 1}"),
         "fmu": campaign(out / "fmu.yaml", "  fmu: " + fmu.strip()),
     }
-    runs = {name: subprocess.Popen([str(bins / "mapper"), "run", str(file), "--json", "--out", str(out / f"runs-{name}")], stdout=subprocess.PIPE,
+    first = {name: arguments.real_time if name in places else [] for name in files}
+    runs = {name: subprocess.Popen([*first[name], str(bins / "mapper"), "run", str(file), "--json", "--out", str(out / f"runs-{name}")], stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True, env=environment, cwd=ROOT) for name, file in files.items()}
     results = {}
     for name, process in runs.items():

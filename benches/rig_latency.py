@@ -6,8 +6,8 @@ Needs mapper, its drivers and mapper-lab-server built in --bin, and the packages
 server, ms: from the answer that carries a speed above the guard's limit, to the first command of the way into the safe state; then, on the lab
 server, s: from kill -9 of the runner to that command, and from the return of a server that was killed to its first answered read.
 
-With --security basic256_sha256 OPC UA alone, signed and encrypted: a relay cannot read it, so asyncua stamps inside, before it encrypts the answer and after it has decrypted
-the command. Its own cryptography (in Python) is part of the figure then. `none (inside)`: in the clear, from the same place, to be held against it.
+With --security basic256_sha256 OPC UA alone, signed and encrypted: a relay cannot read it, so the servers stamp inside, before they encrypt the answer and after they have decrypted
+the command. Their own cryptography (asyncua's in Python) is part of the figure then. `none (inside)`: in the clear, from the same place, to be held against it.
 """
 
 import argparse
@@ -125,29 +125,37 @@ class Relay:
 
 
 class Inside:
-    """asyncua with stamps of its own, which `seen` has as a relay's."""
+    """A server with stamps of its own, which `seen` has as a relay's."""
 
-    def __init__(self, python, directory, security, port=0):
+    def __init__(self, arguments, security, environment=None):
         self.security, self.seen = security, []
-        secure = [] if security == "none" else ["--secure", str(directory / "server")]
-        script = [python, str(ROOT / "tests/python/opcua_rig.py"), str(port), "--stamps", *secure]
-        self.process = subprocess.Popen(script, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        self.port = int(self.process.stdout.readline())
+        self.process = subprocess.Popen(list(map(str, arguments)), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
+        self.port = int(self.process.stdout.readline().strip().rsplit(":", 1)[-1])
         threading.Thread(target=self.listen, daemon=True).start()
 
     def listen(self):
         for line in self.process.stdout:
-            at, word, what = line.split()
-            self.seen.append((float(at), word, float(what) if word == "read" else what))
-
-    def again(self):
-        """What comes from now on."""
-        self.seen = []
-        return self
+            words = line.split()
+            if len(words) == 3 and words[1] in ("read", "told"):
+                at, word, what = words
+                self.seen.append((float(at), word, float(what) if word == "read" else what))
 
     def end(self):
         self.process.kill()
         self.process.wait()
+
+
+def asyncua(bins, python, directory, security, port=0):
+    secure = [] if security == "none" else ["--secure", directory / "server"]
+    return Inside([python, ROOT / "tests/python/opcua_rig.py", port, "--stamps", *secure], security)
+
+
+def stamped_lab(bins, python, directory, security, port=0):
+    """Another stand each time, at rest."""
+    arguments = [bins / "mapper-lab-server", ROOT / "campaigns/turbo_a.yaml", "--opcua", f"127.0.0.1:{port}", "--stamps"]
+    arguments += ["--clear"] if security == "none" else []
+    environment = {**os.environ, "MAPPER_STATE_DIR": str(directory / "lab"), "PLC_USER": "lab", "PLC_PASSWORD": "hunter2"}
+    return Inside(arguments, security, environment)
 
 
 def lab(bins, directory, driver, port=0):
@@ -273,30 +281,33 @@ def in_the_clear(bins, python, directory, runs):
 
 
 def inside(bins, python, directory, runs, security):
-    """OPC UA by the stamps of asyncua itself."""
+    """OPC UA by the stamps of the servers themselves, each with another one each time."""
     fewer = max(1, runs // 2)
-    for security in ["none", security]:
-        server = Inside(python, directory, security)
-        name = f"opcua, asyncua, {security} (inside)"
-        row(f"violation to command, {name}", [violation(bins, directory, "opcua", server.again()) for _ in range(runs)], "ms")
-        server.end()
-    values = []
-    for _ in range(fewer):
-        server = Inside(python, directory, security)
-        values.append(killed(bins, directory, "opcua", server))
-        server.end()
-    row(f"kill -9 of the runner to command, {name}", values, "s")
-    values = []
-    for _ in range(fewer):
-        servers = [Inside(python, directory, security)]
+    for start, server in [(asyncua, "asyncua"), (stamped_lab, "lab server")]:
 
-        def start():
-            servers.append(Inside(python, directory, security, servers[0].port))
-            return servers[1]
+        def each(measure, protection, count):
+            values = []
+            for _ in range(count):
+                one = start(bins, python, directory, protection)
+                values.append(measure(one))
+                one.end()
+            return values
 
-        values.append(restarted(bins, directory, "opcua", servers[0], servers[0].end, start))
-        servers[1].end()
-    row(f"server back to samples, {name}", values, "s")
+        for protection in ["none", security]:
+            name = f"opcua, {server}, {protection} (inside)"
+            row(f"violation to command, {name}", each(lambda one: violation(bins, directory, "opcua", one), protection, runs), "ms")
+        row(f"kill -9 of the runner to command, {name}", each(lambda one: killed(bins, directory, "opcua", one), security, fewer), "s")
+        values = []
+        for _ in range(fewer):
+            servers = [start(bins, python, directory, security)]
+
+            def again():
+                servers.append(start(bins, python, directory, security, servers[0].port))
+                return servers[1]
+
+            values.append(restarted(bins, directory, "opcua", servers[0], servers[0].end, again))
+            servers[1].end()
+        row(f"server back to samples, {name}", values, "s")
 
 
 def main():

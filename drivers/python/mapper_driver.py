@@ -1,8 +1,8 @@
 """Drivers for mapper in Python: one file, the standard library alone. docs/protocol.md says what goes over the pipes.
 
 An author writes a class with the methods of Rig and calls serve(). Frames, hello, lease, and the safe trajectory when nobody is there any
-more (lease over, input closed, SIGTERM) are done here. A call that hangs keeps the rig from becoming safe: whatever a rig reads or writes
-needs a deadline of its own. Messages are JSON: their numbers are SI, and None is "no reading".
+more (lease over, input closed, SIGTERM) are done here, over pipes or at a socket. A call that hangs keeps the rig from becoming safe:
+whatever a rig reads or writes needs a deadline of its own. Messages are JSON: their numbers are SI, and None is "no reading".
 """
 
 import hashlib
@@ -10,13 +10,15 @@ import json
 import os
 import queue
 import signal
+import socket
+import stat
 import struct
 import sys
 import threading
 import time
 
 MAGIC = "mapper-backend"
-VERSION = {"major": 1, "minor": 0}
+VERSION = {"major": 1, "minor": 1}
 FRAME_LIMIT_BYTES = 1 << 20
 LEASE_S = 2.0
 STEP_S = 0.1  # between two setpoints on the way into the safe state
@@ -27,6 +29,7 @@ WAITING = 256  # messages for a host that does not read; samples beyond are drop
 KEPT = 64  # places beyond those for answers and remarks alone: a rig is in doubt as long as its answer has not come
 ROWS = 500  # samples in one message
 LATEST_S = 1e9  # run time that a simulated rig is polled for: beyond it the steps of a way down are lost in rounding
+TERMINATE = object()  # among what comes: a signal asks to end
 
 UNITS = {
     "N": "rpm", "m_c": "kg/s", "P1": "Pa", "T1": "K", "P2": "Pa", "T2": "K", "Tc": "K", "m_t": "kg/s", "P3": "Pa", "T3": "K",
@@ -57,6 +60,9 @@ class Rig:
         """New setpoints: mode, p3_pa, t3_k, valve_opening_ratio, oil_temperature_k. What is outside `accepts` never comes here."""
         raise NotImplementedError
 
+    def hold(self):
+        """Stay at the setpoints that were set last: somebody looks. Nothing to do where the rig keeps them by itself."""
+
     def poll(self, until_s):
         """Samples since the last poll, up to until_s: (times, {channel: values}, [(t_s, kind, message)]). In real time it is called at the
         rate of the rig, for the newest sample."""
@@ -84,8 +90,10 @@ def secret(setting):
     if setting is None:
         return None
     name = setting.get("env") if isinstance(setting, dict) else None
-    if not name or name not in os.environ:
-        raise Refused("settings", "write {env: NAME}, the name of an environment variable that is set")
+    if not isinstance(name, str):
+        raise Refused("settings", "write {env: NAME}, the name of an environment variable that holds it")
+    if not os.environ.get(name):
+        raise Refused("settings", f"the environment variable {name} is not set")
     return os.environ[name]
 
 
@@ -180,6 +188,15 @@ class Server:
             check(params, self.about["accepts"])
         self.rig.set(params)
         armed["told"] = params
+        return {}
+
+    def on_hold(self, _, __):
+        armed = self.held()
+        if armed["ended"]:
+            raise Refused("lease_ended", "the lease had ended and the rig was made safe; disarm it and arm it again")
+        if not armed["told"]:
+            raise Refused("out_of_order", "there are no setpoints to hold: none were set since arming or since it was made safe")
+        self.rig.hold()
         return {}
 
     def on_poll(self, params, _):
@@ -350,39 +367,128 @@ def read_frame(stream):
 
 
 def serve(name, version, open_rig):
-    """Serves one host on standard input and output. open_rig(settings) makes the Rig; the file of the driver is mapper-backend-NAME."""
-    news, to_write = queue.Queue(WAITING), queue.Queue(WAITING + KEPT)
-    stdin, stdout = sys.stdin.buffer, sys.stdout.buffer
-    sys.stdout = sys.stderr  # a print() of the author must not get between the frames
+    """Serves one host on standard input and output, or with `--socket PATH` those that come to that socket, one after the other. open_rig(settings)
+    makes the Rig; the file of the driver is mapper-backend-NAME."""
+    news = queue.Queue(WAITING)
+    # What a print() of the author or a library in C writes goes to standard error: it must not get between the frames.
+    frames = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    sys.stdout = sys.stderr
+    for number in (signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        signal.signal(number, lambda *_: threading.Thread(target=news.put, args=(TERMINATE,), daemon=True).start())
+
+    def write(frame):
+        frames.write(frame)
+        frames.flush()
+
+    if len(sys.argv) == 1:
+        serve_one(Server(name, version, open_rig), sys.stdin.buffer, write, news)
+    elif len(sys.argv) == 3 and sys.argv[1] == "--socket":
+        serve_at(sys.argv[2], name, version, open_rig, news)
+    else:
+        sys.exit(f"{os.path.basename(sys.argv[0])} is a driver: `mapper` starts it by itself, without arguments; or --socket PATH, where hosts come to it")
+
+
+def serve_at(path, name, version, open_rig, news):
+    """Serves the hosts that come to a socket, which is its user's alone. Who comes while another is served is told so."""
+    try:
+        listener = listen_at(path)
+    except OSError as error:
+        sys.exit(f"{path}: {error}")
+    busy = threading.Lock()
+
+    def open_the_door():
+        while True:
+            try:
+                host, _ = listener.accept()
+            except OSError:
+                return
+            if busy.acquire(blocking=False):
+                news.put(host)
+            else:
+                turn_away(host)
+
+    threading.Thread(target=open_the_door, daemon=True).start()
+    try:
+        came = None
+        while came is not TERMINATE:
+            came = news.get()
+            if isinstance(came, socket.socket):
+                with came, came.makefile("rb") as stdin:
+                    asked_to_end = serve_one(Server(name, version, open_rig), stdin, came.sendall, news)
+                    hang_up(came)
+                came = TERMINATE if asked_to_end else None
+                busy.release()
+    finally:
+        if os.path.lexists(path):
+            os.unlink(path)
+
+
+def listen_at(path):
+    """A socket that listens at this path. What a driver left there that was killed is taken away."""
+    os.makedirs(os.path.dirname(os.path.abspath(path)), mode=0o700, exist_ok=True)
+    listener = socket.socket(socket.AF_UNIX)
+    if os.path.lexists(path):
+        if not stat.S_ISSOCK(os.lstat(path).st_mode):
+            raise OSError("there is a file that is no socket")
+        with socket.socket(socket.AF_UNIX) as probe:
+            if probe.connect_ex(path) == 0:
+                raise OSError("another driver listens there")
+        os.unlink(path)
+    listener.bind(path)
+    os.chmod(path, 0o600)
+    listener.listen()
+    return listener
+
+
+def hang_up(host):
+    try:
+        host.shutdown(socket.SHUT_RDWR)
+    except OSError:
+        pass  # it is gone already
+
+
+def turn_away(host):
+    """Answers the first request with why there is no more."""
+    try:
+        host.settimeout(1.0)
+        with host, host.makefile("rb") as stdin:
+            identity = json.loads(read_frame(stdin) or b"null")["id"]
+            words = "this driver serves another host, or its rig is still being made safe; wait until that is over"
+            body = json.dumps({"id": identity, "error": {"code": "refused", "message": words}}).encode()
+            host.sendall(struct.pack(">I", len(body)) + body)
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        pass  # whoever it was, he says nothing that could be answered
+
+
+def serve_one(server, stdin, write, news):
+    """Serves this host until it is gone and the rig is safe; write() takes a frame. Whether a signal asked to end meanwhile."""
+    to_write = queue.Queue(WAITING + KEPT)
+    asked_to_end = False
 
     def listen():
-        while True:
-            body = read_frame(stdin)
-            try:
-                message = json.loads(body) if body else None
-            except (ValueError, RecursionError):
-                message = None
-            news.put(message)
-            if message is None:
-                return
+        try:
+            while (body := read_frame(stdin)) and (message := json.loads(body)) is not None:
+                news.put(message)
+        except (OSError, ValueError, RecursionError):
+            pass  # gone, or nobody knows where the next frame begins
+        news.put(None)
 
     def tell():
         try:
-            while True:
-                body = to_write.get()
-                stdout.write(struct.pack(">I", len(body)) + body)
-                stdout.flush()
-        except OSError:
+            while (body := to_write.get()) is not None:
+                write(struct.pack(">I", len(body)) + body)
+        except (OSError, ValueError):
             return
 
     for work in (listen, tell):
         threading.Thread(target=work, daemon=True).start()
-    for number in (signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGTERM)):
-        signal.signal(number, lambda *_: threading.Thread(target=news.put, args=(None,), daemon=True).start())
-    server = Server(name, version, open_rig)
 
     def heed(message):
-        if message is None:
+        nonlocal asked_to_end
+        if message is TERMINATE:
+            asked_to_end = True
+        if message is None or message is TERMINATE:
             server.leave(time.monotonic())
         elif isinstance(message, dict):
             server.take(time.monotonic(), message)
@@ -423,3 +529,8 @@ def serve(name, version, open_rig):
                 server.rig.disarm()
             except Exception:
                 pass  # nobody can be told
+        try:
+            to_write.put_nowait(None)
+        except queue.Full:
+            pass  # who writes ends with the pipe
+    return asked_to_end

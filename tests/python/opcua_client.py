@@ -10,6 +10,7 @@ import json
 import logging
 import pathlib
 import sys
+import time
 
 from asyncua import Client, ua
 from asyncua.crypto.cert_gen import setup_self_signed_certificate
@@ -61,17 +62,25 @@ async def main():
         seen["wrong_type"] = await code_of(node("p3").write_value(ua.DataValue(ua.Variant("much", ua.VariantType.String))))
         for name, value in [("valve", 1.0), ("p3", 180e3), ("t3", 600.0), ("air", True)]:
             seen.setdefault("written", []).append(await write(name, value))
-        ages = []
-        for beat in range(1, 11):
-            await write("heartbeat", beat)
-            await asyncio.sleep(0.3)
-            value = await node("T2").read_data_value()
-            ages.append((datetime.datetime.now(datetime.timezone.utc) - value.SourceTimestamp.replace(tzinfo=datetime.timezone.utc)).total_seconds())
+        for _ in range(3):
+            ages, slowest_s = [], 0.0
+            for beat in range(1, 11):
+                begun = time.monotonic()
+                await write("heartbeat", beat)
+                await asyncio.sleep(0.3)
+                value = await node("T2").read_data_value()
+                ages.append((datetime.datetime.now(datetime.timezone.utc) - value.SourceTimestamp.replace(tzinfo=datetime.timezone.utc)).total_seconds())
+                slowest_s = max(slowest_s, time.monotonic() - begun)
+            if slowest_s < 1.5:
+                break
+            # This computer was too busy to beat twice in 2 s: the stand trips rightly, and it is begun again.
+            await write("acknowledge", True)
+            await write("air", True)
         seen["rpm"] = await node("N").read_value()
         seen["tripped_while_beating"] = await node("tripped").read_value()
         seen["oldest_s"], seen["youngest_s"] = max(ages), min(ages)
         # Nobody beats any more.
-        for _ in range(100):
+        for _ in range(600):
             await asyncio.sleep(0.05)
             if await node("tripped").read_value():
                 break

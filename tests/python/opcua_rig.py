@@ -1,7 +1,7 @@
 """The small rig of drivers/python in real time behind asyncua, an OPC UA server that shares no code with the driver.
 
 Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps] [--sessions N]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
-reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean). As a PLC has to, it cuts the
+reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean); text, flag, table, whole (of other types). As a PLC has to, it cuts the
 air by itself where the heartbeat stands still. Values that no stand could bear are refused with BadOutOfRange.
 
 With --secure it takes signed and encrypted sessions alone, of the user `lab` with the password `hunter2` if nothing else is said; the certificate is made in the directory
@@ -90,8 +90,12 @@ async def make(arguments):
         nodes[name] = await stand.add_variable(ua.NodeId(name, index), name, first, ua.VariantType.Float)
     nodes["air"] = await stand.add_variable(ua.NodeId("air", index), "air", False, ua.VariantType.Boolean)
     nodes["heartbeat"] = await stand.add_variable(ua.NodeId("heartbeat", index), "heartbeat", 0, ua.VariantType.UInt32)
+    # What campaigns name by mistake: a text, a truth value, a table, whole numbers.
+    for name, value, kind in [("text", "12.5", ua.VariantType.String), ("flag", False, ua.VariantType.Boolean),
+                              ("table", [1.0, 2.0], ua.VariantType.Double), ("whole", 1, ua.VariantType.Int16)]:
+        nodes[name] = await stand.add_variable(ua.NodeId(name, index), name, value, kind)
     nodes["tripped"] = await stand.add_variable(ua.NodeId("tripped", index), "tripped", False, ua.VariantType.Boolean)
-    for name in [*SETPOINTS, "air", "heartbeat"]:
+    for name in [*SETPOINTS, "air", "heartbeat", "flag", "whole"]:
         await nodes[name].set_writable()
     refuse_what_is_too_much(server, index)
     if arguments.sessions is not None:

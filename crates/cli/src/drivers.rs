@@ -2,24 +2,13 @@
 
 use mapper_backends::BACKENDS;
 use mapper_core::{Backend, BackendError};
-use mapper_host::{Driver, Places};
+use mapper_host::{Driver, KNOWN, Places};
 use serde_json::Value;
 
-/// Drivers that come with the source and are built by themselves: name, what for, the line that builds it.
-pub const KNOWN: &[(&str, &str, &str)] = &[
-    (
-        "lab",
-        "the virtual lab behind the protocol, to rehearse on",
-        "cargo build --release -p mapper-backend-lab",
-    ),
-    ("modbus", "a PLC that speaks Modbus TCP, docs/rig.md", "cargo build --release -p mapper-backend-modbus"),
-    ("ak", "an instrument, read alone, docs/rig.md", "cargo build --release -p mapper-backend-ak"),
-    ("opcua", "a PLC that speaks OPC UA, docs/rig.md", "cargo build --release -p mapper-backend-opcua"),
-];
-
-/// Where drivers are looked for: beside this program, then on `PATH`.
+/// Where drivers are looked for: those that listen at a socket beside locks and latches, then beside this program, then on `PATH`.
 pub fn places() -> Places {
-    Places::new(std::env::current_exe().ok().as_deref(), std::env::var_os("PATH").as_deref())
+    let sockets = crate::rig_states::directory(None).join("drivers");
+    Places::new(std::env::current_exe().ok().as_deref(), std::env::var_os("PATH").as_deref(), Some(sockets))
 }
 
 /// The driver that a campaign asks for.

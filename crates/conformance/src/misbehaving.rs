@@ -74,6 +74,8 @@ pub struct Misbehaving<B> {
     tripped: bool,
     /// Every safe command that arrived, with the run time of the last poll, s.
     pub safe_at_s: Vec<f64>,
+    /// When it was told to hold, s.
+    pub held_at_s: Vec<f64>,
     /// Every setpoint that arrived, with the same.
     pub told: Vec<(f64, Setpoints)>,
 }
@@ -89,6 +91,7 @@ impl<B: Backend> Misbehaving<B> {
             back: Vec::new(),
             tripped: false,
             safe_at_s: Vec::new(),
+            held_at_s: Vec::new(),
             told: Vec::new(),
         }
     }
@@ -254,6 +257,14 @@ impl<B: Backend> Backend for Misbehaving<B> {
             }
         }
         Ok(batch)
+    }
+
+    fn hold(&mut self) -> Result<(), BackendError> {
+        if self.active().iter().any(|(_, fault)| *fault == Fault::Lost) {
+            return Err(self.lost());
+        }
+        self.held_at_s.push(self.now_s);
+        self.inner.hold()
     }
 
     fn make_safe(&mut self) -> Result<(), BackendError> {

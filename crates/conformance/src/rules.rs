@@ -19,6 +19,7 @@ pub const RULES: &[Rule] = &[
     ("how often it is polled changes nothing but the cut", polling_changes_nothing),
     ("equal seeds, equal calls: equal samples to the bit", repeats_itself),
     ("a setpoint that means nothing is refused by a typed error, and changes nothing", refuses_wild_setpoints),
+    ("told to hold, it keeps the setpoints that it was told", holds),
     ("it may be made safe at any time after arming, and twice", is_made_safe),
     ("a disarmed rig can be armed again, and starts at time 0", starts_anew),
     ("the end of what it has is the loss of the rig, after which it can be made safe", ends_with_its_loss),
@@ -50,8 +51,17 @@ pub fn judge(candidate: &Candidate<'_>) -> Result<Vec<(&'static str, Checked)>, 
     });
     match said {
         Some(why) => Err(NotArmed { name: candidate.name.to_owned(), why }),
-        None => Ok(RULES.iter().map(|(rule, check)| (*rule, check(candidate))).collect()),
+        None => Ok(RULES.iter().map(|(rule, check)| (*rule, settled(candidate, *check))).collect()),
     }
+}
+
+/// How often a rule that a rig in real time breaks is looked at before it is said.
+const LOOKS: usize = 3;
+
+/// A computer that is busy makes a rig in real time late, now and then; a rule that is not kept is broken each time.
+fn settled(candidate: &Candidate<'_>, check: fn(&Candidate<'_>) -> Checked) -> Checked {
+    let looks = if in_real_time(candidate).unwrap_or(false) { LOOKS } else { 1 };
+    (1..looks).find_map(|_| check(candidate).ok()).map_or_else(|| check(candidate), Ok)
 }
 
 macro_rules! ensure {
@@ -117,6 +127,7 @@ fn keeps_the_life_cycle(candidate: &Candidate<'_>) -> Checked {
         // No samples after disarming, in particular.
         out_of_order("poll", rig.poll(2.0))?;
         out_of_order("set", rig.set(&candidate.setpoints))?;
+        out_of_order("hold", rig.hold())?;
         out_of_order("make_safe", rig.make_safe())?;
         out_of_order("disarm", rig.disarm())?;
     }
@@ -248,6 +259,33 @@ fn refuses_wild_setpoints(candidate: &Candidate<'_>) -> Checked {
     let one = fine("poll", rig.poll(2.0))?;
     let same = in_real_time(candidate)? || bits(&one) == bits(&fine("poll", candidate.running()?.poll(2.0))?);
     ensure!(same, "a refused setpoint has changed what it does");
+    Ok(())
+}
+
+/// What it says that it was told stays so, and a simulation goes on as if nobody had said a word.
+fn holds(candidate: &Candidate<'_>) -> Checked {
+    use mapper_core::Channel;
+    const COMMANDS: [Channel; 4] =
+        [Channel::P3Command, Channel::T3Command, Channel::ValveCommand, Channel::TOilCommand];
+    let mut rig = candidate.running()?;
+    let before = fine("poll", rig.poll(1.0))?;
+    fine("hold", rig.hold())?;
+    fine("hold", rig.hold())?;
+    let after = fine("poll", rig.poll(2.0))?;
+    let told = if rig.describe().controls { &COMMANDS[..] } else { &[] };
+    for channel in told.iter().copied() {
+        let Some((before, after)) = before.last(channel).zip(after.last(channel)) else { continue };
+        ensure!(before == after, "{channel} was {before} and is {after}");
+    }
+    if in_real_time(candidate)? {
+        return Ok(());
+    }
+    let mut unheld = candidate.running()?;
+    fine("poll", unheld.poll(1.0))?;
+    ensure!(
+        bits(&fine("poll", unheld.poll(2.0))?) == bits(&after),
+        "to be told to hold has changed what it does"
+    );
     Ok(())
 }
 

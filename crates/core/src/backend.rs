@@ -108,7 +108,7 @@ impl SetpointRanges {
 /// A gas stand, real or simulated. It owns its time; all data are owned.
 ///
 /// Life cycle: [`describe`](Backend::describe), [`arm`](Backend::arm), then any number of
-/// [`set`](Backend::set) and [`poll`](Backend::poll), then [`disarm`](Backend::disarm).
+/// [`set`](Backend::set), [`hold`](Backend::hold) and [`poll`](Backend::poll), then [`disarm`](Backend::disarm).
 /// [`make_safe`](Backend::make_safe) is allowed at any time after arming, also after an error.
 pub trait Backend: Send {
     /// What the rig is and measures.
@@ -133,6 +133,15 @@ pub trait Backend: Send {
     /// [`BackendError::OutOfOrder`] before it is armed and told its setpoints, [`BackendError::Simulation`] and
     /// [`BackendError::Lost`] with the time at which it stopped.
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError>;
+
+    /// Tells the rig to stay at the setpoints that it was told last, because somebody looks before the run goes on. A rig that keeps them by
+    /// itself has nothing to do; one behind a controller writes them once more, which shows whether it still takes them.
+    ///
+    /// # Errors
+    /// As those of [`set`](Backend::set).
+    fn hold(&mut self) -> Result<(), BackendError> {
+        Ok(())
+    }
 
     /// Brings the rig into its safe state: air off, valve open.
     ///

@@ -1,7 +1,7 @@
 //! A driver as a backend.
 
 use crate::error::DriverError;
-use crate::find::{PREFIX, Places, file_name};
+use crate::find::{At, PREFIX, Places, file_name};
 use crate::lease::Lease;
 use crate::link::Link;
 use crate::pending::{Pending, ROUNDING_S};
@@ -10,7 +10,7 @@ use mapper_core::{
     Backend, BackendError, RigDescription, SampleBatch, SetpointRange, SetpointRanges, Setpoints,
 };
 use mapper_protocol::{
-    Configure, Described, Failure, Hello, MAGIC, Message, Poll, Samples, VERSION, Welcome, batch,
+    Code, Configure, Described, Failure, Hello, MAGIC, Message, Poll, Samples, VERSION, Welcome, batch,
     description, rig_error, setpoints_on_the_wire,
 };
 use serde::Serialize;
@@ -53,6 +53,8 @@ pub struct Driver {
     name: String,
     link: Link,
     session: Option<String>,
+    /// An older driver does not know the word: setpoints hold there by themselves.
+    knows_hold: bool,
     description: Option<RigDescription>,
     secrets: Secrets,
     patience: Patience,
@@ -80,10 +82,13 @@ impl Driver {
         hint: &str,
     ) -> Result<Driver, BackendError> {
         let wrong = |error| settings_error(name, String::new(), error);
-        let Some(program) = places.find(name) else {
-            let looked = match places.0.len() {
+        let Some(at) = places.find(name) else {
+            if let Some(program) = places.not_executable(name) {
+                return Err(wrong(DriverError::NotExecutable { program }));
+            }
+            let looked = match places.programs.len() {
                 0 => "any directory, since PATH is empty".to_owned(),
-                _ => places.0.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
+                _ => places.programs.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
             };
             let program = file_name(name).unwrap_or_else(|| format!("{PREFIX}<name>"));
             return Err(wrong(DriverError::NotFound {
@@ -94,9 +99,11 @@ impl Driver {
             }));
         };
         let variable = |name: &str| std::env::var(name).ok();
-        let secrets =
-            Secrets::of(settings, &variable).map_err(|(path, error)| settings_error(name, path, error))?;
-        Driver::start(&program, name, settings, secrets, PATIENCE)
+        // One that was there before has an environment of its own.
+        let needed = matches!(at, At::Program(_));
+        let secrets = Secrets::of(settings, &variable, needed)
+            .map_err(|(path, error)| settings_error(name, path, error))?;
+        Driver::start(&at, name, settings, secrets, PATIENCE)
     }
 
     /// Starts the program of a driver, without secrets.
@@ -109,11 +116,24 @@ impl Driver {
         settings: &Value,
         patience: Patience,
     ) -> Result<Driver, BackendError> {
-        Driver::start(program, name, settings, Secrets::default(), patience)
+        Driver::start(&At::Program(program.to_owned()), name, settings, Secrets::default(), patience)
+    }
+
+    /// Connects to a driver that listens at a socket, without secrets.
+    ///
+    /// # Errors
+    /// As [`Driver::find`].
+    pub fn at_socket(
+        socket: &Path,
+        name: &str,
+        settings: &Value,
+        patience: Patience,
+    ) -> Result<Driver, BackendError> {
+        Driver::start(&At::Socket(socket.to_owned()), name, settings, Secrets::default(), patience)
     }
 
     fn start(
-        program: &Path,
+        at: &At,
         name: &str,
         settings: &Value,
         secrets: Secrets,
@@ -122,8 +142,19 @@ impl Driver {
         let wrong = |error| settings_error(name, String::new(), error);
         let mut driver = Driver {
             name: name.to_owned(),
-            link: Link::start(program).map_err(wrong)?,
+            link: match at {
+                At::Program(program) => Link::start(program),
+                #[cfg(unix)]
+                At::Socket(socket) => Link::connect(socket),
+                #[cfg(not(unix))]
+                At::Socket(socket) => Err(DriverError::Away {
+                    socket: socket.clone(),
+                    source: std::io::ErrorKind::Unsupported.into(),
+                }),
+            }
+            .map_err(wrong)?,
             session: None,
+            knows_hold: false,
             description: None,
             secrets,
             patience,
@@ -170,6 +201,7 @@ impl Driver {
         if theirs.name != self.name {
             return Err(wrong(DriverError::Name(theirs.name)));
         }
+        self.knows_hold = theirs.protocol.minor >= mapper_protocol::HOLD_SINCE_MINOR;
         self.link.limit_frames(theirs.frame_limit_bytes);
         self.session = Some(welcome.session);
         Ok(theirs.version)
@@ -227,8 +259,13 @@ impl Driver {
             };
             match (message.id, message.error, message.result) {
                 (Some(id), Some(failure), _) if id == self.asked => {
-                    let failure = Failure { message: self.secrets.hide(&failure.message), ..failure };
-                    return Err(rig_error(failure, &self.name, call, self.now_s));
+                    let mut message = failure.message;
+                    // What was lost meanwhile says more than that the lease has ended.
+                    if let (Code::LeaseEnded, Some(spoiled)) = (failure.code, &self.spoiled) {
+                        message = format!("{message}; {spoiled}");
+                    }
+                    let failure = Failure { message: self.secrets.hide(&message), ..failure };
+                    return Err(self.refused(failure, call));
                 }
                 (Some(id), None, result) if id == self.asked => return Ok(result.unwrap_or(Value::Null)),
                 // An answer that came too late.
@@ -239,6 +276,17 @@ impl Driver {
                 // A driver that talks without end does not answer either.
                 return Err(BackendError::Deadline { call, limit_s: within.as_secs_f64() });
             }
+        }
+    }
+
+    /// A refusal, as the error of a rig.
+    fn refused(&self, failure: Failure, call: &'static str) -> BackendError {
+        match rig_error(failure, &self.name, call, self.now_s) {
+            // Before it is described there is no rig that could be lost.
+            BackendError::Lost { source, .. } if self.description.is_none() => {
+                BackendError::Settings { backend: self.name.clone(), path: String::new(), source }
+            }
+            error => error,
         }
     }
 
@@ -375,6 +423,14 @@ impl Backend for Driver {
         // Simulated time is the driver's own to the last bit, and nothing is waiting for it.
         let rounding_s = if self.simulated() { 0.0 } else { ROUNDING_S };
         Ok(self.pending.take(until_s, rounding_s, &channels))
+    }
+
+    fn hold(&mut self) -> Result<(), BackendError> {
+        self.need_armed("hold")?;
+        match self.knows_hold {
+            true => self.ask("hold", &json!({}), self.patience.call).map(drop),
+            false => Ok(()),
+        }
     }
 
     fn make_safe(&mut self) -> Result<(), BackendError> {

@@ -21,12 +21,30 @@ pub enum DriverError {
         hint: String,
     },
     /// It cannot be started.
-    #[error("{} cannot be started: {source}", program.display())]
+    #[error("{} cannot be started: {source}{}", program.display(), first_line(source))]
     NotStarted {
         /// The program.
         program: PathBuf,
         /// Why.
         source: std::io::Error,
+    },
+    /// Nobody listens at its socket.
+    #[error(
+        "nobody listens at the socket {}: {source}. Start the driver that belongs to it (`mapper-backend-NAME --socket PATH`), or remove the file: a \
+         driver that is found as a program is started then",
+        socket.display()
+    )]
+    Away {
+        /// The socket.
+        socket: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The program may not be started.
+    #[error("{} is there, but may not be executed; `chmod +x {}`", program.display(), program.display())]
+    NotExecutable {
+        /// The program.
+        program: PathBuf,
     },
     /// It is no driver, or one of another time.
     #[error("it speaks version {}.{} of the protocol; this program speaks {}.{}. Use a driver of the same major version", theirs.major, theirs.minor, ours.major, ours.minor)]
@@ -65,4 +83,17 @@ pub enum DriverError {
     /// A variable that is not set.
     #[error("the environment variable {0} is not set")]
     NotSet(String),
+}
+
+/// What is usual for a script that the system does not start.
+fn first_line(source: &std::io::Error) -> &'static str {
+    /// Of Unix: neither a program nor a script with a first line.
+    const ENOEXEC: i32 = 8;
+    match source.kind() {
+        std::io::ErrorKind::NotFound => ", although it is there: look at the interpreter in its first line",
+        _ if cfg!(unix) && source.raw_os_error() == Some(ENOEXEC) => {
+            ": a script begins with its interpreter, as `#!/usr/bin/env python3`"
+        }
+        _ => "",
+    }
 }

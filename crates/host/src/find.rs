@@ -1,58 +1,89 @@
-//! Where drivers are: beside this program, then in the directories of `PATH`.
+//! Where drivers are: those that listen at a socket, then programs beside this one and in the directories of `PATH`.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// What the file name of a driver begins with; the rest is the name that campaigns write.
 pub const PREFIX: &str = "mapper-backend-";
+/// What the file name of a socket ends with; the rest is the name that campaigns write.
+const SOCKET: &str = ".socket";
 
-/// Directories that drivers are looked for in, first one first.
+/// Where drivers are looked for.
 #[derive(Debug, Clone, Default)]
-pub struct Places(pub Vec<PathBuf>);
+pub struct Places {
+    /// Directories of programs, first one first.
+    pub programs: Vec<PathBuf>,
+    /// The directory of sockets at which drivers listen; those come before programs.
+    pub sockets: Option<PathBuf>,
+}
+
+/// A driver's place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum At {
+    /// A program, which is started for each run.
+    Program(PathBuf),
+    /// A socket, at which one listens that somebody has started.
+    Socket(PathBuf),
+}
 
 /// A driver that is there.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
     /// Name in campaigns.
     pub name: String,
-    /// The program.
-    pub program: PathBuf,
+    /// Where.
+    pub at: At,
 }
 
 impl Places {
-    /// The directory of `program`, and those of a variable like `PATH`.
-    pub fn new(program: Option<&Path>, path: Option<&OsStr>) -> Places {
+    /// The directory of `program`, those of a variable like `PATH`, and a directory of sockets.
+    pub fn new(program: Option<&Path>, path: Option<&OsStr>, sockets: Option<PathBuf>) -> Places {
         let beside = program.and_then(Path::parent).map(Path::to_owned);
         let on_path = path.map(|path| std::env::split_paths(path).collect::<Vec<_>>()).unwrap_or_default();
-        let mut places: Vec<PathBuf> = Vec::new();
+        let mut programs: Vec<PathBuf> = Vec::new();
         // A relative entry, the empty one in particular, would be whatever directory somebody stands in.
         for place in beside.into_iter().chain(on_path).filter(|place| place.is_absolute()) {
-            if !places.contains(&place) {
-                places.push(place);
+            if !programs.contains(&place) {
+                programs.push(place);
             }
         }
-        Places(places)
+        Places { programs, sockets: sockets.filter(|place| place.is_absolute()) }
     }
 
-    /// The program that drives rigs for `backend: NAME`.
-    pub fn find(&self, name: &str) -> Option<PathBuf> {
+    /// What drives rigs for `backend: NAME`.
+    pub fn find(&self, name: &str) -> Option<At> {
         let file = file_name(name)?;
-        self.0.iter().map(|place| place.join(&file)).find(|program| is_program(program))
+        let socket = self.sockets.as_ref().map(|place| place.join(format!("{name}{SOCKET}")));
+        let socket = socket.filter(|socket| is_socket(socket)).map(At::Socket);
+        let program =
+            || self.programs.iter().map(|place| place.join(&file)).find(|program| is_program(program));
+        socket.or_else(|| program().map(At::Program))
+    }
+
+    /// A file that has the name of the program, but may not be started.
+    pub(crate) fn not_executable(&self, name: &str) -> Option<PathBuf> {
+        let file = file_name(name)?;
+        self.programs.iter().map(|place| place.join(&file)).find(|program| program.is_file())
     }
 
     /// All drivers, by name; the one that would be used where there are several.
     pub fn all(&self) -> Vec<Found> {
         let mut found: Vec<Found> = Vec::new();
-        for place in &self.0 {
-            for entry in place.read_dir().into_iter().flatten().flatten() {
-                let file = entry.file_name();
-                let Some(name) = file.to_str().and_then(|file| file.strip_prefix(PREFIX)) else { continue };
-                let name = name.strip_suffix(std::env::consts::EXE_SUFFIX).unwrap_or(name);
-                let there = found.iter().any(|found| found.name == name);
-                if !there && file_name(name).is_some_and(|whole| *whole == *file) && is_program(&entry.path())
-                {
-                    found.push(Found { name: name.to_owned(), program: entry.path() });
-                }
+        let inside = |place: &PathBuf| place.read_dir().into_iter().flatten().flatten();
+        for entry in self.sockets.iter().flat_map(inside) {
+            let file = entry.file_name();
+            let Some(name) = file.to_str().and_then(|file| file.strip_suffix(SOCKET)) else { continue };
+            if file_name(name).is_some() && is_socket(&entry.path()) {
+                found.push(Found { name: name.to_owned(), at: At::Socket(entry.path()) });
+            }
+        }
+        for entry in self.programs.iter().flat_map(inside) {
+            let file = entry.file_name();
+            let Some(name) = file.to_str().and_then(|file| file.strip_prefix(PREFIX)) else { continue };
+            let name = name.strip_suffix(std::env::consts::EXE_SUFFIX).unwrap_or(name);
+            let there = found.iter().any(|found| found.name == name);
+            if !there && file_name(name).is_some_and(|whole| *whole == *file) && is_program(&entry.path()) {
+                found.push(Found { name: name.to_owned(), at: At::Program(entry.path()) });
             }
         }
         found.sort_by(|a, b| a.name.cmp(&b.name));
@@ -73,9 +104,20 @@ fn is_program(path: &Path) -> bool {
     path.metadata().is_ok_and(|file| file.is_file() && file.permissions().mode() & 0o111 != 0)
 }
 
+#[cfg(unix)]
+fn is_socket(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    path.metadata().is_ok_and(|file| file.file_type().is_socket())
+}
+
 #[cfg(not(unix))]
 fn is_program(path: &Path) -> bool {
     path.is_file()
+}
+
+#[cfg(not(unix))]
+fn is_socket(_: &Path) -> bool {
+    false
 }
 
 #[cfg(test)]
@@ -93,7 +135,8 @@ mod tests {
     #[test]
     fn relative_directories_are_not_looked_in() {
         let path = std::env::join_paths(["", "here", "/usr/bin", "/usr/bin"]).unwrap();
-        let places = Places::new(Some(Path::new("/opt/mapper/mapper")), Some(&path));
-        assert_eq!(places.0, [Path::new("/opt/mapper"), Path::new("/usr/bin")]);
+        let places = Places::new(Some(Path::new("/opt/mapper/mapper")), Some(&path), Some("drivers".into()));
+        assert_eq!(places.programs, [Path::new("/opt/mapper"), Path::new("/usr/bin")]);
+        assert_eq!(places.sockets, None);
     }
 }

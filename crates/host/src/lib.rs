@@ -6,6 +6,7 @@
 mod driver;
 mod error;
 mod find;
+mod known;
 mod lease;
 mod link;
 mod pending;
@@ -13,4 +14,5 @@ mod secrets;
 
 pub use driver::{Driver, PATIENCE, Patience};
 pub use error::DriverError;
-pub use find::{Found, PREFIX, Places};
+pub use find::{At, Found, PREFIX, Places};
+pub use known::KNOWN;

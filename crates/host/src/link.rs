@@ -1,12 +1,12 @@
-//! The pipes to a driver. Two threads read and write, so that nobody waits for longer than he said.
+//! The pipes or the socket to a driver. Two threads read and write, so that nobody waits for longer than he said.
 
 use crate::error::DriverError;
 use mapper_protocol::{
     Encoding, FRAME_LIMIT_BYTES, FrameError, Message, decode, encode, read_frame, write_frame,
 };
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::Path;
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex};
@@ -42,9 +42,18 @@ impl Outlet {
     }
 }
 
-/// A driver and its pipes.
+/// Who is at the other end.
+enum Peer {
+    /// A program that was started for this run, and ends with it.
+    Program(Child),
+    /// One that was there before.
+    #[cfg(unix)]
+    Socket(std::os::unix::net::UnixStream),
+}
+
+/// A driver, and the way to it.
 pub(crate) struct Link {
-    child: Child,
+    peer: Peer,
     outlet: Option<Outlet>,
     inlet: Receiver<Came>,
     frame_limit: Arc<AtomicU32>,
@@ -68,6 +77,25 @@ impl Link {
         else {
             return Err(not_started(std::io::Error::other("it has no pipes")));
         };
+        Link::over(stdin, stdout, Some(stderr), Peer::Program(child)).map_err(not_started)
+    }
+
+    /// Connects to a driver that listens at this socket.
+    #[cfg(unix)]
+    pub(crate) fn connect(socket: &Path) -> Result<Link, DriverError> {
+        let away = |source| DriverError::Away { socket: socket.to_owned(), source };
+        let stream = std::os::unix::net::UnixStream::connect(socket).map_err(away)?;
+        let both = || stream.try_clone().map_err(away);
+        let (input, output) = (HalfClosing(both()?), both()?);
+        Link::over(input, output, None::<std::io::Empty>, Peer::Socket(stream)).map_err(away)
+    }
+
+    fn over(
+        input: impl Write + Send + 'static,
+        output: impl Read + Send + 'static,
+        words_of: Option<impl Read + Send + 'static>,
+        peer: Peer,
+    ) -> std::io::Result<Link> {
         let frame_limit = Arc::new(AtomicU32::new(mapper_protocol::FIRST_FRAME_LIMIT_BYTES));
         let (send, to_write) = sync_channel(WAITING);
         let (tell, inlet) = sync_channel(WAITING);
@@ -78,21 +106,22 @@ impl Link {
         // None of them is waited for: each ends with its pipe.
         std::thread::Builder::new()
             .name("to driver".to_owned())
-            .spawn(move || write_all(stdin, &to_write, &limit))
+            .spawn(move || write_all(input, &to_write, &limit))
             .and_then(|_| {
                 std::thread::Builder::new()
                     .name("from driver".to_owned())
-                    .spawn(move || read_all(stdout, &tell, &its))
+                    .spawn(move || read_all(output, &tell, &its))
             })
             .and_then(|_| {
                 std::thread::Builder::new().name("driver's words".to_owned()).spawn(move || {
-                    listen(stderr, &words);
+                    if let Some(said) = words_of {
+                        listen(said, &words);
+                    }
                     drop(listens);
                 })
-            })
-            .map_err(not_started)?;
+            })?;
         Ok(Link {
-            child,
+            peer,
             outlet: Some(Outlet { to_write: send, packed }),
             inlet,
             frame_limit,
@@ -130,8 +159,8 @@ impl Link {
         line.map_or_else(String::new, |line| format!("; its last words: {line}"))
     }
 
-    /// Closes the driver's input, which ends it. One that holds a rig is left to its own: it flies its safe trajectory. Any other has
-    /// so much time, and is killed then.
+    /// Closes the driver's input, which ends it, or its session where it listens at a socket. One that holds a rig is left to its own: it
+    /// flies its safe trajectory. Any other has so much time, and is killed or hung up on then.
     pub(crate) fn close(&mut self, holds_a_rig: bool, within: Duration) {
         self.outlet = None;
         let end = Instant::now() + within;
@@ -141,15 +170,48 @@ impl Link {
                 break;
             }
         }
-        if !holds_a_rig && !matches!(self.child.try_wait(), Ok(Some(_))) {
-            // Where it has closed its output it is about to end; killing it then harms nobody.
-            let _ = self.child.kill();
-            let _ = self.child.wait();
+        match &mut self.peer {
+            Peer::Program(child) => {
+                if !holds_a_rig && !matches!(child.try_wait(), Ok(Some(_))) {
+                    // Where it has closed its output it is about to end; killing it then harms nobody.
+                    let _ = child.kill();
+                    let _ = child.wait();
+                }
+            }
+            #[cfg(unix)]
+            Peer::Socket(stream) => {
+                use std::net::Shutdown::{Both, Write};
+                // It may have gone already.
+                let _ = stream.shutdown(if holds_a_rig { Write } else { Both });
+            }
         }
     }
 }
 
-fn write_all(mut stdin: ChildStdin, to_write: &Receiver<Vec<u8>>, limit: &AtomicU32) {
+/// The writing half of a socket: it ends with its writer, as a pipe does, whoever has the reading half.
+#[cfg(unix)]
+struct HalfClosing(std::os::unix::net::UnixStream);
+
+#[cfg(unix)]
+impl Write for HalfClosing {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.flush()
+    }
+}
+
+#[cfg(unix)]
+impl Drop for HalfClosing {
+    fn drop(&mut self) {
+        // Where the other side has gone there is nothing to close.
+        let _ = self.0.shutdown(std::net::Shutdown::Write);
+    }
+}
+
+fn write_all(mut stdin: impl Write, to_write: &Receiver<Vec<u8>>, limit: &AtomicU32) {
     for body in to_write {
         if write_frame(&mut stdin, &body, limit.load(Ordering::Relaxed)).is_err() {
             break;
@@ -157,7 +219,7 @@ fn write_all(mut stdin: ChildStdin, to_write: &Receiver<Vec<u8>>, limit: &Atomic
     }
 }
 
-fn read_all(mut stdout: ChildStdout, tell: &SyncSender<Came>, packed: &AtomicBool) {
+fn read_all(mut stdout: impl Read, tell: &SyncSender<Came>, packed: &AtomicBool) {
     loop {
         let came = match read_frame(&mut stdout, FRAME_LIMIT_BYTES) {
             Ok(Some(body)) => {

@@ -17,7 +17,7 @@ const DEEPEST: usize = 64;
 pub(crate) struct Secrets(Vec<String>);
 
 impl Secrets {
-    /// What `settings` name; `variable` gives the value of an environment variable.
+    /// What `settings` name; `variable` gives the value of an environment variable. `needed`: each has to be there.
     ///
     /// # Errors
     /// The key path and [`DriverError::Secret`] where a secret stands in the settings, [`DriverError::NotSet`] for an absent
@@ -25,9 +25,10 @@ impl Secrets {
     pub(crate) fn of(
         settings: &Value,
         variable: &dyn Fn(&str) -> Option<String>,
+        needed: bool,
     ) -> Result<Secrets, (String, DriverError)> {
         let mut secrets = Secrets::default();
-        secrets.look(settings, &mut Vec::new(), variable)?;
+        secrets.look(settings, &mut Vec::new(), variable, needed)?;
         // The longest first: one that begins another must not leave that one's end.
         secrets.0.sort_by_key(|secret| std::cmp::Reverse(secret.len()));
         Ok(secrets)
@@ -38,11 +39,13 @@ impl Secrets {
         value: &Value,
         path: &mut Vec<String>,
         variable: &dyn Fn(&str) -> Option<String>,
+        needed: bool,
     ) -> Result<(), (String, DriverError)> {
         if let Some(name) = environment(value) {
             match variable(name) {
                 Some(secret) if !secret.is_empty() => self.0.push(secret),
-                _ => return Err((path.join("."), DriverError::NotSet(name.to_owned()))),
+                _ if needed => return Err((path.join("."), DriverError::NotSet(name.to_owned()))),
+                _ => {}
             }
             return Ok(());
         }
@@ -60,7 +63,7 @@ impl Secrets {
         };
         for (key, value) in inside {
             path.push(key);
-            self.look(value, path, variable)?;
+            self.look(value, path, variable, needed)?;
             path.pop();
         }
         Ok(())
@@ -105,14 +108,14 @@ mod tests {
     #[test]
     fn secrets_come_from_the_environment_alone_and_are_hidden() {
         let variable = |name: &str| (name == "PLC").then(|| "hunter2".to_owned());
-        let read = |settings: Value| Secrets::of(&settings, &variable);
+        let read = |settings: Value| Secrets::of(&settings, &variable, true);
         let secrets = read(json!({"user": "lab", "security": {"password": {"env": "PLC"}}})).ok().unwrap();
         assert_eq!(secrets.hide("login of lab with hunter2 failed"), "login of lab with [secret] failed");
         let two = |name: &str| Some(if name == "A" { "hunter" } else { "hunter2" }.to_owned());
-        let secrets = Secrets::of(&json!([{"env": "A"}, {"env": "B"}]), &two).ok().unwrap();
+        let secrets = Secrets::of(&json!([{"env": "A"}, {"env": "B"}]), &two, true).ok().unwrap();
         assert_eq!(secrets.hide("hunter2, hunter"), "[secret], [secret]");
         let short = |_: &str| Some("me".to_owned());
-        let secrets = Secrets::of(&json!({"env": "A"}), &short).ok().unwrap();
+        let secrets = Secrets::of(&json!({"env": "A"}), &short, true).ok().unwrap();
         assert_eq!(
             secrets.hide("message for me: (me) meets me"),
             "message for [secret]: ([secret]) meets [secret]"
@@ -123,5 +126,9 @@ mod tests {
         let (path, error) = read(json!({"token": {"env": "NOT_THERE"}})).err().unwrap();
         assert_eq!((path.as_str(), error.to_string().contains("NOT_THERE")), ("token", true));
         assert!(read(json!({"password": null, "host": "x"})).is_ok());
+        // Of a driver that has an environment of its own what is known here is hidden, and what is not is its own matter.
+        let both = json!([{"env": "PLC"}, {"env": "NOT_THERE"}]);
+        let secrets = Secrets::of(&both, &variable, false).ok().unwrap();
+        assert_eq!(secrets.hide("with hunter2"), "with [secret]");
     }
 }

@@ -55,11 +55,11 @@ fn running(fault: &str) -> Driver {
 fn what_is_no_driver_is_refused_before_there_is_a_rig() {
     for (fault, words) in [
         ("mute", "did not answer `hello` within 0.3 s"),
-        ("garbage", "a frame of"),
+        ("garbage", "text that begins with `Welc` where frames belong"),
         ("too_large", "2147483647 bytes; at most 1048576"),
         ("half_a_frame", "the stream ended after 1 of 256 bytes"),
         ("dies_at_once", "no licence for this rig"),
-        ("wrong_version", "version 2.99 of the protocol; this program speaks 1.0"),
+        ("wrong_version", "version 2.99 of the protocol; this program speaks 1.1"),
         ("wrong_magic", "begins with another word"),
         ("wrong_name", "calls itself `another`"),
         ("unknown_channel", "no channel is called `T99`"),
@@ -118,10 +118,31 @@ fn answers_that_nobody_waits_for_are_thrown_away_and_a_refusal_is_told() {
     assert!(error.contains("the valve does not answer"), "{error}");
 }
 
+/// A file that has the name and cannot be started: said as that, with what to do, and not that there is none.
+#[test]
+fn a_file_that_cannot_be_started_is_told_with_what_is_wrong_with_it() {
+    use std::os::unix::fs::PermissionsExt;
+    let directory = std::env::temp_dir().join(format!("mapper-host-files-{}", std::process::id()));
+    std::fs::create_dir_all(&directory).unwrap();
+    let places = Places { programs: vec![directory.clone()], sockets: None };
+    for (name, text, mode, words) in [
+        ("locked", "#!/bin/sh\n", 0o644, "is there, but may not be executed; `chmod +x "),
+        ("bare", "import sys\n", 0o755, "a script begins with its interpreter"),
+        ("elsewhere", "#!/no/such/interpreter\n", 0o755, "look at the interpreter in its first line"),
+    ] {
+        let file = directory.join(format!("mapper-backend-{name}"));
+        std::fs::write(&file, text).unwrap();
+        std::fs::set_permissions(&file, std::fs::Permissions::from_mode(mode)).unwrap();
+        let said = Driver::find(&places, name, &Value::Null, "", "").err().unwrap().to_string();
+        assert!(said.contains(words) && said.contains(file.to_str().unwrap()), "{name}: {said}");
+    }
+    std::fs::remove_dir_all(&directory).unwrap();
+}
+
 /// Told where was looked and what to do, and a name from a campaign reaches no other directory.
 #[test]
 fn a_driver_that_is_not_there_is_told_with_where_was_looked() {
-    let places = Places(vec!["/nowhere/at/all".into()]);
+    let places = Places { programs: vec!["/nowhere/at/all".into()], sockets: None };
     for name in ["opcuaa", "../../bin/sh"] {
         let error = Driver::find(&places, name, &Value::Null, "virtual_lab, replay", "").err().unwrap();
         let words = error.to_string();

@@ -35,6 +35,14 @@ pub enum FrameError {
         /// What may be sent, bytes.
         limit: u32,
     },
+    /// It is text.
+    #[error(
+        "text that begins with `{begins}` where frames belong: standard output is for frames alone, and words for people go to standard error"
+    )]
+    Text {
+        /// Its first letters.
+        begins: String,
+    },
     /// It is empty.
     #[error("an empty frame")]
     Empty,
@@ -68,6 +76,13 @@ pub fn read_frame(stream: &mut impl Read, limit_bytes: u32) -> Result<Option<Vec
     let bytes = u32::from_be_bytes(length);
     match bytes {
         0 => return Err(FrameError::Empty),
+        // Letters would be a length of half a gigabyte and more.
+        _ if bytes > limit_bytes
+            && length.iter().all(|byte| matches!(byte, b' '..=b'~' | b'\n' | b'\r' | b'\t')) =>
+        {
+            let begins = String::from_utf8_lossy(&length).escape_debug().to_string();
+            return Err(FrameError::Text { begins });
+        }
         _ if bytes > limit_bytes => {
             return Err(FrameError::TooLarge { bytes: bytes.into(), limit: limit_bytes });
         }
@@ -180,6 +195,8 @@ mod tests {
         assert!(matches!(read_frame(&mut &[0u8, 0][..], 100), Err(FrameError::Cut { got: 2, wanted: 4 })));
         assert!(read_frame(&mut &[][..], 100).unwrap().is_none());
         assert!(write_frame(&mut Vec::new(), &[b'{'; 101], 100).is_err());
+        let text = read_frame(&mut &b"\nWelcome!"[..], 1 << 20).unwrap_err().to_string();
+        assert!(text.contains("begins with `\\nWel`") && text.contains("standard error"), "{text}");
     }
 
     proptest! {

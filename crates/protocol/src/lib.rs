@@ -23,7 +23,9 @@ pub use schema::schema;
 /// First word of both sides.
 pub const MAGIC: &str = "mapper-backend";
 /// Version of the protocol spoken here. Another major number is refused; a higher minor one has fields that are ignored.
-pub const VERSION: Version = Version { major: 1, minor: 0 };
+pub const VERSION: Version = Version { major: 1, minor: 1 };
+/// From this minor version on a driver knows `hold`.
+pub const HOLD_SINCE_MINOR: u32 = 1;
 /// Largest frame that this side takes, bytes.
 pub const FRAME_LIMIT_BYTES: u32 = 1 << 20;
 /// Largest frame that anybody may send before he was told a limit, bytes.

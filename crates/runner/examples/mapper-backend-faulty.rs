@@ -9,6 +9,10 @@ use mapper_core::{Backend, BackendError};
 
 fn main() -> std::process::ExitCode {
     mapper_driver::serve("faulty", env!("CARGO_PKG_VERSION"), |settings| {
+        #[allow(clippy::print_stdout, reason = "what an author prints must not get between the frames")]
+        {
+            println!("faulty: {settings}");
+        }
         let place = settings.as_u64().and_then(|place| usize::try_from(place).ok());
         let row = place.and_then(|place| behind::OVER_THE_PROTOCOL.get(place));
         let Some((begin_s, fault, _)) = row else {

@@ -11,6 +11,7 @@ enum Call {
     Arm,
     Set(Setpoints),
     Poll(f64),
+    Hold,
     MakeSafe,
     Disarm,
 }
@@ -60,6 +61,7 @@ impl Deadlined {
                         Call::Arm => backend.arm().map(|()| None),
                         Call::Set(setpoints) => backend.set(&setpoints).map(|()| None),
                         Call::Poll(until_s) => backend.poll(until_s).map(Some),
+                        Call::Hold => backend.hold().map(|()| None),
                         Call::MakeSafe => backend.make_safe().map(|()| None),
                         Call::Disarm => backend.disarm().map(|()| None),
                     }));
@@ -118,6 +120,10 @@ impl Backend for Deadlined {
         self.call("poll", Call::Poll(until_s)).map(Option::unwrap_or_default)
     }
 
+    fn hold(&mut self) -> Result<(), BackendError> {
+        self.call("hold", Call::Hold).map(drop)
+    }
+
     fn make_safe(&mut self) -> Result<(), BackendError> {
         self.call("make_safe", Call::MakeSafe).map(drop)
     }
@@ -173,8 +179,8 @@ mod tests {
     #[test]
     fn a_rig_that_hangs_is_given_up_and_late_answers_are_not_mixed_up() {
         let (go, going) = channel();
-        // Half a second, for a machine that is busy with other tests.
-        let [arming, call] = [Duration::from_secs(10), Duration::from_millis(500)];
+        // A second, for a machine that is busy with other tests.
+        let [arming, call] = [Duration::from_secs(10), Duration::from_secs(1)];
         let mut rig = Deadlined::new(Box::new(Hangs(Mutex::new(going))), Deadlines { arming, call }).unwrap();
         rig.arm().unwrap();
         go.send(()).unwrap();

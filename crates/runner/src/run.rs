@@ -357,7 +357,7 @@ impl Run<'_, '_> {
     /// Lets the rig run to `until_s` under the eyes of guards, observer and source. In a step the source may end it early,
     /// and a guard may hold or cut it; outside of steps what would cut one ends the run.
     fn watch(&mut self, mut until_s: f64, in_step: bool, hold_speed: bool) -> Result<(), Halt> {
-        let (mut held_s, mut operator_held_s) = (0.0, 0.0);
+        let (mut held_s, mut operator_held_s, mut told_to_hold) = (0.0, 0.0, false);
         while self.now_s < until_s {
             self.look_for_a_stop(in_step, until_s)?;
             let before_s = self.now_s;
@@ -377,8 +377,9 @@ impl Run<'_, '_> {
                 }
             }
             self.pass_asked()?;
-            if self.protection.operator.is_some_and(Operator::holds) && operator_held_s < OPERATOR_HOLD_MAX_S
-            {
+            let operator_holds = self.protection.operator.is_some_and(Operator::holds)
+                && operator_held_s < OPERATOR_HOLD_MAX_S;
+            if operator_holds {
                 let more_s = self.now_s - before_s;
                 (operator_held_s, until_s) = (operator_held_s + more_s, until_s + more_s);
             }
@@ -386,6 +387,11 @@ impl Run<'_, '_> {
             let ends = self.with.steps.on_batch(&batch);
             let holding = trips.iter().any(|trip| trip.reaction == Reaction::Hold)
                 || (held_s > 0.0 && Bench::new(&mut self.with.guards).is_violated());
+            // Once, when it begins: the rig says whether it still takes what it was told.
+            if (holding || operator_holds) && !told_to_hold {
+                self.with.backend.hold()?;
+            }
+            told_to_hold = holding || operator_holds;
             if holding {
                 let last_s =
                     batch.t_s.first().zip(batch.t_s.last()).map_or(0.0, |(first, last)| last - first);

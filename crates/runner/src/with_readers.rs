@@ -236,6 +236,10 @@ impl Backend for WithReaders {
         Ok(whole)
     }
 
+    fn hold(&mut self) -> Result<(), BackendError> {
+        self.rig.hold()
+    }
+
     fn make_safe(&mut self) -> Result<(), BackendError> {
         self.rig.make_safe()
     }

@@ -177,7 +177,8 @@ fn nobody_waits_for_a_reader_in_real_time() {
     let lab = VirtualLab::new(LabSettings::ideal(Model::nominal(), BoundaryConditions::default()));
     let hangs = Hangs(held, Beside { simulated_time: false, ..beside(10.0) });
     let reader = Reader { name: "cell".to_owned(), backend: Box::new(hangs), channels: vec![Channel::TAmb] };
-    let mut rig = WithReaders::new(Box::new(lab), vec![reader], Duration::from_millis(200)).unwrap();
+    // To connect, on a machine that is busy with other tests; letting go waits for it twice.
+    let mut rig = WithReaders::new(Box::new(lab), vec![reader], Duration::from_secs(1)).unwrap();
     assert!(!rig.describe().simulated_time);
     rig.arm().unwrap();
     rig.set(&Setpoints {

@@ -166,6 +166,10 @@ impl Backend for Instrument {
         })
     }
 
+    fn hold(&mut self) -> Result<(), BackendError> {
+        self.armed("hold").map(drop)
+    }
+
     fn make_safe(&mut self) -> Result<(), BackendError> {
         self.armed("make_safe").map(drop)
     }

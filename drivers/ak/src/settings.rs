@@ -62,6 +62,12 @@ pub(crate) enum SettingError {
     Form(serde_json::Error),
     #[error("{value} {unit} is outside {low} to {high} {unit}")]
     Outside { value: f64, unit: &'static str, low: f64, high: f64 },
+    #[error("a scale of {0} loses the value; it is between 1e-12 and 1e12, or between -1e12 and -1e-12")]
+    Scale(f64),
+    #[error(
+        "this number of the answer is read as {0} already; one of the two is not there. Give it its own, or leave it out"
+    )]
+    ReadTwice(Channel),
     #[error(transparent)]
     Code(#[from] TelegramError),
     #[error("{0} would control or set the instrument; it is only read, by codes that begin with A")]
@@ -95,13 +101,19 @@ impl Settings {
         let mut questions = Questions::new();
         for (channel, place) in &settings.read {
             let path = format!("read.{channel}");
-            within(&format!("{path}.scale"), place.scale.abs(), "", 1e-12, 1e12)?;
+            if !(1e-12..=1e12).contains(&place.scale.abs()) {
+                return Err(wrong(format!("{path}.scale"), SettingError::Scale(place.scale)));
+            }
             within(&format!("{path}.value"), place.value as f64, "", 1.0, 1000.0)?;
             let code: Code = place.code.parse().map_err(|error: TelegramError| wrong(&path, error.into()))?;
             if !code.asks() {
                 return Err(wrong(path, SettingError::Controls(code)));
             }
-            questions.entry((code, place.channel)).or_default().push((*channel, place.clone()));
+            let asked = questions.entry((code, place.channel)).or_default();
+            if let Some((other, _)) = asked.iter().find(|(_, other)| other.value == place.value) {
+                return Err(wrong(path, SettingError::ReadTwice(*other)));
+            }
+            asked.push((*channel, place.clone()));
         }
         let rate_hz = settings.rate_hz();
         match questions.len() {

@@ -36,7 +36,8 @@ fn instrument(answers: &'static [&'static [&'static [u8]]]) -> String {
 
 fn driver(address: &str, code: &str) -> Result<Driver, mapper_core::BackendError> {
     let settings = json!({
-        "address": address, "rate": "5 Hz", "timeout": "100 ms",
+        // Only the torn answer is waited for to its end: longer, so that a busy machine loses no other.
+        "address": address, "rate": "5 Hz", "timeout": "800 ms",
         "read": {"m_c": {"code": code, "value": 1, "scale": 0.001}, "T1": {"code": code, "value": 2, "offset": 273.15}},
     });
     Driver::of_program(env!("CARGO_BIN_EXE_mapper-backend-ak").as_ref(), "ak", &settings, PATIENCE)

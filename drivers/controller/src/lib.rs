@@ -10,7 +10,7 @@ mod limits;
 mod rig;
 
 pub use absurd::{can_be_read, short};
-pub use limits::{Accepts, LimitError, NEEDS, Safe, Target, within};
+pub use limits::{Accepts, LimitError, NEEDS, Safe, Target, fine_enough, scale, within};
 pub use rig::{Reading, Stand, rig};
 
 use mapper_core::Channel;

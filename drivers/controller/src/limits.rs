@@ -123,9 +123,52 @@ pub enum LimitError {
         /// Highest.
         high: f64,
     },
+    /// A scale that loses the value.
+    #[error("a scale of {0} loses the value; it is between 1e-12 and 1e12, or between -1e12 and -1e-12")]
+    Scale(f64),
+    /// A setpoint that goes in coarse steps.
+    #[error(
+        "holds whole numbers, so that it goes in steps of {step} from {low} to {high} (SI): what lies between would be rounded without a word. Use a \
+         type with a fraction there, or a finer `scale`"
+    )]
+    Coarse {
+        /// From one whole number to the next, SI.
+        step: f64,
+        /// Lowest setpoint, SI.
+        low: f64,
+        /// Highest setpoint, SI.
+        high: f64,
+    },
     /// A channel that a guard looks at is not there.
     #[error("the rig has to measure {0}: a guard needs it")]
     NotMeasured(Channel),
+}
+
+/// Largest step of a setpoint, of its range: 0.12 of a valve of 0.1 to 2.5, 15 kPa of 300 kPa.
+const COARSE_RATIO: f64 = 0.05;
+
+/// The scale, where it keeps a value.
+///
+/// # Errors
+/// [`LimitError::Scale`], also for 0 and NaN.
+pub fn scale(scale: f64) -> Result<f64, LimitError> {
+    match (1e-12..=1e12).contains(&scale.abs()) {
+        true => Ok(scale),
+        false => Err(LimitError::Scale(scale)),
+    }
+}
+
+/// Whether a setpoint that is written as a whole number goes in steps that are fine enough; `step`: from one to the next, SI.
+///
+/// # Errors
+/// [`LimitError::Coarse`].
+pub fn fine_enough(target: Target, step: f64, range: SetpointRange) -> Result<(), LimitError> {
+    let SetpointRange { low, high } = range;
+    match target {
+        Target::Air | Target::Heartbeat => Ok(()),
+        _ if step.abs() <= COARSE_RATIO * (high - low) => Ok(()),
+        _ => Err(LimitError::Coarse { step: step.abs(), low, high }),
+    }
 }
 
 /// The value, where it lies within bounds.

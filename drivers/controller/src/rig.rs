@@ -94,6 +94,8 @@ struct Rig<C> {
 
 struct Armed {
     told: Option<Setpoints>,
+    /// It was told to become safe since.
+    safe: bool,
     sequence: u64,
     last_s: f64,
     heartbeat: u16,
@@ -204,7 +206,8 @@ impl<C: Controller> Backend for Rig<C> {
             self.controller.close();
             return Err(self.lost(error));
         }
-        self.armed = Some(Armed { told: None, sequence: 0, last_s: -1.0, heartbeat: 0, beaten_s: 0.0 });
+        self.armed =
+            Some(Armed { told: None, safe: false, sequence: 0, last_s: -1.0, heartbeat: 0, beaten_s: 0.0 });
         Ok(())
     }
 
@@ -225,7 +228,8 @@ impl<C: Controller> Backend for Rig<C> {
         let on = on.then_some((Target::Air, 1.0));
         let values: Vec<_> = off.into_iter().chain(values).chain(on).collect();
         self.write(&values)?;
-        self.armed("set")?.told = Some(*setpoints);
+        let armed = self.armed("set")?;
+        (armed.told, armed.safe) = (Some(*setpoints), false);
         Ok(())
     }
 
@@ -258,8 +262,19 @@ impl<C: Controller> Backend for Rig<C> {
         })
     }
 
+    fn hold(&mut self) -> Result<(), BackendError> {
+        let armed = self.armed("hold")?;
+        match armed.told.filter(|_| !armed.safe) {
+            Some(told) => self.set(&told),
+            // What was told before it was made safe would bring the air back.
+            None => Ok(()),
+        }
+    }
+
     fn make_safe(&mut self) -> Result<(), BackendError> {
-        let open = self.armed("make_safe")?.told.map_or(0.0, |told| told.valve_opening_ratio);
+        let armed = self.armed("make_safe")?;
+        armed.safe = true;
+        let open = armed.told.map_or(0.0, |told| told.valve_opening_ratio);
         let highest = self.stand.accepts.range(Target::Valve).high;
         let valve = open.max(self.stand.safe.opening).min(highest);
         // The heater last: a controller that refuses it has opened its valve.

@@ -1,5 +1,5 @@
 //! What every driver needs: an author writes a [`Backend`] and calls [`About::serve`], or [`serve`] where nobody starts it by hand; frames, hello, lease and the
-//! safe trajectory when nobody is there any more are done here. docs/protocol.md says what goes over the pipes.
+//! safe trajectory when nobody is there any more are done here, over pipes or at a socket. docs/protocol.md says what goes over them.
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
@@ -28,17 +28,23 @@ mod pipes;
 mod refusal;
 mod secret;
 mod server;
+mod serving;
+#[cfg(unix)]
+mod socket;
 mod words;
 
 pub use address::address;
 pub use by_channel::by_channel;
 pub use pipes::serve;
 pub use secret::{SecretError, secret};
-pub use words::About;
+#[cfg(unix)]
+pub use socket::serve_at;
+pub use words::{About, SOCKET};
 
 use mapper_core::{Backend, BackendError};
 
 /// Makes the rig from the driver's settings in the campaign, `null` where there are none. The rig is not touched yet.
-pub trait Open: FnOnce(&serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {}
+/// A driver at a socket makes one for each host that comes.
+pub trait Open: Fn(&serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {}
 
-impl<F: FnOnce(&serde_json::Value) -> Result<Box<dyn Backend>, BackendError>> Open for F {}
+impl<F: Fn(&serde_json::Value) -> Result<Box<dyn Backend>, BackendError>> Open for F {}

@@ -1,115 +1,36 @@
-//! Standard input and output, signals, and the clock.
+//! Standard input and output.
 
 use crate::Open;
 use crate::outlet::Outlet;
 use crate::server::Server;
-use mapper_protocol::{FRAME_LIMIT_BYTES, Message, decode, read_frame};
-use std::io::Read;
+use crate::serving::{WAITING, heed_signals, listen, serve_one, session};
+use std::io::Write;
 use std::process::ExitCode;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::time::{Duration, Instant};
-
-/// Messages of the host that wait for a rig that is busy; more wait in its pipe.
-const WAITING: usize = 256;
-/// Longest wait, s.
-const LONGEST_S: f64 = 3600.0;
-
-/// What happens to a driver.
-enum Came {
-    Message(Box<Message>),
-    /// The host is gone, or talks what nobody understands.
-    Closed,
-    /// A signal asks it to end.
-    Terminate,
-}
+use std::sync::mpsc::sync_channel;
 
 /// Serves one host on standard input and output, until it is gone and the rig is safe. `name`: the file name of the program is
 /// `mapper-backend-NAME`.
 pub fn serve(name: &'static str, version: &'static str, open: impl Open + 'static) -> ExitCode {
-    let begun = Instant::now();
-    let now_s = || begun.elapsed().as_secs_f64();
     let (tell, news) = sync_channel(WAITING);
     if listen(std::io::stdin(), tell.clone()).and_then(|()| heed_signals(tell)).is_err() {
         return ExitCode::FAILURE;
     }
-    let Ok(outlet) = Outlet::into_pipe(std::io::stdout()) else { return ExitCode::FAILURE };
-    let mut server = Server::new(name, version, session(), Box::new(open));
-    while !server.is_over() {
-        // What has come while the rig was busy has come in time.
-        while let Ok(came) = news.try_recv() {
-            heed(&mut server, came, now_s());
-        }
-        let next_s = server.tick(now_s());
-        send(&mut server, &outlet);
-        if server.is_over() {
-            break;
-        }
-        if let Some(came) = wait(&news, next_s) {
-            heed(&mut server, came, now_s());
-        }
-        send(&mut server, &outlet);
-    }
+    let Ok(outlet) = frames().and_then(Outlet::into_pipe) else { return ExitCode::FAILURE };
+    serve_one(Server::new(name, version, session(), Box::new(open)), &news, &outlet);
     ExitCode::SUCCESS
 }
 
-fn heed(server: &mut Server, came: Came, now_s: f64) {
-    match came {
-        Came::Message(message) => server.take(now_s, *message),
-        Came::Closed | Came::Terminate => server.leave(now_s),
-    }
-}
-
-/// A name that no other session of this driver has: its process and when it began.
-fn session() -> String {
-    let since = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
-    format!("{}-{}", std::process::id(), since.as_nanos())
-}
-
-fn wait(news: &Receiver<Came>, next_s: Option<f64>) -> Option<Came> {
-    let within = Duration::from_secs_f64(next_s.unwrap_or(LONGEST_S).clamp(0.0, LONGEST_S));
-    match news.recv_timeout(within) {
-        Ok(came) => Some(came),
-        Err(RecvTimeoutError::Timeout) => None,
-        Err(RecvTimeoutError::Disconnected) => Some(Came::Closed),
-    }
-}
-
-fn send(server: &mut Server, outlet: &Outlet) {
-    let limit_bytes = server.frame_limit_bytes() as usize;
-    for message in std::mem::take(&mut server.out) {
-        outlet.send(&message, limit_bytes);
-    }
-}
-
-fn listen(mut stdin: impl Read + Send + 'static, tell: SyncSender<Came>) -> std::io::Result<()> {
-    let read = move || {
-        while let Ok(Some(body)) = read_frame(&mut stdin, FRAME_LIMIT_BYTES) {
-            let Ok(message) = decode(&body) else { break };
-            if tell.send(Came::Message(Box::new(message))).is_err() {
-                return;
-            }
-        }
-        // Nobody is left to be told where this fails.
-        let _ = tell.send(Came::Closed);
-    };
-    std::thread::Builder::new().name("from host".to_owned()).spawn(read).map(drop)
-}
-
+/// Where frames go. Whatever else in this program writes to standard output, an author's own words or a library in C, goes to standard error
+/// from now on: it must not get between the frames.
 #[cfg(unix)]
-fn heed_signals(tell: SyncSender<Came>) -> std::io::Result<()> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGHUP, SIGINT])?;
-    let heed = move || {
-        for _ in signals.forever() {
-            if tell.send(Came::Terminate).is_err() {
-                return;
-            }
-        }
-    };
-    std::thread::Builder::new().name("signals".to_owned()).spawn(heed).map(drop)
+fn frames() -> std::io::Result<impl Write + Send> {
+    use std::os::fd::AsFd;
+    let out = std::io::stdout().as_fd().try_clone_to_owned()?;
+    rustix::stdio::dup2_stdout(std::io::stderr())?;
+    Ok(std::io::BufWriter::new(std::fs::File::from(out)))
 }
 
 #[cfg(not(unix))]
-fn heed_signals(_: SyncSender<Came>) -> std::io::Result<()> {
-    Ok(())
+fn frames() -> std::io::Result<impl Write + Send> {
+    Ok(std::io::stdout())
 }

@@ -22,5 +22,7 @@ pub fn secret(setting: &Value) -> Result<Option<String>, SecretError> {
         return Ok(None);
     }
     let name = setting.get("env").and_then(Value::as_str).ok_or(SecretError::Form)?;
-    std::env::var(name).map(Some).map_err(|_| SecretError::NotSet(name.to_owned()))
+    // An empty one is one that somebody forgot.
+    let value = std::env::var(name).ok().filter(|value| !value.is_empty());
+    value.map(Some).ok_or_else(|| SecretError::NotSet(name.to_owned()))
 }

@@ -75,6 +75,7 @@ impl Server {
             "describe" => self.describe(),
             "arm" => self.arm(now_s),
             "set" => self.set(&message.params),
+            "hold" => self.hold(),
             "poll" => self.poll(&message.params),
             "make_safe" => self.make_safe(),
             "disarm" => self.disarm(),
@@ -150,14 +151,27 @@ impl Server {
         let wanted = setpoints(&read(params)?);
         let (rig, description, armed) = self.held()?;
         if armed.ended || armed.descent.is_some() {
-            let message = "the lease had ended and the rig was made safe; disarm it and arm it again";
-            return Err(refused(Code::LeaseEnded, message));
+            return Err(lease_ended());
         }
         if let Some(accepts) = &description.accepts {
             accepts.check(&wanted).map_err(|error| Box::new(error_on_the_wire(&error)))?;
         }
         guarded(|| rig.set(&wanted))?;
         armed.told = Some(wanted);
+        Ok(json!({}))
+    }
+
+    fn hold(&mut self) -> Result<Value, Refusal> {
+        let (rig, _, armed) = self.held()?;
+        if armed.ended || armed.descent.is_some() {
+            return Err(lease_ended());
+        }
+        if armed.told.is_none() {
+            let message =
+                "there are no setpoints to hold: none were told since arming or since it was made safe";
+            return Err(refused(Code::OutOfOrder, message));
+        }
+        guarded(|| rig.hold())?;
         Ok(json!({}))
     }
 
@@ -285,6 +299,10 @@ impl Server {
     }
 }
 
+fn lease_ended() -> Refusal {
+    refused(Code::LeaseEnded, "the lease had ended and the rig was made safe; disarm it and arm it again")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -344,6 +362,9 @@ mod tests {
             let columns = vec![ChannelColumn { channel: Channel::T2, values: vec![300.0] }];
             let t_s = vec![until_s];
             Ok(SampleBatch { first_sequence: self.samples - 1, t_s, columns, ..SampleBatch::default() })
+        }
+        fn hold(&mut self) -> Result<(), BackendError> {
+            self.write("hold".to_owned())
         }
         fn make_safe(&mut self) -> Result<(), BackendError> {
             if self.refuses == 0 {
@@ -419,6 +440,20 @@ mod tests {
         assert!(ask(&mut server, 10.0, "disarm", json!({})).is_none());
         assert!(ask(&mut server, 10.0, "arm", json!({})).is_none());
         assert!(ask(&mut server, 10.0, "set", setpoints_on_the_wire()).is_none());
+    }
+
+    /// What was told before the rig was made safe, or before its lease ended, is not to be held: it would bring the air back.
+    #[test]
+    fn what_is_held_is_what_was_told_last_and_nothing_from_before_it_was_made_safe() {
+        let (mut server, log) = flying(false, 100);
+        assert!(ask(&mut server, 0.1, "hold", json!({})).is_none());
+        assert_eq!(*log.lock().unwrap(), ["hold"]);
+        assert!(ask(&mut server, 0.2, "make_safe", json!({})).is_none());
+        assert_eq!(ask(&mut server, 0.3, "hold", json!({})).unwrap().code, Code::OutOfOrder);
+        assert!(ask(&mut server, 0.4, "set", setpoints_on_the_wire()).is_none());
+        server.tick(3.0);
+        assert_eq!(ask(&mut server, 3.1, "hold", json!({})).unwrap().code, Code::LeaseEnded);
+        assert_eq!(log.lock().unwrap().iter().filter(|told| *told == "hold").count(), 1);
     }
 
     /// By another session no lease is renewed, and nothing is set.
@@ -503,10 +538,10 @@ mod tests {
         /// Whatever comes in whatever order: one answer to each request, no panic, and a rig that nobody talks to any more becomes safe.
         #[test]
         fn no_messages_keep_a_rig_from_becoming_safe(
-            steps in prop::collection::vec((0usize..9, any::<bool>(), thing(), 0.0f64..3.0), 0..60), simulated: bool,
+            steps in prop::collection::vec((0usize..10, any::<bool>(), thing(), 0.0f64..3.0), 0..60), simulated: bool,
         ) {
-            const METHODS: [&str; 9] =
-                ["hello", "configure", "describe", "arm", "set", "poll", "make_safe", "disarm", "__class__"];
+            const METHODS: [&str; 10] =
+                ["hello", "configure", "describe", "arm", "set", "poll", "make_safe", "disarm", "__class__", "hold"];
             let (mut server, log) = refusing(simulated, 1_000, 3);
             let mut now_s = 0.0;
             for (id, (method, known, params, later_s)) in steps.into_iter().enumerate() {

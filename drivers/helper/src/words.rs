@@ -17,11 +17,14 @@ pub struct About {
     pub settings: &'static str,
 }
 
+/// Where a driver listens that somebody has started, docs/protocol.md.
+pub const SOCKET: &str = "--socket";
 /// Wrong arguments, as everywhere.
 const WRONG_ARGUMENTS: u8 = 2;
 
 impl About {
-    /// Serves a host as [`serve`](crate::serve), or says to people what this is: `mapper` starts drivers without arguments, with pipes.
+    /// Serves a host as [`serve`](crate::serve), with `--socket PATH` those that come there, or says to people what this is: `mapper` starts
+    /// drivers without arguments, with pipes.
     pub fn serve(self, open: impl Open + 'static) -> ExitCode {
         let Some(argument) = std::env::args_os().nth(1) else {
             if std::io::stdin().is_terminal() {
@@ -31,6 +34,13 @@ impl About {
             }
             return crate::serve(self.name, self.version, open);
         };
+        #[cfg(unix)]
+        if argument == SOCKET {
+            let mut more = std::env::args_os().skip(2);
+            if let (Some(path), None) = (more.next(), more.next()) {
+                return crate::serve_at(path.as_ref(), self.name, self.version, open);
+            }
+        }
         match argument.to_str() {
             Some("--help" | "-h" | "help") => say(&mut std::io::stdout(), &self.help()),
             Some("--version" | "-V") => say(&mut std::io::stdout(), &self.title()),
@@ -59,9 +69,12 @@ impl About {
              This is a driver: `mapper` starts it by itself where a campaign says `backend: {{{name}: ...}}`, and talks to it over\n\
              standard input and output. There is nothing to start by hand. It has to stand beside `mapper` or on PATH:\n\
              `mapper backend list` shows whether it is found.\n\n\
+             With --socket it is there before a run and after it: another user, or a service, has started it. `mapper` looks for it at\n\
+             `drivers/{name}.socket` below $MAPPER_STATE_DIR or ~/.local/state/mapper.\n\n\
              Settings: {settings}\n\
              To look at those of a campaign: mapper check CAMPAIGN\n\n\
-             Options:\n  -h, --help     Print this\n  -V, --version  Print the version",
+             Options:\n  --socket PATH  Serve the hosts that come to this socket, one after the other, until a signal ends it\n  \
+             -h, --help     Print this\n  -V, --version  Print the version",
             self.title()
         )
     }

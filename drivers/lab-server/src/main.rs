@@ -48,6 +48,10 @@ struct Arguments {
     /// Serve readings as AK telegrams there, e.g. 127.0.0.1:8888; they control nothing
     #[arg(long, value_name = "ADDRESS")]
     ak: Option<SocketAddr>,
+    /// A line for each speed that OPC UA hands out and each set-point that it takes: `SECONDS read RPM`, `SECONDS told NAME`, on the clock of this
+    /// computer that nobody sets; behind its decryption, so that latency can be measured where a session is encrypted
+    #[arg(long, requires = "opcua")]
+    stamps: bool,
     /// Seconds of the lab in one second on the wall, 0.1 to 100
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
@@ -171,7 +175,7 @@ fn run(arguments: &Arguments) -> Result<(), LabError> {
     let stand = Arc::new(Mutex::new(make(arguments)?));
     // One for the commands of whoever drives, one for who looks on.
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
-    let shared = Shared { stand: stand.clone(), begun: Instant::now() };
+    let shared = Shared { stand: stand.clone(), begun: Instant::now(), stamps: arguments.stamps };
     let serving = serve(&runtime, arguments, &shared)?;
     let mut said = false;
     while !serving.iter().any(JoinHandle::is_finished) {

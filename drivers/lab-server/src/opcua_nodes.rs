@@ -1,6 +1,7 @@
 //! The stand as nodes, as the example of docs/rig.md has them: `ns=2;s=NAME` in SI, `air`, `heartbeat`, `tripped`, `acknowledge`.
 
 use crate::stand::{SETPOINTS, Stand, Target, measured};
+use mapper_core::Channel;
 use opcua::server::address_space::VariableBuilder;
 use opcua::server::authenticator::{AuthManager, DefaultAuthenticator};
 use opcua::server::diagnostics::NamespaceMetadata;
@@ -10,6 +11,7 @@ use opcua::server::{
 };
 use opcua::types::{DataTypeId, DataValue, DateTime, NodeId, ObjectId, StatusCode, Variant};
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -44,6 +46,8 @@ pub struct Shared {
     pub stand: Arc<Mutex<Stand>>,
     /// When its time began.
     pub begun: Instant,
+    /// Whether reads of the speed and set-points are told on standard output, with their times.
+    pub stamps: bool,
 }
 
 impl Shared {
@@ -62,7 +66,17 @@ impl Shared {
         })
     }
 
-    fn tell(&self, target: Target, value: &DataValue) -> StatusCode {
+    /// A line that says when something passed.
+    fn stamp(&self, words: impl std::fmt::Display) {
+        if self.stamps {
+            let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+            let seconds = now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9;
+            // Where nobody reads, nobody is told.
+            let _ = writeln!(std::io::stdout(), "{seconds:.6} {words}");
+        }
+    }
+
+    fn tell(&self, name: &str, target: Target, value: &DataValue) -> StatusCode {
         let number = match &value.value {
             Some(Variant::Boolean(on)) => f64::from(u8::from(*on)),
             Some(Variant::Double(number)) => *number,
@@ -71,7 +85,13 @@ impl Shared {
         };
         let Ok(mut stand) = self.stand.lock() else { return StatusCode::BadInternalError };
         match stand.tell(target, number) {
-            Ok(()) => StatusCode::Good,
+            Ok(()) => {
+                drop(stand);
+                if target != Target::Heartbeat {
+                    self.stamp(format_args!("told {name}"));
+                }
+                StatusCode::Good
+            }
             Err(_) => StatusCode::BadOutOfRange,
         }
     }
@@ -220,7 +240,15 @@ fn fill(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
         let id = put(channel.symbol(), DataTypeId::Double, Variant::Double(f64::NAN), false);
         let shared = shared.clone();
         let read = move |stand: &Stand| stand.reading(channel).map(Variant::Double);
-        manager.inner().add_read_callback(id, move |_, _, _| shared.value(read));
+        manager.inner().add_read_callback(id, move |_, _, _| {
+            let value = shared.value(read);
+            if channel == Channel::ShaftSpeed
+                && let Some(Variant::Double(rpm)) = value.as_ref().ok().and_then(|value| value.value.as_ref())
+            {
+                shared.stamp(format_args!("read {rpm}"));
+            }
+            value
+        });
     }
     let id = put("tripped", DataTypeId::Boolean, Variant::Boolean(false), false);
     let stand = shared.clone();
@@ -231,7 +259,7 @@ fn fill(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
         let (reads, writes) = (shared.clone(), shared.clone());
         let read = move |stand: &Stand| Some(variant(kind, stand.told(target)));
         manager.inner().add_read_callback(id.clone(), move |_, _, _| reads.value(read));
-        manager.inner().add_write_callback(id, move |value, _| writes.tell(target, &value));
+        manager.inner().add_write_callback(id, move |value, _| writes.tell(name, target, &value));
     }
     Ok(())
 }

@@ -22,6 +22,10 @@ impl Backend for RealTime {
         self.0.poll(until_s)
     }
 
+    fn hold(&mut self) -> Result<(), BackendError> {
+        self.0.hold()
+    }
+
     fn make_safe(&mut self) -> Result<(), BackendError> {
         self.0.make_safe()
     }

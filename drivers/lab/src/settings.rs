@@ -47,8 +47,9 @@ pub(crate) fn open(settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
     };
     let settings = Settings::deserialize(settings).map_err(|error| wrong("", LabError::Form(error)))?;
     let of_campaign = |words: String| wrong("campaign", LabError::Campaign(words));
-    let campaign =
-        mapper_campaign::load(&settings.campaign).map_err(|error| of_campaign(error.to_string()))?;
+    // A driver at a socket stands in another directory than whoever writes a campaign: the mistake says where was looked.
+    let path = std::path::absolute(&settings.campaign).unwrap_or(settings.campaign);
+    let campaign = mapper_campaign::load(&path).map_err(|error| of_campaign(error.to_string()))?;
     let registry =
         Registry { backends: BACKENDS.to_vec(), effects: mapper_effects::catalogue(), ..Registry::default() };
     let model = nominal_model(&campaign).map_err(|error| of_campaign(error.to_string()))?;

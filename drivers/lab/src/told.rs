@@ -48,6 +48,11 @@ impl Backend for Told {
         self.inner.poll(until_s)
     }
 
+    fn hold(&mut self) -> Result<(), BackendError> {
+        self.write("hold");
+        self.inner.hold()
+    }
+
     fn make_safe(&mut self) -> Result<(), BackendError> {
         self.write("make safe");
         self.inner.make_safe()

@@ -49,6 +49,11 @@ impl Form {
         }
     }
 
+    /// Whether it holds whole numbers alone.
+    pub(crate) fn is_whole(self) -> bool {
+        !matches!(self, Form::F32 | Form::F64)
+    }
+
     /// How many registers.
     pub(crate) fn count(self) -> u16 {
         match self {

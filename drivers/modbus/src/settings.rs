@@ -2,7 +2,7 @@
 
 use crate::link::Table;
 use crate::registers::{Form, Order};
-use mapper_controller::{Accepts, LimitError, Safe, Stand, Target, within};
+use mapper_controller::{Accepts, LimitError, Safe, Stand, Target, fine_enough, scale, within};
 use mapper_core::{BackendError, Channel};
 use mapper_yaml::units::{Duration, Frequency, Quantity};
 use serde::Deserialize;
@@ -100,6 +100,14 @@ pub(crate) enum SettingError {
     NotWritten,
     #[error("two values are written to register {0}")]
     Shared(u16),
+    #[error(
+        "register {register} is read as {other} already; one of the two is not there. Give it its own register, or leave it out"
+    )]
+    ReadTwice { register: u16, other: Channel },
+    #[error(
+        "register {register} is the one that `write.{key}` goes to: what was asked for would be read in place of what is measured"
+    )]
+    ReadsSetpoint { register: u16, key: &'static str },
 }
 
 pub(crate) fn wrong(path: impl Into<String>, error: SettingError) -> BackendError {
@@ -159,6 +167,7 @@ impl Settings {
         for (channel, place) in &self.read {
             self.check_place(&format!("read.{channel}"), place)?;
         }
+        self.check_what_is_read()?;
         let mut taken: Vec<u16> = Vec::new();
         for target in Target::ALL {
             let (path, place) = (format!("write.{}", target.key()), self.place(target));
@@ -167,12 +176,15 @@ impl Settings {
             }
             self.check_place(&path, &place)?;
             let range = self.accepts.range(target);
+            if place.form.is_whole() {
+                fine_enough(target, place.scale, range).map_err(|error| wrong(path.clone(), error.into()))?;
+            }
             for value in [range.low, range.high] {
                 if self.registers(&place, value).is_none() {
                     return Err(wrong(path, SettingError::DoesNotFit { value }));
                 }
             }
-            for register in place.register..place.register + place.form.count() {
+            for register in place.registers() {
                 if taken.contains(&register) {
                     return Err(wrong(path, SettingError::Shared(register)));
                 }
@@ -182,8 +194,30 @@ impl Settings {
         Ok(())
     }
 
+    /// No two channels come from one register, and none from one that is written.
+    fn check_what_is_read(&self) -> Result<(), BackendError> {
+        let mut taken: BTreeMap<(Table, u16), Channel> = BTreeMap::new();
+        for (channel, place) in &self.read {
+            let at = |error| wrong(format!("read.{channel}.register"), error);
+            for register in place.registers() {
+                if let Some(other) = taken.insert((place.table, register), *channel)
+                    && other != *channel
+                {
+                    return Err(at(SettingError::ReadTwice { register, other }));
+                }
+                let goes_to = |target: &Target| self.place(*target).registers().contains(&register);
+                if let Some(target) =
+                    Target::ALL.into_iter().find(goes_to).filter(|_| place.table == Table::Holding)
+                {
+                    return Err(at(SettingError::ReadsSetpoint { register, key: target.key() }));
+                }
+            }
+        }
+        Ok(())
+    }
+
     fn check_place(&self, path: &str, place: &Place) -> Result<(), BackendError> {
-        bound(&format!("{path}.scale"), place.scale.abs(), "", 1e-12, 1e12)?;
+        scale(place.scale).map_err(|error| wrong(format!("{path}.scale"), error.into()))?;
         bound(&format!("{path}.register"), f64::from(place.register), "", 0.0, f64::from(u16::MAX - 4))
             .map(drop)
     }
@@ -200,10 +234,91 @@ impl Settings {
 }
 
 impl Place {
+    /// All that it takes.
+    pub(crate) fn registers(&self) -> std::ops::Range<u16> {
+        self.register..self.register.saturating_add(self.form.count())
+    }
+
     /// The value in registers of this order, SI; NaN where there is none.
     pub(crate) fn value(&self, registers: &[u16], words: Order, bytes: Order) -> f64 {
         let number = self.form.number(registers, words, bytes).unwrap_or(f64::NAN);
         let value = number * self.scale + self.offset;
         if value.is_finite() { value } else { f64::NAN }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn settings() -> Value {
+        json!({
+            "address": "127.0.0.1:502",
+            "read": {"N": {"register": 0}, "T2": {"register": 10}, "P3": {"register": 16}},
+            "write": {
+                "p3": {"register": 100}, "t3": {"register": 102}, "valve": {"register": 104}, "oil_temperature": {"register": 106},
+                "air": {"register": 110, "type": "u16"}, "heartbeat": {"register": 111, "type": "u16"},
+            },
+            "accepts": {"p3": ["105 kPa", "400 kPa"], "t3": ["280 K", "900 K"], "valve": [0.1, 2.5], "oil_temperature": ["280 K", "400 K"]},
+            "safe": {"opening": 1.0, "within": "20 s"},
+        })
+    }
+
+    /// Path and words of what is wrong.
+    fn refused(at: [&str; 2], value: Value) -> (String, String) {
+        let mut settings = settings();
+        settings[at[0]][at[1]] = value;
+        match Settings::read(&settings) {
+            Err(BackendError::Settings { path, source, .. }) => (path, source.to_string()),
+            other => panic!("{settings}: {}", other.is_ok()),
+        }
+    }
+
+    /// What would be read or written wrongly without a word.
+    #[test]
+    fn what_cannot_be_meant_is_refused_at_its_place() {
+        assert!(Settings::read(&settings()).is_ok());
+        for (at, value, path, words) in [
+            // The same register, one of its two words, and one that is written.
+            (
+                ["read", "T2"],
+                json!({"register": 16}),
+                "read.P3.register",
+                "register 16 is read as T2 already",
+            ),
+            (
+                ["read", "T2"],
+                json!({"register": 17}),
+                "read.P3.register",
+                "register 17 is read as T2 already",
+            ),
+            (["read", "P3"], json!({"register": 100}), "read.P3.register", "`write.p3` goes to"),
+            (
+                ["read", "P3"],
+                json!({"register": 16, "scale": 0}),
+                "read.P3.scale",
+                "a scale of 0 loses the value",
+            ),
+            (["write", "valve"], json!({"register": 104, "scale": 0}), "write.valve.scale", "a scale of 0"),
+            // An opening of 0.7 would be written as 1.
+            (
+                ["write", "valve"],
+                json!({"register": 104, "type": "u16"}),
+                "write.valve",
+                "in steps of 1 from 0.1 to 2.5",
+            ),
+            (["write", "p3"], json!({"register": 100, "type": "u16"}), "write.p3", "cannot hold 105000"),
+            (["write", "t3"], json!({"register": 101}), "write.t3", "written to register 101"),
+        ] {
+            let (found, said) = refused(at, value);
+            assert!(found == path && said.contains(words), "{found}: {said}");
+        }
+        // The same number in the other table, and whole numbers that are fine enough.
+        let mut fine = settings();
+        fine["read"]["P3"] = json!({"register": 10, "table": "input"});
+        fine["write"]["valve"] = json!({"register": 104, "type": "u16", "scale": 0.01});
+        fine["write"]["p3"] = json!({"register": 100, "type": "u16", "scale": 1000.0});
+        assert!(Settings::read(&fine).is_ok());
     }
 }

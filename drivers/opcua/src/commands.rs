@@ -9,7 +9,8 @@ use std::io::Write;
 use std::process::ExitCode;
 
 /// A gas stand behind a PLC or another controller that speaks OPC UA. This is a driver: `mapper` starts it by itself, without arguments, where a
-/// campaign says `backend: {opcua: ...}`; docs/rig.md, "Over OPC UA", has its settings. The commands below are for people.
+/// campaign says `backend: {opcua: ...}`; docs/rig.md, "Over OPC UA", has its settings. With `--socket PATH` it serves the hosts that come there,
+/// docs/protocol.md. The commands below are for people.
 #[derive(Parser)]
 #[command(name = "mapper-backend-opcua", version)]
 struct Arguments {

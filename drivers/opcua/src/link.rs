@@ -37,6 +37,8 @@ const SILENT_S: u64 = 4;
 pub(crate) enum LinkError {
     #[error("{server} did not answer within {} ms", within.as_millis())]
     Late { server: String, within: Duration },
+    #[error("{server} did not answer a read within {} ms (`timeout`, at most 800 ms: a controller that needs longer cannot be driven from here)", within.as_millis())]
+    Slow { server: String, within: Duration },
     #[error("{server}: {words}")]
     Failed { server: String, words: String },
     #[error(
@@ -336,7 +338,7 @@ impl Link {
             .send(session.channel());
         let read = async { timeout(within, read).await };
         let answer = match self.runtime.block_on(read) {
-            Err(_) => Err(LinkError::Late { server: self.server(), within }),
+            Err(_) => Err(LinkError::Slow { server: self.server(), within }),
             Ok(Err(error)) => Err(self.failed(error.to_string())),
             Ok(Ok(answer)) => {
                 let values = answer.results.unwrap_or_default();

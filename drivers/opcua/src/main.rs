@@ -1,6 +1,6 @@
 //! `mapper-backend-opcua`: a gas stand behind a PLC or another controller that speaks OPC UA; docs/rig.md has its settings.
 //!
-//! Without arguments it is a driver and speaks docs/protocol.md; with `trust ENDPOINT` it pins the certificate of a server.
+//! Without arguments, or with `--socket PATH`, it is a driver and speaks docs/protocol.md; with `trust ENDPOINT` it pins the certificate of a server.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -15,7 +15,7 @@ mod value;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    if std::env::args_os().len() > 1 {
+    if std::env::args_os().nth(1).is_some_and(|first| first != mapper_driver::SOCKET) {
         return commands::run();
     }
     let about = mapper_driver::About {

@@ -2,8 +2,8 @@
 
 use crate::link::{Link, LinkError};
 use crate::settings::{Checked, SettingError, Settings, Timestamps, wrong};
-use crate::value::{like, number, quality, words};
-use mapper_controller::{Controller, Reading, Target, rig};
+use crate::value::{is_number, is_whole, kind, like, number, quality, words};
+use mapper_controller::{Controller, Reading, Target, fine_enough, rig};
 use mapper_core::{Backend, BackendError, Channel, Quality};
 use opcua::types::{AttributeId, DataValue, DateTime, NodeId, StatusCode, Variant};
 use serde_json::Value;
@@ -116,6 +116,35 @@ impl Nodes {
         })
     }
 
+    /// Whether every setpoint that the rig is said to take can be written as this type.
+    fn holds_what_is_accepted(
+        &self,
+        target: Target,
+        node: &NodeId,
+        there: &Variant,
+    ) -> Result<(), LinkError> {
+        let wrong = |words: String| Err(LinkError::Node { node: node.clone(), words });
+        let Some((_, scale)) = self.checked.write(target) else { return Err(LinkError::Unknown(target)) };
+        let range = self.checked.settings.accepts.range(target);
+        let key = target.key();
+        let name = kind(there);
+        // A truth value is what air is, and nothing else.
+        let is_bool = matches!(there, Variant::Boolean(_)) && target != Target::Air;
+        if let Some(value) = [range.high, range.low]
+            .into_iter()
+            .find(|value| is_bool || like(there, scale.outside(*value)).is_none())
+        {
+            return wrong(format!(
+                "({name}) cannot hold {} for `write.{key}`; look at the node, and at its `unit`, or `scale` and `offset`",
+                scale.outside(value)
+            ));
+        }
+        match fine_enough(target, scale.step(), range) {
+            Err(error) if is_whole(there) => wrong(format!("({name}, `write.{key}`) {error}")),
+            _ => Ok(()),
+        }
+    }
+
     /// Types and access of what is written.
     fn learn_types(&mut self) -> Result<(), LinkError> {
         let written: Vec<(Target, NodeId)> =
@@ -124,6 +153,7 @@ impl Nodes {
         let values = self.link.read(&nodes, AttributeId::Value)?.values;
         for ((target, node), value) in written.into_iter().zip(values) {
             let there = self.type_of(&node, &value)?;
+            self.holds_what_is_accepted(target, &node, &there)?;
             self.types.insert(target, there);
         }
         let levels = self.link.read(&nodes, AttributeId::UserAccessLevel)?.values;
@@ -158,9 +188,13 @@ impl Controller for Nodes {
         self.link.open()?;
         let answer = self.link.read(&self.nodes, AttributeId::Value)?;
         self.compare_clocks(&answer.sent);
-        for (node, value) in self.nodes.iter().zip(answer.values) {
+        for ((channel, node, _), value) in self.checked.reads.iter().zip(answer.values) {
             if let Some(status) = value.status.filter(|status| is_for_good(*status)) {
                 let words = format!("cannot be read: {}", words(status));
+                return Err(LinkError::Node { node: node.clone(), words });
+            }
+            if let Some(there) = value.value.filter(|there| !there.is_empty() && !is_number(there)) {
+                let words = format!("holds no number, as `read.{channel}` needs: {there}");
                 return Err(LinkError::Node { node: node.clone(), words });
             }
         }

@@ -1,6 +1,6 @@
 //! The settings of the driver as a campaign writes them below `opcua`.
 
-use mapper_controller::{Accepts, LimitError, Safe, Stand, Target, within};
+use mapper_controller::{Accepts, LimitError, Safe, Stand, Target, scale, within};
 use mapper_core::{BackendError, Channel, Dimension};
 use mapper_driver::{SecretError, secret};
 use mapper_yaml::units::{Duration, Frequency, Kind, Quantity};
@@ -130,6 +130,14 @@ pub(crate) enum SettingError {
     TwoScales,
     #[error("two values are written to the node {0}")]
     Shared(NodeId),
+    #[error(
+        "the node {node} is read as {other} already; one of the two is not there. Give it its own node, or leave it out"
+    )]
+    ReadTwice { node: NodeId, other: Channel },
+    #[error(
+        "the node {node} is the one that `write.{key}` goes to: what was asked for would be read in place of what is measured"
+    )]
+    ReadsSetpoint { node: NodeId, key: &'static str },
     #[error("a user has a password, and a password a user")]
     HalfAUser,
     #[error("with `security: none` the password would go over the wire in the clear")]
@@ -155,6 +163,11 @@ impl Scale {
         if value.is_finite() { value } else { f64::NAN }
     }
 
+    /// From one whole number to the next, SI.
+    pub(crate) fn step(self) -> f64 {
+        self.scale
+    }
+
     pub(crate) fn outside(self, value: f64) -> f64 {
         (value - self.offset) / self.scale
     }
@@ -174,8 +187,7 @@ impl Place {
     /// How the number there becomes the value of a channel.
     fn scale(&self, channel: Channel) -> Result<Scale, SettingError> {
         let Some(unit) = &self.unit else {
-            let scale = self.scale.unwrap_or(1.0);
-            within(scale.abs(), "", 1e-12, 1e12)?;
+            let scale = scale(self.scale.unwrap_or(1.0))?;
             let offset = within(self.offset.unwrap_or(0.0), "", -1e12, 1e12)?;
             return Ok(Scale { scale, offset });
         };
@@ -232,10 +244,20 @@ impl Settings {
         if user.is_some() && self.security == Security::None {
             return Err(wrong("security", SettingError::Exposed));
         }
-        let mut reads = Vec::new();
+        let mut reads: Vec<(Channel, NodeId, Scale)> = Vec::new();
         for (channel, place) in &self.read {
             let scale = place.scale(*channel).map_err(|error| wrong(format!("read.{channel}"), error))?;
-            reads.push((*channel, place.node.clone(), scale));
+            let node = place.node.clone();
+            let at = |error: SettingError| wrong(format!("read.{channel}.node"), error);
+            if let Some((other, ..)) = reads.iter().find(|(_, there, _)| *there == node) {
+                return Err(at(SettingError::ReadTwice { node, other: *other }));
+            }
+            if let Some(target) =
+                Target::ALL.into_iter().find(|target| self.write.place(*target).0.node == node)
+            {
+                return Err(at(SettingError::ReadsSetpoint { node, key: target.key() }));
+            }
+            reads.push((*channel, node, scale));
         }
         let mut writes: BTreeMap<Target, (NodeId, Scale)> = BTreeMap::new();
         for target in Target::ALL {
@@ -367,6 +389,15 @@ mod tests {
             (value["user"], value["password"]) = (json!({"env": "PATH"}), json!({"env": "PATH"}));
         });
         assert_eq!(exposed.0, "security");
+        let (at, said) = path(&|value| value["read"]["T3"] = json!({"node": "ns=2;i=3"}));
+        assert!(
+            at == "read.T3.node" && said.contains("the node ns=2;i=3 is read as P3 already"),
+            "{at}: {said}"
+        );
+        let (at, said) = path(&|value| value["read"]["P3"] = json!({"node": "ns=2;s=p3"}));
+        assert!(at == "read.P3.node" && said.contains("`write.p3` goes to"), "{at}: {said}");
+        let (at, said) = path(&|value| value["write"]["p3"]["scale"] = json!(0.0));
+        assert!(at == "write.p3" && said.contains("a scale of 0 loses the value"), "{at}: {said}");
         let unmeasured = path(&|value| drop(value["read"].as_object_mut().unwrap().remove("P3")));
         assert_eq!(unmeasured.0, "read");
     }

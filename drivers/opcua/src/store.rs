@@ -1,6 +1,5 @@
 //! Certificates on disk: our own, and the one that each server had when somebody said that it is to be trusted.
 
-use crate::settings::NAME;
 use opcua::crypto::{CertificateStore, X509, X509Data};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
@@ -33,6 +32,9 @@ pub(crate) enum StoreError {
     Expired { server: String, words: String },
 }
 
+/// Its name below the state of its user.
+const DIRECTORY: &str = "opcua";
+
 /// The directory of certificates.
 #[derive(Debug, Clone)]
 pub(crate) struct Store {
@@ -47,7 +49,7 @@ impl Store {
         let state = variable("MAPPER_STATE_DIR")
             .or_else(|| variable("XDG_STATE_HOME").map(|state| state.join("mapper")))
             .or_else(|| variable("HOME").map(|home| home.join(".local/state/mapper")));
-        Ok(Store { root: state.ok_or(StoreError::NoPlace)?.join(NAME) })
+        Ok(Store { root: state.ok_or(StoreError::NoPlace)?.join(DIRECTORY) })
     }
 
     /// Where it is.

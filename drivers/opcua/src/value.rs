@@ -1,7 +1,7 @@
 //! Numbers in values of OPC UA.
 
 use mapper_core::Quality;
-use opcua::types::{DataValue, StatusCode, Variant};
+use opcua::types::{DataValue, StatusCode, Variant, VariantTypeId};
 
 /// The number that a value holds; NaN where it holds none. A truth value is 1 or 0.
 pub(crate) fn number(value: &Variant) -> f64 {
@@ -19,6 +19,26 @@ pub(crate) fn number(value: &Variant) -> f64 {
         Variant::Double(value) => *value,
         _ => f64::NAN,
     }
+}
+
+/// The type of a value, as the specification calls it.
+pub(crate) fn kind(value: &Variant) -> String {
+    match value.type_id() {
+        VariantTypeId::Empty => "empty".to_owned(),
+        VariantTypeId::Scalar(one) => format!("{one:?}"),
+        VariantTypeId::Array(one, _) => format!("array of {one:?}"),
+    }
+}
+
+/// Whether a value of this type is a number; a truth value is none.
+pub(crate) fn is_number(value: &Variant) -> bool {
+    !matches!(value, Variant::Boolean(_))
+        && (matches!(value, Variant::Float(_) | Variant::Double(_)) || !number(value).is_nan())
+}
+
+/// Whether a value of this type has no fraction.
+pub(crate) fn is_whole(value: &Variant) -> bool {
+    !matches!(value, Variant::Float(_) | Variant::Double(_))
 }
 
 /// The number as a value of the type that stands there; `None` where it does not fit.

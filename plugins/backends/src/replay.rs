@@ -231,6 +231,10 @@ impl Backend for ReplayBackend {
         })
     }
 
+    fn hold(&mut self) -> Result<(), BackendError> {
+        self.need_armed("hold")
+    }
+
     fn make_safe(&mut self) -> Result<(), BackendError> {
         self.need_armed("make_safe")
     }

@@ -55,7 +55,7 @@ fn check(name: &str, campaign: &CampaignFile) {
     let arguments: Vec<_> = arguments.into_iter().chain([campaign.path.as_os_str()]).collect();
     let finished = done(with_drivers(&arguments));
     assert!(!finished.stdout.contains("BROKEN"), "{}", finished.stdout);
-    assert_eq!(finished.exits(0).stdout.lines().count(), 12);
+    assert_eq!(finished.exits(0).stdout.lines().count(), 13);
 }
 
 /// One word of the campaign is another; the lab is the same, and so is every point to the last digit.
@@ -66,6 +66,34 @@ fn the_lab_behind_its_driver_gives_the_points_of_the_lab() {
     let (expected, found) = (made_once(&built_in).result, run(&behind));
     assert_eq!(expected["points"].as_array().unwrap().len(), 4);
     assert_eq!(found["points"], expected["points"]);
+}
+
+/// Nothing in the campaign says where a driver is: one that listens below the state of its user comes before the program.
+#[test]
+fn a_driver_at_a_socket_is_found_by_its_place_and_gives_the_points_of_the_lab() {
+    build_drivers();
+    let states = mapper_tests::scratch();
+    let socket = states.path().join("drivers/lab.socket");
+    let program = Path::new(mapper_command([""; 0]).get_program()).with_file_name("mapper-backend-lab");
+    let listening = Server(Command::new(program).arg("--socket").arg(&socket).spawn().unwrap());
+    while !socket.exists() {
+        std::thread::yield_now();
+    }
+    let with = |arguments: &[&std::ffi::OsStr]| {
+        let mut command = with_drivers(arguments);
+        command.env("MAPPER_STATE_DIR", states.path());
+        done(command).exits(0)
+    };
+    let list = with(&["backend", "list", "--json"].map(AsRef::as_ref)).json();
+    let found = list["backends"].as_array().unwrap().iter().find(|one| one["name"] == "lab").unwrap();
+    assert_eq!(found["socket"].as_str().unwrap(), socket.to_str().unwrap());
+    let built_in = short("  virtual_lab: {}");
+    let behind = lab(&built_in, "");
+    let runs = behind.runs();
+    let run =
+        ["run".as_ref(), behind.path.as_os_str(), "--json".as_ref(), "--out".as_ref(), runs.as_os_str()];
+    assert_eq!(with(&run).json()["points"], made_once(&built_in).result["points"]);
+    drop(listening);
 }
 
 #[test]
@@ -131,7 +159,7 @@ fn a_model_keeps_every_rule_and_gives_the_points_of_its_rig() {
 #[cfg_attr(not(with_python), ignore = "needs Python: run `cargo xtask test`")]
 fn the_helper_in_python_keeps_what_the_protocol_promises() {
     let held = mapper_tests::python("driver_rules.py", [""; 0]);
-    assert_eq!(held["held"].as_array().unwrap().len(), 12, "{held}");
+    assert_eq!(held["held"].as_array().unwrap().len(), 14, "{held}");
 }
 
 #[test]
@@ -242,9 +270,10 @@ fn a_runner_that_stood_still_records_what_it_missed() {
     let recording = mapper_tests::only_run(&campaign.runs()).join("recording.mcap");
     let report = read_recording(&recording, &ChannelMap::native(), &ReadOptions::default()).unwrap();
     let events: Vec<_> = report.recording.events.iter().map(|event| (event.kind, &*event.message)).collect();
-    let missing = events
-        .iter()
-        .position(|(_, words)| words.contains("the rig was lost") && words.contains("are missing"));
+    // On a computer that is so busy that the driver filled neither queue nor pipe nothing is missing: the next set-point is refused then. That what
+    // is missing is said holds in any case: drivers/lab/tests/unread.rs.
+    let says_why = |words: &str| words.contains("are missing") || words.contains("the lease had ended");
+    let missing = events.iter().position(|(_, words)| words.contains("the rig was lost") && says_why(words));
     let safe = events.iter().position(|(kind, _)| *kind == EventKind::SafeState);
     assert!(missing.is_some() && missing < safe, "{events:#?}");
 }
@@ -365,6 +394,6 @@ fn a_rig_behind_opcua_keeps_every_rule() {
     let arguments: Vec<_> = arguments.into_iter().chain([campaign.path.as_os_str()]).collect();
     let finished = as_user(with_drivers(&arguments));
     assert!(!finished.stdout.contains("BROKEN"), "{}", finished.stdout);
-    assert_eq!(finished.exits(0).stdout.lines().count(), 12);
+    assert_eq!(finished.exits(0).stdout.lines().count(), 13);
     server.end();
 }

@@ -65,11 +65,11 @@ fn checked(name: &str, campaign: &CampaignFile, state: &Path, password: &str) ->
     done(command)
 }
 
-/// Twelve rules, all kept, by a user with a state of his own.
+/// Thirteen rules, all kept, by a user with a state of his own.
 fn keeps_every_rule(name: &str, campaign: &CampaignFile, state: &Path) {
     let finished = checked(name, campaign, state, PASSWORD);
     assert!(!finished.stdout.contains("BROKEN"), "{}", finished.stdout);
-    assert_eq!(finished.exits(0).stdout.lines().count(), 12);
+    assert_eq!(finished.exits(0).stdout.lines().count(), 13);
 }
 
 fn trust(endpoint: &str, state: &Path) {
@@ -102,9 +102,9 @@ fn a_program_of_others_drives_the_lab_over_opcua() {
     assert_eq!(seen["wrong_type"], "BadTypeMismatch");
     assert!(seen["written"].as_array().unwrap().iter().all(|code| code == "Good"), "{seen}");
     assert!(seen["rpm"].as_f64().unwrap() > 20e3 && seen["tripped_while_beating"] == false, "{seen}");
-    // The time is the stand's own: within its step and what a machine that is busy adds.
+    // The time is the stand's own: within its step and what a machine that is busy adds; nobody's would be of another day.
     assert!(
-        seen["youngest_s"].as_f64().unwrap() > -0.01 && seen["oldest_s"].as_f64().unwrap() < 1.0,
+        seen["youngest_s"].as_f64().unwrap() > -0.01 && seen["oldest_s"].as_f64().unwrap() < 10.0,
         "{seen}"
     );
     assert!(seen["tripped"] == true && seen["air_after"] == false, "{seen}");
@@ -122,7 +122,7 @@ fn a_rig_that_cannot_be_armed_is_not_judged() {
         let finished = checked(name, campaign, scratch.path(), password).exits(5);
         assert_eq!(finished.stdout, "");
         assert_eq!(finished.stderr.trim_end().lines().count(), 1, "{}", finished.stderr);
-        let begun = format!("mapper: `{name}` cannot be armed, so that none of its 12 rules was judged: ");
+        let begun = format!("mapper: `{name}` cannot be armed, so that none of its 13 rules was judged: ");
         assert!(finished.stderr.starts_with(&begun), "{}", finished.stderr);
         for reason in reasons {
             assert!(finished.stderr.contains(reason), "{reason}: {}", finished.stderr);
@@ -408,7 +408,8 @@ fn a_driver_that_is_started_by_hand_says_what_it_is() {
     for name in ["modbus", "opcua", "ak", "lab"] {
         let file = format!("mapper-backend-{name}");
         build_driver(&file);
-        let help = said(&file, &["--help"]).exits(0).stdout;
+        // However wide its lines are.
+        let help = said(&file, &["--help"]).exits(0).stdout.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(help.contains("`mapper` starts it") && help.contains("docs/"), "{help}");
         let version = said(&file, &["--version"]).exits(0).stdout;
         assert_eq!(version.trim(), format!("{file} {}", env!("CARGO_PKG_VERSION")));

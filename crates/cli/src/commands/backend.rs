@@ -6,7 +6,7 @@ use crate::{drivers, output, registry, rig_states};
 use clap::{Args, Subcommand};
 use mapper_conformance::{Candidate, judge};
 use mapper_core::{RigMode, Setpoints};
-use mapper_host::Found;
+use mapper_host::{At, Found, KNOWN};
 use mapper_session::{RigStates, nominal_model};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -49,12 +49,14 @@ impl Backend {
     fn list(&self) -> Result<(), Failure> {
         let found = drivers::places().all();
         let driver = |found: &Found| {
-            let known = drivers::KNOWN.iter().find(|(name, ..)| *name == found.name);
+            let known = KNOWN.iter().find(|(name, ..)| *name == found.name);
             let summary = known.map_or("driver", |(_, summary, _)| summary);
-            json!({"name": found.name, "summary": summary, "program": found.program})
+            match &found.at {
+                At::Program(program) => json!({"name": found.name, "summary": summary, "program": program}),
+                At::Socket(socket) => json!({"name": found.name, "summary": summary, "socket": socket}),
+            }
         };
-        let absent =
-            drivers::KNOWN.iter().filter(|(name, ..)| !found.iter().any(|found| found.name == *name));
+        let absent = KNOWN.iter().filter(|(name, ..)| !found.iter().any(|found| found.name == *name));
         let built_in = registry::registry().backends;
         let all: Vec<Value> = built_in
             .iter()
@@ -69,9 +71,10 @@ impl Backend {
         }
         let line = |one: &Value| {
             let word = |key: &str| one[key].as_str();
-            let place = match (word("program"), word("build")) {
-                (Some(program), _) => format!("; {program}"),
-                (_, Some(line)) => format!("; not found, built by: {line}"),
+            let place = match (word("program"), word("socket"), word("build")) {
+                (Some(program), ..) => format!("; {program}"),
+                (_, Some(socket), _) => format!("; at the socket {socket}"),
+                (.., Some(line)) => format!("; not found, built by: {line}"),
                 _ => String::new(),
             };
             format!(
@@ -90,10 +93,14 @@ impl Backend {
         if named != name {
             // What is built in does without settings; a driver has an address at least, which another one's are not.
             if !registry.backends.iter().any(|plugin| plugin.name == name) {
-                let remedy = format!("`mapper backend check {named} --campaign {}`", path.display());
-                let words = format!(
-                    "this campaign names `{named}`, not `{name}`, and has no settings for that: {remedy}"
-                );
+                let is_known = KNOWN.iter().any(|(known, ..)| *known == name);
+                let words = match is_known || drivers::places().find(name).is_some() {
+                    false => format!("there is no backend `{name}`; `mapper backend list` shows all"),
+                    true => format!(
+                        "this campaign names `{named}`, not `{name}`, and has no settings for that: `mapper backend check {named} --campaign {}`",
+                        path.display()
+                    ),
+                };
                 return Err(Failure::new(Code::BadInput, words));
             }
             campaign.backend =

@@ -352,6 +352,8 @@ fn mild_reactions_do_what_they_say() {
 
     // Held for as long as may be, then it ends.
     let held = with(Reaction::Hold, &high);
+    assert_eq!(held.rig.held_at_s.len(), 1, "the rig is told once, when it begins");
+    assert!((FAULT_S + 5.0..FAULT_S + 7.0).contains(&held.rig.held_at_s[0]), "{:?}", held.rig.held_at_s);
     let RunEnd::Tripped(trip) = held.end.unwrap() else { panic!("held for ever") };
     assert!(trip.reason.contains("has held the setpoints for 300 s"), "{}", trip.reason);
     assert!(trip.t_s < 130.0 + 320.0);

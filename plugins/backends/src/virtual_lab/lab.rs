@@ -202,6 +202,10 @@ impl Backend for VirtualLab {
         armed.advance(settings, until_s)
     }
 
+    fn hold(&mut self) -> Result<(), BackendError> {
+        self.armed("hold").map(drop)
+    }
+
     fn make_safe(&mut self) -> Result<(), BackendError> {
         let (settings, armed) = self.armed("make_safe")?;
         let now_s = armed.now_s;

@@ -1,0 +1,13 @@
+//! Drivers that are not there need not be guessed at.
+
+/// Drivers that come with the source and are built by themselves: name, what for, the line that builds it.
+pub const KNOWN: &[(&str, &str, &str)] = &[
+    (
+        "lab",
+        "the virtual lab behind the protocol, to rehearse on",
+        "cargo build --release -p mapper-backend-lab",
+    ),
+    ("modbus", "a PLC that speaks Modbus TCP, docs/rig.md", "cargo build --release -p mapper-backend-modbus"),
+    ("ak", "an instrument, read alone, docs/rig.md", "cargo build --release -p mapper-backend-ak"),
+    ("opcua", "a PLC that speaks OPC UA, docs/rig.md", "cargo build --release -p mapper-backend-opcua"),
+];

@@ -1,0 +1,167 @@
+//! A socket of this computer: the driver is there before a host comes and after it has gone, and serves one after the other.
+
+use crate::Open;
+use crate::outlet::Outlet;
+use crate::server::Server;
+use crate::serving::{Came, WAITING, heed_signals, listen, serve_one, session, wait};
+use mapper_protocol::{
+    Code, Encoding, FIRST_FRAME_LIMIT_BYTES, Failure, Message, decode, encode, read_frame, write_frame,
+};
+use std::io::{Error, ErrorKind, Write};
+use std::net::Shutdown;
+use std::os::unix::fs::{DirBuilderExt, FileTypeExt, PermissionsExt};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::time::Duration;
+
+/// How long somebody who is turned away has for his first word, and to hear why.
+const AT_THE_DOOR: Duration = Duration::from_secs(1);
+
+/// Serves hosts that come to the socket at `path`, one after the other and each with a rig of its own, until a signal ends it. Who comes while
+/// another is served, or while its rig becomes safe, is told so. The socket is its user's alone.
+pub fn serve_at(
+    path: &Path,
+    name: &'static str,
+    version: &'static str,
+    open: impl Open + 'static,
+) -> ExitCode {
+    let (tell, news) = sync_channel(WAITING);
+    let busy = Arc::new(AtomicBool::new(false));
+    let begun = bind(path).and_then(|(listener, file)| {
+        heed_signals(tell.clone())?;
+        let (tell, busy) = (tell.clone(), busy.clone());
+        std::thread::Builder::new()
+            .name("door".to_owned())
+            .spawn(move || open_the_door(&listener, &tell, &busy))
+            .map(|_| file)
+    });
+    // The file goes with the driver.
+    let _file = match begun {
+        Ok(file) => file,
+        Err(error) => {
+            // Where standard error is closed nobody is told.
+            let _ = writeln!(std::io::stderr(), "error: {}: {error}", path.display());
+            return ExitCode::FAILURE;
+        }
+    };
+    let open = Rc::new(open);
+    loop {
+        let host = match wait(&news, None) {
+            Some(Came::Connected(host)) => host,
+            Some(Came::Terminate) => return ExitCode::SUCCESS,
+            _ => continue,
+        };
+        let open = open.clone();
+        let server = Server::new(name, version, session(), Box::new(move |settings| open(settings)));
+        let served = attend(server, &host, tell.clone(), &news);
+        // Whatever is still unread: nobody is there, or he said what nobody understands.
+        let _ = host.shutdown(Shutdown::Both);
+        busy.store(false, Ordering::SeqCst);
+        if served.unwrap_or(false) {
+            return ExitCode::SUCCESS;
+        }
+    }
+}
+
+fn attend(
+    server: Server,
+    host: &UnixStream,
+    tell: SyncSender<Came>,
+    news: &std::sync::mpsc::Receiver<Came>,
+) -> std::io::Result<bool> {
+    let outlet = Outlet::into_pipe(host.try_clone()?)?;
+    listen(host.try_clone()?, tell)?;
+    Ok(serve_one(server, news, &outlet))
+}
+
+fn open_the_door(listener: &UnixListener, tell: &SyncSender<Came>, busy: &AtomicBool) {
+    loop {
+        match listener.accept() {
+            Ok((host, _)) if busy.swap(true, Ordering::SeqCst) => turn_away(host),
+            Ok((host, _)) => {
+                if tell.send(Came::Connected(host)).is_err() {
+                    return;
+                }
+            }
+            // No handles left, say: that passes.
+            Err(_) => std::thread::sleep(Duration::from_millis(100)),
+        }
+    }
+}
+
+/// Answers the first request with why there is no more.
+fn turn_away(mut host: UnixStream) {
+    let timed =
+        host.set_read_timeout(Some(AT_THE_DOOR)).and_then(|()| host.set_write_timeout(Some(AT_THE_DOOR)));
+    if timed.is_err() {
+        return;
+    }
+    let Ok(Some(body)) = read_frame(&mut host, FIRST_FRAME_LIMIT_BYTES) else { return };
+    let Some(id) = decode(&body).ok().and_then(|message| message.id) else { return };
+    let words =
+        "this driver serves another host, or its rig is still being made safe; wait until that is over";
+    let refusal = Message::answer(id, Err(Box::new(Failure::new(Code::Refused, words))));
+    if let Ok(body) = encode(&refusal, Encoding::MessagePack) {
+        // He is gone where this fails.
+        let _ = write_frame(&mut host, &body, FIRST_FRAME_LIMIT_BYTES);
+    }
+}
+
+/// The socket's file, which ends with the driver.
+struct OwnFile(PathBuf);
+
+impl Drop for OwnFile {
+    fn drop(&mut self) {
+        // Somebody else may have removed it.
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+/// Listens at `path`. What a driver has left there that was killed is taken away; where one listens, or where something else is, nothing is.
+fn bind(path: &Path) -> std::io::Result<(UnixListener, OwnFile)> {
+    if let Some(directory) = path.parent().filter(|directory| !directory.as_os_str().is_empty()) {
+        std::fs::DirBuilder::new().recursive(true).mode(0o700).create(directory)?;
+    }
+    if let Ok(there) = path.symlink_metadata() {
+        if !there.file_type().is_socket() {
+            return Err(Error::new(ErrorKind::AlreadyExists, "there is a file that is no socket"));
+        }
+        if UnixStream::connect(path).is_ok() {
+            return Err(Error::new(ErrorKind::AddrInUse, "another driver listens there"));
+        }
+        std::fs::remove_file(path)?;
+    }
+    let listener = UnixListener::bind(path)?;
+    let file = OwnFile(path.to_owned());
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600))?;
+    Ok((listener, file))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_killed_driver_left_is_taken_away_and_nothing_else() {
+        let directory = std::env::temp_dir().join(format!("mapper-socket-{}", std::process::id()));
+        let path = directory.join("below/rig.socket");
+        let (listener, file) = bind(&path).unwrap();
+        assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o600);
+        assert!(bind(&path).err().unwrap().to_string().contains("another driver listens"));
+        // As a kill leaves it.
+        std::mem::forget(file);
+        drop(listener);
+        let (_listener, file) = bind(&path).unwrap();
+        drop(file);
+        assert!(!path.exists());
+        std::fs::write(&path, "notes").unwrap();
+        assert!(bind(&path).err().unwrap().to_string().contains("no socket"));
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "notes");
+        std::fs::remove_dir_all(&directory).unwrap();
+    }
+}

@@ -1,0 +1,138 @@
+//! A driver at a socket of this computer, in real time: hosts come one after the other, and one that is gone leaves a rig that becomes safe.
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_core::{Backend, RigMode, Setpoints};
+use mapper_host::{At, Driver, PATIENCE, Places};
+use notify::{RecommendedWatcher, RecursiveMode, Watcher};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_mapper-backend-lab");
+const SETPOINTS: Setpoints = Setpoints {
+    mode: RigMode::Running,
+    p3_pa: 150e3,
+    t3_k: 773.15,
+    valve_opening_ratio: 0.7,
+    oil_temperature_k: 323.15,
+};
+
+/// A directory whose files are looked at when something is written there.
+struct Scratch {
+    directory: tempfile::TempDir,
+    news: Receiver<notify::Result<notify::Event>>,
+    _watcher: RecommendedWatcher,
+}
+
+impl Scratch {
+    fn new() -> Scratch {
+        let directory = tempfile::tempdir().unwrap();
+        let (tell, news) = channel();
+        let mut watcher = notify::recommended_watcher(tell).unwrap();
+        watcher.watch(directory.path(), RecursiveMode::NonRecursive).unwrap();
+        Scratch { directory, news, _watcher: watcher }
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+
+    fn until(&self, reached: impl Fn() -> bool) {
+        while !reached() {
+            self.news.recv_timeout(Duration::from_secs(60)).expect("something happens").unwrap();
+        }
+    }
+
+    /// What a rig was told, as soon as these words are among it.
+    fn told(&self, name: &str, words: &str) -> String {
+        let text = || std::fs::read_to_string(self.file(name)).unwrap_or_default();
+        self.until(|| text().contains(words));
+        text()
+    }
+
+    fn settings(&self, told: &str) -> Value {
+        let campaign = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns/turbo_a.yaml");
+        json!({"campaign": campaign, "real_time": true, "told": self.file(told)})
+    }
+}
+
+/// Ends with the test.
+struct Listening(Child);
+
+impl Drop for Listening {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Listening {
+    fn at(socket: &Path, scratch: &Scratch) -> Listening {
+        let child = Command::new(PROGRAM).arg("--socket").arg(socket).spawn().unwrap();
+        scratch.until(|| std::os::unix::net::UnixStream::connect(socket).is_ok());
+        Listening(child)
+    }
+}
+
+/// A host that comes once the one before it has quite gone.
+fn come(places: &Places, settings: &Value) -> Driver {
+    loop {
+        match Driver::find(places, "lab", settings, "", "") {
+            Ok(driver) => return driver,
+            Err(error) => assert!(error.to_string().contains("serves another host"), "{error}"),
+        }
+    }
+}
+
+#[test]
+fn hosts_come_one_after_the_other_and_one_that_is_gone_leaves_a_safe_rig() {
+    let scratch = Scratch::new();
+    let socket = scratch.file("lab.socket");
+    let mut listening = Listening::at(&socket, &scratch);
+    let places = Places { programs: Vec::new(), sockets: Some(scratch.directory.path().to_owned()) };
+    assert_eq!(places.find("lab"), Some(At::Socket(socket.clone())));
+
+    let mut first = come(&places, &scratch.settings("first"));
+    first.arm().unwrap();
+    first.set(&SETPOINTS).unwrap();
+    first.hold().unwrap();
+    assert!(!first.poll(1.0).unwrap().t_s.is_empty());
+    // Whoever comes now is told so, as a mistake before there is a rig.
+    let refused = Driver::at_socket(&socket, "lab", &scratch.settings("second"), PATIENCE).err().unwrap();
+    assert!(refused.to_string().contains("this driver serves another host"), "{refused}");
+    // As it is where a runner is killed: nobody says a word. The rig is flown down and let go, and the next host is served.
+    drop(first);
+    let told = scratch.told("first", "disarm");
+    let way: Vec<&str> = told.lines().skip_while(|line| !line.contains("T3 293 K")).collect();
+    assert!(told.contains("hold") && way.len() > 3 && way[way.len() - 2].contains("make safe"), "{told}");
+
+    let mut second = come(&places, &scratch.settings("second"));
+    second.arm().unwrap();
+    second.set(&SETPOINTS).unwrap();
+    assert!(!second.poll(1.0).unwrap().t_s.is_empty());
+
+    // A signal ends it with the rig that it has, and nothing is left at its place.
+    let pid = listening.0.id().to_string();
+    assert!(Command::new("kill").args(["-s", "TERM", &pid]).status().unwrap().success());
+    assert!(listening.0.wait().unwrap().success());
+    assert!(scratch.told("second", "disarm").contains("make safe"));
+    assert!(!socket.exists());
+    assert!(second.make_safe().is_err(), "nobody can say that");
+}
+
+/// What a driver that was killed has left: said as that, and the next one takes its place.
+#[test]
+fn a_socket_at_which_nobody_listens_is_said_and_can_be_taken_again() {
+    let scratch = Scratch::new();
+    let socket = scratch.file("lab.socket");
+    drop(Listening::at(&socket, &scratch));
+    assert!(socket.exists());
+    let places = Places { programs: Vec::new(), sockets: Some(scratch.directory.path().to_owned()) };
+    let away = Driver::find(&places, "lab", &Value::Null, "", "").err().unwrap().to_string();
+    assert!(away.contains("nobody listens at the socket") && away.contains("--socket"), "{away}");
+    let _again = Listening::at(&socket, &scratch);
+    come(&places, &scratch.settings("told"));
+}

@@ -96,6 +96,9 @@ with sync_playwright() as playwright:
     page.focus("#step-choice")
     page.keyboard.press("ArrowDown")
     result["by_keyboard"] = page.input_value("#step-choice") != step
+    page.close()
+    # Printed as it is opened, not as somebody has left it.
+    page = opened(browser, 1400, 1000, "dark")
     page.pdf(path=folder / "report.pdf", format="A4", landscape=True)
     browser.close()
 

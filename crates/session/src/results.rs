@@ -215,8 +215,9 @@ impl Session<'_> {
         let others: Vec<OtherRun<'_>> =
             other_maps.iter().map(|(name, map)| OtherRun { name: name.clone(), map }).collect();
         let repeats = identified.repeats();
-        let report = run_report_of(&told, &identified, &remarks, &repeats, false);
-        page_of(&told, &identified, &report, map.as_ref(), &others, gap, self.registry.commit)
+        let program = program_and_commit(self.registry.commit);
+        let report = run_report_of(&told, &identified, map.as_ref(), &program, &remarks, &repeats, false);
+        page_of(&identified, &report, &others, gap)
     }
 
     /// The files of what was identified.
@@ -249,12 +250,21 @@ impl Session<'_> {
         }
         write_new(&directory.join(run_directory::POINTS), json_text(&points_file)?.as_bytes())?;
         let repeats = identified.repeats();
-        let shown = run_report_of(told, &identified, &remarks, &repeats, map.contains_key("svg"));
+        let program = program_and_commit(self.registry.commit);
+        let has_picture = map.contains_key("svg");
+        let shown = run_report_of(
+            told,
+            &identified,
+            compressor_map.as_ref(),
+            &program,
+            &remarks,
+            &repeats,
+            has_picture,
+        );
         let report = directory.join(run_directory::REPORT);
         write_new(&report, run_report(&shown).as_bytes())?;
         let page = directory.join(run_directory::PAGE);
-        let page_text =
-            page_of(told, &identified, &shown, compressor_map.as_ref(), &[], None, self.registry.commit)?;
+        let page_text = page_of(&identified, &shown, &[], None)?;
         write_new(&page, page_text.as_bytes())?;
         let Identified { points, thermal, two_parameter, sensors, zero, score, surge, .. } = identified;
         Ok(Results {
@@ -295,6 +305,8 @@ fn identified_by(method: Method) -> String {
 fn run_report_of<'a>(
     told: &'a Told,
     identified: &'a Identified,
+    map: Option<&'a CompressorMap>,
+    program: &'a str,
     remarks: &'a [String],
     repeats: &'a [RepeatedJump],
     has_picture: bool,
@@ -303,6 +315,12 @@ fn run_report_of<'a>(
         machine: &told.machine,
         campaign: told.campaign.as_ref(),
         plan: told.plan.as_ref(),
+        tested_at: told.tested_at.as_deref(),
+        program,
+        map,
+        recording: &identified.recording,
+        used: &identified.config.declared,
+        zero: &identified.zero,
         sources: &told.sources,
         outcome: &told.outcome,
         remarks,
@@ -326,27 +344,15 @@ fn run_report_of<'a>(
 
 /// The page of what was identified, beside other runs' maps.
 fn page_of(
-    told: &Told,
     identified: &Identified,
     report: &RunReport<'_>,
-    map: Option<&CompressorMap>,
     others: &[OtherRun<'_>],
     gap: Option<&Gap>,
-    commit: &str,
 ) -> Result<String, SessionError> {
     let course = |point: &IdentifiedPoint| t2_course(&identified.recording, point, &identified.config);
     let courses: Vec<T2Course> = identified.points_alone().filter_map(course).collect();
-    Ok(run_page(&RunPage {
-        report,
-        map,
-        recording: &identified.recording,
-        courses: &courses,
-        zero: &identified.zero,
-        tested_at: told.tested_at.as_deref(),
-        program: &program_and_commit(commit),
-        gap: gap.map(|gap| gap_part(&gap.diagnosed)),
-        others,
-    })?)
+    let gap = gap.map(|gap| gap_part(&gap.diagnosed));
+    Ok(run_page(&RunPage { report, courses: &courses, gap, others })?)
 }
 
 /// A recording as a report names it.

@@ -6,6 +6,7 @@ use crate::output::Replace;
 use crate::{interrupt, manner, output, registry};
 use clap::Args;
 use mapper_blind::calibrate::{Plan, calibrate};
+use mapper_blind::reliability::{reliabilities, reliability_text};
 use mapper_fleet::Engine;
 use mapper_session::json_text;
 use serde_json::json;
@@ -60,9 +61,17 @@ impl Calibrate {
         if let Some(file) = &self.observed {
             self.replace.write(file, json_text(&observed)?.as_bytes())?;
         }
+        let found = reliabilities(&observed)?;
         if self.json {
-            return output::print_json(&json!({ "calibration": self.out, "diagnoses": observed.len() }));
+            return output::print_json(
+                &json!({ "calibration": self.out, "diagnoses": observed.len(), "reliability": found }),
+            );
         }
-        output::print(&format!("calibration from {} diagnoses in {}\n", observed.len(), self.out.display()))
+        output::print(&format!(
+            "calibration from {} diagnoses in {}\n{}",
+            observed.len(),
+            self.out.display(),
+            reliability_text(&found)
+        ))
     }
 }

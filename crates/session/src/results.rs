@@ -8,13 +8,14 @@ use crate::{Gap, Registry, Session, SessionError, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
-use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Method, Plan, ThermalModel};
+use mapper_campaign::units::Kind;
+use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, ThermalModel};
 use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_observe::FusedChannel;
 use mapper_page::{OtherRun, RunPage, run_page};
 use mapper_record::score::{ScoreSummary, ScoredPoint, beside_truths};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_report::{ReportSource, RunReport, SurgeReport, gap_part, instant, run_report};
+use mapper_report::{Display, ReportSource, RunReport, SurgeReport, gap_part, instant, run_report};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
@@ -91,6 +92,18 @@ impl Told {
             campaign,
             plan,
             sources,
+        }
+    }
+
+    /// Units of the map's pictures: those that the campaign wants shown.
+    fn map_units(&self) -> MapUnits {
+        let Some(campaign) = &self.campaign else { return MapUnits::default() };
+        let display = Display::new(&campaign.display);
+        MapUnits {
+            flow: campaign.display.flow.clone(),
+            flow_of_one_kg_s: display.number(Kind::MassFlow, 1.0),
+            speed: campaign.display.speed.clone(),
+            speed_of_one_rpm: display.number(Kind::Speed, 1.0),
         }
     }
 
@@ -232,7 +245,9 @@ impl Session<'_> {
         remarks.extend(identified.remarks.iter().cloned());
         let compressor_map = compressor_map(&told.machine, &identified, &mut remarks);
         let map = match &compressor_map {
-            Some(map) => export(self.registry, &told.formats(), map, directory, &mut remarks)?,
+            Some(map) => {
+                export(self.registry, &told.formats(), map, &told.map_units(), directory, &mut remarks)?
+            }
             None => BTreeMap::new(),
         };
         let mut points_file = json!({
@@ -410,13 +425,14 @@ fn export(
     registry: &Registry,
     formats: &[String],
     map: &CompressorMap,
+    units: &MapUnits,
     directory: &Path,
     remarks: &mut Vec<String>,
 ) -> Result<BTreeMap<String, PathBuf>, SessionError> {
     let mut files = BTreeMap::new();
     for name in formats {
         let format = registry.written_format(name)?;
-        let bytes = match format.write(map) {
+        let bytes = match format.write_in(map, units) {
             Ok(bytes) => bytes,
             // A campaign of a few points has a map, but no surface through it.
             Err(error @ ExportError::NeedsFit { .. }) => {

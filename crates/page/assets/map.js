@@ -136,7 +136,7 @@ function drawEta() {
       marks.push(Plot.line(nodes, { x: "flow", y: "eta", stroke: lineColour(name), clip: true }));
       // Its speed stands where the line ends towards choke, or where it leaves what is drawn.
       const end = d3.greatest(nodes, n => n.flow);
-      if (end) marks.push(Plot.text([end], { x: "flow", y: "eta", text: () => short(line.speed), dy: 9, textAnchor: "middle", fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3, fontSize: 10 }));
+      if (end) marks.push(Plot.text([end], { x: "flow", y: "eta", text: () => short(line.speed), dy: 14, textAnchor: "middle", fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3, fontSize: 10 }));
     }
   if (layer("intervals")) marks.push(Plot.ruleX(data.filter(p => p.eta_low != null), { x: "flow", y1: "eta_low", y2: "eta_high", stroke: p => lineColour(p.line) }));
   if (layer("dynamic")) {

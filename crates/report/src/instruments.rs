@@ -10,17 +10,18 @@ pub const INSTRUMENT_HEADS: [&str; 9] = [
     "sensor",
     "reads",
     "unit",
-    "noise of one sample +/-",
-    "offset declared +/-",
-    "offset as used +/-",
+    "noise +/-",
+    "offset +/-",
+    "as used +/-",
     "gain +/- %",
     "tap or probe",
     "last calibration",
 ];
 
 /// What the columns are.
-pub const INSTRUMENT_WORDS: &str = "Half widths of 95 % intervals; temperatures in K. The offset as used is what the isothermal \
-                                    zero leaves of the declared one, where there was a zero. `-`: nobody has declared it.";
+pub const INSTRUMENT_WORDS: &str = "Half widths of 95 % intervals, as declared: noise of one sample, offset left after calibration, gain; \
+                                    temperatures in K. As used: the offset that the isothermal zero leaves, where there was one. \
+                                    `-`: nobody has declared it.";
 
 /// A row for each sensor of the campaign. `used`: what the points were identified with.
 pub fn instrument_rows(

@@ -29,7 +29,7 @@ fn panel(one: &Reliability) -> Panel {
         Axis::new("probability given, %").range(0.0, 105.0),
         Axis::new("first answer right, %").range(0.0, 105.0),
     )
-    .title(format!("{}: {cases} diagnoses, error {error}", one.calibration))
+    .title(format!("calibration {}: {cases} diagnoses, error {error}", one.calibration))
     .with(Line::new(vec![(0.0, 0.0), (100.0, 100.0)], palette::GREY).dash(Dash::Dashed).label("it holds"))
     .with(Scatter::new(one.bins.iter().map(point).collect::<Vec<_>>(), palette::BLUE).label("classes of 10 %"))
 }

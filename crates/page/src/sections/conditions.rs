@@ -1,5 +1,6 @@
 //! What was tested where, under which conditions, with which instruments.
 
+use crate::prose::prose;
 use crate::run_page::RunPage;
 use crate::table::{facts, words_table};
 use mapper_report::{
@@ -20,8 +21,10 @@ pub(crate) fn conditions(page: &RunPage<'_>, display: &Display) -> Markup {
                 @if !read.is_empty() { (words_table("Conditions read at the ends of the steps", &CONDITION_HEADS, &read)) }
             }
             @if !instruments.is_empty() {
-                p { (INSTRUMENT_WORDS) }
-                (words_table("Instruments", &INSTRUMENT_HEADS, &instruments))
+                div #instruments {
+                    p { (prose(INSTRUMENT_WORDS)) }
+                    (words_table("Instruments", &INSTRUMENT_HEADS, &instruments))
+                }
             }
         }
     }

@@ -194,4 +194,10 @@ function drawPlan() {
   put(element, plot, `The ${jumps.length} jumps of the plan in their order; the table below lists them.`);
 }
 
+// Which dashed lines are whose.
+page.others.forEach((other, index) => {
+  const box = document.querySelector(`input[name=layer][value=other${index}]`);
+  if (box) box.parentElement.style.borderBottom = `2px dashed ${d3.schemeTableau10[index % 10]}`;
+});
+
 redrawn.push(drawMap, drawEta, drawPlan);

@@ -43,13 +43,18 @@ pub fn surge_heads(marks: &[ScoredMark], display: &Display) -> Vec<String> {
     heads
 }
 
-/// The same for a terminal of 80 columns.
+/// The same for a terminal of 80 columns. `truth`: whether to say how far the marks are from it.
 pub fn surge_columns_text(
     marks: &[ScoredMark],
     remarks: &[String],
     surges: usize,
     units: &DisplayUnits,
+    truth: bool,
 ) -> String {
+    let unscored = |scored: &ScoredMark| ScoredMark { truth_flow_corrected_kg_s: None, ..scored.clone() };
+    let marks: Vec<ScoredMark> =
+        marks.iter().map(|scored| if truth { scored.clone() } else { unscored(scored) }).collect();
+    let marks = marks.as_slice();
     let display = Display::new(units);
     let mut heads = [&units.speed, &units.flow, "+/- %", "PR", "+/-", "nearest %", "openings", "found by"]
         .map(str::to_owned)

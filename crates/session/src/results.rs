@@ -88,7 +88,11 @@ impl Told {
         Told {
             outcome: String::new(),
             machine: campaign.as_ref().map_or_else(named, |campaign| campaign.machine.name.clone()),
-            tested_at: sources.first().and_then(|source| instant(source.start_time_ns)),
+            // Simulated time has no date; the directory of its run has.
+            tested_at: sources
+                .first()
+                .and_then(|source| instant(source.start_time_ns))
+                .or_else(|| run_directory::started(recorded.first()?.path.parent()?)),
             campaign,
             plan,
             sources,

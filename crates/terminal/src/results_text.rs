@@ -119,7 +119,7 @@ fn short(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
         text.push_str(&wrapped(&truth, COLUMNS, 2));
     }
     if let Some(surge) = found.surge {
-        text.push_str(&surge_columns_text(&surge.marks, &surge.remarks, surge.surges, units));
+        text.push_str(&surge_columns_text(&surge.marks, &surge.remarks, surge.surges, units, shown.truth));
     }
     // Sensors that all agree are no news.
     for fused in found.sensors.iter().filter(|fused| !fused.left_out.is_empty()) {

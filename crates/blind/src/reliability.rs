@@ -8,6 +8,7 @@ use mapper_gap::calibration::Calibration;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::Write;
+use std::path::Path;
 
 /// Classes of equal width from 0 to 1.
 const BINS: usize = 10;
@@ -145,12 +146,19 @@ fn beside(before: &Calibration, observed: &[Observed]) -> [Reliability; 2] {
     ]
 }
 
+/// What came of so many diagnoses, and where the calibration is.
+pub fn calibrated_text(diagnoses: usize, file: &Path, reliabilities: &[Reliability]) -> String {
+    let said = reliability_text(reliabilities);
+    format!("calibration from {diagnoses} diagnoses in {}\n{said}", file.display())
+}
+
 /// A sentence for each.
 pub fn reliability_text(reliabilities: &[Reliability]) -> String {
     let mut text = String::new();
     for one in reliabilities {
         let cases: usize = one.bins.iter().map(|bin| bin.right.trials).sum();
-        let percent = |share: Option<f64>| share.map_or("-".to_owned(), |share| format!("{:.1} %", 100.0 * share));
+        let percent =
+            |share: Option<f64>| share.map_or("-".to_owned(), |share| format!("{:.1} %", 100.0 * share));
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,

@@ -27,11 +27,7 @@ pub fn condition_rows(
             boundary.map(|b| b.t3_k).filter(|_| !follows.turbine_inlet),
         ),
         (Channel::P4, "turbine outlet pressure P4", boundary.map(|b| b.p4_pa)),
-        (
-            Channel::TOil,
-            "oil temperature",
-            boundary.map(|b| b.oil_temperature_k).filter(|_| !follows.oil),
-        ),
+        (Channel::TOil, "oil temperature", boundary.map(|b| b.oil_temperature_k).filter(|_| !follows.oil)),
         (Channel::TAmb, "ambient temperature", boundary.map(|b| b.ambient_temperature_k)),
     ];
     let rows = conditions.into_iter().filter_map(|(channel, what, declared)| {

@@ -1,15 +1,20 @@
 //! What a map covers and how sure it is, in a few sentences.
 
 use crate::duration::duration;
-use crate::run_report::RunReport;
-use mapper_core::{IdentifiedPoint, Verdict};
+use mapper_campaign::Campaign;
+use mapper_core::{CompressorMap, IdentifiedPoint, Plan, Verdict};
 use mapper_numerics::statistics::median;
+use mapper_record::score::ScoredPoint;
 
-/// What was measured, how sure it is, how long it took; `None` where there is nothing to say.
-pub fn key_figures(report: &RunReport<'_>) -> Option<String> {
-    let points = || report.points.iter().map(|scored| &scored.point);
-    let map = report.map?;
-    let units = report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
+/// What was measured, how sure it is, how long it was planned to take; `None` where there is no map.
+pub fn key_figures(
+    map: Option<&CompressorMap>,
+    points: &[ScoredPoint],
+    campaign: Option<&Campaign>,
+    plan: Option<&Plan>,
+) -> Option<String> {
+    let (all, map) = (points.len(), map?);
+    let units = campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
     let display = crate::Display::new(&units);
     let on_map: usize = map.lines.iter().map(|line| line.points.len()).sum();
     let speeds = || map.lines.iter().map(|line| line.speed_corrected_rpm);
@@ -19,20 +24,23 @@ pub fn key_figures(report: &RunReport<'_>) -> Option<String> {
         0 => return None,
         1 => format!("{on_map} points at {fastest} {} (corrected)", units.speed),
         lines => {
-            format!("{on_map} points on {lines} speed lines from {slowest} to {fastest} {} (corrected)", units.speed)
+            format!(
+                "{on_map} points on {lines} speed lines from {slowest} to {fastest} {} (corrected)",
+                units.speed
+            )
         }
     };
-    match points().count().saturating_sub(on_map) {
+    match all.saturating_sub(on_map) {
         0 => {}
         1 => words.push_str(", one more visit to compare"),
         more => words.push_str(&format!(", {more} more visits to compare")),
     }
     words.push('.');
-    if let Some(sure) = certainty(points()) {
+    if let Some(sure) = certainty(points.iter().map(|scored| &scored.point)) {
         words.push_str(&sure);
     }
-    if let Some(plan) = report.plan {
-        let rest_s = report.campaign.and_then(|campaign| campaign.zero).map_or(0.0, |zero| zero.duration_s);
+    if let Some(plan) = plan {
+        let rest_s = campaign.and_then(|campaign| campaign.zero).map_or(0.0, |zero| zero.duration_s);
         words.push_str(&format!(" Planned for {}", duration(rest_s + plan.duration_s())));
         if rest_s > 0.0 {
             words.push_str(&format!(", {} of it at rest", duration(rest_s)));

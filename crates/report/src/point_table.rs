@@ -89,12 +89,10 @@ pub fn point_heads(display: &Display) -> [String; 18] {
 pub fn point_cells(recording: &Recording, point: &IdentifiedPoint, display: &Display) -> [PointCell; 18] {
     let marker = recording.steps.iter().find(|marker| marker.index == point.step);
     let read = |channel| marker.and_then(|marker| at_end(recording, marker, channel));
-    let temperature = |k: Option<f64>| {
-        k.map_or_else(PointCell::nothing, |k| PointCell::new(display.temperature(k), k))
-    };
-    let pressure = |pa: Option<f64>| {
-        pa.map_or_else(PointCell::nothing, |pa| PointCell::new(display.pressure(pa), pa))
-    };
+    let temperature =
+        |k: Option<f64>| k.map_or_else(PointCell::nothing, |k| PointCell::new(display.temperature(k), k));
+    let pressure =
+        |pa: Option<f64>| pa.map_or_else(PointCell::nothing, |pa| PointCell::new(display.pressure(pa), pa));
     let half = |low: Option<f64>, high: Option<f64>| low.zip(high).map(|(low, high)| 0.5 * (high - low));
     let optional = |text: String, value: Option<f64>| PointCell::new(text, value.unwrap_or(f64::NAN));
     // A half width of 0 says that nobody declared the sensor, not that it is perfect.

@@ -18,7 +18,9 @@ use crate::zero_text::{ZERO_HEADS, zero_rows, zero_words};
 use mapper_assemble::RepeatedJump;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{Channel, CompressorMap, DeclaredUncertainty, Event, Method, Plan, Recording, ReferenceState};
+use mapper_core::{
+    Channel, CompressorMap, DeclaredUncertainty, Event, Method, Plan, Recording, ReferenceState,
+};
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_observe::FusedChannel;
 use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};
@@ -126,7 +128,7 @@ pub fn run_report(report: &RunReport<'_>) -> String {
         let _ = writeln!(text, "**{}**\n", disagreement.trim_end());
     }
     let _ = writeln!(text, "**{}** {outcome}\n", verdict_sentence(points.iter().map(|scored| &scored.point)));
-    if let Some(words) = key_figures(report) {
+    if let Some(words) = key_figures(report.map, points, campaign, report.plan) {
         let _ = writeln!(text, "{words}\n");
     }
     for remark in remarks {
@@ -260,9 +262,9 @@ fn campaign_rows(campaign: &Campaign) -> Vec<(&'static str, String)> {
         ("rig", campaign.backend.name.clone()),
         (
             "barometer",
-            report.barometer_pa.map_or_else(missing, |pa| {
-                format!("{} {}", display.pressure(pa), campaign.display.pressure)
-            }),
+            report
+                .barometer_pa
+                .map_or_else(missing, |pa| format!("{} {}", display.pressure(pa), campaign.display.pressure)),
         ),
         (
             "relative humidity",
@@ -273,7 +275,9 @@ fn campaign_rows(campaign: &Campaign) -> Vec<(&'static str, String)> {
         rows.push(("cell", format!("{} {}", display.temperature(k), campaign.display.temperature)));
     }
     let follows = campaign.follow_outlet;
-    for (what, holds) in [("turbine inlet temperature", follows.turbine_inlet), ("oil temperature", follows.oil)] {
+    for (what, holds) in
+        [("turbine inlet temperature", follows.turbine_inlet), ("oil temperature", follows.oil)]
+    {
         if holds {
             rows.push((what, "held at the compressor's outlet temperature".to_owned()));
         }
@@ -304,8 +308,10 @@ fn points_section(text: &mut String, units: &DisplayUnits, report: &RunReport<'_
         let _ = writeln!(text, "{shared}\n");
     }
     for group in point_groups(report.map, points(), &display) {
-        let rows =
-            group.points.iter().map(|point| point_cells(report.recording, point, &display).map(|cell| cell.text));
+        let rows = group
+            .points
+            .iter()
+            .map(|point| point_cells(report.recording, point, &display).map(|cell| cell.text));
         let _ = writeln!(text, "### {}\n", group.caption);
         text.push_str(&markdown::table(&point_heads(&display), Align::Right, rows));
         text.push('\n');

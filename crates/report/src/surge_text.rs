@@ -22,7 +22,9 @@ pub fn surge_text(marks: &[ScoredMark], remarks: &[String], surges: usize, units
 
 /// How often the compressor surged, and where surge was not found, a sentence each.
 pub fn surge_remarks(remarks: &[String], surges: usize) -> Vec<String> {
-    std::iter::once(times(surges)).chain(remarks.iter().map(|remark| format!("Not found at {remark}."))).collect()
+    std::iter::once(times(surges))
+        .chain(remarks.iter().map(|remark| format!("Not found at {remark}.")))
+        .collect()
 }
 
 /// Columns of [`surge_rows`].

@@ -12,7 +12,9 @@ pub const ZERO_HEADS: [&str; 4] = ["sensor", "subtracted", "known within +/-", "
 pub fn zero_words(zero: &ZeroOutcome) -> Option<String> {
     match zero {
         ZeroOutcome::NotAsked => None,
-        ZeroOutcome::Refused(reason) => Some(format!("No isothermal zero: {reason}. The declared offsets stand.")),
+        ZeroOutcome::Refused(reason) => {
+            Some(format!("No isothermal zero: {reason}. The declared offsets stand."))
+        }
         ZeroOutcome::Found(zero) => Some(format!(
             "At rest, from {:.0} to {:.0} s, all sensors of a kind read the same; what each read differently is subtracted from its \
              readings. Half widths of 95 % intervals.",

@@ -65,7 +65,8 @@ pub(crate) fn started(directory: &Path) -> Option<String> {
 /// `20261124T110618Z` as `2026-11-24 11:06:18 UTC`.
 fn instant(stamp: &str) -> Option<String> {
     let (day, time) = stamp.strip_suffix('Z')?.split_once('T')?;
-    let is_number = |text: &str, digits: usize| text.len() == digits && text.bytes().all(|b| b.is_ascii_digit());
+    let is_number =
+        |text: &str, digits: usize| text.len() == digits && text.bytes().all(|b| b.is_ascii_digit());
     (is_number(day, 8) && is_number(time, 6)).then(|| {
         let (date, clock) = ([&day[..4], &day[4..6], &day[6..]], [&time[..2], &time[2..4], &time[4..]]);
         format!("{} {} UTC", date.join("-"), clock.join(":"))

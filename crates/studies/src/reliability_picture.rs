@@ -31,5 +31,7 @@ fn panel(one: &Reliability) -> Panel {
     )
     .title(format!("calibration {}: {cases} diagnoses, error {error}", one.calibration))
     .with(Line::new(vec![(0.0, 0.0), (100.0, 100.0)], palette::GREY).dash(Dash::Dashed).label("it holds"))
-    .with(Scatter::new(one.bins.iter().map(point).collect::<Vec<_>>(), palette::BLUE).label("classes of 10 %"))
+    .with(
+        Scatter::new(one.bins.iter().map(point).collect::<Vec<_>>(), palette::BLUE).label("classes of 10 %"),
+    )
 }

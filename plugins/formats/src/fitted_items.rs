@@ -2,7 +2,9 @@
 
 use crate::labels::{percent, speed};
 use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, palette};
-use mapper_core::{CompressorMap, FittedLine, FittedMap, FittedNode, MapUnits, SpeedLine, confidence_interval_95};
+use mapper_core::{
+    CompressorMap, FittedLine, FittedMap, FittedNode, MapUnits, SpeedLine, confidence_interval_95,
+};
 use mapper_mesh::{SUBDIVISIONS, across, contour_levels, fitted_surface};
 
 const SURGE: palette::Colour = palette::VERMILLION;

@@ -100,8 +100,8 @@ fn efficiency_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
         Method::Dynamic | Method::Joint => "adiabatic efficiency, %",
         Method::Imported => "isentropic efficiency, %",
     };
-    let mut panel = Panel::new(flow_axis(units), Axis::new(name))
-        .title("(b) efficiency with its 95 % interval");
+    let mut panel =
+        Panel::new(flow_axis(units), Axis::new(name)).title("(b) efficiency with its 95 % interval");
     if let Some(fitted) = &map.fitted {
         fitted_items::add_eta(&mut panel, map, fitted);
     }

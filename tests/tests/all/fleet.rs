@@ -140,8 +140,10 @@ fn a_calibration_in_pieces_is_one_machines_and_judges_its_probabilities() {
 
     // One machine, one process.
     let (own, cases) = (folder.join("own.json"), folder.join("cases.json"));
-    let arguments = ["gap", "blind", "calibrate", "--seed", "5", "--nulls", "2", "--cases", "1", "--campaign"];
-    let files = [file.to_str().unwrap(), "--out", own.to_str().unwrap(), "--observed", cases.to_str().unwrap()];
+    let arguments =
+        ["gap", "blind", "calibrate", "--seed", "5", "--nulls", "2", "--cases", "1", "--campaign"];
+    let files =
+        [file.to_str().unwrap(), "--out", own.to_str().unwrap(), "--observed", cases.to_str().unwrap()];
     mapper(arguments.iter().chain(&files)).exits(0);
     assert!(of_fleet("observed.json") == std::fs::read(&cases).unwrap(), "the same diagnoses to the byte");
     assert!(of_fleet("calibration.json") == std::fs::read(&own).unwrap(), "the same calibration to the byte");

@@ -180,7 +180,10 @@ fn the_page_of_a_run_is_read_as_people_do() {
     assert!(column("sorted_up").is_sorted() && column("sorted_down").iter().rev().is_sorted());
     // The print is a PDF; heads of tables stand on each of its sheets, and at its foot whose map it is.
     assert_eq!(seen["heads_repeated"], true);
-    assert!(text.contains("@bottom-left{content:") && text.contains("TA\\2d 0001"), "the foot names the machine");
+    assert!(
+        text.contains("@bottom-left{content:") && text.contains("TA\\2d 0001"),
+        "the foot names the machine"
+    );
     assert!(std::fs::read(pictures.join("report.pdf")).unwrap().starts_with(b"%PDF"));
 }
 

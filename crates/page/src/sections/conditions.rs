@@ -4,7 +4,8 @@ use crate::prose::prose;
 use crate::run_page::RunPage;
 use crate::table::{facts, words_table};
 use mapper_report::{
-    CONDITION_HEADS, Display, INSTRUMENT_HEADS, INSTRUMENT_WORDS, condition_facts, condition_rows, instrument_rows,
+    CONDITION_HEADS, Display, INSTRUMENT_HEADS, INSTRUMENT_WORDS, condition_facts, condition_rows,
+    instrument_rows,
 };
 use maud::{Markup, html};
 

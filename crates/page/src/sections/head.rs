@@ -21,7 +21,7 @@ pub(crate) fn head(page: &RunPage<'_>) -> Markup {
             }
             section.verdict.clean[clean] aria-labelledby="verdict" {
                 h2 #verdict { (verdict_sentence(report.points.iter().map(|scored| &scored.point))) }
-                @if let Some(words) = key_figures(report) { p { (words) } }
+                @if let Some(words) = key_figures(report.map, report.points, report.campaign, report.plan) { p { (words) } }
                 @if things.is_empty() && clean {
                     p { "Nothing needs attention before the map is used." }
                 }

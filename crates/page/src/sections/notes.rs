@@ -4,7 +4,10 @@ use crate::prose::{prose, sentence};
 use crate::run_page::RunPage;
 use crate::table::{Cell, Row, data_table, words_table};
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_report::{Display, SurgeReport, doubts, repeated_jumps_text, score_text, surge_heads, surge_remarks, surge_rows, zero_rows, zero_words, ZERO_HEADS};
+use mapper_report::{
+    Display, SurgeReport, ZERO_HEADS, doubts, repeated_jumps_text, score_text, surge_heads, surge_remarks,
+    surge_rows, zero_rows, zero_words,
+};
 use maud::{Markup, html};
 
 pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {

@@ -3,9 +3,7 @@
 use crate::run_page::RunPage;
 use crate::table::{Cell, Row, data_table};
 use mapper_core::{IdentifiedPoint, Verdict};
-use mapper_report::{
-    Display, END_S, PointCell, point_cells, point_groups, point_heads, shared_errors_text,
-};
+use mapper_report::{Display, END_S, PointCell, point_cells, point_groups, point_heads, shared_errors_text};
 use maud::{Markup, html};
 
 pub(crate) fn points(page: &RunPage<'_>, display: &Display) -> Markup {

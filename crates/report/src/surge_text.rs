@@ -53,9 +53,11 @@ pub fn surge_columns_text(
     units: &DisplayUnits,
     truth: bool,
 ) -> String {
-    let unscored = |scored: &ScoredMark| ScoredMark { truth_flow_corrected_kg_s: None, ..scored.clone() };
-    let marks: Vec<ScoredMark> =
-        marks.iter().map(|scored| if truth { scored.clone() } else { unscored(scored) }).collect();
+    let shown = |scored: &ScoredMark| match truth {
+        true => *scored,
+        false => ScoredMark { truth_flow_corrected_kg_s: None, ..*scored },
+    };
+    let marks: Vec<ScoredMark> = marks.iter().map(shown).collect();
     let marks = marks.as_slice();
     let display = Display::new(units);
     let mut heads = [&units.speed, &units.flow, "+/- %", "PR", "+/-", "nearest %", "openings", "found by"]

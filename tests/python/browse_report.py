@@ -71,7 +71,7 @@ with sync_playwright() as playwright:
     result["clicked"], result["chosen"] = step, page.input_value("#step-choice")
     result["step_plots"] = count("#step-plots svg")
     result["step_words"] = page.text_content("#step-words")
-    table = page.locator("table.data").first
+    table = page.locator("#points table.data").first
     column = lambda: [float(text) for text in table.locator("tbody tr td:nth-child(5)").all_text_contents()]
     head = table.locator("thead th:nth-child(5) button")
     head.click()
@@ -96,6 +96,15 @@ with sync_playwright() as playwright:
     page.focus("#step-choice")
     page.keyboard.press("ArrowDown")
     result["by_keyboard"] = page.input_value("#step-choice") != step
+    page.close()
+    # Printed as it is opened, not as somebody has left it.
+    page = opened(browser, 1400, 1000, "dark")
+    # A button in a head would keep the head from being repeated on the next sheet.
+    page.emulate_media(media="print")
+    result["heads_repeated"] = page.evaluate(
+        "[...document.querySelectorAll('main thead button')].every(button => getComputedStyle(button).display === 'contents')"
+    )
+    page.emulate_media(media=None)
     page.pdf(path=folder / "report.pdf", format="A4", landscape=True)
     browser.close()
 

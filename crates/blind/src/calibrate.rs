@@ -98,7 +98,7 @@ pub fn calibrate(
     Ok(Some((fit(&shipped()?, &observed, made_by), observed)))
 }
 
-fn shipped() -> Result<Calibration, BlindError> {
+pub(crate) fn shipped() -> Result<Calibration, BlindError> {
     Calibration::shipped().map_err(BlindError::signatures)
 }
 

@@ -17,6 +17,7 @@ mod laboratory;
 mod logistic;
 mod make;
 mod outside;
+pub mod reliability;
 mod ruler;
 pub mod score;
 mod score_text;

@@ -9,6 +9,8 @@ pub struct Axis {
     pub low: Option<f64>,
     /// Upper end, in the axis' unit; `None` follows the data.
     pub high: Option<f64>,
+    /// Numbers at the axis are values times this, so that the title's unit may be another than that of what is drawn; `None`: 1.
+    pub written_times: Option<f64>,
     /// Ticks with their labels instead of round numbers, e.g. names of cases.
     pub ticks: Option<Vec<(f64, String)>>,
 }
@@ -28,6 +30,12 @@ impl Axis {
     /// Fixes the lower end alone, in the axis' unit.
     pub fn from(mut self, low: f64) -> Self {
         self.low = Some(low);
+        self
+    }
+
+    /// Writes values times `factor` at the axis. One that is not above 0 and finite counts as 1.
+    pub fn written_times(mut self, factor: f64) -> Self {
+        self.written_times = Some(factor);
         self
     }
 

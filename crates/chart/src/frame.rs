@@ -141,9 +141,11 @@ fn scale(axis: &Axis, data: Extent, target: usize) -> Scale {
     let ticks = match &axis.ticks {
         Some(ticks) => ticks.iter().filter(|t| t.0 >= low && t.0 <= high).cloned().collect(),
         None => {
-            let values = nice_ticks(low, high, target.max(2));
+            let factor =
+                axis.written_times.filter(|factor| factor.is_normal() && *factor > 0.0).unwrap_or(1.0);
+            let values = nice_ticks(low * factor, high * factor, target.max(2));
             let texts = labels(&values);
-            values.into_iter().zip(texts).collect()
+            values.into_iter().map(|value| value / factor).zip(texts).collect()
         }
     };
     Scale { low, high, ticks }

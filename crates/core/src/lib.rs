@@ -78,7 +78,7 @@ pub use jump::{Jump, Repeats};
 pub use limits::{Limits, SURGE_ALLOWED_S};
 pub use map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
 pub use map_columns::MAP_COLUMNS;
-pub use map_format::{MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, ReadMap, WriteMap};
+pub use map_format::{DrawMap, MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, MapUnits, ReadMap, WriteMap};
 pub use map_format_error::{ExportError, ImportError};
 pub use model_tolerances::ModelTolerances;
 pub use on_drift::OnDrift;

@@ -8,6 +8,34 @@ pub const MAP_FILE_SIZE_LIMIT: usize = 32 << 20;
 /// Turns a map into the bytes of a file. The same map gives the same bytes.
 pub type WriteMap = fn(&CompressorMap) -> Result<Vec<u8>, ExportError>;
 
+/// Turns a map into the bytes of a picture, its numbers in these units.
+pub type DrawMap = fn(&CompressorMap, &MapUnits) -> Result<Vec<u8>, ExportError>;
+
+/// Units in which a picture of a map is written; the map itself stays in kg/s and rpm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapUnits {
+    /// Unit of flows.
+    pub flow: String,
+    /// What a flow of 1 kg/s is in it, > 0.
+    pub flow_of_one_kg_s: f64,
+    /// Unit of speeds.
+    pub speed: String,
+    /// What a speed of 1 rpm is in it, > 0.
+    pub speed_of_one_rpm: f64,
+}
+
+impl Default for MapUnits {
+    /// kg/s and krpm.
+    fn default() -> Self {
+        MapUnits {
+            flow: "kg/s".to_owned(),
+            flow_of_one_kg_s: 1.0,
+            speed: "krpm".to_owned(),
+            speed_of_one_rpm: 1e-3,
+        }
+    }
+}
+
 /// Turns the text of a file into a map; the second argument is the reference state that the user names.
 ///
 /// A map without a reference state is refused: a wrong one shifts speeds by 1.7 % and more, and nobody sees it.
@@ -26,6 +54,8 @@ pub struct MapFormat {
     pub description: &'static str,
     /// Its writer, if maps can be written in it.
     pub write: Option<WriteMap>,
+    /// Its writer in other units, if it is a picture for people.
+    pub draw: Option<DrawMap>,
     /// Its reader, if maps can be read from it.
     pub read: Option<ReadMap>,
 }
@@ -48,6 +78,14 @@ impl MapFormat {
             Some(write) => write(map),
             None => Err(ExportError::OnlyRead { format: self.name }),
         }
+    }
+
+    /// The same, a picture for people in the units that they want shown.
+    ///
+    /// # Errors
+    /// As [`MapFormat::write`].
+    pub fn write_in(&self, map: &CompressorMap, units: &MapUnits) -> Result<Vec<u8>, ExportError> {
+        self.draw.map_or_else(|| self.write(map), |draw| draw(map, units))
     }
 
     /// The map in the bytes of a file; `given` is the reference state that the user names.

@@ -64,6 +64,23 @@ impl Metric {
         }
     }
 
+    /// What it is, for people.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Metric::GoodPoints => "points that are good",
+            Metric::EtaMean => "mean efficiency",
+            Metric::EtaTrueMean => "mean true efficiency",
+            Metric::EtaMedianError => "median error of the efficiency",
+            Metric::EtaWorstError => "largest error of the efficiency",
+            Metric::EtaCoverage => "intervals that hold the true efficiency",
+            Metric::HMean => "mean heat-transfer coefficient",
+            Metric::HTrueMean => "mean true heat-transfer coefficient",
+            Metric::HMedianError => "median error of the heat-transfer coefficient",
+            Metric::HWorstError => "largest error of the heat-transfer coefficient",
+            Metric::RigMinutes => "time on the rig",
+        }
+    }
+
     /// The figure of this name.
     pub fn find(name: &str) -> Option<Metric> {
         Metric::ALL.into_iter().find(|figure| figure.name() == name)

@@ -62,7 +62,11 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
         }
     }
     if spikes > 0 {
-        findings.remark(code::OUTLIERS, format!("{spikes} samples far from their neighbours are left out"));
+        let said = match spikes {
+            1 => "1 sample far from its neighbours is left out".to_owned(),
+            _ => format!("{spikes} samples far from their neighbours are left out"),
+        };
+        findings.remark(code::OUTLIERS, said);
     }
     if kept.iter().all(|keep| *keep) {
         return samples;

@@ -265,6 +265,7 @@ impl Feed {
                     what: channel.info().description,
                     unit: self.display.unit_of(*channel).to_owned(),
                     value: self.display.reading(*channel, *value),
+                    shown: self.display.shown_reading(*channel, *value),
                     low: bound(|guard| guard.below),
                     high: bound(|guard| guard.above),
                 }

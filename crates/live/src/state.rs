@@ -90,6 +90,8 @@ pub(crate) struct Reading {
     pub(crate) what: &'static str,
     pub(crate) unit: String,
     pub(crate) value: f64,
+    /// The value as reports write it.
+    pub(crate) shown: String,
     pub(crate) low: Option<f64>,
     pub(crate) high: Option<f64>,
 }

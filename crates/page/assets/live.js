@@ -41,7 +41,7 @@ function showNow() {
   byId("bar").value = over ? 1 : duration ? Math.min(1, now.t_s / (now.t_s + now.left_s || 1)) : 0;
   const paced = pace ? now.left_s / pace : null;
   const half = now.left_half_s >= 0.5 ? ` ± ${lasting(now.left_half_s)}` : "";
-  const done = paced == null ? "" : `, at about ${new Date(Date.now() + 1000 * paced).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" })}` + (pace === 1 ? "" : ` (the rig's time runs ${short(pace)} times as fast)`);
+  const done = paced == null ? "" : `, at about ${new Date(Date.now() + 1000 * paced).toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" })}` + (pace === 1 ? "" : ` (the rig's time runs ${short(pace)} times as fast)`);
   text("left", over ? "" : `${lasting(now.t_s)} of rig time done, ${lasting(now.left_s)}${half} to the end${done}.`);
   const pressed = { hold: now.holds || now.stops, "go-on": !now.holds, stop: now.stops, safe: false };
   document.querySelectorAll("button[data-ask]").forEach(button => { button.disabled = over || !connected || pressed[button.dataset.ask]; });
@@ -53,8 +53,8 @@ function showNow() {
     const near = (r.high != null && r.value > 0.95 * r.high) || (r.low != null && r.value < 1.05 * r.low);
     const beyond = (r.high != null && r.value > r.high) || (r.low != null && r.value < r.low);
     const state = r.high == null && r.low == null ? "no limit" : beyond ? "beyond" : near ? "near" : "within";
-    cells(row, [r.symbol, d3.format(".5~g")(r.value), r.unit, bound(r.low), bound(r.high), state, r.what]);
-    row.cells[5].className = beyond ? "unusable" : near && state !== "no limit" ? "doubtful" : "";
+    cells(row, [r.symbol, r.shown, r.unit, state, bound(r.low), bound(r.high), r.what]);
+    row.cells[3].className = beyond ? "unusable" : near && state !== "no limit" ? "doubtful" : "";
   });
   while (body.rows.length > now.readings.length) body.deleteRow(-1);
 }
@@ -69,11 +69,12 @@ function drawTraces() {
       figure.append(document.createElement("div"), document.createElement("figcaption"));
       box.append(figure);
     }
-    const [holder, caption] = figure.children, last = rows.at(-1);
-    caption.textContent = `${channel.name}, ${channel.unit}${last?.[i + 1] == null ? "" : `: ${d3.format(".5~g")(last[i + 1])}`}`;
+    const [holder, caption] = figure.children;
+    const reads = now?.readings.find(r => r.symbol === channel.name);
+    caption.textContent = reads ? `${channel.name} ${reads.shown} ${channel.unit}, ${reads.what}` : `${channel.name}, ${channel.unit}`;
     const seen = rows.filter(row => row[i + 1] != null);
     put(holder, Plot.plot({
-      width: widthOf(holder), height: 150, marginLeft: 56, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
+      width: widthOf(holder), height: 160, marginLeft: 56, marginBottom: 40, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
       x: { label: "rig time, min" }, y: { label: channel.unit, nice: true },
       marks: [Plot.gridY({ stroke: style("--grid"), strokeOpacity: 1 }), Plot.line(seen, { x: row => row[0] / 60, y: row => row[i + 1], stroke: style("--accent") })],
     }), `${channel.name} over the last minutes, in ${channel.unit}`);
@@ -83,8 +84,8 @@ function drawTraces() {
 function addPoint(p) {
   const row = byId("points").insertRow(0);
   row.dataset.step = p.step;
-  cells(row, [p.name, p.line, shown(p.flow, 2), shown(p.pr, 4), shown(p.eta, 2), shown(half(p.eta_low, p.eta_high), 2), shown(p.h, 0), p.verdict]);
-  row.lastChild.className = p.verdict;
+  cells(row, [p.name, p.line, shown(p.flow, 2), shown(p.pr, 4), shown(p.eta, 2), shown(half(p.eta_low, p.eta_high), 2), shown(p.h, 0), p.verdict, p.said[0] ?? ""]);
+  row.cells[7].className = p.verdict;
   row.addEventListener("click", () => choose(p.step));
 }
 
@@ -107,7 +108,7 @@ const take = {
     ({ now, rows, traced, steps, pace } = s);
     duration = s.duration_s;
     document.title = `${s.campaign}, live`;
-    text("title", `Run of ${s.campaign} on ${s.machine}`);
+    text("title", `Campaign ${s.campaign}, machine ${s.machine}`);
     text("speed-head", `speed ${s.units.speed}`);
     text("flow-head", `flow ${s.units.flow}`);
     Object.assign(page, { units: s.units, points: s.points, planned: s.planned, map: s.map });
@@ -173,7 +174,9 @@ async function follow() {
       }
       isConnected(false, "The connection is lost; the run goes on. Connecting again.");
     } catch (error) {
-      isConnected(false, `Not connected (${error.message}); the run goes on. Connecting again.`);
+      // What a browser calls a silence or a refused connection says nothing to people.
+      const why = error instanceof TypeError || error.name === "AbortError" ? "" : ` (${error.message})`;
+      isConnected(false, `Not connected${why}; the run goes on. Connecting again.`);
     } finally {
       clearTimeout(silent);
     }

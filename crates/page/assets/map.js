@@ -7,7 +7,7 @@ function words(p) {
     `step ${p.name}: ${p.line} ${page.units.speed}` + (p.valve == null ? "" : `, opening ${p.valve}`),
     `flow ${shown(p.flow, 2)} ± ${shown(p.flow_half, 2)} ${page.units.flow}`,
     `pressure ratio ${shown(p.pr, 4)} ± ${shown(p.pr_half, 4)}`,
-    `efficiency ${shown(p.eta, 2)} ± ${shown(half(p.eta_low, p.eta_high), 2)} %`,
+    p.eta == null ? "efficiency not known" : `efficiency ${shown(p.eta, 2)} ± ${shown(half(p.eta_low, p.eta_high), 2)} %`,
   ];
   if (p.eta_common != null) lines.push(`  common ${shown(p.eta_common, 2)}, own ${shown(p.eta_own, 2)}`);
   if (p.h != null) lines.push(`h ${shown(p.h, 0)} ± ${shown(half(p.h_low, p.h_high), 0)} W/(m² K)`);
@@ -39,6 +39,8 @@ function mapMarks() {
     for (const contour of page.map.contours) {
       for (const line of contour.paths) path(line, { stroke: style("--accent"), strokeOpacity: 0.55, strokeWidth: 0.9, className: "contour" });
       const longest = d3.greatest(contour.paths, line => line.length);
+      // A contour that is hardly longer than its number says more without it.
+      if (longest.length < 12) continue;
       const at = longest[Math.floor(longest.length / 2)];
       marks.push(Plot.text([at], { x: d => d[0], y: d => d[1], text: () => `${contour.eta}`, fill: style("--accent"), stroke: style("--ground"), strokeWidth: 3, fontSize: 10, clip: true }));
     }
@@ -48,7 +50,7 @@ function mapMarks() {
       for (const piece of runs(line.nodes, false)) path(piece, { stroke: line.measured ? ink : soft, strokeWidth: 1.2 });
       if (layer("extrapolated")) for (const piece of runs(line.nodes, true)) path(piece, { stroke: soft, strokeDasharray: "4 3", strokeWidth: 1 });
       const end = line.nodes.find(node => !node.out);
-      if (end) marks.push(Plot.text([end], { x: "flow", y: "pr", text: () => short(line.speed), dx: 4, dy: 6, textAnchor: "start", fill: soft, fontSize: 10, clip: true }));
+      if (end) marks.push(Plot.text([end], { x: "flow", y: "pr", text: () => short(line.speed), dx: 5, dy: 7, textAnchor: "start", fill: ink, stroke: style("--ground"), strokeWidth: 3, fontSize: 10 }));
     }
     path(page.map.surge, { stroke: style("--bad"), strokeDasharray: "6 3", strokeWidth: 1.6 });
     path(page.map.choke, { stroke: style("--doubt"), strokeDasharray: "2 3", strokeWidth: 1.6 });
@@ -65,12 +67,14 @@ function mapMarks() {
   return marks;
 }
 
+// The point whose transient is shown; on paper none is.
+const ringed = p => p.step === chosen && !("print" in root.dataset);
 const drawnPoints = () => page.points.filter(p => p.flow != null && (!p.repeat || layer("repeats")));
 const pointMarks = (data, y) => [
   Plot.dot(data, {
-    x: "flow", y, r: p => (p.step === chosen ? 7 : 4.5), symbol: p => (p.verdict === "good" ? "circle" : "diamond"),
-    fill: p => (p.eta == null ? "none" : lineColour(p.line)), stroke: p => (p.step === chosen ? style("--bad") : style("--ground")),
-    strokeWidth: p => (p.step === chosen ? 2.5 : 0.8), className: "points", clip: true,
+    x: "flow", y, r: p => (ringed(p) ? 7 : 4.5), symbol: p => (p.verdict === "good" ? "circle" : "diamond"),
+    fill: p => (p.eta == null ? "none" : lineColour(p.line)), stroke: p => (ringed(p) ? style("--bad") : style("--ground")),
+    strokeWidth: p => (ringed(p) ? 2.5 : 0.8), className: "points", clip: true,
   }),
   Plot.tip(data, Plot.pointer({ x: "flow", y, title: words, fill: style("--ground"), stroke: style("--line"), fontSize: 12, lineWidth: innerWidth < 700 ? 24 : 42 })),
 ];
@@ -96,7 +100,7 @@ function drawMap() {
     ? [Plot.ruleY(data, { y: "pr", x1: p => p.flow - p.flow_half, x2: p => p.flow + p.flow_half, stroke: p => lineColour(p.line), strokeOpacity: 0.7, clip: true })]
     : [];
   const plot = Plot.plot({
-    width, height, marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
+    width, height, marginLeft: 48, marginRight: 26, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
     x: { domain: view.x, label: `corrected flow, ${page.units.flow}` }, y: { domain: view.y, label: "total pressure ratio P2/P1" },
     marks: [...mapMarks(), Plot.dot(ahead, { x: "flow", y: "pr", r: 3, stroke: style("--soft"), clip: true }), ...intervals, ...pointMarks(data, "pr")],
   });
@@ -130,6 +134,9 @@ function drawEta() {
       const name = d3.least(lineNames, n => Math.abs(n - line.speed));
       marks.push(Plot.areaY(nodes, { x: "flow", y1: n => n.eta - n.half, y2: n => n.eta + n.half, fill: lineColour(name), fillOpacity: 0.15, clip: true }));
       marks.push(Plot.line(nodes, { x: "flow", y: "eta", stroke: lineColour(name), clip: true }));
+      // Its speed stands where the line ends towards choke, or where it leaves what is drawn.
+      const end = d3.greatest(nodes, n => n.flow);
+      if (end) marks.push(Plot.text([end], { x: "flow", y: "eta", text: () => short(line.speed), dy: 14, textAnchor: "middle", fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3, fontSize: 10 }));
     }
   if (layer("intervals")) marks.push(Plot.ruleX(data.filter(p => p.eta_low != null), { x: "flow", y1: "eta_low", y2: "eta_high", stroke: p => lineColour(p.line) }));
   if (layer("dynamic")) {
@@ -167,16 +174,30 @@ function drawPlan() {
     if (near) near.steps.push(p.step + 1);
     else places.push({ flow: p.flow, pr: p.pr, steps: [p.step + 1] });
   }
+  // A number that would stand on another one is left to the table.
+  const height = Math.round(0.6 * width), boxes = [];
+  const pixel = p => [(p.flow - d3.min(stops, q => q.flow)) / flowSpan * (width - 96), (d3.max(stops, q => q.pr) - p.pr) / prSpan * (height - 90)];
+  for (const p of places) {
+    const [x, y] = pixel(p), wide = 3.4 * p.steps.join(", ").length;
+    p.named = boxes.every(([left, right, at]) => Math.abs(at - y) > 10 || x - wide > right || x + wide < left);
+    if (p.named) boxes.push([x - wide, x + wide, y]);
+  }
   const plot = Plot.plot({
-    width, height: Math.round(0.6 * width), marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
+    width, height, marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
     x: { label: `corrected flow, ${page.units.flow}`, inset: 14 }, y: { label: "total pressure ratio P2/P1", inset: 14 },
     marks: [
       Plot.arrow([...jumps].reverse(), { x1: d => d.from.flow, y1: d => d.from.pr, x2: d => d.to.flow, y2: d => d.to.pr, stroke: d => shade(d.i), strokeWidth: d => (d.i < 5 ? 2 : 1), bend: 12, inset: 5, headLength: 6 }),
       Plot.dot(places, { x: "flow", y: "pr", fill: style("--ground"), stroke: style("--ink"), r: 3.5 }),
-      Plot.text(places, { x: "flow", y: "pr", text: p => p.steps.join(", "), dy: -9, fontSize: 10, fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3 }),
+      Plot.text(places.filter(p => p.named), { x: "flow", y: "pr", text: p => p.steps.join(", "), dy: -9, fontSize: 10, fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3 }),
     ],
   });
   put(element, plot, `The ${jumps.length} jumps of the plan in their order; the table below lists them.`);
 }
+
+// Which dashed lines are whose.
+page.others.forEach((other, index) => {
+  const box = document.querySelector(`input[name=layer][value=other${index}]`);
+  if (box) box.parentElement.style.borderBottom = `2px dashed ${d3.schemeTableau10[index % 10]}`;
+});
 
 redrawn.push(drawMap, drawEta, drawPlan);

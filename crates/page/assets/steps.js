@@ -6,6 +6,23 @@ function frame(element, options) {
   return { width, height: 250, marginTop: 30, marginLeft: 56, marginBottom: 36, style: { background: "transparent", color: style("--ink"), fontSize: "12px" }, ...options };
 }
 
+// What is known of a point, a line each.
+function stepWords(step, p) {
+  const sentence = text => text[0].toUpperCase() + text.slice(1) + (/[.!?]$/.test(text) ? "" : ".");
+  const both = p.eta_common == null ? "" : `; of it common to all points ± ${shown(p.eta_common, 2)}, its own ± ${shown(p.eta_own, 2)}`;
+  const model = step.model;
+  return [
+    `Step ${p.name}, ${p.verdict}: ${p.line} ${page.units.speed} corrected` + (p.valve == null ? "" : `, opening ${p.valve}`),
+    (p.eta == null ? "efficiency not known" : `efficiency ${shown(p.eta, 2)} ± ${shown(half(p.eta_low, p.eta_high), 2)} %${both}`) +
+      (p.dynamic ? `; by the two-parameter method ${shown(p.dynamic[0], 2)} %` : ""),
+    `corrected flow ${shown(p.flow, 2)} ± ${shown(p.flow_half, 2)} ${page.units.flow}, pressure ratio ${shown(p.pr, 4)} ± ${shown(p.pr_half, 4)}` +
+      (p.h == null ? "" : `, h ${shown(p.h, 0)} ± ${shown(half(p.h_low, p.h_high), 0)} W/(m² K)`),
+    p.raw.length ? `read at the end: ${p.raw.join(", ")}` : null,
+    model ? `the model of T2 with these numbers leaves ${shown(model.rms_k, 3)} K rms, after its mean was shifted by ${shown(model.shift_k, 3)} K` : null,
+    ...p.said.map(sentence),
+  ].filter(Boolean);
+}
+
 function drawStep() {
   const step = page.steps.find(s => s.step === chosen), point = page.points.find(p => p.step === chosen);
   const box = byId("step-plots");
@@ -13,8 +30,9 @@ function drawStep() {
   document.querySelectorAll("tr[data-step]").forEach(row => row.classList.toggle("chosen", Number(row.dataset.step) === chosen));
   if (!step || !point) { box.replaceChildren(); byId("step-words").textContent = "Nothing was read in this step."; return; }
   const model = step.model;
-  byId("step-words").textContent = `${words(point).split("\n").map(line => line.trim()).join("; ")}. ` +
-    (model ? `Model of T2 with these numbers held constant: ${shown(model.rms_k, 3)} K rms left, after its mean was shifted by ${shown(model.shift_k, 3)} K. ` : "") + point.said.join(" ");
+  const list = document.createElement("ul");
+  list.append(...stepWords(step, point).map(words => { const item = document.createElement("li"); item.textContent = words; return item; }));
+  byId("step-words").replaceChildren(list);
   const figures = [];
   const add = (names, title, extra) => {
     const channels = names.map(name => step.channels.find(c => c.name === name)).filter(Boolean);

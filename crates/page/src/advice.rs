@@ -2,14 +2,15 @@
 
 use crate::run_page::RunPage;
 use mapper_core::Verdict;
-use mapper_report::{RunReport, disagreement_text, doubts};
+use mapper_identify::ZeroOutcome;
+use mapper_report::{RunReport, disagreement_text, doubts, zero_words};
 
 /// Whether the map can be handed on as it is.
 pub(crate) fn is_clean(page: &RunPage<'_>) -> bool {
     let report = page.report;
     !report.points.is_empty()
         && report.points.iter().all(|scored| scored.point.verdict == Verdict::Good)
-        && page.map.is_some()
+        && page.report.map.is_some()
 }
 
 /// What to do first, in order of weight, each a sentence.
@@ -24,6 +25,9 @@ pub(crate) fn first_things(report: &RunReport<'_>) -> Vec<String> {
         &report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default(),
     ) {
         things.push(text.trim_end().to_owned());
+    }
+    if let (ZeroOutcome::Refused(_), Some(words)) = (report.zero, zero_words(report.zero)) {
+        things.push(words);
     }
     let of = |verdict| {
         report.points.iter().map(|scored| &scored.point).filter(move |point| point.verdict == verdict)

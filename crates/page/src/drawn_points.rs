@@ -1,11 +1,10 @@
 //! Points as the script draws them, in the units that are shown.
 
 use crate::run_page::RunPage;
-use crate::sections::points::at_end;
 use mapper_campaign::units::Kind;
 use mapper_core::{Channel, IdentifiedPoint, half_width_95, standard_error_of};
 use mapper_identify::TwoParameter;
-use mapper_report::{Display, step_name, verdict_word};
+use mapper_report::{Display, at_end, step_name, verdict_word};
 use serde::Serialize;
 
 /// Channels whose readings stand beside a point.
@@ -56,7 +55,7 @@ pub(crate) struct DrawnPoint {
 /// All points, repeats included.
 pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPoint> {
     let line_of = |step: usize| {
-        let lines = page.map.into_iter().flat_map(|map| &map.lines);
+        let lines = page.report.map.into_iter().flat_map(|map| &map.lines);
         let own = lines.filter(|line| line.points.iter().any(|point| point.identified.step == step));
         own.map(|line| line.speed_corrected_rpm).next()
     };
@@ -116,8 +115,8 @@ fn declared(half: f64) -> Option<f64> {
 
 /// Readings at the end of a step, symbol, value and unit.
 fn raw(page: &RunPage<'_>, step: usize, display: &Display) -> Vec<String> {
-    let marker = page.recording.steps.iter().find(|marker| marker.index == step);
-    let read = |channel| marker.and_then(|marker| at_end(page.recording, marker, channel));
+    let marker = page.report.recording.steps.iter().find(|marker| marker.index == step);
+    let read = |channel| marker.and_then(|marker| at_end(page.report.recording, marker, channel));
     let shown = |channel: Channel| {
         let value = read(channel)?;
         let text = match channel {

@@ -53,7 +53,7 @@ struct DrawnModel {
 
 /// All steps that a point comes from.
 pub(crate) fn drawn_steps(page: &RunPage<'_>, display: &Display) -> Vec<DrawnStep> {
-    let markers = page.recording.steps.iter();
+    let markers = page.report.recording.steps.iter();
     markers
         .filter_map(|marker| {
             let point = page
@@ -67,7 +67,7 @@ pub(crate) fn drawn_steps(page: &RunPage<'_>, display: &Display) -> Vec<DrawnSte
                 .window
                 .map(|window| [window.start_s, window.end_s].map(|t_s| rounded(t_s - marker.start_s)));
             let model = course.map(|course| drawn_model(course, marker, display));
-            Some(DrawnStep { window, model, ..drawn_step(page.recording, marker, display) })
+            Some(DrawnStep { window, model, ..drawn_step(page.report.recording, marker, display) })
         })
         .collect()
 }

@@ -12,6 +12,7 @@ mod drawn_points;
 mod drawn_steps;
 mod live_page;
 mod page;
+mod prose;
 mod run_page;
 mod sections;
 mod shell;

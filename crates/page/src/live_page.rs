@@ -58,7 +58,7 @@ pub fn live_page() -> Result<String, serde_json::Error> {
         lines: [],
         planned: [],
     };
-    shell("A run of mapper, live", Purpose::Live, &empty, &live::live())
+    shell("A run of mapper, live", "A run of mapper, live", Purpose::Live, &empty, &live::live())
 }
 
 /// A point that was identified by itself, on the line of its target.

@@ -48,7 +48,7 @@ pub fn run_page(page: &RunPage<'_>) -> Result<String, serde_json::Error> {
             temperature: units.temperature.clone(),
         },
         points: drawn_points(page, &display),
-        map: page.map.map(|map| drawn_map(map, &display)).unwrap_or_default(),
+        map: page.report.map.map(|map| drawn_map(map, &display)).unwrap_or_default(),
         steps: drawn_steps(page, &display),
         others: page
             .others
@@ -61,6 +61,7 @@ pub fn run_page(page: &RunPage<'_>) -> Result<String, serde_json::Error> {
         main {
             (sections::map::map(page))
             (sections::step::step(page))
+            (sections::conditions::conditions(page, &display))
             (sections::points::points(page, &display))
             (sections::plan::plan(page, &display))
             (sections::gap::gap(page))
@@ -68,5 +69,9 @@ pub fn run_page(page: &RunPage<'_>) -> Result<String, serde_json::Error> {
             (sections::provenance::provenance(page))
         }
     };
-    shell(&format!("Compressor map of {}", report.machine), Purpose::Kept, &drawn, &body)
+    let title = format!("Compressor map of {}", report.machine);
+    let serial = report.campaign.and_then(|campaign| campaign.machine.serial_number.as_deref());
+    let parts = [Some(title.as_str()), serial, report.tested_at, Some(report.program)];
+    let footer = parts.into_iter().flatten().collect::<Vec<_>>().join(" · ");
+    shell(&title, &footer, Purpose::Kept, &drawn, &body)
 }

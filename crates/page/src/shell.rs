@@ -43,9 +43,10 @@ impl Purpose {
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; \
                       base-uri 'none'; form-action 'none'";
 
-/// The whole page; `data` is what its script draws.
+/// The whole page; `footer` stands on each sheet of its print, `data` is what its script draws.
 pub(crate) fn shell(
     title: &str,
+    footer: &str,
     purpose: Purpose,
     data: &impl Serialize,
     body: &Markup,
@@ -59,7 +60,7 @@ pub(crate) fn shell(
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 title { (title) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(STYLE)) (PreEscaped(footer_style(footer))) }
             }
             body {
                 (body)
@@ -71,6 +72,19 @@ pub(crate) fn shell(
         }
     };
     Ok(page.into_string())
+}
+
+/// What stands at the foot of each sheet, and which sheet of how many it is.
+fn footer_style(footer: &str) -> String {
+    // Whatever a name holds: by its number no letter ends a string or an element.
+    let text: String = footer
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c.to_string() } else { format!("\\{:x} ", u32::from(c)) })
+        .collect();
+    format!(
+        "@media print{{@page{{@bottom-left{{content:\"{text}\"}}@bottom-right{{content:\"sheet \" counter(page) \" of \" \
+         counter(pages)}}}}}}"
+    )
 }
 
 /// JSON that ends no element, whatever its strings hold.
@@ -102,8 +116,10 @@ mod tests {
     #[test]
     fn hostile_names_stay_text() {
         let hostile = "</script><script>alert(1)</script>";
-        let page = shell(hostile, Purpose::Kept, &[hostile], &html! { h1 { (hostile) } }).unwrap();
+        let page = shell(hostile, hostile, Purpose::Kept, &[hostile], &html! { h1 { (hostile) } }).unwrap();
         assert!(!page.contains("<script>alert"), "markup of a name got into the page");
+        let style = page.split("<style>").nth(1).unwrap().split("</style>").next().unwrap();
+        assert!(style.contains("sheet \" counter(page)"), "the name ends the style");
         let data = page.split("id=\"data\">").nth(1).unwrap().split("</script>").next().unwrap();
         assert_eq!(serde_json::from_str::<Vec<String>>(data).unwrap(), [hostile]);
     }

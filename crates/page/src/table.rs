@@ -53,8 +53,25 @@ pub(crate) fn data_table(caption: &str, heads: &[String], rows: &[Row]) -> Marku
     }
 }
 
+/// A table whose first two columns are words, made sortable as all are.
+pub(crate) fn words_table<const COLUMNS: usize>(
+    caption: &str,
+    heads: &[&str; COLUMNS],
+    rows: &[[String; COLUMNS]],
+) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(caption) {
+            table.data.words {
+                caption { (caption) }
+                thead { tr { @for head in heads { th scope="col" { (head) } } } }
+                tbody { @for row in rows { tr { @for cell in row { td { (cell) } } } } }
+            }
+        }
+    }
+}
+
 /// What and its value, a row each.
-pub(crate) fn facts(caption: &str, rows: &[(String, String)]) -> Markup {
+pub(crate) fn facts(caption: &str, rows: &[(&str, String)]) -> Markup {
     html! {
         table.facts {
             caption { (caption) }

@@ -50,6 +50,31 @@ impl Display {
         }
     }
 
+    /// A reading of a channel as it is shown, without its unit.
+    pub fn shown_reading(&self, channel: Channel, inside: f64) -> String {
+        match kind_of(channel) {
+            Kind::Speed => self.speed(inside),
+            Kind::MassFlow => self.flow(inside),
+            Kind::Pressure => self.pressure(inside),
+            Kind::Temperature => self.temperature(inside),
+            _ => format!("{inside:.3}"),
+        }
+    }
+
+    /// The unit in which differences between readings of a channel are shown: K for temperatures.
+    pub fn difference_unit(&self, channel: Channel) -> &str {
+        if kind_of(channel) == Kind::Temperature { "K" } else { self.unit_of(channel) }
+    }
+
+    /// A difference between readings of a channel in that unit; `None` for none.
+    pub fn difference(&self, channel: Channel, inside: f64) -> Option<f64> {
+        let shown = match kind_of(channel) {
+            Kind::Temperature => inside,
+            kind => self.number(kind, inside) - self.number(kind, 0.0),
+        };
+        Some(shown).filter(|shown| shown.is_finite() && *shown != 0.0)
+    }
+
     fn in_unit(kind: Kind, symbol: &str, inside: f64) -> f64 {
         // A checked campaign names only units that exist; anything else is shown in SI.
         kind.unit(symbol).map_or(inside, |unit| unit.from_inside(inside))
@@ -67,6 +92,11 @@ impl Display {
     /// A shaft speed.
     pub fn speed(&self, speed_rpm: f64) -> String {
         Self::shown(Kind::Speed, &self.units.speed, speed_rpm, if self.units.speed == "krpm" { 2 } else { 0 })
+    }
+
+    /// An operating point in words: speed with its unit, opening.
+    pub fn place_in_words(&self, point: OperatingPoint) -> String {
+        format!("{} {}, opening {}", self.speed(point.speed_rpm), self.units.speed, point.shown().1)
     }
 
     /// An operating point: speed and opening.

@@ -9,24 +9,121 @@ pub struct Doubt<'a> {
     steps: Vec<usize>,
     /// What kind of doubt it is.
     pub code: &'a str,
-    /// The sentence.
-    pub message: &'a str,
+    /// The sentence; a number that is not the same at all steps as its range.
+    pub message: String,
 }
 
-/// What is said of the points, in order of the first step of each.
+/// What is said of the points, in order of the first step of each. Sentences that differ in their numbers alone are one, with
+/// the range of each number: what a single step says stands with its point.
 pub fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doubt<'a>> {
-    let mut doubts: Vec<Doubt<'a>> = Vec::new();
+    let mut said: Vec<Said<'a>> = Vec::new();
     for point in points {
         let step = point.step + 1;
         for warning in &point.warnings {
-            let (code, message) = (warning.code.as_ref(), warning.message.as_str());
-            match doubts.iter_mut().find(|doubt| doubt.code == code && doubt.message == message) {
-                Some(known) => known.steps.push(step),
-                None => doubts.push(Doubt { steps: vec![step], code, message }),
+            let (code, pieces) = (warning.code.as_ref(), pieces(&warning.message));
+            match said.iter_mut().find(|known| known.code == code && are_alike(&known.pieces, &pieces)) {
+                Some(known) => known.add(step, &pieces),
+                None => said.push(Said { steps: vec![step], code, pieces }),
             }
         }
     }
-    doubts
+    said.into_iter().map(Said::doubt).collect()
+}
+
+/// A sentence in pieces, and the steps that say it.
+struct Said<'a> {
+    steps: Vec<usize>,
+    code: &'a str,
+    pieces: Vec<Piece<'a>>,
+}
+
+/// A piece of a sentence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Piece<'a> {
+    Words(&'a str),
+    /// A number as it is written, smallest and largest so far.
+    Number(&'a str, &'a str),
+}
+
+impl<'a> Said<'a> {
+    fn add(&mut self, step: usize, pieces: &[Piece<'a>]) {
+        if self.steps.last() != Some(&step) {
+            self.steps.push(step);
+        }
+        for (known, new) in self.pieces.iter_mut().zip(pieces) {
+            let (Piece::Number(low, high), Piece::Number(this, _)) = (known, new) else { continue };
+            if value(this) < value(low) {
+                *low = this;
+            }
+            if value(this) > value(high) {
+                *high = this;
+            }
+        }
+    }
+
+    fn doubt(self) -> Doubt<'a> {
+        let word = |piece: &Piece<'_>| match piece {
+            Piece::Words(words) => (*words).to_owned(),
+            Piece::Number(low, high) if value(low) == value(high) => (*low).to_owned(),
+            Piece::Number(low, high) => format!("{low} to {high}"),
+        };
+        Doubt { message: self.pieces.iter().map(word).collect(), steps: self.steps, code: self.code }
+    }
+}
+
+fn value(number: &str) -> f64 {
+    number.parse().unwrap_or(f64::NAN)
+}
+
+/// Whether two sentences differ in their numbers alone.
+fn are_alike(a: &[Piece<'_>], b: &[Piece<'_>]) -> bool {
+    a.len() == b.len()
+        && a.iter().zip(b).all(|(a, b)| match (a, b) {
+            (Piece::Words(a), Piece::Words(b)) => a == b,
+            (Piece::Number(..), Piece::Number(..)) => true,
+            _ => false,
+        })
+}
+
+/// Words and numbers by turns. A digit behind a letter belongs to a name (`T2`), and so does what touches a letter (`95krpm`).
+fn pieces(sentence: &str) -> Vec<Piece<'_>> {
+    let mut pieces = Vec::new();
+    let (mut words, mut at) = (0, 0);
+    while at < sentence.len() {
+        let rest = &sentence[at..];
+        let stands_free = !sentence[..at].ends_with(|c: char| c.is_alphanumeric() || "_.@-+".contains(c));
+        let length = if stands_free { number_length(rest) } else { 0 };
+        if length == 0 {
+            at += rest.chars().next().map_or(1, char::len_utf8);
+            continue;
+        }
+        if words < at {
+            pieces.push(Piece::Words(&sentence[words..at]));
+        }
+        pieces.push(Piece::Number(&rest[..length], &rest[..length]));
+        at += length;
+        words = at;
+    }
+    if words < sentence.len() {
+        pieces.push(Piece::Words(&sentence[words..]));
+    }
+    pieces
+}
+
+/// Bytes of the decimal number that a text begins with; 0 where it begins with none.
+fn number_length(text: &str) -> usize {
+    let sign = usize::from(text.starts_with(['+', '-']));
+    let digits = |from: usize| text[from..].bytes().take_while(u8::is_ascii_digit).count();
+    let whole = digits(sign);
+    if whole == 0 {
+        return 0;
+    }
+    let mut length = sign + whole;
+    if text[length..].starts_with('.') && digits(length + 1) > 0 {
+        length += 1 + digits(length + 1);
+    }
+    let touches = text[length..].starts_with(|c: char| c.is_alphanumeric() || "_@".contains(c));
+    if touches { 0 } else { length }
 }
 
 impl Doubt<'_> {
@@ -60,8 +157,36 @@ mod tests {
 
     #[test]
     fn neighbours_are_a_range_and_pairs_are_not() {
-        let of = |steps: &[usize]| Doubt { steps: steps.to_vec(), code: "", message: "" }.steps();
+        let of = |steps: &[usize]| Doubt { steps: steps.to_vec(), code: "", message: String::new() }.steps();
         assert_eq!(of(&[3]), "step 3");
         assert_eq!(of(&[2, 5, 6, 7, 9, 10]), "steps 2, 5 to 7, 9, 10");
+    }
+
+    /// The sentence of all steps, as it would be said of them one after the other.
+    fn said(sentences: &[&'static str]) -> Vec<String> {
+        let mut said: Vec<Said<'_>> = Vec::new();
+        for (step, sentence) in sentences.iter().enumerate() {
+            let pieces = pieces(sentence);
+            match said.iter_mut().find(|known| are_alike(&known.pieces, &pieces)) {
+                Some(known) => known.add(step, &pieces),
+                None => said.push(Said { steps: vec![step], code: "", pieces }),
+            }
+        }
+        said.into_iter().map(|said| said.doubt().message).collect()
+    }
+
+    #[test]
+    fn sentences_that_differ_in_numbers_are_one_with_their_range() {
+        let moved = ["T2 moves by -21.4 K, 95 % of it in 3 s", "T2 moves by +9.5 K, 95 % of it in 12 s"];
+        assert_eq!(said(&moved), ["T2 moves by -21.4 to +9.5 K, 95 % of it in 3 to 12 s"]);
+        assert_eq!(said(&["flow is 1.5.", "flow is 2."]), ["flow is 1.5 to 2."]);
+    }
+
+    /// Names are no numbers: T2 is not T1, and 95krpm@1 is one place.
+    #[test]
+    fn names_keep_sentences_apart() {
+        for pair in [["T1 is off", "T2 is off"], ["at 95krpm@1", "at 50krpm@1"], ["by µ 2K", "by µ 3K"]] {
+            assert_eq!(said(&pair), pair);
+        }
     }
 }

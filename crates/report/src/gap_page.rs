@@ -84,7 +84,8 @@ fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
         (heading("Which"))
         (causes(done))
         (heading("Where"))
-        (places(done))
+        @if diagnosis.r#where.is_empty() { p { "No part departs from the model by more than noise." } }
+        @else { (places(done)) }
         (PreEscaped(map_of_where(done)))
         @if !diagnosis.forces.is_empty() {
             (heading("Missing forces, each as if it were the only one"))

@@ -58,11 +58,8 @@ pub fn history_svg(
     ));
     for figure in figures {
         let (unit, factor) = figure.shown_unit();
-        let mut panel = Panel::new(
-            Axis::new("night (UTC)").ticks(dates(first_ms, last_ms)),
-            Axis::new(format!("{figure}, {unit}")),
-        )
-        .title(figure.name());
+        let mut panel = Panel::new(Axis::new("night (UTC)").ticks(dates(first_ms, last_ms)), Axis::new(unit))
+            .title(format!("{}, {unit} ({figure})", figure.in_words()));
         let (mut rings, mut of_points) = (Vec::new(), Vec::new());
         for ((campaign, method), colour) in lines.iter().zip(COLOURS.iter().cycle()) {
             let mut nights: BTreeMap<(i64, i64), (bool, &str, Vec<f64>)> = BTreeMap::new();

@@ -13,9 +13,9 @@ pub fn repeated_jumps_text(jumps: &[RepeatedJump], display: &Display) -> String 
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,
-            "Repeats {} to {}: eta {} %; from first to last {:+.2} points (standard error from noise {}).",
-            display.place(jump.from),
-            display.place(jump.to),
+            "Repeats of the jump from {} to {}: efficiency {} %; from first to last {:+.2} points (standard error from noise {} points).",
+            display.place_in_words(jump.from),
+            display.place_in_words(jump.to),
             found.join(", "),
             100.0 * jump.eta_change,
             percent(jump.eta_change_standard_error, 2),

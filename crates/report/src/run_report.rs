@@ -1,22 +1,30 @@
 //! The test report of a run, as Markdown.
 
+use crate::conditions::{CONDITION_HEADS, condition_rows};
 use crate::disagreement::disagreement_text;
 use crate::display::Display;
 use crate::doubts::doubts;
 use crate::duration::duration;
+use crate::instruments::{INSTRUMENT_HEADS, INSTRUMENT_WORDS, instrument_rows};
+use crate::key_figures::key_figures;
+use crate::lines_of_points::verdict_sentence;
 use crate::markdown::{self, Align};
-use crate::number::{number, percent};
-use crate::points::{opening, score_text, step_name, verdict_word};
+use crate::point_table::{point_cells, point_groups, point_heads};
+use crate::points::score_text;
 use crate::repeated_jumps::repeated_jumps_text;
 use crate::shared_errors::shared_errors_text;
 use crate::surge_text::surge_text;
+use crate::zero_text::{ZERO_HEADS, zero_rows, zero_words};
 use mapper_assemble::RepeatedJump;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{Event, Method, Plan, ReferenceState};
-use mapper_identify::TwoParameter;
+use mapper_core::{
+    Channel, CompressorMap, DeclaredUncertainty, Event, Method, Plan, Recording, ReferenceState,
+};
+use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_observe::FusedChannel;
 use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Everything a test report needs.
@@ -27,6 +35,16 @@ pub struct RunReport<'a> {
     pub campaign: Option<&'a Campaign>,
     /// What was run; `None` where nobody planned it here.
     pub plan: Option<&'a Plan>,
+    /// When the test was run, as it is to be shown; `None` where nobody knows.
+    pub tested_at: Option<&'a str>,
+    /// Program, version and commit.
+    pub program: &'a str,
+    /// The map; `None` where there is none.
+    pub map: Option<&'a CompressorMap>,
+    /// What was read, as it was identified.
+    pub recording: &'a Recording,
+    /// Uncertainty of each channel with which the points were identified.
+    pub used: &'a BTreeMap<Channel, DeclaredUncertainty>,
     /// What the points were identified from; of a run, whose directory has its recording, nothing.
     pub sources: &'a [ReportSource],
     /// How the run ended, in a sentence.
@@ -47,6 +65,8 @@ pub struct RunReport<'a> {
     pub repeats: &'a [RepeatedJump],
     /// What the two-parameter method makes of the same steps, where another method was used.
     pub two_parameter: &'a [TwoParameter],
+    /// What came of the isothermal zero.
+    pub zero: &'a ZeroOutcome,
     /// What became of channels with several sensors.
     pub sensors: &'a [FusedChannel],
     /// How far the points are from the simulator's truth; `None` on a real rig.
@@ -97,15 +117,20 @@ pub fn run_report(report: &RunReport<'_>) -> String {
         score,
         surge,
         has_picture,
+        recording,
         ..
     } = *report;
     let units = campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
+    let display = Display::new(&units);
     // Writing to a String cannot fail, here and below.
     let mut text = format!("# Compressor map of {machine}\n\n");
     if let Some(disagreement) = disagreement_text(points, two_parameter, &units) {
         let _ = writeln!(text, "**{}**\n", disagreement.trim_end());
     }
-    let _ = writeln!(text, "{outcome}\n");
+    let _ = writeln!(text, "**{}** {outcome}\n", verdict_sentence(points.iter().map(|scored| &scored.point)));
+    if let Some(words) = key_figures(report.map, points, campaign, report.plan) {
+        let _ = writeln!(text, "{words}\n");
+    }
     for remark in remarks {
         let _ = writeln!(text, "- {remark}");
     }
@@ -115,9 +140,13 @@ pub fn run_report(report: &RunReport<'_>) -> String {
     if has_picture {
         text.push_str("![map](map.svg)\n\n");
     }
-    let rows: Vec<[String; 2]> =
-        head_rows(report).into_iter().map(|(what, value)| [what.to_owned(), value]).collect();
-    text.push_str(&markdown::table(&["", ""], Align::Left, &rows));
+    text.push_str("## Conditions\n\n");
+    text.push_str(&facts(&condition_facts(report)));
+    let rows = condition_rows(campaign, recording, &display);
+    if !rows.is_empty() {
+        text.push_str("\nRead at the ends of the steps:\n\n");
+        text.push_str(&markdown::table(&CONDITION_HEADS, Align::Left, &rows));
+    }
     text.push('\n');
     if !sources.is_empty() {
         // Steps are counted through all recordings.
@@ -127,14 +156,10 @@ pub fn run_report(report: &RunReport<'_>) -> String {
         text.push_str(&markdown::table(&["recording", "begins", "lasts", "steps"], Align::Left, &rows));
         text.push('\n');
     }
-    if let Some(calibration) =
-        campaign.map(|campaign| &campaign.report.calibration).filter(|days| !days.is_empty())
-    {
-        let calibrated = calibration.iter();
-        let rows: Vec<[String; 2]> = calibrated
-            .map(|(channel, day)| [format!("{channel} ({})", channel.info().description), day.to_string()])
-            .collect();
-        text.push_str(&markdown::table(&["sensor", "last calibration"], Align::Left, &rows));
+    if let Some(campaign) = campaign {
+        let rows = instrument_rows(campaign, report.used, &display);
+        let _ = writeln!(text, "## Instruments\n\n{INSTRUMENT_WORDS}\n");
+        text.push_str(&markdown::table(&INSTRUMENT_HEADS, Align::Left, &rows));
         text.push('\n');
     }
     if !sensors.is_empty() {
@@ -147,9 +172,13 @@ pub fn run_report(report: &RunReport<'_>) -> String {
     if let Some(score) = score {
         let _ = writeln!(text, "{}", score_text(score));
     }
-    points_section(&mut text, &units, points);
+    points_section(&mut text, &units, report);
     if let Some(SurgeReport { marks, remarks, surges }) = surge {
         let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, surges, &units));
+    }
+    if let Some(words) = zero_words(report.zero) {
+        let _ = writeln!(text, "\n## Isothermal zero\n\n{words}\n");
+        text.push_str(&markdown::table(&ZERO_HEADS, Align::Left, zero_rows(report.zero, &display)));
     }
     if !repeats.is_empty() {
         let sentences = repeated_jumps_text(repeats, &Display::new(&units));
@@ -166,6 +195,7 @@ pub fn run_report(report: &RunReport<'_>) -> String {
     for event in events {
         let _ = writeln!(text, "- {:.1} s: {}", event.t_s, event.message);
     }
+    let _ = write!(text, "\n## Provenance\n\n{}", facts(&provenance_facts(report)));
     text
 }
 
@@ -188,11 +218,29 @@ fn source_row(source: &ReportSource, before: usize) -> [String; 4] {
     ]
 }
 
-/// What is known of rig, conditions and making: what, and its value in words.
-pub fn head_rows(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
-    let mut rows = report.campaign.map(campaign_rows).unwrap_or_default();
+fn facts(rows: &[(&'static str, String)]) -> String {
+    let rows = rows.iter().map(|(what, value)| [(*what).to_owned(), value.clone()]);
+    markdown::table(&["", ""], Align::Left, rows)
+}
+
+/// What was tested by whom, where, when, and what rig and cell were to hold: what, and its value in words.
+pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
+    let mut rows = vec![("tested", report.tested_at.unwrap_or("not stated").to_owned())];
+    rows.extend(report.campaign.map(campaign_rows).unwrap_or_default());
+    if report.score.is_some()
+        && let Some((_, rig)) = rows.iter_mut().find(|(what, _)| *what == "rig")
+    {
+        rig.push_str(" (simulated)");
+    }
     rows.push(("reference state of corrected quantities", report.reference.to_string()));
+    rows
+}
+
+/// How the numbers were made: what, and its value in words.
+pub fn provenance_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
+    let mut rows = vec![("program", report.program.to_owned())];
     rows.push(("identification", format!("{}, alpha_A = {}", report.method, report.alpha_area_ratio)));
+    rows.extend(report.campaign.map(|campaign| ("campaign", campaign.name.clone())));
     if let Some((campaign, plan)) = report.campaign.zip(report.plan) {
         rows.push(("duration", whole_duration(campaign, plan)));
         rows.push(("order", plan.objective.clone()));
@@ -204,33 +252,37 @@ pub fn head_rows(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
 }
 
 fn campaign_rows(campaign: &Campaign) -> Vec<(&'static str, String)> {
-    let (display, report, boundary) = (Display::new(&campaign.display), &campaign.report, &campaign.boundary);
-    let temperature = |k: f64| format!("{} {}", display.temperature(k), campaign.display.temperature);
-    let pressure = |pa: f64| format!("{} {}", display.pressure(pa), campaign.display.pressure);
-    let follows = || "held at the compressor's outlet temperature".to_owned();
+    let (display, report) = (Display::new(&campaign.display), &campaign.report);
     let missing = || "not stated".to_owned();
-    vec![
-        ("campaign", campaign.name.clone()),
+    let mut rows = vec![
+        ("machine", campaign.machine.name.clone()),
         ("serial number", campaign.machine.serial_number.clone().unwrap_or_else(missing)),
         ("operator", report.operator.clone().unwrap_or_else(missing)),
         ("test cell", report.test_cell.clone().unwrap_or_else(missing)),
         ("rig", campaign.backend.name.clone()),
-        ("barometer", report.barometer_pa.map_or_else(missing, pressure)),
+        (
+            "barometer",
+            report
+                .barometer_pa
+                .map_or_else(missing, |pa| format!("{} {}", display.pressure(pa), campaign.display.pressure)),
+        ),
         (
             "relative humidity",
             report.humidity_ratio.map_or_else(missing, |ratio| format!("{:.0} %", 100.0 * ratio)),
         ),
-        ("inlet (total)", format!("{}, {}", temperature(boundary.t1_k), pressure(boundary.p1_pa))),
-        (
-            "turbine inlet temperature (total)",
-            if campaign.follow_outlet.turbine_inlet { follows() } else { temperature(boundary.t3_k) },
-        ),
-        ("turbine outlet pressure", pressure(boundary.p4_pa)),
-        (
-            "oil temperature",
-            if campaign.follow_outlet.oil { follows() } else { temperature(boundary.oil_temperature_k) },
-        ),
-    ]
+    ];
+    if let Some(k) = report.cell_temperature_k {
+        rows.push(("cell", format!("{} {}", display.temperature(k), campaign.display.temperature)));
+    }
+    let follows = campaign.follow_outlet;
+    for (what, holds) in
+        [("turbine inlet temperature", follows.turbine_inlet), ("oil temperature", follows.oil)]
+    {
+        if holds {
+            rows.push((what, "held at the compressor's outlet temperature".to_owned()));
+        }
+    }
+    rows
 }
 
 /// Rest and steps, as `mapper check` and `mapper plan` count them.
@@ -245,46 +297,27 @@ fn whole_duration(campaign: &Campaign, plan: &Plan) -> String {
     }
 }
 
-fn points_section(text: &mut String, units: &DisplayUnits, points: &[ScoredPoint]) {
+fn points_section(text: &mut String, units: &DisplayUnits, report: &RunReport<'_>) {
     let display = Display::new(units);
+    let points = || report.points.iter().map(|scored| &scored.point);
     text.push_str(
-        "## Points\n\nIntervals are 95 %: noise, declared sensor offsets, and what moving flow is estimated to cost the method.\n\n",
+        "## Points by speed line\n\nIntervals are 95 %: noise, declared sensor offsets, and what moving flow is estimated to cost \
+         the method. T2, P2 and T3 are means over the last 2 s of the step, when the gas is settled and the housing is not.\n\n",
     );
-    if let Some(shared) = shared_errors_text(points.iter().map(|scored| &scored.point), units) {
+    if let Some(shared) = shared_errors_text(points(), units) {
         let _ = writeln!(text, "{shared}\n");
     }
-    let heads = [
-        "step",
-        &display.speed_head("speed"),
-        "opening",
-        &display.flow_head("corrected flow"),
-        "PR",
-        "eta %",
-        "eta interval %",
-        "h W/(m2 K)",
-        "h interval",
-        "verdict",
-    ];
-    let rows: Vec<[String; 10]> = points
-        .iter()
-        .map(|ScoredPoint { point, .. }| {
-            [
-                step_name(point),
-                display.speed(point.speed_rpm),
-                opening(point.valve_opening_ratio),
-                display.flow(point.flow_corrected_kg_s),
-                format!("{:.4}", point.pressure_ratio),
-                percent(point.eta, 2),
-                format!("{} .. {}", percent(point.eta_low, 2), percent(point.eta_high, 2)),
-                number(point.h_w_m2k, 0),
-                format!("{} .. {}", number(point.h_low_w_m2k, 0), number(point.h_high_w_m2k, 0)),
-                verdict_word(point.verdict).to_owned(),
-            ]
-        })
-        .collect();
-    text.push_str(&markdown::table(&heads, Align::Left, &rows));
-    text.push_str("\n## Doubts and remarks\n\n");
-    let doubts = doubts(points.iter().map(|scored| &scored.point));
+    for group in point_groups(report.map, points(), &display) {
+        let rows = group
+            .points
+            .iter()
+            .map(|point| point_cells(report.recording, point, &display).map(|cell| cell.text));
+        let _ = writeln!(text, "### {}\n", group.caption);
+        text.push_str(&markdown::table(&point_heads(&display), Align::Right, rows));
+        text.push('\n');
+    }
+    text.push_str("## Doubts and remarks\n\n");
+    let doubts = doubts(points());
     for doubt in &doubts {
         let _ = writeln!(text, "- {} ({}): {}", doubt.steps(), doubt.code, doubt.message);
     }

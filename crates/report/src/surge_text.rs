@@ -3,15 +3,32 @@
 use crate::display::Display;
 use crate::markdown::{self, Align};
 use crate::number::{number, percent};
+use crate::table::with_heads;
+use crate::wrapped::wrapped;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{SurgeFoundBy, SurgeMark, half_width_95};
 use mapper_record::score::ScoredMark;
-use std::fmt::Write;
+
+/// Columns of a terminal that nobody has made wider.
+const COLUMNS: usize = 80;
 
 /// Marks of a search for surge, what it did not find, and how often the compressor surged; Markdown.
 pub fn surge_text(marks: &[ScoredMark], remarks: &[String], surges: usize, units: &DisplayUnits) -> String {
     let display = Display::new(units);
-    let with_truth = marks.iter().any(|scored| scored.truth_flow_corrected_kg_s.is_some());
+    let table = markdown::table(&surge_heads(marks, &display), Align::Right, surge_rows(marks, &display));
+    let said: String = surge_remarks(remarks, surges).iter().map(|said| format!("\n{said}\n")).collect();
+    format!("{table}{said}")
+}
+
+/// How often the compressor surged, and where surge was not found, a sentence each.
+pub fn surge_remarks(remarks: &[String], surges: usize) -> Vec<String> {
+    std::iter::once(times(surges))
+        .chain(remarks.iter().map(|remark| format!("Not found at {remark}.")))
+        .collect()
+}
+
+/// Columns of [`surge_rows`].
+pub fn surge_heads(marks: &[ScoredMark], display: &Display) -> Vec<String> {
     let mut heads = vec![
         display.speed_head("corrected speed"),
         display.flow_head("surge flow, corrected"),
@@ -22,40 +39,86 @@ pub fn surge_text(marks: &[ScoredMark], remarks: &[String], surges: usize, units
         "openings".to_owned(),
         "found by".to_owned(),
     ];
-    if with_truth {
+    if with_truth(marks) {
         heads.push("off the truth, %".to_owned());
     }
-    let rows: Vec<Vec<String>> = marks
-        .iter()
-        .map(|ScoredMark { mark, truth_flow_corrected_kg_s }| {
-            let flow_kg_s = mark.flow_corrected_kg_s;
-            let mut row = vec![
-                display.speed(mark.speed_corrected_rpm),
-                display.flow(flow_kg_s),
-                percent(Some(half_width_95(mark.flow_total_standard_error_kg_s()) / flow_kg_s), 1),
-                number(Some(mark.pressure_ratio), 3),
-                number(Some(half_width_95(mark.pressure_ratio_standard_error)), 3),
-                percent(Some(mark.closest_flow_corrected_kg_s / flow_kg_s - 1.0), 1),
-                mark.steps.to_string(),
-                found_by(mark).to_owned(),
-            ];
-            if with_truth {
-                row.push(percent(truth_flow_corrected_kg_s.map(|truth| flow_kg_s / truth - 1.0), 2));
-            }
-            row
-        })
+    heads
+}
+
+/// The same for a terminal of 80 columns. `truth`: whether to say how far the marks are from it.
+pub fn surge_columns_text(
+    marks: &[ScoredMark],
+    remarks: &[String],
+    surges: usize,
+    units: &DisplayUnits,
+    truth: bool,
+) -> String {
+    let shown = |scored: &ScoredMark| match truth {
+        true => *scored,
+        false => ScoredMark { truth_flow_corrected_kg_s: None, ..*scored },
+    };
+    let marks: Vec<ScoredMark> = marks.iter().map(shown).collect();
+    let marks = marks.as_slice();
+    let display = Display::new(units);
+    let mut heads = [&units.speed, &units.flow, "+/- %", "PR", "+/-", "nearest %", "openings", "found by"]
+        .map(str::to_owned)
+        .to_vec();
+    if with_truth(marks) {
+        heads.push("off %".to_owned());
+    }
+    let mut table = with_heads(&heads);
+    for row in surge_rows(marks, &display) {
+        table.add_row(row);
+    }
+    let lines: String = table
+        .to_string()
+        .lines()
+        .map(|line| format!("{}\n", line.strip_prefix(' ').unwrap_or(line).trim_end()))
         .collect();
-    let mut text = markdown::table(&heads, Align::Right, &rows);
-    let times = match surges {
+    let words = "Surge-side ends that were sought: corrected speed and flow, half widths of 95 % intervals, how far above it the \
+                 nearest point was, openings that were tried.";
+    let mut text = format!("{}\n{lines}\n", wrapped(words, COLUMNS, 0));
+    if with_truth(marks) {
+        text.push_str("off: from the simulator's truth.\n");
+    }
+    for said in surge_remarks(remarks, surges) {
+        text.push_str(&wrapped(&said, COLUMNS, 2));
+    }
+    text
+}
+
+fn with_truth(marks: &[ScoredMark]) -> bool {
+    marks.iter().any(|scored| scored.truth_flow_corrected_kg_s.is_some())
+}
+
+/// A row for each mark, in order of speed.
+pub fn surge_rows(marks: &[ScoredMark], display: &Display) -> Vec<Vec<String>> {
+    let row = |ScoredMark { mark, truth_flow_corrected_kg_s }: &ScoredMark| {
+        let flow_kg_s = mark.flow_corrected_kg_s;
+        let mut row = vec![
+            display.speed(mark.speed_corrected_rpm),
+            display.flow(flow_kg_s),
+            percent(Some(half_width_95(mark.flow_total_standard_error_kg_s()) / flow_kg_s), 1),
+            number(Some(mark.pressure_ratio), 3),
+            number(Some(half_width_95(mark.pressure_ratio_standard_error)), 3),
+            percent(Some(mark.closest_flow_corrected_kg_s / flow_kg_s - 1.0), 1),
+            mark.steps.to_string(),
+            found_by(mark).to_owned(),
+        ];
+        if with_truth(marks) {
+            row.push(percent(truth_flow_corrected_kg_s.map(|truth| flow_kg_s / truth - 1.0), 2));
+        }
+        row
+    };
+    marks.iter().map(row).collect()
+}
+
+fn times(surges: usize) -> String {
+    match surges {
         0 => "The compressor did not go into surge on the way.".to_owned(),
         1 => "The compressor went into surge once on the way; the valve opened at once.".to_owned(),
         more => format!("The compressor went into surge {more} times on the way; the valve opened at once."),
-    };
-    let _ = writeln!(text, "\n{times}");
-    for remark in remarks {
-        let _ = writeln!(text, "\nNot found at {remark}.");
     }
-    text
 }
 
 fn found_by(mark: &SurgeMark) -> &'static str {

@@ -1,8 +1,48 @@
 //! The isothermal zero, for people.
 
-use mapper_core::half_width_95;
-use mapper_identify::ZeroOutcome;
+use crate::display::Display;
+use mapper_core::{Channel, half_width_95};
+use mapper_identify::{IsothermalZero, ZeroOutcome};
 use std::fmt::Write;
+
+/// Columns of [`zero_rows`].
+pub const ZERO_HEADS: [&str; 4] = ["sensor", "subtracted", "known within +/-", "unit"];
+
+/// What was done, or why nothing was; `None` where no zero was asked for.
+pub fn zero_words(zero: &ZeroOutcome) -> Option<String> {
+    match zero {
+        ZeroOutcome::NotAsked => None,
+        ZeroOutcome::Refused(reason) => {
+            Some(format!("No isothermal zero: {reason}. The declared offsets stand."))
+        }
+        ZeroOutcome::Found(zero) => Some(format!(
+            "At rest, from {:.0} to {:.0} s, all sensors of a kind read the same; what each read differently is subtracted from its \
+             readings. Half widths of 95 % intervals.",
+            zero.start_s, zero.end_s
+        )),
+    }
+}
+
+/// A row for each sensor with an offset; none where there is no zero.
+pub fn zero_rows(zero: &ZeroOutcome, display: &Display) -> Vec<[String; 4]> {
+    let ZeroOutcome::Found(zero) = zero else { return Vec::new() };
+    let row = |(channel, offset): (&Channel, &f64)| {
+        let shown = |value: f64| display.difference(*channel, value).unwrap_or(0.0);
+        let half = shown(half_width_95(left(zero, *channel)));
+        // As many decimals as tell the half width with two figures.
+        let decimals = match half > 0.0 && half.is_finite() {
+            true => (1.0 - half.log10().floor()).clamp(0.0, 6.0) as usize,
+            false => 2,
+        };
+        let unit = display.difference_unit(*channel).to_owned();
+        [channel.to_string(), format!("{:+.decimals$}", shown(*offset)), format!("{half:.decimals$}"), unit]
+    };
+    zero.offsets.iter().map(row).collect()
+}
+
+fn left(zero: &IsothermalZero, channel: Channel) -> f64 {
+    zero.left_sigma.get(&channel).copied().unwrap_or(f64::NAN)
+}
 
 /// Offsets subtracted from the readings, with what is not known of them, or why there are none; empty where none was asked for.
 pub fn zero_text(zero: &ZeroOutcome) -> String {
@@ -17,7 +57,7 @@ pub fn zero_text(zero: &ZeroOutcome) -> String {
                 zero.start_s, zero.end_s
             );
             for (channel, offset) in &zero.offsets {
-                let half = half_width_95(zero.left_sigma.get(channel).copied().unwrap_or(f64::NAN));
+                let half = half_width_95(left(zero, *channel));
                 // Writing to a String cannot fail.
                 let _ = writeln!(text, "  {channel:<6} {offset:+.2} +/- {half:.2} {}", channel.unit());
             }

@@ -8,13 +8,14 @@ use crate::{Gap, Registry, Session, SessionError, run_directory};
 use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
-use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, Method, Plan, ThermalModel};
+use mapper_campaign::units::Kind;
+use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, ThermalModel};
 use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_observe::FusedChannel;
 use mapper_page::{OtherRun, RunPage, run_page};
 use mapper_record::score::{ScoreSummary, ScoredPoint, beside_truths};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_report::{ReportSource, RunReport, SurgeReport, gap_part, instant, run_report};
+use mapper_report::{Display, ReportSource, RunReport, SurgeReport, gap_part, instant, run_report};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
@@ -87,10 +88,26 @@ impl Told {
         Told {
             outcome: String::new(),
             machine: campaign.as_ref().map_or_else(named, |campaign| campaign.machine.name.clone()),
-            tested_at: sources.first().and_then(|source| instant(source.start_time_ns)),
+            // Simulated time has no date; the directory of its run has.
+            tested_at: sources
+                .first()
+                .and_then(|source| instant(source.start_time_ns))
+                .or_else(|| run_directory::started(recorded.first()?.path.parent()?)),
             campaign,
             plan,
             sources,
+        }
+    }
+
+    /// Units of the map's pictures: those that the campaign wants shown.
+    fn map_units(&self) -> MapUnits {
+        let Some(campaign) = &self.campaign else { return MapUnits::default() };
+        let display = Display::new(&campaign.display);
+        MapUnits {
+            flow: campaign.display.flow.clone(),
+            flow_of_one_kg_s: display.number(Kind::MassFlow, 1.0),
+            speed: campaign.display.speed.clone(),
+            speed_of_one_rpm: display.number(Kind::Speed, 1.0),
         }
     }
 
@@ -215,8 +232,9 @@ impl Session<'_> {
         let others: Vec<OtherRun<'_>> =
             other_maps.iter().map(|(name, map)| OtherRun { name: name.clone(), map }).collect();
         let repeats = identified.repeats();
-        let report = run_report_of(&told, &identified, &remarks, &repeats, false);
-        page_of(&told, &identified, &report, map.as_ref(), &others, gap, self.registry.commit)
+        let program = program_and_commit(self.registry.commit);
+        let report = run_report_of(&told, &identified, map.as_ref(), &program, &remarks, &repeats, false);
+        page_of(&identified, &report, &others, gap)
     }
 
     /// The files of what was identified.
@@ -231,7 +249,9 @@ impl Session<'_> {
         remarks.extend(identified.remarks.iter().cloned());
         let compressor_map = compressor_map(&told.machine, &identified, &mut remarks);
         let map = match &compressor_map {
-            Some(map) => export(self.registry, &told.formats(), map, directory, &mut remarks)?,
+            Some(map) => {
+                export(self.registry, &told.formats(), map, &told.map_units(), directory, &mut remarks)?
+            }
             None => BTreeMap::new(),
         };
         let mut points_file = json!({
@@ -249,12 +269,21 @@ impl Session<'_> {
         }
         write_new(&directory.join(run_directory::POINTS), json_text(&points_file)?.as_bytes())?;
         let repeats = identified.repeats();
-        let shown = run_report_of(told, &identified, &remarks, &repeats, map.contains_key("svg"));
+        let program = program_and_commit(self.registry.commit);
+        let has_picture = map.contains_key("svg");
+        let shown = run_report_of(
+            told,
+            &identified,
+            compressor_map.as_ref(),
+            &program,
+            &remarks,
+            &repeats,
+            has_picture,
+        );
         let report = directory.join(run_directory::REPORT);
         write_new(&report, run_report(&shown).as_bytes())?;
         let page = directory.join(run_directory::PAGE);
-        let page_text =
-            page_of(told, &identified, &shown, compressor_map.as_ref(), &[], None, self.registry.commit)?;
+        let page_text = page_of(&identified, &shown, &[], None)?;
         write_new(&page, page_text.as_bytes())?;
         let Identified { points, thermal, two_parameter, sensors, zero, score, surge, .. } = identified;
         Ok(Results {
@@ -295,6 +324,8 @@ fn identified_by(method: Method) -> String {
 fn run_report_of<'a>(
     told: &'a Told,
     identified: &'a Identified,
+    map: Option<&'a CompressorMap>,
+    program: &'a str,
     remarks: &'a [String],
     repeats: &'a [RepeatedJump],
     has_picture: bool,
@@ -303,6 +334,12 @@ fn run_report_of<'a>(
         machine: &told.machine,
         campaign: told.campaign.as_ref(),
         plan: told.plan.as_ref(),
+        tested_at: told.tested_at.as_deref(),
+        program,
+        map,
+        recording: &identified.recording,
+        used: &identified.config.declared,
+        zero: &identified.zero,
         sources: &told.sources,
         outcome: &told.outcome,
         remarks,
@@ -326,27 +363,15 @@ fn run_report_of<'a>(
 
 /// The page of what was identified, beside other runs' maps.
 fn page_of(
-    told: &Told,
     identified: &Identified,
     report: &RunReport<'_>,
-    map: Option<&CompressorMap>,
     others: &[OtherRun<'_>],
     gap: Option<&Gap>,
-    commit: &str,
 ) -> Result<String, SessionError> {
     let course = |point: &IdentifiedPoint| t2_course(&identified.recording, point, &identified.config);
     let courses: Vec<T2Course> = identified.points_alone().filter_map(course).collect();
-    Ok(run_page(&RunPage {
-        report,
-        map,
-        recording: &identified.recording,
-        courses: &courses,
-        zero: &identified.zero,
-        tested_at: told.tested_at.as_deref(),
-        program: &program_and_commit(commit),
-        gap: gap.map(|gap| gap_part(&gap.diagnosed)),
-        others,
-    })?)
+    let gap = gap.map(|gap| gap_part(&gap.diagnosed));
+    Ok(run_page(&RunPage { report, courses: &courses, gap, others })?)
 }
 
 /// A recording as a report names it.
@@ -404,13 +429,14 @@ fn export(
     registry: &Registry,
     formats: &[String],
     map: &CompressorMap,
+    units: &MapUnits,
     directory: &Path,
     remarks: &mut Vec<String>,
 ) -> Result<BTreeMap<String, PathBuf>, SessionError> {
     let mut files = BTreeMap::new();
     for name in formats {
         let format = registry.written_format(name)?;
-        let bytes = match format.write(map) {
+        let bytes = match format.write_in(map, units) {
             Ok(bytes) => bytes,
             // A campaign of a few points has a map, but no surface through it.
             Err(error @ ExportError::NeedsFit { .. }) => {

@@ -57,7 +57,40 @@ pub(crate) fn keep_beside(directory: &Path, named: &str, text: &str) -> Result<(
     write_new(&path, text.as_bytes())
 }
 
+/// When the run in this directory was started, as people read it, by the directory's name; `None` for any other name.
+pub(crate) fn started(directory: &Path) -> Option<String> {
+    directory.file_name()?.to_str()?.rsplit('-').find_map(instant)
+}
+
+/// `20261124T110618Z` as `2026-11-24 11:06:18 UTC`.
+fn instant(stamp: &str) -> Option<String> {
+    let (day, time) = stamp.strip_suffix('Z')?.split_once('T')?;
+    let is_number =
+        |text: &str, digits: usize| text.len() == digits && text.bytes().all(|b| b.is_ascii_digit());
+    (is_number(day, 8) && is_number(time, 6)).then(|| {
+        let (date, clock) = ([&day[..4], &day[4..6], &day[6..]], [&time[..2], &time[2..4], &time[4..]]);
+        format!("{} {} UTC", date.join("-"), clock.join(":"))
+    })
+}
+
 /// The recording of a run directory, or the file itself.
 pub fn recording_of(path: &Path) -> PathBuf {
     if path.is_dir() { path.join(RECORDING) } else { path.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_was_made_knows_when_from_its_directory() {
+        let parent = tempfile::tempdir().unwrap();
+        for _ in 0..2 {
+            let made = create(parent.path(), "a-b", "20261124T110618Z").unwrap();
+            assert_eq!(started(&made).as_deref(), Some("2026-11-24 11:06:18 UTC"), "{}", made.display());
+        }
+        for other in ["runs/a", "a-2026T1Z", "a-20261124T11061éZ", "/"] {
+            assert_eq!(started(Path::new(other)), None, "{other}");
+        }
+    }
 }

@@ -1,8 +1,10 @@
 //! `study: calibration`: the cases that turn scores into probabilities, as `mapper gap blind calibrate` draws them.
 
 use crate::error::StudyError;
+use crate::reliability_picture::reliability_svg;
 use crate::source::CampaignSource;
 use mapper_blind::calibrate::{Calibrated, Observed, Plan, cases, fitted};
+use mapper_blind::reliability::{reliabilities, reliability_text};
 use mapper_blind::{Case, StoredCase};
 use mapper_fleet::{At, Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkError};
 use mapper_session::{Registry, json_text};
@@ -95,6 +97,13 @@ impl Kind for Calibration<'_> {
         let text = |value: Result<String, mapper_session::SessionError>| value.map_err(FleetError::kind);
         out.write("calibration.json", text(json_text(&calibration))?.as_bytes())?;
         out.write("observed.json", text(json_text(&observed))?.as_bytes())?;
-        Ok(format!("calibration.json from {} diagnoses in observed.json", observed.len()))
+        let reliabilities = reliabilities(&observed).map_err(FleetError::kind)?;
+        out.write("reliability.json", text(json_text(&reliabilities))?.as_bytes())?;
+        out.write("reliability.svg", reliability_svg(&reliabilities).as_bytes())?;
+        Ok(format!(
+            "calibration.json from {} diagnoses in observed.json; reliability.svg\n{}",
+            observed.len(),
+            reliability_text(&reliabilities).trim_end()
+        ))
     }
 }

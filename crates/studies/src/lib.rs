@@ -6,6 +6,7 @@ mod error;
 mod maps;
 mod nightly;
 mod program;
+mod reliability_picture;
 mod source;
 
 use mapper_fleet::Kind;

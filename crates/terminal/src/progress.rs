@@ -9,7 +9,7 @@ use serde_json::json;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How often the clock of a bar is drawn.
 const TICK: Duration = Duration::from_millis(250);
@@ -174,6 +174,8 @@ struct State {
     look: Option<&'static str>,
     /// What was said last, in a pipe.
     said: String,
+    /// When the first piece of work was begun.
+    began: Option<Instant>,
     steps: usize,
     /// Number of the step that is under way, from 1.
     step: usize,
@@ -278,13 +280,39 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
         ),
         SessionEvent::Told(event) => event_line(event.t_s, &event.message),
         SessionEvent::Progress { what, .. } if *what != state.said => what.clone(),
-        SessionEvent::PiecesDone { done, of } => format!("{done} of {of}"),
+        SessionEvent::PiecesDone { done, of } => {
+            let began = *state.began.get_or_insert_with(Instant::now);
+            if !is_told(*done, *of) {
+                return;
+            }
+            pieces_line(*done, *of, began.elapsed().as_secs_f64())
+        }
         _ => return,
     };
     if let SessionEvent::Progress { what, .. } = event {
         state.said.clone_from(what);
     }
     say(&line);
+}
+
+/// So many lines at most say how many pieces are done.
+const PIECES_LINES: usize = 200;
+
+/// Whether a line says that so many pieces are done.
+fn is_told(done: usize, of: usize) -> bool {
+    done == of || done.is_multiple_of(of.div_ceil(PIECES_LINES).max(1))
+}
+
+/// How many pieces are done after how long, and what that says of the rest.
+fn pieces_line(done: usize, of: usize, elapsed_s: f64) -> String {
+    match done {
+        0 => format!("0 of {of} done"),
+        _ if done < of => {
+            let left_s = elapsed_s * (of - done) as f64 / done as f64;
+            format!("{done} of {of} done in {}, {} left", short(elapsed_s), short(left_s))
+        }
+        _ => format!("{done} of {of} done in {}", short(elapsed_s)),
+    }
 }
 
 /// One JSON object a line: the event as the session has it. Readings are for a live page, and the rig's time is told now and then.
@@ -306,4 +334,22 @@ fn tell_program(event: &SessionEvent, state: &mut State) {
 /// A reader that has gone away, as `tee` on Ctrl-C, is no reason to panic.
 fn say(line: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{line}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{PIECES_LINES, is_told, pieces_line};
+
+    #[test]
+    fn a_pipe_is_told_what_is_left_and_never_a_thousand_lines() {
+        assert_eq!(pieces_line(0, 14, 0.0), "0 of 14 done");
+        // A third done in 20 s leaves two thirds: 40 s.
+        assert_eq!(pieces_line(5, 15, 20.0), "5 of 15 done in 20 s, 40 s left");
+        assert_eq!(pieces_line(15, 15, 62.0), "15 of 15 done in 62 s");
+        for of in [1, 14, 200, 10_007] {
+            let lines = (0..=of).filter(|done| is_told(*done, of)).count();
+            assert!(lines <= PIECES_LINES + 2 && is_told(of, of), "{of}: {lines}");
+        }
+        assert_eq!((0..=14).filter(|done| is_told(*done, 14)).count(), 15, "each of a few");
+    }
 }

@@ -7,8 +7,8 @@ use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_observe::FusedChannel;
 use mapper_report::{
     Display, Paint, ScoredPoint, disagreement_text, first_doubts_text, paint_verdict, points_by_line_text,
-    points_text, repeated_jumps_text, sensors_text, shared_errors_text, surge_text, thermal_text, truth_text,
-    verdict_sentence, wrapped, zero_text,
+    points_text, repeated_jumps_text, sensors_text, shared_errors_text, surge_columns_text, surge_text,
+    thermal_text, truth_text, verdict_sentence, wrapped, zero_text,
 };
 use mapper_session::{Identified, Results, SoughtSurge};
 use std::fmt::Write;
@@ -119,7 +119,7 @@ fn short(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
         text.push_str(&wrapped(&truth, COLUMNS, 2));
     }
     if let Some(surge) = found.surge {
-        text.push_str(&surge_text(&surge.marks, &surge.remarks, surge.surges, units));
+        text.push_str(&surge_columns_text(&surge.marks, &surge.remarks, surge.surges, units, shown.truth));
     }
     // Sensors that all agree are no news.
     for fused in found.sensors.iter().filter(|fused| !fused.left_out.is_empty()) {

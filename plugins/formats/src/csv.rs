@@ -12,5 +12,6 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &[],
     description: "one row a point, units in the column names, reference state and method in `#` lines",
     write: Some(write::write),
+    draw: None,
     read: Some(read::read),
 };

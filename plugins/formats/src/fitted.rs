@@ -9,6 +9,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &[],
     description: "the fitted lines with standard errors, each node marked measured or extrapolated",
     write: Some(write),
+    draw: None,
     read: None,
 };
 

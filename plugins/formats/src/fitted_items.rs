@@ -1,14 +1,16 @@
 //! The fitted surface in the picture: lines, contours, surge and choke, and grey where it is extrapolated.
 
-use crate::labels::{krpm, percent};
+use crate::labels::{percent, speed};
 use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, palette};
-use mapper_core::{CompressorMap, FittedLine, FittedMap, FittedNode, SpeedLine, confidence_interval_95};
+use mapper_core::{
+    CompressorMap, FittedLine, FittedMap, FittedNode, MapUnits, SpeedLine, confidence_interval_95,
+};
 use mapper_mesh::{SUBDIVISIONS, across, contour_levels, fitted_surface};
 
 const SURGE: palette::Colour = palette::VERMILLION;
 const CHOKE: palette::Colour = palette::PURPLE;
 /// Everything below the points of the panel pressure ratio over flow.
-pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap) {
+pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap, units: &MapUnits) {
     add_shade(panel, fitted);
     if let Some(grid) = fitted_surface(fitted) {
         let levels = contour_levels(grid.value_range());
@@ -30,7 +32,7 @@ pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap) {
         panel.add(
             Line::new(end.into_iter().collect(), colour)
                 .width_px(0.0)
-                .end_label(krpm(line.speed_corrected_rpm), LineEnd::Last),
+                .end_label(speed(line.speed_corrected_rpm, units), LineEnd::Last),
         );
     }
     let surge: Vec<(f64, f64)> = fitted.surge_line().map(|(_, n)| place(n)).collect();

@@ -11,6 +11,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &[],
     description: "the whole map with every point's uncertainty, warnings and window",
     write: Some(write),
+    draw: None,
     read: Some(read),
 };
 

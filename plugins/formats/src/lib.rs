@@ -13,7 +13,7 @@ mod reference;
 mod simulation_table;
 
 pub use lines::POINT_LIMIT;
-pub use map_picture::{map_figure, map_panel};
+pub use map_picture::map_figure;
 pub use mapper_mesh::efficiency_surface;
 pub use reference::parse_reference;
 

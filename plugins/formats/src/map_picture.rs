@@ -6,13 +6,13 @@
 
 use crate::fitted_items;
 use crate::heading::efficiency_name;
-use crate::labels::{krpm, percent};
+use crate::labels::{percent, speed};
 use mapper_chart::{Axis, Contours, Figure, Line, LineEnd, Marker, Panel, Scatter, ScatterPoint, palette};
-use mapper_core::{CompressorMap, MapPoint, Method, SurgeMark, Verdict, confidence_interval_95};
+use mapper_core::{CompressorMap, MapPoint, MapUnits, Method, SurgeMark, Verdict, confidence_interval_95};
 use mapper_mesh::{contour_levels, efficiency_surface, ordered, speed_curve};
 
-/// The map as a figure of two panels; flow in kg/s, efficiency in %.
-pub fn map_figure(map: &CompressorMap) -> Figure {
+/// The map as a figure of two panels in these units, efficiency in %.
+pub fn map_figure(map: &CompressorMap, units: &MapUnits) -> Figure {
     let points = map.lines.iter().map(|line| line.points.len()).sum::<usize>();
     let machine = if map.machine.is_empty() { "unnamed machine" } else { &map.machine };
     Figure::new(format!("Compressor map of {machine}"))
@@ -32,19 +32,23 @@ pub fn map_figure(map: &CompressorMap) -> Figure {
                 ),
             },
         ))
-        .panel(map_panel(map))
-        .panel(efficiency_panel(map))
+        .panel(map_panel(map, units))
+        .panel(efficiency_panel(map, units))
         .panel_size_px(560.0, 460.0)
 }
 
-/// Panel (a) alone, e.g. as the ground for a path through the map: corrected flow in kg/s, pressure ratio.
-pub fn map_panel(map: &CompressorMap) -> Panel {
-    let mut panel =
-        Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new("total pressure ratio P2/P1"))
-            .title("(a) speed lines (krpm, corrected) and efficiency contours (%)");
+/// Corrected flow as it is shown; items of a panel are in kg/s.
+fn flow_axis(units: &MapUnits) -> Axis {
+    Axis::new(format!("corrected mass flow, {}", units.flow)).written_times(units.flow_of_one_kg_s)
+}
+
+/// Panel (a): items in kg/s and pressure ratio.
+fn map_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
+    let mut panel = Panel::new(flow_axis(units), Axis::new("total pressure ratio P2/P1"))
+        .title(format!("(a) speed lines ({}, corrected) and efficiency contours (%)", units.speed));
     match &map.fitted {
-        Some(fitted) => fitted_items::add_map(&mut panel, fitted),
-        None => add_measured_lines(&mut panel, map),
+        Some(fitted) => fitted_items::add_map(&mut panel, fitted, units),
+        None => add_measured_lines(&mut panel, map, units),
     }
     if !map.surge.is_empty() {
         panel.add(surge_marks(map));
@@ -78,26 +82,26 @@ fn surge_marks(map: &CompressorMap) -> Scatter {
 }
 
 /// Lines and contours without a fit: through the points.
-fn add_measured_lines(panel: &mut Panel, map: &CompressorMap) {
+fn add_measured_lines(panel: &mut Panel, map: &CompressorMap, units: &MapUnits) {
     if let Some(grid) = efficiency_surface(map) {
         let levels = contour_levels(grid.value_range());
         panel.add(Contours::new(grid, &levels, percent).shaded().colour(palette::Colour(40, 80, 120)));
     }
     for line in &map.lines {
         let curve = speed_curve(map, line);
-        let speed = krpm(line.speed_corrected_rpm);
+        let speed = speed(line.speed_corrected_rpm, units);
         panel.add(Line::new(curve, palette::INK).width_px(1.3).end_label(speed, LineEnd::Last));
     }
 }
 
-fn efficiency_panel(map: &CompressorMap) -> Panel {
+fn efficiency_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
     let name = match map.method {
         Method::Steady => "apparent efficiency, %",
         Method::Dynamic | Method::Joint => "adiabatic efficiency, %",
         Method::Imported => "isentropic efficiency, %",
     };
-    let mut panel = Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new(name))
-        .title("(b) efficiency with its 95 % interval");
+    let mut panel =
+        Panel::new(flow_axis(units), Axis::new(name)).title("(b) efficiency with its 95 % interval");
     if let Some(fitted) = &map.fitted {
         fitted_items::add_eta(&mut panel, map, fitted);
     }
@@ -117,7 +121,7 @@ fn efficiency_panel(map: &CompressorMap) -> Panel {
         if points.is_empty() {
             continue;
         }
-        let label = format!("{} krpm", krpm(line.speed_corrected_rpm));
+        let label = format!("{} {}", speed(line.speed_corrected_rpm, units), units.speed);
         if map.fitted.is_none() {
             panel.add(Line::new(points.iter().map(|(p, _)| (p.x, p.y)).collect(), colour).label(&label));
         }

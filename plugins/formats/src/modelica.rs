@@ -15,6 +15,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &[],
     description: "tables over corrected speed and beta for Modelica.Blocks.Tables.CombiTable2Ds",
     write: Some(write),
+    draw: None,
     read: None,
 };
 

@@ -11,6 +11,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &[],
     description: "NPSS tables of flow, pressure ratio and efficiency over beta and corrected speed",
     write: Some(write),
+    draw: None,
     read: None,
 };
 

@@ -1,7 +1,7 @@
 //! The picture as pixels.
 
 use crate::map_picture::map_figure;
-use mapper_core::{CompressorMap, ExportError, MapFormat};
+use mapper_core::{CompressorMap, ExportError, MapFormat, MapUnits};
 
 /// Pixels for each unit of the picture: sharp on paper and on dense screens.
 const SCALE: f32 = 2.0;
@@ -12,9 +12,14 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &[],
     description: "the picture as pixels",
     write: Some(write),
+    draw: Some(draw),
     read: None,
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
-    map_figure(map).to_png(SCALE).map_err(ExportError::failed(FORMAT.name))
+    draw(map, &MapUnits::default())
+}
+
+fn draw(map: &CompressorMap, units: &MapUnits) -> Result<Vec<u8>, ExportError> {
+    map_figure(map, units).to_png(SCALE).map_err(ExportError::failed(FORMAT.name))
 }

@@ -14,6 +14,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &[],
     description: "Python module with a pyCycle map: [alpha][Nc][Rline]",
     write: Some(write),
+    draw: None,
     read: None,
 };
 

@@ -20,6 +20,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &["map", "sae", "dat"],
     description: "SAE text: corrected rpm, corrected kg/s, pressure ratio, efficiency, from choke to surge",
     write: Some(write),
+    draw: None,
     read: Some(read),
 };
 

@@ -15,6 +15,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &[],
     description: "MATLAB script: tables over corrected speed and beta, and over corrected speed and pressure ratio",
     write: Some(write),
+    draw: None,
     read: None,
 };
 

@@ -9,6 +9,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &[],
     description: "the surge-side ends that were sought, with standard errors",
     write: Some(write),
+    draw: None,
     read: None,
 };
 

@@ -1,7 +1,7 @@
 //! The map as a picture.
 
 use crate::map_picture::map_figure;
-use mapper_core::{CompressorMap, ExportError, MapFormat};
+use mapper_core::{CompressorMap, ExportError, MapFormat, MapUnits};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "svg",
@@ -9,9 +9,14 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &[],
     description: "picture: speed lines with efficiency contours, and efficiency with its 95 % interval",
     write: Some(write),
+    draw: Some(draw),
     read: None,
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
-    Ok(map_figure(map).to_svg().into_bytes())
+    draw(map, &MapUnits::default())
+}
+
+fn draw(map: &CompressorMap, units: &MapUnits) -> Result<Vec<u8>, ExportError> {
+    Ok(map_figure(map, units).to_svg().into_bytes())
 }

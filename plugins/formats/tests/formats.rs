@@ -142,6 +142,41 @@ fn the_picture_shows_every_point_and_says_what_it_shows() {
     assert_eq!(hollow.count(), 3);
 }
 
+/// The same picture in other units: nothing moves, the numbers at the flow axes are a thousand times as large.
+#[test]
+fn the_picture_is_written_in_the_units_that_are_wanted() {
+    let map = support::turbo_a();
+    let units = mapper_core::MapUnits {
+        flow: "g/s".to_owned(),
+        flow_of_one_kg_s: 1000.0,
+        speed: "rpm".to_owned(),
+        speed_of_one_rpm: 1.0,
+    };
+    let svg = FORMATS.find("svg").unwrap();
+    let [usual, wanted] = [svg.write(&map).unwrap(), svg.write_in(&map, &units).unwrap()]
+        .map(|bytes| String::from_utf8(bytes).unwrap());
+    let texts = |svg: &str| -> Vec<String> {
+        let document = roxmltree::Document::parse(svg).unwrap();
+        let all = document.descendants().filter(|n| n.has_tag_name("text"));
+        all.filter_map(|n| n.text()).map(str::to_owned).collect()
+    };
+    let (usual_texts, wanted_texts) = (texts(&usual), texts(&wanted));
+    assert!(wanted_texts.iter().any(|text| text == "corrected mass flow, g/s"));
+    assert!(!wanted_texts.iter().any(|text| text.contains("kg/s") || text.contains("krpm")));
+    for line in &map.lines {
+        assert!(wanted_texts.contains(&format!("{}", line.speed_corrected_rpm)), "{wanted_texts:?}");
+    }
+    let tick = |texts: &[String], value: f64| {
+        texts.iter().any(|text| text.parse::<f64>().is_ok_and(|x| (x - value).abs() < 1e-9))
+    };
+    assert!(tick(&usual_texts, 0.06) && tick(&wanted_texts, 60.0), "{usual_texts:?} {wanted_texts:?}");
+    let circles = |svg: &str| svg.matches("<circle").count();
+    assert_eq!(circles(&usual), circles(&wanted));
+    // A table of numbers stays in SI.
+    let csv = FORMATS.find("csv").unwrap();
+    assert_eq!(csv.write(&map).unwrap(), csv.write_in(&map, &units).unwrap());
+}
+
 #[test]
 fn odd_maps_give_a_picture() {
     let mut one = support::turbo_a();

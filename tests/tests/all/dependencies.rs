@@ -51,7 +51,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // The application: everything between arguments and words. Plug-ins are handed in.
     ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics", "fleet", "fmu"]),
     // What fleets work on: one file a kind, above the application and the blind cases.
-    ("mapper-studies",   &["blind", "campaign", "core", "fleet", "history", "record", "session"]),
+    ("mapper-studies",   &["blind", "campaign", "chart", "core", "fleet", "history", "record", "session"]),
     // What a terminal, a pipe or another program sees; what a browser sees while a run goes on.
     ("mapper-terminal",  &["core", "campaign", "assemble", "identify", "observe", "report", "session"]),
     ("mapper-live",      &["core", "campaign", "page", "record", "report", "session"]),

@@ -107,6 +107,48 @@ fn a_template_hands_a_study_to_another_queue() {
     assert!(refused.code != Some(0) && refused.stderr.contains("shell"), "{}", refused.stderr);
 }
 
+/// A calibration of a few cases of four points: in pieces it is that of one machine, and it says whether its probabilities hold.
+#[test]
+fn a_calibration_in_pieces_is_one_machines_and_judges_its_probabilities() {
+    let scratch = scratch();
+    let folder = scratch.path();
+    let shipped = std::fs::read_to_string(repository().join("campaigns/gap_rig.yaml")).unwrap();
+    let shorter = [("dwell: 120 s", "dwell: 60 s"), ("end: 110 s}", "end: 55 s}")];
+    let campaign = crate::pages::FOUR_POINTS.iter().chain(&shorter).fold(shipped, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    });
+    let (file, study) = (folder.join("rig.yaml"), folder.join("study.yaml"));
+    std::fs::write(&file, campaign).unwrap();
+    let text = "fleet: small\nstudy: calibration\ncampaign: rig.yaml\nseed: 5\nnulls: 2\ncases: 1\n";
+    std::fs::write(&study, text).unwrap();
+    let directory = folder.join("fleet");
+    make(&study, &directory);
+    mapper(fleet("work", &directory, &["--shard", "2/2"])).exits(0);
+    let said = mapper(fleet("run", &directory, &[])).exits(0).stdout;
+    assert!(said.contains("expected calibration error"), "{said}");
+    let of_fleet = |name: &str| std::fs::read(directory.join("result").join(name)).unwrap();
+    let [shipped, fitted]: [Value; 2] = serde_json::from_slice(&of_fleet("reliability.json")).unwrap();
+    let observed: Vec<Value> = serde_json::from_slice(&of_fleet("observed.json")).unwrap();
+    for one in [shipped, fitted] {
+        let bins = one["bins"].as_array().unwrap();
+        let judged: u64 = bins.iter().map(|bin| bin["right"]["trials"].as_u64().unwrap()).sum();
+        assert_eq!(judged as usize, observed.len(), "every diagnosis is in one class");
+        assert!((0.0..=1.0).contains(&one["expected_calibration_error"].as_f64().unwrap()), "{one}");
+    }
+    assert!(of_fleet("reliability.svg").starts_with(b"<svg"));
+
+    // One machine, one process.
+    let (own, cases) = (folder.join("own.json"), folder.join("cases.json"));
+    let arguments =
+        ["gap", "blind", "calibrate", "--seed", "5", "--nulls", "2", "--cases", "1", "--campaign"];
+    let files =
+        [file.to_str().unwrap(), "--out", own.to_str().unwrap(), "--observed", cases.to_str().unwrap()];
+    mapper(arguments.iter().chain(&files)).exits(0);
+    assert!(of_fleet("observed.json") == std::fs::read(&cases).unwrap(), "the same diagnoses to the byte");
+    assert!(of_fleet("calibration.json") == std::fs::read(&own).unwrap(), "the same calibration to the byte");
+}
+
 #[test]
 fn an_item_that_fails_says_why_and_is_done_again() {
     let scratch = scratch();

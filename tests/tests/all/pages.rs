@@ -120,6 +120,23 @@ fn the_page_of_a_run_is_read_as_people_do() {
     assert!(text.len() < 1_000_000, "{} bytes", text.len());
     assert!(!text.contains("<img src=x"), "markup of a name got into the page");
     assert!(text.contains("&lt;img src=x onerror=alert(1)&gt;"), "the name is shown as text");
+    // What a test report has to name, here and in the plain one.
+    let plain = std::fs::read_to_string(run.join("report.md")).unwrap();
+    for (what, words) in [
+        ("serial number", "TA-0001"),
+        ("program with its commit", "mapper 0."),
+        ("that nothing was measured", "simulated"),
+        ("reference state", "298 K, 100 kPa"),
+        ("conditions as read", "turbine inlet temperature T3, total"),
+        ("calibration", "2026-09-02"),
+        ("uncertainty of every reading", "as used +/-"),
+        ("corrected speed of a line", "krpm corrected"),
+    ] {
+        assert!(text.contains(words), "{what} is not on the page");
+        assert!(plain.contains(words), "{what} is not in report.md");
+    }
+    let picture = std::fs::read_to_string(run.join("map.svg")).unwrap();
+    assert!(picture.contains("corrected mass flow, g/s"), "the picture is in the campaign's units");
 
     let Some(chromium) = option_env!("MAPPER_TEST_CHROMIUM") else {
         panic!("needs Chromium: run `cargo xtask test`")
@@ -161,7 +178,12 @@ fn the_page_of_a_run_is_read_as_people_do() {
     assert!(seen["tables"].as_u64().unwrap() >= 6);
     assert_eq!(seen["heads_without_sorting"], 0, "every table is sorted by its heads");
     assert!(column("sorted_up").is_sorted() && column("sorted_down").iter().rev().is_sorted());
-    // The print is a PDF.
+    // The print is a PDF; heads of tables stand on each of its sheets, and at its foot whose map it is.
+    assert_eq!(seen["heads_repeated"], true);
+    assert!(
+        text.contains("@bottom-left{content:") && text.contains("TA\\2d 0001"),
+        "the foot names the machine"
+    );
     assert!(std::fs::read(pictures.join("report.pdf")).unwrap().starts_with(b"%PDF"));
 }
 

@@ -67,12 +67,8 @@ impl Drift {
             value["recording_warnings"] = json!(warnings);
             return output::print_json(&value);
         }
-        let mut text = drift_text(&drift.report);
-        text.push_str(&sensors_text(&drift.sensors));
-        text.push_str(&zero_text(&drift.zero));
-        for warning in warnings {
-            text.push_str(&format!("recording: {warning}\n"));
-        }
+        let mut text = drift_text(&drift.report) + &sensors_text(&drift.sensors) + &zero_text(&drift.zero);
+        text.extend(warnings.iter().map(|warning| format!("recording: {warning}\n")));
         output::print(&text)
     }
 

@@ -1,8 +1,9 @@
 //! Verdict and what to do first.
 
 use crate::advice::{first_things, is_clean};
+use crate::prose::sentence;
 use crate::run_page::RunPage;
-use mapper_report::verdict_sentence;
+use mapper_report::{key_figures, verdict_sentence};
 use maud::{Markup, html};
 
 pub(crate) fn head(page: &RunPage<'_>) -> Markup {
@@ -14,21 +15,23 @@ pub(crate) fn head(page: &RunPage<'_>) -> Markup {
             h1 { "Compressor map of " (report.machine) }
             p.under {
                 @if let Some(serial) = serial { "Serial number " (serial) ". " }
-                @if let Some(when) = page.tested_at { "Tested " (when) ". " }
+                @if let Some(when) = report.tested_at { "Tested " (when) ". " }
+                @if report.score.is_some() { strong { "Simulated rig: nothing was measured on a real machine." } " " }
                 "Efficiency is isentropic, total to total; corrected to " (report.reference) "; method " (report.method) "."
             }
             section.verdict.clean[clean] aria-labelledby="verdict" {
                 h2 #verdict { (verdict_sentence(report.points.iter().map(|scored| &scored.point))) }
+                @if let Some(words) = key_figures(report.map, report.points, report.campaign, report.plan) { p { (words) } }
                 @if things.is_empty() && clean {
                     p { "Nothing needs attention before the map is used." }
                 }
                 @if !things.is_empty() {
                     p { "First:" }
-                    ul { @for thing in &things { li { (thing) } } }
+                    ul { @for thing in &things { li { (sentence(thing)) } } }
                 }
             }
             nav aria-label="Sections" {
-                @for (to, name) in [("map", "Map"), ("step", "A point's transient"), ("points", "Points"), ("plan", "Plan as flown"),
+                @for (to, name) in [("map", "Map"), ("step", "A point's transient"), ("conditions", "Conditions and instruments"), ("points", "Points"), ("plan", "Plan as flown"),
                     ("gap", "Gap"), ("notes", "Notes"), ("provenance", "Provenance")] {
                     @if to != "gap" || page.gap.is_some() { a href=(format!("#{to}")) { (name) } }
                 }

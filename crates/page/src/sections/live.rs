@@ -63,7 +63,7 @@ pub(crate) fn live() -> Markup {
                 h2 #readings-head { "Readings and their limits" }
                 div.scroll tabindex="0" role="region" aria-label="Readings and their limits" {
                     table.data.words {
-                        thead { tr { @for head in ["channel", "reads", "unit", "lowest", "highest", "state", "what it is"] { th scope="col" { (head) } } } }
+                        thead { tr { @for head in ["channel", "reads", "unit", "state", "lowest", "highest", "what it is"] { th scope="col" { (head) } } } }
                         tbody #readings {}
                     }
                 }
@@ -71,13 +71,13 @@ pub(crate) fn live() -> Markup {
             section aria-labelledby="points-head" {
                 h2 #points-head { "Points so far" }
                 div.scroll tabindex="0" role="region" aria-label="Points so far" {
-                    table.data {
+                    table.data.remarks {
                         thead {
                             tr {
                                 th scope="col" { "step" }
                                 th scope="col" #speed-head { "speed" }
                                 th scope="col" #flow-head { "flow" }
-                                @for head in ["PR", "eta %", "+/-", "h W/(m2 K)", "verdict"] { th scope="col" { (head) } }
+                                @for head in ["PR", "eta %", "+/-", "h W/(m2 K)", "verdict", "why"] { th scope="col" { (head) } }
                             }
                         }
                         tbody #points {}

@@ -1,5 +1,6 @@
 //! The sections of the page, in its order.
 
+pub(crate) mod conditions;
 pub(crate) mod gap;
 pub(crate) mod head;
 pub(crate) mod live;

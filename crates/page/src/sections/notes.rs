@@ -1,25 +1,35 @@
 //! Zero, drift, surge, sensors, events, doubts: what happened beside the map.
 
+use crate::prose::{prose, sentence};
 use crate::run_page::RunPage;
+use crate::table::{Cell, Row, data_table, words_table};
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_report::{Display, doubts, repeated_jumps_text, score_text, surge_text, zero_text};
+use mapper_report::{
+    Display, SurgeReport, ZERO_HEADS, doubts, repeated_jumps_text, score_text, surge_heads, surge_remarks,
+    surge_rows, zero_rows, zero_words,
+};
 use maud::{Markup, html};
 
 pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
     let report = page.report;
     let display = Display::new(units);
-    let zero = zero_text(page.zero);
+    let zero = zero_rows(report.zero, &display);
     let said = doubts(report.points.iter().map(|scored| &scored.point));
     html! {
         section #notes aria-labelledby="notes-head" {
             h2 #notes-head { "Notes" }
-            p { (report.outcome) }
-            @if !report.remarks.is_empty() { ul { @for remark in report.remarks { li { (remark) } } } }
+            h3 { "Outcome" }
+            p { (prose(report.outcome)) }
+            @if !report.remarks.is_empty() { ul { @for remark in report.remarks { li { (prose(remark)) } } } }
             @if let Some(score) = report.score {
                 h3 { "Against the simulator's truth" }
                 (sentences(&score_text(score)))
             }
-            @if !zero.trim().is_empty() { h3 { "Isothermal zero" } pre { (zero.trim()) } }
+            @if let Some(words) = zero_words(report.zero) {
+                h3 { "Isothermal zero" }
+                p { (prose(&words)) }
+                @if !zero.is_empty() { (words_table("Offsets subtracted", &ZERO_HEADS, &zero)) }
+            }
             @if !report.repeats.is_empty() {
                 h3 { "Drift" }
                 p { "Repeats are kept out of the map. Fixed offsets cancel in what changes between them." }
@@ -27,7 +37,7 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
             }
             @if let Some(surge) = report.surge {
                 h3 { "Surge" }
-                pre { (surge_text(surge.marks, surge.remarks, surge.surges, units)) }
+                (surge_part(&surge, &display))
             }
             @if !report.sensors.is_empty() {
                 h3 { "Several sensors" }
@@ -35,14 +45,23 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
             }
             h3 { "Doubts and remarks" }
             @if said.is_empty() { p { "None." } }
-            @else { ul { @for doubt in &said { li { (doubt.steps()) " (" (doubt.code) "): " (doubt.message) } } } }
+            @else { ul { @for doubt in &said { li { (doubt.steps()) " (" (doubt.code) "): " (sentence(&doubt.message)) } } } }
             h3 { "Events" }
             @if report.events.is_empty() { p { "None." } }
-            @else { ul { @for event in report.events { li { (format!("{:.1} s", event.t_s)) ": " (event.message) } } } }
+            @else { ul { @for event in report.events { li { (format!("{:.1} s", event.t_s)) ": " (prose(&event.message)) } } } }
         }
     }
 }
 
+fn surge_part(surge: &SurgeReport<'_>, display: &Display) -> Markup {
+    let cells = |row: Vec<String>| Row { step: None, cells: row.into_iter().map(Cell::text).collect() };
+    let rows: Vec<Row> = surge_rows(surge.marks, display).into_iter().map(cells).collect();
+    html! {
+        (data_table("Surge-side ends that were sought", &surge_heads(surge.marks, display), &rows))
+        @for said in surge_remarks(surge.remarks, surge.surges) { p { (said) } }
+    }
+}
+
 fn sentences(text: &str) -> Markup {
-    html! { ul { @for line in text.lines().filter(|line| !line.trim().is_empty()) { li { (line) } } } }
+    html! { ul { @for line in text.lines().filter(|line| !line.trim().is_empty()) { li { (prose(line)) } } } }
 }

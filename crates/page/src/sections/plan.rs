@@ -36,18 +36,18 @@ pub(crate) fn plan(page: &RunPage<'_>, display: &Display) -> Markup {
                 @if missing > 0 { "; " (missing) " of " (plan.steps.len()) " steps were not flown" } "."
                 " The thermal gradient of a step, dTc, is the change of the housing temperature within the window that was used; sigma is one standard error."
             }
-            figure { div #plan-plot {} figcaption { "Jumps in their order; the first stand out most. Numbers are those of the steps." } }
+            figure { div #plan-plot {} figcaption { "Jumps in their order; the first stand out most. Numbers are those of the steps; one that would stand on another is left out, the table has all." } }
             (data_table("Steps", &heads, &rows))
         }
     }
 }
 
 fn flown(page: &RunPage<'_>, step: &PlanStep) -> bool {
-    page.recording.steps.iter().any(|marker| marker.index == step.index)
+    page.report.recording.steps.iter().any(|marker| marker.index == step.index)
 }
 
 fn row(page: &RunPage<'_>, display: &Display, step: &PlanStep) -> Row {
-    let marker = page.recording.steps.iter().find(|marker| marker.index == step.index);
+    let marker = page.report.recording.steps.iter().find(|marker| marker.index == step.index);
     let point = page.report.points.iter().map(|scored| &scored.point).find(|point| point.step == step.index);
     let optional = |value: Option<f64>, decimals| match value {
         Some(value) => Cell::number(number(Some(value), decimals), value),

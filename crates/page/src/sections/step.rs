@@ -21,7 +21,7 @@ pub(crate) fn step(page: &RunPage<'_>) -> Markup {
                     }
                 }
             }
-            p #step-words aria-live="polite" {}
+            div #step-words aria-live="polite" {}
             div.plots #step-plots {}
         }
     }

@@ -6,6 +6,7 @@ use crate::output::Replace;
 use crate::{interrupt, manner, output, registry};
 use clap::Args;
 use mapper_blind::calibrate::{Plan, calibrate};
+use mapper_blind::reliability::{calibrated_text, reliabilities};
 use mapper_fleet::Engine;
 use mapper_session::json_text;
 use serde_json::json;
@@ -53,16 +54,18 @@ impl Calibrate {
         let made_by = plan.command(&self.campaign);
         let found = calibrate(&campaign, &registry::registry().effects, &plan, made_by, &engine);
         progress.clear();
-        let stopped =
-            || Failure::new(Code::Interrupted, "stopped by the operator; `mapper fleet` keeps what is done");
+        let stopped = || Failure::new(Code::Interrupted, "stopped; `mapper fleet` keeps what is done");
         let (calibration, observed) = found?.ok_or_else(stopped)?;
         self.replace.write(&self.out, json_text(&calibration)?.as_bytes())?;
         if let Some(file) = &self.observed {
             self.replace.write(file, json_text(&observed)?.as_bytes())?;
         }
-        if self.json {
-            return output::print_json(&json!({ "calibration": self.out, "diagnoses": observed.len() }));
+        let (found, made) = (reliabilities(&observed)?, observed.len());
+        match self.json {
+            true => {
+                output::print_json(&json!({"calibration": self.out, "diagnoses": made, "reliability": found}))
+            }
+            false => output::print(&calibrated_text(made, &self.out, &found)),
         }
-        output::print(&format!("calibration from {} diagnoses in {}\n", observed.len(), self.out.display()))
     }
 }

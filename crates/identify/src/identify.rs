@@ -81,7 +81,7 @@ pub fn identify_beside(
             for point in found.points.iter_mut().flatten() {
                 point.verdict = point.verdict.doubted();
                 let code = code::OFF_THE_NOMINAL_MAP.to_owned();
-                point.warnings.push(Warning { code, message: message.clone() });
+                point.warnings.insert(0, Warning { code, message: message.clone() });
             }
         }
         return Ok(found);
@@ -175,9 +175,10 @@ fn identified(
             })
             .collect(),
     };
-    for objection in &objections {
+    // First what speaks against the readings: whatever else is said of a point rests on them.
+    for objection in objections.iter().rev() {
         for position in &objection.steps {
-            findings[*position].doubt(objection.code, objection.message.clone());
+            findings[*position].doubt_first(objection.code, objection.message.clone());
         }
     }
     let points = recording

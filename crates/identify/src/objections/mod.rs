@@ -9,6 +9,7 @@ mod clock;
 pub(crate) mod ends;
 mod frozen;
 mod head;
+mod housing;
 mod linear;
 mod noise;
 mod nominal_rig;
@@ -25,7 +26,7 @@ use crate::dynamic::Estimate;
 use crate::nominal_map::NominalRig;
 use crate::objections::ends::{Ends, ends};
 use crate::objections::objection::Objection;
-use mapper_core::Recording;
+use mapper_core::{Method, Recording};
 
 /// All objections. `alone`: what the two-parameter method makes of each step; empty where there is no housing temperature.
 pub(crate) fn objections(
@@ -54,6 +55,9 @@ pub(crate) fn objections(
         let works = if heads.is_empty() { work::objections(&ends, alone, config) } else { Vec::new() };
         found.extend(heads);
         found.extend(works);
+        if found.is_empty() && config.method != Method::Steady {
+            found.extend(housing::objections(recording, config));
+        }
         if let Some(nominal) = nominal.filter(|_| found.is_empty()) {
             found.extend(nominal_rig::objections(&ends, nominal, config));
         }

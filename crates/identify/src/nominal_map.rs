@@ -175,7 +175,7 @@ pub(crate) fn off_the_map(
     // One offset of a temperature by itself: among all that chi-square allows for it would hide.
     let slopes = DVector::from_iterator(
         count,
-        used.iter().map(|(point, nominal, _)| {
+        used.iter().map(|(point, nominal, ..)| {
             -nominal.eta * nominal.eta
                 / (point.t1_k * isentropic_rise_ratio(point.pressure_ratio, point.t1_k))
         }),

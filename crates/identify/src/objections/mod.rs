@@ -23,6 +23,7 @@ mod work;
 
 use crate::IdentifyConfig;
 use crate::dynamic::Estimate;
+use crate::identify::Balance;
 use crate::nominal_map::NominalRig;
 use crate::objections::ends::{Ends, ends};
 use crate::objections::objection::Objection;
@@ -34,6 +35,7 @@ pub(crate) fn objections(
     alone: &[Estimate],
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
+    balance: Balance,
 ) -> Vec<Objection> {
     let mut ends = ends(recording, config);
     let mut found = steps::objections(recording);
@@ -55,7 +57,7 @@ pub(crate) fn objections(
         let works = if heads.is_empty() { work::objections(&ends, alone, config) } else { Vec::new() };
         found.extend(heads);
         found.extend(works);
-        if found.is_empty() && config.method != Method::Steady {
+        if found.is_empty() && config.method != Method::Steady && balance == Balance::Asked {
             found.extend(housing::objections(recording, config));
         }
         if let Some(nominal) = nominal.filter(|_| found.is_empty()) {

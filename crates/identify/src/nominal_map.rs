@@ -129,7 +129,12 @@ pub(crate) fn off_the_map(
         .filter_map(|(place, point)| {
             let nominal = nearest(point, map, point.speed_corrected_rpm * speed_factor, flow_factor)?;
             let off = point.eta? - nominal.eta;
-            (off.is_finite() && point.eta_own_standard_error().is_some()).then_some((point, nominal, off, when(place)))
+            (off.is_finite() && point.eta_own_standard_error().is_some()).then_some((
+                point,
+                nominal,
+                off,
+                when(place),
+            ))
         })
         .take(MOST)
         .collect();
@@ -196,7 +201,8 @@ pub(crate) fn off_the_map(
     }
     let factor = covariance.cholesky()?;
     // One that comes over the run: no map changes with the time, so that only chance and what else changed with it hide a creep.
-    let creep = DVector::from_iterator(count, used.iter().zip(slopes.iter()).map(|((.., when), slope)| slope * when));
+    let creep =
+        DVector::from_iterator(count, used.iter().zip(slopes.iter()).map(|((.., when), slope)| slope * when));
     let solved = factor.solve(&creep);
     let (pull, information) = (solved.dot(&off), solved.dot(&creep));
     if pull.abs() > CREEP_SIGMAS * information.sqrt() {

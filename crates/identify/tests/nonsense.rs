@@ -186,9 +186,14 @@ fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
         println!("{mark} {name:35} {}", scores.map(|score| cell(&score)).join(" | "));
     }
     assert!(rows.len() >= 60);
-    let said = |what: &str, scores: &[Score; 3]| format!("draw {seed}, {what}: {}", scores.map(|score| cell(&score)).join(" | "));
-    let mut bad: Vec<String> =
-        rows.iter().filter(|(_, scores)| scores.iter().any(wrong)).map(|(name, scores)| said(name, scores)).collect();
+    let said = |what: &str, scores: &[Score; 3]| {
+        format!("draw {seed}, {what}: {}", scores.map(|score| cell(&score)).join(" | "))
+    };
+    let mut bad: Vec<String> = rows
+        .iter()
+        .filter(|(_, scores)| scores.iter().any(wrong))
+        .map(|(name, scores)| said(name, scores))
+        .collect();
     // Not by refusing everything: the sound recording keeps its points, and so do harmless changes of it.
     if base.iter().any(|score| score.good < 10) {
         bad.push(said("sound", &base));

@@ -77,7 +77,9 @@ fn seen_late_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
     let still = p3.slice(step.start_s - STILL_S, before_s + 1e-9).1;
     let level_pa = median(still.iter().filter(|value| value.is_finite()))?;
     let scatter_pa = robust_sigma(&still.iter().map(|value| value - level_pa).collect::<Vec<f64>>())?;
-    let seen_pa = p3.held(step.start_s).filter(|_| p3.t_s.binary_search_by(|t_s| t_s.total_cmp(&step.start_s)).is_ok())?;
+    let seen_pa = p3
+        .held(step.start_s)
+        .filter(|_| p3.t_s.binary_search_by(|t_s| t_s.total_cmp(&step.start_s)).is_ok())?;
     let moved_pa = (seen_pa - level_pa) * jump_pa.signum();
     (moved_pa > MOVED_SIGMAS * scatter_pa && moved_pa > MOVED_RATIO * jump_pa.abs()).then_some(before_s)
 }
@@ -313,7 +315,8 @@ mod tests {
         let p3 = with_it.series.get_mut(&Channel::P3).unwrap();
         p3.t_s.iter_mut().for_each(|t_s| *t_s = (*t_s * 10.0).round() / 10.0 + 0.1);
         let (told, _) = read(&with_it);
-        let starts = |recording: &Recording| recording.steps.iter().map(|step| step.start_s).collect::<Vec<_>>();
+        let starts =
+            |recording: &Recording| recording.steps.iter().map(|step| step.start_s).collect::<Vec<_>>();
         assert_eq!(starts(&told), starts(&seen));
     }
 

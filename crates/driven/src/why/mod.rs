@@ -15,8 +15,8 @@ mod side;
 mod turbine;
 mod turbine_sensors;
 
+pub use compressor_sensors::compressor_sensors;
 pub use diagnose::{Ask, diagnose};
 pub use diagnosis::{Beyond, Cause, Course, Diagnosis, HeldOut, NotAsked, Phase, Unknown, Word};
 pub use side::{NoSide, Which};
-pub use compressor_sensors::compressor_sensors;
 pub use turbine_sensors::turbine_sensors;

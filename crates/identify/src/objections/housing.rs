@@ -58,16 +58,20 @@ struct Part {
 }
 
 pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Option<Objection> {
-    let steps: Vec<Vec<Part>> =
-        recording.steps.iter().map(|step| parts(recording, step.start_s + AFTER_S, step.end_s, config)).collect();
+    let steps: Vec<Vec<Part>> = recording
+        .steps
+        .iter()
+        .map(|step| parts(recording, step.start_s + AFTER_S, step.end_s, config))
+        .collect();
     if steps.iter().filter(|parts| !parts.is_empty()).count() < FEWEST_STEPS {
         return None;
     }
     let parts: Vec<&Part> = steps.iter().flatten().collect();
-    let (first_s, last_s) = parts
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), part| (low.min(part.middle_s), high.max(part.middle_s)));
-    let column = |of: &dyn Fn(&Part) -> f64| parts.iter().map(|part| of(part) / part.error_w).collect::<Vec<f64>>();
+    let (first_s, last_s) = parts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), part| {
+        (low.min(part.middle_s), high.max(part.middle_s))
+    });
+    let column =
+        |of: &dyn Fn(&Part) -> f64| parts.iter().map(|part| of(part) / part.error_w).collect::<Vec<f64>>();
     let values = column(&|part| part.conductance_w_k * part.over_k);
     let mut columns = vec![
         column(&|part| part.slope_k_s),
@@ -77,9 +81,11 @@ pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Opti
         column(&|part| part.conductance_w_k),
     ];
     let apart = *fit(&columns, &values)?.last()?;
-    columns.push(column(&|part| part.conductance_w_k * ((part.middle_s - first_s) / (last_s - first_s) - 0.5)));
+    columns
+        .push(column(&|part| part.conductance_w_k * ((part.middle_s - first_s) / (last_s - first_s) - 0.5)));
     let creep = *fit(&columns, &values)?.last()?;
-    let offset = |channel: Channel| config.declared.get(&channel).map_or(0.0, |declared| declared.offset_sigma);
+    let offset =
+        |channel: Channel| config.declared.get(&channel).map_or(0.0, |declared| declared.offset_sigma);
     let most_k = MOST_K + OFFSETS * offset(Channel::T2).hypot(offset(Channel::Tc));
     let told = |found: Coefficient, most_k: f64| found.value.abs() > most_k.max(SIGMAS * found.error);
     // Tc is named, for T2 has more that speaks for it.
@@ -124,8 +130,15 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
         let by_kept_w = capacity_w_k * error / (kept * kept) * over_k;
         let error_w = by_kept_w.hypot(LACKS_W + LACKS_RATIO * conductance_w_k);
         let slope_k_s = top / bottom;
-        (slope_k_s.is_finite() && error_w.is_finite())
-            .then_some(Part { slope_k_s, tc_k, t1_k, over_k, conductance_w_k, error_w, middle_s })
+        (slope_k_s.is_finite() && error_w.is_finite()).then_some(Part {
+            slope_k_s,
+            tc_k,
+            t1_k,
+            over_k,
+            conductance_w_k,
+            error_w,
+            middle_s,
+        })
     };
     (0..count).filter_map(part).collect()
 }

@@ -14,9 +14,6 @@ use nalgebra::{DMatrix, DVector};
 /// Declared standard deviations of the efficiency's scale that are allowed for: a machine may be better or worse than its
 /// map all over without any of its points being wrong.
 const SCALE_SIGMAS: f64 = 6.0;
-/// The same of the scale beside which an offset, a creep and all together are looked for: a level within three declared standard deviations hides
-/// them, one beyond does not.
-const LEVEL_SPREAD: f64 = 3.0;
 /// The same of the map's smooth error, and the least that is allowed for, fraction.
 const SHAPE_SIGMAS: f64 = 3.0;
 const LEAST_SHAPE: f64 = 3e-3;
@@ -179,8 +176,7 @@ pub(crate) fn off_the_map(
             100.0 * tolerances.compressor_efficiency_ratio,
         ));
     }
-    let spread = LEVEL_SPREAD * tolerances.compressor_efficiency_ratio;
-    let covariance = covariance + spread * spread * &etas * etas.transpose();
+    let covariance = covariance + scale * scale * &etas * etas.transpose();
     // One offset of a temperature by itself: among all that chi-square allows for it would hide.
     let slopes = DVector::from_iterator(
         count,

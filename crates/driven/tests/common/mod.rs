@@ -67,9 +67,6 @@ impl Course {
     }
 }
 
-/// Lag of the T2 element behind the probe's tip, s, as something to plant: what a sheath has and a bare probe has not.
-pub const ELEMENT_LAG: &str = "element lag";
-
 /// A log of a machine with its own efficiency, heat transfer and housing, and with `planted` effects; with its truth.
 pub fn engine(
     seed: u64,
@@ -85,10 +82,6 @@ pub fn engine(
     let mut rig = Rig::new(Model::nominal());
     own(&mut rig.model.params, &mut normal);
     for (id, value) in planted {
-        if *id == ELEMENT_LAG {
-            rig.instruments.path_mut(Channel::T2).lag_s += value;
-            continue;
-        }
         let effects = [catalogue(), turbine_sensors()].concat();
         let effect = effects.iter().find(|effect| effect.info().id == *id).unwrap();
         add(&mut rig, effect.as_ref(), &[*value]).unwrap();

@@ -44,6 +44,14 @@ pub enum Problem {
         /// The channel.
         channel: Channel,
     },
+    /// Nobody knows how far the valve was open.
+    #[error(
+        "the recording does not say how far the valve was open at step {step}, and the model is driven with that: map it as `valve_command`, as commanded or as measured, or give it among `constants`; without it `mapper transient` diagnoses the compressor side from its measured neighbours"
+    )]
+    NoValve {
+        /// Index of the first step of which it is not known.
+        step: usize,
+    },
     /// Measured P3 is nowhere near its command.
     #[error(
         "measured P3 is {measured_pa:.0} Pa where {commanded_pa:.0} Pa is commanded: the two do not belong together; check the channel map and the units"

@@ -33,6 +33,9 @@ pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Resu
             return Err(Problem::NoDriver { channel });
         }
     }
+    if let Some(step) = recording.steps.iter().find(|step| !step.valve_opening_ratio.is_finite()) {
+        return Err(Problem::NoValve { step: step.index });
+    }
     for (channel, values) in &table.columns {
         middle(values).map_or(Ok(()), |middle| check_running(*channel, middle))?;
     }

@@ -108,6 +108,12 @@ impl Findings {
         self.verdict = self.verdict.doubted();
     }
 
+    /// A doubt before all others: what speaks against the readings themselves.
+    pub(crate) fn doubt_first(&mut self, code: &str, message: String) {
+        self.warnings.insert(0, Warning { code: code.to_owned(), message });
+        self.verdict = self.verdict.doubted();
+    }
+
     pub(crate) fn refuse(&mut self, code: &str, message: String) {
         self.remark(code, message);
         self.verdict = Verdict::Unusable;

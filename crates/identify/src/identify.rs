@@ -73,7 +73,7 @@ pub fn identify_beside(
     config: &IdentifyConfig,
     nominal: Option<NominalRig<'_>>,
 ) -> Result<Identified, IdentifyError> {
-    let mut found = identified(recording, config, nominal.as_ref())?;
+    let mut found = identified(recording, config, nominal.as_ref(), Balance::Asked)?;
     let any_good = found.points.iter().flatten().any(|point| point.verdict == Verdict::Good);
     let Some(nominal) = nominal.filter(|_| any_good) else { return Ok(found) };
     if config.method == Method::Steady {
@@ -81,7 +81,7 @@ pub fn identify_beside(
             for point in found.points.iter_mut().flatten() {
                 point.verdict = point.verdict.doubted();
                 let code = code::OFF_THE_NOMINAL_MAP.to_owned();
-                point.warnings.push(Warning { code, message: message.clone() });
+                point.warnings.insert(0, Warning { code, message: message.clone() });
             }
         }
         return Ok(found);
@@ -102,7 +102,8 @@ pub fn identify_beside(
 fn off_by_both(recording: &Recording, config: &IdentifyConfig, nominal: &NominalRig<'_>) -> Option<String> {
     recording.require(Channel::Tc).ok()?;
     let points = |method: Method| -> Option<Vec<IdentifiedPoint>> {
-        let found = identified(recording, &IdentifyConfig { method, ..config.clone() }, None).ok()?;
+        let config = IdentifyConfig { method, ..config.clone() };
+        let found = identified(recording, &config, None, Balance::NotAsked).ok()?;
         Some(found.points.into_iter().flatten().collect())
     };
     let off = |points: &[IdentifiedPoint]| {
@@ -114,10 +115,18 @@ fn off_by_both(recording: &Recording, config: &IdentifyConfig, nominal: &Nominal
     agrees.then_some(message)
 }
 
+/// Whether the heat balance of the housing may object. An apparent efficiency has nothing to do with Tc.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Balance {
+    Asked,
+    NotAsked,
+}
+
 fn identified(
     recording: &Recording,
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
+    balance: Balance,
 ) -> Result<Identified, IdentifyError> {
     check(config)?;
     let missing = missing(recording, config.method);
@@ -147,7 +156,7 @@ fn identified(
     } else {
         Default::default()
     };
-    let objections = objections(recording, &alone, config, nominal);
+    let objections = objections(recording, &alone, config, nominal, balance);
     let (mut thermal, mut two_parameter) = (None, Vec::new());
     let estimates: Vec<Estimate> = match config.method {
         Method::Joint => {
@@ -175,9 +184,10 @@ fn identified(
             })
             .collect(),
     };
-    for objection in &objections {
+    // First what speaks against the readings: whatever else is said of a point rests on them.
+    for objection in objections.iter().rev() {
         for position in &objection.steps {
-            findings[*position].doubt(objection.code, objection.message.clone());
+            findings[*position].doubt_first(objection.code, objection.message.clone());
         }
     }
     let points = recording

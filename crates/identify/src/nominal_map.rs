@@ -23,6 +23,8 @@ const LENGTH: f64 = 0.7;
 const DOUBT_SIGMAS: f64 = 4.0;
 /// Standard deviations of a temperature's offset.
 const OFFSET_SIGMAS: f64 = 3.0;
+/// Standard errors of a creep over the run: one in sixteen thousand by chance.
+const CREEP_SIGMAS: f64 = 4.0;
 /// Standard errors of the level beyond its tolerance.
 const LEVEL_SIGMAS: f64 = 4.0;
 /// How far along its speed line a point may be misplaced by the tolerances of flow map and valve, in units of the line's
@@ -59,7 +61,7 @@ pub fn doubt_off_the_nominal_map(
     for point in points.iter_mut().filter(|point| adiabatic(point) && point.eta.is_some()) {
         point.verdict = point.verdict.doubted();
         let warning = Warning { code: code::OFF_THE_NOMINAL_MAP.to_owned(), message: message.clone() };
-        point.warnings.push(warning);
+        point.warnings.insert(0, warning);
     }
 }
 
@@ -115,13 +117,21 @@ pub(crate) fn off_the_map(
 ) -> Option<String> {
     let speed_factor = reference.speed_factor_to(map.reference());
     let flow_factor = reference.flow_factor_to(map.reference());
-    let used: Vec<(&IdentifiedPoint, OnMap, f64)> = points
+    // Share of the run at which each was measured, from -0.5 to 0.5.
+    let when = |place: usize| place as f64 / (points.len().max(2) - 1) as f64 - 0.5;
+    let used: Vec<(&IdentifiedPoint, OnMap, f64, f64)> = points
         .iter()
-        .filter(|point| adiabatic(point) && point.verdict == Verdict::Good)
-        .filter_map(|point| {
+        .enumerate()
+        .filter(|(_, point)| adiabatic(point) && point.verdict == Verdict::Good)
+        .filter_map(|(place, point)| {
             let nominal = nearest(point, map, point.speed_corrected_rpm * speed_factor, flow_factor)?;
             let off = point.eta? - nominal.eta;
-            (off.is_finite() && point.eta_own_standard_error().is_some()).then_some((point, nominal, off))
+            (off.is_finite() && point.eta_own_standard_error().is_some()).then_some((
+                point,
+                nominal,
+                off,
+                when(place),
+            ))
         })
         .take(MOST)
         .collect();
@@ -139,7 +149,7 @@ pub(crate) fn off_the_map(
     let shape = (SHAPE_SIGMAS * tolerances.efficiency_shape_ratio).max(LEAST_SHAPE);
     let scale = SCALE_SIGMAS * tolerances.compressor_efficiency_ratio;
     let covariance = DMatrix::from_fn(count, count, |i, j| {
-        let ((one, nominal, _), (other, other_nominal, _)) = (used[i], used[j]);
+        let ((one, nominal, ..), (other, other_nominal, ..)) = (used[i], used[j]);
         let own = if i == j {
             let own = one.eta_own_standard_error().unwrap_or(0.0);
             let constant_h = if one.method == Method::Dynamic { DYNAMIC_OWN } else { 0.0 };
@@ -152,8 +162,8 @@ pub(crate) fn off_the_map(
             + own
             + shape * shape * nominal.eta * other_nominal.eta * (-0.5 * square).exp()
     });
-    let off = DVector::from_iterator(count, used.iter().map(|(.., off)| *off));
-    let etas = DVector::from_iterator(count, used.iter().map(|(_, nominal, _)| nominal.eta));
+    let off = DVector::from_iterator(count, used.iter().map(|(.., off, _)| *off));
+    let etas = DVector::from_iterator(count, used.iter().map(|(_, nominal, ..)| nominal.eta));
     // The level by itself: a machine may be better or worse all over, but not by any amount.
     let factor = covariance.clone().cholesky()?;
     let (information, pull) = (etas.dot(&factor.solve(&etas)), etas.dot(&factor.solve(&off)));
@@ -170,7 +180,7 @@ pub(crate) fn off_the_map(
     // One offset of a temperature by itself: among all that chi-square allows for it would hide.
     let slopes = DVector::from_iterator(
         count,
-        used.iter().map(|(point, nominal, _)| {
+        used.iter().map(|(point, nominal, ..)| {
             -nominal.eta * nominal.eta
                 / (point.t1_k * isentropic_rise_ratio(point.pressure_ratio, point.t1_k))
         }),
@@ -185,7 +195,21 @@ pub(crate) fn off_the_map(
              map are declared to explain (one standard deviation): T1, T2, Tc or the pressures are off; compare them at standstill (`zero`)"
         ));
     }
-    let chi_square = off.dot(&covariance.cholesky()?.solve(&off));
+    let factor = covariance.cholesky()?;
+    // One that comes over the run: no map changes with the time, so that only chance and what else changed with it hide a creep.
+    let creep =
+        DVector::from_iterator(count, used.iter().zip(slopes.iter()).map(|((.., when), slope)| slope * when));
+    let solved = factor.solve(&creep);
+    let (pull, information) = (solved.dot(&off), solved.dot(&creep));
+    if pull.abs() > CREEP_SIGMAS * information.sqrt() {
+        return Some(format!(
+            "beside the nominal map the efficiencies change over the run as if T2 - T1 crept by {:+.1} +/- {:.1} K, whatever speed and \
+             flow: T1, T2, Tc or a pressure creeps; compare them at standstill before and after (`zero`)",
+            pull / information,
+            2.0 / information.sqrt(),
+        ));
+    }
+    let chi_square = off.dot(&factor.solve(&off));
     let freedom = count as f64;
     if chi_square <= freedom + DOUBT_SIGMAS * (2.0 * freedom).sqrt() {
         return None;

@@ -67,9 +67,9 @@ struct Sound {
     declared: BTreeMap<Channel, DeclaredUncertainty>,
 }
 
-fn sound(seed: u64) -> Sound {
-    let clean = campaign(&grid(), 100.0, Machine::default());
+fn sound(seed: u64, clean: &Campaign) -> Sound {
     let (recording, declared) = measured(&clean.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(seed));
+    let clean = Campaign { recording: clean.recording.clone(), truth: clean.truth.clone() };
     Sound { clean, recording, declared }
 }
 
@@ -155,11 +155,26 @@ fn cell(score: &Score) -> String {
     )
 }
 
+/// Draws of noise and offsets: the one by which the margins were chosen, or as many as asked for, from 0 on.
+fn draws() -> Vec<u64> {
+    match std::env::var("MAPPER_NONSENSE_SEEDS") {
+        Ok(seeds) => (0..seeds.parse().unwrap()).collect(),
+        Err(_) => vec![3],
+    }
+}
+
 #[test]
 fn no_doctored_recording_gives_a_good_point_that_is_wrong() {
-    let sound = sound(3);
+    let clean = campaign(&grid(), 100.0, Machine::default());
+    let bad: Vec<String> = draws().into_iter().flat_map(|draw| of_draw(draw, &clean)).collect();
+    assert!(bad.is_empty(), "{bad:#?}");
+}
+
+/// What is wrong with one draw of noise and offsets.
+fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
+    let sound = sound(seed, clean);
     let base = METHODS.map(|method| score(&sound.recording, &sound, method));
-    println!("{:37} {}", "sound", base.map(|score| cell(&score)).join(" | "));
+    println!("draw {seed}\n  {:35} {}", "sound", base.map(|score| cell(&score)).join(" | "));
     let rows = mapper_numerics::parallel::map(table::DOCTORED, |(name, doctor)| {
         let mut recording = sound.recording.clone();
         doctor(&mut recording);
@@ -170,17 +185,25 @@ fn no_doctored_recording_gives_a_good_point_that_is_wrong() {
         let mark = if scores.iter().any(wrong) { "X" } else { " " };
         println!("{mark} {name:35} {}", scores.map(|score| cell(&score)).join(" | "));
     }
-    let bad: Vec<&str> =
-        rows.iter().filter(|(_, scores)| scores.iter().any(wrong)).map(|(name, _)| *name).collect();
-    assert!(bad.is_empty(), "good points that are wrong: {bad:?}");
+    assert!(rows.len() >= 60);
+    let said = |what: &str, scores: &[Score; 3]| {
+        format!("draw {seed}, {what}: {}", scores.map(|score| cell(&score)).join(" | "))
+    };
+    let mut bad: Vec<String> = rows
+        .iter()
+        .filter(|(_, scores)| scores.iter().any(wrong))
+        .map(|(name, scores)| said(name, scores))
+        .collect();
     // Not by refusing everything: the sound recording keeps its points, and so do harmless changes of it.
-    assert!(base.iter().all(|score| score.good >= 10), "{base:?}");
+    if base.iter().any(|score| score.good < 10) {
+        bad.push(said("sound", &base));
+    }
     for (name, scores) in rows.iter().filter(|(name, _)| HARMLESS.contains(name)) {
-        for (score, base) in scores.iter().zip(&base) {
-            assert!(score.good + 2 >= base.good, "{name}: {score:?} of {base:?}");
+        if scores.iter().zip(&base).any(|(score, base)| score.good + 2 < base.good) {
+            bad.push(said(&format!("{name}, harmless, refused"), scores));
         }
     }
-    assert!(rows.len() >= 60);
+    bad
 }
 
 /// What speaks against readings.

@@ -82,7 +82,7 @@ impl LogFormats {
 }
 
 /// Formats that people have and that are not read, by their first bytes, with what to do.
-const OTHERS: [(&[u8], &str); 8] = [
+const OTHERS: [(&[u8], &str); 9] = [
     (
         b"\x89MCAP",
         "it is an MCAP recording, which `mapper identify` reads; topics and fields are named in a channel map",
@@ -105,6 +105,7 @@ const OTHERS: [(&[u8], &str); 8] = [
     (b"MATLAB", "it is a MATLAB file; export it as CSV"),
     (b"\xD0\xCF\x11\xE0", "it is a workbook of Excel before 2007; save it as .xlsx"),
     (b"\x1F\x8B", "it is packed with gzip; unpack it"),
+    (b"PK", "it is a zip archive, and no whole workbook of Excel; unpack it, or save the workbook again"),
 ];
 
 /// What a file of no known format is.

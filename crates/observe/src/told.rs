@@ -8,11 +8,18 @@ use crate::lagged_command::{LaggedCommand, Level, Response, alike, levels_of_ste
 use crate::table::Table;
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_numerics::minimise::minimise;
-use mapper_numerics::statistics::median;
+use mapper_numerics::statistics::{median, robust_sigma};
 use std::ops::Range;
 
 /// A step's command that comes later than this behind its begin is not taken for it, s.
 const LATE_MAX_S: f64 = 2.0;
+/// Samples of a command further apart than this say nothing of when it changed, s.
+const SEEN_LATE_MAX_S: f64 = 1.0;
+/// What P3 does before a jump is looked at for so long, s.
+const STILL_S: f64 = 3.0;
+/// P3 has moved where it is off its level by so many of its scatter's standard deviations, and by this share of the jump.
+const MOVED_SIGMAS: f64 = 6.0;
+const MOVED_RATIO: f64 = 0.02;
 /// Around a jump of P3 its time shows from so long before to so long after, s.
 const AROUND_S: (f64, f64) = (1.0, 3.0);
 /// Jumps are timed where they are apart by so many of their errors, and by so much, s.
@@ -50,7 +57,31 @@ fn told_s(recording: &Recording, step: &StepMarker) -> f64 {
         let then = values.get(still)?;
         (still > 0 && !alike(before, told) && alike(*then, told)).then(|| t_s[still - 1])
     };
-    commands.into_iter().find_map(late).map_or(step.start_s, |late_s| late_s.max(step.start_s))
+    let late_s = commands.into_iter().find_map(late).map(|late_s| late_s.max(step.start_s));
+    late_s.or_else(|| seen_late_s(recording, step)).unwrap_or(step.start_s)
+}
+
+/// Where a log has the command only as its samples saw it, a step begins with the first sample that has the new one, and the rig
+/// may have been told at any time since the sample before: then measured P3 has moved by that first sample.
+fn seen_late_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
+    let (command, p3) = (recording.series.get(&Channel::P3Command)?, recording.series.get(&Channel::P3)?);
+    let first = command.t_s.partition_point(|t_s| *t_s < step.start_s);
+    let place = first.checked_sub(1)?;
+    let (before_s, before_pa) = (command.t_s[place], command.values[place]);
+    let after_pa = command.values.get(first).copied().filter(|_| command.t_s[first] == step.start_s)?;
+    let jump_pa = after_pa - before_pa;
+    if alike(before_pa, after_pa) || step.start_s - before_s > SEEN_LATE_MAX_S {
+        return None;
+    }
+    // By so much P3 moves while nobody commands it, noise included.
+    let still = p3.slice(step.start_s - STILL_S, before_s + 1e-9).1;
+    let level_pa = median(still.iter().filter(|value| value.is_finite()))?;
+    let scatter_pa = robust_sigma(&still.iter().map(|value| value - level_pa).collect::<Vec<f64>>())?;
+    let seen_pa = p3
+        .held(step.start_s)
+        .filter(|_| p3.t_s.binary_search_by(|t_s| t_s.total_cmp(&step.start_s)).is_ok())?;
+    let moved_pa = (seen_pa - level_pa) * jump_pa.signum();
+    (moved_pa > MOVED_SIGMAS * scatter_pa && moved_pa > MOVED_RATIO * jump_pa.abs()).then_some(before_s)
 }
 
 /// What the measured P3 says of times.
@@ -266,6 +297,27 @@ mod tests {
         assert_eq!(told, recording);
         assert_eq!(times.scatter_s, 0.0);
         assert_eq!(times.timed(&told), recording);
+    }
+
+    /// As a table of a logger has it: no step marks, the new command in the first row behind the jump.
+    #[test]
+    fn a_command_that_was_seen_a_sample_late_is_put_before_it() {
+        let recording = recorded(&[0.0; 12], 0.0);
+        let mut seen = recording.clone();
+        for index in 1..12 {
+            seen.steps[index].start_s += 0.1;
+            seen.steps[index - 1].end_s = recording.steps[index - 1].end_s;
+        }
+        let (told, times) = read(&seen);
+        assert_eq!(times.timed(&told).steps, recording.steps);
+        // Where P3 has not moved by that sample, the command came with it.
+        let mut with_it = seen.clone();
+        let p3 = with_it.series.get_mut(&Channel::P3).unwrap();
+        p3.t_s.iter_mut().for_each(|t_s| *t_s = (*t_s * 10.0).round() / 10.0 + 0.1);
+        let (told, _) = read(&with_it);
+        let starts =
+            |recording: &Recording| recording.steps.iter().map(|step| step.start_s).collect::<Vec<_>>();
+        assert_eq!(starts(&told), starts(&seen));
     }
 
     #[test]

@@ -311,9 +311,9 @@ fn wrong_reference(
     Some((format!("the log gives {name} in {recorded}, a pressure {over}"), remedy.to_owned()))
 }
 
-/// Whether a file that starts with these bytes is MCAP, or too short to be anything else.
+/// Whether a file that starts with these bytes is MCAP, or too short to be anything else; an empty one is nothing.
 pub(crate) fn is_mcap(head: &[u8]) -> bool {
-    head.starts_with(b"\x89MCAP") || head.len() < 5 && b"\x89MCAP".starts_with(head)
+    head.starts_with(b"\x89MCAP") || !head.is_empty() && head.len() < 5 && b"\x89MCAP".starts_with(head)
 }
 
 /// The file as a log, where it is no MCAP and there are formats to ask.

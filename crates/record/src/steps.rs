@@ -2,6 +2,7 @@
 
 use crate::ReadWarning;
 use mapper_core::{Channel, Group, OperatingPoint, Series, StepKind, StepMarker};
+use mapper_numerics::statistics::median;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -115,6 +116,11 @@ pub(crate) fn steps_from_commands(
         .enumerate()
         .map(|(index, ((start_s, settled_s), end_s))| {
             let held = |command: Option<&Series>| command.and_then(|c| held_number(c, *settled_s));
+            // Of a rig whose P3 nobody commanded: what it came to.
+            let reached = || {
+                let p3 = series.get(&Channel::P3)?;
+                median(p3.slice(0.5 * (start_s + end_s), end_s).1.iter().filter(|pa| pa.is_finite()))
+            };
             StepMarker {
                 index,
                 kind: StepKind::Point,
@@ -122,7 +128,7 @@ pub(crate) fn steps_from_commands(
                 end_s,
                 from: None,
                 to: None,
-                p3_pa: held(commands[0].1).unwrap_or(f64::NAN),
+                p3_pa: commands[0].1.map_or_else(reached, |_| held(commands[0].1)).unwrap_or(f64::NAN),
                 valve_opening_ratio: held(commands[1].1).unwrap_or(f64::NAN),
             }
         })

@@ -72,9 +72,12 @@ pub fn points_by_line_text(
         on_a_line.contains(&scored.point.step) || visits.into_iter().any(same)
     };
     let others = points.iter().filter(|scored| scored.point.kind.measures() && !is_on_a_line(scored));
-    let mut name = if on_a_line.is_empty() { String::new() } else { "no line".to_owned() };
+    // Where there are no lines each has the speed that it was measured at.
+    let mut name = (!on_a_line.is_empty()).then(|| "no line".to_owned());
     for scored in others {
-        add(std::mem::take(&mut name), scored);
+        let own = || display.speed(scored.point.speed_corrected_rpm);
+        let name = if on_a_line.is_empty() { own() } else { name.take().unwrap_or_default() };
+        add(name, scored);
     }
     let rendered = table.to_string();
     let mut text = format!(

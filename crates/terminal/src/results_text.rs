@@ -38,12 +38,12 @@ struct Found<'a> {
     zero: &'a ZeroOutcome,
     surge: Option<&'a SoughtSurge>,
     remarks: Vec<String>,
-    /// What `mapper identify` is told to show the rest.
-    named: String,
+    /// What shows the rest.
+    more: &'a str,
 }
 
-/// What a run has left: a table with what to know below it, verdict and files last.
-pub fn results_text(units: &DisplayUnits, results: &Results, shown: Shown) -> String {
+/// What a run has left: a table with what to know below it, verdict and files last. `more`: the command that shows the rest, in words.
+pub fn results_text(units: &DisplayUnits, results: &Results, more: &str, shown: Shown) -> String {
     let mut text = found_text(
         units,
         &Found {
@@ -56,7 +56,7 @@ pub fn results_text(units: &DisplayUnits, results: &Results, shown: Shown) -> St
             zero: &results.zero,
             surge: results.surge.as_ref(),
             remarks: results.remarks.clone(),
-            named: results.run.display().to_string(),
+            more,
         },
         shown,
     );
@@ -72,11 +72,12 @@ pub fn results_text(units: &DisplayUnits, results: &Results, shown: Shown) -> St
     text
 }
 
-/// What was identified without leaving any files. `named`: the recordings, as they were given; `warnings`: what was wrong with them.
+/// What was identified without leaving any files. `more`: the command that shows the rest, in words; `warnings`: what was wrong with
+/// the recordings.
 pub fn identified_text(
     units: &DisplayUnits,
     identified: &Identified,
-    named: &str,
+    more: &str,
     warnings: &[String],
     shown: Shown,
 ) -> String {
@@ -91,7 +92,7 @@ pub fn identified_text(
         zero: &identified.zero,
         surge: identified.surge.as_ref(),
         remarks: identified.remarks.iter().cloned().chain(warnings).collect(),
-        named: named.to_owned(),
+        more,
     };
     found_text(units, &found, shown)
 }
@@ -129,8 +130,8 @@ fn short(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
         text.push_str(&wrapped(remark, COLUMNS, 2));
     }
     let more = format!(
-        "+/- is half a 95 % interval. What all points share, repeats, sensors and the zero: `mapper identify {} --full`, or the page of the run.",
-        found.named
+        "+/- is half a 95 % interval. What all points share, repeats, sensors and the zero: {}, or the page of the run.",
+        found.more
     );
     text.push_str(&wrapped(&more, COLUMNS, 2));
     text

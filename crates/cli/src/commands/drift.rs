@@ -67,7 +67,8 @@ impl Drift {
             value["recording_warnings"] = json!(warnings);
             return output::print_json(&value);
         }
-        let mut text = drift_text(&drift.report) + &sensors_text(&drift.sensors) + &zero_text(&drift.zero);
+        let mut text =
+            [drift_text(&drift.report), sensors_text(&drift.sensors), zero_text(&drift.zero)].concat();
         text.extend(warnings.iter().map(|warning| format!("recording: {warning}\n")));
         output::print(&text)
     }

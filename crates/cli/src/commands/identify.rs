@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use mapper_core::Method;
 use mapper_session::{Recorded, Session};
 use mapper_terminal::{identified_text, results_text};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Identify efficiency and heat transfer from run directories, MCAP recordings or logs of other programs
 #[derive(Debug, Args)]
@@ -35,6 +35,9 @@ pub struct Identify {
     pub json: bool,
 }
 
+/// What shows more than the first look.
+const MORE: &str = "the same command with `--full`";
+
 impl Identify {
     /// Identifies all steps of the recordings.
     pub fn run(&self) -> Result<(), Failure> {
@@ -54,14 +57,13 @@ impl Identify {
             let results = session.identify_into(recorded, &map, method, directory)?;
             return match self.json {
                 true => output::print_json(&results),
-                false => output::print(&results_text(&display, &results, self.shown.shown())),
+                false => output::print(&results_text(&display, &results, MORE, self.shown.shown())),
             };
         }
         let found = session.identify(recorded, &map, method)?;
-        let named = path.as_deref().map(Path::display).map(|path| path.to_string()).unwrap_or_default();
         match self.json {
             true => output::print_json(&found.json(path.as_deref(), &warnings)),
-            false => output::print(&identified_text(&display, &found, &named, &warnings, self.shown.shown())),
+            false => output::print(&identified_text(&display, &found, MORE, &warnings, self.shown.shown())),
         }
     }
 }

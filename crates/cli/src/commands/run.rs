@@ -174,7 +174,8 @@ impl Run {
         match (results, &failure) {
             (Err(error), None) => return Err(error.into()),
             (Ok(results), _) if !self.json => {
-                output::print(&results_text(&campaign.display, &results, self.shown.shown()))?;
+                let more = format!("`mapper identify {} --full`", results.run.display());
+                output::print(&results_text(&campaign.display, &results, &more, self.shown.shown()))?;
             }
             // Stopped before there was anything to identify: why it was stopped is what counts.
             (Err(_), Some(_)) if !self.json => {}

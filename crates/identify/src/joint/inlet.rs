@@ -87,7 +87,8 @@ fn share_of_noise(problem: &Problem<'_>) -> Option<f64> {
     }
     let by_noise = problem.information(INLET)?.powf(-0.5);
     let alpha = problem.shared[ALPHA];
-    let ln_ratio = mapper_numerics::statistics::mean(&problem.ln_inlet_ratios())?;
+    let ln_ratios = problem.ln_inlet_ratios();
+    let ln_ratio = mapper_numerics::statistics::mean(&ln_ratios)?;
     // The change of alpha_A that passes for the whole way from one reading to the other.
     let way = (alpha * (1.0 - alpha) * ln_ratio).abs();
     let by_faults = ALPHA_FLOOR / way;

@@ -9,6 +9,7 @@ mod clock;
 pub(crate) mod ends;
 mod frozen;
 mod head;
+mod housing;
 mod linear;
 mod noise;
 mod nominal_rig;
@@ -22,10 +23,11 @@ mod work;
 
 use crate::IdentifyConfig;
 use crate::dynamic::Estimate;
+use crate::identify::Balance;
 use crate::nominal_map::NominalRig;
 use crate::objections::ends::{Ends, ends};
 use crate::objections::objection::Objection;
-use mapper_core::Recording;
+use mapper_core::{Method, Recording};
 
 /// All objections. `alone`: what the two-parameter method makes of each step; empty where there is no housing temperature.
 pub(crate) fn objections(
@@ -33,6 +35,7 @@ pub(crate) fn objections(
     alone: &[Estimate],
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
+    balance: Balance,
 ) -> Vec<Objection> {
     let mut ends = ends(recording, config);
     let mut found = steps::objections(recording);
@@ -54,6 +57,9 @@ pub(crate) fn objections(
         let works = if heads.is_empty() { work::objections(&ends, alone, config) } else { Vec::new() };
         found.extend(heads);
         found.extend(works);
+        if found.is_empty() && config.method != Method::Steady && balance == Balance::Asked {
+            found.extend(housing::objections(recording, config));
+        }
         if let Some(nominal) = nominal.filter(|_| found.is_empty()) {
             found.extend(nominal_rig::objections(&ends, nominal, config));
         }

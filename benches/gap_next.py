@@ -5,14 +5,17 @@
 
 Each case is a rig with one effect of the catalogue, a little larger than what is just seen, that has run four steps. Where the diagnosis
 leaves causes open and says what the stand can do, the best experiment of each kind is run: the same rig does the same four steps and then
-the lines that the diagnosis gives. Afterwards the true cause has 95 % of what was open, or it has not; the forecast said how
-probably. A table of both is printed, and every experiment is a line of DIR/experiments.jsonl.
+the lines that the diagnosis gives, or begins with a soak. Afterwards the true cause has 95 % of what was open, or it has not; the
+forecast said how probably. An offset that the soak tells is subtracted before anything is diagnosed: then it is told, and what
+is left of the others says whether it has been settled. A table of both is printed, and every experiment is a line of
+DIR/experiments.jsonl.
 """
 import argparse, concurrent.futures, json, pathlib, random, re, subprocess, time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SPEEDS, OPENINGS = "[90 krpm, 130 krpm, 70 krpm, 110 krpm]", "[0.7]"
 SETTLED = 0.95
+AT_REST = {"t1_offset": "t1", "t2_offset": "t2", "tc_offset": "tc"}
 
 
 def campaign(effect, seed):
@@ -77,9 +80,12 @@ def case(mapper, folder, number, seed, candidates):
         kinds.add(kind)
         place = folder / kind
         place.mkdir(parents=True, exist_ok=True)
-        (place / "next.rhai").write_text("for p in grid() { jump(p); }\n" + "\n".join(suggestion["script"]) + "\n")
-        text = re.sub(r"^order: .*", "sequence: next.rhai", own, flags=re.M)
-        text = re.sub(r"^(repeats|return_to_first): .*\n", "", text, flags=re.M)
+        if kind == "soak":
+            text = own + "\n".join(suggestion["script"]) + "\n"
+        else:
+            (place / "next.rhai").write_text("for p in grid() { jump(p); }\n" + "\n".join(suggestion["script"]) + "\n")
+            text = re.sub(r"^order: .*", "sequence: next.rhai", own, flags=re.M)
+            text = re.sub(r"^(repeats|return_to_first): .*\n", "", text, flags=re.M)
         then = diagnosed(mapper, place, text)
         if then is None:
             rows.append({"case": number, "effect": name, "kind": kind, "refused": True})
@@ -87,6 +93,9 @@ def case(mapper, folder, number, seed, candidates):
         after = {tuple(c["effects"]): c["probability"] for c in then["candidates"]}
         total = sum(after.get(tuple(c), 0.0) for c in is_open)
         share = after.get((name,), 0.0) / total if total > 0 else 0.0
+        if kind == "soak" and name in AT_REST:
+            told = any(w.startswith(f"{AT_REST[name].capitalize()} reads") for w in then["off_at_rest"])
+            share = 1.0 - total if told else 0.0
         rows.append({"case": number, "effect": name, "kind": kind, "forecast": suggestion["probability_settled"],
                      "bit": suggestion["entropy_drop_bit"], "share": share, "settled": share >= SETTLED,
                      "outside": then["probability_outside"], "outside_before": first["probability_outside"]})

@@ -278,6 +278,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         next,
         experiments,
         smallest_seen,
+        off_at_rest: Vec::new(),
         assumed: if tolerances_declared { Vec::new() } else { assumed(&study) },
         warnings,
     };

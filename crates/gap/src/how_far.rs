@@ -2,6 +2,7 @@
 
 use crate::adequacy::misfit_of_steps;
 use crate::carried::{StepMisfit, carried};
+use crate::first_step::with_start_read;
 use crate::fit::{Effort, Fit, fit};
 use crate::folds::Folds;
 use crate::nuisance::OUTPUTS;
@@ -98,7 +99,9 @@ fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
             Some(cause) => (beside, causes[cause]),
         };
         // A fold that cannot be fitted keeps the fit to all steps: it claims less than it could.
-        fit(study, linearised, &whole.hypothesis, &selection, EFFORT).unwrap_or_else(|_| whole.clone())
+        let fitted = fit(study, linearised, &whole.hypothesis, &selection, EFFORT);
+        let fitted = fitted.unwrap_or_else(|_| whole.clone());
+        if selection.steps[0] { fitted } else { with_start_read(study, linearised, fitted) }
     });
     let (mut before, mut after) = (whole(null), whole(null));
     for (fold, steps) in folds.steps.iter().enumerate() {

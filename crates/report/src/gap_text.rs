@@ -19,6 +19,11 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     if let Some(nearest) = nearest(diagnosis) {
         text += &format!("{nearest}\n");
     }
+    if diagnosis.verdict != Verdict::WithinTolerance {
+        for sensor in &diagnosis.off_at_rest {
+            text += &format!("{sensor}: subtracted before the diagnosis\n");
+        }
+    }
     if !diagnosis.r#where.is_empty() {
         text += "\nwhere\n";
         for place in diagnosis.r#where.iter().take(PLACES) {
@@ -117,6 +122,10 @@ fn removed(law: &Law) -> String {
 pub fn headline(diagnosis: &Diagnosis) -> String {
     let first = diagnosis.candidates.first();
     match (diagnosis.verdict, first) {
+        (Verdict::WithinTolerance, _) if !diagnosis.off_at_rest.is_empty() => format!(
+            "{}; with that subtracted nothing beyond the declared tolerances is seen",
+            diagnosis.off_at_rest.join(", ")
+        ),
         (Verdict::WithinTolerance, _) => "nothing beyond the declared tolerances is seen".to_owned(),
         (Verdict::Explained, Some(first)) => {
             let verb = if first.effects.len() == 1 { "explains" } else { "explain" };

@@ -8,7 +8,7 @@ use crate::planning::nominal_model;
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
-use mapper_core::{Recording, StepMarker};
+use mapper_core::{Channel, DeclaredUncertainty, Recording, StepMarker};
 use mapper_discover::discover::discover;
 use mapper_drift::{CauseKind, DriftReport, without_drift};
 use mapper_gap::actuators::Actuators;
@@ -29,6 +29,7 @@ use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use mapper_record::ChannelMap;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::slice;
 use std::sync::Arc;
 
@@ -93,7 +94,7 @@ impl Session<'_> {
             self.tell(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };
         progress(0.0, "drift");
-        let Prepared { recording, declared, model, drift, sensors, zero } =
+        let Prepared { recording, declared, model, drift, sensors, zero, off_at_rest } =
             self.prepared_for_gap(recorded, campaign, map)?;
         let between = |from: f64, to: f64| {
             move |done_ratio: f64, what: &str| progress(from + (to - from) * done_ratio, what)
@@ -105,7 +106,7 @@ impl Session<'_> {
             recording: &recording,
             declared,
             tolerances_declared: campaign.tolerances_declared,
-            experiments: experiments(self.registry, campaign, &model)?,
+            experiments: experiments(self.registry, campaign, map, &model)?,
             model,
             effects,
             calibration: calibration.clone(),
@@ -134,6 +135,7 @@ impl Session<'_> {
         // What was wrong with the file belongs to what is said about it.
         let warnings = recorded.read.warnings.iter().map(ToString::to_string);
         diagnosed.diagnosis.warnings.extend(warnings);
+        diagnosed.diagnosis.off_at_rest = off_at_rest;
         note_drift(&mut diagnosed.diagnosis, drift.as_ref());
         Ok(Gap { diagnosed, drift, sensors, zero })
     }
@@ -157,7 +159,8 @@ impl Session<'_> {
         let recording = taken_off(recordings.into_iter().next().unwrap_or_default(), drift.as_ref());
         model.params.t2_probe_diameter_m = config.probe_diameter_m;
         // A zero leaves less of the offsets.
-        let zero = ZeroOutcome::of(&recording, &config, campaign.zero);
+        let zero = ZeroOutcome::with_a_fault(&recording, &config, campaign.zero);
+        let off_at_rest = off_at_rest(&zero, &config.declared);
         let (recording, zeroed) = zero.take_off(recording, config);
         let declared = Declared {
             sensors: zeroed.declared,
@@ -165,7 +168,7 @@ impl Session<'_> {
             tolerances: campaign.tolerances,
             nominal: campaign.boundary,
         };
-        Ok(Prepared { recording, declared, model, drift, sensors, zero })
+        Ok(Prepared { recording, declared, model, drift, sensors, zero, off_at_rest })
     }
 
     /// Holds the machine that a diagnosis found against a recording that it has not seen; nothing is fitted.
@@ -241,6 +244,30 @@ struct Prepared {
     drift: Option<DriftReport>,
     sensors: Vec<FusedChannel>,
     zero: ZeroOutcome,
+    /// What the zero says of sensors that are off by more than is declared.
+    off_at_rest: Vec<String>,
+}
+
+/// Declared standard deviations from which on an offset at rest is more than what was declared.
+const BEYOND_SIGMAS: f64 = 3.0;
+
+/// A sentence for each sensor that is off at rest by more than is declared of it.
+fn off_at_rest(zero: &ZeroOutcome, declared: &BTreeMap<Channel, DeclaredUncertainty>) -> Vec<String> {
+    let ZeroOutcome::Found(zero) = zero else { return Vec::new() };
+    let beyond = zero.offsets.iter().filter_map(|(channel, off)| {
+        let sigma = declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);
+        let left = zero.left_sigma.get(channel).copied().unwrap_or(0.0);
+        let much = off.abs() > BEYOND_SIGMAS * sigma.hypot(left);
+        much.then(|| {
+            format!(
+                "{channel} reads {:.2} {unit} too {} at rest, where {sigma:.2} {unit} are declared",
+                off.abs(),
+                if *off > 0.0 { "high" } else { "low" },
+                unit = channel.unit(),
+            )
+        })
+    });
+    beyond.collect()
 }
 
 /// Share of the time that the search for drift takes.

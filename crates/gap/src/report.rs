@@ -231,6 +231,15 @@ pub struct PointGap {
     pub h_after_w_m2k: f64,
 }
 
+/// A tolerance or offset beyond what is declared.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Strained {
+    /// Which.
+    pub what: String,
+    /// By how much it is off, in sigmas as declared, > 0; 6 at most.
+    pub sigmas: f64,
+}
+
 /// The gap, each step predicted by a fit that did not see it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Gap {
@@ -252,6 +261,8 @@ pub struct Gap {
     pub largest_step: Option<usize>,
     /// Its share of the gap.
     pub largest_share: f64,
+    /// The tolerance that is furthest from what is declared where no cause is assumed; `None` where all are within three sigmas.
+    pub strained: Option<Strained>,
     /// Channels that the cause makes worse.
     pub worse: Vec<String>,
     /// Steps that were held out in one of the folds, by index; none where steps are too few.

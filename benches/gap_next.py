@@ -1,18 +1,21 @@
 #!/usr/bin/env python3
 """How often `what next` of a gap diagnosis keeps what it says.
 
-    python3 benches/gap_next.py target/release/mapper DIR [--cases 60] [--seed 1] [--effects oil_scale,ventilation] [--jobs 2] [--minutes 60]
+    python3 benches/gap_next.py target/release/mapper DIR [--cases 60] [--seed 1] [--sizes 0.7 1.2] [--effects oil_scale,ventilation] [--jobs 2] [--minutes 60]
 
-Each case is a rig with one effect of the catalogue, a little larger than what is just seen, that has run four steps. Where the diagnosis
-leaves causes open and says what the stand can do, the best experiment of each kind is run: the same rig does the same four steps and then
-the lines that the diagnosis gives. Afterwards the true cause has 95 % of what was open, or it has not; the forecast said how
-probably. A table of both is printed, and every experiment is a line of DIR/experiments.jsonl.
+Each case is a rig with one effect of the catalogue, about as large as what is just seen, that has run three steps. Where the diagnosis
+leaves causes open and says what the stand can do, the best experiment of each kind is run: the same rig does the same three steps and then
+the lines that the diagnosis gives, or begins with a soak. Afterwards the true cause has 95 % of what was open, or it has not; the
+forecast said how probably. An offset that the soak tells is subtracted before anything is diagnosed: then it is told, and what
+is left of the others says whether it has been settled. A table of both is printed, and every experiment is a line of
+DIR/experiments.jsonl.
 """
 import argparse, concurrent.futures, json, pathlib, random, re, subprocess, time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-SPEEDS, OPENINGS = "[90 krpm, 130 krpm, 70 krpm, 110 krpm]", "[0.7]"
+SPEEDS, OPENINGS = "[90 krpm, 130 krpm, 70 krpm]", "[0.7]"
 SETTLED = 0.95
+AT_REST = {"t1_offset": "t1", "t2_offset": "t2", "tc_offset": "tc"}
 
 
 def campaign(effect, seed):
@@ -53,10 +56,10 @@ def effects(mapper, folder):
             if s["value"] is not None and len(p := listed[s["effect"]]) == 1]
 
 
-def case(mapper, folder, number, seed, candidates):
+def case(mapper, folder, number, seed, sizes, candidates):
     draw = random.Random(seed * 100003 + number)
     name, parameter, seen = draw.choice(candidates)
-    value = parameter["neutral"] + draw.uniform(0.9, 1.5) * (seen - parameter["neutral"])
+    value = parameter["neutral"] + draw.uniform(*sizes) * (seen - parameter["neutral"])
     unit = parameter["unit"]
     written = f"{value:.6g}" if unit in ("1", "-", "") else f"{value:.6g} {unit}"
     folder = folder / f"case_{number:03}"
@@ -77,16 +80,25 @@ def case(mapper, folder, number, seed, candidates):
         kinds.add(kind)
         place = folder / kind
         place.mkdir(parents=True, exist_ok=True)
-        (place / "next.rhai").write_text("for p in grid() { jump(p); }\n" + "\n".join(suggestion["script"]) + "\n")
-        text = re.sub(r"^order: .*", "sequence: next.rhai", own, flags=re.M)
-        text = re.sub(r"^(repeats|return_to_first): .*\n", "", text, flags=re.M)
+        if kind == "soak":
+            text = own + "\n".join(suggestion["script"]) + "\n"
+        else:
+            (place / "next.rhai").write_text("for p in grid() { jump(p); }\n" + "\n".join(suggestion["script"]) + "\n")
+            text = re.sub(r"^order: .*", "sequence: next.rhai", own, flags=re.M)
+            text = re.sub(r"^(repeats|return_to_first): .*\n", "", text, flags=re.M)
         then = diagnosed(mapper, place, text)
         if then is None:
             rows.append({"case": number, "effect": name, "kind": kind, "refused": True})
             continue
         after = {tuple(c["effects"]): c["probability"] for c in then["candidates"]}
         total = sum(after.get(tuple(c), 0.0) for c in is_open)
+        if first["verdict"] == "within_tolerance":
+            total += then["probability_none"]
         share = after.get((name,), 0.0) / total if total > 0 else 0.0
+        if kind == "soak" and name in AT_REST:
+            total = sum(after.get(tuple(c), 0.0) for c in is_open)
+            told = any(w.startswith(f"{AT_REST[name].capitalize()} reads") for w in then["off_at_rest"])
+            share = 1.0 - total if told else 0.0
         rows.append({"case": number, "effect": name, "kind": kind, "forecast": suggestion["probability_settled"],
                      "bit": suggestion["entropy_drop_bit"], "share": share, "settled": share >= SETTLED,
                      "outside": then["probability_outside"], "outside_before": first["probability_outside"]})
@@ -114,6 +126,7 @@ def main():
     parser.add_argument("directory", type=pathlib.Path)
     parser.add_argument("--cases", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--sizes", type=float, nargs=2, default=(0.7, 1.2), help="least and most, of what is just seen")
     parser.add_argument("--effects", help="draw from these alone")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--minutes", type=float, default=60.0, help="no case is begun after")
@@ -128,7 +141,7 @@ def main():
     def one(number):
         if time.monotonic() - start > 60 * given.minutes:
             return None
-        return case(mapper, folder, number, given.seed, candidates)
+        return case(mapper, folder, number, given.seed, given.sizes, candidates)
 
     with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool, open(folder / "experiments.jsonl", "w") as out:
         for answer in pool.map(one, range(given.cases)):

@@ -1,5 +1,6 @@
 //! The machine at rest before a run.
 
+use crate::Channel;
 use serde::{Deserialize, Serialize};
 
 /// How the machine rests before it runs, so that sensors which must read the same can be held against each other: the
@@ -18,6 +19,9 @@ pub struct Soak {
 }
 
 impl Soak {
+    /// Sensors that read alike at rest: temperatures, and pressures.
+    pub const ALIKE: [&'static [Channel]; 2] =
+        [&[Channel::T1, Channel::T2, Channel::Tc, Channel::TOil], &[Channel::P1, Channel::P2]];
     /// How even a soak is if nothing is declared: 0.05 K.
     pub const TEMPERATURE_SIGMA_K: f64 = 0.05;
     /// The same of the pressures: 5 Pa.

@@ -14,6 +14,7 @@ use mapper_gap::additions::additions;
 use mapper_gap::adequacy::adequacy;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, prior};
+use mapper_gap::first_step::with_start_read;
 use mapper_gap::fit::{Effort, Fit, fit};
 use mapper_gap::how_far::channels_on;
 use mapper_gap::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
@@ -253,11 +254,15 @@ fn propose(
         return Vec::new();
     };
     let held_out = held_out_steps(diagnosed);
-    let shrink = shrink(study, &before, &trained.fit, held_out);
+    let read = |fit: Fit| {
+        if training.steps[0] { fit } else { with_start_read(&bench.study, linearised, fit) }
+    };
+    let (before, after) = (read(before), read(trained.fit.clone()));
+    let shrink = shrink(study, &before, &after, held_out);
     if shrink < LEAST_SHRINK || found.stability < LEAST_STABILITY {
         return Vec::new();
     }
-    let (channels, worse) = channels_on(study, linearised, [&before, &trained.fit], held_out);
+    let (channels, worse) = channels_on(study, linearised, [&before, &after], held_out);
     let everywhere = Selection::all(study);
     let (own, own_fit) = bench.alone(study, best);
     let one_more = additions(&own, linearised, &everywhere, &own_fit)

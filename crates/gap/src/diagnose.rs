@@ -22,7 +22,7 @@ use crate::smallest_seen::smallest_seen;
 use crate::study::{Hypothesis, PredictError, Prediction, Study, members};
 use crate::usable::usable;
 pub use crate::weigh::prior;
-use crate::weigh::{by_weight, rivals, weigh, weight};
+use crate::weigh::{by_weight, rivals, suspicions, weigh, weight};
 use crate::whiten::Linearised;
 use mapper_core::Recording;
 use mapper_numerics::parallel;
@@ -252,7 +252,9 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     };
     progress(0.95, "what next");
     let Suggested { next, experiments } = match verdict {
-        Verdict::WithinTolerance => Suggested::default(),
+        Verdict::WithinTolerance => suspicions(&weighed, &fits, &null)
+            .map(|rivals| next(&study, rivals, &experiments, calibration.temperature))
+            .unwrap_or_default(),
         Verdict::Unexplained | Verdict::PartlyExplained => {
             Suggested { next: Some(look_beside(&r#where)), experiments: Vec::new() }
         }
@@ -278,6 +280,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         next,
         experiments,
         smallest_seen,
+        off_at_rest: Vec::new(),
         assumed: if tolerances_declared { Vec::new() } else { assumed(&study) },
         warnings,
     };

@@ -20,7 +20,7 @@ pub struct AllowedJump {
 /// Something that may be done.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Experiment {
-    /// Start, target and time; equal points where a temperature alone is changed. P3 is what holds the target.
+    /// Start, target and time; equal points where a temperature alone is changed. P3 is what holds the target. Nothing of it counts for a soak.
     pub jump: AllowedJump,
     /// What is changed besides.
     pub beside: Beside,
@@ -47,6 +47,22 @@ pub enum Beside {
     },
     /// A channel of the model is measured that was not.
     Sensor(Channel),
+    /// The machine rests before it runs, so that its temperature sensors are held against each other.
+    Soak(AtRest),
+}
+
+/// How well a soak tells the offsets of the temperature sensors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AtRest {
+    /// Time at rest, s, > 0.
+    pub duration_s: f64,
+    /// One standard deviation of what is then left of each offset against the others, K, > 0; in the order of [`AtRest::CHANNELS`].
+    pub left_sigma_k: [f64; AtRest::CHANNELS.len()],
+}
+
+impl AtRest {
+    /// Sensors that are told. Of two pressure taps that differ nobody knows which is off, and a supply of oil wanders.
+    pub const CHANNELS: [Channel; 3] = [Channel::T1, Channel::T2, Channel::Tc];
 }
 
 /// How T3 and oil follow their setpoints on a usual stand, s: the virtual lab's, and nobody declares another.
@@ -64,7 +80,8 @@ impl Experiment {
     /// Time that it takes, min; the way to its start is not counted, a sensor's mounting is (half an hour).
     pub fn minutes(&self) -> f64 {
         let mounting = if matches!(self.beside, Beside::Sensor(_)) { MOUNTING_MIN } else { 0.0 };
-        (self.jump.dwell_s / 60.0).max(0.1) + mounting
+        let at_work_s = if let Beside::Soak(soak) = self.beside { soak.duration_s } else { self.jump.dwell_s };
+        (at_work_s / 60.0).max(0.1) + mounting
     }
 
     /// Whether the valve alone is moved, at one speed.
@@ -78,7 +95,7 @@ impl Experiment {
     /// The driver that its step changes, as it would be recorded at `t_s` (rising) if the step began at `start_s`.
     pub fn driven(&self, t_s: &[f64], start_s: f64) -> Option<(Channel, Series)> {
         let (channel, from_k, to_k, lag_s) = match self.beside {
-            Beside::Nothing | Beside::Sensor(_) => return None,
+            Beside::Nothing | Beside::Sensor(_) | Beside::Soak(_) => return None,
             Beside::T3 { from_k, to_k } => (Channel::T3, from_k, to_k, T3_LAG_S),
             Beside::Oil { from_k, to_k } => (Channel::TOil, from_k, to_k, OIL_LAG_S),
         };

@@ -2,10 +2,11 @@
 
 use crate::adequacy::misfit_of_steps;
 use crate::carried::{StepMisfit, carried};
+use crate::first_step::{is_start, with_start_read};
 use crate::fit::{Effort, Fit, fit};
 use crate::folds::Folds;
-use crate::nuisance::OUTPUTS;
-use crate::report::{ChannelGap, Gap, PointGap};
+use crate::nuisance::{NuisanceKind, OUTPUTS};
+use crate::report::{ChannelGap, Gap, PointGap, Strained};
 use crate::selection::{Selection, dot_over};
 use crate::study::{Hypothesis, Study};
 use crate::whiten::{Linearised, rows_of_step};
@@ -71,12 +72,26 @@ pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
         steps_with_gap: carried.steps,
         largest_step: carried.largest.map(|(step, _)| step),
         largest_share: carried.largest.map_or(0.0, |(_, share)| share),
+        strained: strained(study, null),
         worse,
         held_out_steps: if folds.steps.len() > 1 { steps } else { Vec::new() },
         folds: folds.steps.clone(),
         channels,
         points: points(study, &compared.causes.first().unwrap_or(&null).hypothesis),
     }
+}
+
+/// From so many sigmas on a tolerance is strained.
+const STRAINED_SIGMAS: f64 = 3.0;
+
+/// The tolerance of a fit that is furthest from what is declared; how the metal started and the clocks go are no properties of a
+/// rig.
+fn strained(study: &Study, fit: &Fit) -> Option<Strained> {
+    let own = study.nuisances.iter().zip(&fit.hypothesis.nuisances);
+    let machine = own.filter(|(n, _)| !is_start(n.kind) && !matches!(n.kind, NuisanceKind::Delay(_)));
+    let (nuisance, sigmas) = machine.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    let strained = Strained { what: nuisance.kind.to_string(), sigmas: sigmas.abs() };
+    (strained.sigmas > STRAINED_SIGMAS).then_some(strained)
 }
 
 fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
@@ -98,7 +113,9 @@ fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
             Some(cause) => (beside, causes[cause]),
         };
         // A fold that cannot be fitted keeps the fit to all steps: it claims less than it could.
-        fit(study, linearised, &whole.hypothesis, &selection, EFFORT).unwrap_or_else(|_| whole.clone())
+        let fitted = fit(study, linearised, &whole.hypothesis, &selection, EFFORT);
+        let fitted = fitted.unwrap_or_else(|_| whole.clone());
+        if selection.steps[0] { fitted } else { with_start_read(study, linearised, fitted) }
     });
     let (mut before, mut after) = (whole(null), whole(null));
     for (fold, steps) in folds.steps.iter().enumerate() {

@@ -9,13 +9,12 @@ use crate::coordinate::{Coordinate, coordinates, parameters};
 use crate::diagnose::Diagnosed;
 use crate::fit::{Effort, Fit, fit};
 use crate::in_words;
-use crate::nuisance::NuisanceKind;
+use crate::first_step::is_start;
 use crate::report::Verdict;
 use crate::selection::Selection;
 use crate::study::{EffectValues, Hypothesis, Study};
 use mapper_core::confidence_interval_95;
 use mapper_numerics::parallel;
-use mapper_observe::knob::Knob;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
@@ -209,7 +208,7 @@ fn together(study: &Study, fits: Vec<&Fit>, at: &[Coordinate], wanted: usize) ->
         .nuisances
         .iter()
         .enumerate()
-        .filter(|(_, n)| matches!(n.kind, NuisanceKind::Knob(Knob::StartTc | Knob::StartTt)))
+        .filter(|(_, n)| is_start(n.kind))
         .map(|(i, _)| i)
         .collect();
     let nuisances = study.nuisances.len();

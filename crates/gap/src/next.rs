@@ -147,7 +147,7 @@ fn suggestion(kind: Kind, experiment: &Experiment, odds: &Odds, open_bit: f64) -
     }
 }
 
-/// The lines of a sequence that run a step.
+/// The lines of a sequence that run a step, or that of a campaign which begins with a soak.
 fn script(experiment: &Experiment) -> Vec<String> {
     let place = |point: OperatingPoint| {
         format!("point(\"{} krpm\", {})", round(point.speed_rpm / 1e3), round(point.valve_opening_ratio))
@@ -156,6 +156,7 @@ fn script(experiment: &Experiment) -> Vec<String> {
     let AllowedJump { from, to, dwell_s, .. } = experiment.jump;
     let change = match experiment.beside {
         Beside::Nothing | Beside::Sensor(_) => None,
+        Beside::Soak(soak) => return vec![format!("zero: {{soak: {} min}}", round(soak.duration_s / 60.0))],
         Beside::T3 { to_k, .. } => Some(format!("t3(\"{} degC\");", celsius(to_k))),
         Beside::Oil { to_k, .. } => Some(format!("oil(\"{} degC\");", celsius(to_k))),
     };

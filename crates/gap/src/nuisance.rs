@@ -31,6 +31,27 @@ pub enum NuisanceKind {
     Delay(usize),
 }
 
+impl std::fmt::Display for NuisanceKind {
+    /// As it stands in files and is told to people.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            NuisanceKind::Offset(channel) => write!(f, "offset of {channel}"),
+            NuisanceKind::FlowMeterGain => f.write_str("flow_meter_gain"),
+            NuisanceKind::Knob(Knob::Flow) => f.write_str("flow_map"),
+            NuisanceKind::Knob(Knob::Efficiency) => f.write_str("compressor_efficiency"),
+            NuisanceKind::Knob(Knob::TurbineEfficiency) => f.write_str("turbine_efficiency"),
+            NuisanceKind::Knob(Knob::ValveArea) => f.write_str("valve_area"),
+            NuisanceKind::Knob(Knob::CompressorConvection) => f.write_str("convection"),
+            NuisanceKind::Knob(Knob::ExternalConvection) => f.write_str("external_convection"),
+            NuisanceKind::Knob(Knob::OilConductance) => f.write_str("oil_conductance"),
+            NuisanceKind::Knob(knob) => write!(f, "{knob:?}"),
+            NuisanceKind::TurbineDrop => f.write_str("turbine_drop"),
+            NuisanceKind::Shape(i) => write!(f, "efficiency_shape {i}"),
+            NuisanceKind::Delay(output) => write!(f, "delay of {}", OUTPUTS[*output]),
+        }
+    }
+}
+
 /// One thing that may be off, and by how much.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nuisance {

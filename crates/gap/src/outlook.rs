@@ -2,15 +2,16 @@
 //! is fitted again.
 
 use crate::actuators::Actuators;
+use crate::at_rest::apart_at_rest;
 use crate::coordinate::coordinates;
 use crate::experiment::{AllowedJump, Beside, Experiment};
+use crate::first_step::is_start;
 use crate::fit::{Fit, effect_changes};
-use crate::nuisance::{NuisanceKind, OUTPUTS};
+use crate::nuisance::OUTPUTS;
 use crate::study::{Hypothesis, Study};
 use crate::whiten::{Linearised, dot};
 use mapper_core::{Channel, OperatingPoint, Recording, Series, StepKind, StepMarker};
 use mapper_observe::declared::Declared;
-use mapper_observe::knob::Knob;
 use mapper_observe::table::Table;
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
@@ -122,10 +123,6 @@ fn refound(study: &Study, fit: &Fit) -> Hypothesis {
     hypothesis
 }
 
-fn is_start(kind: NuisanceKind) -> bool {
-    matches!(kind, NuisanceKind::Knob(Knob::StartTc | Knob::StartTt))
-}
-
 /// How far apart two candidates' predictions of an experiment are, in squared sigmas of the noise alone: a first look.
 ///
 /// `None` where the model cannot make the step.
@@ -134,6 +131,9 @@ pub fn apart_at_first_sight(
     experiment: &Experiment,
     fits: &[&Fit],
 ) -> Option<Vec<Vec<f64>>> {
+    if let Beside::Soak(soak) = experiment.beside {
+        return apart_at_rest(recorded, &soak, fits);
+    }
     let study = imagined(recorded, experiment, COARSE_S)?;
     let linearised = Linearised::of_noise_alone(&study).ok()?;
     let predictions: Option<Vec<Vec<f64>>> = fits
@@ -155,6 +155,9 @@ pub fn apart_at_first_sight(
 /// With `D` the difference of the predictions, `J` the derivatives of `j`'s prediction by its nuisances and parameters
 /// and `L` the precision in which the recording leaves them: `D'D - D'J (L + J'J)^-1 J'D`, all whitened.
 pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
+    if let Beside::Soak(soak) = experiment.beside {
+        return apart_at_rest(recorded, &soak, fits);
+    }
     let study = imagined(recorded, experiment, FINE_S)?;
     let nominal = Linearised::new(&study).ok()?;
     let mut predicted = Vec::new();
@@ -180,7 +183,7 @@ pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option
     Some(rows)
 }
 
-fn misfit(difference: &[f64], columns: &[Vec<f64>], precision: &DMatrix<f64>) -> Option<f64> {
+pub(crate) fn misfit(difference: &[f64], columns: &[Vec<f64>], precision: &DMatrix<f64>) -> Option<f64> {
     let n = columns.len();
     let mut matrix = precision.clone();
     for i in 0..n {

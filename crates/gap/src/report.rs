@@ -45,6 +45,8 @@ pub struct Diagnosis {
     pub smallest_seen: Vec<SmallestSeen>,
     /// What was assumed because the campaign does not declare it; one sentence each.
     pub assumed: Vec<String>,
+    /// Sensors that a soak shows to be off by more than is declared, which was subtracted beforehand; one sentence each.
+    pub off_at_rest: Vec<String>,
     /// What could not be used, and what to know before believing the rest; one sentence each.
     pub warnings: Vec<String>,
 }
@@ -229,6 +231,15 @@ pub struct PointGap {
     pub h_after_w_m2k: f64,
 }
 
+/// A tolerance or offset beyond what is declared.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Strained {
+    /// Which.
+    pub what: String,
+    /// By how much it is off, in sigmas as declared, > 0; 6 at most.
+    pub sigmas: f64,
+}
+
 /// The gap, each step predicted by a fit that did not see it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Gap {
@@ -250,6 +261,8 @@ pub struct Gap {
     pub largest_step: Option<usize>,
     /// Its share of the gap.
     pub largest_share: f64,
+    /// The tolerance that is furthest from what is declared where no cause is assumed; `None` where all are within three sigmas.
+    pub strained: Option<Strained>,
     /// Channels that the cause makes worse.
     pub worse: Vec<String>,
     /// Steps that were held out in one of the folds, by index; none where steps are too few.
@@ -292,6 +305,13 @@ pub enum Next {
         #[serde(skip_serializing_if = "Option::is_none")]
         oil_temperature_k: Option<[f64; 2]>,
     },
+    /// A soak before the next run.
+    Soak {
+        /// Time at rest, min.
+        soak_minutes: f64,
+        /// Probability expected for the true candidate after it.
+        expected_probability: f64,
+    },
     /// The sensor that would.
     Sensor {
         /// Which.
@@ -315,11 +335,14 @@ pub enum Kind {
     OilStep,
     /// A jump with a channel measured that was not.
     Sensor,
+    /// A rest before the run, in which sensors are held against each other.
+    Soak,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Kind; 5] = [Kind::Jump, Kind::ValveStep, Kind::T3Step, Kind::OilStep, Kind::Sensor];
+    pub const ALL: [Kind; 6] =
+        [Kind::Jump, Kind::ValveStep, Kind::T3Step, Kind::OilStep, Kind::Sensor, Kind::Soak];
 
     /// That of an experiment.
     pub fn of(experiment: &Experiment) -> Kind {
@@ -327,6 +350,7 @@ impl Kind {
             Beside::T3 { .. } => Kind::T3Step,
             Beside::Oil { .. } => Kind::OilStep,
             Beside::Sensor(_) => Kind::Sensor,
+            Beside::Soak(_) => Kind::Soak,
             Beside::Nothing if experiment.is_valve_step() => Kind::ValveStep,
             Beside::Nothing => Kind::Jump,
         }
@@ -338,7 +362,7 @@ impl Kind {
 pub struct Suggestion {
     /// What kind.
     pub kind: Kind,
-    /// Where it starts, settled.
+    /// Where it starts, settled; standing still for a soak.
     pub from: JumpPoint,
     /// Where it goes.
     pub to: JumpPoint,
@@ -358,7 +382,7 @@ pub struct Suggestion {
     pub entropy_drop_bit: f64,
     /// That entropy before, bit.
     pub entropy_bit: f64,
-    /// The lines of a sequence that run it.
+    /// The lines of a sequence that run it; for a soak that of the campaign.
     pub script: Vec<String>,
 }
 
@@ -372,6 +396,12 @@ impl Suggestion {
                     "with it one jump answers {:.0} % of what is open between the first candidates",
                     100.0 * self.entropy_drop_bit / self.entropy_bit.max(f64::MIN_POSITIVE)
                 ),
+            };
+        }
+        if self.kind == Kind::Soak {
+            return Next::Soak {
+                soak_minutes: self.minutes,
+                expected_probability: self.expected_probability,
             };
         }
         Next::Jump {

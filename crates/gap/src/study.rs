@@ -299,6 +299,12 @@ impl Study {
         Ok((rig, circumstances))
     }
 
+    /// What a channel reads too much by a hypothesis at the end of the recording, in its unit.
+    pub(crate) fn offset_at_end(&self, hypothesis: &Hypothesis, channel: Channel) -> Option<f64> {
+        let last = self.steps.len().checked_sub(1)?;
+        Some(self.rig(hypothesis, last).ok()?.0.instruments.path(channel).offset)
+    }
+
     /// Stretches of steps in which a hypothesis' rig stays what it is: the first step of each.
     fn stretches(&self, hypothesis: &Hypothesis) -> Vec<usize> {
         let shares = |step: usize| {

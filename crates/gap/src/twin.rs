@@ -3,13 +3,12 @@
 use crate::coordinate::coordinates;
 use crate::diagnose::Diagnosed;
 use crate::fit::{Fit, effect_changes};
-use crate::nuisance::{NuisanceKind, OUTPUTS};
+use crate::nuisance::OUTPUTS;
 use crate::outlook::{Alike, imagined_steps};
 use crate::report::Verdict;
 use crate::study::{Hypothesis, Study};
 use crate::whiten::{Linearised, dot};
 use mapper_core::{StepMarker, half_width_95};
-use mapper_observe::knob::Knob;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -73,25 +72,6 @@ pub enum TwinError {
     Predict(#[from] crate::study::PredictError),
 }
 
-/// What identifies a tolerance in files.
-fn name(kind: NuisanceKind) -> String {
-    match kind {
-        NuisanceKind::Offset(channel) => format!("offset of {channel}"),
-        NuisanceKind::FlowMeterGain => "flow_meter_gain".to_owned(),
-        NuisanceKind::Knob(Knob::Flow) => "flow_map".to_owned(),
-        NuisanceKind::Knob(Knob::Efficiency) => "compressor_efficiency".to_owned(),
-        NuisanceKind::Knob(Knob::TurbineEfficiency) => "turbine_efficiency".to_owned(),
-        NuisanceKind::Knob(Knob::ValveArea) => "valve_area".to_owned(),
-        NuisanceKind::Knob(Knob::CompressorConvection) => "convection".to_owned(),
-        NuisanceKind::Knob(Knob::ExternalConvection) => "external_convection".to_owned(),
-        NuisanceKind::Knob(Knob::OilConductance) => "oil_conductance".to_owned(),
-        NuisanceKind::Knob(knob) => format!("{knob:?}"),
-        NuisanceKind::TurbineDrop => "turbine_drop".to_owned(),
-        NuisanceKind::Shape(i) => format!("efficiency_shape {i}"),
-        NuisanceKind::Delay(output) => format!("delay of {}", OUTPUTS[output]),
-    }
-}
-
 fn is_start(name: &str) -> bool {
     name == "StartTc" || name == "StartTt"
 }
@@ -107,7 +87,7 @@ impl Found {
     fn of_fit(study: &Study, fit: &Fit) -> Option<Found> {
         let covariance = fit.precision.clone().cholesky()?.inverse();
         let tolerance = |(nuisance, sigmas): (&crate::nuisance::Nuisance, &f64)| FoundTolerance {
-            name: name(nuisance.kind),
+            name: nuisance.kind.to_string(),
             value: sigmas * nuisance.sigma,
             sigma: nuisance.sigma,
         };
@@ -129,7 +109,7 @@ impl Found {
     /// The hypothesis of a twin in another recording, and its covariance: of that recording's own start nothing is known yet.
     fn hypothesis(&self, study: &Study) -> Result<(Hypothesis, DMatrix<f64>), TwinError> {
         let same = study.nuisances.len() == self.tolerances.len()
-            && study.nuisances.iter().zip(&self.tolerances).all(|(n, found)| name(n.kind) == found.name);
+            && study.nuisances.iter().zip(&self.tolerances).all(|(n, found)| n.kind.to_string() == found.name);
         if !same {
             let (theirs, ours) = (self.tolerances.len(), study.nuisances.len());
             return Err(TwinError::Tolerances { theirs, ours });

@@ -36,8 +36,11 @@ pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Resu
     if let Some(step) = recording.steps.iter().find(|step| !step.valve_opening_ratio.is_finite()) {
         return Err(Problem::NoValve { step: step.index });
     }
+    // A rest before the first step may be longer than all steps.
+    let starts_s = recording.steps.first().map_or(f64::NEG_INFINITY, |step| step.start_s);
+    let running = table.range(starts_s, f64::INFINITY);
     for (channel, values) in &table.columns {
-        middle(values).map_or(Ok(()), |middle| check_running(*channel, middle))?;
+        middle(&values[running.clone()]).map_or(Ok(()), |middle| check_running(*channel, middle))?;
     }
     let jumps = recording
         .steps

@@ -194,6 +194,19 @@ pub(crate) fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> 
     estimates
 }
 
+/// Where no cause is named but one is more probable than nothing: the causes, and nothing among them, most probable first.
+pub(crate) fn suspicions<'a>(weighed: &Weighed, fits: &'a [Fit], null: &'a Fit) -> Option<Rivals<'a>> {
+    if weighed.candidates.first()?.probability <= weighed.none {
+        return None;
+    }
+    let causes = weighed.candidates.iter().zip(&weighed.shown);
+    let mut open: Vec<(f64, &Fit)> = causes.map(|(cause, place)| (cause.probability, &fits[*place])).collect();
+    let nothing = open.partition_point(|(probability, _)| *probability > weighed.none);
+    open.insert(nothing, (weighed.none, null));
+    let (probabilities, fits) = open.into_iter().unzip();
+    Some(Rivals { fits, probabilities })
+}
+
 /// The causes that are still open, best first; `None` where the first is settled.
 pub(crate) fn rivals<'a>(weighed: &Weighed, fits: &'a [Fit]) -> Option<Rivals<'a>> {
     let probabilities: Vec<f64> = weighed.candidates.iter().map(|candidate| candidate.probability).collect();

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Visits, boundary, declared};
-use mapper_core::{Channel, OperatingPoint, Recording};
+use mapper_core::{Channel, OperatingPoint, Recording, Series};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
 use mapper_gap::experiment::{AllowedJump, Experiment};
@@ -103,6 +103,35 @@ fn nothing_is_called_nothing() {
     let n = diagnosed.null.residual.len() as f64;
     let mean_square = diagnosed.null.residual.iter().map(|r| r * r).sum::<f64>() / n;
     assert!((0.8..1.0 + 4.0 * (2.0 / n).sqrt()).contains(&mean_square), "{mean_square}");
+}
+
+/// A soak before the first step may be longer than all steps: the shaft stands for most of such a recording.
+#[test]
+fn a_long_rest_before_the_first_step_changes_nothing() {
+    let plain = record(&[], 5);
+    let rest_s = 600.0;
+    let rested = |(channel, series): (&Channel, &Series)| {
+        let at_rest = match channel {
+            Channel::P1 | Channel::P2 | Channel::P3 | Channel::P4 => 100e3,
+            Channel::ShaftSpeed | Channel::CompressorFlow | Channel::TurbineFlow => 0.0,
+            _ => 298.15,
+        };
+        let count = (10.0 * rest_s) as usize;
+        let t_s = (0..count).map(|i| 0.1 * i as f64).chain(series.t_s.iter().map(|t| t + rest_s)).collect();
+        let values = std::iter::repeat_n(at_rest, count).chain(series.values.iter().copied()).collect();
+        (*channel, Series { t_s, values })
+    };
+    let mut recording = plain.clone();
+    recording.series = plain.series.iter().map(rested).collect();
+    for step in &mut recording.steps {
+        step.start_s += rest_s;
+        step.end_s += rest_s;
+    }
+    let diagnosis = ask(&recording).unwrap().diagnosis;
+    assert_eq!(diagnosis.verdict, Verdict::WithinTolerance, "{:?}", diagnosis.candidates);
+    // A step that was held out is told as well as noise lets it, the first one too, of which nobody else knows how warm it began.
+    let before = ask(&plain).unwrap().diagnosis.gap.before;
+    assert!(before.abs() < 0.3 && diagnosis.gap.before.abs() < 0.3, "{before} {}", diagnosis.gap.before);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use common::{Visits, boundary, declared};
 use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, Question, diagnose};
-use mapper_gap::experiment::{AllowedJump, Beside, Experiment};
+use mapper_gap::experiment::{AllowedJump, AtRest, Beside, Experiment};
 use mapper_gap::fit::Fit;
 use mapper_gap::next::{Rivals, Suggested, next};
 use mapper_gap::outlook::apart;
@@ -104,6 +104,27 @@ fn an_oil_step_tells_an_oil_side_pair_apart_and_a_lag_from_nothing() {
     let step = nearest(&oil_step(70e3, 40.0), &pair, &diagnosed);
     let jumped = nearest(&jump(60e3, 140e3, 60.0), &pair, &diagnosed);
     assert!(step < 0.1 * jumped, "{step} {jumped}");
+}
+
+/// At rest T1, T2 and Tc read alike but for their offsets, and the housings' heat shows in none of them.
+#[test]
+fn a_soak_tells_which_sensor_is_off_and_nothing_of_the_housings() {
+    let soak = |left_k: f64| {
+        let soak = AtRest { duration_s: 1800.0, left_sigma_k: [left_k; AtRest::CHANNELS.len()] };
+        Experiment { beside: Beside::Soak(soak), ..jump(70e3, 70e3, 300.0) }
+    };
+    let diagnosed = ask(("t2_offset", 2.0), &["t1_offset", "t2_offset"]);
+    let pair = [fit_of(&diagnosed, "t2_offset"), fit_of(&diagnosed, "t1_offset")];
+    let told = |left_k: f64| apart(&diagnosed.study, &soak(left_k), &pair).unwrap();
+    // 2 K of T2 against as much of T1, declared to a quarter of a kelvin: three sigmas and more.
+    assert!(told(0.05)[0][1] > 9.0 && told(0.05)[0][0].abs() < 1e-9, "{:?}", told(0.05));
+    assert!(told(100.0)[0][1] < 0.01, "sensors that rest unevenly by 100 K tell nothing: {:?}", told(100.0));
+
+    let diagnosed = ask(("ventilation", 2.0), &["ventilation", "oil_scale"]);
+    let pair = [fit_of(&diagnosed, "ventilation"), fit_of(&diagnosed, "oil_scale")];
+    let told = apart(&diagnosed.study, &soak(0.05), &pair).unwrap();
+    // Tolerances fitted beside each differ by a part of what is declared.
+    assert!(told[0][1] < 2.0 && told[1][0] < 2.0, "{told:?}");
 }
 
 /// The list is ranked by what a minute answers, its first is what is to be done next, and only what was offered stands in it.

@@ -55,5 +55,8 @@ pub use nominal_map::{NominalRig, doubt_off_the_nominal_map};
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
 pub use two_parameter::TwoParameter;
-pub use zero::{IsothermalZero, NoZero, ZeroSettings, expected_after_zero, isothermal_zero, zeroed};
+pub use zero::{
+    IsothermalZero, NoZero, ZeroSettings, expected_after_zero, isothermal_zero, isothermal_zero_with_a_fault,
+    zeroed,
+};
 pub use zero_outcome::ZeroOutcome;

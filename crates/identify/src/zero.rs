@@ -130,6 +130,28 @@ pub fn isothermal_zero(
     config: &IdentifyConfig,
     settings: &ZeroSettings,
 ) -> Result<IsothermalZero, NoZero> {
+    zero_of(recording, config, settings, false)
+}
+
+/// As [`isothermal_zero`], of a rig on which one temperature sensor may be off by more than is declared: it is held against the
+/// others; oil that drifts is left out. Of two pressure taps that differ by more nobody knows which is off: what is declared of them stands.
+///
+/// # Errors
+/// [`NoZero`] where the recording has no soak, or one that is none.
+pub fn isothermal_zero_with_a_fault(
+    recording: &Recording,
+    config: &IdentifyConfig,
+    settings: &ZeroSettings,
+) -> Result<IsothermalZero, NoZero> {
+    zero_of(recording, config, settings, true)
+}
+
+fn zero_of(
+    recording: &Recording,
+    config: &IdentifyConfig,
+    settings: &ZeroSettings,
+    a_fault: bool,
+) -> Result<IsothermalZero, NoZero> {
     let (start_s, end_s) = at_rest(recording);
     let no_soak = NoZero::NoSoak { found_s: (end_s - start_s).max(0.0), needed_s: settings.shortest_s };
     if (end_s - start_s).is_nan() || end_s - start_s < settings.shortest_s {
@@ -142,7 +164,12 @@ pub fn isothermal_zero(
         let mut readings = Vec::new();
         for channel in group {
             let Some(reading) = soak_mean(recording, *channel, start_s, end_s) else { continue };
-            if group.len() > 2 && reading.drift_per_min.abs() > settings.drift_k_min {
+            let drifts = group.len() > 2 && reading.drift_per_min.abs() > settings.drift_k_min;
+            // A supply of oil that wanders says nothing of the cell, and nothing else hangs on it.
+            if drifts && a_fault && *channel == Channel::TOil {
+                continue;
+            }
+            if drifts {
                 return Err(NoZero::Drifts {
                     channel: *channel,
                     drift_k_min: reading.drift_per_min,
@@ -158,20 +185,44 @@ pub fn isothermal_zero(
             {
                 (mean, own) = (limit, sigma.hypot(error));
             }
-            readings.push((*channel, mean, own, own.hypot(declared.offset_sigma)));
+            readings.push(Reading { channel: *channel, mean, own, total: own.hypot(declared.offset_sigma) });
         }
-        let weight: f64 = readings.iter().map(|(.., total)| total.powi(-2)).sum();
-        let common = readings.iter().map(|(_, mean, _, total)| mean * total.powi(-2)).sum::<f64>() / weight;
+        let mut common = common(&readings);
         if readings.len() < 2 || !common.is_finite() {
             continue;
         }
-        for (channel, reading, own, total) in readings {
-            let off = reading - common;
-            if off.abs() > UNEVEN_SIGMAS * total {
-                return Err(NoZero::Uneven { channel, off, sigma: total });
+        let uneven = |common: f64, at_fault: Option<Channel>| {
+            let mut sound = readings.iter().filter(|reading| Some(reading.channel) != at_fault);
+            sound.find(|reading| (reading.mean - common).abs() > UNEVEN_SIGMAS * reading.total)
+        };
+        if let Some(first) = uneven(common, None) {
+            let Reading { channel, mean, total, .. } = *first;
+            let refused = NoZero::Uneven { channel, off: mean - common, sigma: total };
+            if !a_fault {
+                return Err(refused);
             }
-            zero.offsets.insert(channel, off);
-            zero.left_sigma.insert(channel, own);
+            if readings.len() < 3 {
+                continue;
+            }
+            // The one without which the others agree best.
+            let without = |channel: Channel| {
+                let others: Vec<Reading> =
+                    readings.iter().filter(|other| other.channel != channel).copied().collect();
+                let common = self::common(&others);
+                let spread: f64 =
+                    others.iter().map(|other| ((other.mean - common) / other.total).powi(2)).sum();
+                (channel, common, spread)
+            };
+            let tried = readings.iter().map(|reading| without(reading.channel));
+            let Some((at_fault, of_others, _)) = tried.min_by(|a, b| a.2.total_cmp(&b.2)) else { continue };
+            if uneven(of_others, Some(at_fault)).is_some() {
+                return Err(refused);
+            }
+            common = of_others;
+        }
+        for reading in readings {
+            zero.offsets.insert(reading.channel, reading.mean - common);
+            zero.left_sigma.insert(reading.channel, reading.own);
         }
     }
     if zero.offsets.is_empty() { Err(no_soak) } else { Ok(zero) }
@@ -230,10 +281,8 @@ fn sigma_of_mean(noise_sigma: f64, stretch_s: f64, config: &IdentifyConfig) -> f
 
 /// Channels that read alike at rest, and how even each group is.
 fn groups(settings: &ZeroSettings) -> [(&'static [Channel], f64); 2] {
-    [
-        (&[Channel::T1, Channel::T2, Channel::Tc, Channel::TOil], settings.temperature_sigma_k),
-        (&[Channel::P1, Channel::P2], settings.pressure_sigma_pa),
-    ]
+    let [temperatures, pressures] = Soak::ALIKE;
+    [(temperatures, settings.temperature_sigma_k), (pressures, settings.pressure_sigma_pa)]
 }
 
 /// The last stretch in which the shaft rests before the first step that leaves it running: where steps were found in the
@@ -295,6 +344,23 @@ fn expected_limit_error(noise_sigma: f64, soak_s: f64, config: &IdentifyConfig) 
     let variance = coloured(config.noise_colour).variance_of_mean(samples, BLOCK_S);
     let relaxing: Vec<f64> = t_s.iter().map(|t_s| relaxation::usual_k(*t_s)).collect();
     relaxation::limit(&t_s, &relaxing, noise_sigma * variance.sqrt()).map(|(_, error)| error)
+}
+
+/// What a sensor reads at rest, K or Pa.
+#[derive(Clone, Copy)]
+struct Reading {
+    channel: Channel,
+    mean: f64,
+    /// One standard deviation of what is left of its offset.
+    own: f64,
+    /// The same with the declared offset.
+    total: f64,
+}
+
+/// What sensors read together.
+fn common(readings: &[Reading]) -> f64 {
+    let weight: f64 = readings.iter().map(|reading| reading.total.powi(-2)).sum();
+    readings.iter().map(|reading| reading.mean * reading.total.powi(-2)).sum::<f64>() / weight
 }
 
 struct SoakMean {

@@ -1,7 +1,9 @@
 //! What came of the isothermal zero that a campaign asks for.
 
 use crate::IdentifyConfig;
-use crate::zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};
+use crate::zero::{
+    IsothermalZero, NoZero, ZeroSettings, isothermal_zero, isothermal_zero_with_a_fault, zeroed,
+};
 use mapper_core::{Recording, Soak};
 use serde::{Serialize, Serializer};
 
@@ -22,6 +24,13 @@ impl ZeroOutcome {
     pub fn of(recording: &Recording, config: &IdentifyConfig, soak: Option<Soak>) -> Self {
         let Some(soak) = soak else { return ZeroOutcome::NotAsked };
         isothermal_zero(recording, config, &ZeroSettings::from(soak))
+            .map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
+    }
+
+    /// The same of a rig of which a temperature sensor may be broken.
+    pub fn with_a_fault(recording: &Recording, config: &IdentifyConfig, soak: Option<Soak>) -> Self {
+        let Some(soak) = soak else { return ZeroOutcome::NotAsked };
+        isothermal_zero_with_a_fault(recording, config, &ZeroSettings::from(soak))
             .map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
     }
 

@@ -6,8 +6,10 @@ mod common;
 mod lab;
 
 use lab::{Machine, campaign, eighteen, measured};
-use mapper_core::{Channel, Method, Recording, Series};
-use mapper_identify::{IdentifyConfig, NoZero, ZeroSettings, identify, isothermal_zero, zeroed};
+use mapper_core::{Channel, DeclaredUncertainty, Method, Recording, Series};
+use mapper_identify::{
+    IdentifyConfig, NoZero, ZeroSettings, identify, isothermal_zero, isothermal_zero_with_a_fault, zeroed,
+};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
@@ -86,4 +88,26 @@ fn what_is_no_soak_is_refused() {
     let mut broken = with_soak(&clean.recording, 300.0);
     broken.series.get_mut(&Channel::T2).unwrap().values.iter_mut().for_each(|value| *value += 4.0);
     assert!(matches!(zero(&broken), Err(NoZero::Uneven { .. })));
+}
+
+/// For a diagnosis one sensor may be off by more than anybody declared: three that read 25 degC tell by how much. Of two that
+/// are off, one each way, nobody can tell.
+#[test]
+fn a_broken_sensor_is_held_against_the_others() {
+    let clean = campaign(&eighteen()[..2], 120.0, Machine::default());
+    let mut broken = with_soak(&clean.recording, 300.0);
+    let declared = |sigma: f64| DeclaredUncertainty { offset_sigma: sigma, ..DeclaredUncertainty::default() };
+    let channels = [Channel::T1, Channel::T2, Channel::Tc, Channel::TOil];
+    let config = IdentifyConfig {
+        declared: channels.map(|channel| (channel, declared(0.25))).into(),
+        ..IdentifyConfig::default()
+    };
+    let mut shift = |channel: Channel, by_k: f64| {
+        broken.series.get_mut(&channel).unwrap().values.iter_mut().for_each(|value| *value += by_k);
+        isothermal_zero_with_a_fault(&broken, &config, &ZeroSettings::default())
+    };
+    let zero = shift(Channel::T2, 4.0).unwrap();
+    assert!((zero.offsets[&Channel::T2] - 4.0).abs() < 1e-9, "{:?}", zero.offsets);
+    assert!(zero.offsets[&Channel::T1].abs() < 1e-9 && zero.offsets[&Channel::Tc].abs() < 1e-9);
+    assert!(matches!(shift(Channel::Tc, -4.0), Err(NoZero::Uneven { .. })));
 }

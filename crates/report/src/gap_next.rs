@@ -11,7 +11,7 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
     let mut text = "\nwhat next\n".to_owned();
     match (next, diagnosis.experiments.first()) {
         (Next::Sensor { sensor, reason }, _) => text += &format!("  {sensor}: {reason}\n"),
-        (Next::Jump { .. }, Some(first)) => {
+        (Next::Jump { .. } | Next::Soak { .. }, Some(first)) => {
             text += &format!(
                 "  {}: {:.1} min, after which the true cause should reach {:.0} %\n",
                 named(first),
@@ -20,7 +20,7 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
             );
             text += &how(first);
         }
-        (Next::Jump { .. }, None) => {}
+        (Next::Jump { .. } | Next::Soak { .. }, None) => {}
     }
     let Some(first) = diagnosis.experiments.first() else { return text };
     text += &format!(
@@ -72,6 +72,7 @@ fn named(experiment: &Suggestion) -> String {
         Kind::Sensor => {
             format!("a sensor for {}, and a {}", experiment.sensor.as_deref().unwrap_or("-"), jump())
         }
+        Kind::Soak => "a soak before the next run, which tells the offsets of the temperature sensors".to_owned(),
     }
 }
 
@@ -86,6 +87,9 @@ fn how(experiment: &Suggestion) -> String {
             to.speed_rpm / 1e3,
             to.valve,
         ),
+        Kind::Soak => {
+            format!("  a line of the campaign, before it is run again: {}\n", experiment.script.join(" "))
+        }
         _ => format!("  lines of a sequence, after the points: {}\n", experiment.script.join(" ")),
     }
 }

@@ -4,7 +4,7 @@ use crate::gap_next::next_text;
 use crate::number::four_figures;
 use mapper_core::with_unit;
 use mapper_gap::report::{
-    Candidate, ChannelGap, Diagnosis, Estimate, Law, PointGap, SmallestSeen, Verdict, law_found,
+    Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Verdict, law_found,
 };
 use std::collections::BTreeMap;
 
@@ -18,6 +18,11 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     let mut text = format!("{}\n", headline(diagnosis));
     if let Some(nearest) = nearest(diagnosis) {
         text += &format!("{nearest}\n");
+    }
+    if diagnosis.verdict != Verdict::WithinTolerance {
+        for sensor in &diagnosis.off_at_rest {
+            text += &format!("{sensor}: subtracted before the diagnosis\n");
+        }
     }
     if !diagnosis.r#where.is_empty() {
         text += "\nwhere\n";
@@ -117,6 +122,15 @@ fn removed(law: &Law) -> String {
 pub fn headline(diagnosis: &Diagnosis) -> String {
     let first = diagnosis.candidates.first();
     match (diagnosis.verdict, first) {
+        (Verdict::WithinTolerance, _) if !diagnosis.off_at_rest.is_empty() => format!(
+            "{}; with that subtracted nothing beyond the declared tolerances is seen",
+            diagnosis.off_at_rest.join(", ")
+        ),
+        (Verdict::WithinTolerance, Some(first)) if first.probability > diagnosis.probability_none => format!(
+            "nothing beyond the declared tolerances is seen for certain; {} is suspected ({:.0} %)",
+            named(first),
+            100.0 * first.probability
+        ),
         (Verdict::WithinTolerance, _) => "nothing beyond the declared tolerances is seen".to_owned(),
         (Verdict::Explained, Some(first)) => {
             let verb = if first.effects.len() == 1 { "explains" } else { "explain" };
@@ -221,10 +235,23 @@ fn how_far(diagnosis: &Diagnosis) -> String {
     }
     text += &by_channel(&gap.channels, "with the cause", if named { 3 } else { 2 });
     if named {
+        text += &strained(gap);
         text += &points(&gap.points);
     }
     text
 }
+
+/// What the cause spares the tolerances, where they can stand in for it: then it leaves no smaller residual.
+fn strained(gap: &Gap) -> String {
+    let Some(strained) = gap.strained.as_ref().filter(|_| gap.shrink < STANDS_IN) else { return String::new() };
+    format!(
+        "  tolerances can stand in for the cause, beyond what is declared: {} by {:.1} sigma\n",
+        strained.what, strained.sigmas
+    )
+}
+
+/// A cause that removes less than this of what tolerances leave is one that they can stand in for.
+const STANDS_IN: f64 = 0.5;
 
 /// How far with a law that no effect of the catalogue comes near.
 fn how_far_by(law: &Law, steps: usize) -> String {

@@ -1,14 +1,17 @@
-//! What a stand may do to tell causes apart: the planner's jumps, and steps of T3 and oil that limits and rig accept.
+//! What a stand may do to tell causes apart: the planner's jumps, steps of T3 and oil that limits and rig accept, and a soak.
 
+use crate::declared::identification_with;
 use crate::planning::with_plan_request;
 use crate::{Registry, SessionError};
 use mapper_campaign::Campaign;
 use mapper_core::{OperatingPoint, RigMode, SetpointRanges, Setpoints};
-use mapper_gap::experiment::{AllowedJump, Beside, Experiment};
+use mapper_gap::experiment::{AllowedJump, AtRest, Beside, Experiment};
+use mapper_identify::{ZeroSettings, expected_after_zero};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::reach::reach;
 use mapper_planner::PlanRequest;
+use mapper_record::ChannelMap;
 
 /// Points up to which every jump between them is simulated to see whether it is allowed.
 const MAX_POINTS: usize = 40;
@@ -19,6 +22,8 @@ const OIL_STEPS_K: [f64; 2] = [40.0, -20.0];
 const T3_ROOM_K: f64 = 15.0;
 /// Time of such a step, s: housings follow in minutes.
 const DWELL_S: f64 = 300.0;
+/// Time of a soak, s: what the shipped campaigns take.
+const SOAK_S: f64 = 1800.0;
 
 /// All that may be done.
 ///
@@ -27,6 +32,7 @@ const DWELL_S: f64 = 300.0;
 pub(crate) fn experiments(
     registry: &Registry,
     campaign: &Campaign,
+    map: &ChannelMap,
     model: &Model,
 ) -> Result<Vec<Experiment>, SessionError> {
     let mut all: Vec<Experiment> =
@@ -36,7 +42,28 @@ pub(crate) fn experiments(
         let places = corners(&campaign.points);
         all.extend(places.iter().flat_map(|point| temperature_steps(campaign, model, *point, &accepts)));
     }
+    all.extend(soak(campaign, map));
     Ok(all)
+}
+
+/// A soak before the next run, where the campaign does not have one already.
+fn soak(campaign: &Campaign, map: &ChannelMap) -> Option<Experiment> {
+    if campaign.zero.is_some() {
+        return None;
+    }
+    let settings = ZeroSettings::default();
+    let left = expected_after_zero(identification_with(campaign, map), &settings, SOAK_S).declared;
+    let left_sigma = |channel| left.get(&channel).map_or(settings.temperature_sigma_k, |left| left.offset_sigma);
+    let soak = AtRest {
+        duration_s: SOAK_S,
+        left_sigma_k: std::array::from_fn(|place| left_sigma(AtRest::CHANNELS[place])),
+    };
+    let rest = OperatingPoint {
+        speed_rpm: 0.0,
+        valve_opening_ratio: campaign.points.first()?.valve_opening_ratio,
+    };
+    let jump = AllowedJump { from: rest, to: rest, from_p3_pa: 0.0, to_p3_pa: 0.0, dwell_s: SOAK_S };
+    Some(Experiment { jump, beside: Beside::Soak(soak) })
 }
 
 /// The jumps that the planner allows between the points of the campaign; none for grids too large to simulate them all,

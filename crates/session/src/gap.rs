@@ -8,19 +8,23 @@ use crate::planning::nominal_model;
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
-use mapper_core::{Recording, StepMarker};
+use mapper_core::{Channel, DeclaredUncertainty, Recording, StepMarker};
 use mapper_discover::discover::discover;
 use mapper_drift::{CauseKind, DriftReport, without_drift};
 use mapper_gap::actuators::Actuators;
+use mapper_gap::adequacy::adequacy;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
+use mapper_gap::fit::{Effort, fit};
 use mapper_gap::next::look_beside;
 use mapper_gap::outlook::Alike;
 use mapper_gap::problem::Problem;
 use mapper_gap::report::{Diagnosis, Next, Verdict, law_found};
+use mapper_gap::selection::Selection;
 use mapper_gap::study::Study;
 use mapper_gap::twin::{Expected, Found, Held, forecast_steps, hold};
 use mapper_gap::usable::usable;
+use mapper_gap::whiten::Linearised;
 use mapper_identify::ZeroOutcome;
 use mapper_observe::lagged_command::Response;
 use mapper_observe::table::Table;
@@ -29,6 +33,7 @@ use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use mapper_record::ChannelMap;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::slice;
 use std::sync::Arc;
 
@@ -93,7 +98,7 @@ impl Session<'_> {
             self.tell(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };
         progress(0.0, "drift");
-        let Prepared { recording, declared, model, drift, sensors, zero } =
+        let Prepared { recording, declared, model, drift, doubted, sensors, zero, off_at_rest } =
             self.prepared_for_gap(recorded, campaign, map)?;
         let between = |from: f64, to: f64| {
             move |done_ratio: f64, what: &str| progress(from + (to - from) * done_ratio, what)
@@ -105,7 +110,7 @@ impl Session<'_> {
             recording: &recording,
             declared,
             tolerances_declared: campaign.tolerances_declared,
-            experiments: experiments(self.registry, campaign, &model)?,
+            experiments: experiments(self.registry, campaign, map, &model)?,
             model,
             effects,
             calibration: calibration.clone(),
@@ -134,7 +139,11 @@ impl Session<'_> {
         // What was wrong with the file belongs to what is said about it.
         let warnings = recorded.read.warnings.iter().map(ToString::to_string);
         diagnosed.diagnosis.warnings.extend(warnings);
+        diagnosed.diagnosis.off_at_rest = off_at_rest;
         note_drift(&mut diagnosed.diagnosis, drift.as_ref());
+        diagnosed.diagnosis.warnings.extend(doubted.map(|reason| {
+            format!("Without a drift nothing but noise is left of this recording; so none was subtracted, though: {reason}")
+        }));
         Ok(Gap { diagnosed, drift, sensors, zero })
     }
 
@@ -154,18 +163,30 @@ impl Session<'_> {
         let Fused { recordings, config, channels } =
             fused(recordings(slice::from_ref(recorded)), config, Some(campaign), map);
         let sensors = channels.into_iter().next().unwrap_or_default();
-        let recording = taken_off(recordings.into_iter().next().unwrap_or_default(), drift.as_ref());
+        let raw = recordings.into_iter().next().unwrap_or_default();
         model.params.t2_probe_diameter_m = config.probe_diameter_m;
-        // A zero leaves less of the offsets.
-        let zero = ZeroOutcome::of(&recording, &config, campaign.zero);
-        let (recording, zeroed) = zero.take_off(recording, config);
-        let declared = Declared {
-            sensors: zeroed.declared,
-            noise_colour: map.noise_colour.unwrap_or_default(),
-            tolerances: campaign.tolerances,
-            nominal: campaign.boundary,
+        let ready = |drift: Option<&DriftReport>| {
+            let recording = taken_off(raw.clone(), drift);
+            // A zero leaves less of the offsets.
+            let zero = ZeroOutcome::with_a_fault(&recording, &config, campaign.zero);
+            let off_at_rest = off_at_rest(&zero, &config.declared);
+            let (recording, zeroed) = zero.take_off(recording, config.clone());
+            let declared = Declared {
+                sensors: zeroed.declared,
+                noise_colour: map.noise_colour.unwrap_or_default(),
+                tolerances: campaign.tolerances,
+                nominal: campaign.boundary,
+            };
+            Zeroed { recording, declared, zero, off_at_rest }
         };
-        Ok(Prepared { recording, declared, model, drift, sensors, zero })
+        let as_it_is = ready(None);
+        let (zeroed, drift, doubted) = match drift {
+            Some(drift) if leaves_noise(&as_it_is, campaign, &model) => (as_it_is, None, Some(drift.reason)),
+            Some(drift) => (ready(Some(&drift)), Some(drift), None),
+            None => (as_it_is, None, None),
+        };
+        let Zeroed { recording, declared, zero, off_at_rest } = zeroed;
+        Ok(Prepared { recording, declared, model, drift, doubted, sensors, zero, off_at_rest })
     }
 
     /// Holds the machine that a diagnosis found against a recording that it has not seen; nothing is fitted.
@@ -181,15 +202,7 @@ impl Session<'_> {
         found: &Found,
     ) -> Result<Held, SessionError> {
         let Prepared { recording, declared, model, .. } = self.prepared_for_gap(recorded, campaign, map)?;
-        let table = Table::new(&recording).ok_or(GapError::from(Problem::Empty))?;
-        usable(&recording, &table, &declared).map_err(GapError::from)?;
-        let actuators = if campaign.tolerances_declared {
-            Actuators::declared(&table, &recording, &declared)
-        } else {
-            Actuators::undeclared(&table, &recording, &declared)
-        };
-        let study = Study::with_actuators(&recording, table, declared, model, effects, actuators);
-        Ok(hold(&study, found)?)
+        Ok(hold(&study_of(&recording, campaign, declared, model, effects)?, found)?)
     }
 
     /// What the machine that a diagnosis found is expected to read at the end of each step of a campaign's plan.
@@ -233,14 +246,80 @@ impl Session<'_> {
     }
 }
 
+/// A recording as the diagnosis sees it.
+fn study_of(
+    recording: &Recording,
+    campaign: &Campaign,
+    declared: Declared,
+    model: Model,
+    effects: Vec<Arc<dyn Effect>>,
+) -> Result<Study, GapError> {
+    let table = Table::new(recording).ok_or(GapError::from(Problem::Empty))?;
+    usable(recording, &table, &declared)?;
+    let actuators = if campaign.tolerances_declared {
+        Actuators::declared(&table, recording, &declared)
+    } else {
+        Actuators::undeclared(&table, recording, &declared)
+    };
+    Ok(Study::with_actuators(recording, table, declared, model, effects, actuators))
+}
+
+/// Whether tolerances alone leave nothing but noise of a recording: then there is no drift that could be subtracted, whatever
+/// repeats look like. A diagnosis is much the keener of the two.
+fn leaves_noise(zeroed: &Zeroed, campaign: &Campaign, model: &Model) -> bool {
+    let look = || -> Result<bool, GapError> {
+        let study =
+            study_of(&zeroed.recording, campaign, zeroed.declared.clone(), model.clone(), Vec::new())?;
+        let linearised = Linearised::new(&study)?;
+        let null = fit(&study, &linearised, &study.nothing(), &Selection::all(&study), Effort::default())?;
+        let left = adequacy(&study, &linearised, &null, 0.0);
+        Ok(Calibration::shipped().is_ok_and(|calibration| calibration.outside(left.features()) < 0.5))
+    };
+    look().unwrap_or(false)
+}
+
+/// A recording with its zero subtracted.
+struct Zeroed {
+    recording: Recording,
+    declared: Declared,
+    zero: ZeroOutcome,
+    off_at_rest: Vec<String>,
+}
+
 /// A recording made ready for the diagnosis.
 struct Prepared {
     recording: Recording,
     declared: Declared,
     model: Model,
     drift: Option<DriftReport>,
+    /// A drift that was seen and does not stand.
+    doubted: Option<String>,
     sensors: Vec<FusedChannel>,
     zero: ZeroOutcome,
+    /// What the zero says of sensors that are off by more than is declared.
+    off_at_rest: Vec<String>,
+}
+
+/// Declared standard deviations from which on an offset at rest is more than what was declared.
+const BEYOND_SIGMAS: f64 = 3.0;
+
+/// A sentence for each sensor that is off at rest by more than is declared of it.
+fn off_at_rest(zero: &ZeroOutcome, declared: &BTreeMap<Channel, DeclaredUncertainty>) -> Vec<String> {
+    let ZeroOutcome::Found(zero) = zero else { return Vec::new() };
+    let beyond = zero.offsets.iter().filter_map(|(channel, off)| {
+        let sigma = declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);
+        let left = zero.left_sigma.get(channel).copied().unwrap_or(0.0);
+        let much = off.abs() > BEYOND_SIGMAS * sigma.hypot(left);
+        much.then(|| {
+            format!(
+                "{channel} reads {:.2} {unit} too {} at rest, where {sigma:.2} {unit} are declared",
+                off.abs(),
+                if *off > 0.0 { "high" } else { "low" },
+                unit = channel.unit(),
+            )
+        })
+    });
+    beyond.collect()
 }
 
 /// Share of the time that the search for drift takes.

@@ -1,0 +1,41 @@
+//! The metal's temperature at the start is no property of the machine: a fit that has not seen the first step reads it there.
+
+use crate::fit::{Fit, MOST_SIGMAS};
+use crate::nuisance::NuisanceKind;
+use crate::selection::dot_over;
+use crate::study::Study;
+use crate::whiten::{Linearised, rows_of_step};
+use mapper_observe::knob::Knob;
+use nalgebra::{DMatrix, DVector};
+
+/// Whether a nuisance is the metal's temperature at the start.
+pub(crate) fn is_start(kind: NuisanceKind) -> bool {
+    matches!(kind, NuisanceKind::Knob(Knob::StartTc | Knob::StartTt))
+}
+
+/// A fit whose start is read from the first step, all else as it is. Without it a step that was held out would count what nobody
+/// could know for a misfit of the machine, a hundred times over. The fit itself where the start is known no better so.
+pub fn with_start_read(study: &Study, linearised: &Linearised, fit: Fit) -> Fit {
+    let rows = [rows_of_step(study, 0)];
+    let starts: Vec<usize> =
+        study.nuisances.iter().enumerate().filter(|(_, n)| is_start(n.kind)).map(|(i, _)| i).collect();
+    let column = |place: usize| &linearised.columns[starts[place]];
+    let n = starts.len();
+    let matrix = DMatrix::from_fn(n, n, |i, j| {
+        dot_over(&rows, column(i), column(j)) + if i == j { 1.0 } else { 0.0 }
+    });
+    let right = DVector::from_fn(n, |i, _| {
+        dot_over(&rows, column(i), &fit.residual) - fit.hypothesis.nuisances[starts[i]]
+    });
+    let Some(step) = matrix.cholesky().map(|cholesky| cholesky.solve(&right)) else { return fit };
+    let mut moved = fit.hypothesis.clone();
+    for (index, by) in starts.iter().zip(step.iter()) {
+        moved.nuisances[*index] = (moved.nuisances[*index] + by).clamp(-MOST_SIGMAS, MOST_SIGMAS);
+    }
+    let Ok(prediction) = study.predict(&moved) else { return fit };
+    let residual = linearised.residual(study, &prediction);
+    if dot_over(&rows, &residual, &residual) >= dot_over(&rows, &fit.residual, &fit.residual) {
+        return fit;
+    }
+    Fit { hypothesis: moved, prediction, residual, ..fit }
+}

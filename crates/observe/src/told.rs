@@ -76,7 +76,7 @@ fn seen_late_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
     // By so much P3 moves while nobody commands it, noise included.
     let still = p3.slice(step.start_s - STILL_S, before_s + 1e-9).1;
     let level_pa = median(still.iter().filter(|value| value.is_finite()))?;
-    let scatter_pa = robust_sigma(still.iter().map(|value| value - level_pa).collect::<Vec<f64>>())?;
+    let scatter_pa = robust_sigma(still.iter().map(|value| value - level_pa))?;
     let seen_pa = p3
         .held(step.start_s)
         .filter(|_| p3.t_s.binary_search_by(|t_s| t_s.total_cmp(&step.start_s)).is_ok())?;

@@ -80,7 +80,8 @@ impl Experiment {
     /// Time that it takes, min; the way to its start is not counted, a sensor's mounting is (half an hour).
     pub fn minutes(&self) -> f64 {
         let mounting = if matches!(self.beside, Beside::Sensor(_)) { MOUNTING_MIN } else { 0.0 };
-        let at_work_s = if let Beside::Soak(soak) = self.beside { soak.duration_s } else { self.jump.dwell_s };
+        let at_work_s =
+            if let Beside::Soak(soak) = self.beside { soak.duration_s } else { self.jump.dwell_s };
         (at_work_s / 60.0).max(0.1) + mounting
     }
 

@@ -21,9 +21,8 @@ pub fn with_start_read(study: &Study, linearised: &Linearised, fit: Fit) -> Fit 
         study.nuisances.iter().enumerate().filter(|(_, n)| is_start(n.kind)).map(|(i, _)| i).collect();
     let column = |place: usize| &linearised.columns[starts[place]];
     let n = starts.len();
-    let matrix = DMatrix::from_fn(n, n, |i, j| {
-        dot_over(&rows, column(i), column(j)) + if i == j { 1.0 } else { 0.0 }
-    });
+    let matrix =
+        DMatrix::from_fn(n, n, |i, j| dot_over(&rows, column(i), column(j)) + if i == j { 1.0 } else { 0.0 });
     let right = DVector::from_fn(n, |i, _| {
         dot_over(&rows, column(i), &fit.residual) - fit.hypothesis.nuisances[starts[i]]
     });

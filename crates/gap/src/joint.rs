@@ -7,9 +7,9 @@
 use crate::calibration::Calibration;
 use crate::coordinate::{Coordinate, coordinates, parameters};
 use crate::diagnose::Diagnosed;
+use crate::first_step::is_start;
 use crate::fit::{Effort, Fit, fit};
 use crate::in_words;
-use crate::first_step::is_start;
 use crate::report::Verdict;
 use crate::selection::Selection;
 use crate::study::{EffectValues, Hypothesis, Study};
@@ -204,13 +204,8 @@ fn neutral_coordinates(study: &Study, hypothesis: &Hypothesis, at: &[Coordinate]
 
 /// Coordinate of one parameter by several recordings together, and its standard error.
 fn together(study: &Study, fits: Vec<&Fit>, at: &[Coordinate], wanted: usize) -> Option<(f64, f64)> {
-    let starts: Vec<usize> = study
-        .nuisances
-        .iter()
-        .enumerate()
-        .filter(|(_, n)| is_start(n.kind))
-        .map(|(i, _)| i)
-        .collect();
+    let starts: Vec<usize> =
+        study.nuisances.iter().enumerate().filter(|(_, n)| is_start(n.kind)).map(|(i, _)| i).collect();
     let nuisances = study.nuisances.len();
     let kept: Vec<usize> = (0..nuisances + at.len()).filter(|i| !starts.contains(i)).collect();
     let shared = kept.iter().filter(|i| **i < nuisances).count();

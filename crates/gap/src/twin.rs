@@ -109,7 +109,11 @@ impl Found {
     /// The hypothesis of a twin in another recording, and its covariance: of that recording's own start nothing is known yet.
     fn hypothesis(&self, study: &Study) -> Result<(Hypothesis, DMatrix<f64>), TwinError> {
         let same = study.nuisances.len() == self.tolerances.len()
-            && study.nuisances.iter().zip(&self.tolerances).all(|(n, found)| n.kind.to_string() == found.name);
+            && study
+                .nuisances
+                .iter()
+                .zip(&self.tolerances)
+                .all(|(n, found)| n.kind.to_string() == found.name);
         if !same {
             let (theirs, ours) = (self.tolerances.len(), study.nuisances.len());
             return Err(TwinError::Tolerances { theirs, ours });

@@ -200,7 +200,8 @@ pub(crate) fn suspicions<'a>(weighed: &Weighed, fits: &'a [Fit], null: &'a Fit) 
         return None;
     }
     let causes = weighed.candidates.iter().zip(&weighed.shown);
-    let mut open: Vec<(f64, &Fit)> = causes.map(|(cause, place)| (cause.probability, &fits[*place])).collect();
+    let mut open: Vec<(f64, &Fit)> =
+        causes.map(|(cause, place)| (cause.probability, &fits[*place])).collect();
     let nothing = open.partition_point(|(probability, _)| *probability > weighed.none);
     open.insert(nothing, (weighed.none, null));
     let (probabilities, fits) = open.into_iter().unzip();

@@ -72,7 +72,9 @@ fn named(experiment: &Suggestion) -> String {
         Kind::Sensor => {
             format!("a sensor for {}, and a {}", experiment.sensor.as_deref().unwrap_or("-"), jump())
         }
-        Kind::Soak => "a soak before the next run, which tells the offsets of the temperature sensors".to_owned(),
+        Kind::Soak => {
+            "a soak before the next run, which tells the offsets of the temperature sensors".to_owned()
+        }
     }
 }
 

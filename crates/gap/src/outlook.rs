@@ -7,9 +7,10 @@ use crate::coordinate::coordinates;
 use crate::experiment::{AllowedJump, Beside, Experiment};
 use crate::first_step::is_start;
 use crate::fit::{Fit, effect_changes};
+use crate::misfit::misfit;
 use crate::nuisance::OUTPUTS;
 use crate::study::{Hypothesis, Study};
-use crate::whiten::{Linearised, dot};
+use crate::whiten::Linearised;
 use mapper_core::{Channel, OperatingPoint, Recording, Series, StepKind, StepMarker};
 use mapper_observe::declared::Declared;
 use mapper_observe::table::Table;
@@ -17,7 +18,7 @@ use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::steady::hold_speed;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// Time at the start of a jump that is looked at as well, s.
@@ -181,23 +182,6 @@ pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option
         rows.push(row);
     }
     Some(rows)
-}
-
-pub(crate) fn misfit(difference: &[f64], columns: &[Vec<f64>], precision: &DMatrix<f64>) -> Option<f64> {
-    let n = columns.len();
-    let mut matrix = precision.clone();
-    for i in 0..n {
-        for j in 0..=i {
-            let product = dot(&columns[i], &columns[j]);
-            matrix[(i, j)] += product;
-            if i != j {
-                matrix[(j, i)] += product;
-            }
-        }
-    }
-    let right = DVector::from_fn(n, |i, _| dot(&columns[i], difference));
-    let taken = right.dot(&matrix.cholesky()?.solve(&right));
-    Some((dot(difference, difference) - taken).max(0.0))
 }
 
 /// What the recording leaves open, but that a new start is as unknown as the first one was.

@@ -5,6 +5,7 @@ use crate::end_state::{EndState, end_state};
 use crate::findings::{Findings, code};
 use crate::needs::missing;
 use crate::nominal_map::{NominalRig, doubt_off_the_nominal_map, off_the_map};
+use crate::objections::housing::Balance;
 use crate::objections::objection::Objection;
 use crate::objections::objections;
 use crate::two_parameter::TwoParameter;
@@ -113,13 +114,6 @@ fn off_by_both(recording: &Recording, config: &IdentifyConfig, nominal: &Nominal
     let joint = points(Method::Joint)?;
     let agrees = joint.iter().all(|point| point.verdict != Verdict::Good) || off(&joint).is_some();
     agrees.then_some(message)
-}
-
-/// Whether the heat balance of the housing may object. An apparent efficiency has nothing to do with Tc.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Balance {
-    Asked,
-    NotAsked,
 }
 
 fn identified(

@@ -156,7 +156,7 @@ fn lost_samples_and_spikes_are_left_out() {
     assert!((point.eta.unwrap() - transient.eta).abs() < 1e-8);
     let message = |code: &str| &point.warnings.iter().find(|warning| warning.code == code).unwrap().message;
     assert!(message(code::LOST_SAMPLES).starts_with("32 of "));
-    assert!(message(code::OUTLIERS).starts_with("1 samples"));
+    assert!(message(code::OUTLIERS).starts_with("1 sample far"));
     assert_eq!(point.verdict, Verdict::Good);
 }
 

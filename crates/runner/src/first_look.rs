@@ -1,7 +1,7 @@
 //! The first seconds of a run, looked at before anything is driven far: every channel alive, in range, and in time.
 
 use crate::guard::{Guard, Told, Trip};
-use mapper_core::{Channel, GuardName, Reaction, SampleBatch, measurable};
+use mapper_core::{Channel, GuardName, Reaction, SampleBatch, measurable, with_unit};
 
 /// How long is looked, s.
 const LOOK_S: f64 = 5.0;
@@ -46,7 +46,10 @@ impl FirstLook {
                 Some(value) if !range.contains(value) => {
                     let (low, high, unit) = (range.start(), range.end(), channel.unit());
                     let words = format!(
-                        "{channel} reads {value:.3e} {unit}, where a sensor reads {low:e} to {high:e} {unit}"
+                        "{channel} reads {}, where a sensor reads {} to {}",
+                        with_unit(digits(*value), unit),
+                        digits(*low),
+                        with_unit(digits(*high), unit)
                     );
                     faults.push((needed, words));
                 }
@@ -57,6 +60,15 @@ impl FirstLook {
             faults.push((true, format!("the source's clock is off by {:.1} s", self.clock_off_s)));
         }
         faults
+    }
+}
+
+/// As many digits as tell a reading from its range.
+fn digits(value: f64) -> String {
+    match value.abs() {
+        size if size >= 1e7 => format!("{value:.2e}"),
+        size if size >= 10.0 => format!("{value:.0}"),
+        _ => format!("{value}"),
     }
 }
 

@@ -169,7 +169,7 @@ fn the_picture_is_written_in_the_units_that_are_wanted() {
     let tick = |texts: &[String], value: f64| {
         texts.iter().any(|text| text.parse::<f64>().is_ok_and(|x| (x - value).abs() < 1e-9))
     };
-    assert!(tick(&usual_texts, 0.06) && tick(&wanted_texts, 60.0), "{usual_texts:?} {wanted_texts:?}");
+    assert!(tick(&usual_texts, 0.05) && tick(&wanted_texts, 50.0), "{usual_texts:?} {wanted_texts:?}");
     let circles = |svg: &str| svg.matches("<circle").count();
     assert_eq!(circles(&usual), circles(&wanted));
     // A table of numbers stays in SI.

@@ -52,8 +52,11 @@ fn nights_are_quiet_until_the_model_changes_and_then_say_what_moved() {
     let first = night(folder, &[]).exits(0);
     assert!(first.stdout.contains("The first night"), "{}", first.stdout);
     // A line per run in a pipe; behind it stands how long it took and what is left.
-    let done: Vec<String> =
-        first.stderr.lines().map(|line| line.split_whitespace().take(3).collect::<Vec<_>>().join(" ")).collect();
+    let done: Vec<String> = first
+        .stderr
+        .lines()
+        .map(|line| line.split_whitespace().take(3).collect::<Vec<_>>().join(" "))
+        .collect();
     assert_eq!(done, ["0 of 2", "1 of 2", "2 of 2"], "{}", first.stderr);
     let second = night(folder, &["--json"]).exits(0).json();
     assert_eq!(second["quiet"], true);

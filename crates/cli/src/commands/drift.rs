@@ -44,9 +44,8 @@ impl Drift {
             .iter()
             .map(|file| Recorded::read(&registry, file, &map, given.as_ref()))
             .collect::<Result<_, SessionError>>()?;
-        let Some(first) = recorded.first() else {
-            return Err(Failure::new(Code::BadInput, "no recording was given"));
-        };
+        let none = || Failure::new(Code::BadInput, "no recording was given");
+        let first = recorded.first().ok_or_else(none)?;
         let campaign = first.known("Give it with `mapper drift --recording FILE CAMPAIGN`")?;
         let drift = Session::new(&registry).drift(&recorded, campaign, &map)?;
         if let Some(path) = &self.corrected {

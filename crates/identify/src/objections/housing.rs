@@ -20,6 +20,13 @@ use mapper_core::{Channel, Recording, Window};
 use mapper_numerics::statistics::mean;
 use mapper_physics::air;
 
+/// Whether the heat balance of the housing may object. An apparent efficiency has nothing to do with Tc.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Balance {
+    Asked,
+    NotAsked,
+}
+
 /// Begin of what is looked at, after that of the step, s: speed, flow and probe have settled.
 const AFTER_S: f64 = 10.0;
 /// Part over which the housing's slope is taken, s.

@@ -9,7 +9,7 @@ mod clock;
 pub(crate) mod ends;
 mod frozen;
 mod head;
-mod housing;
+pub(crate) mod housing;
 mod linear;
 mod noise;
 mod nominal_rig;
@@ -23,9 +23,9 @@ mod work;
 
 use crate::IdentifyConfig;
 use crate::dynamic::Estimate;
-use crate::identify::Balance;
 use crate::nominal_map::NominalRig;
 use crate::objections::ends::{Ends, ends};
+use crate::objections::housing::Balance;
 use crate::objections::objection::Objection;
 use mapper_core::{Method, Recording};
 

@@ -5,7 +5,7 @@
 //! The ratio of the two laws varies by a few percent over a map (with the gas temperature behind the wheel), which is all
 //! that a recording can tell them by, unless alpha_A is held as declared. Then the readings differ by some hundredths of alpha_A,
 //! for which small faults of the model pass as well: a map that drops more steeply than the surface that is fitted was seen
-//! to speak for the wrong one by a factor of a thousand, with every draw of noise. So both are fitted and weighed, such faults
+//! to speak for the wrong one by odds of hundreds to one. So both are fitted and weighed, such faults
 //! counted in; where the recording does not decide, the difference is carried on as an error of everything that it moves.
 
 use crate::joint::parameters::{ALPHA, INLET, LN_COEFFICIENT, Prior};

@@ -84,7 +84,7 @@ pub use model_tolerances::ModelTolerances;
 pub use on_drift::OnDrift;
 pub use one_line::one_line;
 pub use operating_point::OperatingPoint;
-pub use plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
+pub use plan::{MadeFrom, Plan, PlanBound, PlanErrorBound, PlanFigures, PlanStep, Predicted, StepKind};
 pub use plausible::{Plausible, measurable, plausible};
 pub use recording::{ReadingOrigin, Recording, RecordingError, Series};
 pub use redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};

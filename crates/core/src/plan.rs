@@ -161,6 +161,16 @@ pub struct PlanBound {
     pub model_error_k: f64,
 }
 
+/// What no order of a plan's points can know better than, each held for the plan's dwell, by the information of all steps together.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PlanErrorBound {
+    /// The plan's own error of the efficiency, root of the mean square over the points, fraction. It holds where nothing is as declared,
+    /// and before points learn from their neighbours on the map, so that it is larger than `open_rms_error_eta`.
+    pub error_eta: f64,
+    /// No order has less, fraction; by the search's housing model, corrected by what the full model gives along this plan.
+    pub least_error_eta: f64,
+}
+
 /// An ordered, checked list of steps with what is expected of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
@@ -186,6 +196,9 @@ pub struct Plan {
     /// How good the best order can be; `None` where the order was not searched for.
     #[serde(default)]
     pub bound: Option<PlanBound>,
+    /// What no order can know better than, where that was worked out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error_bound: Option<PlanErrorBound>,
     /// What is not known of the bound, and why; `None` where all is known.
     #[serde(default)]
     pub bound_remark: Option<String>,

@@ -46,6 +46,7 @@ pub use identify::{Identified, identify, identify_beside, identify_each, identif
 pub use joint::campaign_information::{CampaignInformation, Known, StepInformation, StepSoFar, WorthNow};
 pub use joint::expected::{ExpectedStep, expected_together};
 pub use joint::surface::EfficiencySurface;
+pub use joint::tangent::VarianceTangent;
 pub use joint::worth::StepWorth;
 pub use mapper_core::{
     Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings, SettleBands, WindowRule,

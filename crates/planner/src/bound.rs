@@ -7,12 +7,12 @@
 use crate::assignment::{bottleneck, largest_assignment};
 use crate::auction::prices;
 use crate::chain::Chain;
-use crate::housing::Housing;
+use crate::housing::{Housing, Interval};
 
 /// Rounds of narrowing: each multiplies what is left to gain by what the housing remembers of a dwell.
 const ROUNDS: usize = 12;
 /// Above this many points the sum is bounded by prices that are off by the last of these increments, K.
-const EXACT_POINTS: usize = 500;
+pub(crate) const EXACT_POINTS: usize = 500;
 const INCREMENTS_K: (f64, f64) = (5.0, 0.01);
 /// Above this many points there is no bound: its table grows with the square.
 pub(crate) const MOST_POINTS: usize = 4000;
@@ -33,8 +33,6 @@ pub(crate) struct Optimistic {
     first_k: Vec<f64>,
 }
 
-type Interval = (f64, f64);
-
 impl Optimistic {
     /// `None` for too many points, and where the reduced housing does not stay within any bounds.
     pub(crate) fn of(housing: &Housing, points: &[usize]) -> Option<Self> {
@@ -42,7 +40,7 @@ impl Optimistic {
         if n > MOST_POINTS {
             return None;
         }
-        let boxes = reachable(housing, points)?;
+        let boxes = reachable_boxes(housing, points)?;
         let mut weight_k = vec![f64::NEG_INFINITY; n * n];
         let mut first_k = vec![0.0; n];
         for (i, &from) in points.iter().enumerate() {
@@ -105,7 +103,7 @@ impl Optimistic {
 }
 
 /// For each point the box of scaled states that a dwell there can end in.
-fn reachable(housing: &Housing, points: &[usize]) -> Option<Vec<(Interval, Interval)>> {
+pub(crate) fn reachable_boxes(housing: &Housing, points: &[usize]) -> Option<Vec<(Interval, Interval)>> {
     let everything = |size: f64| ((-size, size), (-size, size));
     let within = |inner: Interval, outer: Interval| inner.0 >= outer.0 && inner.1 <= outer.1;
     for size in [1.5, 3.0, 6.0] {

@@ -40,6 +40,7 @@ pub(crate) fn finished(
         figures,
         bound_remark: bound_remark(request, bound.as_ref()),
         bound,
+        error_bound: None,
         steps,
         surge_search_s: 0.0,
     }
@@ -53,10 +54,10 @@ fn bound_remark(request: &PlanRequest<'_>, bound: Option<&PlanBound>) -> Option<
     let text = match request.order {
         VisitOrder::Listed | VisitOrder::Greedy | VisitOrder::SpeedLines => "the order was not searched for",
         _ if request.required_sigma_eta.is_some() => {
-            "none is known: each dwell is chosen for itself, and bounds hold for one dwell alone"
+            "none is known for the gradients: each dwell is chosen for itself, and their bounds hold for one dwell alone"
         }
         VisitOrder::Information | VisitOrder::Time | VisitOrder::Best => {
-            "none is known for the predicted error of the efficiency; those of the gradients hold for any order"
+            "those of the gradients hold for any order"
         }
         VisitOrder::SumGradient | VisitOrder::WorstGradient if bound.is_none() => {
             "none was worked out: more points than the bound's table takes, or a housing that stays within no box"

@@ -8,7 +8,7 @@
 
 use crate::chain::Chain;
 use crate::forecast::forecast;
-use crate::method::WorthOfStep;
+use crate::method::{ForecastRow, WorthOfStep};
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::OperatingPoint;
 use mapper_numerics::parallel;
@@ -21,7 +21,7 @@ use std::collections::HashSet;
 const ALIKE_K: f64 = 0.01;
 
 /// From fraction^2 to %^2: numbers about 1.
-const PERCENT2: f64 = 1e4;
+pub(crate) const PERCENT2: f64 = 1e4;
 
 /// Scaled (c, t, w) of three of the six starts; the other three are their mirror images.
 const DESIGN: [[f64; 3]; 3] = [[-1.0, -1.0, -1.0], [0.2, -0.6, -1.0], [0.6, 0.0, 1.0]];
@@ -100,6 +100,12 @@ pub(crate) struct Response {
     worth: Option<Surface>,
 }
 
+/// From the smallest to the largest.
+pub(crate) type Interval = (f64, f64);
+
+/// What a step to the point at a place is worth, fraction^2, by its rows.
+pub(crate) type WorthAt<'a> = dyn Fn(usize, &[ForecastRow]) -> Option<f64> + Sync + 'a;
+
 /// The reduced machine.
 #[derive(Debug, Clone)]
 pub(crate) struct Housing {
@@ -152,12 +158,48 @@ impl Housing {
         start: Option<State>,
         worth: Option<&dyn WorthOfStep>,
     ) -> Result<Self, PlanError> {
+        let dwells_s = vec![request.timing.dwell_s; points.len()];
+        match worth {
+            Some(worth) => Housing::of_dwells(
+                request,
+                points,
+                targets,
+                start,
+                &dwells_s,
+                Some(&|_, rows| worth.of(rows)),
+            ),
+            None => Housing::of_dwells(request, points, targets, start, &dwells_s, None),
+        }
+    }
+
+    /// The same where each point is held for a dwell of its own, and a step's worth goes with the point, given by its place.
+    pub(crate) fn of_dwells(
+        request: &PlanRequest<'_>,
+        points: &[OperatingPoint],
+        targets: &[SteadyState],
+        start: Option<State>,
+        dwells_s: &[f64],
+        worth: Option<&WorthAt<'_>>,
+    ) -> Result<Self, PlanError> {
         let scale = Scale::of(targets, start);
         let [slowest, fastest] = ends(targets).ok_or(PlanError::NoPoints)?;
-        let aims: Vec<(&SteadyState, OperatingPoint)> = targets.iter().zip(points.iter().copied()).collect();
-        let one = |(target, to): &(&SteadyState, OperatingPoint)| {
-            response(request, target, &scale, [slowest, fastest], start.is_none(), worth)
-                .map_err(|source| PlanError::Forecast { to: *to, source })
+        let aims: Vec<(usize, &SteadyState, f64)> = targets
+            .iter()
+            .zip(dwells_s)
+            .enumerate()
+            .map(|(place, (target, dwell_s))| (place, target, *dwell_s))
+            .collect();
+        let one = |(place, target, dwell_s): &(usize, &SteadyState, f64)| {
+            response(
+                request,
+                target,
+                *dwell_s,
+                &scale,
+                [slowest, fastest],
+                start.is_none(),
+                worth.map(|worth| (worth, *place)),
+            )
+            .map_err(|source| PlanError::Forecast { to: points[*place], source })
         };
         Ok(Housing {
             responses: parallel::try_map(&aims, one)?,
@@ -189,6 +231,16 @@ impl Housing {
             gradient_max_k: f64::INFINITY,
             ..self.clone()
         })
+    }
+
+    /// What the step `from` -> `to` from `state` is worth, %^2, where that is known.
+    pub(crate) fn worth(&self, from: usize, to: usize, [c, t]: [f64; 2]) -> Option<f64> {
+        Some(self.responses[to].worth?.at(c, t, self.responses[from].speed))
+    }
+
+    /// The most that it is worth from any state of a box.
+    pub(crate) fn most_worth(&self, from: usize, to: usize, (c, t): (Interval, Interval)) -> Option<f64> {
+        Some(self.responses[to].worth?.range(c, t, self.responses[from].speed).1)
     }
 
     /// A state of the machine, scaled.
@@ -247,12 +299,12 @@ fn starts(scale: &Scale, [slowest, fastest]: [&SteadyState; 2]) -> [[State; 2]; 
 fn response(
     request: &PlanRequest<'_>,
     target: &SteadyState,
+    dwell_s: f64,
     scale: &Scale,
     [slowest, fastest]: [&SteadyState; 2],
     starts_cold: bool,
-    worth: Option<&dyn WorthOfStep>,
+    worth: Option<(&WorthAt<'_>, usize)>,
 ) -> Result<Response, mapper_physics::simulate::SimulationError> {
-    let dwell_s = request.timing.dwell_s;
     let mut gradient_k = [[0.0; 2]; 3];
     let mut end = [[[0.0; 2]; 3]; 2];
     let mut error = Vec::new();
@@ -266,7 +318,7 @@ fn response(
             let left = scale.scaled(&forecast.end);
             end[0][i][j] = left[0];
             end[1][i][j] = left[1];
-            match (&mut worths, worth.and_then(|worth| worth.of(&forecast.rows))) {
+            match (&mut worths, worth.and_then(|(worth, place)| worth(place, &forecast.rows))) {
                 (Some(worths), Some(worth)) => worths[i][j] = PERCENT2 * worth,
                 // Of a step that tells nothing there is nothing to choose by.
                 (worths, _) => *worths = None,

@@ -36,6 +36,17 @@ pub trait PredictedMethod: std::fmt::Debug + Sync {
         None
     }
 
+    /// A tangent of the variances that campaigns of the same points make, at one whose steps tell `times` as much as these; `measures`:
+    /// whether each step measures a point. `None` for a method that looks at each step for itself.
+    fn tangent_at(
+        &self,
+        _steps: &[&[ForecastRow]],
+        _measures: &[bool],
+        _times: f64,
+    ) -> Option<Box<dyn ErrorTangent>> {
+        None
+    }
+
     /// Whether it looks at all steps together.
     fn is_joint(&self) -> bool {
         false
@@ -50,4 +61,14 @@ pub trait WorthOfStep: std::fmt::Debug + Sync {
     /// By how much the step makes all points more certain, less the variance of its own point, fraction^2; the rows lead from
     /// its jump to its end.
     fn of(&self, rows: &[ForecastRow]) -> Option<f64>;
+}
+
+/// A tangent of the sum of the variances of a campaign's points, by the information of all its steps: no campaign's sum is below `start`, less what
+/// its steps count for.
+pub trait ErrorTangent: std::fmt::Debug + Sync {
+    /// Where no step counts for anything, fraction^2.
+    fn start(&self) -> f64;
+
+    /// What a step in place of the campaign's step `place` counts for, fraction^2; the rows lead from its jump to its end.
+    fn of(&self, rows: &[ForecastRow], place: usize) -> Option<f64>;
 }

@@ -82,7 +82,7 @@ pub fn with_dwells(
 }
 
 /// Goes through the steps of a plan, from the warm-up on.
-fn along(
+pub(crate) fn along(
     request: &PlanRequest<'_>,
     plan: &Plan,
     mut each: impl FnMut(

@@ -114,6 +114,15 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
     if let Some(bound) = &plan.bound {
         text.push_str(&bound_text(bound));
     }
+    if let Some(bound) = &plan.error_bound {
+        let _ = writeln!(
+            text,
+            "By what all steps tell, before points learn from their neighbours on the map, the error of this plan is {} rms; no order of its points, \
+             each for as long, comes below {}.",
+            percent(Some(bound.error_eta), 2),
+            percent(Some(bound.least_error_eta), 2),
+        );
+    }
     if let Some(remark) = &plan.bound_remark {
         let _ = writeln!(text, "Bound: {remark}.");
     }

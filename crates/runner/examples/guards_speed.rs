@@ -128,6 +128,7 @@ fn plan() -> Plan {
             minutes: 60.0,
         },
         bound: None,
+        error_bound: None,
         bound_remark: None,
         surge_search_s: 0.0,
         remarks: Vec::new(),

@@ -54,6 +54,7 @@ fn plan() -> Plan {
             minutes: 1.0,
         },
         bound: None,
+        error_bound: None,
         bound_remark: None,
         surge_search_s: 0.0,
         remarks: Vec::new(),

@@ -1,10 +1,10 @@
 //! The identification methods as the planner sees them.
 
 use mapper_identify::{
-    Expected, ExpectedRow, ExpectedStep, IdentifyConfig, PressureTap, StepWorth, expected, expected_steady,
-    expected_together,
+    Expected, ExpectedRow, ExpectedStep, IdentifyConfig, PressureTap, StepWorth, VarianceTangent, expected,
+    expected_steady, expected_together,
 };
-use mapper_planner::{ForecastRow, MethodResult, PredictedMethod, WorthOfStep};
+use mapper_planner::{ErrorTangent, ForecastRow, MethodResult, PredictedMethod, WorthOfStep};
 
 /// The dynamic method with the campaign's settings.
 #[derive(Debug)]
@@ -63,6 +63,18 @@ impl PredictedMethod for Joint {
         Some(Box::new(Worth(worth)))
     }
 
+    fn tangent_at(
+        &self,
+        steps: &[&[ForecastRow]],
+        measures: &[bool],
+        times: f64,
+    ) -> Option<Box<dyn ErrorTangent>> {
+        let rows = expected_rows(steps);
+        let steps = expected_steps(&rows, steps);
+        let tangent = VarianceTangent::at(&steps, measures, times, &self.alone.config)?;
+        Some(Box::new(Tangent(tangent)))
+    }
+
     fn is_joint(&self) -> bool {
         true
     }
@@ -80,6 +92,21 @@ impl WorthOfStep for Worth {
         let expected = expected_rows(&[rows]);
         let step = expected_steps(&expected, &[rows]);
         self.0.of(step.first()?)
+    }
+}
+
+#[derive(Debug)]
+struct Tangent(VarianceTangent);
+
+impl ErrorTangent for Tangent {
+    fn start(&self) -> f64 {
+        self.0.start()
+    }
+
+    fn of(&self, rows: &[ForecastRow], place: usize) -> Option<f64> {
+        let expected = expected_rows(&[rows]);
+        let step = expected_steps(&expected, &[rows]);
+        self.0.of(step.first()?, place)
     }
 }
 

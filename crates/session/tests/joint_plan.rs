@@ -9,7 +9,10 @@ use mapper_backends::virtual_lab;
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, VisitOrder};
 use mapper_formats::FORMATS;
-use mapper_session::{Registry, RunRequest, Session, compared, nominal_model, plan, with_plan_request};
+use mapper_planner::error_bound;
+use mapper_session::{
+    Registry, RunRequest, Session, SessionError, compared, nominal_model, plan, plan_of, with_plan_request,
+};
 use shipped::campaign;
 
 const GRID: [(&str, &str); 3] = [
@@ -119,4 +122,41 @@ fn the_best_order_is_the_best_of_those_compared() {
     assert!(cost(&comparison.proposed) <= costs[0] * (1.0 + 1e-9), "{costs:?}");
     let open = |name: &str| comparison.of_order(name).unwrap().open_rms_error_eta.unwrap();
     assert!(open("information") < open("speed_lines"), "jumps move the housing, and that is what tells");
+}
+
+/// Of four points at three speeds each order is made and judged by what all its steps tell: none is below the bound of any.
+#[test]
+fn no_order_is_below_the_bound_of_its_error() {
+    let first = small(&[
+        ANY_ERROR,
+        ("dwell: 120 s ", "dwell: 60 s "),
+        ("speeds: [50 krpm, 80 krpm, 110 krpm, 140 krpm]", "speeds: [50 krpm, 90 krpm, 140 krpm]"),
+        ("openings: [0.5, 1.0, 2.0]", "openings: [0.6, 1.5]"),
+    ]);
+    let model = nominal_model(&first).unwrap();
+    let mut bounds = Vec::new();
+    for order in orders(4) {
+        let points = order.iter().map(|place| first.points[*place]).collect();
+        let campaign = Campaign { order: VisitOrder::Listed, points, ..first.clone() };
+        let bound = with_plan_request(&campaign, &model, |request| {
+            Ok::<_, SessionError>(error_bound(request, &plan_of(&campaign, request)?)?.unwrap())
+        });
+        bounds.push(bound.unwrap());
+    }
+    let (least, most) = bounds.iter().fold((f64::INFINITY, 0.0), |(low, high), bound| {
+        (bound.error_eta.min(low), bound.error_eta.max(high))
+    });
+    let highest = bounds.iter().map(|bound| bound.least_error_eta).fold(0.0, f64::max);
+    assert!(highest <= least, "a bound of {highest}, and an order has {least}");
+    // The orders differ, and the bound says something.
+    assert!(most > 1.1 * least && highest > 0.3 * least, "{least} to {most}, bounds to {highest}");
+}
+
+/// All orders of the first so many numbers.
+fn orders(count: usize) -> Vec<Vec<usize>> {
+    let Some(last) = count.checked_sub(1) else { return vec![Vec::new()] };
+    let put = |order: Vec<usize>| {
+        (0..=order.len()).map(move |place| [&order[..place], &[last], &order[place..]].concat())
+    };
+    orders(last).into_iter().flat_map(put).collect()
 }

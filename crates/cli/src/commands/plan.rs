@@ -10,7 +10,7 @@ use mapper_campaign::campaign::SequenceSource;
 use mapper_campaign::units::{Kind, parse};
 use mapper_core::{OperatingPoint, Plan as StepPlan};
 use mapper_physics::model::Model;
-use mapper_planner::PlanRequest;
+use mapper_planner::{PlanRequest, error_bound};
 use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
 use mapper_session::{
     Rehearsal, Session, SessionError, compared, json_text, nominal_model, plan_of, rehearse,
@@ -86,7 +86,11 @@ impl Plan {
                 _ => None,
             };
             let effort = self.effort.unwrap_or(request.effort);
-            let plan = plan_of(&campaign, &PlanRequest { effort, appended, ..request.clone() })?;
+            let asked = PlanRequest { effort, appended, ..request.clone() };
+            let mut plan = plan_of(&campaign, &asked)?;
+            if asked.order.needs_method() {
+                plan.error_bound = error_bound(&asked, &plan).map_err(SessionError::from)?;
+            }
             let wanted = self.compare || self.svg.is_some();
             let comparison = wanted.then(|| compared(&campaign, request, &plan)).transpose()?;
             Ok::<_, SessionError>((plan, comparison))

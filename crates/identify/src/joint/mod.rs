@@ -27,6 +27,7 @@ pub(crate) mod smoothness;
 pub(crate) mod solve;
 pub(crate) mod start;
 pub(crate) mod surface;
+pub(crate) mod tangent;
 pub(crate) mod worth;
 
 use crate::dynamic::Estimate;

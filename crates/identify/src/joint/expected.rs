@@ -7,6 +7,7 @@ use crate::IdentifyConfig;
 use crate::config::coloured;
 use crate::dynamic::Estimate;
 use crate::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow};
+use crate::joint::parsimony::NO_EXTRA;
 use crate::joint::rows::{End, Row, StepRows, block_s_after, place};
 use crate::joint::solve::{Problem, ROUGHLY};
 use crate::joint::start::{self, START_S};
@@ -58,6 +59,8 @@ pub fn expected_together(
     let mut smoothed = open.clone();
     if as_declared {
         parsimony::settle(&mut problem)?;
+        // Intervals hold what a recording cannot exclude; here the machine is as declared.
+        problem.extra_variances = NO_EXTRA;
         smoothed = judged(&problem)?;
     }
     let mut found = vec![None; steps.len()];

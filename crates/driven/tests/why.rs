@@ -4,10 +4,10 @@
 
 mod common;
 
-use common::{Course, declared, engine, healthy};
+use common::{Course, ELEMENT_LAG, declared, engine, healthy};
 use mapper_core::{Channel, Recording};
 use mapper_driven::why::{Ask, Diagnosis, Which, Word, diagnose};
-use mapper_driven::{DrivenError, why::turbine_sensors};
+use mapper_driven::{DrivenError, why::compressor_sensors, why::turbine_sensors};
 use mapper_effects::catalogue;
 use mapper_gap::calibration::Calibration;
 use mapper_physics::effect::Rig;
@@ -99,6 +99,28 @@ fn a_slow_probe_is_named_with_its_size() {
     }
 }
 
+/// An element within a sheath: two lags, one behind the other, which a bare probe has not.
+#[test]
+fn a_sheathed_probe_is_named_and_no_wall_beside_a_bare_one() {
+    let sheath = [("tip_diameter", 3e-3), (ELEMENT_LAG, 1.5)];
+    let found = all_of(COMPRESSOR, &Course::brake(), &sheath, &[Channel::Tc]);
+    assert!(count(&found, |found| is_named(found, "sheathed_probe")) >= almost_all());
+    let held = |found: &Diagnosis| {
+        let holds = |name: &str, truth: f64| {
+            found.causes[0].parameters.get(name).is_some_and(|p| (p.low..=p.high).contains(&truth))
+        };
+        holds("sheathed_probe.sheath_diameter", 3e-3) && holds("sheathed_probe.element_lag", 1.5)
+    };
+    assert!(count(&found, held) >= almost_all());
+}
+
+/// What a sheath is not: a housing whose inner wall lags behind the gas.
+#[test]
+fn an_inner_wall_is_named_and_no_sheath() {
+    let found = all_of(COMPRESSOR, &Course::hills(), &[("inner_node", 15.0)], &[]);
+    assert!(count(&found, |found| is_named(found, "inner_node")) >= almost_all());
+}
+
 /// A part of the log that nobody fitted is predicted within what was said of it.
 #[test]
 fn the_brake_is_predicted_with_the_cause_that_was_named_before_it() {
@@ -156,7 +178,8 @@ fn what_cannot_be_asked_is_said() {
         let mut all: Vec<String> = found.asked.iter().map(|one| one.effect.clone()).collect();
         all.extend(found.not_asked.iter().map(|one| one.effect.clone()));
         all.sort();
-        let mut expected = catalogue.clone();
+        let own = compressor_sensors().into_iter().map(|effect| effect.info().id.to_string());
+        let mut expected: Vec<String> = catalogue.iter().cloned().chain(own).collect();
         expected.sort();
         assert_eq!(all, expected);
     }

@@ -46,7 +46,8 @@ pub enum Problem {
     },
     /// Nobody knows how far the valve was open.
     #[error(
-        "the recording does not say how far the valve was open at step {step}, and the model is driven with that: map it as `valve_command`, as commanded or as measured, or give it among `constants`; without it `mapper transient` diagnoses the compressor side from its measured neighbours"
+        "the recording does not say how far the valve was open at step {}, and the model is driven with that: map it as `valve_command`, as commanded or as measured, or give it among `constants`; without it `mapper transient` diagnoses the compressor side from its measured neighbours",
+        .step + 1
     )]
     NoValve {
         /// Index of the first step of which it is not known.

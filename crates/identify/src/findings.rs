@@ -80,12 +80,14 @@ pub mod code {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Findings {
     pub(crate) verdict: Verdict,
+    /// Doubts first, then remarks.
     pub(crate) warnings: Vec<Warning>,
+    doubts: usize,
 }
 
 impl Findings {
     pub(crate) fn new() -> Self {
-        Findings { verdict: Verdict::Good, warnings: Vec::new() }
+        Findings { verdict: Verdict::Good, warnings: Vec::new(), doubts: 0 }
     }
 
     /// Something to know that is no reason to doubt.
@@ -95,7 +97,11 @@ impl Findings {
 
     /// Adds what another has found.
     pub(crate) fn take(&mut self, other: Findings) {
-        self.warnings.extend(other.warnings);
+        let mut doubts = other.warnings;
+        self.warnings.extend(doubts.split_off(other.doubts));
+        for doubt in doubts {
+            self.warn(self.doubts, doubt);
+        }
         self.verdict = match (self.verdict, other.verdict) {
             (Verdict::Unusable, _) | (_, Verdict::Unusable) => Verdict::Unusable,
             (Verdict::Doubtful, _) | (_, Verdict::Doubtful) => Verdict::Doubtful,
@@ -104,18 +110,45 @@ impl Findings {
     }
 
     pub(crate) fn doubt(&mut self, code: &str, message: String) {
-        self.remark(code, message);
+        self.warn(self.doubts, Warning { code: code.to_owned(), message });
         self.verdict = self.verdict.doubted();
     }
 
     /// A doubt before all others: what speaks against the readings themselves.
     pub(crate) fn doubt_first(&mut self, code: &str, message: String) {
-        self.warnings.insert(0, Warning { code: code.to_owned(), message });
+        self.warn(0, Warning { code: code.to_owned(), message });
         self.verdict = self.verdict.doubted();
     }
 
     pub(crate) fn refuse(&mut self, code: &str, message: String) {
-        self.remark(code, message);
+        self.warn(self.doubts, Warning { code: code.to_owned(), message });
         self.verdict = Verdict::Unusable;
+    }
+
+    /// A doubt at its place: a first look shows no more than the first warning, which is to be the reason why a point is not good.
+    fn warn(&mut self, place: usize, doubt: Warning) {
+        self.warnings.insert(place, doubt);
+        self.doubts += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn doubts_come_before_remarks_whatever_was_found_first() {
+        let (mut findings, mut other) = (Findings::new(), Findings::new());
+        findings.remark(code::OUTLIERS, "two samples are left out".to_owned());
+        findings.doubt(code::SMALL_GRADIENT, "T2 hardly moves".to_owned());
+        other.remark(code::THROUGH_THE_LAW, "no jump".to_owned());
+        other.refuse(code::AT_BOUND, "on a bound".to_owned());
+        findings.take(other);
+        findings.doubt_first(code::DEAD_CHANNEL, "T2 is dead".to_owned());
+        let codes: Vec<&str> = findings.warnings.iter().map(|warning| warning.code.as_str()).collect();
+        let expected =
+            [code::DEAD_CHANNEL, code::SMALL_GRADIENT, code::AT_BOUND, code::OUTLIERS, code::THROUGH_THE_LAW];
+        assert_eq!(codes, expected);
+        assert_eq!(findings.verdict, Verdict::Unusable);
     }
 }

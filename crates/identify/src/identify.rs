@@ -3,8 +3,9 @@
 use crate::dynamic::Estimate;
 use crate::end_state::{EndState, end_state};
 use crate::findings::{Findings, code};
+use crate::joint::AsFitted;
 use crate::needs::missing;
-use crate::nominal_map::{NominalRig, doubt_off_the_nominal_map, off_the_map};
+use crate::nominal_map::{NominalRig, Offset, doubt, off_the_map, offset, reach};
 use crate::objections::housing::Balance;
 use crate::objections::objection::Objection;
 use crate::objections::objections;
@@ -12,8 +13,11 @@ use crate::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, dynamic, joint, steady};
 use mapper_core::{
     Channel, CommonErrors, EstimateUncertainty, Event, EventKind, IdentifiedPoint, Method, Recording,
-    StepMarker, ThermalModel, Verdict, Warning, WindowRule, confidence_interval_95,
+    StepMarker, ThermalModel, Verdict, WindowRule, confidence_interval_95,
 };
+
+/// Standard deviations of an offset by `dynamic` from which on it is worth asking `joint`, which tells it better: one sound recording in three.
+const HINT_SIGMAS: f64 = 1.0;
 
 /// Identifies every step of a recording, in order. Steps of which not even the place on the map is known are left
 /// out; [`identify_each`] says which and why.
@@ -75,45 +79,102 @@ pub fn identify_beside(
     nominal: Option<NominalRig<'_>>,
 ) -> Result<Identified, IdentifyError> {
     let mut found = identified(recording, config, nominal.as_ref(), Balance::Asked)?;
-    let any_good = found.points.iter().flatten().any(|point| point.verdict == Verdict::Good);
-    let Some(nominal) = nominal.filter(|_| any_good) else { return Ok(found) };
-    if config.method == Method::Steady {
-        if let Some(message) = off_by_both(recording, config, &nominal) {
-            for point in found.points.iter_mut().flatten() {
-                point.verdict = point.verdict.doubted();
-                let code = code::OFF_THE_NOMINAL_MAP.to_owned();
-                point.warnings.insert(0, Warning { code, message: message.clone() });
-            }
-        }
-        return Ok(found);
+    let any_good = found.points().any(|point| point.verdict == Verdict::Good);
+    let Some(nominal) = nominal.filter(|_| any_good) else { return Ok(found.identified) };
+    let said = beside_the_nominal_map(recording, config, &nominal, &found);
+    let points = &mut found.identified.points;
+    match said {
+        None => {}
+        Some(Said::Against(message)) => doubt(
+            points
+                .iter_mut()
+                .flatten()
+                .filter(|point| config.method == Method::Steady || point.eta.is_some()),
+            &message,
+        ),
+        Some(Said::Likely(offset)) => reach(points, offset, &config.thresholds),
     }
-    let mut points: Vec<IdentifiedPoint> = found.points.iter().flatten().cloned().collect();
-    doubt_off_the_nominal_map(&mut points, nominal.model.map.as_ref(), config.reference, nominal.tolerances);
-    let mut judged = points.into_iter();
-    for point in found.points.iter_mut().flatten() {
-        if let Some(judged) = judged.next() {
-            *point = judged;
-        }
-    }
-    Ok(found)
+    Ok(found.identified)
 }
 
-/// What speaks against the readings where both methods that see the heat find efficiencies off the nominal map, or the second none
-/// that are good: an apparent efficiency cannot be held against it. One of them alone may lack what the machine has.
-fn off_by_both(recording: &Recording, config: &IdentifyConfig, nominal: &NominalRig<'_>) -> Option<String> {
+/// What the nominal map says of a recording's points.
+enum Said {
+    /// They are not to be trusted, and why.
+    Against(String),
+    /// An offset that their intervals have to reach to.
+    Likely(Offset),
+}
+
+/// `None` where nothing speaks against the points.
+fn beside_the_nominal_map(
+    recording: &Recording,
+    config: &IdentifyConfig,
+    nominal: &NominalRig<'_>,
+    found: &Found,
+) -> Option<Said> {
+    let map = nominal.model.map.as_ref();
+    let off = |found: &Found| {
+        let points: Vec<IdentifiedPoint> = found.points().cloned().collect();
+        off_the_map(&points, map, config.reference, nominal.tolerances)
+    };
+    let offset = |points: Vec<IdentifiedPoint>| offset(&points, map, config.reference, nominal.tolerances);
+    let of_offset = |told: Offset| match told.objection() {
+        Some(message) => Some(Said::Against(message)),
+        None => told.is_likely().then_some(Said::Likely(told)),
+    };
+    if config.method == Method::Joint {
+        return off(found).map(Said::Against).or_else(|| of_offset(offset(found.as_fitted())?));
+    }
     recording.require(Channel::Tc).ok()?;
-    let points = |method: Method| -> Option<Vec<IdentifiedPoint>> {
-        let config = IdentifyConfig { method, ..config.clone() };
-        let found = identified(recording, &config, None, Balance::NotAsked).ok()?;
-        Some(found.points.into_iter().flatten().collect())
+    let by = |method: Method| {
+        identified(recording, &IdentifyConfig { method, ..config.clone() }, None, Balance::NotAsked).ok()
     };
-    let off = |points: &[IdentifiedPoint]| {
-        off_the_map(points, nominal.model.map.as_ref(), config.reference, nominal.tolerances)
-    };
-    let message = off(&points(Method::Dynamic)?)?;
-    let joint = points(Method::Joint)?;
-    let agrees = joint.iter().all(|point| point.verdict != Verdict::Good) || off(&joint).is_some();
-    agrees.then_some(message)
+    let other = if config.method == Method::Dynamic { None } else { Some(by(Method::Dynamic)?) };
+    let dynamic = other.as_ref().unwrap_or(found);
+    let by_dynamic = off(dynamic);
+    if let (Method::Dynamic, Some(message)) = (config.method, &by_dynamic) {
+        return Some(Said::Against(message.clone()));
+    }
+    let hint = offset(dynamic.points().cloned().collect());
+    if by_dynamic.is_none() && hint.is_some_and(|hint| hint.sigmas().abs() < HINT_SIGMAS) {
+        return None;
+    }
+    let joint = by(Method::Joint)?;
+    // An apparent efficiency cannot be held against a map: both methods that see the heat find theirs off it, or the second none that are
+    // good. One of them alone may lack what the machine has.
+    let none_good = joint.points().all(|point| point.verdict != Verdict::Good);
+    if let Some(message) = by_dynamic.filter(|_| none_good || off(&joint).is_some()) {
+        return Some(Said::Against(message));
+    }
+    // `joint` tells an offset better than `dynamic`, which holds h constant.
+    let told = offset(joint.as_fitted())?;
+    of_offset(told).filter(|_| hint.is_none_or(|hint| hint.found_k * told.found_k > 0.0))
+}
+
+/// What a method makes of a recording.
+struct Found {
+    identified: Identified,
+    /// Efficiencies of `joint` before the smoothness of the map had its say, one for each step; empty where there are none.
+    as_fitted: Vec<Option<AsFitted>>,
+}
+
+impl Found {
+    fn points(&self) -> impl Iterator<Item = &IdentifiedPoint> {
+        self.identified.points.iter().flatten()
+    }
+
+    /// The points with the efficiencies before smoothness had its say.
+    fn as_fitted(&self) -> Vec<IdentifiedPoint> {
+        let steps = self.identified.points.iter().zip(&self.as_fitted);
+        let point = |(point, fitted): (&Result<IdentifiedPoint, StepError>, &Option<AsFitted>)| {
+            let (mut point, fitted) = (point.as_ref().ok()?.clone(), fitted.as_ref()?);
+            let (low, high) = confidence_interval_95(fitted.eta, fitted.error);
+            (point.eta, point.eta_low, point.eta_high) = (Some(fitted.eta), Some(low), Some(high));
+            point.common.eta_changes.clone_from(&fitted.common);
+            Some(point)
+        };
+        steps.filter_map(point).collect()
+    }
 }
 
 fn identified(
@@ -121,7 +182,7 @@ fn identified(
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
     balance: Balance,
-) -> Result<Identified, IdentifyError> {
+) -> Result<Found, IdentifyError> {
     check(config)?;
     let missing = missing(recording, config.method);
     if !missing.is_empty() {
@@ -151,7 +212,7 @@ fn identified(
         Default::default()
     };
     let objections = objections(recording, &alone, config, nominal, balance);
-    let (mut thermal, mut two_parameter) = (None, Vec::new());
+    let (mut thermal, mut two_parameter, mut as_fitted) = (None, Vec::new(), Vec::new());
     let estimates: Vec<Estimate> = match config.method {
         Method::Joint => {
             let known: Vec<Option<EndState>> =
@@ -163,6 +224,7 @@ fn identified(
             let joint = joint::estimate(recording, &known, (alone, told), config, condemned, &mut findings);
             thermal = joint.thermal;
             two_parameter = joint.two_parameter;
+            as_fitted = joint.as_fitted;
             joint.estimates
         }
         Method::Dynamic | Method::Imported => {
@@ -192,7 +254,7 @@ fn identified(
         .zip(findings)
         .map(|(((step, state), estimate), findings)| Ok(point(step, &state?, &estimate, findings, config)))
         .collect();
-    Ok(Identified { points, thermal, two_parameter })
+    Ok(Found { identified: Identified { points, thermal, two_parameter }, as_fitted })
 }
 
 /// The steps that may have a say in what all share: where an objection is to a few, they would spoil the others. Samples of a channel that

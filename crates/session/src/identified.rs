@@ -8,7 +8,10 @@ use crate::{Session, SessionError, SessionEvent};
 use mapper_assemble::{RepeatedJump, repeated_jumps};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{IdentifiedPoint, Method, Recording, StepMarker, StepOrigin, ThermalModel, joined};
-use mapper_identify::{IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, identify_beside, method_for};
+use mapper_identify::{
+    IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_beside, isothermal_zero,
+    method_for,
+};
 use mapper_observe::FusedChannel;
 use mapper_record::ChannelMap;
 use mapper_record::score::{
@@ -19,6 +22,9 @@ use serde_json::{Value, json};
 
 use mapper_surge::SurgeMarks;
 use std::path::{Path, PathBuf};
+
+/// Rest before the first step, s, that is worth a word: thermocouples in a housing need it to come to the others.
+const UNUSED_REST_S: f64 = 600.0;
 
 /// What a recording gives.
 #[derive(Debug)]
@@ -150,6 +156,7 @@ impl Session<'_> {
         let sensors = fused.channels.into_iter().next().unwrap_or_default();
         let first = fused.recordings.first().ok_or(SessionError::NoRecording)?;
         let zero = ZeroOutcome::of(first, &fused.config, soak);
+        remarks.extend(campaign.filter(|_| soak.is_none()).and_then(|_| rest_unused(first, &fused.config)));
         let (_, config) = zero.take_off(Recording::default(), fused.config.clone());
         let off = |recording: Recording| zero.take_off(recording, fused.config.clone()).0;
         let (recording, origins) = joined(fused.recordings.into_iter().map(off).collect());
@@ -180,6 +187,19 @@ impl Session<'_> {
             remarks,
         })
     }
+}
+
+/// That a recording rests before its first step, as a zero needs it, and nobody asked for one.
+fn rest_unused(recording: &Recording, config: &IdentifyConfig) -> Option<String> {
+    let settings = ZeroSettings { shortest_s: UNUSED_REST_S, ..ZeroSettings::default() };
+    let rest = isothermal_zero(recording, config, &settings).ok().filter(|rest| !rest.offsets.is_empty())?;
+    Some(format!(
+        "from {:.0} to {:.0} s, before the first step, the machine rests and its sensors read alike: `zero: {{soak: {:.0} min}}` in the \
+         campaign takes off what they read differently there, which leaves less of the declared offsets in the intervals",
+        rest.start_s,
+        rest.end_s,
+        (rest.end_s - rest.start_s) / 60.0
+    ))
 }
 
 /// What is kept of each recording beside what is identified.

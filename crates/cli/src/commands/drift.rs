@@ -2,7 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::given::channel_map;
+use crate::given::{channel_map, given_campaign};
 use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
@@ -15,15 +15,18 @@ use std::path::PathBuf;
 /// Say whether the rig stayed the same while a map was made: which sensor drifts, or the machine, since when and how fast
 #[derive(Debug, Args)]
 pub struct Drift {
-    /// Run directories in the order in which they were made; with `--recording`, the one campaign of the recordings
-    #[arg(required = true, value_name = "RUN|CAMPAIGN")]
+    /// Run directories, MCAP files or logs, in the order in which they were made; with `--recording`, their campaign
+    #[arg(required = true, value_name = "RECORDING|CAMPAIGN")]
     pub paths: Vec<PathBuf>,
-    /// MCAP recording, of this program or another; may be given more than once, in the order in which they were made
-    #[arg(long, value_name = "FILE")]
+    /// Recording, instead of by its place; may be given more than once
+    #[arg(long, value_name = "FILE", conflicts_with = "campaign")]
     pub recording: Vec<PathBuf>,
     /// Channel map: where recordings made by another program hold the rig's channels (YAML)
-    #[arg(long, value_name = "FILE", requires = "recording")]
+    #[arg(long, value_name = "FILE")]
     pub channels: Option<PathBuf>,
+    /// Campaign of the machine, where the recordings carry none
+    #[arg(long, value_name = "FILE")]
+    pub campaign: Option<PathBuf>,
     /// Write the points corrected for drift to this new CSV file
     #[arg(long, value_name = "FILE")]
     pub corrected: Option<PathBuf>,
@@ -44,21 +47,20 @@ impl Drift {
             .iter()
             .map(|file| Recorded::read(&registry, file, &map, given.as_ref()))
             .collect::<Result<_, SessionError>>()?;
-        let none = || Failure::new(Code::BadInput, "no recording was given");
-        let first = recorded.first().ok_or_else(none)?;
-        let campaign = first.known("Give it with `mapper drift --recording FILE CAMPAIGN`")?;
+        // clap asks for one.
+        let Some(first) = recorded.first() else { return Ok(()) };
+        let campaign = first.known("Give it with `--campaign FILE`")?;
         let drift = Session::new(&registry).drift(&recorded, campaign, &map)?;
         if let Some(path) = &self.corrected {
             let corrected =
                 corrected_csv(&drift.report).map_err(|error| Failure::new(Code::Failure, error))?;
             self.replace.write(path, &corrected)?;
         }
-        let warnings = recorded.iter().flat_map(|recorded| &recorded.read.warnings);
-        let warnings: Vec<String> = warnings.map(ToString::to_string).collect();
+        let warnings: Vec<String> =
+            recorded.iter().flat_map(|recorded| &recorded.read.warnings).map(ToString::to_string).collect();
         if self.json {
             let mut value = serde_json::to_value(&drift.report).map_err(SessionError::from)?;
-            let paths: Vec<&PathBuf> = recorded.iter().map(|recorded| &recorded.path).collect();
-            value["recordings"] = json!(paths);
+            value["recordings"] = recorded.iter().map(|recorded| json!(recorded.path)).collect();
             value["zero"] = json!(drift.zero);
             if !drift.sensors.is_empty() {
                 value["sensors"] = json!(drift.sensors);
@@ -74,14 +76,13 @@ impl Drift {
 
     /// Recordings, and the campaign where one is given.
     fn sources(&self) -> Result<(&[PathBuf], Option<Campaign>), Failure> {
-        if self.recording.is_empty() {
-            return Ok((&self.paths, None));
-        }
-        let [campaign] = self.paths.as_slice() else {
+        let named = !self.recording.is_empty();
+        if named && self.paths.len() > 1 {
             let message = "`--recording` needs one campaign, that of the machine that was recorded";
             return Err(Failure::new(Code::BadInput, message));
-        };
-        let campaign = mapper_campaign::load(campaign).map_err(Failure::of_campaign)?;
-        Ok((&self.recording, Some(campaign)))
+        }
+        let (files, campaign) =
+            if named { (&self.recording, self.paths.first()) } else { (&self.paths, self.campaign.as_ref()) };
+        Ok((files, given_campaign(campaign.map(PathBuf::as_path))?))
     }
 }

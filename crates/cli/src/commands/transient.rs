@@ -63,12 +63,8 @@ impl Transient {
             return output::print_json(&found);
         }
         let mut text = found.text();
-        for warning in &recorded.read.warnings {
-            text.push_str(&format!("recording: {warning}\n"));
-        }
-        for file in files {
-            text.push_str(&format!("{}\n", file.display()));
-        }
+        text.extend(recorded.read.warnings.iter().map(|warning| format!("recording: {warning}\n")));
+        text.extend(files.iter().map(|file| format!("{}\n", file.display())));
         output::print(&text)
     }
 }

@@ -87,10 +87,8 @@ pub(crate) fn smallest<S: Side>(
         let info = question.effects[*effect].info();
         let (parameter, others) = info.parameters.split_last()?;
         let coordinate = Coordinate::new(parameter);
-        let length = |value: f64| -> Option<(f64, usize)> {
-            let beside = others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high));
-            let there =
-                Hypothesis { effects: vec![(*effect, beside.chain([value]).collect())], ..base.clone() };
+        let length_beside = |others: &[f64], value: f64| -> Option<(f64, usize)> {
+            let there = Hypothesis { effects: vec![(*effect, [others, &[value]].concat())], ..base.clone() };
             let there = question.predict(&there)?;
             let change: Vec<Vec<f64>> =
                 there.iter().zip(&said).map(|(t, s)| t.iter().zip(s).map(|(t, s)| t - s).collect()).collect();
@@ -114,6 +112,12 @@ pub(crate) fn smallest<S: Side>(
         };
         let typical = away((parameter.neutral + parameter.typical_step).clamp(parameter.low, parameter.high));
         let furthest = away(value_at(typical * 1e9));
+        // By itself where it shows by itself: a wall without a mass shows nothing, the lag of an element in no sheath does.
+        let neutral: Vec<f64> = others.iter().map(|p| p.neutral).collect();
+        let usual: Vec<f64> =
+            others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high)).collect();
+        let alone = length_beside(&neutral, value_at(typical))?.0 > 1e-6;
+        let length = |value: f64| length_beside(if alone { &neutral } else { &usual }, value);
         let (mut here, mut taker) = (typical, 0);
         // The smallest of those that were looked at and are large enough.
         let mut seen: Option<f64> = None;

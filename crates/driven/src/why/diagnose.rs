@@ -3,6 +3,7 @@
 use super::asked::{audible, smallest};
 use super::calm::calm;
 use super::compressor::CompressorSide;
+use super::compressor_sensors::compressor_sensors;
 use super::diagnosis::{Cause, Course, Diagnosis, Unknown, Word};
 use super::fit::{Fit, Question};
 use super::held_out::{beyond, held_out, ids, off_k};
@@ -61,7 +62,10 @@ pub struct Ask<'a> {
 /// to fit, [`DrivenError::NoAnswer`] where the nominal machine has no answer under what drives.
 pub fn diagnose(ask: &Ask<'_>, side: Which) -> Result<Diagnosis, DrivenError> {
     match side {
-        Which::Compressor => of_side::<CompressorSide>(ask),
+        Which::Compressor => {
+            let effects = [ask.effects, &compressor_sensors()].concat();
+            of_side::<CompressorSide>(&Ask { effects: &effects, ..*ask })
+        }
         Which::Turbine => {
             let effects = [ask.effects, &turbine_sensors()].concat();
             of_side::<TurbineSide>(&Ask { effects: &effects, ..*ask })

@@ -3,6 +3,7 @@
 mod asked;
 mod calm;
 mod compressor;
+mod compressor_sensors;
 mod diagnose;
 mod diagnosis;
 mod fit;
@@ -14,6 +15,7 @@ mod side;
 mod turbine;
 mod turbine_sensors;
 
+pub use compressor_sensors::compressor_sensors;
 pub use diagnose::{Ask, diagnose};
 pub use diagnosis::{Beyond, Cause, Course, Diagnosis, HeldOut, NotAsked, Phase, Unknown, Word};
 pub use side::{NoSide, Which};

@@ -67,6 +67,12 @@ impl Course {
     }
 }
 
+/// Lag of the T2 element behind the probe's tip, s, as something to plant: what a sheath has and a bare probe has not.
+pub const ELEMENT_LAG: &str = "element lag";
+
+/// Share of the housing's heat capacity of an inner wall that is planted; what is said of it is its conductance, W/K.
+const INNER_WALL_RATIO: f64 = 0.4;
+
 /// A log of a machine with its own efficiency, heat transfer and housing, and with `planted` effects; with its truth.
 pub fn engine(
     seed: u64,
@@ -82,9 +88,15 @@ pub fn engine(
     let mut rig = Rig::new(Model::nominal());
     own(&mut rig.model.params, &mut normal);
     for (id, value) in planted {
+        if *id == ELEMENT_LAG {
+            rig.instruments.path_mut(Channel::T2).lag_s += value;
+            continue;
+        }
         let effects = [catalogue(), turbine_sensors()].concat();
         let effect = effects.iter().find(|effect| effect.info().id == *id).unwrap();
-        add(&mut rig, effect.as_ref(), &[*value]).unwrap();
+        let wall = [INNER_WALL_RATIO, *value];
+        let values = if *id == "inner_node" { &wall[..] } else { &wall[1..] };
+        add(&mut rig, effect.as_ref(), values).unwrap();
     }
     let (flow_gain, t2_offset_k) = (1.0 + normal(0.01), normal(0.5));
     let model = &rig.model;

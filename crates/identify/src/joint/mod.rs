@@ -62,6 +62,19 @@ pub(crate) struct Joint {
     pub(crate) thermal: Option<ThermalModel>,
     /// What the two-parameter method makes of the steps that it can use.
     pub(crate) two_parameter: Vec<TwoParameter>,
+    /// The efficiencies before the smoothness of the map had its say, one for each step; empty where nothing was fitted together.
+    pub(crate) as_fitted: Vec<Option<AsFitted>>,
+}
+
+/// An efficiency as the fit has it.
+#[derive(Debug, Clone)]
+pub(crate) struct AsFitted {
+    /// Fraction.
+    pub(crate) eta: f64,
+    /// One standard error, fraction.
+    pub(crate) error: f64,
+    /// What one standard deviation of each error that the points share does to it, fraction.
+    pub(crate) common: Vec<f64>,
 }
 
 /// Identifies all steps. `end_states` and `findings`: one for each step; no end state, no estimate. `alone`: each step by
@@ -85,7 +98,7 @@ pub(crate) fn estimate(
     }
     if config.joint == JointSettings::all_off() {
         findings.iter_mut().zip(told).for_each(|(findings, told)| findings.take(told));
-        return Joint { estimates: alone, thermal: None, two_parameter: Vec::new() };
+        return Joint { estimates: alone, thermal: None, two_parameter: Vec::new(), as_fitted: Vec::new() };
     }
     let steps = start::steps(recording, end_states, config, findings);
     let careful = carefully(config);
@@ -110,10 +123,11 @@ pub(crate) fn estimate(
             findings[step.position].doubt(code::FIT_FAILED, message);
             estimates[step.position] = alone[step.position].clone();
         }
-        return Joint { estimates, thermal: None, two_parameter };
+        return Joint { estimates, thermal: None, two_parameter, as_fitted: Vec::new() };
     };
-    let Attempt { problem, smoothed, thermal, resting, left_out, .. } = attempt;
+    let Attempt { problem, smoothed, before, thermal, resting, left_out, .. } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
+    let mut as_fitted = vec![None; recording.steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
         let own = &mut findings[step.position];
         let (Judged { value: eta, uncertainty: eta_error }, ln_h) = (smoothed.eta[i], smoothed.ln_h[i]);
@@ -128,6 +142,11 @@ pub(crate) fn estimate(
             own.refuse(code::FIT_FAILED, "the fit gives no finite number for this step".to_owned());
             continue;
         }
+        as_fitted[step.position] = Some(AsFitted {
+            eta: before.eta[i].value,
+            error: before.eta[i].uncertainty.combined_standard_error(),
+            common: before.common[0][i].clone(),
+        });
         let (first, last) = (step.rows.first(), step.rows.last());
         let change =
             |read: fn(&rows::Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
@@ -173,7 +192,7 @@ pub(crate) fn estimate(
             own.doubt(code::MODEL_DOUBTED, doubt.clone());
         }
     }
-    Joint { estimates, thermal: Some(thermal), two_parameter }
+    Joint { estimates, thermal: Some(thermal), two_parameter, as_fitted }
 }
 
 /// A fit with what is made of it.
@@ -181,6 +200,8 @@ struct Attempt<'a> {
     problem: Problem<'a>,
     covariance: Covariance,
     smoothed: Smoothed,
+    /// The same before the smoothness of the map had its say.
+    before: Smoothed,
     thermal: ThermalModel,
     /// By how much the efficiencies would be off if what was drawn to its declared value were not as declared, fraction.
     resting: f64,
@@ -202,6 +223,7 @@ impl<'a> Attempt<'a> {
             (member.shares, member.barred) = (false, true);
         }
         let (covariance, resting) = fitted(&mut problem, steps, config)?;
+        let before = smoothness::as_fitted(&problem, &covariance, steps);
         let mut smoothed = smoothness::smoothed(&problem, &covariance, steps, config.reference);
         if smoothed.strain > smoothness::STRAIN_SIGMAS {
             // The declaration does not hold: the offsets then have the spread that they show.
@@ -213,7 +235,7 @@ impl<'a> Attempt<'a> {
             smoothed.strain = strain;
         }
         let thermal = shared::thermal_model(&problem, &covariance, &smoothed, steps, config);
-        Some(Attempt { problem, covariance, smoothed, thermal, resting, left_out: None })
+        Some(Attempt { problem, covariance, smoothed, before, thermal, resting, left_out: None })
     }
 
     /// The fit without the region of the map that disagrees most, if there is one.

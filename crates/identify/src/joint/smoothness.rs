@@ -89,13 +89,11 @@ pub(crate) fn smoothed(
     reference: ReferenceState,
 ) -> Smoothed {
     let (etas, ln_hs) = quantities(problem, covariance, steps);
-    let shared: Vec<Quantity> = (0..covariance.fitted.len()).map(|row| of_shared(covariance, row)).collect();
-    let carried: Vec<usize> =
-        (0..covariance.fitted.len()).filter(|row| is_offset(covariance.fitted[*row])).collect();
+    let carried = (0..covariance.fitted.len()).any(|row| is_offset(covariance.fitted[row]));
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
     let scale = SurfaceScale::of(&places, reference);
     let few = etas.len() <= MOST;
-    let solved = match scale.filter(|_| few && problem.setting.shaped && !carried.is_empty()) {
+    let solved = match scale.filter(|_| few && problem.setting.shaped && carried) {
         None => Vec::new(),
         Some(scale) => {
             let coordinates: Vec<(f64, f64, f64)> = places
@@ -108,6 +106,18 @@ pub(crate) fn smoothed(
             solve(&etas, &coordinates, problem)
         }
     };
+    judged(covariance, &etas, &ln_hs, &solved)
+}
+
+/// All numbers as the fit has them, with the offsets as declared: what smoothness has taken off can no longer be held against a map that is known.
+pub(crate) fn as_fitted(problem: &Problem<'_>, covariance: &Covariance, steps: &[StepRows]) -> Smoothed {
+    let (etas, ln_hs) = quantities(problem, covariance, steps);
+    judged(covariance, &etas, &ln_hs, &[])
+}
+
+fn judged(covariance: &Covariance, etas: &[Quantity], ln_hs: &[Quantity], solved: &[Solved]) -> Smoothed {
+    let shared: Vec<Quantity> = (0..covariance.fitted.len()).map(|row| of_shared(covariance, row)).collect();
+    let carried = (0..covariance.fitted.len()).filter(|row| is_offset(covariance.fitted[*row]));
     // Errors that offsets and what is assumed bring, before and after.
     let biased: Vec<usize> = (0..covariance.fitted.len())
         .filter(|row| (OFFSETS..SURFACE).contains(&covariance.fitted[*row]))
@@ -119,8 +129,7 @@ pub(crate) fn smoothed(
                 let sigma2 = covariance.shared[(*row, *row)];
                 let mut share = quantity.by_shared[*row];
                 if let Some(pull) = pull {
-                    share -=
-                        pull.iter().zip(&etas).map(|(pull, eta)| pull * eta.by_shared[*row]).sum::<f64>();
+                    share -= pull.iter().zip(etas).map(|(pull, eta)| pull * eta.by_shared[*row]).sum::<f64>();
                 }
                 share * share / sigma2
             })
@@ -158,15 +167,11 @@ pub(crate) fn smoothed(
         .map(&judge)
         .map(|judged| (judged.value, judged.uncertainty.combined_standard_error()))
         .collect();
-    let strain = carried
-        .iter()
-        .map(|row| shared[*row].0.powi(2) / covariance.shared[(*row, *row)])
-        .sum::<f64>()
-        .sqrt();
-    let (eta, ln_h) = (parallel::map(&etas, judge), parallel::map(&ln_hs, judge));
+    let strain = carried.map(|row| shared[row].0.powi(2) / covariance.shared[(row, row)]).sum::<f64>().sqrt();
+    let (eta, ln_h) = (parallel::map(etas, judge), parallel::map(ln_hs, judge));
     let best = solved.iter().max_by(|a, b| a.weight.total_cmp(&b.weight));
-    let common = [(&etas, &eta), (&ln_hs, &ln_h)].map(|(quantities, judged)| {
-        let (covariance, own) = together(quantities, &etas, best);
+    let common = [(etas, &eta), (ln_hs, &ln_h)].map(|(quantities, judged)| {
+        let (covariance, own) = together(quantities, etas, best);
         let errors: Vec<f64> = judged.iter().map(|one| one.uncertainty.combined_standard_error()).collect();
         common_part(&covariance, &own, &errors)
     });

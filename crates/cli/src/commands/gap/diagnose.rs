@@ -21,8 +21,11 @@ pub struct Diagnose {
     /// Campaign with machine, declared uncertainties and tolerances (YAML)
     pub campaign: PathBuf,
     /// Run directory, MCAP file, or log of another program; several, in order, are diagnosed each and compared
-    #[arg(long = "recording", value_name = "FILE", required = true)]
+    #[arg(value_name = "RECORDING", required_unless_present = "named")]
     pub recordings: Vec<PathBuf>,
+    /// The same, by name
+    #[arg(long = "recording", value_name = "FILE")]
+    pub named: Vec<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
     #[arg(long, value_name = "MAP")]
     pub channels: Option<PathBuf>,
@@ -49,12 +52,13 @@ impl Diagnose {
         let map = channel_map(self.channels.as_deref())?;
         let registry = registry::registry();
         let effects = registry.effects_with(&self.effects)?;
-        if (self.html.is_some() || self.laws.is_some()) && self.recordings.len() > 1 {
-            let message = "--html and --laws are for one recording; give one --recording with them";
+        let recordings: Vec<&PathBuf> = self.recordings.iter().chain(&self.named).collect();
+        if (self.html.is_some() || self.laws.is_some()) && recordings.len() > 1 {
+            let message = "--html and --laws are for one recording; give one with them";
             return Err(Failure::new(Code::BadInput, message));
         }
-        let mut gaps = Vec::with_capacity(self.recordings.len());
-        for recording in &self.recordings {
+        let mut gaps = Vec::with_capacity(recordings.len());
+        for recording in recordings {
             let progress = manner::progress();
             progress.show(&SessionEvent::Progress { done_ratio: 0.0, what: "reading".to_owned() });
             let recorded = Recorded::read(&registry, recording, &map, Some(&campaign))?;
@@ -74,8 +78,7 @@ impl Diagnose {
             return if self.json { output::print_json(&gap.json()?) } else { output::print(&text(gap)) };
         }
         let diagnosed: Vec<&Diagnosed> = gaps.iter().map(|(_, gap)| &gap.diagnosed).collect();
-        let calibration = Calibration::shipped().map_err(SessionError::Calibration)?;
-        let over = over_recordings(&diagnosed, &calibration);
+        let over = over_recordings(&diagnosed, &Calibration::shipped().map_err(SessionError::Calibration)?);
         if self.json {
             let each: Result<Vec<Value>, Failure> = gaps
                 .iter()

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Write the other results of a run: thermal model, turbine, pictures of h and of errors
 #[derive(Debug, Args)]
 pub struct Rig {
-    /// Run directory, or MCAP file
+    /// Run directory, MCAP file, or log of another program
     pub recording: PathBuf,
     /// Directory for the files; existing files are not replaced
     #[arg(long, value_name = "DIR")]

@@ -23,6 +23,9 @@ pub struct Manifest {
     /// What the cases ran on.
     #[serde(default)]
     pub laboratory: Laboratory,
+    /// Whether each rig was also recorded on a night without its causes, as NAME.healthy.mcap.
+    #[serde(default)]
+    pub healthy: bool,
     /// Names of the cases; each has a recording NAME.mcap.
     pub cases: Vec<String>,
     /// SHA-256 of the file of answers.

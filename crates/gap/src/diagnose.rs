@@ -9,6 +9,7 @@ use crate::calibration::Calibration;
 use crate::experiment::Experiment;
 use crate::fit::{Effort, Fit, fit};
 use crate::folds::Folds;
+use crate::healthy::Healthy;
 use crate::how_far::{Compared, how_far};
 use crate::late::late;
 use crate::more::extend;
@@ -50,6 +51,8 @@ pub struct Question<'a> {
     pub recording: &'a Recording,
     /// What is declared.
     pub declared: Declared,
+    /// A recording of the same rig and steps in which nothing was wrong: what is asked then is what changed since.
+    pub healthy: Option<Healthy<'a>>,
     /// The nominal machine.
     pub model: Model,
     /// Candidate effects.
@@ -108,6 +111,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     let Question {
         recording,
         declared,
+        healthy,
         model,
         effects,
         tolerances_declared,
@@ -124,7 +128,16 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     } else {
         Actuators::undeclared(&table, recording, &declared)
     };
+    let (nominal, mut since) = (model.clone(), None);
     let mut study = Study::with_actuators(recording, table, declared, model, effects, actuators);
+    if let Some(healthy) = healthy {
+        progress(0.01, "the healthy recording");
+        let changed = study.since(healthy, nominal, tolerances_declared)?;
+        study = changed.study;
+        since = Some(changed.since);
+        let of_healthy = |warning: String| format!("the healthy recording: {warning}");
+        warnings.extend(changed.warnings.into_iter().map(of_healthy));
+    }
     if study.scatter_s > 0.0 {
         warnings.push(format!(
             "the times of the samples are off by {:.0} ms, as P3 tells where it jumps: readings that move count for as much less",
@@ -270,6 +283,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     progress(1.0, "done");
     let diagnosis = Diagnosis {
         verdict,
+        since,
         r#where,
         candidates: weighed.candidates,
         probability_none: weighed.none,

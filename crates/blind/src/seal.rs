@@ -33,6 +33,12 @@ pub struct Manifest {
 }
 
 impl Manifest {
+    /// What tells its score from that of other cases.
+    pub fn title(&self) -> String {
+        let beside = if self.healthy { ", beside a healthy recording" } else { "" };
+        format!("{}{beside}", self.laboratory.name())
+    }
+
     /// Reads a manifest.
     ///
     /// # Errors

@@ -9,6 +9,7 @@ use crate::calibration::Calibration;
 use crate::experiment::Experiment;
 use crate::fit::{Effort, Fit, fit};
 use crate::folds::Folds;
+pub use crate::gap_error::GapError;
 use crate::healthy::Healthy;
 use crate::how_far::{Compared, how_far};
 use crate::late::late;
@@ -20,7 +21,7 @@ use crate::report::{Diagnosis, Verdict};
 use crate::select::{Search, does_something, keep_best, refit, search};
 use crate::selection::Selection;
 use crate::smallest_seen::smallest_seen;
-use crate::study::{Hypothesis, PredictError, Prediction, Study, members};
+use crate::study::{Hypothesis, Prediction, Study, members};
 use crate::usable::usable;
 pub use crate::weigh::prior;
 use crate::weigh::{by_weight, rivals, suspicions, weigh, weight};
@@ -33,17 +34,6 @@ use mapper_observe::told::as_told;
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use std::sync::Arc;
-
-/// Why a recording cannot be diagnosed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum GapError {
-    /// The recording does not fit the campaign, or lacks what is needed.
-    #[error(transparent)]
-    Recording(#[from] Problem),
-    /// The nominal model cannot follow.
-    #[error("the nominal model cannot follow this recording: {0}; is it of this machine?")]
-    Predict(#[from] PredictError),
-}
 
 /// What a diagnosis starts from.
 pub struct Question<'a> {

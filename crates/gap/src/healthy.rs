@@ -7,16 +7,17 @@
 
 use crate::actuators::Actuators;
 use crate::another_machine::another_machine;
-use crate::diagnose::GapError;
 use crate::errors_of_change::{covariance_of_errors, elsewhere, errors_of_change};
 use crate::first_step::is_start;
 use crate::fit::MOST_SIGMAS;
+use crate::gap_error::GapError;
 use crate::hypothesis::Hypothesis;
 use crate::normal::nuisance_products;
 use crate::nuisance::OUTPUTS;
 use crate::problem::Problem;
 use crate::same_steps::same_steps;
 use crate::selection::{Selection, dot_over};
+use crate::since::{Lacking, Since};
 use crate::study::{Group, PredictError, Study};
 use crate::usable::usable;
 use crate::whiten::{Linearised, dot};
@@ -26,7 +27,6 @@ use mapper_observe::table::Table;
 use mapper_observe::told::as_told;
 use mapper_physics::model::Model;
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// A recording of the same rig with the same steps, made while nothing was wrong.
@@ -38,26 +38,6 @@ pub struct Healthy<'a> {
     pub recording: &'a Recording,
     /// What is declared of it.
     pub declared: Declared,
-}
-
-/// What was taken for granted of a rig: what it was like while it was healthy.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Since {
-    /// The healthy recording.
-    pub recording: String,
-    /// For each channel what the model lacked there with its tolerances fitted: in both recordings, and not judged.
-    pub lacking: BTreeMap<String, Lacking>,
-}
-
-/// What a model lacks of one channel.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Lacking {
-    /// Root mean square, in the channel's unit.
-    pub size: f64,
-    /// Unit.
-    pub unit: String,
-    /// Share by which the model misses what the channel does over the recording, 0..1: it may miss as much of what changed since.
-    pub share: f64,
 }
 
 /// A study of what changed.

@@ -151,6 +151,7 @@ impl<'a> Calibrated<'a> {
             experiments: Vec::new(),
             recording: &recording,
             declared: declared(self.campaign),
+            healthy: None,
             model: self.nominal.clone(),
             effects: self.catalogue.to_vec(),
             calibration: self.before.clone(),

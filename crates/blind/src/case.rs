@@ -41,6 +41,8 @@ pub struct Draw {
     pub sigma_range: [f64; 2],
     /// What the cases run on.
     pub laboratory: Laboratory,
+    /// Whether each rig is also recorded on a night without its causes.
+    pub healthy: bool,
 }
 
 /// From what can hardly be seen to what nobody overlooks.
@@ -56,6 +58,7 @@ impl Draw {
             outside,
             sigma_range: SIGMA_RANGE,
             laboratory: Laboratory::default(),
+            healthy: false,
         }
     }
 

@@ -33,3 +33,20 @@ impl CaseKind {
         }
     }
 }
+
+/// A name that no kind has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("no blind case is `{name}`: none, single, pair, outside and triple are")]
+pub struct UnknownKind {
+    /// What was asked for.
+    pub name: String,
+}
+
+impl std::str::FromStr for CaseKind {
+    type Err = UnknownKind;
+
+    fn from_str(name: &str) -> Result<Self, UnknownKind> {
+        let mut known = CaseKind::USUAL.into_iter().chain([CaseKind::Triple]);
+        known.find(|kind| kind.name() == name).ok_or_else(|| UnknownKind { name: name.to_owned() })
+    }
+}

@@ -30,6 +30,9 @@ pub(crate) struct Schedule<'a> {
     laboratory: Laboratory,
 }
 
+/// Turns the seed of a case into that of the night on which its rig was healthy: no other draw uses it.
+const ANOTHER_NIGHT: u64 = 0x3C6E_F372_FE94_F82B;
+
 impl<'a> Schedule<'a> {
     /// The points in the campaign's own order, P3 commanded open loop.
     pub(crate) fn new(campaign: &'a Campaign, nominal: &'a Model) -> Result<Self, BlindError> {
@@ -46,8 +49,8 @@ impl<'a> Schedule<'a> {
         Schedule { laboratory, ..self }
     }
 
-    /// The lab of a case: nominal machine, drawn tolerances, then the causes.
-    fn lab(&self, case: &Case) -> Result<VirtualLab, BlindError> {
+    /// The lab of a case: nominal machine, drawn tolerances, then the causes; noise and weather of `night_seed`.
+    fn lab(&self, case: &Case, night_seed: u64) -> Result<VirtualLab, BlindError> {
         let mut rig = Rig::new(self.nominal.clone());
         draw_tolerances(&mut rig, &self.campaign.tolerances, case.seed);
         for cause in &case.causes {
@@ -62,8 +65,8 @@ impl<'a> Schedule<'a> {
             t3_actuator: at_once,
             valve_actuator: at_once,
             oil_actuator: at_once,
-            weather: Weather::drawn(case.seed),
-            seed: case.seed,
+            weather: Weather::drawn(night_seed),
+            seed: night_seed,
             ..LabSettings::ideal(self.nominal.clone(), self.campaign.boundary)
         };
         settings.take(rig);
@@ -108,8 +111,25 @@ impl<'a> Schedule<'a> {
         header: &RecordingHeader,
     ) -> Result<Truth, BlindError> {
         let mut kept = ToFile::new(RecordingWriter::create(file, header)?);
-        self.drive(case, &mut kept)?;
+        self.drive(case, case.seed, &mut kept)?;
         Ok(Truth::new(case, kept.finish()?))
+    }
+
+    /// Runs the rig of a case without its causes on another night: the same offsets and tolerances, other noise and weather.
+    ///
+    /// # Errors
+    /// Where the lab stops or the file cannot be written.
+    pub(crate) fn run_healthy(
+        &self,
+        case: &Case,
+        file: &Path,
+        header: &RecordingHeader,
+    ) -> Result<(), BlindError> {
+        let mut kept = ToFile::new(RecordingWriter::create(file, header)?);
+        let healthy = Case { causes: Vec::new(), sigmas: Vec::new(), ..case.clone() };
+        self.drive(&healthy, case.seed ^ ANOTHER_NIGHT, &mut kept)?;
+        kept.finish()?;
+        Ok(())
     }
 
     /// Runs a case into memory.
@@ -118,15 +138,15 @@ impl<'a> Schedule<'a> {
     /// Where the lab stops.
     pub(crate) fn record(&self, case: &Case) -> Result<Recording, BlindError> {
         let mut kept = ToMemory::default();
-        self.drive(case, &mut kept)?;
+        self.drive(case, case.seed, &mut kept)?;
         Ok(kept.recording)
     }
 
     /// The runner of every campaign, without guards: nothing that is drawn endangers a virtual machine.
-    fn drive(&self, case: &Case, observer: &mut dyn RunObserver) -> Result<(), BlindError> {
+    fn drive(&self, case: &Case, night_seed: u64, observer: &mut dyn RunObserver) -> Result<(), BlindError> {
         let runner = Runner {
             steps: &mut StepsOfCase::new(&self.steps, self.campaign.timing.warm_up_s),
-            backend: &mut self.lab(case)?,
+            backend: &mut self.lab(case, night_seed)?,
             clock: &mut UnpacedClock,
             guards: Vec::new(),
             observer,

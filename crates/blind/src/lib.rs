@@ -31,7 +31,7 @@ pub use case::{Case, Draw, SIGMA_RANGE};
 pub use cause::Cause;
 pub use error::BlindError;
 pub use interval::{Share, clopper_pearson_95};
-pub use kind::CaseKind;
+pub use kind::{CaseKind, UnknownKind};
 pub use laboratory::{Laboratory, UnknownLaboratory};
 pub use make::{Made, drawn, make, record, seal};
 pub use outside::{OutsideUse, outside_kinds};

@@ -29,7 +29,7 @@ pub struct Made {
 }
 
 /// Draws cases from `catalogue` and the outside causes, runs each on the virtual lab of `campaign`, and leaves in
-/// `directory`, which must not hold cases yet, NAME.mcap for each, the answers, and a manifest with their hash.
+/// `directory`, which must not hold cases yet, NAME.mcap for each (and NAME.healthy.mcap where that is asked for), the answers, and a manifest with their hash.
 ///
 /// `done` is told the number of finished cases. Equal arguments give equal bytes.
 ///
@@ -47,8 +47,9 @@ pub fn make(
     // Strengths are measured on the model's own lab, so that equal seeds give equal causes on both.
     let schedule = Schedule::new(campaign, &nominal)?.on(draw.laboratory);
     std::fs::create_dir_all(directory).map_err(BlindError::file(directory))?;
-    let answers = run_all(&schedule, campaign, &cases, directory, done)?;
-    Ok(Made { manifest: seal(&campaign.name, draw.laboratory, &answers, directory)?, answers })
+    let answers = run_all(&schedule, campaign, &cases, draw.healthy, directory, done)?;
+    let manifest = seal(&campaign.name, draw.laboratory, draw.healthy, &answers, directory)?;
+    Ok(Made { manifest, answers })
 }
 
 /// Draws cases.
@@ -92,6 +93,7 @@ pub fn record(
 pub fn seal(
     campaign: &str,
     laboratory: Laboratory,
+    healthy: bool,
     answers: &[Truth],
     directory: &Path,
 ) -> Result<Manifest, BlindError> {
@@ -99,6 +101,7 @@ pub fn seal(
     let manifest = Manifest {
         campaign: campaign.to_owned(),
         laboratory,
+        healthy,
         cases: answers.iter().map(|answer| answer.name.clone()).collect(),
         answers_sha256: sha256(&bytes),
     };
@@ -119,6 +122,7 @@ fn run_all(
     schedule: &Schedule<'_>,
     campaign: &Campaign,
     cases: &[Case],
+    healthy: bool,
     directory: &Path,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<Truth>, BlindError> {
@@ -127,6 +131,10 @@ fn run_all(
     parallel::try_map(cases, |case| {
         let header = header(campaign);
         let truth = schedule.run(case, &directory.join(format!("{}.mcap", case.name)), &header);
+        if healthy && truth.is_ok() {
+            let file = directory.join(format!("{}.healthy.mcap", case.name));
+            schedule.run_healthy(case, &file, &header)?;
+        }
         done(finished.fetch_add(1, Ordering::Relaxed) + 1);
         truth
     })

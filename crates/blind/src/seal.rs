@@ -23,6 +23,9 @@ pub struct Manifest {
     /// What the cases ran on.
     #[serde(default)]
     pub laboratory: Laboratory,
+    /// Whether each rig was also recorded on a night without its causes, as NAME.healthy.mcap.
+    #[serde(default)]
+    pub healthy: bool,
     /// Names of the cases; each has a recording NAME.mcap.
     pub cases: Vec<String>,
     /// SHA-256 of the file of answers.
@@ -30,6 +33,12 @@ pub struct Manifest {
 }
 
 impl Manifest {
+    /// What tells its score from that of other cases.
+    pub fn title(&self) -> String {
+        let beside = if self.healthy { ", beside a healthy recording" } else { "" };
+        format!("{}{beside}", self.laboratory.name())
+    }
+
     /// Reads a manifest.
     ///
     /// # Errors

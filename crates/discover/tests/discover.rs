@@ -42,6 +42,7 @@ fn ask(rig: &Rig, seed: u64) -> Diagnosed {
         experiments: Vec::new(),
         recording: &recording,
         declared: declared(),
+        healthy: None,
         model: Model::nominal(),
         effects: candidates.iter().map(|id| mapper_effects::find(id).unwrap()).collect(),
         calibration: Calibration::shipped().unwrap(),

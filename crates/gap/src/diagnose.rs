@@ -9,6 +9,8 @@ use crate::calibration::Calibration;
 use crate::experiment::Experiment;
 use crate::fit::{Effort, Fit, fit};
 use crate::folds::Folds;
+pub use crate::gap_error::GapError;
+use crate::healthy::Healthy;
 use crate::how_far::{Compared, how_far};
 use crate::late::late;
 use crate::more::extend;
@@ -19,7 +21,7 @@ use crate::report::{Diagnosis, Verdict};
 use crate::select::{Search, does_something, keep_best, refit, search};
 use crate::selection::Selection;
 use crate::smallest_seen::smallest_seen;
-use crate::study::{Hypothesis, PredictError, Prediction, Study, members};
+use crate::study::{Hypothesis, Prediction, Study, members};
 use crate::usable::usable;
 pub use crate::weigh::prior;
 use crate::weigh::{by_weight, rivals, suspicions, weigh, weight};
@@ -33,23 +35,14 @@ use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
 use std::sync::Arc;
 
-/// Why a recording cannot be diagnosed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum GapError {
-    /// The recording does not fit the campaign, or lacks what is needed.
-    #[error(transparent)]
-    Recording(#[from] Problem),
-    /// The nominal model cannot follow.
-    #[error("the nominal model cannot follow this recording: {0}; is it of this machine?")]
-    Predict(#[from] PredictError),
-}
-
 /// What a diagnosis starts from.
 pub struct Question<'a> {
     /// What was recorded.
     pub recording: &'a Recording,
     /// What is declared.
     pub declared: Declared,
+    /// A recording of the same rig and steps in which nothing was wrong: what is asked then is what changed since.
+    pub healthy: Option<Healthy<'a>>,
     /// The nominal machine.
     pub model: Model,
     /// Candidate effects.
@@ -108,6 +101,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     let Question {
         recording,
         declared,
+        healthy,
         model,
         effects,
         tolerances_declared,
@@ -124,7 +118,16 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     } else {
         Actuators::undeclared(&table, recording, &declared)
     };
+    let (nominal, mut since) = (model.clone(), None);
     let mut study = Study::with_actuators(recording, table, declared, model, effects, actuators);
+    if let Some(healthy) = healthy {
+        progress(0.01, "the healthy recording");
+        let changed = study.since(healthy, nominal, tolerances_declared)?;
+        study = changed.study;
+        since = Some(changed.since);
+        let of_healthy = |warning: String| format!("the healthy recording: {warning}");
+        warnings.extend(changed.warnings.into_iter().map(of_healthy));
+    }
     if study.scatter_s > 0.0 {
         warnings.push(format!(
             "the times of the samples are off by {:.0} ms, as P3 tells where it jumps: readings that move count for as much less",
@@ -270,6 +273,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     progress(1.0, "done");
     let diagnosis = Diagnosis {
         verdict,
+        since,
         r#where,
         candidates: weighed.candidates,
         probability_none: weighed.none,

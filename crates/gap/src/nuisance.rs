@@ -57,8 +57,18 @@ impl std::fmt::Display for NuisanceKind {
 pub struct Nuisance {
     /// What.
     pub kind: NuisanceKind,
+    /// Where it is if nothing is known of this recording, in the unit of what it changes: 0 for the nominal rig, what an earlier
+    /// recording says of this one otherwise.
+    pub centre: f64,
     /// One sigma, in the unit of what it changes.
     pub sigma: f64,
+}
+
+impl Nuisance {
+    /// What stands in the rig, so many sigmas from the centre.
+    pub fn value(&self, sigmas: f64) -> f64 {
+        self.centre + sigmas * self.sigma
+    }
 }
 
 /// The gas behind a turbine swirls and is not mixed, and what the shaft gets is less than what the gas gives by what
@@ -91,7 +101,10 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     let sensors = DRIVERS.iter().chain(OUTPUTS.iter().filter(|channel| !DRIVERS.contains(channel)));
     all.extend(sensors.map(|channel| (K::Offset(*channel), declared.offset_sigma(*channel))));
     all.extend((0..OUTPUTS.len()).map(|i| (K::Delay(i), DELAY_SIGMA_S)));
-    all.into_iter().filter(|(_, sigma)| *sigma > 0.0).map(|(kind, sigma)| Nuisance { kind, sigma }).collect()
+    all.into_iter()
+        .filter(|(_, sigma)| *sigma > 0.0)
+        .map(|(kind, sigma)| Nuisance { kind, centre: 0.0, sigma })
+        .collect()
 }
 
 /// What is not part of a rig but of how it is driven.

@@ -110,6 +110,7 @@ fn imagined(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Optio
     let driven = |t_s: &[f64]| experiment.driven(t_s, HOLD_S);
     let mut study = imagined_steps(like, steps, &jump.from, interval_s, driven)?;
     study.catalogue = recorded.catalogue;
+    study.nuisances.clone_from(&recorded.nuisances);
     Some(study)
 }
 

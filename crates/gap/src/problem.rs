@@ -63,4 +63,32 @@ pub enum Problem {
         /// Its command, Pa.
         commanded_pa: f64,
     },
+    /// The healthy recording has another number of steps.
+    #[error(
+        "the healthy recording has {healthy} step(s), the one under diagnosis {recorded}: only the same steps can be compared; record a healthy run of the same plan"
+    )]
+    OtherSteps {
+        /// In the healthy one.
+        healthy: usize,
+        /// In the one under diagnosis.
+        recorded: usize,
+    },
+    /// One of its steps is another one.
+    #[error(
+        "step {step} of the healthy recording is another one: {what} {healthy:.3} {unit}, where the recording under diagnosis has {recorded:.3} {unit} (more than {within:.3} apart); record a healthy run of the same plan"
+    )]
+    OtherStep {
+        /// Index of the step.
+        step: usize,
+        /// What differs.
+        what: &'static str,
+        /// In the healthy one.
+        healthy: f64,
+        /// In the one under diagnosis.
+        recorded: f64,
+        /// Unit of both.
+        unit: &'static str,
+        /// By how much they may differ.
+        within: f64,
+    },
 }

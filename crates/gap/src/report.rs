@@ -1,6 +1,7 @@
 //! What a diagnosis says, as machines read it.
 
 use crate::experiment::{Beside, Experiment};
+use crate::since::Since;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -23,6 +24,9 @@ pub enum Verdict {
 pub struct Diagnosis {
     /// The word on the whole.
     pub verdict: Verdict,
+    /// Where a healthy recording was given: all that is said is of what changed since.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub since: Option<Since>,
     /// Places of the gap, largest first.
     pub r#where: Vec<Place>,
     /// Causes, best first.

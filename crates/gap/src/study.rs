@@ -2,6 +2,7 @@
 
 use crate::actuators::Actuators;
 use crate::course::Course;
+pub use crate::hypothesis::{EffectValues, Hypothesis, members};
 use crate::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
 pub use crate::point_state::PointState;
 use crate::rest::{rested, with_metal_held};
@@ -23,6 +24,7 @@ use mapper_physics::effect::{Effect, EffectError, EffectParameter, Rig, add};
 use mapper_physics::inputs::Inputs;
 use mapper_physics::instruments::{ChannelFollower, true_value};
 use mapper_physics::model::{Model, Outputs, PreparedModel, State};
+use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// Values of one output in one step that have a common noise.
@@ -47,25 +49,6 @@ pub struct StudyStep {
     pub jumped: bool,
     /// Its blocks.
     pub blocks: Vec<Block>,
-}
-
-/// Effects with their values: indices into the candidates, and as many values as each has parameters.
-pub type EffectValues = Vec<(usize, Vec<f64>)>;
-
-/// A point in the space of everything that may be off.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Hypothesis {
-    /// Nuisances, in their sigmas.
-    pub nuisances: Vec<f64>,
-    /// Effects.
-    pub effects: EffectValues,
-}
-
-/// Names of a hypothesis' effects, by index, in order.
-pub fn members(hypothesis: &Hypothesis) -> Vec<usize> {
-    let mut members: Vec<usize> = hypothesis.effects.iter().map(|(index, _)| *index).collect();
-    members.sort_unstable();
-    members
 }
 
 /// What the model gives for a hypothesis.
@@ -125,7 +108,9 @@ pub struct Study {
     /// For each time, the place of its block: step and block; `None` at a jump.
     places: Vec<Option<(usize, usize)>>,
     /// Row of each output in each step's blocks.
-    rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>>,
+    pub(crate) rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>>,
+    /// For each group the noise of what was subtracted from its values, unit squared; nothing where nothing was.
+    pub(crate) noise_besides: Vec<DMatrix<f64>>,
 }
 
 /// The first step counts from this long before the first jump, s: before it nothing tells what a rig was doing, and
@@ -263,6 +248,7 @@ impl Study {
             times_s,
             places,
             rows,
+            noise_besides: Vec::new(),
         }
     }
 
@@ -287,7 +273,7 @@ impl Study {
             }
         }
         for (nuisance, sigmas) in self.nuisances.iter().zip(&hypothesis.nuisances) {
-            apply(nuisance.kind, sigmas * nuisance.sigma, &mut rig, &mut circumstances);
+            apply(nuisance.kind, nuisance.value(*sigmas), &mut rig, &mut circumstances);
         }
         if circumstances.shape != [0.0; SHAPES] {
             rig.model.map =

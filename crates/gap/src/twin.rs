@@ -88,7 +88,7 @@ impl Found {
         let covariance = fit.precision.clone().cholesky()?.inverse();
         let tolerance = |(nuisance, sigmas): (&crate::nuisance::Nuisance, &f64)| FoundTolerance {
             name: nuisance.kind.to_string(),
-            value: sigmas * nuisance.sigma,
+            value: nuisance.value(*sigmas),
             sigma: nuisance.sigma,
         };
         Some(Found {
@@ -137,7 +137,7 @@ impl Found {
                 covariance[(i, i)] = 1.0;
                 nuisances.push(0.0);
             } else {
-                nuisances.push(found.value / study.nuisances[i].sigma);
+                nuisances.push((found.value - study.nuisances[i].centre) / study.nuisances[i].sigma);
             }
         }
         Ok((Hypothesis { nuisances, effects }, covariance))

@@ -16,12 +16,33 @@ use std::sync::Arc;
 pub struct Linearised {
     /// Prediction without any deviation.
     pub base: Prediction,
-    /// One factor for each group.
-    factors: Arc<Vec<WhiteningFactor>>,
+    /// What is known of the noise.
+    noise: Noise,
     /// Whitened change for one sigma of each nuisance.
     pub columns: Vec<Vec<f64>>,
     /// Products of the columns, for each step.
     pub products: Vec<DMatrix<f64>>,
+}
+
+/// Noise of the values of each group.
+#[derive(Debug, Clone)]
+struct Noise {
+    covariances: Arc<Vec<DMatrix<f64>>>,
+    factors: Arc<Vec<WhiteningFactor>>,
+}
+
+impl Noise {
+    fn new(covariances: Vec<DMatrix<f64>>) -> Noise {
+        // Positive definite by construction; independent values of the same spread stand in should rounding say otherwise.
+        let factor = |covariance: &DMatrix<f64>| {
+            WhiteningFactor::new(covariance.clone()).unwrap_or_else(|| {
+                let (n, variance) = (covariance.nrows(), covariance.diagonal().mean());
+                WhiteningFactor::independent(n, variance.max(f64::MIN_POSITIVE).sqrt())
+            })
+        };
+        let factors = covariances.iter().map(factor).collect();
+        Noise { covariances: Arc::new(covariances), factors: Arc::new(factors) }
+    }
 }
 
 impl Linearised {
@@ -33,8 +54,8 @@ impl Linearised {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
         let changes = changes(study, &nothing, &base);
-        let factors = Arc::new(factors(study, &nothing, &base, &changes));
-        Ok(Linearised::with(study, base, changes, factors))
+        let noise = Noise::new(covariances(study, &nothing, &base, &changes));
+        Ok(Linearised::with(study, base, changes, noise))
     }
 
     /// Whitening by the noise of the outputs alone, without derivatives.
@@ -44,8 +65,8 @@ impl Linearised {
     pub fn of_noise_alone(study: &Study) -> Result<Linearised, PredictError> {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
-        let factors = Arc::new(factors(study, &nothing, &base, &[]));
-        Ok(Linearised { base, factors, columns: Vec::new(), products: Vec::new() })
+        let noise = Noise::new(covariances(study, &nothing, &base, &[]));
+        Ok(Linearised { base, noise, columns: Vec::new(), products: Vec::new() })
     }
 
     /// Linearised again at a hypothesis; the whitening stays.
@@ -55,16 +76,11 @@ impl Linearised {
     pub fn at(&self, study: &Study, hypothesis: &Hypothesis) -> Result<Linearised, PredictError> {
         let base = study.predict(hypothesis)?;
         let changes = changes(study, hypothesis, &base);
-        Ok(Linearised::with(study, base, changes, self.factors.clone()))
+        Ok(Linearised::with(study, base, changes, self.noise.clone()))
     }
 
-    fn with(
-        study: &Study,
-        base: Prediction,
-        mut columns: Vec<Vec<f64>>,
-        factors: Arc<Vec<WhiteningFactor>>,
-    ) -> Linearised {
-        let mut linearised = Linearised { base, factors, columns: Vec::new(), products: Vec::new() };
+    fn with(study: &Study, base: Prediction, mut columns: Vec<Vec<f64>>, noise: Noise) -> Linearised {
+        let mut linearised = Linearised { base, noise, columns: Vec::new(), products: Vec::new() };
         for column in &mut columns {
             linearised.whiten(study, column);
         }
@@ -76,14 +92,19 @@ impl Linearised {
 
     /// Whitens a vector in the residuals' layout, in place.
     pub fn whiten(&self, study: &Study, values: &mut [f64]) {
-        for (group, factor) in study.groups.iter().zip(self.factors.iter()) {
+        for (group, factor) in study.groups.iter().zip(self.noise.factors.iter()) {
             factor.whiten(&mut values[group.rows.clone()]);
         }
     }
 
+    /// Covariance of the values of one group by noise and by inputs that are not known better, unit squared.
+    pub(crate) fn covariance(&self, group: usize) -> &DMatrix<f64> {
+        &self.noise.covariances[group]
+    }
+
     /// Whitens values of one group, in place.
     pub fn whiten_group(&self, group: usize, values: &mut [f64]) {
-        self.factors[group].whiten(values);
+        self.noise.factors[group].whiten(values);
     }
 
     /// Whitened residual of a prediction.
@@ -170,12 +191,13 @@ fn surge_jumps(study: &Study, nothing: &Hypothesis) -> Vec<bool> {
     (0..study.steps.len()).map(|step| near(step) || (step > 0 && near(step - 1))).collect()
 }
 
-fn factors(
+/// Covariance of the values of each group.
+fn covariances(
     study: &Study,
     nothing: &Hypothesis,
     base: &Prediction,
     changes: &[Vec<f64>],
-) -> Vec<WhiteningFactor> {
+) -> Vec<DMatrix<f64>> {
     let surge_jumps = surge_jumps(study, nothing);
     // Response of every value to a unit of each input, from that of its offset.
     let responses: Vec<(InputNoise, &Vec<f64>, f64)> = DRIVERS
@@ -193,7 +215,8 @@ fn factors(
     study
         .groups
         .iter()
-        .map(|group| {
+        .enumerate()
+        .map(|(place, group)| {
             let blocks: Vec<_> =
                 group.blocks.iter().map(|i| study.steps[group.step].blocks[*i].clone()).collect();
             let times: Vec<&[f64]> =
@@ -232,9 +255,10 @@ fn factors(
                     }
                 }
             }
-            let n = covariance.nrows();
-            // Positive definite by construction; the identity stands in should rounding say otherwise.
-            WhiteningFactor::new(covariance).unwrap_or_else(|| WhiteningFactor::independent(n, sigma))
+            if let Some(more) = study.noise_besides.get(place) {
+                covariance += more;
+            }
+            covariance
         })
         .collect()
 }

@@ -40,6 +40,7 @@ fn ask(truth: (&str, f64), candidates: &[&str]) -> Diagnosed {
         experiments: Vec::new(),
         recording: &recording,
         declared: declared(),
+        healthy: None,
         model: Model::nominal(),
         effects,
         calibration: Calibration::shipped().unwrap(),

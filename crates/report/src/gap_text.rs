@@ -6,6 +6,7 @@ use mapper_core::with_unit;
 use mapper_gap::report::{
     Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Verdict, law_found,
 };
+use mapper_gap::since::Since;
 use std::collections::BTreeMap;
 
 /// Causes shown.
@@ -18,6 +19,9 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     let mut text = format!("{}\n", headline(diagnosis));
     if let Some(nearest) = nearest(diagnosis) {
         text += &format!("{nearest}\n");
+    }
+    if let Some(since) = &diagnosis.since {
+        text += &not_judged(since);
     }
     if diagnosis.verdict != Verdict::WithinTolerance {
         for sensor in &diagnosis.off_at_rest {
@@ -121,29 +125,52 @@ fn removed(law: &Law) -> String {
 /// One sentence: the most probable answer.
 pub fn headline(diagnosis: &Diagnosis) -> String {
     let first = diagnosis.candidates.first();
+    let since = diagnosis.since.as_ref().map(|since| since.recording.as_str());
+    let seen = since.map_or_else(|| "is seen".to_owned(), |since| format!("has changed since {since}"));
     match (diagnosis.verdict, first) {
         (Verdict::WithinTolerance, _) if !diagnosis.off_at_rest.is_empty() => format!(
-            "{}; with that subtracted nothing beyond the declared tolerances is seen",
+            "{}; with that subtracted nothing beyond the declared tolerances {seen}",
             diagnosis.off_at_rest.join(", ")
         ),
         (Verdict::WithinTolerance, Some(first)) if first.probability > diagnosis.probability_none => format!(
-            "nothing beyond the declared tolerances is seen for certain; {} is suspected ({:.0} %)",
+            "nothing beyond the declared tolerances {seen} for certain; {} is suspected ({:.0} %)",
             named(first),
             100.0 * first.probability
         ),
-        (Verdict::WithinTolerance, _) => "nothing beyond the declared tolerances is seen".to_owned(),
+        (Verdict::WithinTolerance, _) => format!("nothing beyond the declared tolerances {seen}"),
         (Verdict::Explained, Some(first)) => {
             let verb = if first.effects.len() == 1 { "explains" } else { "explain" };
-            format!("{} {verb} the gap", named(first))
+            let what =
+                since.map_or_else(|| "the gap".to_owned(), |since| format!("what changed since {since}"));
+            format!("{} {verb} {what}", named(first))
         }
         _ => {
+            let of = since.map_or_else(String::new, |since| format!(" of what changed since {since}"));
             let outside = format!(
-                "a cause outside the catalogue is the most probable ({:.1} %)",
+                "a cause outside the catalogue is the most probable{of} ({:.1} %)",
                 100.0 * diagnosis.probability_outside
             );
             law_found(diagnosis).map_or_else(|| outside.clone(), |law| format!("{outside}: {}", law.sentence))
         }
     }
+}
+
+/// What is in both recordings and not judged, where a healthy one was given.
+fn not_judged(since: &Since) -> String {
+    let lacking = since.lacking.iter().map(|(channel, lacking)| {
+        let (scale, unit) = in_people_s_unit(&lacking.unit);
+        format!("{channel} {}", with_unit(four_figures(scale * lacking.size), unit))
+    });
+    format!(
+        "what changed since {} alone is told; what the model lacked there already is not judged: {}\n",
+        since.recording,
+        lacking.collect::<Vec<_>>().join(", ")
+    )
+}
+
+/// Pascals are many.
+fn in_people_s_unit(unit: &str) -> (f64, &str) {
+    if unit == "Pa" { (1e-3, "kPa") } else { (1.0, unit) }
 }
 
 /// What of the catalogue comes nearest to a cause that is not in it.
@@ -212,7 +239,7 @@ fn carried_by(gap: &mapper_gap::report::Gap) -> String {
 fn how_far(diagnosis: &Diagnosis) -> String {
     let gap = &diagnosis.gap;
     if let Some(law) = law_found(diagnosis) {
-        return how_far_by(law, gap.folds.iter().map(Vec::len).sum());
+        return how_far_by(diagnosis, law, gap.folds.iter().map(Vec::len).sum());
     }
     let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
     let mut text = match gap.folds.len() {
@@ -233,7 +260,7 @@ fn how_far(diagnosis: &Diagnosis) -> String {
     } else if !gap.worse.is_empty() {
         text += &format!("  the gap does not shrink: {} gets worse\n", gap.worse.join(", "));
     }
-    text += &by_channel(&gap.channels, "with the cause", if named { 3 } else { 2 });
+    text += &by_channel(diagnosis, &gap.channels, "with the cause", if named { 3 } else { 2 });
     if named {
         text += &strained(gap);
         text += &points(&gap.points);
@@ -256,24 +283,30 @@ fn strained(gap: &Gap) -> String {
 const STANDS_IN: f64 = 0.5;
 
 /// How far with a law that no effect of the catalogue comes near.
-fn how_far_by(law: &Law, steps: usize) -> String {
+fn how_far_by(diagnosis: &Diagnosis, law: &Law, steps: usize) -> String {
     let seen = match law.held_out_steps {
         0 => "on the steps that were fitted: too few to hold any out".to_owned(),
         held => format!("on {held} of {steps} steps, used neither to find the law nor to fit it"),
     };
-    format!("\nhow far, {seen}\n  {}\n", removed(law)) + by_channel(&law.channels, "with the law", 3).as_str()
+    format!("\nhow far, {seen}\n  {}\n", removed(law))
+        + by_channel(diagnosis, &law.channels, "with the law", 3).as_str()
 }
 
 /// What is left of each channel in the first so many columns.
-fn by_channel(channels: &BTreeMap<String, ChannelGap>, with: &str, columns: usize) -> String {
+fn by_channel(
+    diagnosis: &Diagnosis,
+    channels: &BTreeMap<String, ChannelGap>,
+    with: &str,
+    columns: usize,
+) -> String {
     let mut text = format!("  {:4}", "");
-    for head in ["nominal", "tolerances fitted", with].iter().take(columns) {
+    let bare = if diagnosis.since.is_some() { "as healthy" } else { "nominal" };
+    for head in [bare, "tolerances fitted", with].iter().take(columns) {
         text += &format!(" {head:>18}");
     }
     text += "\n";
     for (channel, row) in channels {
-        // Pascals are many.
-        let (scale, unit) = if row.unit == "Pa" { (1e-3, "kPa") } else { (1.0, row.unit.as_str()) };
+        let (scale, unit) = in_people_s_unit(&row.unit);
         text += &format!("  {channel:4}");
         for value in [row.nominal, row.before, row.after].iter().take(columns) {
             text += &format!(" {:>18}", four_figures(scale * value));

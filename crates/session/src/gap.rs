@@ -16,6 +16,7 @@ use mapper_gap::adequacy::adequacy;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
 use mapper_gap::fit::{Effort, fit};
+use mapper_gap::healthy::Healthy;
 use mapper_gap::next::look_beside;
 use mapper_gap::outlook::Alike;
 use mapper_gap::problem::Problem;
@@ -56,7 +57,9 @@ impl Gap {
     /// [`SessionError::Json`]: none in practice.
     pub fn json(&self) -> Result<Value, SessionError> {
         let mut value = serde_json::to_value(&self.diagnosed.diagnosis)?;
-        value["found"] = json!(Found::of(&self.diagnosed));
+        // What the model lacks in both recordings is part of the rig and of no machine that could be written down.
+        let whole = self.diagnosed.diagnosis.since.is_none();
+        value["found"] = json!(whole.then(|| Found::of(&self.diagnosed)).flatten());
         value["drift"] = self.drift.as_ref().map_or(Value::Null, drift_json);
         value["zero"] = json!(self.zero);
         if !self.sensors.is_empty() {
@@ -92,6 +95,7 @@ impl Session<'_> {
         campaign: &Campaign,
         map: &ChannelMap,
         effects: Vec<Arc<dyn Effect>>,
+        healthy: Option<&Recorded>,
     ) -> Result<Gap, SessionError> {
         // Drift comes first: of the whole work it is about this share.
         let progress = |done_ratio: f64, what: &str| {
@@ -100,6 +104,7 @@ impl Session<'_> {
         progress(0.0, "drift");
         let Prepared { recording, declared, model, drift, doubted, sensors, zero, off_at_rest } =
             self.prepared_for_gap(recorded, campaign, map)?;
+        let before = healthy.map(|healthy| self.prepared_for_gap(healthy, campaign, map)).transpose()?;
         let between = |from: f64, to: f64| {
             move |done_ratio: f64, what: &str| progress(from + (to - from) * done_ratio, what)
         };
@@ -109,6 +114,11 @@ impl Session<'_> {
         let mut diagnosed = diagnose(Question {
             recording: &recording,
             declared,
+            healthy: before.as_ref().zip(healthy).map(|(before, healthy)| Healthy {
+                name: healthy.path.display().to_string(),
+                recording: &before.recording,
+                declared: before.declared.clone(),
+            }),
             tolerances_declared: campaign.tolerances_declared,
             experiments: experiments(self.registry, campaign, map, &model)?,
             model,

@@ -24,7 +24,7 @@ pub fn found_in(path: &Path) -> Result<Found, SessionError> {
     let diagnosis: Diagnosis = serde_json::from_str(&text_of(path)?)
         .map_err(|error| wrong(path, format!("not a diagnosis: {error}")))?;
     diagnosis.found.ok_or_else(|| {
-        wrong(path, "it does not hold what was found; make it with `mapper gap diagnose --json`".to_owned())
+        wrong(path, "it does not hold what was found; make it with `mapper gap diagnose --json`, of one recording and without --healthy".to_owned())
     })
 }
 

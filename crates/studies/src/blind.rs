@@ -116,8 +116,13 @@ impl Kind for Blind<'_> {
         // As anybody would diagnose it: from the file alone, which has no truth.
         let recorded = Recorded::read(self.0, &file, &ChannelMap::native(), Some(&campaign))?;
         let session = Session { stop: at.stop, ..Session::new(self.0) };
-        let gap =
-            session.diagnose_gap(&recorded, &campaign, &ChannelMap::native(), self.0.effects.clone())?;
+        let gap = session.diagnose_gap(
+            &recorded,
+            &campaign,
+            &ChannelMap::native(),
+            self.0.effects.clone(),
+            None,
+        )?;
         Ok(serde_json::to_string(&BlindPart { truth, diagnosis: gap.json()? })?)
     }
 
@@ -137,7 +142,7 @@ impl Kind for Blind<'_> {
         }
         let campaign = settings["campaign"].as_str().unwrap_or_default();
         let laboratory = Laboratory::deserialize(&settings["laboratory"]).unwrap_or_default();
-        seal(campaign, laboratory, &truths, out.directory()).map_err(FleetError::kind)?;
+        seal(campaign, laboratory, false, &truths, out.directory()).map_err(FleetError::kind)?;
         let scored = score(out.directory()).map_err(FleetError::kind)?;
         out.write("score.json", json_text(&scored).map_err(FleetError::kind)?.as_bytes())?;
         Ok(format!(

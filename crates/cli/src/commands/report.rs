@@ -66,7 +66,7 @@ fn diagnosed(
     let progress = manner::progress();
     let on_event = |event: &_| progress.show(event);
     let session = Session { on_event: &on_event, ..Session::new(registry) };
-    let gap = session.diagnose_gap(recorded, &campaign, map, effects);
+    let gap = session.diagnose_gap(recorded, &campaign, map, effects, None);
     progress.clear();
     Ok(gap?)
 }

@@ -51,8 +51,24 @@ pub fn record_of(rig: &Rig, visits: &Visits, seed: u64) -> Recording {
     record_late(rig, visits, seed, &[], 0.0)
 }
 
+/// The same rig, offsets and all, on another night: other noise.
+pub fn record_another_night(rig: &Rig, visits: &Visits, seed: u64, night_seed: u64) -> Recording {
+    recorded(rig, visits, [seed, night_seed], &[], 0.0)
+}
+
 /// The same of a run in real time: told each step so much late, s, its samples taken off their times by so much, one sigma.
 pub fn record_late(rig: &Rig, visits: &Visits, seed: u64, late_s: &[f64], scatter_s: f64) -> Recording {
+    recorded(rig, visits, [seed, seed], late_s, scatter_s)
+}
+
+/// Offsets by the first seed, noise by the second.
+fn recorded(
+    rig: &Rig,
+    visits: &Visits,
+    [seed, night_seed]: [u64; 2],
+    late_s: &[f64],
+    scatter_s: f64,
+) -> Recording {
     let Visits { speeds_rpm, dwell_s } = *visits;
     let nominal = Model::nominal();
     let p3_pa: Vec<f64> =
@@ -82,8 +98,12 @@ pub fn record_late(rig: &Rig, visits: &Visits, seed: u64, late_s: &[f64], scatte
     let guess = hold_speed(&nominal, speeds_rpm[0], &boundary()).unwrap().state;
     let start = mapper_physics::driven::settle(&rig.model, &at_rest, guess).unwrap();
     let mut random = Pcg64::seed_from_u64(seed);
+    let offsets: Vec<f64> =
+        SENSORS.iter().map(|(_, _, offset)| offset * random.sample::<f64, _>(StandardNormal)).collect();
+    if night_seed != seed {
+        random = Pcg64::seed_from_u64(night_seed);
+    }
     let mut normal = move || -> f64 { random.sample(StandardNormal) };
-    let offsets: Vec<f64> = SENSORS.iter().map(|(_, _, offset)| offset * normal()).collect();
     let mut followers: Vec<ChannelFollower> =
         SENSORS.iter().map(|(channel, ..)| ChannelFollower::new(*rig.instruments.path(*channel))).collect();
     let mut slow = vec![0.0; SENSORS.len()];

@@ -26,6 +26,9 @@ pub struct Diagnose {
     /// The same, by name
     #[arg(long = "recording", value_name = "FILE")]
     pub named: Vec<PathBuf>,
+    /// Recording of the same rig and steps, made while nothing was wrong: say what changed since, not what the model lacks
+    #[arg(long, value_name = "FILE")]
+    pub healthy: Option<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
     #[arg(long, value_name = "MAP")]
     pub channels: Option<PathBuf>,
@@ -57,14 +60,16 @@ impl Diagnose {
             let message = "--html and --laws are for one recording; give one with them";
             return Err(Failure::new(Code::BadInput, message));
         }
+        let read = |file: &PathBuf| Recorded::read(&registry, file, &map, Some(&campaign));
+        let healthy = self.healthy.as_ref().map(read).transpose()?;
         let mut gaps = Vec::with_capacity(recordings.len());
         for recording in recordings {
             let progress = manner::progress();
             progress.show(&SessionEvent::Progress { done_ratio: 0.0, what: "reading".to_owned() });
-            let recorded = Recorded::read(&registry, recording, &map, Some(&campaign))?;
+            let recorded = read(recording)?;
             let on_event = |event: &_| progress.show(event);
             let session = Session { on_event: &on_event, ..Session::new(&registry) };
-            let gap = session.diagnose_gap(&recorded, &campaign, &map, effects.clone())?;
+            let gap = session.diagnose_gap(&recorded, &campaign, &map, effects.clone(), healthy.as_ref())?;
             progress.clear();
             gaps.push((recorded.path.display().to_string(), gap));
         }

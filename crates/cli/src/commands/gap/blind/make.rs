@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::{manner, output, registry};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use mapper_blind::{CaseKind, Draw, Laboratory, OutsideUse};
 use serde_json::json;
 use std::path::PathBuf;
@@ -22,9 +22,9 @@ pub struct Make {
     /// Number of cases
     #[arg(long)]
     pub cases: usize,
-    /// Draw only cases of this kind; may be repeated
+    /// Draw only cases of this kind (none, single, pair, outside, triple); may be repeated
     #[arg(long = "kind", value_name = "KIND")]
-    kinds: Vec<BlindKind>,
+    kinds: Vec<CaseKind>,
     /// Minimum signature of a cause, in sigmas
     #[arg(long, value_name = "SIGMAS", default_value_t = mapper_blind::SIGMA_RANGE[0])]
     pub least_sigma: f64,
@@ -37,36 +37,12 @@ pub struct Make {
     /// Backend that makes the recordings: virtual_lab, or other_lab, whose structure no model of the catalogue has
     #[arg(long, value_name = "NAME", default_value = "virtual_lab")]
     laboratory: Laboratory,
+    /// Also record each rig on another night without its causes, for `run` to give to the diagnosis with --healthy
+    #[arg(long)]
+    healthy: bool,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
-}
-
-/// What a blind case is a case of.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum BlindKind {
-    /// Nothing beyond the declared tolerances.
-    None,
-    /// One effect of the catalogue.
-    Single,
-    /// Two effects of the catalogue.
-    Pair,
-    /// A cause outside the catalogue.
-    Outside,
-    /// Three effects of the catalogue.
-    Triple,
-}
-
-impl From<BlindKind> for CaseKind {
-    fn from(kind: BlindKind) -> Self {
-        match kind {
-            BlindKind::None => CaseKind::None,
-            BlindKind::Single => CaseKind::Single,
-            BlindKind::Pair => CaseKind::Pair,
-            BlindKind::Outside => CaseKind::Outside,
-            BlindKind::Triple => CaseKind::Triple,
-        }
-    }
 }
 
 impl Make {
@@ -75,8 +51,9 @@ impl Make {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let outside = if self.calibration { OutsideUse::Calibration } else { OutsideUse::Check };
         let draw = Draw {
-            kinds: self.kinds.iter().map(|kind| CaseKind::from(*kind)).collect(),
+            kinds: self.kinds.clone(),
             laboratory: self.laboratory,
+            healthy: self.healthy,
             sigma_range: [self.least_sigma, self.most_sigma],
             ..Draw::new(self.seed, self.cases, outside)
         };

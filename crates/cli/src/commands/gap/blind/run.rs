@@ -8,6 +8,7 @@ use mapper_blind::{MANIFEST_NAME, Manifest};
 use mapper_fleet::{Engine, cores};
 use mapper_session::write_new;
 use serde_json::json;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -38,7 +39,8 @@ impl Run {
         let engine = Engine { jobs: self.jobs, stop: &stop, told: &told };
         let names: Vec<&String> = manifest.cases.iter().filter(|name| !name.contains(['/', '\\'])).collect();
         let threads = (cores() / engine.at_a_time(names.len())).max(1);
-        let diagnosed = engine.each(&names, |_, name| self.diagnose(&program, name, threads));
+        let diagnosed =
+            engine.each(&names, |_, name| self.diagnose(&program, name, manifest.healthy, threads));
         progress.clear();
         let diagnosed: Vec<_> = diagnosed?.into_iter().collect::<Option<_>>().ok_or_else(|| {
             Failure::new(Code::Interrupted, "stopped by the operator; the same command goes on from there")
@@ -54,7 +56,13 @@ impl Run {
         Err(failure(format!("{} recordings were not diagnosed:\n{}", failed.len(), failed.join("\n"))))
     }
     /// Diagnoses one case where that is not done yet; `Err` within: what the diagnosis said.
-    fn diagnose(&self, program: &Path, name: &str, threads: usize) -> Result<Result<(), String>, Failure> {
+    fn diagnose(
+        &self,
+        program: &Path,
+        name: &str,
+        healthy: bool,
+        threads: usize,
+    ) -> Result<Result<(), String>, Failure> {
         let of_case = |ending: &str| self.directory.join(format!("{name}.{ending}"));
         let diagnosis = of_case("diagnosis.json");
         if diagnosis.exists() {
@@ -66,6 +74,12 @@ impl Run {
             .arg("--recording")
             .arg(of_case("mcap"))
             .arg("--json")
+            .args(
+                healthy
+                    .then(|| [OsString::from("--healthy"), of_case("healthy.mcap").into()])
+                    .into_iter()
+                    .flatten(),
+            )
             // Several at once: each keeps to its share of the cores.
             .env("RAYON_NUM_THREADS", threads.to_string())
             .stdin(Stdio::null())

@@ -35,9 +35,9 @@ impl Score {
             return output::print_json(&scored);
         }
         if let Some(other) = &self.beside {
-            let name = |of: &Path| Manifest::read(&of.join(MANIFEST_NAME)).map(|it| it.laboratory.name());
-            let heads = [name(&self.directory)?, name(other)?];
-            return output::print(&scored.beside(heads, &score(other)?));
+            let title = |of: &Path| Manifest::read(&of.join(MANIFEST_NAME)).map(|it| it.title());
+            let (this, that) = (title(&self.directory)?, title(other)?);
+            return output::print(&scored.beside([&this, &that], &score(other)?));
         }
         let mut text = scored.case_lines() + "\n";
         for (label, value) in scored.rows() {

@@ -1,0 +1,15 @@
+//! Why there is no diagnosis.
+
+use crate::problem::Problem;
+use crate::study::PredictError;
+
+/// Why a recording cannot be diagnosed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GapError {
+    /// The recording does not fit the campaign, or lacks what is needed.
+    #[error(transparent)]
+    Recording(#[from] Problem),
+    /// The nominal model cannot follow.
+    #[error("the nominal model cannot follow this recording: {0}; is it of this machine?")]
+    Predict(#[from] PredictError),
+}

@@ -1,0 +1,187 @@
+//! What changed since a recording of the same rig in which nothing was wrong.
+//!
+//! No model of a rig is right. What it lacks in structure is in every recording of that rig, and larger than most causes. A recording
+//! made while nothing was wrong tells it, block by block: its readings `m_h` less the model `f_h` with the tolerances `u_h` fitted to it. That
+//! is subtracted from the recording under diagnosis, `m - (m_h - f_h(u_h))`, whose noise becomes `C + C_h`: as it is, for
+//! smoothing it would ask for how it runs. Each recording is driven by its own inputs, so that other weather is no change.
+
+use crate::actuators::Actuators;
+use crate::another_machine::another_machine;
+use crate::errors_of_change::{covariance_of_errors, elsewhere, errors_of_change};
+use crate::first_step::is_start;
+use crate::fit::MOST_SIGMAS;
+use crate::gap_error::GapError;
+use crate::hypothesis::Hypothesis;
+use crate::normal::nuisance_products;
+use crate::nuisance::OUTPUTS;
+use crate::problem::Problem;
+use crate::same_steps::same_steps;
+use crate::selection::{Selection, dot_over};
+use crate::since::{Lacking, Since};
+use crate::study::{Group, PredictError, Study};
+use crate::usable::usable;
+use crate::whiten::{Linearised, dot};
+use mapper_core::{Channel, Recording};
+use mapper_observe::declared::Declared;
+use mapper_observe::table::Table;
+use mapper_observe::told::as_told;
+use mapper_physics::model::Model;
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+
+/// A recording of the same rig with the same steps, made while nothing was wrong.
+#[derive(Debug)]
+pub struct Healthy<'a> {
+    /// Its name for people.
+    pub name: String,
+    /// What was recorded.
+    pub recording: &'a Recording,
+    /// What is declared of it.
+    pub declared: Declared,
+}
+
+/// A study of what changed.
+pub(crate) struct Changed {
+    pub(crate) study: Study,
+    pub(crate) since: Since,
+    /// What to know of the healthy recording.
+    pub(crate) warnings: Vec<String>,
+}
+
+impl Study {
+    /// This recording as what changed since a healthy one.
+    ///
+    /// # Errors
+    /// [`GapError`] where the healthy recording cannot be used, or has other steps.
+    pub(crate) fn since(
+        self,
+        healthy: Healthy<'_>,
+        model: Model,
+        tolerances_declared: bool,
+    ) -> Result<Changed, GapError> {
+        let Healthy { name, recording, declared } = healthy;
+        let recording = &as_told(recording);
+        let table = Table::new(recording).ok_or(Problem::Empty)?;
+        let warnings = usable(recording, &table, &declared)?;
+        let actuators = if tolerances_declared {
+            Actuators::declared(&table, recording, &declared)
+        } else {
+            Actuators::undeclared(&table, recording, &declared)
+        };
+        let before = Study::with_actuators(recording, table, declared, model, Vec::new(), actuators);
+        same_steps(&before, &self)?;
+        let linearised = Linearised::new(&before)?;
+        another_machine(&before, &linearised.base.values)?;
+        let tolerances = tolerances(&before, &linearised)?;
+        let told = before.predict(&tolerances)?;
+        let lacking: Vec<f64> =
+            before.measured.iter().zip(&told.values).map(|(seen, told)| seen - told).collect();
+        let shares = errors_of_change(&before, &linearised, &lacking);
+        // What the healthy recording has no value for cannot be compared.
+        let partners = partners(&self, &before);
+        let mut study = self.with_rows(&partners.iter().map(Option::is_some).collect::<Vec<_>>());
+        let partners: Vec<usize> = partners.into_iter().flatten().collect();
+        for (measured, row) in study.measured.iter_mut().zip(&partners) {
+            *measured -= lacking[*row];
+        }
+        // From where they were tolerances may have moved by as much as is declared: sensors are mounted again.
+        for nuisance in &mut study.nuisances {
+            let was =
+                before.nuisances.iter().zip(&tolerances.nuisances).find(|(was, _)| was.kind == nuisance.kind);
+            if let Some((was, sigmas)) = was.filter(|_| !is_start(nuisance.kind)) {
+                nuisance.centre = was.value(*sigmas);
+            }
+        }
+        let unchanged = study.predict(&study.nothing())?;
+        let changed: Vec<f64> =
+            study.measured.iter().zip(&unchanged.values).map(|(seen, told)| seen - told).collect();
+        let elsewhere = elsewhere(&study, &changed);
+        let noise = study.groups.iter().map(|group| {
+            let rows = &partners[group.rows.clone()];
+            let blocks = &study.steps[group.step].blocks;
+            let since_jump_s: Vec<f64> =
+                group.blocks.iter().map(|block| blocks[*block].since_jump_s).collect();
+            let missed: Vec<f64> =
+                group.rows.clone().map(|row| shares[group.output] * changed[row]).collect();
+            let moved: Vec<f64> = rows.iter().map(|row| elsewhere[group.step] * lacking[*row]).collect();
+            let mut noise = covariance_of_errors(&since_jump_s, [&missed, &moved]);
+            let before_it =
+                before.groups.iter().position(|other| rows.iter().all(|row| other.rows.contains(row)));
+            if let Some(place) = before_it {
+                let (covariance, first) = (linearised.covariance(place), before.groups[place].rows.start);
+                noise += DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
+                    covariance[(rows[i] - first, rows[j] - first)]
+                });
+            }
+            noise
+        });
+        study.noise_besides = noise.collect();
+        let since = Since { recording: name, lacking: by_channel(&before, &lacking, &shares) };
+        Ok(Changed { study, since, warnings })
+    }
+}
+
+/// Iterations of the fit of the tolerances, which are small.
+const ITERATIONS: usize = 4;
+
+/// Tolerances of a healthy rig, fitted with the noise that its misfit asks for: what no tolerance explains must not strain them.
+fn tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, PredictError> {
+    let everywhere = Selection::all(study);
+    let products = nuisance_products(study, linearised, &everywhere);
+    let rows = everywhere.rows(study);
+    let (mut best, mut residual) = (study.nothing(), linearised.residual(study, &linearised.base));
+    let n = best.nuisances.len();
+    for _ in 0..ITERATIONS {
+        let excess = (dot(&residual, &residual) / residual.len().max(1) as f64).max(1.0);
+        let matrix = &products + DMatrix::identity(n, n) * excess;
+        let right = DVector::from_fn(n, |i, _| {
+            dot_over(&rows, &linearised.columns[i], &residual) - excess * best.nuisances[i]
+        });
+        let Some(step) = matrix.cholesky().map(|cholesky| cholesky.solve(&right)) else { break };
+        let mut moved = best.clone();
+        for (sigmas, by) in moved.nuisances.iter_mut().zip(step.iter()) {
+            *sigmas = (*sigmas + by).clamp(-MOST_SIGMAS, MOST_SIGMAS);
+        }
+        let there = linearised.residual_of(study, &moved)?;
+        let cost = |residual: &[f64], at: &Hypothesis| {
+            dot(residual, residual) / excess + dot(&at.nuisances, &at.nuisances)
+        };
+        if cost(&there, &moved) >= cost(&residual, &best) {
+            break;
+        }
+        (best, residual) = (moved, there);
+    }
+    Ok(best)
+}
+
+/// What is lacking of each channel.
+fn by_channel(study: &Study, lacking: &[f64], shares: &[f64]) -> BTreeMap<String, Lacking> {
+    let of_output = |(output, channel): (usize, &Channel)| {
+        let groups = study.groups.iter().filter(|group| group.output == output);
+        let rows: Vec<usize> = groups.flat_map(|group| group.rows.clone()).collect();
+        let squares: f64 = rows.iter().map(|row| lacking[*row].powi(2)).sum();
+        let size = (squares / rows.len().max(1) as f64).sqrt();
+        let lacking = Lacking { size, unit: channel.unit().to_owned(), share: shares[output] };
+        (!rows.is_empty()).then(|| (channel.symbol().to_owned(), lacking))
+    };
+    OUTPUTS.iter().enumerate().filter_map(of_output).collect()
+}
+
+/// For each row of a study the row of the other at the same place.
+fn partners(study: &Study, other: &Study) -> Vec<Option<usize>> {
+    let mut partners = vec![None; study.measured.len()];
+    for group in &study.groups {
+        let same = |candidate: &&Group| candidate.step == group.step && candidate.output == group.output;
+        let Some(there) = other.groups.iter().find(same) else { continue };
+        for (row, block) in group.rows.clone().zip(&group.blocks) {
+            let block = &study.steps[group.step].blocks[*block];
+            let close_s = block.spread_s.max(0.5 * study.table.interval_s);
+            let found = there.rows.clone().zip(&there.blocks).find(|(_, candidate)| {
+                let candidate = &other.steps[group.step].blocks[**candidate];
+                (candidate.since_jump_s - block.since_jump_s).abs() < close_s
+            });
+            partners[row] = found.map(|(row, _)| row);
+        }
+    }
+    partners
+}

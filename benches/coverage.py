@@ -157,16 +157,16 @@ def main():
     text += f"\n\n`joint` is worse than `dynamic` (medians) by more than 0.2 points in {plain:.1f} % of the recordings, and by more than the standard\n"
     text += f"error that it gives itself in {stated:.1f} %: its noise and offsets, which the two methods take up differently.\n"
     if arguments.write:
-        Path(arguments.write).write_text(PAGE.format(table=text, campaigns=len(campaigns)))
+        Path(arguments.write).write_text(PAGE.format(table=text, campaigns=len(campaigns), first=arguments.first))
     print(text, file=sys.stderr if arguments.write else sys.stdout)
 
 
 PAGE = """\
 # Intervals on machines that differ
 
-Generated; do not edit. The command, half an hour on two cores:
+Generated; do not edit. The command, some ten minutes on two cores:
 
-    python3 benches/coverage.py --mapper target/release/mapper --write docs/coverage.md
+    python3 benches/coverage.py --mapper target/release/mapper --campaigns {campaigns} --first {first} --write docs/coverage.md
 
 {campaigns} campaigns, each with a machine, a grid, tolerances, noise and offsets of its own: maps that fall by 0 to 8 points more
 towards low speed and drop more or less steeply at choke, housings 0.7 to 1.6 times as heavy, convection with exponents from 0.75
@@ -178,8 +178,8 @@ recordings as `joint`. Errors in points of efficiency; "held" is the share of 95
 The points of a recording share their offsets, and their intervals hold or miss together: a class is some {campaigns} / 8 draws
 of those, not as many as it has points.
 
-Where alpha_A is not declared, fewer of the good points hold than elsewhere: a recording cannot always tell 0.03 to 0.05 from
-none, and then what is declared is believed. No bound on what rests on declarations tells those recordings from the others.
+Where alpha_A is not declared a recording cannot always tell 0.03 to 0.05 from none; intervals hold both
+([decision 0052](decisions/0052-even-odds-of-alpha-a.md)).
 """
 
 

@@ -312,7 +312,7 @@ rms error, beside conventional mapping of the same machine.
 {table}
 
 Twenty seeds are twenty draws of what the points of a campaign share: that of h is the flow meter's gain alone, and its share held
-goes with the few seeds that draw it beyond two declared standard deviations. [coverage.md](coverage.md) has eight hundred draws.
+goes with the few seeds that draw it beyond two declared standard deviations. [coverage.md](coverage.md) has four hundred draws.
 
 The machines: turbo_a is the nominal one; the bent map loses 6 points more towards low speed, as 1/n^2; the other housing
 has a tenth of its area before the wheel, of which nothing is declared, is heavier, has another law of convection, and a map that drops

@@ -383,8 +383,9 @@ fn a_share_that_the_recording_can_not_tell_is_no_number() {
 /// Noise, offsets and a gain as declared, 8 campaigns of 18 points: the intervals of eta and of h hold, and are no wider
 /// than they have to be. What a campaign's points share is one draw for all of them, so 144 points count for some twenty.
 /// Of twenty at 95 % fewer than 16 hold in 0.3 % of the cases; of twenty at 68 % fewer than 7 or more than 18 in 0.3 % and
-/// 0.5 %; their root mean square is known to 16 %, of which three are allowed. `examples/joint_study.rs` has the hundreds
-/// of campaigns.
+/// 0.5 %; their root mean square is known to 16 %, of which three are allowed above a width of 1.4: the intervals also hold what a
+/// recording cannot exclude of alpha_A, the probe and the direction factor, none of which this machine has, and what all of h has
+/// in common are eight draws. `examples/joint_study.rs` has the hundreds of campaigns.
 #[test]
 fn intervals_of_a_campaign_with_noise_and_offsets_hold_and_are_not_too_wide() {
     let campaign = campaign(&eighteen(), 120.0, Machine::default());
@@ -406,6 +407,6 @@ fn intervals_of_a_campaign_with_noise_and_offsets_hold_and_are_not_too_wide() {
         let (held, within_one, width) = (honesty.held(), honesty.within_one(), honesty.width());
         assert!(held >= 0.8, "{name}: {held} hold");
         assert!((0.35..=0.92).contains(&within_one), "{name}: {within_one} within one standard error");
-        assert!((0.6..=1.6).contains(&width), "{name}: {width} as wide as the errors");
+        assert!((0.6..=2.1).contains(&width), "{name}: {width} as wide as the errors");
     }
 }

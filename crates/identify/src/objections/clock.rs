@@ -17,6 +17,8 @@ const SLOPE_S: f64 = 4.0;
 const BEFORE_S: f64 = 10.0;
 const AFTER_S: f64 = 45.0;
 const EVERY_S: f64 = 0.5;
+/// What a change looks at behind its moment, and a second for the jump to begin early, s.
+const AHEAD_S: f64 = SLOPE_S + 1.0;
 /// Lag behind the others from which on a channel is late, s: a probe of 4 mm and a shaft that runs up make 2 s.
 const LATE_S: f64 = 3.5;
 /// Jumps from which on they can be averaged, and the most that are.
@@ -36,7 +38,8 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let steps = &recording.steps;
     let jumps_s: Vec<f64> = (0..steps.len())
         .filter(|position| begins_with_jump(steps, *position))
-        .filter(|position| steps[*position].end_s - steps[*position].start_s > AFTER_S)
+        // The change at the last moment looks ahead, and must not see the next jump.
+        .filter(|position| steps[*position].end_s - steps[*position].start_s > AFTER_S + AHEAD_S)
         .map(|position| steps[position].start_s)
         .take(MOST)
         .collect();

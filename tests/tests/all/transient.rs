@@ -38,8 +38,11 @@ fn an_engine_is_asked_why() {
     let why = &transient(&["--fit-until", "13.2 s", "--json"]).exits(0).json()["why"];
     let causes = why["causes"].as_array().unwrap();
     let open = why["open"].as_u64().unwrap() as usize;
-    let slow =
-        |cause: &serde_json::Value| cause["effects"].as_array().unwrap().iter().any(|e| e == "tip_diameter");
+    // With a sheath or without, the probe is slow.
+    let slow = |cause: &serde_json::Value| {
+        let effects = cause["effects"].as_array().unwrap();
+        effects.iter().any(|effect| effect == "tip_diameter" || effect == "sheathed_probe")
+    };
     assert!(open > 0 && causes[..open].iter().all(slow), "{causes:?}");
     let held_out = &why["held_out"];
     assert!(held_out["phases"].as_array().unwrap().len() >= 3);

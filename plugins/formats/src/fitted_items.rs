@@ -64,31 +64,47 @@ pub(crate) fn add_eta(panel: &mut Panel, map: &CompressorMap, fitted: &FittedMap
     }
 }
 
-/// Flow, efficiency and its standard error along a line from its lowest measured efficiency towards choke to its smallest
-/// measured flow, where the curve ends between two nodes.
-fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<(f64, f64, f64)> {
+/// A place on a line's curve: flow, efficiency and its standard error.
+type OnCurve = (f64, f64, f64);
+
+/// The curve of a line between its largest and its smallest measured flow, where it ends between two nodes, and above its lowest
+/// efficiency: at choke the flow no longer tells how far it was measured.
+fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<OnCurve> {
     let points = || own.points.iter().filter(|point| point.eta.is_some());
-    let smallest_kg_s = points().map(|point| point.flow_corrected_kg_s).fold(f64::INFINITY, f64::min);
+    let flows = || points().map(|point| point.flow_corrected_kg_s);
+    let (smallest_kg_s, largest_kg_s) =
+        (flows().fold(f64::INFINITY, f64::min), flows().fold(f64::NEG_INFINITY, f64::max));
     let lowest =
         points().filter_map(|point| point.identified.eta_low.or(point.eta)).fold(f64::INFINITY, f64::min);
-    let values = |n: &FittedNode| (n.flow_corrected_kg_s, n.eta, n.eta_standard_error);
-    let mut drawn: Vec<(f64, f64, f64)> = Vec::new();
+    let mut drawn: Vec<OnCurve> = Vec::new();
+    let mut before: Option<OnCurve> = None;
     // From choke to surge.
-    for (flow_kg_s, eta, standard_error) in line.nodes.iter().map(values) {
-        if flow_kg_s >= smallest_kg_s {
-            if eta >= lowest || !drawn.is_empty() {
-                drawn.push((flow_kg_s, eta, standard_error));
-            }
-            continue;
+    for node in line.nodes.iter().map(|n| (n.flow_corrected_kg_s, n.eta, n.eta_standard_error)) {
+        let (flow_kg_s, eta, _) = node;
+        if flow_kg_s < smallest_kg_s {
+            drawn.extend(
+                before.filter(|_| !drawn.is_empty()).map(|before| at_flow(before, node, smallest_kg_s)),
+            );
+            break;
         }
-        if let Some(&(before_kg_s, before, error_before)) = drawn.last() {
-            let share = (before_kg_s - smallest_kg_s) / (before_kg_s - flow_kg_s);
-            let at = |a: f64, b: f64| a + share * (b - a);
-            drawn.push((smallest_kg_s, at(before, eta), at(error_before, standard_error)));
+        if flow_kg_s <= CHOKED_RATIO * largest_kg_s && (eta >= lowest || !drawn.is_empty()) {
+            let beyond = before.filter(|before| drawn.is_empty() && before.0 > CHOKED_RATIO * largest_kg_s);
+            drawn.extend(beyond.map(|before| at_flow(before, node, largest_kg_s)));
+            drawn.push(node);
         }
-        break;
+        before = Some(node);
     }
     drawn
+}
+
+/// Where a line is choked its flow differs by less than this from one measured point to the next.
+const CHOKED_RATIO: f64 = 1.01;
+
+/// The curve between two nodes at a flow between theirs.
+fn at_flow(a: OnCurve, b: OnCurve, flow_kg_s: f64) -> OnCurve {
+    let share = (a.0 - flow_kg_s) / (a.0 - b.0);
+    let at = |a: f64, b: f64| a + share * (b - a);
+    (flow_kg_s, at(a.1, b.1), at(a.2, b.2))
 }
 
 fn place(node: &FittedNode) -> (f64, f64) {

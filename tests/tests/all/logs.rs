@@ -17,6 +17,9 @@ impl Run {
         for (old, new) in [
             ("[90 krpm, 150 krpm, 50 krpm, 130 krpm, 70 krpm, 110 krpm]", "[90 krpm, 130 krpm]"),
             ("openings: [0.5, 0.7, 1.0]", "openings: [0.7, 1.0]"),
+            // Each jump by itself: a common fit of four points ends within its own tolerance only, not to the last digit of a log, and has
+            // a say in the first step, whose begin no jump tells.
+            ("method: joint ", "method: dynamic "),
         ] {
             assert_eq!(text.matches(old).count(), 1, "`{old}` in the campaign of the gap rig");
             text = text.replace(old, new);

@@ -4,16 +4,17 @@ use mapper_core::ReferenceState;
 use mapper_physics::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use std::sync::Arc;
 
-/// Places of the bumps over corrected speed, 100 krpm.
-const SPEEDS: [f64; 6] = [0.5, 0.7, 0.9, 1.1, 1.3, 1.5];
-/// Places of the bumps over the way from the surge line (0) to choke (1).
-const WAYS: [f64; 3] = [0.1, 0.4, 0.7];
-/// Widths of a bump.
+/// Bumps over corrected speed: how many, where the first lies and how wide each is and how far from the next, 100 krpm.
+const SPEEDS: usize = 6;
+const FIRST_SPEED: f64 = 0.5;
 const SPEED_WIDTH: f64 = 0.2;
+/// Bumps over the way from the surge line (0) to choke (1).
+const WAYS: usize = 3;
+const FIRST_WAY: f64 = 0.1;
 const WAY_WIDTH: f64 = 0.3;
 
 /// Number of basis functions.
-pub const SHAPES: usize = SPEEDS.len() * WAYS.len();
+pub const SHAPES: usize = SPEEDS * WAYS;
 
 /// What the declared size is divided by for one coefficient. The root mean square of all together would be 1.7: a
 /// deviation that lives in one corner of the map must not count as impossible.
@@ -34,14 +35,23 @@ fn basis(speed_corrected_rpm: f64, surge_position_ratio: f64) -> [f64; SHAPES] {
     let speed = speed_corrected_rpm / 100_000.0;
     let position = surge_position_ratio.clamp(0.0, 1.0);
     let way = (1.0 - position * position).sqrt();
-    // Beyond four widths a bump is below 4e-4: not worth an exponential.
-    let bump = |away: f64, width: f64| {
-        let widths = away / width;
-        if widths.abs() > 4.0 { 0.0 } else { (-0.5 * widths * widths).exp() }
-    };
-    let over_speed = SPEEDS.map(|at| bump(speed - at, SPEED_WIDTH));
-    let over_way = WAYS.map(|at| bump(way - at, WAY_WIDTH));
-    std::array::from_fn(|i| over_speed[i / WAYS.len()] * over_way[i % WAYS.len()])
+    let over_speed: [f64; SPEEDS] = bumps((speed - FIRST_SPEED) / SPEED_WIDTH);
+    let over_way: [f64; WAYS] = bumps((way - FIRST_WAY) / WAY_WIDTH);
+    std::array::from_fn(|i| over_speed[i / WAYS] * over_way[i % WAYS])
+}
+
+/// `exp(-(x - i)^2 / 2)` for i = 0, 1, ...: each from the one before by a ratio that falls by e, since exponentials are most of
+/// what a diagnosis computes.
+fn bumps<const N: usize>(widths_from_first: f64) -> [f64; N] {
+    // Further away all are nothing, and no ratio may overflow.
+    let x = widths_from_first.clamp(-20.0, 20.0);
+    let (mut bump, mut ratio) = ((-0.5 * x * x).exp(), (x - 0.5).exp());
+    std::array::from_fn(|_| {
+        let here = bump;
+        bump *= ratio;
+        ratio *= std::f64::consts::E.recip();
+        here
+    })
 }
 
 impl CompressorCharacteristic for ShapedMap {
@@ -76,5 +86,22 @@ impl CompressorCharacteristic for ShapedMap {
 
     fn fingerprint(&self) -> String {
         format!("{}, efficiency shaped by {:?}", self.inner.fingerprint(), self.coefficients)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bumps_are_gaussians_one_width_apart() {
+        for x in [-3.0, -0.4, 0.0, 1.3, 5.0, 8.5] {
+            for (i, bump) in bumps::<6>(x).into_iter().enumerate() {
+                let expected = f64::exp(-0.5 * (x - i as f64).powi(2));
+                // Some ten roundings.
+                assert!((bump - expected).abs() <= 1e-14 * expected, "{x} {i}: {bump:e} {expected:e}");
+            }
+        }
+        assert!(bumps::<6>(1e9).into_iter().all(|bump| bump < 1e-40));
     }
 }

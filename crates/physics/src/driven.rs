@@ -5,6 +5,7 @@
 //! moves; each step is one of [Rodas5P](crate::rosenbrock), which is L-stable, so that the outlet volume (milliseconds)
 //! does not limit it.
 
+use crate::characteristic::CharacteristicPoint;
 use crate::inputs::Inputs;
 use crate::model::{Model, Outputs, PreparedModel, State};
 use crate::params::BoundaryConditions;
@@ -152,6 +153,7 @@ where
             last_s: before_end_s,
             boundary_s: pair[0],
             prepared: model.prepare_at(inputs.time_s(pair[0]), &boundary),
+            on_map: None,
         };
         // The speed line has a corner on the surge line, with an infinite slope on one side: short steps across it.
         let fast = end_s - pair[0] < 0.11;
@@ -208,6 +210,9 @@ struct DrivenSystem<'a, I: Inputs> {
     /// Time for which the model is prepared.
     boundary_s: f64,
     prepared: PreparedModel<'a>,
+    /// First state asked for at that time, and what the map says there: most slopes are taken over states that move neither
+    /// speed nor pressure.
+    on_map: Option<(State, CharacteristicPoint)>,
 }
 
 impl<I: Inputs> DrivenSystem<'_, I> {
@@ -220,6 +225,20 @@ impl<I: Inputs> DrivenSystem<'_, I> {
         if t_s != self.boundary_s {
             self.prepared = self.model.prepare_at(self.inputs.time_s(t_s), &self.inputs.at(t_s));
             self.boundary_s = t_s;
+            self.on_map = None;
+        }
+    }
+
+    fn on_map(&mut self, state: &State) -> CharacteristicPoint {
+        let same = |at: &State| at.shaft_speed_rad_s == state.shaft_speed_rad_s && at.p2_pa == state.p2_pa;
+        match self.on_map {
+            Some((at, known)) if same(&at) => known,
+            Some(_) => self.prepared.on_map(state),
+            None => {
+                let asked = self.prepared.on_map(state);
+                self.on_map = Some((*state, asked));
+                asked
+            }
         }
     }
 }
@@ -228,7 +247,8 @@ impl<const N: usize, I: Inputs> OdeSystem<N> for DrivenSystem<'_, I> {
     fn rates(&mut self, t_s: f64, y: &[f64; N]) -> [f64; N] {
         self.prepare_for(t_s);
         let state = State::from_array(y);
-        let outputs = self.prepared.evaluate(&state);
+        let on_map = self.on_map(&state);
+        let outputs = self.prepared.evaluate_on_map(&state, on_map);
         self.prepared.derivatives(&state, &outputs)
     }
 

@@ -3,7 +3,7 @@
 use crate::bearing_friction::friction_power_w;
 use crate::boundary::BoundaryConditions;
 pub use crate::boundary::BoundaryError;
-use crate::characteristic::CompressorCharacteristic;
+use crate::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use crate::compression;
 use crate::hooks::{HookList, Hooks, Site};
 pub use crate::outputs::{Added, Outputs};
@@ -117,24 +117,35 @@ impl PreparedModel<'_> {
     /// Everything the model knows at `state`.
     #[inline]
     pub fn evaluate(&self, state: &State) -> Outputs {
+        self.evaluate_on_map(state, self.on_map(state))
+    }
+
+    /// What the map says at `state`: of the state it depends on shaft speed and outlet pressure alone.
+    #[inline]
+    pub(crate) fn on_map(&self, state: &State) -> CharacteristicPoint {
+        self.model.map.evaluate_scaled(
+            state.shaft_speed_rpm() * self.speed_correction_ratio,
+            state.p2_pa / self.boundary.p1_pa,
+            self.model.params.compressor.flow_scale_ratio,
+        )
+    }
+
+    /// As [`PreparedModel::evaluate`] where it is known what the map says there.
+    #[inline]
+    pub(crate) fn evaluate_on_map(&self, state: &State, on_map: CharacteristicPoint) -> Outputs {
         // Two bodies from one text: a model without hooks must not pay for looking.
         if self.model.hooks.is_empty() {
-            self.evaluate_with::<false>(state)
+            self.evaluate_with::<false>(state, on_map)
         } else {
-            self.evaluate_with::<true>(state)
+            self.evaluate_with::<true>(state, on_map)
         }
     }
 
     #[inline]
-    fn evaluate_with<const HOOKED: bool>(&self, state: &State) -> Outputs {
+    fn evaluate_with<const HOOKED: bool>(&self, state: &State, on_map: CharacteristicPoint) -> Outputs {
         let (params, boundary, hooks) = (&self.model.params, &self.boundary, &self.model.hooks);
         let compressor = &params.compressor;
         let pressure_ratio = state.p2_pa / boundary.p1_pa;
-        let on_map = self.model.map.evaluate_scaled(
-            state.shaft_speed_rpm() * self.speed_correction_ratio,
-            pressure_ratio,
-            compressor.flow_scale_ratio,
-        );
         let flow_corrected_kg_s = on_map.flow_corrected_kg_s;
         let inner = self.model.has_inner_wall();
         let wall_k = if inner { state.inner_k } else { state.tc_k };

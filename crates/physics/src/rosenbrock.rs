@@ -123,8 +123,8 @@ where
         }
         let (t0_s, y0) = (self.t_s, self.y);
         let f0 = system.rates(t0_s, &y0);
-        let time_derivative = system.time_derivative(t0_s, &y0, &f0);
         let jacobian = self.jacobian(system, t0_s, &y0, &f0);
+        let time_derivative = system.time_derivative(t0_s, &y0, &f0);
         let left_s = end_s - t0_s;
         let mut h = if self.next_step_s > 0.0 { self.next_step_s } else { self.first_step_s(&y0, &f0) };
         let mut rejected = false;
@@ -174,8 +174,8 @@ where
     ) -> Result<Step<N>, IntegrationError> {
         let (t0_s, y0) = (self.t_s, self.y);
         let f0 = system.rates(t0_s, &y0);
-        let time_derivative = system.time_derivative(t0_s, &y0, &f0);
         let jacobian = self.jacobian(system, t0_s, &y0, &f0);
+        let time_derivative = system.time_derivative(t0_s, &y0, &f0);
         let failed = IntegrationError::StepTooSmall { t_s: t0_s, step_s: end_s - t0_s };
         let stages =
             self.stages(system, &jacobian, &f0, time_derivative.as_ref(), end_s - t0_s).ok_or(failed)?;

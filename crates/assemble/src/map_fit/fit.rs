@@ -1,6 +1,7 @@
 //! The fit of a surface to a map, stiff enough that no lines cross.
 
 use super::MapFitError;
+use super::beyond::End;
 use super::crossing::crossings;
 use super::observations::Observations;
 use super::solution::Solution;
@@ -20,10 +21,10 @@ impl MapFit {
     /// # Errors
     /// [`MapFitError`] where there is too little, too much or nothing sensible to fit.
     pub fn new(map: &CompressorMap) -> Result<Self, MapFitError> {
-        MapFit::of(Observations::of(map)?, None)
+        Ok(MapFit::of(Observations::of(map)?, None)?.widened(&[End::Slow, End::Fast]))
     }
 
-    /// `near`: a fit of nearly the same points, from which the search may start.
+    /// As [`MapFit::new`] with errors beyond the measured speeds as the roughness says. `near`: a fit of nearly the same points, from which the search may start.
     pub(crate) fn of(data: Observations, near: Option<&Solution>) -> Result<Self, MapFitError> {
         let mut best: Option<(usize, MapFit)> = None;
         for stiffness in STIFFNESSES {

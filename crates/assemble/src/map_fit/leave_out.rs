@@ -1,5 +1,6 @@
 //! How well a line is predicted by the others.
 
+use super::beyond::End;
 use super::surface::MapFit;
 use mapper_core::LeftOutLine;
 use mapper_numerics::parallel;
@@ -12,14 +13,18 @@ use mapper_numerics::statistics::{NORMAL_975, median};
 /// does (docs/maps.md says how close), in a third of the rounds.
 pub fn leave_out(fit: &MapFit) -> Vec<LeftOutLine> {
     let count = fit.data.lines_rpm.len();
-    let one = |line: usize| left_out(fit, line, line == 0 || line + 1 == count);
+    let one = |line: usize| {
+        let end = if line == 0 { Some(End::Slow) } else { (line + 1 == count).then_some(End::Fast) };
+        left_out(fit, line, end)
+    };
     let lines: Vec<usize> = (0..count).collect();
     parallel::map(&lines, |line| one(*line)).into_iter().flatten().collect()
 }
 
-fn left_out(all: &MapFit, line: usize, outermost: bool) -> Option<LeftOutLine> {
+fn left_out(all: &MapFit, line: usize, end: Option<End>) -> Option<LeftOutLine> {
     let data = &all.data;
     let rest = MapFit::of(data.without(line).ok()?, Some(&all.solution)).ok()?;
+    let rest = rest.widened(end.as_slice());
     let (mut distances, mut errors) = (Vec::new(), Vec::new());
     let (mut distances_held, mut errors_held) = (0usize, 0usize);
     let [distance_rms, eta_rms] = rest.solution.rms;
@@ -44,7 +49,7 @@ fn left_out(all: &MapFit, line: usize, outermost: bool) -> Option<LeftOutLine> {
     let share = |held: usize, of: usize| (of > 0).then(|| held as f64 / of as f64);
     Some(LeftOutLine {
         speed_corrected_rpm: data.lines_rpm[line],
-        outermost,
+        outermost: end.is_some(),
         distance_held_ratio: share(distances_held, distances.len()),
         eta_held_ratio: share(errors_held, errors.len()),
         distance_ratio: median(&distances)?,

@@ -1,5 +1,6 @@
 //! A smooth surface through all speed lines together.
 
+mod beyond;
 mod common_errors;
 mod crossing;
 mod error;

@@ -1,5 +1,6 @@
 //! What a fit gives: parameters at any speed, with their covariance.
 
+use super::beyond::BothEnds;
 use super::line_shape::{FlowFrame, LineShape, PARAMETERS, Parameters, WORK};
 use super::problem::LINE_OFFSETS;
 use super::splines::Splines;
@@ -17,6 +18,8 @@ pub(crate) struct Solution {
     pub(super) covariance: DMatrix<f64>,
     /// One over the penalty: variance of the roughness.
     pub(super) roughness_variance: Parameters,
+    /// How much wider what is drawn on beyond the measured speeds is than its roughness says.
+    pub(super) beyond: BothEnds,
     /// Standard deviations of the line offsets, logarithms.
     pub line_scatter: [f64; 3],
     /// Scales of distance and efficiency that the residuals were weighed by.
@@ -43,7 +46,8 @@ impl Solution {
     }
 
     /// Covariance of the parameters at a speed: of the surface, of a line about it, and of what may happen between the
-    /// knots and beyond them.
+    /// knots and beyond them. There a trend may die away, as the surface's does, or go straight on, or anything between: a third
+    /// of the square of the difference, as of any value that is equally likely between two.
     pub(crate) fn covariance(&self, speed_ratio: f64) -> DMatrix<f64> {
         let (rows, knots) = (self.splines.rows(speed_ratio), self.splines.len());
         // The roughness was estimated on this many second differences: Student's quantile over the normal one, squared.
@@ -51,13 +55,18 @@ impl Solution {
         let few = student_quantile(0.975, freedom).map_or(1.0, |quantile| (quantile / NORMAL_975).powi(2));
         let open =
             (self.splines.shape.open_variance(speed_ratio), self.splines.work.open_variance(speed_ratio));
+        let beyond = self.beyond_at(speed_ratio);
+        let trends = [self.splines.shape.died_away(speed_ratio), self.splines.work.died_away(speed_ratio)];
         let mut out = DMatrix::zeros(PARAMETERS, PARAMETERS);
         for a in 0..PARAMETERS {
             for b in 0..PARAMETERS {
                 let block = self.covariance.view((a * knots, b * knots), (knots, knots));
                 out[(a, b)] = (rows.of(a).transpose() * block * rows.of(b))[(0, 0)];
             }
-            out[(a, a)] += if a < WORK { open.0 } else { open.1 } * self.roughness_variance[a] * few;
+            let (open, trend, widened) =
+                if a < WORK { (open.0, &trends[0], beyond.shape) } else { (open.1, &trends[1], beyond.work) };
+            let died_away = self.values.row(a).transpose().dot(trend);
+            out[(a, a)] += widened * (open * self.roughness_variance[a] * few + died_away * died_away / 3.0);
         }
         for (index, together) in LINE_OFFSETS.iter().enumerate() {
             for (a, b) in together.iter().flat_map(|a| together.iter().map(move |b| (*a, *b))) {

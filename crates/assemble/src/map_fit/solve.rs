@@ -1,6 +1,7 @@
 //! The rounds of a fit: steps of Levenberg and Marquardt, and between them the variances.
 
 use super::MapFitError;
+use super::beyond::BothEnds;
 use super::line_shape::{FlowFrame, Parameters, WORK};
 use super::observations::Observations;
 use super::precisions::{Precisions, ROUGHNESS_REACH};
@@ -166,6 +167,7 @@ fn solve_from(
         Unknowns { offsets: DMatrix::zeros(LINE_OFFSETS.len(), data.lines_rpm.len()), ..unknowns.clone() };
     let smooth_feet = problem.feet(&smooth, Some(&feet));
     Ok(Solution {
+        beyond: BothEnds::PLAIN,
         rms: problem.rms(&problem.residuals(&smooth_feet)),
         improbability,
         best_eta: smooth_feet.iter().map(|foot| foot.place.eta).fold(0.0, f64::max),

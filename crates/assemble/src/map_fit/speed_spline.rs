@@ -3,6 +3,7 @@
 //! Source: P. J. Green, B. W. Silverman, Nonparametric Regression and Generalized Linear Models (1994), ch. 2: values
 //! at the knots as parameters, `g'' = R^-1 Q' g`, integral of `g''^2` equal to `g' K g` with `K = Q R^-1 Q'`.
 
+use super::beyond::End;
 use nalgebra::{DMatrix, DVector};
 
 /// Length over which the slope beyond the outermost knots dies away, as a share of the nominal speed (or its inverse),
@@ -84,18 +85,10 @@ impl SpeedSpline {
             row[0] = 1.0;
             return row;
         }
-        let outside = self.outside(speed_ratio);
-        if outside > 0.0 {
-            let damping = DAMPING.min(0.5 * (x[n - 1] - x[0]));
-            let reach = damping * (1.0 - (-outside / damping).exp());
-            let (end, inner) = if at < x[0] { (0, 1) } else { (n - 1, n - 2) };
-            let h = (x[end] - x[inner]).abs();
-            row[end] = 1.0 + reach / h;
-            row[inner] = -reach / h;
-            // Slope at the end: the secant's, corrected by the curvature at the inner knot.
-            for k in 0..n {
-                row[k] += reach * h / 6.0 * self.second[(inner, k)];
-            }
+        if self.outside(speed_ratio) > 0.0 {
+            let (reach, _) = self.reach(speed_ratio);
+            row = self.end_slope(at) * reach;
+            row[if at < x[0] { 0 } else { n - 1 }] += 1.0;
             return row;
         }
         let i = x.partition_point(|knot| *knot <= at).clamp(1, n - 1) - 1;
@@ -108,6 +101,36 @@ impl SpeedSpline {
                 * ((a * a * a - a) * self.second[(i, k)] + (b * b * b - b) * self.second[(i + 1, k)]);
         }
         row
+    }
+
+    /// How far the slope at the end goes on beyond the knots before it has died away, and how much further the speed lies, both in
+    /// the coordinate.
+    fn reach(&self, speed_ratio: f64) -> (f64, f64) {
+        let (outside, x) = (self.outside(speed_ratio), &self.knots);
+        let damping = DAMPING.min(0.5 * (x[x.len() - 1] - x[0]));
+        let reach = if damping > 0.0 { damping * (1.0 - (-outside / damping).exp()) } else { 0.0 };
+        (reach, outside - reach)
+    }
+
+    /// Weights of the knot values that give the slope at the end nearest to a place outside, outwards: the secant's, corrected by
+    /// the curvature at the inner knot. At least two knots.
+    fn end_slope(&self, at: f64) -> DVector<f64> {
+        let (n, x) = (self.knots.len(), &self.knots);
+        let (end, inner) = if at < x[0] { (0, 1) } else { (n - 1, n - 2) };
+        let h = (x[end] - x[inner]).abs();
+        let mut row = self.second.row(inner).transpose() * (h / 6.0);
+        row[end] += 1.0 / h;
+        row[inner] -= 1.0 / h;
+        row
+    }
+
+    /// Weights of the knot values that give by how much more the value would change beyond the knots if the slope at the end
+    /// went straight on instead of dying away; zeros inside.
+    pub(crate) fn died_away(&self, speed_ratio: f64) -> DVector<f64> {
+        if self.knots.len() < 2 || self.outside(speed_ratio) == 0.0 {
+            return DVector::zeros(self.knots.len());
+        }
+        self.end_slope(self.coordinate.of(speed_ratio)) * self.reach(speed_ratio).1
     }
 
     /// Variance of the value at a speed where all knot values are known, for roughness (the variance that the penalty
@@ -125,6 +148,12 @@ impl SpeedSpline {
         // The precision of one value given all others stands on the diagonal.
         let precision = SpeedSpline::with_knots(self.coordinate, knots).penalty[(place, place)];
         if precision > 0.0 { 1.0 / precision } else { 0.0 }
+    }
+
+    /// Beyond which end of the knots a speed lies; `None` inside.
+    pub(crate) fn end_beyond(&self, speed_ratio: f64) -> Option<End> {
+        let slow = self.coordinate.of(speed_ratio) < self.knots[0];
+        (self.outside(speed_ratio) > 0.0).then_some(if slow { End::Slow } else { End::Fast })
     }
 
     /// How far a speed lies outside the knots, in the coordinate; 0 inside.
@@ -158,6 +187,9 @@ mod tests {
             prop_assert!((near - (0.3 + slope * (at + 1e-6))).abs() < 1e-9);
             let far = spline.row(at + 50.0).dot(&values);
             prop_assert!((far - (0.3 + slope * (at + DAMPING.min(0.5 * at)))).abs() < 1e-9);
+            // What has died away is the rest of the straight line.
+            let straight = far + spline.died_away(at + 50.0).dot(&values);
+            prop_assert!((straight - (0.3 + slope * (at + 50.0))).abs() < 1e-9);
         }
 
         /// A straight line through two knots, a third value in their middle at distance h: the curvature is spread over

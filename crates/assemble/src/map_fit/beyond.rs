@@ -1,0 +1,125 @@
+//! How much wider than its roughness says a fit's errors are beyond the measured speeds.
+//!
+//! Between lines the roughness of each parameter tells what a line may do that nobody measured. Beyond them it tells too
+//! little: whatever bends towards one end (choke flow at low speed, work at high Mach numbers) is smooth in the middle, where the
+//! roughness is found. So the outermost line is left out, and the variance of what is drawn on is widened until it explains how
+//! far that line lies from where the others put it. It is never narrowed: one line is no ground for more confidence.
+
+use super::observations::Observation;
+use super::solution::Solution;
+use super::surface::MapFit;
+
+/// Factors on the variance of what is drawn on beyond one end; 1 where the roughness says enough.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Beyond {
+    /// Of the shape of lines.
+    pub shape: f64,
+    /// Of work, and so of efficiency.
+    pub work: f64,
+}
+
+/// As the roughness says.
+const PLAIN: Beyond = Beyond { shape: 1.0, work: 1.0 };
+
+/// An end of the measured speeds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum End {
+    Slow,
+    Fast,
+}
+
+/// Factors of both ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct BothEnds {
+    pub slow: Beyond,
+    pub fast: Beyond,
+}
+
+impl BothEnds {
+    pub(crate) const PLAIN: BothEnds = BothEnds { slow: PLAIN, fast: PLAIN };
+
+    fn both(factors: Beyond) -> BothEnds {
+        BothEnds { slow: factors, fast: factors }
+    }
+}
+
+impl MapFit {
+    /// The fit with errors beyond its ends as wide as the outermost lines show.
+    pub(super) fn widened(mut self, ends: &[End]) -> MapFit {
+        for end in ends {
+            let line = match end {
+                End::Slow => 0,
+                End::Fast => self.data.lines_rpm.len() - 1,
+            };
+            let rest =
+                self.data.without(line).ok().and_then(|data| MapFit::of(data, Some(&self.solution)).ok());
+            let Some(rest) = rest else { continue };
+            let factors = shown_by(rest, self.data.points.iter().filter(|point| point.line == line));
+            match end {
+                End::Slow => self.solution.beyond.slow = factors,
+                End::Fast => self.solution.beyond.fast = factors,
+            }
+        }
+        self
+    }
+}
+
+/// The factors with which a fit's errors explain, on average over a line's points, how far these lie from it.
+fn shown_by<'a>(mut rest: MapFit, points: impl Iterator<Item = &'a Observation> + Clone) -> Beyond {
+    let [distance_rms, eta_rms] = rest.solution.rms;
+    let nominal_rpm = rest.data.nominal_speed_rpm;
+    // Squares of what is off, and of its standard error by a fit whose variance beyond the ends has these factors.
+    let mut sums = |shape: f64, work: f64| {
+        rest.solution.beyond = BothEnds::both(Beyond { shape, work });
+        let [mut distance, mut eta] = [Sums::default(); 2];
+        for point in points.clone() {
+            let (speed_rpm, scales) =
+                (point.speed_ratio * nominal_rpm, (point.flow_scale_kg_s, point.ratio_scale));
+            let place = rest.nearest(speed_rpm, point.flow_kg_s, point.pressure_ratio, scales.0, scales.1);
+            let known = place.distance_standard_error_ratio.hypot(distance_rms);
+            distance.take(place.distance_ratio, known);
+            if let Some(measured) = point.eta {
+                eta.take(
+                    measured - place.eta,
+                    place.eta_standard_error.hypot(eta_rms).hypot(point.eta_error),
+                );
+            }
+        }
+        (distance, eta)
+    };
+    let shape = factor(sums(0.0, 0.0).0, sums(1.0, 0.0).0);
+    let work = factor(sums(shape, 0.0).1, sums(shape, 1.0).1);
+    Beyond { shape, work }
+}
+
+/// Sums of squares over the points of a line.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    off: f64,
+    explained: f64,
+}
+
+impl Sums {
+    fn take(&mut self, off: f64, standard_error: f64) {
+        self.off += off * off;
+        self.explained += standard_error * standard_error;
+    }
+}
+
+/// The factor on what the variance beyond the ends adds that explains what is off, at least 1.
+fn factor(without: Sums, with: Sums) -> f64 {
+    let beyond = with.explained - without.explained;
+    let factor = (with.off - without.explained) / beyond;
+    if factor.is_finite() { factor.max(1.0) } else { 1.0 }
+}
+
+impl Solution {
+    /// Factors at a speed: those of the end beyond which it lies.
+    pub(super) fn beyond_at(&self, speed_ratio: f64) -> Beyond {
+        match self.splines.shape.end_beyond(speed_ratio) {
+            None => PLAIN,
+            Some(End::Slow) => self.beyond.slow,
+            Some(End::Fast) => self.beyond.fast,
+        }
+    }
+}

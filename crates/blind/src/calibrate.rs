@@ -204,10 +204,6 @@ fn errors_sigma(case: &Case, study: &Study, fit: &Fit) -> Vec<f64> {
 const QUIET: f64 = 0.985;
 /// Minimum threshold: odds of e^3 for the cause, whatever the effect-free cases say.
 const LEAST_THRESHOLD: f64 = 3.0;
-/// Weakest signature that temperature and logistic are fitted to, sigmas: an outside cause that can hardly be seen cannot be
-/// told from one inside, and would teach the logistic to doubt everything.
-const SEEN_SIGMA: f64 = 12.0;
-
 /// The calibration that fits what was observed, beside the one that ships.
 ///
 /// # Errors
@@ -216,15 +212,14 @@ pub fn fitted(observed: &[Observed], made_by: String) -> Result<Calibration, Bli
     Ok(fit(&shipped()?, observed, made_by))
 }
 
-/// The calibration that fits what was observed.
+/// The calibration that fits what was observed: all of it, weak signatures too. An outside cause that can hardly be seen is named as
+/// something of the catalogue, and how often that happens is what a probability has to say.
 pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {
     let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(Observed::margin);
     let quiet = quantile(margins, QUIET).map_or(before.threshold, |margin| margin.max(LEAST_THRESHOLD));
-    let seen = |o: &&Observed| o.sigma.is_none_or(|sigma| sigma >= SEEN_SIGMA);
-    let inside: Vec<&Observed> =
-        observed.iter().filter(|o| o.kind != CaseKind::Outside).filter(seen).collect();
+    let inside: Vec<&Observed> = observed.iter().filter(|o| o.kind != CaseKind::Outside).collect();
     let rows: Vec<([f64; 3], bool)> =
-        observed.iter().filter(seen).map(|o| (o.features, o.kind == CaseKind::Outside)).collect();
+        observed.iter().map(|o| (o.features, o.kind == CaseKind::Outside)).collect();
     let errors = observed.iter().flat_map(|o| &o.errors_sigma).map(|z| z.abs());
     Calibration {
         made_by,

@@ -93,17 +93,35 @@ impl Kind for Calibration<'_> {
             observed.extend(found);
         }
         let made_by = settings["made_by"].as_str().unwrap_or_default().to_owned();
-        let calibration = fitted(&observed, made_by).map_err(FleetError::kind)?;
-        let text = |value: Result<String, mapper_session::SessionError>| value.map_err(FleetError::kind);
-        out.write("calibration.json", text(json_text(&calibration))?.as_bytes())?;
-        out.write("observed.json", text(json_text(&observed))?.as_bytes())?;
-        let reliabilities = reliabilities(&observed).map_err(FleetError::kind)?;
-        out.write("reliability.json", text(json_text(&reliabilities))?.as_bytes())?;
-        out.write("reliability.svg", reliability_svg(&reliabilities).as_bytes())?;
-        Ok(format!(
-            "calibration.json from {} diagnoses in observed.json; reliability.svg\n{}",
-            observed.len(),
-            reliability_text(&reliabilities).trim_end()
-        ))
+        let (files, said) = calibrated(&observed, made_by)?;
+        for (name, text) in files {
+            out.write(name, text.as_bytes())?;
+        }
+        Ok(said)
     }
+}
+
+/// What is made of the cases: files by name, and what is said of them.
+///
+/// # Errors
+/// [`FleetError::Kind`] where the calibration that ships was spoilt.
+pub fn calibrated(
+    observed: &[Observed],
+    made_by: String,
+) -> Result<([(&'static str, String); 4], String), FleetError> {
+    let calibration = fitted(observed, made_by).map_err(FleetError::kind)?;
+    let reliabilities = reliabilities(observed).map_err(FleetError::kind)?;
+    let text = |value: Result<String, mapper_session::SessionError>| value.map_err(FleetError::kind);
+    let files = [
+        ("calibration.json", text(json_text(&calibration))?),
+        ("observed.json", text(json_text(&observed))?),
+        ("reliability.json", text(json_text(&reliabilities))?),
+        ("reliability.svg", reliability_svg(&reliabilities)),
+    ];
+    let said = format!(
+        "calibration.json from {} diagnoses in observed.json; reliability.svg\n{}",
+        observed.len(),
+        reliability_text(&reliabilities).trim_end()
+    );
+    Ok((files, said))
 }

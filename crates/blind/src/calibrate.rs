@@ -227,7 +227,7 @@ pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Cali
         temperature: temperature(&inside, before.temperature),
         // Never narrower than the fit says: a few cases are no ground for more confidence.
         interval_factor: quantile(errors, 0.95).map_or(before.interval_factor, |z| (z / NORMAL_975).max(1.0)),
-        outside: logistic(&rows, before.outside).unwrap_or(before.outside),
+        outside: logistic(&rows).unwrap_or(before.outside),
         ..before.clone()
     }
 }

@@ -68,14 +68,14 @@ pub fn discover(
     let nothing = Base::nothing(study, linearised);
     let mut bench = Bench { study: study.clone(), library };
     let mut found = found(&mut bench, &nothing, &training, &everywhere, &|fit| {
-        calibration.outside(adequacy(study, linearised, fit, 0.0).features()) < 0.5
+        adequacy(study, linearised, fit, 0.0).may_be_noise()
     });
     progress(0.4, "a law beside a cause");
     let left = found.as_ref().is_none_or(|found| !found.adequate);
     if left
         && diagnosed.diagnosis.verdict == Verdict::PartlyExplained
         && let Some(best) = diagnosed.fits.first()
-        && let Some(both) = beside(&mut bench, diagnosed, best, calibration, &training, &everywhere)
+        && let Some(both) = beside(&mut bench, diagnosed, best, &training, &everywhere)
     {
         let score = |found: &Found| found.fitted.first().map_or(f64::NEG_INFINITY, Candidate::score);
         let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + RARE_BESIDE);
@@ -137,16 +137,13 @@ fn beside(
     bench: &mut Bench,
     diagnosed: &Diagnosed,
     best: &Fit,
-    calibration: &Calibration,
     training: &Selection,
     everywhere: &Selection,
 ) -> Option<Found> {
     let Diagnosed { study, linearised, .. } = diagnosed;
     let there = linearised.at(study, &best.hypothesis).ok()?;
     let base = Base::beside(study, &there, best);
-    found(bench, &base, training, everywhere, &|fit| {
-        calibration.outside(adequacy(study, linearised, fit, 0.0).features()) < 0.5
-    })
+    found(bench, &base, training, everywhere, &|fit| adequacy(study, linearised, fit, 0.0).may_be_noise())
 }
 
 /// Searches the library from a base: in closed form, then by runs of the model.

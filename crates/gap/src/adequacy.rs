@@ -11,6 +11,11 @@ const BASIS_S: [f64; 4] = [5.0, 20.0, 60.0, 200.0];
 /// Directions in each group.
 pub const DIRECTIONS: usize = BASIS_S.len() + 1;
 
+/// Smooth misfit that noise leaves in one recording of a thousand, standard deviations, and what scatter from step to step counts
+/// beside it: it grows with the strength of an effect, also of one that is found.
+const NOISE_SIGMA: f64 = 3.3;
+const SCATTER_COUNTS: f64 = 0.25;
+
 /// What a fit leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adequacy {
@@ -28,6 +33,11 @@ pub struct Adequacy {
 }
 
 impl Adequacy {
+    /// Whether what is left may be noise and the imperfection of a fit, one more effect of the catalogue not considered.
+    pub fn may_be_noise(&self) -> bool {
+        self.smooth_sigma + SCATTER_COUNTS * self.scatter_sigma < NOISE_SIGMA
+    }
+
     /// What the probability of an outside cause is made of.
     pub fn features(&self) -> [f64; 3] {
         [self.smooth_sigma, self.scatter_sigma, self.one_more]

@@ -23,8 +23,7 @@ pub struct Calibration {
     pub prior_triple: f64,
     /// Widens the parameters' standard errors.
     pub interval_factor: f64,
-    /// Logistic of an outside cause: offset, and slopes of the smooth misfit's and the scatter's sigmas and of the gain
-    /// of one more effect.
+    /// Logistic of an outside cause: offset, and slopes of the [counted](counted) misfit, scatter and gain of one more effect.
     pub outside: [f64; 4],
 }
 
@@ -46,12 +45,18 @@ impl Calibration {
     /// Probability of an outside cause by what the best fit leaves.
     pub fn outside(&self, features: [f64; 3]) -> f64 {
         let [offset, slopes @ ..] = self.outside;
-        let x = offset + slopes.iter().zip(features).map(|(slope, x)| slope * squash(x)).sum::<f64>();
+        let x = offset + slopes.iter().zip(counted(features)).map(|(slope, x)| slope * x).sum::<f64>();
         1.0 / (1.0 + (-x).exp())
     }
 }
 
-/// What a feature counts as in the logistic: gross misfits are all alike.
-pub fn squash(feature: f64) -> f64 {
-    feature.clamp(-5.0, 100.0)
+/// Largest square of a misfit that counts, halved: gross misfits are all alike.
+const MOST: f64 = 500.0;
+
+/// What the features of an outside cause count as in its logistic. The smooth misfit by half its square, which is the logarithm of
+/// how unlikely noise makes it. The scatter from step to step and the gain of one more effect by their order of magnitude: they
+/// grow with the strength of a cause, also of one that is found, which the model's lines follow to a few per cent only.
+pub fn counted([smooth_sigma, scatter_sigma, one_more]: [f64; 3]) -> [f64; 3] {
+    let unlikely = 0.5 * smooth_sigma.max(0.0).powi(2);
+    [unlikely.min(MOST), scatter_sigma.max(0.0).asinh(), one_more.max(0.0).asinh()]
 }

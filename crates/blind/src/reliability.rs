@@ -48,10 +48,22 @@ pub struct Reliability {
     pub truth_not_listed: usize,
 }
 
+/// By how much the odds of nothing against a cause of the catalogue are larger among the cases than the priors say, logarithm. Cases
+/// without a cause are drawn in numbers for the threshold's sake; a probability is judged as of somebody who knows how many.
+fn odds_of_nothing(calibration: &Calibration, cases: &[Observed]) -> f64 {
+    let count = |wanted: fn(CaseKind) -> bool| cases.iter().filter(|case| wanted(case.kind)).count() as f64;
+    let nothing = count(|kind| kind == CaseKind::None);
+    let causes = count(|kind| !matches!(kind, CaseKind::None | CaseKind::Outside));
+    let prior_causes = calibration.prior_single + calibration.prior_pair + calibration.prior_triple;
+    let more = (nothing / causes).ln() - (calibration.prior_none / prior_causes).ln();
+    if more.is_finite() { more } else { 0.0 }
+}
+
 /// The first answer: its probability, and whether it is right. `None` without any score.
-fn first_answer(case: &Observed, calibration: &Calibration) -> Option<(f64, bool)> {
+fn first_answer(case: &Observed, calibration: &Calibration, odds_of_nothing: f64) -> Option<(f64, bool)> {
     let outside = calibration.outside(case.features);
-    let scores = || case.candidates.iter().map(|(_, score)| *score).chain([case.nothing]);
+    let nothing = case.nothing + odds_of_nothing;
+    let scores = || case.candidates.iter().map(|(_, score)| *score).chain([nothing]);
     let top = scores().reduce(f64::max)?;
     let weight = |score: f64| ((score - top) / calibration.temperature).exp();
     let total: f64 = scores().map(weight).sum();
@@ -70,7 +82,7 @@ fn first_answer(case: &Observed, calibration: &Calibration) -> Option<(f64, bool
     };
     let named = shown.into_iter().map(|(causes, probability)| (probability, is_right(causes)));
     named
-        .chain([(inside(case.nothing), case.kind == CaseKind::None), (outside, is_outside)])
+        .chain([(inside(nothing), case.kind == CaseKind::None), (outside, is_outside)])
         .filter(|(probability, _)| probability.is_finite())
         .max_by(|a, b| a.0.total_cmp(&b.0))
 }
@@ -130,7 +142,8 @@ pub fn reliabilities(observed: &[Observed]) -> Result<[Reliability; 2], BlindErr
 }
 
 fn beside(before: &Calibration, observed: &[Observed]) -> [Reliability; 2] {
-    let by = |calibration: &Calibration, case: &Observed| first_answer(case, calibration);
+    let odds = odds_of_nothing(before, observed);
+    let by = |calibration: &Calibration, case: &Observed| first_answer(case, calibration, odds);
     let shipped: Vec<(f64, bool)> = observed.iter().filter_map(|case| by(before, case)).collect();
     let mut held_out = Vec::new();
     for fold in 0..FOLDS {

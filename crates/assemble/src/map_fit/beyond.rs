@@ -5,43 +5,9 @@
 //! roughness is found. So the outermost line is left out, and the variance of what is drawn on is widened until it explains how
 //! far that line lies from where the others put it. It is never narrowed: one line is no ground for more confidence.
 
+use super::ends::{Beyond, BothEnds, End};
 use super::observations::Observation;
-use super::solution::Solution;
 use super::surface::MapFit;
-
-/// Factors on the variance of what is drawn on beyond one end; 1 where the roughness says enough.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Beyond {
-    /// Of the shape of lines.
-    pub shape: f64,
-    /// Of work, and so of efficiency.
-    pub work: f64,
-}
-
-/// As the roughness says.
-const PLAIN: Beyond = Beyond { shape: 1.0, work: 1.0 };
-
-/// An end of the measured speeds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum End {
-    Slow,
-    Fast,
-}
-
-/// Factors of both ends.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct BothEnds {
-    pub slow: Beyond,
-    pub fast: Beyond,
-}
-
-impl BothEnds {
-    pub(crate) const PLAIN: BothEnds = BothEnds { slow: PLAIN, fast: PLAIN };
-
-    fn both(factors: Beyond) -> BothEnds {
-        BothEnds { slow: factors, fast: factors }
-    }
-}
 
 impl MapFit {
     /// The fit with errors beyond its ends as wide as the outermost lines show.
@@ -111,15 +77,4 @@ fn factor(without: Sums, with: Sums) -> f64 {
     let beyond = with.explained - without.explained;
     let factor = (with.off - without.explained) / beyond;
     if factor.is_finite() { factor.max(1.0) } else { 1.0 }
-}
-
-impl Solution {
-    /// Factors at a speed: those of the end beyond which it lies.
-    pub(super) fn beyond_at(&self, speed_ratio: f64) -> Beyond {
-        match self.splines.shape.end_beyond(speed_ratio) {
-            None => PLAIN,
-            Some(End::Slow) => self.beyond.slow,
-            Some(End::Fast) => self.beyond.fast,
-        }
-    }
 }

@@ -1,8 +1,8 @@
 //! The fit of a surface to a map, stiff enough that no lines cross.
 
 use super::MapFitError;
-use super::beyond::End;
 use super::crossing::crossings;
+use super::ends::End;
 use super::observations::Observations;
 use super::solution::Solution;
 use super::solve::solve;

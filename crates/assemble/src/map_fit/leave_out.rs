@@ -1,6 +1,6 @@
 //! How well a line is predicted by the others.
 
-use super::beyond::End;
+use super::ends::End;
 use super::surface::MapFit;
 use mapper_core::LeftOutLine;
 use mapper_numerics::parallel;

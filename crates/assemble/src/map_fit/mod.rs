@@ -3,6 +3,7 @@
 mod beyond;
 mod common_errors;
 mod crossing;
+mod ends;
 mod error;
 mod fit;
 mod leave_out;

@@ -1,6 +1,6 @@
 //! What a fit gives: parameters at any speed, with their covariance.
 
-use super::beyond::BothEnds;
+use super::ends::{Beyond, BothEnds, End, PLAIN};
 use super::line_shape::{FlowFrame, LineShape, PARAMETERS, Parameters, WORK};
 use super::problem::LINE_OFFSETS;
 use super::splines::Splines;
@@ -43,6 +43,15 @@ impl Solution {
 
     pub(crate) fn shape(&self, speed_ratio: f64) -> LineShape {
         LineShape::new(&self.parameters(speed_ratio), self.frame)
+    }
+
+    /// Factors at a speed: those of the end beyond which it lies.
+    fn beyond_at(&self, speed_ratio: f64) -> Beyond {
+        match self.splines.shape.end_beyond(speed_ratio) {
+            None => PLAIN,
+            Some(End::Slow) => self.beyond.slow,
+            Some(End::Fast) => self.beyond.fast,
+        }
     }
 
     /// Covariance of the parameters at a speed: of the surface, of a line about it, and of what may happen between the

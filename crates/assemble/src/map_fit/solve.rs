@@ -1,7 +1,7 @@
 //! The rounds of a fit: steps of Levenberg and Marquardt, and between them the variances.
 
 use super::MapFitError;
-use super::beyond::BothEnds;
+use super::ends::BothEnds;
 use super::line_shape::{FlowFrame, Parameters, WORK};
 use super::observations::Observations;
 use super::precisions::{Precisions, ROUGHNESS_REACH};

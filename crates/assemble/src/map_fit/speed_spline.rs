@@ -3,7 +3,7 @@
 //! Source: P. J. Green, B. W. Silverman, Nonparametric Regression and Generalized Linear Models (1994), ch. 2: values
 //! at the knots as parameters, `g'' = R^-1 Q' g`, integral of `g''^2` equal to `g' K g` with `K = Q R^-1 Q'`.
 
-use super::beyond::End;
+use super::ends::End;
 use nalgebra::{DMatrix, DVector};
 
 /// Length over which the slope beyond the outermost knots dies away, as a share of the nominal speed (or its inverse),

@@ -5,7 +5,7 @@ use crate::case::{Case, Draw};
 use crate::error::BlindError;
 use crate::kind::CaseKind;
 use crate::lab::Schedule;
-use crate::logistic::logistic;
+use crate::logistic::{Row, logistic};
 use crate::outside::{OutsideUse, outside_kinds};
 use crate::ruler::{StudyRuler, declared};
 use mapper_campaign::{Campaign, nominal_model};
@@ -200,6 +200,19 @@ fn errors_sigma(case: &Case, study: &Study, fit: &Fit) -> Vec<f64> {
     errors
 }
 
+/// How much each case counts, 1 on average. Cases without a cause are drawn in numbers for the threshold's sake: all together they
+/// count as much as the prior of nothing says, so that what is fitted and judged is what a reader is told.
+pub(crate) fn weights(calibration: &Calibration, observed: &[Observed]) -> Vec<f64> {
+    let all = observed.len() as f64;
+    let nothing = observed.iter().filter(|o| o.kind == CaseKind::None).count() as f64;
+    if nothing == 0.0 || nothing == all {
+        return vec![1.0; observed.len()];
+    }
+    let (of_nothing, of_causes) =
+        (calibration.prior_none * all / nothing, (1.0 - calibration.prior_none) * all / (all - nothing));
+    observed.iter().map(|o| if o.kind == CaseKind::None { of_nothing } else { of_causes }).collect()
+}
+
 /// Share of the effect-free cases that stay below the threshold.
 const QUIET: f64 = 0.985;
 /// Minimum threshold: odds of e^3 for the cause, whatever the effect-free cases say.
@@ -217,9 +230,12 @@ pub fn fitted(observed: &[Observed], made_by: String) -> Result<Calibration, Bli
 pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {
     let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(Observed::margin);
     let quiet = quantile(margins, QUIET).map_or(before.threshold, |margin| margin.max(LEAST_THRESHOLD));
-    let inside: Vec<&Observed> = observed.iter().filter(|o| o.kind != CaseKind::Outside).collect();
-    let rows: Vec<([f64; 3], bool)> =
-        observed.iter().map(|o| (o.features, o.kind == CaseKind::Outside)).collect();
+    let weights = weights(before, observed);
+    let weighed = || observed.iter().zip(weights.iter().copied());
+    let inside: Vec<(&Observed, f64)> = weighed().filter(|(o, _)| o.kind != CaseKind::Outside).collect();
+    let rows: Vec<Row> = weighed()
+        .map(|(o, weight)| Row { features: o.features, outside: o.kind == CaseKind::Outside, weight })
+        .collect();
     let errors = observed.iter().flat_map(|o| &o.errors_sigma).map(|z| z.abs());
     Calibration {
         made_by,
@@ -238,12 +254,12 @@ const TEMPERATURE_SPREAD: f64 = 0.3;
 
 /// The temperature under which the truth of the cases has the largest probability, as far as they say otherwise than
 /// `before`.
-fn temperature(cases: &[&Observed], before: f64) -> f64 {
+fn temperature(cases: &[(&Observed, f64)], before: f64) -> f64 {
     let cost = |temperature: f64| -> f64 {
         let away = (temperature / before).ln() / TEMPERATURE_SPREAD;
         let misses: f64 = cases
             .iter()
-            .filter_map(|case| {
+            .filter_map(|(case, weight)| {
                 let truth = match case.kind {
                     CaseKind::None => Some(case.nothing),
                     _ => case.candidates.iter().find(|(names, _)| *names == case.causes).map(|(_, s)| *s),
@@ -251,7 +267,7 @@ fn temperature(cases: &[&Observed], before: f64) -> f64 {
                 let all = case.candidates.iter().map(|(_, score)| *score).chain([case.nothing]);
                 let top = all.clone().fold(f64::NEG_INFINITY, f64::max);
                 let sum: f64 = all.map(|score| ((score - top) / temperature).exp()).sum();
-                truth.map(|score| sum.ln() - (score - top) / temperature)
+                truth.map(|score| weight * (sum.ln() - (score - top) / temperature))
             })
             .sum();
         misses + 0.5 * away * away
@@ -285,9 +301,21 @@ mod tests {
         let mut cases: Vec<Observed> = (0..80).map(|_| observed(CaseKind::Single, 40.0, 36.0)).collect();
         cases.extend((0..20).map(|_| observed(CaseKind::Single, 36.0, 40.0)));
         let expected = 4.0 / 4f64.ln();
-        let found = temperature(&cases.iter().collect::<Vec<_>>(), expected);
+        let found = temperature(&cases.iter().map(|case| (case, 1.0)).collect::<Vec<_>>(), expected);
         // The grid's own steps are 6 %.
         assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected}");
+    }
+
+    /// 90 cases of nothing and 10 with a cause count as the priors say, and on average 1.
+    #[test]
+    fn cases_of_nothing_count_as_the_prior_says() {
+        let before = Calibration { prior_none: 0.3, ..Calibration::shipped().unwrap() };
+        let of = |kind, count| (0..count).map(move |_| observed(kind, 0.0, 0.0));
+        let cases: Vec<Observed> = of(CaseKind::None, 90).chain(of(CaseKind::Single, 10)).collect();
+        let found = weights(&before, &cases);
+        let [nothing, causes] = [&found[..90], &found[90..]].map(|part| part.iter().sum::<f64>());
+        assert!((nothing - 30.0).abs() < 1e-9 && (causes - 70.0).abs() < 1e-9, "{nothing} {causes}");
+        assert_eq!(weights(&before, &cases[90..]), vec![1.0; 10]);
     }
 
     #[test]

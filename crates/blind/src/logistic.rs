@@ -13,19 +13,26 @@ const PRIOR: f64 = 0.25;
 /// a few such cases would teach that a gross misfit means nothing.
 const LEAST: [f64; 3] = [0.5, 0.0, 0.0];
 
-/// Offset and slopes of the logistic that tells the rows marked `true` from the others. `None` where one of the classes is
-/// empty.
-pub(crate) fn logistic(rows: &[([f64; 3], bool)]) -> Option<[f64; 4]> {
-    if rows.iter().all(|(_, class)| *class) || rows.iter().all(|(_, class)| !*class) {
+/// A case.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    pub features: [f64; 3],
+    pub outside: bool,
+    /// How much it counts.
+    pub weight: f64,
+}
+
+/// Offset and slopes of the logistic that tells outside causes from the others. `None` where one of the classes is empty.
+pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 4]> {
+    if rows.iter().all(|row| row.outside) || rows.iter().all(|row| !row.outside) {
         return None;
     }
-    let rows: Vec<([f64; 3], bool)> =
-        rows.iter().map(|(features, class)| (counted(*features), *class)).collect();
+    let rows: Vec<Row> = rows.iter().map(|row| Row { features: counted(row.features), ..*row }).collect();
     let loss = |weights: &[f64; 4]| -> f64 {
         let away: f64 = weights[1..].iter().map(|slope| 0.5 * PRIOR * (slope - EXPECTED).powi(2)).sum();
-        let miss = |(features, class): &([f64; 3], bool)| {
-            let x = argument(weights, features);
-            if *class { (-x).exp().ln_1p() } else { x.exp().ln_1p() }
+        let miss = |row: &Row| {
+            let x = argument(weights, &row.features);
+            row.weight * if row.outside { (-x).exp().ln_1p() } else { x.exp().ln_1p() }
         };
         away + rows.iter().map(miss).sum::<f64>()
     };
@@ -61,24 +68,28 @@ fn argument(weights: &[f64; 4], features: &[f64; 3]) -> f64 {
 mod tests {
     use super::*;
 
+    fn row(features: [f64; 3], outside: bool) -> Row {
+        Row { features, outside, weight: 1.0 }
+    }
+
     /// Two classes told apart by the second feature alone, 2 and 20; the others say nothing.
     #[test]
     fn the_boundary_lies_between_the_classes() {
-        let rows: Vec<([f64; 3], bool)> = (0..80)
-            .map(|i| ([-1.0, if i % 2 == 0 { 2.0 } else { 20.0 }, f64::from(i / 2 % 3)], i % 2 == 1))
+        let rows: Vec<Row> = (0..80)
+            .map(|i| row([-1.0, if i % 2 == 0 { 2.0 } else { 20.0 }, f64::from(i / 2 % 3)], i % 2 == 1))
             .collect();
         let weights = logistic(&rows).unwrap();
         // Eighty cases against a weak prior: each class on its side with odds of e^2 at least.
         let at = |features| argument(&weights, &counted(features));
         assert!(at([-1.0, 2.0, 1.0]) < -2.0 && at([-1.0, 20.0, 1.0]) > 2.0);
-        assert!(logistic(&[([1.0; 3], true)]).is_none());
+        assert!(logistic(&[row([1.0; 3], true)]).is_none());
     }
 
     /// Cases that went astray do not teach that a gross misfit is nothing.
     #[test]
     fn a_gross_misfit_is_never_nothing() {
-        let rows: Vec<([f64; 3], bool)> =
-            (0..80).map(|i| ([if i % 8 == 0 { 1e4 } else { 0.0 }, 0.0, 3.0], i % 8 == 1)).collect();
+        let rows: Vec<Row> =
+            (0..80).map(|i| row([if i % 8 == 0 { 1e4 } else { 0.0 }, 0.0, 3.0], i % 8 == 1)).collect();
         let weights = logistic(&rows).unwrap();
         assert!(argument(&weights, &counted([20.0, 0.0, 3.0])) > 10.0, "{weights:?}");
     }

@@ -1,6 +1,6 @@
 //! Whether probabilities hold: what was said with probability p should be right in a share p of the cases.
 
-use crate::calibrate::{Observed, fit, shipped};
+use crate::calibrate::{Observed, fit, shipped, weights};
 use crate::error::BlindError;
 use crate::interval::{Share, clopper_pearson_95};
 use crate::kind::CaseKind;
@@ -22,14 +22,29 @@ pub struct Bin {
     pub from: f64,
     /// Highest probability of the class.
     pub to: f64,
+    /// Share of all cases, by how much they count.
+    pub share: f64,
     /// Mean of the probabilities that were given.
     pub said: f64,
-    /// How often the first answer was right.
+    /// How often the first answer was right, each case counting once.
     pub right: Share,
-    /// 95 % interval of the share that is right (Clopper and Pearson).
+    /// The share that is right, by how much the cases count.
+    pub right_share: f64,
+    /// 95 % interval of that share (Clopper and Pearson), as of [so many](Bin::effective_cases) equal cases.
     pub right_low: f64,
     /// Its other end.
     pub right_high: f64,
+    /// So many cases that count equally tell as much (Kish 1965): squared sum of the weights over the sum of their squares.
+    pub effective_cases: f64,
+}
+
+/// A first answer.
+#[derive(Debug, Clone, Copy)]
+struct Answer {
+    probability: f64,
+    right: bool,
+    /// How much the case counts.
+    weight: f64,
 }
 
 /// Reliability of the first answer, by one calibration.
@@ -48,22 +63,10 @@ pub struct Reliability {
     pub truth_not_listed: usize,
 }
 
-/// By how much the odds of nothing against a cause of the catalogue are larger among the cases than the priors say, logarithm. Cases
-/// without a cause are drawn in numbers for the threshold's sake; a probability is judged as of somebody who knows how many.
-fn odds_of_nothing(calibration: &Calibration, cases: &[Observed]) -> f64 {
-    let count = |wanted: fn(CaseKind) -> bool| cases.iter().filter(|case| wanted(case.kind)).count() as f64;
-    let nothing = count(|kind| kind == CaseKind::None);
-    let causes = count(|kind| !matches!(kind, CaseKind::None | CaseKind::Outside));
-    let prior_causes = calibration.prior_single + calibration.prior_pair + calibration.prior_triple;
-    let more = (nothing / causes).ln() - (calibration.prior_none / prior_causes).ln();
-    if more.is_finite() { more } else { 0.0 }
-}
-
 /// The first answer: its probability, and whether it is right. `None` without any score.
-fn first_answer(case: &Observed, calibration: &Calibration, odds_of_nothing: f64) -> Option<(f64, bool)> {
+fn first_answer(case: &Observed, calibration: &Calibration) -> Option<(f64, bool)> {
     let outside = calibration.outside(case.features);
-    let nothing = case.nothing + odds_of_nothing;
-    let scores = || case.candidates.iter().map(|(_, score)| *score).chain([nothing]);
+    let scores = || case.candidates.iter().map(|(_, score)| *score).chain([case.nothing]);
     let top = scores().reduce(f64::max)?;
     let weight = |score: f64| ((score - top) / calibration.temperature).exp();
     let total: f64 = scores().map(weight).sum();
@@ -82,7 +85,7 @@ fn first_answer(case: &Observed, calibration: &Calibration, odds_of_nothing: f64
     };
     let named = shown.into_iter().map(|(causes, probability)| (probability, is_right(causes)));
     named
-        .chain([(inside(nothing), case.kind == CaseKind::None), (outside, is_outside)])
+        .chain([(inside(case.nothing), case.kind == CaseKind::None), (outside, is_outside)])
         .filter(|(probability, _)| probability.is_finite())
         .max_by(|a, b| a.0.total_cmp(&b.0))
 }
@@ -94,34 +97,23 @@ fn is_listed(case: &Observed) -> bool {
 }
 
 /// Classes, and their expected calibration error.
-fn reliability(calibration: &str, cases: &[Observed], answers: &[(f64, bool)]) -> Reliability {
+fn reliability(calibration: &str, cases: &[Observed], answers: &[Answer]) -> Reliability {
+    let all: f64 = answers.iter().map(|answer| answer.weight).sum();
     let bins: Vec<Bin> = (0..BINS)
         .filter_map(|index| {
-            let inside = |p: f64| ((p * BINS as f64) as usize).min(BINS - 1) == index;
-            let members: Vec<(f64, bool)> = answers.iter().copied().filter(|(p, _)| inside(*p)).collect();
-            let trials = members.len();
-            let right = Share { hits: members.iter().filter(|(_, right)| *right).count(), trials };
-            let (right_low, right_high) = clopper_pearson_95(right);
-            let said = members.iter().map(|(p, _)| p).sum::<f64>() / trials as f64;
-            let edge = |index: usize| index as f64 / BINS as f64;
-            (trials > 0).then_some(Bin {
-                from: edge(index),
-                to: edge(index + 1),
-                said,
-                right,
-                right_low,
-                right_high,
-            })
+            let inside =
+                |answer: &&Answer| ((answer.probability * BINS as f64) as usize).min(BINS - 1) == index;
+            let members: Vec<&Answer> = answers.iter().filter(inside).collect();
+            bin(index, &members, all)
         })
         .collect();
-    let all = answers.len() as f64;
     let over = |error: &dyn Fn(&Bin) -> f64| {
-        (all > 0.0).then(|| bins.iter().map(|bin| bin.right.trials as f64 * error(bin)).sum::<f64>() / all)
+        (!bins.is_empty()).then(|| bins.iter().map(|bin| bin.share * error(bin)).sum::<f64>())
     };
-    let missed = |bin: &Bin| (bin.right.hits as f64 / bin.right.trials as f64 - bin.said).abs();
+    let missed = |bin: &Bin| (bin.right_share - bin.said).abs();
     // Mean absolute deviation of a share about its expectation, by the normal law: sqrt(2/pi) sigma.
     let by_chance = |bin: &Bin| {
-        (2.0 / std::f64::consts::PI * bin.said * (1.0 - bin.said) / bin.right.trials as f64).max(0.0).sqrt()
+        (2.0 / std::f64::consts::PI * bin.said * (1.0 - bin.said) / bin.effective_cases).max(0.0).sqrt()
     };
     Reliability {
         calibration: calibration.to_owned(),
@@ -132,7 +124,32 @@ fn reliability(calibration: &str, cases: &[Observed], answers: &[(f64, bool)]) -
     }
 }
 
-/// Reliability by the calibration that ships, which has seen none of the cases, and by the one that they fit, each case judged by
+/// A class; `None` without members. `all`: the sum of all weights.
+fn bin(index: usize, members: &[&Answer], all: f64) -> Option<Bin> {
+    let sum = |value: &dyn Fn(&Answer) -> f64| members.iter().map(|answer| value(answer)).sum::<f64>();
+    let weight = sum(&|answer| answer.weight);
+    let right_share = sum(&|answer| if answer.right { answer.weight } else { 0.0 }) / weight;
+    let effective_cases = weight * weight / sum(&|answer| answer.weight * answer.weight);
+    let equal = Share {
+        hits: (right_share * effective_cases).round() as usize,
+        trials: effective_cases.round() as usize,
+    };
+    let (right_low, right_high) = clopper_pearson_95(equal);
+    let edge = |index: usize| index as f64 / BINS as f64;
+    (!members.is_empty()).then_some(Bin {
+        from: edge(index),
+        to: edge(index + 1),
+        share: weight / all,
+        said: sum(&|answer| answer.weight * answer.probability) / weight,
+        right: Share { hits: members.iter().filter(|answer| answer.right).count(), trials: members.len() },
+        right_share,
+        right_low,
+        right_high,
+        effective_cases,
+    })
+}
+
+/// Reliability by the calibration that ships, which may have seen the cases, and by the one that they fit, each case judged by
 /// a fit to the others (five parts).
 ///
 /// # Errors
@@ -142,16 +159,19 @@ pub fn reliabilities(observed: &[Observed]) -> Result<[Reliability; 2], BlindErr
 }
 
 fn beside(before: &Calibration, observed: &[Observed]) -> [Reliability; 2] {
-    let odds = odds_of_nothing(before, observed);
-    let by = |calibration: &Calibration, case: &Observed| first_answer(case, calibration, odds);
-    let shipped: Vec<(f64, bool)> = observed.iter().filter_map(|case| by(before, case)).collect();
+    let weights = weights(before, observed);
+    let by = |calibration: &Calibration, (case, weight): (&Observed, f64)| {
+        first_answer(case, calibration).map(|(probability, right)| Answer { probability, right, weight })
+    };
+    let weighed: Vec<(&Observed, f64)> = observed.iter().zip(weights.iter().copied()).collect();
+    let shipped: Vec<Answer> = weighed.iter().filter_map(|case| by(before, *case)).collect();
     let mut held_out = Vec::new();
     for fold in 0..FOLDS {
-        let of_fold = |(index, _): &(usize, &Observed)| index % FOLDS == fold;
-        let (judged, fitted): (Vec<_>, Vec<_>) = observed.iter().enumerate().partition(of_fold);
-        let fitted: Vec<Observed> = fitted.into_iter().map(|(_, case)| case.clone()).collect();
+        let of_fold = |(index, _): &(usize, &(&Observed, f64))| index % FOLDS == fold;
+        let (judged, fitted): (Vec<_>, Vec<_>) = weighed.iter().enumerate().partition(of_fold);
+        let fitted: Vec<Observed> = fitted.into_iter().map(|(_, (case, _))| (*case).clone()).collect();
         let calibration = fit(before, &fitted, String::new());
-        held_out.extend(judged.iter().filter_map(|(_, case)| by(&calibration, case)));
+        held_out.extend(judged.iter().filter_map(|(_, case)| by(&calibration, **case)));
     }
     [
         reliability("that ships", observed, &shipped),

@@ -6,6 +6,7 @@
 //! far that line lies from where the others put it. It is never narrowed: one line is no ground for more confidence.
 
 use super::ends::{Beyond, BothEnds, End};
+use super::miss::Off;
 use super::observations::Observation;
 use super::surface::MapFit;
 
@@ -32,24 +33,14 @@ impl MapFit {
 
 /// The factors with which a fit's errors explain, on average over a line's points, how far these lie from it.
 fn shown_by<'a>(mut rest: MapFit, points: impl Iterator<Item = &'a Observation> + Clone) -> Beyond {
-    let [distance_rms, eta_rms] = rest.solution.rms;
-    let nominal_rpm = rest.data.nominal_speed_rpm;
     // Squares of what is off, and of its standard error by a fit whose variance beyond the ends has these factors.
     let mut sums = |shape: f64, work: f64| {
         rest.solution.beyond = BothEnds::both(Beyond { shape, work });
         let [mut distance, mut eta] = [Sums::default(); 2];
         for point in points.clone() {
-            let (speed_rpm, scales) =
-                (point.speed_ratio * nominal_rpm, (point.flow_scale_kg_s, point.ratio_scale));
-            let place = rest.nearest(speed_rpm, point.flow_kg_s, point.pressure_ratio, scales.0, scales.1);
-            let known = place.distance_standard_error_ratio.hypot(distance_rms);
-            distance.take(place.distance_ratio, known);
-            if let Some(measured) = point.eta {
-                eta.take(
-                    measured - place.eta,
-                    place.eta_standard_error.hypot(eta_rms).hypot(point.eta_error),
-                );
-            }
+            let miss = rest.miss(point);
+            distance.take(miss.distance);
+            miss.eta.into_iter().for_each(|off| eta.take(off));
         }
         (distance, eta)
     };
@@ -66,9 +57,9 @@ struct Sums {
 }
 
 impl Sums {
-    fn take(&mut self, off: f64, standard_error: f64) {
-        self.off += off * off;
-        self.explained += standard_error * standard_error;
+    fn take(&mut self, off: Off) {
+        self.off += off.by * off.by;
+        self.explained += off.standard_error * off.standard_error;
     }
 }
 

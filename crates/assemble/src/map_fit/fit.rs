@@ -24,7 +24,8 @@ impl MapFit {
         Ok(MapFit::of(Observations::of(map)?, None)?.widened(&[End::Slow, End::Fast]))
     }
 
-    /// As [`MapFit::new`] with errors beyond the measured speeds as the roughness says. `near`: a fit of nearly the same points, from which the search may start.
+    /// As [`MapFit::new`], with errors beyond the measured speeds as the roughness says. `near`: a fit of nearly the same points,
+    /// from which the search may start.
     pub(crate) fn of(data: Observations, near: Option<&Solution>) -> Result<Self, MapFitError> {
         let mut best: Option<(usize, MapFit)> = None;
         for stiffness in STIFFNESSES {

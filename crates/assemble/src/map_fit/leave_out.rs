@@ -1,6 +1,7 @@
 //! How well a line is predicted by the others.
 
 use super::ends::End;
+use super::miss::Off;
 use super::surface::MapFit;
 use mapper_core::LeftOutLine;
 use mapper_numerics::parallel;
@@ -27,23 +28,14 @@ fn left_out(all: &MapFit, line: usize, end: Option<End>) -> Option<LeftOutLine> 
     let rest = rest.widened(end.as_slice());
     let (mut distances, mut errors) = (Vec::new(), Vec::new());
     let (mut distances_held, mut errors_held) = (0usize, 0usize);
-    let [distance_rms, eta_rms] = rest.solution.rms;
-    let held = |off: f64, line: f64, point: f64| usize::from(off <= NORMAL_975 * line.hypot(point));
+    let held = |off: Off| usize::from(off.by <= NORMAL_975 * off.standard_error);
     for point in data.points.iter().filter(|point| point.line == line) {
-        let speed_rpm = point.speed_ratio * data.nominal_speed_rpm;
-        let place = rest.nearest(
-            speed_rpm,
-            point.flow_kg_s,
-            point.pressure_ratio,
-            point.flow_scale_kg_s,
-            point.ratio_scale,
-        );
-        distances.push(place.distance_ratio);
-        distances_held += held(place.distance_ratio, place.distance_standard_error_ratio, distance_rms);
-        if let Some(eta) = point.eta {
-            let off = (eta - place.eta).abs();
-            errors.push(off);
-            errors_held += held(off, place.eta_standard_error, eta_rms.hypot(point.eta_error));
+        let miss = rest.miss(point);
+        distances.push(miss.distance.by);
+        distances_held += held(miss.distance);
+        if let Some(off) = miss.eta {
+            errors.push(off.by);
+            errors_held += held(off);
         }
     }
     let share = |held: usize, of: usize| (of > 0).then(|| held as f64 / of as f64);

@@ -9,6 +9,7 @@ mod fit;
 mod leave_out;
 mod line_errors;
 mod line_shape;
+mod miss;
 mod nearest;
 mod observations;
 mod precisions;

@@ -23,7 +23,7 @@ pub struct Calibration {
     pub prior_triple: f64,
     /// Widens the parameters' standard errors.
     pub interval_factor: f64,
-    /// Logistic of an outside cause: offset, and slopes of the [counted](counted) misfit, scatter and gain of one more effect.
+    /// Logistic of an outside cause: offset, and slopes of the [`counted`] misfit, scatter and gain of one more effect.
     pub outside: [f64; 4],
 }
 

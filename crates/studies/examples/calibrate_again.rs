@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release -p mapper-studies --example calibrate_again -- DIR/result/observed.json MADE_BY OUT
 //!
-//! MADE_BY is the command that is written into the calibration; OUT a directory for what the study writes too.
+//! MADE_BY is the command that is written into the calibration; OUT a directory.
 
 use mapper_studies::calibrated;
 use std::path::Path;
@@ -13,10 +13,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err("usage: calibrate_again OBSERVED MADE_BY OUT".into());
     };
     let observed = serde_json::from_str::<Vec<_>>(&std::fs::read_to_string(observed)?)?;
-    let (files, said) = calibrated(&observed, made_by.clone())?;
-    for (name, text) in files.iter().filter(|(name, _)| *name != "observed.json") {
+    let made = calibrated(&observed, made_by.clone())?;
+    for (name, text) in &made.files {
         std::fs::write(Path::new(out).join(name), text)?;
     }
-    println!("{said}");
+    println!("{}", made.said);
     Ok(())
 }

@@ -93,29 +93,33 @@ impl Kind for Calibration<'_> {
             observed.extend(found);
         }
         let made_by = settings["made_by"].as_str().unwrap_or_default().to_owned();
-        let (files, said) = calibrated(&observed, made_by)?;
-        for (name, text) in files {
+        let made = calibrated(&observed, made_by)?;
+        for (name, text) in made.files {
             out.write(name, text.as_bytes())?;
         }
-        Ok(said)
+        out.write("observed.json", json_text(&observed).map_err(FleetError::kind)?.as_bytes())?;
+        Ok(made.said)
     }
 }
 
-/// What is made of the cases: files by name, and what is said of them.
+/// What is made of the diagnoses of a study.
+pub struct Fitted {
+    /// Files by name: calibration, reliability and its picture.
+    pub files: Vec<(&'static str, String)>,
+    /// What is said of them.
+    pub said: String,
+}
+
+/// Fits the calibration to diagnoses, and says whether its probabilities hold.
 ///
 /// # Errors
 /// [`FleetError::Kind`] where the calibration that ships was spoilt.
-pub fn calibrated(
-    observed: &[Observed],
-    made_by: String,
-) -> Result<([(&'static str, String); 4], String), FleetError> {
+pub fn calibrated(observed: &[Observed], made_by: String) -> Result<Fitted, FleetError> {
     let calibration = fitted(observed, made_by).map_err(FleetError::kind)?;
     let reliabilities = reliabilities(observed).map_err(FleetError::kind)?;
-    let text = |value: Result<String, mapper_session::SessionError>| value.map_err(FleetError::kind);
-    let files = [
-        ("calibration.json", text(json_text(&calibration))?),
-        ("observed.json", text(json_text(&observed))?),
-        ("reliability.json", text(json_text(&reliabilities))?),
+    let files = vec![
+        ("calibration.json", json_text(&calibration).map_err(FleetError::kind)?),
+        ("reliability.json", json_text(&reliabilities).map_err(FleetError::kind)?),
         ("reliability.svg", reliability_svg(&reliabilities)),
     ];
     let said = format!(
@@ -123,5 +127,5 @@ pub fn calibrated(
         observed.len(),
         reliability_text(&reliabilities).trim_end()
     );
-    Ok((files, said))
+    Ok(Fitted { files, said })
 }

@@ -4,6 +4,8 @@
 //!
 //! MADE_BY is the command that is written into the calibration; OUT a directory.
 
+#![allow(clippy::print_stdout)]
+
 use mapper_studies::calibrated;
 use std::path::Path;
 

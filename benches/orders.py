@@ -38,7 +38,7 @@ MACHINES = {
         "turbo_a", {"virtual_lab: {}": "virtual_lab: {machine: {alpha_area: 0.15}}"}, AFTER_THE_ZERO,
     ),
 }
-ORDERS = ["information", "sum_gradient", "worst_gradient", "greedy", "speed_lines"]
+ORDERS = ["information", "information 75 %", "sum_gradient", "worst_gradient", "greedy", "speed_lines"]
 DWELL = "40 s"
 
 
@@ -54,8 +54,9 @@ def campaign(folder, machine, method, order, seed):
     text = re.sub(r"(?m)^  (dwell|warm_up|method|window):.*\n", "", text)
     text = re.sub(r"(?m)^timing:.*$", f"timing:\n  dwell: {DWELL}\n  warm_up: 2 min", text)
     text = re.sub(r"(?m)^identification:.*$", f"identification:\n  method: {identification}", text)
-    text += f"\norder: {order}\nseed: {seed}\n" + (ZERO + "\n" if zero else "")
-    path = folder / f"{order}-{seed}.yaml"
+    order, _, share = order.partition(" ")
+    text += f"\norder: {order}\nseed: {seed}\n" + (ZERO + "\n" if zero else "") + (f"gradient_share: {share}\n" if share else "")
+    path = folder / f"{order}{share[:2]}-{seed}.yaml"
     path.write_text(text)
     return path
 
@@ -143,7 +144,7 @@ Generated; do not edit. The command, some half an hour on two cores:
 included, after a warm-up of 2 minutes (both, with repeats, are the minutes; a soak is not). Errors of the efficiency in points.
 "Forecast" is the plan's rms error on a machine as declared, "forecast, open" where alpha_A, the probe and the direction of the heat
 have to be found from the recording; "rms" is what all points of all seeds erred, then the middle and the worst seed and the worst
-point of all.
+point of all. "information 75 %" is `order: information` with `gradient_share: 75 %`.
 
 {table}
 

@@ -7,7 +7,7 @@ mod common;
 mod lab;
 
 use lab::{Campaign, Machine, campaign, eighteen, measured};
-use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, ReferenceState, Verdict};
+use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, ReferenceState, StepKind, Verdict};
 use mapper_identify::{IdentifyConfig, code, doubt_off_the_nominal_map, identify};
 use mapper_physics::model::Model;
 use nalgebra::{DMatrix, DVector};
@@ -138,5 +138,33 @@ fn the_nominal_map_tells_an_offset_beyond_its_declaration() {
     off.recording.series.get_mut(&Channel::T2).unwrap().values.iter_mut().for_each(|t2_k| *t2_k += 2.75);
     for seed in 0..3 {
         assert_eq!(doubted(&off, seed), 18, "seed {seed}");
+    }
+}
+
+/// Ten long steps at two places, among short ones, close a heat balance of five unknowns by chance alone: on a sound machine it must not
+/// speak of an offset.
+#[test]
+fn repeats_alone_tell_no_heat_balance() {
+    let repeated = [(1.4, 50e3), (1.4, 155e3)];
+    let points: Vec<(f64, f64)> = eighteen()
+        .chunks(4)
+        .flat_map(|four| four.iter().copied().chain(repeated).collect::<Vec<_>>())
+        .collect();
+    let mut clean = campaign(&points, 38.0, Machine { alpha: 0.1, ..Machine::default() });
+    for (i, point) in points.iter().enumerate() {
+        let step = &mut clean.recording.steps[i];
+        if !repeated.contains(point) {
+            step.end_s = step.start_s + 20.0;
+        } else if points[..i].contains(point) {
+            step.kind = StepKind::Repeat;
+        }
+    }
+    for seed in 0..12 {
+        for point in found(&clean, seed, Method::Joint) {
+            assert!(
+                point.warnings.iter().all(|warning| warning.code != code::SCALED_CHANNEL),
+                "seed {seed}: {point:?}"
+            );
+        }
     }
 }

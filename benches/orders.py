@@ -121,6 +121,8 @@ def main():
                 folder.mkdir()
                 write_table(folder / "steep.csv", 0.02, 1.2)
                 for order in arguments.orders.split(","):
+                    if METHODS[method][0] != "joint" and " " in order:
+                        continue  # Shares of the gradients are kept under `joint` alone.
                     one = lambda seed: mapped(mapper, folder, machine, method, order, seed)
                     runs = list(pool.map(one, range(1, arguments.seeds + 1)))
                     rows.append(row(machine, method, order, runs))

@@ -80,14 +80,20 @@ fn priced_openly(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan,
     if !is_sought || request.points.len() > MOST_POINTS_FROM_ALL_STARTS {
         return priced_from(campaign, request, is_sought);
     }
-    let mut cheapest: Result<Plan, SessionError> = Err(PlanError::NoPoints.into());
-    for made in parallel::map(&STARTS, |(other_seed, gradient_share)| {
+    // An error below the required one is worth nothing.
+    let required = request.required_sigma_eta.unwrap_or(0.0);
+    let cost = |plan: &Plan| {
+        let error = plan.figures.open_rms_error_eta.unwrap_or(f64::INFINITY).max(required);
+        error * error * plan.figures.minutes
+    };
+    let made = parallel::map(&STARTS, |(other_seed, gradient_share)| {
         let seed = request.seed.wrapping_add(*other_seed);
-        let start = PlanRequest { seed, gradient_share: *gradient_share, ..request.clone() };
-        priced_from(campaign, &start, true)
-    }) {
+        priced_from(campaign, &PlanRequest { seed, gradient_share: *gradient_share, ..request.clone() }, true)
+    });
+    let mut cheapest: Result<Plan, SessionError> = Err(PlanError::NoPoints.into());
+    for made in made {
         cheapest = match (cheapest, made) {
-            (Ok(before), Ok(plan)) if !clearly_cheaper(&plan, &before, 1.0) => Ok(before),
+            (Ok(before), Ok(plan)) if cost(&plan) >= cost(&before) => Ok(before),
             (Ok(before), Err(_)) => Ok(before),
             (_, made) => made,
         };

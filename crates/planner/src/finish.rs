@@ -67,6 +67,15 @@ fn bound_remark(request: &PlanRequest<'_>, bound: Option<&PlanBound>) -> Option<
     Some(text.to_owned())
 }
 
+/// How what is said of a share of the gradients begins.
+const KEEPS: &str = "where all steps last equally long, the order keeps";
+
+/// The plan without what it says of a share of the gradients: where a search only began with one, nobody asked for it.
+pub fn without_share(mut plan: Plan) -> Plan {
+    plan.remarks.retain(|remark| !remark.starts_with(KEEPS));
+    plan
+}
+
 fn remarks(
     request: &PlanRequest<'_>,
     ordered: &Ordered,
@@ -76,7 +85,7 @@ fn remarks(
     let mut remarks = Vec::new();
     if let (Some(ratio), Some(share)) = (ordered.gradient_ratio, request.gradient_share) {
         remarks.push(format!(
-            "where all steps last equally long, the order keeps {:.0} % of the largest sum of gradients, of which {:.0} % are asked for",
+            "{KEEPS} {:.0} % of the largest sum of gradients, of which {:.0} % are asked for",
             1e2 * ratio,
             1e2 * share
         ));

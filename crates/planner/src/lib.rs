@@ -42,6 +42,7 @@ pub use comparison::{Comparison, STABLE_DRIFT_K_MIN, WayOfMapping, along_speed_l
 pub use dwell::{REACHED_RATIO, SHORTEST_S, rested_dwell_s};
 pub use error_bound::error_bound;
 pub use fingerprint::sha256_hex;
+pub use finish::without_share;
 pub use graph::{JumpForecast, Rejection, explain_jump, jump_graph};
 pub use method::{ErrorTangent, ForecastRow, MethodResult, PredictedMethod, WorthOfStep};
 pub use objective::Objective;

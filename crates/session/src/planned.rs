@@ -13,7 +13,7 @@ use mapper_numerics::parallel;
 use mapper_physics::model::Model;
 use mapper_planner::{
     Comparison, Now, PlanError, PlanRequest, after_step, before_first_step, best, clearly_cheaper, compare,
-    make_plan, with_dwells,
+    make_plan, with_dwells, without_share,
 };
 
 /// Most steps of a plan that is ordered again: that goes through all of them several times.
@@ -98,7 +98,7 @@ fn priced_openly(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan,
             (_, made) => made,
         };
     }
-    Ok(Plan { seed: request.seed, ..cheapest? })
+    Ok(without_share(Plan { seed: request.seed, ..cheapest? }))
 }
 
 /// The plan with dwells by price from one start; `sought`: whether its order may be sought again for these.

@@ -12,7 +12,7 @@ use crate::joint::parameters::{OFFSETS, SURFACE};
 use crate::joint::quantity::{Quantity, is_offset, of_shared, quantities};
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
-use crate::joint::surface::SurfaceScale;
+use crate::joint::surface::{SLOW_LOSS, SurfaceScale};
 use mapper_core::{EstimateUncertainty, ReferenceState};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::median;
@@ -27,9 +27,6 @@ const SPEED_LENGTHS: [f64; 4] = [0.7, 1.0, 1.4, 2.0];
 const FLOW_LENGTHS: [f64; 5] = [0.35, 0.5, 0.7, 1.0, 2.0];
 /// What no smooth function follows, fraction.
 const ROUGHNESSES: [f64; 2] = [1e-3, 4e-3];
-/// Efficiency that small Reynolds numbers and leakage cost beyond that, fraction, one standard deviation, times the
-/// middle speed over the speed, squared, less 1: it can not be told from an offset at all.
-const SLOW_LOSS: f64 = 1e-2;
 /// Mean of efficiencies and its standard deviation, fraction: any.
 const MEAN: (f64, f64) = (0.65, 1.0);
 /// Points from which on the weights are found from a part of them: the effort grows with the cube.
@@ -277,6 +274,7 @@ fn matrix(
         let own = if i == j { roughness * roughness + if used[i] { 0.0 } else { 1e4 } } else { 0.0 };
         0.5 * (etas[i].by_eta[j] + etas[j].by_eta[i])
             + amplitude * amplitude * (-0.5 * (by_speed * by_speed + by_flow * by_flow)).exp()
+            // It can not be told from an offset at all.
             + SLOW_LOSS * SLOW_LOSS * slow * other_slow
             + MEAN.1 * MEAN.1
             + own

@@ -23,9 +23,10 @@ const POWERS: [(i32, i32, f64); TERM_COUNT - 1] = [
     (0, 3, 0.05),
     (2, 2, 0.05),
 ];
-/// The last term is [`SurfaceScale::slowness`], with this standard deviation of its coefficient beforehand: published maps fall by 2 to
-/// 10 points from their peak to a third of full speed, where it is about 3.
-const SLOW_LOSS: f64 = 2e-2;
+/// Efficiency that small Reynolds numbers and leakage cost beyond that, fraction, one standard deviation, times
+/// [`SurfaceScale::slowness`], the last term: published maps fall by 2 to 10 points from their peak to a third of full speed, where it is
+/// about 3.
+pub(crate) const SLOW_LOSS: f64 = 1e-2;
 /// Number of coefficients.
 pub(crate) const TERM_COUNT: usize = 12;
 
@@ -141,8 +142,8 @@ mod tests {
     use nalgebra::{SMatrix, SVector};
 
     /// Published maps fall by 2 to 10 points towards a third of full speed, about as one over the speed squared. Pinned as loosely as
-    /// short steps pin it (half a point a step), the surface stays within half a tenth of a point of a fall by 6; a cubic alone is off by
-    /// nearly two tenths at the second line.
+    /// short steps pin it (half a point a step), the surface stays within 0.12 points of a fall by 6; a cubic alone is off by 0.18 at
+    /// the second line.
     #[test]
     fn a_loss_at_low_speed_is_followed() {
         const OWN: f64 = 5e-3;
@@ -166,7 +167,7 @@ mod tests {
         let surface = EfficiencySurface { scale, coefficients };
         for (speed_rpm, flow_kg_s) in places {
             let off = surface.efficiency(speed_rpm, flow_kg_s) + loss(speed_rpm);
-            assert!(off.abs() < 5e-4, "{speed_rpm} rpm, {flow_kg_s} kg/s: {off}");
+            assert!(off.abs() < 1.2e-3, "{speed_rpm} rpm, {flow_kg_s} kg/s: {off}");
         }
     }
 }

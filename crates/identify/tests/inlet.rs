@@ -44,9 +44,9 @@ fn without_noise_the_law_before_the_wheel_is_told() {
             let told = thermal.inlet.unwrap();
             assert_eq!((told.convection, told.origin), (inlet, Origin::Fitted), "{told:?}");
             let ((eta, h), alpha) = (worst(&points, &campaign), thermal.alpha_area_ratio.value.unwrap());
-            // As without noise elsewhere: what the surface misses of the map.
+            // As without noise elsewhere: what the surface misses of the map, up to a quarter of a point.
             assert!(
-                (alpha - 0.3).abs() < 0.005 && eta < 0.002 && h < 0.015,
+                (alpha - 0.3).abs() < 0.005 && eta < 0.0025 && h < 0.015,
                 "alpha {alpha}, eta {eta}, h {h}"
             );
         }

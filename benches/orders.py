@@ -152,12 +152,12 @@ point of all. "information 75 %" is `order: information` with `gradient_share: 7
 
 Twenty seeds are few: the worst two or three of them make most of a row's rms, and another twenty move it by a sixth. Within that, with 48
 points and `joint` no order of large jumps is better than another, after the zero as without it; along speed lines the same points err
-alike where all is as declared, half as much again on the steep map, and twice as much where alpha_A has to be found, and hardly any of them
-can be called good. With 18 points speed lines err two to ten times as much as jumps. That is what jumps are made for.
+alike where all is as declared, half as much again on the steep map, and twice as much where alpha_A has to be found, and hardly any of
+turbo_a's can be called good. With 18 points speed lines err two to ten times as much as jumps. That is what jumps are made for.
 
-`information` ships for turbo_a: after the zero no order errs less, and by its open forecast none tells more in that time. It is not within
+`information` ships for turbo_a: after the zero no order errs less, and by the open forecast none is better by more than a percent. It is not within
 5 % of the best in every row: `sum_gradient` errs less on grid18 after the zero (0.24 beside 0.30 points), orders of larger gradients on the
-steep map without a zero, and the share of 75 % with alpha_A undeclared; medians of the seeds say the same of none of them by more than a fifth.
+steep map without a zero, and the share of 75 % with alpha_A undeclared: forecasts do not tell these apart.
 `mapper plan --compare` and `mapper check` go by the forecast. Under `dynamic` the order of least error is `information` but on grid18, where
 speed lines have the smallest jumps and so the least bias (1.23 beside 1.37): the paper's largest gradients cost that method a tenth.
 `steady` is not here: it waits until nothing moves, see [methods.md](methods.md).

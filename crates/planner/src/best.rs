@@ -28,6 +28,11 @@ pub(crate) fn cost_of(open_rms_error_eta: Option<f64>, minutes: f64) -> f64 {
     open_rms_error_eta.map_or(f64::INFINITY, |rms| rms * rms * minutes)
 }
 
+/// The same of a plan that has an error to reach, a fraction: one below it is worth nothing.
+pub fn cost_of_reaching(plan: &Plan, required_sigma_eta: f64) -> f64 {
+    cost_of(plan.figures.open_rms_error_eta.map(|rms| rms.max(required_sigma_eta)), plan.figures.minutes)
+}
+
 /// Whether one plan costs less than so many times the other: mean square error times minutes.
 pub fn clearly_cheaper(one: &Plan, other: &Plan, ratio: f64) -> bool {
     cost(one) < ratio * cost(other)

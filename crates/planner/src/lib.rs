@@ -37,7 +37,7 @@ mod simulations;
 mod stage;
 mod walk;
 
-pub use best::{best, clearly_cheaper};
+pub use best::{best, clearly_cheaper, cost_of_reaching};
 pub use comparison::{Comparison, STABLE_DRIFT_K_MIN, WayOfMapping, along_speed_lines, compare};
 pub use dwell::{REACHED_RATIO, SHORTEST_S, rested_dwell_s};
 pub use error_bound::error_bound;

@@ -13,7 +13,7 @@ use mapper_numerics::parallel;
 use mapper_physics::model::Model;
 use mapper_planner::{
     Comparison, Now, PlanError, PlanRequest, after_step, before_first_step, best, clearly_cheaper, compare,
-    make_plan, with_dwells, without_share,
+    cost_of_reaching, make_plan, with_dwells, without_share,
 };
 use std::ops::RangeInclusive;
 
@@ -82,12 +82,7 @@ fn priced_openly(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan,
     if !is_sought || !FROM_ALL_STARTS.contains(&request.points.len()) {
         return priced_from(campaign, request, is_sought);
     }
-    // An error below the required one is worth nothing.
-    let required = request.required_sigma_eta.unwrap_or(0.0);
-    let cost = |plan: &Plan| {
-        let error = plan.figures.open_rms_error_eta.unwrap_or(f64::INFINITY).max(required);
-        error * error * plan.figures.minutes
-    };
+    let cost = |plan: &Plan| cost_of_reaching(plan, request.required_sigma_eta.unwrap_or(0.0));
     let made = parallel::map(&STARTS, |(other_seed, gradient_share)| {
         let seed = request.seed.wrapping_add(*other_seed);
         priced_from(campaign, &PlanRequest { seed, gradient_share: *gradient_share, ..request.clone() }, true)

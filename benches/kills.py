@@ -51,7 +51,7 @@ def promised_and_lost(run):
                 elif isinstance(record, Message) and topics.get(record.channel_id) == "/step":
                     step = json.loads(record.data)
                     if step["phase"] == "end":
-                        ended.add(step["index"])
+                        ended.add(step["step"])
     except Exception as error:  # The cut end of the file: what came before it was read.
         print(f"the recording ends with: {error}", file=sys.stderr) if not topics else None
     return len(promised - ended)

@@ -1,6 +1,6 @@
 //! Why points make no map.
 
-use mapper_core::{Method, with_unit};
+use mapper_core::{Method, step_number, with_unit};
 
 /// Why points make no map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -10,11 +10,12 @@ pub enum AssembleError {
     NoPoints,
     /// A coordinate of a point is not a number, so that it has no place on the map.
     #[error(
-        "step {step}: {quantity} is {}, so the point has no place on the map; leave the step out or repair the channel",
+        "step {}: {quantity} is {}, so the point has no place on the map; leave the step out or repair the channel",
+        step_number(*step),
         with_unit(value, unit)
     )]
     NoPlace {
-        /// Index of the step.
+        /// Place of the step, from 0.
         step: usize,
         /// Which coordinate.
         quantity: &'static str,
@@ -25,10 +26,11 @@ pub enum AssembleError {
     },
     /// A point was identified by another method than the map says.
     #[error(
-        "step {step} was identified by `{found}`, the map is `{expected}`; identify all points by one method"
+        "step {} was identified by `{found}`, the map is `{expected}`; identify all points by one method",
+        step_number(*step)
     )]
     MixedMethods {
-        /// Index of the step.
+        /// Place of the step, from 0.
         step: usize,
         /// Method of the map.
         expected: Method,

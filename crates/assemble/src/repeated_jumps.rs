@@ -10,7 +10,8 @@ pub struct RepeatedJump {
     pub from: OperatingPoint,
     /// Where it goes.
     pub to: OperatingPoint,
-    /// Indices of the steps.
+    /// Places of the steps, from 0; files have their numbers, from 1.
+    #[serde(serialize_with = "mapper_core::step_number::list::serialize")]
     pub steps: Vec<usize>,
     /// Efficiency found by each, fraction.
     pub eta: Vec<f64>,

@@ -140,7 +140,7 @@ fn repeats_are_kept_out_of_the_lines() {
 fn what_makes_no_map_is_said() {
     assert_eq!(make(&[]), Err(AssembleError::NoPoints));
     let lost = make(&[point(3, None, 5e4, f64::NAN)]).unwrap_err();
-    assert!(lost.to_string().starts_with("step 3: corrected mass flow is NaN kg/s"), "{lost}");
+    assert!(lost.to_string().starts_with("step 4: corrected mass flow is NaN kg/s"), "{lost}");
     let mut other = point(4, None, 5e4, 0.03);
     other.method = Method::Steady;
     assert!(matches!(make(&[other]), Err(AssembleError::MixedMethods { step: 4, .. })));

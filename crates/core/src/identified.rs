@@ -107,7 +107,8 @@ pub fn standard_error_of(low: f64, high: f64) -> f64 {
 /// One identified point of the map. Absent numbers are `None`, never made up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IdentifiedPoint {
-    /// Index of the step.
+    /// Place of the step, from 0; files have its number, from 1.
+    #[serde(with = "crate::step_number")]
     pub step: usize,
     /// Whether the step was made for the map, or to see drift.
     #[serde(default)]

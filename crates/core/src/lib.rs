@@ -44,6 +44,7 @@ mod settle_bands;
 mod soak;
 mod speed_response;
 mod step_marker;
+pub mod step_number;
 mod surge;
 mod thermal_model;
 mod timing;
@@ -95,6 +96,7 @@ pub use settle_bands::SettleBands;
 pub use soak::Soak;
 pub use speed_response::{SpeedControlSettings, SpeedResponse};
 pub use step_marker::StepMarker;
+pub use step_number::step_number;
 pub use surge::{SurgeFoundBy, SurgeMark, SurgeSeek};
 pub use thermal_model::{
     ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,

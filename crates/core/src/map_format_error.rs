@@ -1,6 +1,6 @@
 //! Why a map cannot be written, and why a file is not a map.
 
-use crate::ReferenceState;
+use crate::{ReferenceState, step_number};
 
 /// What a library below a format says.
 type Cause = Box<dyn std::error::Error + Send + Sync>;
@@ -17,9 +17,9 @@ pub enum ExportError {
         source: Cause,
     },
     /// A coordinate is not a number: JSON would turn it into null, and the file could not be read back.
-    #[error("step {step}: {quantity} is {value}; the format cannot hold it; leave the point out of the map")]
+    #[error("step {}: {quantity} is {value}; the format cannot hold it; leave the point out of the map", step_number(*step))]
     NotFinite {
-        /// Index of the step.
+        /// Place of the step, from 0.
         step: usize,
         /// Which field.
         quantity: &'static str,

@@ -85,7 +85,8 @@ impl Predicted {
 /// One step: go to a point and stay there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanStep {
-    /// Position in the plan, from 0.
+    /// Place in the plan, from 0; files have its number, from 1.
+    #[serde(flatten, with = "crate::step_number::entry")]
     pub index: usize,
     /// Point, repeat, the first point once more, or approach to surge.
     pub kind: StepKind,

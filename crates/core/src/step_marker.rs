@@ -1,12 +1,13 @@
 //! Where a step of the plan lies in a recording.
 
-use crate::{OperatingPoint, StepKind};
+use crate::{OperatingPoint, StepKind, step_number};
 use serde::{Deserialize, Serialize};
 
 /// Start and end of one step as it was run (or found in a recording made by others).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StepMarker {
-    /// Index of the step in its plan, or in order of appearance.
+    /// Place of the step in its plan, or in order of appearance, from 0; files have its number, from 1.
+    #[serde(flatten, with = "crate::step_number::entry")]
     pub index: usize,
     /// Point or repeat.
     pub kind: StepKind,
@@ -23,4 +24,14 @@ pub struct StepMarker {
     /// Commanded valve opening relative to the nominal area.
     #[serde(rename = "valve")]
     pub valve_opening_ratio: f64,
+}
+
+impl StepMarker {
+    /// Places from here on belong to steps that a resumed run makes once more, outside its plan: no plan has as many.
+    pub const AGAIN_FROM: usize = 1_000_000;
+
+    /// Number of the step in its run, from 1; `None` for one that is made once more.
+    pub fn number(&self) -> Option<usize> {
+        (self.index < StepMarker::AGAIN_FROM).then(|| step_number(self.index))
+    }
 }

@@ -7,6 +7,7 @@ use crate::expression::{Expression, product};
 use crate::force::APART;
 use crate::select::Choice;
 use crate::term::{Role, Term};
+use mapper_core::step_number;
 use mapper_gap::whiten::rows_of_step;
 use nalgebra::DMatrix;
 
@@ -123,7 +124,7 @@ fn from(term: &Term, begin_s: f64, step: usize) -> Term {
     }
     // Level and slope are no longer one law: their sentence says when each begins.
     later.role = Role::Other;
-    later.words = format!("{} from step {} on", later.words, step + 1);
+    later.words = format!("{} from step {} on", later.words, step_number(step));
     later
 }
 

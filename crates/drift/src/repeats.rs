@@ -2,7 +2,7 @@
 
 use crate::blocks::CampaignStep;
 use crate::request::RecordedRun;
-use mapper_core::{Channel, Recording};
+use mapper_core::{Channel, Recording, step_number};
 use std::collections::BTreeMap;
 
 /// Visits of one jump that are needed: two show a difference, only a third shows that it stays or grows.
@@ -56,7 +56,7 @@ pub(crate) fn refusal(
         return Some(format!(
             "No verdict: step {} of recording {} lasts {:.1} h of {:.1} h in all; steps of a campaign last up to {:.0} h, and all of \
              them up to {:.0} h. A wrong time in the log would do that.",
-            step.index + 1,
+            step_number(step.index),
             step.run + 1,
             (step.end_s - step.start_s) / 3600.0,
             whole_s / 3600.0,

@@ -75,7 +75,8 @@ pub struct VisitChannel {
 pub struct Visit {
     /// Which recording, from 0.
     pub run: usize,
-    /// Step within the recording.
+    /// Place of the step in the recording, from 0; files have its number, from 1.
+    #[serde(serialize_with = "mapper_core::step_number::serialize")]
     pub step: usize,
     /// Start of the step, time of the campaign, s.
     pub t_s: f64,
@@ -111,7 +112,8 @@ pub struct RepeatGroup {
 pub struct CorrectedPoint {
     /// Which recording, from 0.
     pub run: usize,
-    /// Step within the recording.
+    /// Place of the step in the recording, from 0; files have its number, from 1.
+    #[serde(serialize_with = "mapper_core::step_number::serialize")]
     pub step: usize,
     /// Measured shaft speed at the end of the step, rpm.
     pub speed_rpm: f64,

@@ -1,6 +1,6 @@
 //! What forbids a diagnosis: a clear word instead of a confident culprit.
 
-use mapper_core::Channel;
+use mapper_core::{Channel, step_number};
 use mapper_observe::plausible::Implausible;
 
 /// What forbids a diagnosis.
@@ -47,10 +47,10 @@ pub enum Problem {
     /// Nobody knows how far the valve was open.
     #[error(
         "the recording does not say how far the valve was open at step {}, and the model is driven with that: map it as `valve_command`, as commanded or as measured, or give it among `constants`; without it `mapper transient` diagnoses the compressor side from its measured neighbours",
-        .step + 1
+        step_number(*step)
     )]
     NoValve {
-        /// Index of the first step of which it is not known.
+        /// Place, from 0, of the first step of which it is not known.
         step: usize,
     },
     /// Measured P3 is nowhere near its command.
@@ -75,10 +75,11 @@ pub enum Problem {
     },
     /// One of its steps is another one.
     #[error(
-        "step {step} of the healthy recording is another one: {what} {healthy:.3} {unit}, where the recording under diagnosis has {recorded:.3} {unit} (more than {within:.3} apart); record a healthy run of the same plan"
+        "step {} of the healthy recording is another one: {what} {healthy:.3} {unit}, where the recording under diagnosis has {recorded:.3} {unit} (more than {within:.3} apart); record a healthy run of the same plan",
+        step_number(*step)
     )]
     OtherStep {
-        /// Index of the step.
+        /// Place of the step, from 0.
         step: usize,
         /// What differs.
         what: &'static str,

@@ -96,7 +96,8 @@ pub struct Estimate {
 /// With which step a cause begins.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Onset {
-    /// The step, by index.
+    /// Place of the step, from 0; files have its number, from 1.
+    #[serde(serialize_with = "mapper_core::step_number::serialize")]
     pub step: usize,
     /// Its start, s of the recording.
     pub t_s: f64,
@@ -261,7 +262,8 @@ pub struct Gap {
     pub shrink_high: f64,
     /// Number of steps whose misfit is beyond noise, tolerances fitted: the witnesses of the interval.
     pub steps_with_gap: usize,
-    /// The step that carries most of the gap, by index.
+    /// Place of the step that carries most of the gap, from 0; files have its number, from 1.
+    #[serde(serialize_with = "mapper_core::step_number::option::serialize")]
     pub largest_step: Option<usize>,
     /// Its share of the gap.
     pub largest_share: f64,
@@ -269,9 +271,11 @@ pub struct Gap {
     pub strained: Option<Strained>,
     /// Channels that the cause makes worse.
     pub worse: Vec<String>,
-    /// Steps that were held out in one of the folds, by index; none where steps are too few.
+    /// Places of the steps that were held out in one of the folds; none where steps are too few. Files have numbers, from 1.
+    #[serde(serialize_with = "mapper_core::step_number::list::serialize")]
     pub held_out_steps: Vec<usize>,
-    /// The folds: steps that were held out together.
+    /// The folds: places of the steps that were held out together, from 0; files have numbers, from 1.
+    #[serde(serialize_with = "mapper_core::step_number::lists::serialize")]
     pub folds: Vec<Vec<usize>>,
     /// Each channel.
     pub channels: BTreeMap<String, ChannelGap>,

@@ -222,7 +222,8 @@ pub fn hold(study: &Study, found: &Found) -> Result<Held, TwinError> {
 /// What a twin expects at the end of a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
-    /// The step, by index.
+    /// Place of the step, from 0; files have its number, from 1.
+    #[serde(with = "mapper_core::step_number")]
     pub step: usize,
     /// Each channel: value and half the width of its 95 % band, in the channel's unit.
     pub channels: BTreeMap<String, [f64; 2]>,

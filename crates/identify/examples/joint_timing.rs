@@ -98,7 +98,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let from = t_s.partition_point(|t| *t < step.start_s);
         let to = t_s.partition_point(|t| *t < step.end_s);
         for (i, t_s) in t_s.iter().enumerate().take(to).skip(from) {
-            write!(text, "{},{}", step.index, t_s - step.start_s)?;
+            write!(text, "{},{}", mapper_core::step_number(step.index), t_s - step.start_s)?;
             for channel in channels {
                 write!(text, ",{}", recording.series[&channel].values[i])?;
             }

@@ -1,7 +1,7 @@
 //! What stops identification altogether, and what stops a single step.
 
 use crate::needs::names;
-use mapper_core::{Channel, Method};
+use mapper_core::{Channel, Method, step_number};
 
 /// Why a recording cannot be identified.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -39,9 +39,9 @@ pub enum IdentifyError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StepError {
     /// The step has no duration.
-    #[error("step {step} runs from {start_s} s to {end_s} s, which is not a valid time span")]
+    #[error("step {} runs from {start_s} s to {end_s} s, which is not a valid time span", step_number(*step))]
     NoDuration {
-        /// Index of the step.
+        /// Place of the step, from 0.
         step: usize,
         /// Start of the step, s.
         start_s: f64,
@@ -50,10 +50,11 @@ pub enum StepError {
     },
     /// A quantity that every point has was never measured in the step.
     #[error(
-        "step {step} ({start_s:.1} s to {end_s:.1} s) has no usable sample of {channel}, so its place on the map is unknown"
+        "step {} ({start_s:.1} s to {end_s:.1} s) has no usable sample of {channel}, so its place on the map is unknown",
+        step_number(*step)
     )]
     NoState {
-        /// Index of the step.
+        /// Place of the step, from 0.
         step: usize,
         /// Start of the step, s.
         start_s: f64,

@@ -5,7 +5,8 @@ use serde::Serialize;
 /// The efficiency that the two-parameter method (`dynamic`) finds in a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TwoParameter {
-    /// Index of the step.
+    /// Place of the step, from 0; files have its number, from 1.
+    #[serde(serialize_with = "mapper_core::step_number::serialize")]
     pub step: usize,
     /// Isentropic efficiency, total to total, fraction.
     pub eta: f64,

@@ -233,7 +233,7 @@ impl Feed {
 
     fn step(&self, kept: &mut Kept, marker: &StepMarker) {
         let forecast = self.plan.get(marker.index);
-        kept.begun = marker.index + 1;
+        kept.begun = marker.number().unwrap_or(kept.begun);
         if let Some(forecast) = forecast {
             kept.after_s = kept.state.duration_s - kept.soak_s - forecast.start_s - forecast.dwell_s;
         }
@@ -243,7 +243,7 @@ impl Feed {
         });
         kept.state.now.phase = "step".to_owned();
         kept.state.now.step = Some(Step {
-            number: marker.index + 1,
+            step: marker.number(),
             place: place.unwrap_or_default(),
             start_s: marker.start_s,
             end_s: marker.end_s,

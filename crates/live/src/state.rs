@@ -74,8 +74,8 @@ pub(crate) struct Now {
 /// The step that is under way.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Step {
-    /// From 1.
-    pub(crate) number: usize,
+    /// Its number, from 1; `None` for one that a resumed run makes once more.
+    pub(crate) step: Option<usize>,
     pub(crate) place: String,
     pub(crate) start_s: f64,
     pub(crate) end_s: f64,

@@ -6,7 +6,7 @@
 use foxglove::{
     ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema, WebSocketServer,
 };
-use mapper_core::{Channel, Group, IdentifiedPoint};
+use mapper_core::{Channel, Group, IdentifiedPoint, step_number};
 use mapper_record::{StepPhase, Topic, event_message, readings_message, step_message};
 use mapper_session::SessionEvent;
 use serde_json::{Value, json};
@@ -168,7 +168,7 @@ fn point_topic() -> Topic {
 
 fn point_message(point: &IdentifiedPoint) -> Value {
     json!({
-        "step": point.step + 1,
+        "step": step_number(point.step),
         "speed_corrected_rpm": point.speed_corrected_rpm,
         "flow_corrected_kg_s": point.flow_corrected_kg_s,
         "pressure_ratio": point.pressure_ratio,

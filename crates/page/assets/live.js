@@ -36,7 +36,7 @@ function waits(step) {
 function showNow() {
   if (!now) return;
   const step = now.step;
-  text("phase", over ? "The run has ended" : step ? `Step ${step.number} of ${Math.max(steps, step.number)}: ${step.place}` : now.phase);
+  text("phase", over ? "The run has ended" : step ? `${step.step ? `Step ${step.step} of ${Math.max(steps, step.step)}` : "A step once more"}: ${step.place}` : now.phase);
   text("where", over || !step ? "" : `${waits(step)[0].toUpperCase()}${waits(step).slice(1)}.`);
   byId("bar").value = over ? 1 : duration ? Math.min(1, now.t_s / (now.t_s + now.left_s || 1)) : 0;
   const paced = pace ? now.left_s / pace : null;

@@ -171,8 +171,8 @@ function drawPlan() {
   const places = [];
   for (const p of stops) {
     const near = places.find(q => Math.hypot((q.flow - p.flow) / flowSpan, (q.pr - p.pr) / prSpan) < 0.015);
-    if (near) near.steps.push(p.step + 1);
-    else places.push({ flow: p.flow, pr: p.pr, steps: [p.step + 1] });
+    if (near) near.steps.push(p.step);
+    else places.push({ flow: p.flow, pr: p.pr, steps: [p.step] });
   }
   // A number that would stand on another one is left to the table.
   const height = Math.round(0.6 * width), boxes = [];

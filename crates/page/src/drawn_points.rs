@@ -23,6 +23,7 @@ const RAW: [Channel; 9] = [
 /// One point. Efficiencies in %, half widths of 95 % intervals in points.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct DrawnPoint {
+    #[serde(serialize_with = "mapper_core::step_number::serialize")]
     step: usize,
     name: String,
     /// Corrected speed of its line, as text.

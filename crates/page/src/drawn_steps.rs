@@ -27,6 +27,7 @@ const CHANNELS: [(Channel, &str); 8] = [
 /// One step; times are seconds after its change of set-points.
 #[derive(Serialize)]
 pub(crate) struct DrawnStep {
+    #[serde(serialize_with = "mapper_core::step_number::serialize")]
     step: usize,
     t: Vec<f64>,
     channels: Vec<DrawnChannel>,

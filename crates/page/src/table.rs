@@ -41,7 +41,7 @@ pub(crate) fn data_table(caption: &str, heads: &[String], rows: &[Row]) -> Marku
                 thead { tr { @for head in heads { th scope="col" { (head) } } } }
                 tbody {
                     @for row in rows {
-                        tr data-step=[row.step] {
+                        tr data-step=[row.step.map(mapper_core::step_number)] {
                             @for cell in &row.cells {
                                 td data-sort=[cell.sorted_by] class=[cell.class] { (cell.text) }
                             }

@@ -19,7 +19,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for step in &report.recording.steps {
         println!(
             "step {}: {} to {} s, P3 {} Pa, valve {}",
-            step.index, step.start_s, step.end_s, step.p3_pa, step.valve_opening_ratio
+            mapper_core::step_number(step.index),
+            step.start_s,
+            step.end_s,
+            step.p3_pa,
+            step.valve_opening_ratio
         );
     }
     for event in &report.recording.events {

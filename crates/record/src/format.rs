@@ -4,12 +4,14 @@
 ///
 /// Bumped when a reader of the version before would misread a file: a topic, field or unit changes its meaning. New
 /// topics, fields and metadata keys do not bump it, since readers pass over what they do not know.
+///
+/// Version 2 numbers the steps on `/step` from 1, as `step`. Version 1 has `index` there, from 0, and still reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct FormatVersion(pub u32);
 
 impl FormatVersion {
     /// What this program writes.
-    pub const CURRENT: FormatVersion = FormatVersion(1);
+    pub const CURRENT: FormatVersion = FormatVersion(2);
 }
 
 impl std::fmt::Display for FormatVersion {

@@ -45,7 +45,7 @@ pub(crate) fn step_schema() -> (Vec<u8>, BTreeMap<String, String>) {
         }})
     };
     let properties = json!({
-        "index": {"type": "integer", "description": "position in the plan, from 0", "unit": "1"},
+        "step": {"type": "integer", "description": "number of the step, from 1", "unit": "1"},
         "kind": {"type": "string", "description": "point or repeat"},
         "phase": {"type": "string", "description": "start or end of the step"},
         "t_s": {"type": "number", "description": "run time", "unit": "s"},

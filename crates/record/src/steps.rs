@@ -23,6 +23,7 @@ const SLOW_RATIO: f64 = 0.02;
 /// A message on `/step`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(crate) struct StepMessage {
+    #[serde(flatten, with = "mapper_core::step_number::entry")]
     index: usize,
     kind: StepKind,
     phase: Phase,
@@ -224,6 +225,34 @@ mod tests {
             (Channel::P3Command, column(|row| row.1)),
             (Channel::ValveCommand, column(|row| row.2)),
         ])
+    }
+
+    /// Version 1 of the format has `index` from 0, version 2 `step` from 1.
+    #[test]
+    fn marks_of_both_versions_are_the_same_steps() {
+        let message = |name: &str, number: usize, phase: &str, t_s: f64| -> StepMessage {
+            let text = format!(
+                r#"{{"{name}":{number},"kind":"point","phase":"{phase}","t_s":{t_s},"p3_pa":1e5,"valve":0.5}}"#
+            );
+            serde_json::from_str(&text).unwrap()
+        };
+        let steps = |name: &str, first: usize| {
+            let marks = (0..3).flat_map(|place| {
+                let start_s = 10.0 * place as f64;
+                [("start", start_s), ("end", start_s + 9.0)]
+                    .map(|(phase, t_s)| message(name, first + place, phase, t_s))
+            });
+            steps_from_markers(marks, 29.0, &mut Vec::new())
+        };
+        let (old, new) = (steps("index", 0), steps("step", 1));
+        assert_eq!(
+            old.iter().map(|step| (step.index, step.end_s)).collect::<Vec<_>>(),
+            [(0, 9.0), (1, 19.0), (2, 29.0)]
+        );
+        let places = |steps: &[StepMarker]| {
+            steps.iter().map(|step| (step.index, step.start_s, step.end_s)).collect::<Vec<_>>()
+        };
+        assert_eq!(places(&old), places(&new));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::format::{EVENT_TOPIC, STEP_TOPIC};
 use crate::schema::{Field, event_schema, numeric_schema, step_schema, unit_metadata};
-use mapper_core::{Channel, Event, Group, StepMarker};
+use mapper_core::{Channel, Event, Group, StepMarker, step_number};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -60,7 +60,7 @@ pub fn step_message(step: &StepMarker, phase: StepPhase) -> (f64, Value) {
         StepPhase::Abandoned => (step.end_s, "abandoned"),
     };
     let message = json!({
-        "index": step.index, "kind": step.kind, "phase": phase, "t_s": t_s,
+        "step": step_number(step.index), "kind": step.kind, "phase": phase, "t_s": t_s,
         "p3_pa": step.p3_pa, "valve": step.valve_opening_ratio, "from": step.from, "to": step.to,
     });
     (t_s, message)

@@ -1,7 +1,7 @@
 //! What was wrong with a recording that could be read all the same.
 
 use crate::ChunkError;
-use mapper_core::Channel;
+use mapper_core::{Channel, step_number};
 
 /// Something a reader of the recording should know. Each displays as one sentence with values.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -169,9 +169,9 @@ pub enum ReadWarning {
         channel: Channel,
     },
     /// The run ended within a step.
-    #[error("step {index} has no end: the run was cut short at {end_s} s")]
+    #[error("step {} has no end: the run was cut short at {end_s} s", step_number(*index))]
     UnfinishedStep {
-        /// Index of the step.
+        /// Place of the step, from 0.
         index: usize,
         /// Time taken for its end: that of the last sample, s.
         end_s: f64,

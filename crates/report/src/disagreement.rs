@@ -2,7 +2,7 @@
 
 use crate::display::Display;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::IdentifiedPoint;
+use mapper_core::{IdentifiedPoint, step_number};
 use mapper_identify::TwoParameter;
 use mapper_record::score::ScoredPoint;
 
@@ -27,7 +27,7 @@ pub fn disagreement_text(
         apart.len(),
         both.len(),
         100.0 * distance,
-        point.step + 1,
+        step_number(point.step),
         display.speed(point.speed_rpm),
         units.speed,
         crate::points::opening(point.valve_opening_ratio),

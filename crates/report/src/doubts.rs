@@ -1,6 +1,6 @@
 //! Doubts and remarks about points, each sentence once.
 
-use mapper_core::IdentifiedPoint;
+use mapper_core::{IdentifiedPoint, step_number};
 
 /// A sentence, and the steps that it is about.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Doubt<'a> {
 pub fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doubt<'a>> {
     let mut said: Vec<Said<'a>> = Vec::new();
     for point in points {
-        let step = point.step + 1;
+        let step = step_number(point.step);
         for warning in &point.warnings {
             let (code, pieces) = (warning.code.as_ref(), pieces(&warning.message));
             match said.iter_mut().find(|known| known.code == code && are_alike(&known.pieces, &pieces)) {

@@ -2,7 +2,7 @@
 
 use crate::gap_next::next_text;
 use crate::number::four_figures;
-use mapper_core::with_unit;
+use mapper_core::{step_number, with_unit};
 use mapper_gap::report::{
     Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Verdict, law_found,
 };
@@ -189,8 +189,8 @@ fn nearest(diagnosis: &Diagnosis) -> Option<String> {
 /// Effects by their names for people, ids behind them, and when they begin.
 pub fn named(candidate: &Candidate) -> String {
     let one = |(id, name): (&String, &String)| match candidate.onsets.get(id) {
-        Some(onset) if onset.grows => format!("{name} ({id}) growing from step {}", onset.step + 1),
-        Some(onset) => format!("{name} ({id}) from step {} on", onset.step + 1),
+        Some(onset) if onset.grows => format!("{name} ({id}) growing from step {}", step_number(onset.step)),
+        Some(onset) => format!("{name} ({id}) from step {} on", step_number(onset.step)),
         None => format!("{name} ({id})"),
     };
     candidate.effects.iter().zip(&candidate.names).map(one).collect::<Vec<_>>().join(" + ")
@@ -231,7 +231,8 @@ fn carried_by(gap: &mapper_gap::report::Gap) -> String {
     }
     let mut text = format!("  {} of {all} steps show a gap", gap.steps_with_gap);
     if let Some(step) = gap.largest_step.filter(|_| gap.largest_share >= NAMED_SHARE) {
-        text += &format!("; step {} alone carries {:.0} % of it", step + 1, 100.0 * gap.largest_share);
+        text +=
+            &format!("; step {} alone carries {:.0} % of it", step_number(step), 100.0 * gap.largest_share);
     }
     text + "\n"
 }

@@ -9,7 +9,7 @@ use crate::table::with_heads;
 use crate::verdict_word;
 use crate::wrapped::wrapped;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{CompressorMap, IdentifiedPoint, SpeedLine, Verdict};
+use mapper_core::{CompressorMap, IdentifiedPoint, SpeedLine, Verdict, step_number};
 use mapper_numerics::statistics::mean;
 use mapper_record::score::ScoredPoint;
 
@@ -122,7 +122,7 @@ fn speed_lines(points: &[ScoredPoint], map: Option<&CompressorMap>) -> Vec<(f64,
 fn row(display: &Display, point: &IdentifiedPoint) -> Vec<String> {
     let half = |low: Option<f64>, high: Option<f64>| Some(0.5 * (high? - low?));
     vec![
-        (point.step + 1).to_string(),
+        step_number(point.step).to_string(),
         opening(point.valve_opening_ratio),
         display.flow(point.flow_corrected_kg_s),
         format!("{:.4}", point.pressure_ratio),

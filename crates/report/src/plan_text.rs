@@ -5,7 +5,7 @@ use crate::duration::{duration, eta};
 use crate::number::{number, percent};
 use crate::table;
 use mapper_campaign::Campaign;
-use mapper_core::{Plan, PlanBound, StepKind};
+use mapper_core::{Plan, PlanBound, StepKind, step_number};
 use std::fmt::Write;
 
 fn bound_text(bound: &PlanBound) -> String {
@@ -54,10 +54,10 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
         let predicted = &step.predicted;
         steps.add_row([
             match step.kind {
-                StepKind::Point => (step.index + 1).to_string(),
-                StepKind::Repeat => format!("{} repeat", step.index + 1),
-                StepKind::Return => format!("{} again", step.index + 1),
-                StepKind::Approach => format!("{} surge", step.index + 1),
+                StepKind::Point => step_number(step.index).to_string(),
+                StepKind::Repeat => format!("{} repeat", step_number(step.index)),
+                StepKind::Return => format!("{} again", step_number(step.index)),
+                StepKind::Approach => format!("{} surge", step_number(step.index)),
             },
             step.from.map_or_else(|| "-".to_owned(), |from| display.place(from)),
             display.place(step.to),

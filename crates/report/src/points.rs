@@ -5,7 +5,7 @@ use crate::doubts::doubts;
 use crate::number::{number, percent};
 use crate::table;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{IdentifiedPoint, StepKind, Verdict};
+use mapper_core::{IdentifiedPoint, StepKind, Verdict, step_number};
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 use std::fmt::Write;
 
@@ -116,10 +116,10 @@ fn points_table(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) -> co
 /// The number of a point's step, from 1, and whether it is a repeat.
 pub fn step_name(point: &IdentifiedPoint) -> String {
     match point.kind {
-        StepKind::Point => (point.step + 1).to_string(),
-        StepKind::Repeat => format!("{} repeat", point.step + 1),
-        StepKind::Return => format!("{} again", point.step + 1),
-        StepKind::Approach => format!("{} surge", point.step + 1),
+        StepKind::Point => step_number(point.step).to_string(),
+        StepKind::Repeat => format!("{} repeat", step_number(point.step)),
+        StepKind::Return => format!("{} again", step_number(point.step)),
+        StepKind::Approach => format!("{} surge", step_number(point.step)),
     }
 }
 

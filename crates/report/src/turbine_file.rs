@@ -17,7 +17,8 @@ const AVERAGE_S: f64 = 10.0;
 /// The turbine at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TurbinePoint {
-    /// Index of the step.
+    /// Place of the step, from 0; files have its number, from 1.
+    #[serde(serialize_with = "mapper_core::step_number::serialize")]
     pub step: usize,
     /// Speed over the root of the inlet temperature, rpm/K^0.5.
     pub speed_parameter_rpm_sqrt_k: f64,

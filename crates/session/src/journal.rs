@@ -101,8 +101,8 @@ pub enum Entry {
     },
     /// The soak is over, and in the recording.
     Soaked,
-    /// A step is over, and in the recording: its index in the plan.
-    StepSaved(usize),
+    /// A step is over, and in the recording: its place in the plan, written as its number.
+    StepSaved(#[serde(with = "mapper_core::step_number")] usize),
     /// The run is over, in words.
     Ended(String),
 }
@@ -253,7 +253,7 @@ mod tests {
         for bytes in [
             &b"\xff\xfe\x00"[..],
             b"{}\n[]\n\"step_saved\"",
-            b"{\"step_saved\": -1}\n{\"step_saved\": 1e400}",
+            b"{\"step_saved\": -1}\n{\"step_saved\": 0}\n{\"step_saved\": 1e400}",
         ] {
             std::fs::write(&path, bytes).unwrap();
             assert_eq!(read_journal(&path).unwrap(), []);

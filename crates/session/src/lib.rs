@@ -14,7 +14,7 @@
 //!     Registry { backends: vec![virtual_lab::PLUGIN], formats: FORMATS, ..Registry::default() };
 //! let show = |event: &SessionEvent| {
 //!     if let SessionEvent::StepStarted(step) = event {
-//!         println!("step {} at {:.0} s", step.index + 1, step.start_s);
+//!         println!("step {} at {:.0} s", mapper_core::step_number(step.index), step.start_s);
 //!     }
 //! };
 //! let session = Session { on_event: &show, ..Session::new(&registry) };

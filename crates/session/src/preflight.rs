@@ -1,7 +1,7 @@
 //! What is looked at before the rig is touched.
 
 use crate::SessionError;
-use mapper_core::{Plan, RigDescription, RigMode, Setpoints};
+use mapper_core::{Plan, RigDescription, RigMode, Setpoints, step_number};
 use std::path::Path;
 
 /// Bytes of a recording for one sample of one channel: measured on the virtual lab with its truth, and half as much again.
@@ -23,9 +23,9 @@ pub(crate) fn check_setpoints(plan: &Plan, rig: &RigDescription) -> Result<(), S
             valve_opening_ratio: step.to.valve_opening_ratio,
             oil_temperature_k: step.oil_temperature_k,
         };
-        accepts
-            .check(&setpoints)
-            .map_err(|error| SessionError::Preflight(format!("step {} of the plan: {error}", place + 1)))?;
+        accepts.check(&setpoints).map_err(|error| {
+            SessionError::Preflight(format!("step {} of the plan: {error}", step_number(place)))
+        })?;
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ use crate::SessionError;
 use crate::resume::{AGAIN_FROM, BrokenOff};
 use mapper_core::{
     ChannelColumn, ElementColumn, Event, PlanStep, Recording, SampleBatch, Series, StepKind, StepMarker,
+    step_number,
 };
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_runner::{RunEnd, RunError, StepSource, StepSourceError};
@@ -179,7 +180,9 @@ impl Told<'_, '_> {
         loop {
             let next = self.inner.next_step().map_err(|error| self.refused(error.to_string()))?;
             let Some(next) = next else {
-                return Err(self.refused(format!("there is no step {} any more", recorded.index + 1)));
+                return Err(
+                    self.refused(format!("there is no step {} any more", step_number(recorded.index)))
+                );
             };
             if next.index < recorded.index {
                 let left_out = StepMarker {
@@ -205,7 +208,7 @@ impl Told<'_, '_> {
                 let to = recorded.to.unwrap_or(next.to);
                 return Err(self.refused(format!(
                     "step {} led to {:.1} rpm at an opening of {:.4} and would now lead to {:.1} rpm at {:.4}",
-                    recorded.index + 1,
+                    step_number(recorded.index),
                     to.speed_rpm,
                     to.valve_opening_ratio,
                     next.to.speed_rpm,

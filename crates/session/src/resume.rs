@@ -9,8 +9,9 @@ use mapper_runner::{StepSource, StepSourceError};
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
-/// Steps that are made once more to come from where the missing one comes from are numbered from here on: no plan has as many.
-pub(crate) const AGAIN_FROM: usize = 1_000_000;
+/// Places of steps that are made once more to come from where the missing one comes from.
+pub(crate) const AGAIN_FROM: usize = StepMarker::AGAIN_FROM;
+
 /// Whether the steps of a campaign depend on what was measured.
 pub(crate) fn depends_on_readings(campaign: &Campaign) -> bool {
     campaign.sequence.is_some()

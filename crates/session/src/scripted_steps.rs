@@ -6,7 +6,7 @@ use crate::estimates::{keep, single_steps, two_last_steps};
 use crate::planned::plan;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
-use mapper_core::{Plan, PlanStep, Recording, SampleBatch, StepMarker};
+use mapper_core::{Plan, PlanStep, Recording, SampleBatch, StepMarker, step_number};
 use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_physics::model::Model;
 use mapper_runner::{StepSource, StepSourceError};
@@ -82,7 +82,7 @@ impl StepSource for ScriptedSteps {
         two_last_steps(&mut self.recent, marker);
         let identified = identify_each(&self.recent, &self.config).map_err(source_error)?.pop();
         self.finished = Some(StepResult {
-            number: step.index + 1,
+            number: step_number(step.index),
             target: step.to,
             from: step.from,
             start_s: marker.start_s,
@@ -99,7 +99,7 @@ impl StepSource for ScriptedSteps {
     fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(step) = self.now.take() else { return Ok(()) };
         self.finished = Some(StepResult {
-            number: step.index + 1,
+            number: step_number(step.index),
             target: step.to,
             from: step.from,
             start_s: marker.start_s,

@@ -3,7 +3,7 @@
 use crate::SessionError;
 use crate::files::read_at_most;
 use mapper_campaign::Campaign;
-use mapper_core::{OperatingPoint, Plan, PlanStep};
+use mapper_core::{OperatingPoint, Plan, PlanStep, step_number};
 use std::path::Path;
 
 /// Largest plan file that is read, bytes.
@@ -65,7 +65,7 @@ fn objection(plan: &Plan, campaign: &Campaign) -> Option<String> {
     }
     let first = plan.steps.iter().enumerate().find_map(|(place, step)| {
         let why = of_step(place, step, campaign)?;
-        Some(format!("step {} {why}", place + 1))
+        Some(format!("step {} {why}", step_number(place)))
     });
     first.or_else(|| {
         let duration_s = plan.duration_s();
@@ -76,7 +76,7 @@ fn objection(plan: &Plan, campaign: &Campaign) -> Option<String> {
 
 fn of_step(place: usize, step: &PlanStep, campaign: &Campaign) -> Option<String> {
     if step.index != place {
-        return Some(format!("says that it is step {}", step.index.saturating_add(1)));
+        return Some(format!("says that it is step {}", step_number(step.index)));
     }
     let limits = &campaign.limits;
     let coldest_k = 250.0;

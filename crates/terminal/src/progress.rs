@@ -203,7 +203,7 @@ impl Shown {
                 self.bar.set_message(run_words(state.step, state.steps, *t_s, state.duration_s, left_s));
             }
             SessionEvent::StepStarted(marker) => {
-                state.step = marker.index + 1;
+                state.step = marker.number().unwrap_or(state.step);
                 self.bar.set_prefix(format!(
                     "{}, {} at this point",
                     place(marker),
@@ -271,10 +271,12 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
             format!("{steps} steps in {} of rig time", short(*duration_s))
         }
         SessionEvent::StepStarted(marker) => format!(
-            "{:8.1} s  step {} of {}, {}, for {}",
+            "{:8.1} s  {}, {}, for {}",
             marker.start_s,
-            marker.index + 1,
-            state.steps.max(marker.index + 1),
+            marker.number().map_or_else(
+                || "a step once more".to_owned(),
+                |number| format!("step {number} of {}", state.steps.max(number))
+            ),
             place(marker),
             short(marker.end_s - marker.start_s)
         ),

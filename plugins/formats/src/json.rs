@@ -3,7 +3,8 @@
 use crate::lines::POINT_LIMIT;
 use crate::reference;
 use mapper_core::{CompressorMap, ExportError, ImportError, MapFormat, ReferenceState};
-use serde_json::Value;
+use serde::Serialize;
+use serde_json::{Value, json};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "json",
@@ -14,6 +15,16 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     draw: None,
     read: Some(read),
 };
+
+/// Layout 2 numbers steps from 1. Files of version 0.1.0 have no `format`, and their steps count from 0.
+const LAYOUT: u32 = 2;
+
+#[derive(Serialize)]
+struct Written<'a> {
+    format: u32,
+    #[serde(flatten)]
+    map: &'a CompressorMap,
+}
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     for point in map.lines.iter().flat_map(|line| &line.points) {
@@ -32,7 +43,7 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
             }
         }
     }
-    let mut bytes = serde_json::to_vec_pretty(map).map_err(ExportError::failed(FORMAT.name))?;
+    let mut bytes = serde_json::to_vec_pretty(&Written { format: LAYOUT, map }).map_err(ExportError::failed(FORMAT.name))?;
     bytes.push(b'\n');
     Ok(bytes)
 }
@@ -50,9 +61,23 @@ fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, Impo
     if let Some(object) = value.as_object_mut() {
         object.insert("reference".to_owned(), serde_json::to_value(settled)?);
     }
+    if value.get("format").is_none() {
+        number_steps_from_one(&mut value);
+    }
     let map: CompressorMap = serde_json::from_value(value)?;
     check(&map)?;
     Ok(map)
+}
+
+fn number_steps_from_one(map: &mut Value) {
+    fn each(value: Option<&mut Value>) -> impl Iterator<Item = &mut Value> {
+        value.and_then(Value::as_array_mut).into_iter().flatten()
+    }
+    for point in each(map.get_mut("lines")).flat_map(|line| each(line.get_mut("points"))) {
+        if let Some(step) = point.pointer_mut("/identified/step") {
+            *step = step.as_u64().map_or(Value::Null, |index| json!(index.saturating_add(1)));
+        }
+    }
 }
 
 fn check(map: &CompressorMap) -> Result<(), ImportError> {

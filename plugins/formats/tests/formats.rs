@@ -111,6 +111,39 @@ fn json_reads_back_to_the_same_map() {
     assert!(value["lines"][0]["points"][0]["eta"].is_null(), "undefined is null");
 }
 
+/// Files of version 0.1.0 count steps from 0, and do not say so.
+#[test]
+fn maps_of_older_versions_keep_their_steps() {
+    let map = support::turbo_a();
+    let written: Vec<usize> = points(&map).iter().map(|point| point.identified.step).collect();
+    let read = |format: &str, text: &str| -> Vec<usize> {
+        let back = FORMATS.find(format).unwrap().read(text.as_bytes(), None).unwrap();
+        points(&back).iter().map(|point| point.identified.step).collect()
+    };
+    let text = export("json", &map);
+    assert_eq!(read("json", &text), written);
+    let mut old: serde_json::Value = serde_json::from_str(&text).unwrap();
+    old.as_object_mut().unwrap().remove("format");
+    for line in old["lines"].as_array_mut().unwrap() {
+        for point in line["points"].as_array_mut().unwrap() {
+            let step = &mut point["identified"]["step"];
+            *step = (step.as_u64().unwrap() - 1).into();
+        }
+    }
+    assert_eq!(read("json", &old.to_string()), written);
+
+    let text = export("csv", &map);
+    let marked = |line: &&str| line.starts_with("# step: ");
+    assert_eq!(text.lines().filter(marked).count(), 1);
+    let old: String = text.lines().filter(|line| !marked(line)).map(|line| format!("{line}\n")).collect();
+    let (mut now, mut before) = (read("csv", &text), read("csv", &old));
+    now.sort_unstable();
+    before.sort_unstable();
+    assert_eq!(now, written);
+    // What stands there is taken as counted from 0.
+    assert_eq!(before, written.iter().map(|step| step + 1).collect::<Vec<_>>());
+}
+
 #[test]
 fn json_refuses_what_it_could_not_read_back() {
     let mut map = support::turbo_a();

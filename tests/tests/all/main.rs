@@ -38,6 +38,7 @@ mod shipped_campaign;
 mod sizes;
 mod sources;
 mod speed_lines;
+mod step_numbers;
 mod stopped;
 mod surge;
 mod terminal;

@@ -202,7 +202,7 @@ fn hostile_plans_are_refused() {
         ("fire", |plan| plan["steps"][0]["t3_k"] = json!(1300.0), "T3"),
         ("valve", |plan| plan["steps"][0]["valve"] = json!(0.0), "valve opening"),
         ("oil", |plan| plan["steps"][0]["oil_temperature_k"] = json!(0.0), "T_oil"),
-        ("order", |plan| plan["steps"][0]["index"] = json!(7), "says that it is step"),
+        ("order", |plan| plan["steps"][0]["step"] = json!(7), "says that it is step"),
         ("nothing to do", |plan| plan["steps"] = json!([]), "0 steps"),
     ];
     for (what, change, words) in hostile {

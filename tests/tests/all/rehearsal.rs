@@ -384,7 +384,7 @@ fn a_plan_of_a_rig_that_has_changed_since_is_refused() {
     std::fs::remove_file(broken.join("points.json")).unwrap();
     let journal = broken.join("journal.jsonl");
     let lines = std::fs::read_to_string(&journal).unwrap();
-    let saved = lines.lines().position(|line| line.contains("\"step_saved\":1")).unwrap();
+    let saved = lines.lines().position(|line| line.contains("\"step_saved\":2")).unwrap();
     let until_then: String = lines.split_inclusive('\n').take(saved + 1).collect();
     std::fs::write(&journal, until_then).unwrap();
     let resume =

@@ -65,7 +65,7 @@ fn a_script_sees_what_the_recording_gives() {
     let points = result["points"].as_array().unwrap();
     assert_eq!(points.len(), 4);
     for point in points.iter().filter(|point| point["eta"].is_number()) {
-        let step = point["step"].as_u64().unwrap() + 1;
+        let step = point["step"].as_u64().unwrap();
         let mark = format!("eta {step} ");
         let told = report.split(&mark).nth(1).unwrap().split_whitespace().next().unwrap();
         let (told, eta): (f64, f64) = (told.parse().unwrap(), point["eta"].as_f64().unwrap());

@@ -1,15 +1,15 @@
-//! Steps that cannot be what they say: a rig is at one operating point at a time, and an index names one step.
+//! Steps that cannot be what they say: a rig is at one operating point at a time, and a number names one step.
 
 use crate::findings::code;
 use crate::objections::objection::Objection;
-use mapper_core::Recording;
+use mapper_core::{Recording, step_number};
 
 /// Overlap that rounded times of other loggers explain, s.
 const ROUNDED_S: f64 = 0.5;
 /// No plan has as many steps: a year of steps of 20 s has 1.6 million.
-const LARGEST_INDEX: usize = 10_000_000;
+const MAX_STEPS: usize = 10_000_000;
 
-/// Steps that overlap in time, share an index, or have one that no plan has.
+/// Steps that overlap in time, share a number, or have one that no plan has.
 pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let steps = &recording.steps;
     let mut found = Vec::new();
@@ -23,10 +23,10 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
             let message = format!(
                 "step {} ({:.1} s to {:.1} s) and step {} ({:.1} s to {:.1} s) overlap, and a rig is at one point at a time: correct \
                  the step marks",
-                steps[before].index,
+                step_number(steps[before].index),
                 steps[before].start_s,
                 steps[before].end_s,
-                step.index,
+                step_number(step.index),
                 step.start_s,
                 step.end_s
             );
@@ -39,17 +39,18 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let mut by_index: Vec<usize> = (0..steps.len()).collect();
     by_index.sort_by_key(|position| steps[*position].index);
     for same in by_index.chunk_by(|a, b| steps[*a].index == steps[*b].index).filter(|same| same.len() > 1) {
-        let index = steps[same[0]].index;
         let message = format!(
-            "{} steps have the index {index}, so what is told of one cannot be told from the others: give each its own",
-            same.len()
+            "{} steps have the number {}, so what is told of one cannot be told from the others: give each its own",
+            same.len(),
+            step_number(steps[same[0]].index)
         );
         found.push(Objection::new(code::STEPS_CONTRADICT, message, same.to_vec()));
     }
-    for (position, step) in steps.iter().enumerate().filter(|(_, step)| step.index > LARGEST_INDEX) {
+    for (position, step) in steps.iter().enumerate().filter(|(_, step)| step_number(step.index) > MAX_STEPS) {
         let message = format!(
-            "step {} at {:.1} s has an index beyond {LARGEST_INDEX}, which no plan has: correct the step marks",
-            step.index, step.start_s
+            "step {} at {:.1} s has a number beyond {MAX_STEPS}, which no plan has: correct the step marks",
+            step_number(step.index),
+            step.start_s
         );
         found.push(Objection::new(code::STEPS_CONTRADICT, message, vec![position]));
     }

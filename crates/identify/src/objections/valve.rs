@@ -9,7 +9,7 @@ use crate::findings::code;
 use crate::objections::ends::Ends;
 use crate::objections::linear::fit;
 use crate::objections::objection::Objection;
-use mapper_core::{Channel, Recording};
+use mapper_core::{Channel, Recording, step_number};
 use mapper_numerics::statistics::median;
 use mapper_physics::orifice;
 
@@ -76,7 +76,7 @@ pub(crate) fn objections(
     let example = worst.map_or_else(String::new, |(by, end)| {
         format!(
             " (step {}: {:.2} g/s at {:.1} kPa, {:+.0} % off)",
-            recording.steps.get(end.position).map_or(end.position, |step| step.index),
+            step_number(recording.steps.get(end.position).map_or(end.position, |step| step.index)),
             end.flow_kg_s * 1e3,
             end.p2_pa / 1e3,
             100.0 * by.exp_m1()

@@ -2,7 +2,7 @@
 
 use crate::run_page::RunPage;
 use crate::table::{Cell, Row, data_table};
-use mapper_core::{PlanStep, standard_error_of};
+use mapper_core::{PlanStep, standard_error_of, step_number};
 use mapper_report::{Display, duration, number, percent};
 use maud::{Markup, html};
 
@@ -58,7 +58,7 @@ fn row(page: &RunPage<'_>, display: &Display, step: &PlanStep) -> Row {
     Row {
         step: point.map(|point| point.step),
         cells: vec![
-            Cell::number((step.index + 1).to_string(), step.index as f64),
+            Cell::number(step_number(step.index).to_string(), step.index as f64),
             Cell::text(step.from.map_or_else(|| "-".to_owned(), |from| display.place(from))),
             Cell::text(display.place(step.to)),
             match point {

@@ -1,6 +1,7 @@
 //! The transient of one point.
 
 use crate::run_page::RunPage;
+use mapper_core::step_number;
 use mapper_report::{Display, step_name};
 use maud::{Markup, html};
 
@@ -14,7 +15,7 @@ pub(crate) fn step(page: &RunPage<'_>) -> Markup {
                 label for="step-choice" { "Step " }
                 select #step-choice {
                     @for point in page.report.points.iter().map(|scored| &scored.point) {
-                        option value=(point.step) {
+                        option value=(step_number(point.step)) {
                             (step_name(point)) " · " (display.speed(point.speed_rpm)) " " (display.units().speed)
                             @if point.valve_opening_ratio.is_finite() { " · opening " (point.valve_opening_ratio) }
                         }

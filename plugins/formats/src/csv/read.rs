@@ -21,6 +21,8 @@ struct Head {
     reference: Option<ReferenceState>,
     machine: String,
     method: Option<Method>,
+    /// What the steps count from: files of version 0.1.0 do not say, and count from 0.
+    first_step: f64,
     columns: Columns,
 }
 
@@ -31,7 +33,7 @@ struct Columns {
 }
 
 pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
-    let (mut reference, mut machine, mut method) = (None, String::new(), None);
+    let (mut reference, mut machine, mut method, mut first_step) = (None, String::new(), None, 0.0);
     for comment in text.lines().filter_map(|line| line.trim_start().strip_prefix('#')) {
         reference = reference.or_else(|| reference::in_comment(comment));
         if let Some((_, name)) = comment.split_once("compressor map of ") {
@@ -39,6 +41,9 @@ pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
         }
         if let Some((_, name)) = comment.split_once("method: ") {
             method = method_of(name);
+        }
+        if comment.trim_start().starts_with("step: ") {
+            first_step = 1.0;
         }
     }
     let table = table_text(text);
@@ -70,7 +75,7 @@ pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
             }
         }
     };
-    let head = Head { reference, machine, method, columns };
+    let head = Head { reference, machine, method, first_step, columns };
     let mut rows: Vec<(Row, StringRecord)> = Vec::new();
     while let Some(next) = pending.take().map(Ok).or_else(|| records.next().map(record)) {
         let next = next?;
@@ -220,7 +225,7 @@ fn own_point(
     let columns = &head.columns;
     let number = |name: &str| columns.number(record, name);
     let or = |name: &str, default: f64| Ok::<_, ImportError>(number(name)?.unwrap_or(default));
-    let mut point = row.point(reference, or("step", 0.0)?.max(0.0) as usize);
+    let mut point = row.point(reference, (or("step", head.first_step)? - head.first_step).max(0.0) as usize);
     point.flow_corrected_kg_s = or("flow_measured_corrected_kg_s", row.flow_corrected_kg_s)?;
     point.pressure_ratio = or("pressure_ratio_measured", row.pressure_ratio)?;
     point.speed_rpm = or("speed_rpm", row.speed_corrected_rpm)?;

@@ -1,6 +1,6 @@
 //! A map as rows of points.
 
-use mapper_core::{CompressorMap, ExportError, MapPoint, SpeedLine, Verdict};
+use mapper_core::{CompressorMap, ExportError, MapPoint, SpeedLine, Verdict, step_number};
 
 /// Column names, in order. An absent number is an empty field; `eta*` are fractions, 95 % intervals.
 const COLUMNS: [&str; 28] = [
@@ -55,6 +55,7 @@ fn header(map: &CompressorMap) -> String {
          # flow_corrected_kg_s and pressure_ratio: brought to line_speed_corrected_rpm by similarity; *_measured: before\n\
          # *_common_changes*: what one standard deviation of each error that all points share changes, separated by semicolons; \
          the rest of an interval is the point's own\n\
+         # step: number of the step in its run, from 1\n\
          # h: heat-transfer coefficient between gas and compressor housing; warnings: codes separated by semicolons\n",
         crate::heading::heading(map, "#"),
         map.method,
@@ -96,7 +97,7 @@ fn row(line: &SpeedLine, point: &MapPoint) -> [String; 28] {
         p.method.to_string(),
         verdict.to_owned(),
         p.warnings.iter().map(|warning| warning.code.as_str()).collect::<Vec<_>>().join(";"),
-        p.step.to_string(),
+        step_number(p.step).to_string(),
         number(p.flow_corrected_kg_s),
         number(p.pressure_ratio),
         list(&p.common.eta_changes),

@@ -16,6 +16,13 @@ impl Rect {
         x >= self.left - slack && x <= self.right + slack && y >= self.top - slack && y <= self.bottom + slack
     }
 
+    pub(crate) fn overlaps(&self, other: &Rect) -> bool {
+        self.left < other.right
+            && other.left < self.right
+            && self.top < other.bottom
+            && other.top < self.bottom
+    }
+
     pub(crate) fn width(&self) -> f64 {
         self.right - self.left
     }
@@ -23,6 +30,11 @@ impl Rect {
     pub(crate) fn height(&self) -> f64 {
         self.bottom - self.top
     }
+}
+
+/// Whether a segment touches the rectangle.
+pub(crate) fn touches(a: (f64, f64), b: (f64, f64), rect: &Rect) -> bool {
+    segment(a, b, rect).is_some()
 }
 
 /// The part of a segment inside the rectangle (Liang-Barsky).

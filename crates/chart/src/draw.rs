@@ -13,6 +13,7 @@ use crate::legend;
 use crate::marching::contour_lines;
 use crate::markers::{MarkerStyle, draw_arrow, draw_marker};
 use crate::palette::{INK, LIGHT_GREY};
+use crate::point_labels::Surroundings;
 use crate::text::{cut, width_px};
 use crate::{Contours, Figure};
 
@@ -68,8 +69,10 @@ fn panel(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
                 drawing.areas(&[clip::polygon(&points, &frame.rect)], item.colour, item.opacity);
             }
             Item::Annotation(item) => annotation(frame, item, &mut late),
+            Item::PointLabels(_) => {}
         }
     }
+    point_labels(drawing, placed, &mut late);
     for text in &late {
         drawing.text(text.at, &text.text, &text.style);
     }
@@ -289,6 +292,37 @@ fn contours(
             }
         }
     }
+}
+
+/// Comes last, so that it sees all that it has to avoid.
+fn point_labels(drawing: &mut Drawing, placed: &PlacedPanel<'_>, late: &mut Vec<LateText>) {
+    let texts = late.iter().map(|text| text_box(text.at, &text.text, &text.style)).collect();
+    let mut surroundings = Surroundings::of(&placed.frame, &placed.panel.items, texts);
+    for item in &placed.panel.items {
+        let Item::PointLabels(item) = item else { continue };
+        for (text, point) in &item.labels {
+            let Some(label) = surroundings.place(placed.frame.px(*point), text, item.size_px) else {
+                continue;
+            };
+            if let Some((from, to)) = label.leader {
+                drawing.line(from, to, &Stroke::solid(item.colour, 0.7));
+            }
+            let style = TextStyle::new(item.size_px, item.colour, TextAnchor::Middle).halo().bold();
+            late.push(LateText { at: label.centre, text: text.clone(), style, at_line_end: false });
+        }
+    }
+}
+
+/// The box of a text that is not turned.
+fn text_box(at: (f64, f64), text: &str, style: &TextStyle) -> Rect {
+    let width = width_px(text, style.size_px);
+    let left = match style.anchor {
+        TextAnchor::Start => at.0,
+        TextAnchor::Middle => at.0 - 0.5 * width,
+        TextAnchor::End => at.0 - width,
+    };
+    let half = 0.5 * style.size_px;
+    Rect { left, top: at.1 - half, right: left + width, bottom: at.1 + half }
 }
 
 fn annotation(frame: &Frame, item: &Annotation, late: &mut Vec<LateText>) {

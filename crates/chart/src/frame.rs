@@ -84,7 +84,7 @@ pub(crate) fn scales(panel: &Panel, width_px: f64, height_px: f64) -> (Scale, Sc
                 RuleAt::Y(value) => y.add(value),
                 RuleAt::X(value) => x.add(value),
             },
-            Item::Annotation(_) => {}
+            Item::Annotation(_) | Item::PointLabels(_) => {}
         }
     }
     let scatters = || {

@@ -18,6 +18,8 @@ pub enum Item {
     Polygon(Polygon),
     /// A text.
     Annotation(Annotation),
+    /// Short texts around points.
+    PointLabels(PointLabels),
 }
 
 /// How a line is broken.
@@ -341,6 +343,18 @@ impl Annotation {
     }
 }
 
+/// Short texts next to points, e.g. the numbers of steps. Each is placed where it covers neither a marker nor another text, and as
+/// few lines as possible; one that stands apart from its point has a leader line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointLabels {
+    /// Text and point of each, the most important first; those that find no place are left out.
+    pub labels: Vec<(String, (f64, f64))>,
+    /// Colour.
+    pub colour: Colour,
+    /// Height of the text, px.
+    pub size_px: f64,
+}
+
 macro_rules! into_item {
     ($($kind:ident),*) => {
         $(impl From<$kind> for Item {
@@ -350,4 +364,4 @@ macro_rules! into_item {
         })*
     };
 }
-into_item!(Line, Scatter, Rule, Contours, Polygon, Annotation);
+into_item!(Line, Scatter, Rule, Contours, Polygon, Annotation, PointLabels);

@@ -64,7 +64,7 @@ pub(crate) fn entries(panel: &Panel) -> Vec<Entry> {
                 Swatch::Line(Stroke { colour: contours.colour, width_px: 1.2, dash: Dash::Solid }),
             ),
             Item::Polygon(polygon) => (&polygon.label, Swatch::Area(polygon.colour, polygon.opacity)),
-            Item::Annotation(_) => continue,
+            Item::Annotation(_) | Item::PointLabels(_) => continue,
         };
         let Some(label) = label else { continue };
         let text = cut(label, FONT_PX, LONGEST_TEXT_PX);

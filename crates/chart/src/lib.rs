@@ -38,6 +38,7 @@ mod marching;
 mod markers;
 pub mod palette;
 mod png;
+mod point_labels;
 mod svg;
 mod text;
 mod ticks;
@@ -47,8 +48,8 @@ pub use contour_item::{ContourLevel, Contours};
 pub use figure::{Figure, LegendPlace, Panel};
 pub use grid::{GridError, StructuredGrid};
 pub use items::{
-    Annotation, Dash, EndLabel, Item, Line, LineEnd, Marker, Note, Polygon, Rule, RuleAt, Scatter,
-    ScatterPoint, Space, TextAnchor,
+    Annotation, Dash, EndLabel, Item, Line, LineEnd, Marker, Note, PointLabels, Polygon, Rule, RuleAt,
+    Scatter, ScatterPoint, Space, TextAnchor,
 };
 pub use marching::contour_lines;
 pub use palette::Colour;

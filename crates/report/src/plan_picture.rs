@@ -1,26 +1,24 @@
-//! The path through the map: conventional mapping beside the plan, as in figure 13 of the paper.
+//! Figure 13 of the paper, made from a campaign: (a) its points along speed lines, (b) in the planned order.
 
 use mapper_campaign::Campaign;
-use mapper_chart::{Annotation, Axis, Colour, Figure, Line, Panel, Scatter, TextAnchor};
-use mapper_core::{OperatingPoint, Plan, StepKind, VisitOrder};
+use mapper_chart::{Annotation, Axis, Colour, Figure, Line, Panel, PointLabels, Scatter};
+use mapper_core::{OperatingPoint, Plan, StepKind, step_number};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::steady::hold_speed;
-use mapper_planner::{Comparison, WayOfMapping};
 
-const MAP: Colour = Colour(0xB0, 0xB0, 0xB0);
-const CONVENTIONAL: Colour = Colour(0xB4, 0x53, 0x09);
-const PROPOSED: Colour = Colour(0x1D, 0x4E, 0x89);
+const MAP: Colour = Colour(0xC8, 0xC8, 0xC8);
+const MAP_TEXT: Colour = Colour(0x80, 0x80, 0x80);
+const SPEED_LINES: Colour = Colour(0xB4, 0x53, 0x09);
+const PLANNED: Colour = Colour(0x1D, 0x4E, 0x89);
+const FIRST: Colour = Colour(0x15, 0x80, 0x3D);
 
-/// Steps that carry their number: more would cover the map.
-const NUMBERED_STEPS: usize = 80;
-/// Jumps that are drawn strongly.
-const FIRST_JUMPS: usize = 10;
-/// How much of the colour is left for all others.
-const LATER_TINT: f64 = 0.6;
+/// Plans of more steps than this have only every fifth number, and those of more than the second every tenth.
+const ALL_NUMBERED: usize = 60;
+const FIFTH_NUMBERED: usize = 150;
 
-/// Both paths side by side, as SVG.
-pub fn plan_svg(campaign: &Campaign, model: &Model, plan: &Plan, comparison: &Comparison) -> String {
+/// Both orders side by side, as SVG; `along_lines` is the plan along speed lines, `None` where the limits allow none.
+pub fn plan_svg(campaign: &Campaign, model: &Model, plan: &Plan, along_lines: Option<&Plan>) -> String {
     let place = |point: OperatingPoint| {
         let boundary =
             BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
@@ -29,88 +27,111 @@ pub fn plan_svg(campaign: &Campaign, model: &Model, plan: &Plan, comparison: &Co
             (1e3 * steady.outputs.flow_corrected_kg_s, steady.outputs.pressure_ratio)
         })
     };
-    let proposed: Vec<OperatingPoint> = plan.steps.iter().map(|step| step.to).collect();
-    let repeats: Vec<(f64, f64)> =
-        plan.steps.iter().filter(|step| step.kind == StepKind::Repeat).map(|step| place(step.to)).collect();
-    let conventional = panel(
-        campaign,
-        &format!("(a) conventional: {}", numbers(&comparison.conventional)),
-        CONVENTIONAL,
-        &comparison.conventional.order,
-        &place,
-    );
-    let mut planned = panel(
-        campaign,
-        &format!("(b) {}: {}", plan.objective, numbers(&comparison.proposed)),
-        PROPOSED,
-        &proposed,
-        &place,
-    );
-    if !repeats.is_empty() {
-        planned.add(Scatter::new(repeats, PROPOSED).hollow().size_px(14.0).label("repeats for drift"));
-    }
-    Figure::new(format!("{}: path through the map", plan.campaign))
+    let grid: Vec<(OperatingPoint, (f64, f64))> =
+        campaign.points.iter().map(|point| (*point, place(*point))).collect();
+    let panels = [
+        ("(a) along speed lines", SPEED_LINES, along_lines),
+        (&format!("(b) planned order, {}", plan.objective.replace('_', " ")), PLANNED, Some(plan)),
+    ]
+    .map(|(title, colour, plan)| match plan {
+        None => speed_lines(&grid).title(format!("{title}: not within the limits")),
+        Some(plan) => panel(&grid, plan, colour, &place).title(format!("{title}: {}", figures(plan))),
+    });
+    let steps = [Some(plan), along_lines].into_iter().flatten().map(|plan| plan.steps.len()).max();
+    let every = match numbered_every(steps.unwrap_or(0)) {
+        1 => "Numbers are those of the steps.".to_owned(),
+        every => format!("The first, the last and every {every}th step have their number."),
+    };
+    let [a, b] = panels;
+    Figure::new(format!("{}: order of the points", plan.campaign))
         .subtitle(format!(
-            "Errors of the efficiency as predicted on the nominal machine: rms, worst. Along speed lines with the plan's method: {}.",
-            comparison.of_order(VisitOrder::SpeedLines.name()).map_or_else(|| "-".to_owned(), numbers)
+            "{every} Total gradient: sum of the housing's temperature changes within the windows. Minutes of the steps, without soak \
+             and warm-up."
         ))
-        .panel(conventional)
-        .panel(planned)
-        .panel_size_px(620.0, 480.0)
+        .panel(a)
+        .panel(b)
+        .panel_size_px(720.0, 620.0)
         .to_svg()
 }
 
-fn numbers(way: &WayOfMapping) -> String {
-    let percent =
-        |error: Option<f64>| error.map_or_else(|| "-".to_owned(), |error| format!("{:.2}", 100.0 * error));
-    format!(
-        "{:.0} min, {} / {} %points",
-        way.minutes,
-        percent(way.rms_error_eta),
-        percent(way.worst_error_eta)
-    )
+fn numbered_every(steps: usize) -> usize {
+    match steps {
+        0..=ALL_NUMBERED => 1,
+        ..=FIFTH_NUMBERED => 5,
+        _ => 10,
+    }
 }
 
-fn panel(
-    campaign: &Campaign,
-    title: &str,
-    colour: Colour,
-    path: &[OperatingPoint],
-    place: &impl Fn(OperatingPoint) -> (f64, f64),
-) -> Panel {
-    // Room for the names of the speed lines at their ends.
-    let widest = campaign.points.iter().map(|point| place(*point).0).fold(0.0, f64::max);
-    let flow = Axis::new("corrected flow, g/s").range(0.0, 1.15 * widest);
-    let mut panel = Panel::new(flow, Axis::new("pressure ratio P2/P1")).title(title);
-    let mut speeds: Vec<f64> = campaign.points.iter().map(|point| point.speed_rpm).collect();
+fn figures(plan: &Plan) -> String {
+    let minutes = plan.steps.iter().map(|step| step.dwell_s).sum::<f64>() / 60.0;
+    format!("total gradient {:.0} K in {minutes:.0} min", plan.figures.sum_gradient_k)
+}
+
+/// The map without a path.
+fn speed_lines(grid: &[(OperatingPoint, (f64, f64))]) -> Panel {
+    let ends =
+        |worse: f64, pick: fn(f64, f64) -> f64| grid.iter().map(|(_, place)| place.0).fold(worse, pick);
+    // Room for numbers at the left, and for the names of the speed lines at their right ends.
+    let (narrowest, widest) = (ends(f64::INFINITY, f64::min), ends(0.0, f64::max));
+    let flow = Axis::new("corrected flow, g/s").range(0.7 * narrowest.min(widest), 1.12 * widest);
+    let mut panel = Panel::new(flow, Axis::new("pressure ratio P2/P1"));
+    let mut speeds: Vec<f64> = grid.iter().map(|(point, _)| point.speed_rpm).collect();
     speeds.sort_by(f64::total_cmp);
     speeds.dedup();
-    for speed_rpm in &speeds {
-        let mut line: Vec<(f64, f64)> =
-            campaign.points.iter().filter(|point| point.speed_rpm == *speed_rpm).map(|p| place(*p)).collect();
+    for speed_rpm in speeds {
+        let of_speed = grid.iter().filter(|(point, _)| point.speed_rpm == speed_rpm);
+        let mut line: Vec<(f64, f64)> = of_speed.map(|(_, place)| *place).collect();
         line.sort_by(|a, b| a.0.total_cmp(&b.0));
         if let Some(end) = line.last() {
             let text = format!("{:.0} krpm", speed_rpm / 1e3);
-            panel.add(Annotation { colour: Colour(0x70, 0x70, 0x70), ..Annotation::new(text, *end) });
+            panel.add(Annotation { colour: MAP_TEXT, shift_px: (9.0, -3.0), ..Annotation::new(text, *end) });
         }
-        panel.add(Line::new(line, MAP).width_px(1.2).label("speed lines"));
-    }
-    let places: Vec<(f64, f64)> = path.iter().map(|point| place(*point)).collect();
-    let first = places.len().min(FIRST_JUMPS + 1);
-    // What comes later must not hide where the path begins.
-    if places.len() > first {
-        let later = places[first - 1..].to_vec();
-        panel.add(Line::new(later, colour.tint(LATER_TINT)).width_px(0.8).arrows().label("later jumps"));
-    }
-    let label = if places.len() > first { format!("first {FIRST_JUMPS} jumps") } else { "path".to_owned() };
-    panel.add(Line::new(places[..first].to_vec(), colour).width_px(1.6).arrows().label(label));
-    panel.add(Scatter::new(places.clone(), colour).size_px(5.0));
-    // Each point carries the number of the step that comes to it first.
-    for (step, at) in places.iter().enumerate() {
-        if places.len() <= NUMBERED_STEPS && !path[..step].contains(&path[step]) {
-            let number = Annotation::new((step + 1).to_string(), *at);
-            panel.add(Annotation { shift_px: (-4.0, 9.0), anchor: TextAnchor::End, colour, ..number });
-        }
+        panel.add(Line::new(line, MAP).width_px(1.0).label("speed lines"));
     }
     panel
+}
+
+fn panel(
+    grid: &[(OperatingPoint, (f64, f64))],
+    plan: &Plan,
+    colour: Colour,
+    place: &impl Fn(OperatingPoint) -> (f64, f64),
+) -> Panel {
+    let mut panel = speed_lines(grid);
+    let places: Vec<(f64, f64)> = plan.steps.iter().map(|step| place(step.to)).collect();
+    let count = places.len();
+    // The more jumps there are, the lighter they have to be for the numbers to stand out.
+    let tint = (0.6 - 0.002 * count as f64).max(0.25);
+    panel.add(Line::new(places.clone(), colour.tint(tint)).width_px(0.8).arrows().label("jumps"));
+    panel.add(Scatter::new(places.clone(), colour).size_px(4.0));
+    let repeats: Vec<(f64, f64)> = plan
+        .steps
+        .iter()
+        .zip(&places)
+        .filter(|(step, _)| step.kind == StepKind::Repeat)
+        .map(|(_, at)| *at)
+        .collect();
+    if !repeats.is_empty() {
+        panel.add(Scatter::new(repeats, colour).hollow().size_px(11.0).label("repeats for drift"));
+    }
+    panel.add(Scatter::new(places[..count.min(1)].to_vec(), FIRST).size_px(9.0).label("first step"));
+    panel.add(PointLabels { labels: numbers(plan, &places), colour, size_px: 10.5 });
+    panel
+}
+
+/// The numbers of the steps at each point, those of several steps together.
+fn numbers(plan: &Plan, places: &[(f64, f64)]) -> Vec<(String, (f64, f64))> {
+    let count = plan.steps.len();
+    let mut labels: Vec<(OperatingPoint, String, (f64, f64))> = Vec::new();
+    for ((place, step), at) in plan.steps.iter().enumerate().zip(places) {
+        let number = step_number(place);
+        if number != 1 && number != count && !number.is_multiple_of(numbered_every(count)) {
+            continue;
+        }
+        match labels.iter_mut().find(|(point, ..)| *point == step.to) {
+            Some((_, text, _)) => *text += &format!(", {number}"),
+            None => labels.push((step.to, number.to_string(), *at)),
+        }
+    }
+    labels.into_iter().map(|(_, text, at)| (text, at)).collect()
 }

@@ -8,7 +8,7 @@ use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
 use mapper_campaign::units::{Kind, parse};
-use mapper_core::{OperatingPoint, Plan as StepPlan};
+use mapper_core::{OperatingPoint, Plan as StepPlan, VisitOrder};
 use mapper_physics::model::Model;
 use mapper_planner::{PlanRequest, error_bound};
 use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
@@ -29,7 +29,7 @@ pub struct Plan {
     /// Also store the plan in this new file, for `mapper run --plan`
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Draw the path on the map beside the conventional one, in this new SVG file
+    /// Draw the order on the map next to the one along speed lines, as figure 13 of the paper, in this new SVG file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
     /// Also compare with conventional mapping and with the same points along speed lines
@@ -80,7 +80,7 @@ impl Plan {
                 false => output::print(&jump_text(&campaign, &jump)),
             };
         }
-        let (plan, comparison) = with_plan_request(&campaign, &model, |request| {
+        let (plan, comparison, along_lines) = with_plan_request(&campaign, &model, |request| {
             let appended = match self.append.as_slice() {
                 [from, to] => Some(mapper_core::Jump { from: *from, to: *to }),
                 _ => None,
@@ -91,13 +91,19 @@ impl Plan {
             if asked.order.needs_method() {
                 plan.error_bound = error_bound(&asked, &plan).map_err(SessionError::from)?;
             }
-            let wanted = self.compare || self.svg.is_some();
-            let comparison = wanted.then(|| compared(&campaign, request, &plan)).transpose()?;
-            Ok::<_, SessionError>((plan, comparison))
+            let comparison = self.compare.then(|| compared(&campaign, request, &plan)).transpose()?;
+            // Limits that the plan keeps may forbid this order.
+            let along_lines = || {
+                let order = VisitOrder::SpeedLines;
+                plan_of(&campaign, &PlanRequest { order, appended: None, ..asked.clone() }).ok()
+            };
+            let along_lines = self.svg.is_some().then(along_lines).flatten();
+            Ok::<_, SessionError>((plan, comparison, along_lines))
         })?;
         self.store(&plan)?;
-        if let (Some(path), Some(comparison)) = (&self.svg, &comparison) {
-            self.replace.write(path, plan_svg(&campaign, &model, &plan, comparison).as_bytes())?;
+        if let Some(path) = &self.svg {
+            let picture = plan_svg(&campaign, &model, &plan, along_lines.as_ref());
+            self.replace.write(path, picture.as_bytes())?;
         }
         if self.json {
             let mut value = serde_json::to_value(&plan).map_err(SessionError::from)?;

@@ -20,7 +20,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from seeds import ROOT, SHIPPED, error_of, half, held, quantile, replaced, share, write_table
+from machines import ROOT, SHIPPED, error_of, half, held, quantile, replaced, share, write_table
 
 ZERO = f"zero: {{soak: 30 min, {SHIPPED}}}\n"
 CLASSES = ["nothing", "alpha_A", "probe", "alpha_A and probe"]
@@ -63,7 +63,7 @@ def drawn(folder, index):
     if "probe" in kind:
         truth.append(f"probe_diameter: {number(rng.uniform(0.7, 2.5))} mm")
     text = replaced(text, "virtual_lab: {}", f"virtual_lab: {{tolerances: drawn, machine: {{{', '.join(truth)}}}}}")
-    text += f"\norder: sum_gradient\nrepeats: off\nseed: {index}\n" + (ZERO if zero else "")
+    text += f"\norder: thermal_gradient\nrepeats: off\nseed: {index}\n" + (ZERO if zero else "")
     path = folder / f"campaign-{index}.yaml"
     path.write_text(text)
     return path, kind, zero

@@ -16,7 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from seeds import ROOT, replaced
+from machines import ROOT, replaced
 
 CAMPAIGNS = {"hot": "turbo_a_conventional.yaml", "joint": "turbo_a.yaml"}
 # Reaction, slip less pre-swirl, slope and friction of the premise's wheel: reaction and density law are not those that the correction assumes.

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from mcap.reader import make_reader
 
-from seeds import ROOT
+from machines import ROOT
 
 
 def main():
@@ -27,12 +27,11 @@ def main():
     arguments = parser.parse_args()
     text = (ROOT / "campaigns" / "turbo_a.yaml").read_text()
     for before, after in [
-        ("order: information ", "order: listed "),
-        ("required_sigma_eta: 0.5 %\n", ""),
+        ("order: thermal_gradient ", "order: listed "),
         ("method: joint ", "method: dynamic "),
         ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
         ("  virtual_lab: {}\n", "  virtual_lab: {sample_rate: 100 Hz}\n"),
-        ("  dwell: 120 s ", "  dwell: 75 s "),
+        ("  dwell: 40 s ", "  dwell: 75 s "),
         ("seed: 1 ", "repeats: off\nreturn_to_first: false\nseed: 1 "),
     ]:
         assert before in text, before

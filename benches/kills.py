@@ -26,7 +26,7 @@ from pathlib import Path
 from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 
-from seeds import ROOT, quantile
+from machines import ROOT, quantile
 
 
 def points_of(run):
@@ -100,10 +100,10 @@ def listed(folder, short):
         ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.0, 1.4]"),
         ("method: joint ", "method: dynamic "),
         ("soak: 30 min", "soak: 5 min"),
-        ("  dwell: 120 s ", "  dwell: 60 s "),
+        ("  dwell: 40 s ", "  dwell: 60 s "),
         ("  formats: [csv, json, svg]\n", "  formats: [csv]\n"),
     ]
-    for before, after in (shorter if short else []) + [("order: information ", "order: listed "), ("required_sigma_eta: 0.5 %\n", "")]:
+    for before, after in (shorter if short else []) + [("order: thermal_gradient ", "order: listed ")]:
         assert before in text, before
         text = text.replace(before, after)
     path = folder / "turbo_a.yaml"

@@ -21,7 +21,6 @@ PARTS = [
     ("speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]", "speeds: [80 krpm, 125 krpm]"),
     ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.4]"),
     ("warm_up: 2 min ", "warm_up: 60 s "),
-    ("required_sigma_eta: 0.5 %\n", ""),
     ("seed: 1 ", "repeats: off\nseed: 1 "),
     ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
     ("method: joint ", "method: dynamic "),

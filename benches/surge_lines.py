@@ -17,7 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from seeds import ROOT, replaced
+from machines import ROOT, replaced
 
 DRAWN = "tolerances: drawn, weather: wandering, "
 # Row of the table: settings of the lab, exponent of the growth.
@@ -65,7 +65,7 @@ def marks_alone(args):
     text = replaced(text, "zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", "")
     text = replaced(text, "method: joint ", "method: steady ")
     text = replaced(text, "formats: [csv, json, svg, surge]", "formats: [json]")
-    text = replaced(text, "order: sum_gradient ", "repeats: off\norder: listed ")
+    text = replaced(text, "order: thermal_gradient ", "repeats: off\norder: listed ")
     text = replaced(text, "virtual_lab: {}", lab(seed, settings, growth))
     return run(mapper, replaced(text, "seed: 1 ", f"seed: {seed} "))[0]
 

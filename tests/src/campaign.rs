@@ -14,7 +14,7 @@ pub const SHORT_GRID: &[(&str, &str)] = &[
     ),
     ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.4]"),
     ("warm_up: 2 min ", "warm_up: 60 s "),
-    ("required_sigma_eta: 0.5 %\n", ""),
+    ("dwell: 40 s ", "dwell: 120 s "),
     ("seed: 1 ", "repeats: off\nreturn_to_first: false\nseed: 1 "),
 ];
 

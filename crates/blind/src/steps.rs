@@ -10,7 +10,7 @@ use mapper_runner::{StepSource, StepSourceError};
 
 /// One step a point, P3 as the nominal model needs it; only the steady state is predicted.
 pub(crate) fn steps_of_case(campaign: &Campaign, nominal: &Model) -> Result<Vec<PlanStep>, BlindError> {
-    let timing = &campaign.timing;
+    let (timing, dwell_s) = (&campaign.timing, campaign.timing.dwell.fixed_or_usual_s());
     let mut from: Option<OperatingPoint> = None;
     let points = campaign.points.iter().enumerate();
     points
@@ -26,9 +26,9 @@ pub(crate) fn steps_of_case(campaign: &Campaign, nominal: &Model) -> Result<Vec<
                 p3_pa: held.boundary.p3_pa,
                 t3_k: boundary.t3_k,
                 oil_temperature_k: boundary.oil_temperature_k,
-                dwell_s: timing.dwell_s,
-                start_s: timing.warm_up_s + index as f64 * timing.dwell_s,
-                predicted: at_rest(&held, timing.dwell_s),
+                dwell_s,
+                start_s: timing.warm_up_s + index as f64 * dwell_s,
+                predicted: at_rest(&held, dwell_s),
             })
         })
         .collect()

@@ -18,7 +18,7 @@ fn a_healthy_recording_tells_a_cause_from_structure() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns/gap_rig.yaml");
     let mut campaign = mapper_campaign::load(&path).unwrap();
     campaign.points.truncate(6);
-    campaign.timing.dwell_s = 60.0;
+    campaign.timing.dwell = mapper_core::Dwell::Fixed(60.0);
     let effects: Vec<Arc<dyn Effect>> =
         ["valve_area", "oil_scale"].iter().map(|id| mapper_effects::find(id).unwrap()).collect();
     let declared = study_without_causes(&campaign, Vec::new(), 9).unwrap().0.declared;

@@ -17,12 +17,11 @@ use crate::elements::sensors::SensorsFile;
 use crate::elements::sequence::sequence;
 use crate::elements::speed_control::{SpeedControlFile, speed_control};
 use crate::elements::surge_search::SurgeSearchFile;
-use crate::elements::timing::TimingElement;
+use crate::elements::timing::TimingFile;
 use crate::elements::tolerances::TolerancesElement;
 use crate::elements::zero::ZeroFile;
-use crate::units::{Fraction, Quantity};
 use mapper_core::{
-    Channel, GuardSet, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats, Replan,
+    Channel, GuardSet, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats,
     SafeTrajectory, Soak, SpeedControlSettings, SurgeSeek, Timing, VisitOrder,
 };
 use mapper_physics::follow_outlet::FollowOutlet;
@@ -87,17 +86,9 @@ pub struct Campaign {
     pub identification: Identification,
     /// Order of the points.
     pub order: VisitOrder,
-    /// Whether what is left is planned again while the campaign runs.
-    #[serde(skip_serializing_if = "Replan::is_off")]
-    pub replan: Replan,
     /// The script that says which step comes next, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sequence: Option<SequenceSource>,
-    /// Share of the largest sum of gradients that an order by what steps tell has to keep, fraction.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gradient_share: Option<f64>,
-    /// Error of the efficiency that `order: time` has to reach, fraction.
-    pub required_sigma_eta: Option<f64>,
     /// The jump that is repeated, if any.
     pub repeats: Option<Repeats>,
     /// Whether the first point, which no jump leads to, is visited once more at the end of the plan.
@@ -137,7 +128,7 @@ impl Campaign {
         let by = GuardedBy {
             limits: &self.limits,
             sensors: &self.sensors,
-            dwell_s: self.timing.dwell_s,
+            dwell_s: self.timing.dwell.fixed_or_usual_s(),
             speed_is_held: self.speed_control.is_some(),
         };
         self.guards.clone().unwrap_or_else(|| GuardsFile::default().guards(&by))
@@ -148,6 +139,11 @@ impl Campaign {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "mapper campaign")]
+#[schemars(extend("x-removed" = {
+    "gradient_share": "leave it out and write `order: thermal_gradient`, which keeps the largest sum",
+    "replan": "leave it out: a plan is run as it stands; a script (`sequence`) can react to results",
+    "required_sigma_eta": "write it under `timing`, in place of `dwell`: `timing: {required_sigma_eta: 0.3 %}`",
+}))]
 pub(crate) struct CampaignFile {
     /// Name of the campaign; run directories begin with it. Letters, digits, `_`, `-` and `.`, at most 64, the first a letter or digit.
     #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"), example = &"turbo_a")]
@@ -174,29 +170,17 @@ pub(crate) struct CampaignFile {
     /// The operating points: `speeds` and `openings`, or `lines`, or `points`.
     pub(crate) grid: GridFile,
     /// How long things take.
-    #[serde(deserialize_with = "TimingElement::deserialize")]
-    #[schemars(with = "TimingElement")]
-    timing: Timing,
+    timing: TimingFile,
     /// The isothermal zero before the first point; none where it is left out.
     zero: Option<ZeroFile>,
     /// How efficiency and heat-transfer coefficient are found.
     identification: Option<IdentificationFile>,
-    /// Order of the points. `sum_gradient`, the default, maximises the sum of the thermal gradients, `worst_gradient` the smallest of them; `information` minimises the predicted error of the efficiency; `time` makes the campaign as short as possible and chooses each dwell; `greedy` looks one step ahead; `listed` keeps the order of the grid.
+    /// Order of the points. `thermal_gradient`, the default, maximises the sum of the housing's temperature changes (Burke et al., figure 13 b), `min_gradient` the smallest of them; `speed_lines` follows speed lines (figure 13 a), `conventional` too, and holds each point until it no longer drifts; `listed` keeps the order of the grid.
     #[serde(default)]
     order: VisitOrder,
-    /// Whether the order of what is left is thought over while the campaign runs: `after_each_step`, by what the steps so far have told, or `off`, the default. It needs the joint method. A point that a guard has left out is tried again.
-    #[serde(default)]
-    #[schemars(example = &"after_each_step")]
-    replan: Replan,
     /// A rhai script that says which step comes next, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/sequences.md says what it may call.
     #[schemars(regex(pattern = r"\.rhai$"), example = &"scripts/zigzag.rhai")]
     sequence: Option<String>,
-    /// Share of the largest sum of the housing's temperature changes that `order: information` has to keep: of the orders that do, the one is taken that tells most for its time. `mapper plan --compare` shows what shares cost.
-    #[schemars(extend("x-above" = "0 %", "x-max" = "100 %"), example = &"75 %")]
-    gradient_share: Option<Quantity<Fraction>>,
-    /// Error of the efficiency (standard error and bias of the method, one standard deviation) that `order: time` has to reach at each point.
-    #[schemars(extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.5 %")]
-    required_sigma_eta: Option<Quantity<Fraction>>,
     /// A jump that is repeated, so that drift shows: at least twice, and every 12 steps where nothing else is said; `off` for none. A sequence script makes its own repeats.
     #[schemars(example = &"off")]
     repeats: Option<RepeatsFile>,
@@ -254,10 +238,11 @@ impl CampaignFile {
         let machine = self.machine.machine(probe_diameter_m, origin, files)?;
         let alpha_area_ratio = machine.params.compressor.alpha_area_ratio;
         let speed_control = speed_control(self.speed_control);
+        let timing = self.timing.timing();
         let by = GuardedBy {
             limits: &limits,
             sensors: &sensors,
-            dwell_s: self.timing.dwell_s,
+            dwell_s: timing.dwell.fixed_or_usual_s(),
             speed_is_held: speed_control.is_some(),
         };
         let guards = self.guards.map(|guards| guards.guards(&by));
@@ -273,14 +258,11 @@ impl CampaignFile {
             readers: readers(self.readers),
             points,
             lines,
-            timing: self.timing,
+            timing,
             zero: self.zero.map(|zero| zero.soak(boundary.t1_k)),
             identification: self.identification.unwrap_or_default().identification(alpha_area_ratio),
             order: self.order,
-            replan: self.replan,
             sequence: sequence(self.sequence.as_deref(), origin, files)?,
-            gradient_share: self.gradient_share.map(|share| share.inside),
-            required_sigma_eta: self.required_sigma_eta.map(|error| error.inside),
             repeats: repeats(self.repeats),
             return_to_first: self.return_to_first.unwrap_or(true),
             on_drift: self.drift.map(|drift| drift.on_drift),

@@ -12,9 +12,7 @@ pub(crate) fn check(source: &Source, root: &Node, files: Files<'_>, notes: &mut 
     elements::limits::check(&mut check);
     elements::guards::check(&mut check);
     elements::window::check(&mut check);
-    elements::order::check(&mut check);
     elements::timing::check(&mut check);
-    elements::replan::check(&mut check);
     elements::repeats::check(&mut check);
     elements::sensors::check(&mut check);
     elements::report::check(&mut check);

@@ -4,7 +4,7 @@
 
 use mapper_campaign::campaign::MapSource;
 use mapper_campaign::{CampaignError, load};
-use mapper_core::{Channel, ReferenceState, VisitOrder, WindowRule};
+use mapper_core::{Channel, Dwell, ReferenceState, VisitOrder, WindowRule};
 use mapper_physics::params::{BoundaryConditions, Params};
 use std::path::{Path, PathBuf};
 
@@ -34,9 +34,12 @@ fn turbo_a_is_the_machine_of_appendix_a() {
     assert_eq!(campaign.boundary, BoundaryConditions::default());
     assert_eq!(campaign.machine.map, MapSource::ClosedForm);
     assert_eq!(campaign.reference, ReferenceState::SAE);
-    assert_eq!(campaign.order, VisitOrder::Information);
+    assert_eq!(campaign.order, VisitOrder::ThermalGradient);
     assert_eq!(campaign.identification.window, WindowRule::Auto);
-    assert_eq!((campaign.timing.warm_up_s, campaign.timing.dwell_s, campaign.seed), (120.0, 120.0, 1));
+    assert_eq!(
+        (campaign.timing.warm_up_s, campaign.timing.dwell, campaign.seed),
+        (120.0, Dwell::Fixed(40.0), 1)
+    );
     assert!(campaign.points.len() >= 30);
     let mut speeds: Vec<f64> = campaign.points.iter().map(|point| point.speed_rpm).collect();
     speeds.sort_by(f64::total_cmp);

@@ -37,10 +37,6 @@ pub struct Predicted {
     pub dtc_k: Option<f64>,
     /// Standard error of the efficiency (fraction); `None` where it was not forecast.
     pub sigma_eta: Option<f64>,
-    /// Standard error of the efficiency (fraction) where what the method can find by itself (alpha_A, the probe, the direction
-    /// factor) is not as declared, and has to be found; `None` where it was not forecast.
-    #[serde(default)]
-    pub open_sigma_eta: Option<f64>,
     /// Relative standard error of the heat-transfer coefficient; `None` where it was not forecast.
     pub sigma_h_rel: Option<f64>,
     /// Error that the identification method itself makes of the efficiency, without noise (fraction, signed): its
@@ -69,7 +65,6 @@ impl Predicted {
             dt2_k: None,
             dtc_k: None,
             sigma_eta: None,
-            open_sigma_eta: None,
             sigma_h_rel: None,
             bias_eta: None,
             bias_h_rel: None,
@@ -129,15 +124,16 @@ pub struct PlanFigures {
     /// Sum over the jumps of the housing's temperature change within the window, K (absolute values).
     pub sum_gradient_k: f64,
     /// Smallest of these changes, K; `None` for a plan without jumps.
-    pub worst_gradient_k: Option<f64>,
+    pub min_gradient_k: Option<f64>,
     /// Largest predicted standard error of the efficiency (fraction); `None` where it was not forecast.
     pub worst_sigma_eta: Option<f64>,
     /// Root of the mean square of predicted standard error and bias of the efficiency (fraction).
     #[serde(default)]
     pub rms_error_eta: Option<f64>,
-    /// Root of the mean square of the standard errors where nothing is as declared, and the method's bias (fraction).
+    /// The same if alpha_A, the probe and the heating/cooling ratio are not as declared and have to be found (fraction); `None` where the
+    /// method finds none of them, or nothing was forecast.
     #[serde(default)]
-    pub open_rms_error_eta: Option<f64>,
+    pub rms_error_undeclared_eta: Option<f64>,
     /// Largest predicted error of the efficiency, standard error and bias in quadrature (fraction).
     #[serde(default)]
     pub worst_error_eta: Option<f64>,
@@ -151,7 +147,7 @@ pub struct PlanBound {
     /// No order has a larger sum of housing gradients, K.
     pub sum_gradient_k: f64,
     /// No order has a larger smallest gradient, K.
-    pub worst_gradient_k: f64,
+    pub min_gradient_k: f64,
     /// How far the figure that was optimised lies below its bound, % of the bound; `None` where none is known for it.
     pub gap_percent: Option<f64>,
     /// Whether the order was shown to be the best within `proof_tolerance_percent`, by branch and bound.
@@ -162,22 +158,12 @@ pub struct PlanBound {
     pub model_error_k: f64,
 }
 
-/// What no order of a plan's points can know better than, each held for the plan's dwell, by the information of all steps together.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct PlanErrorBound {
-    /// The plan's own error of the efficiency, root of the mean square over the points, fraction. It holds where nothing is as declared,
-    /// and before points learn from their neighbours on the map, so that it is larger than `open_rms_error_eta`.
-    pub error_eta: f64,
-    /// No order has less, fraction; by the search's housing model, corrected by what the full model gives along this plan.
-    pub least_error_eta: f64,
-}
-
 /// An ordered, checked list of steps with what is expected of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Name of the campaign.
     pub campaign: String,
-    /// What the order was chosen by, e.g. `listed`, `greedy`.
+    /// What the order was chosen by, e.g. `thermal_gradient`.
     pub objective: String,
     /// Seed of the search (and of simulated rigs).
     pub seed: u64,
@@ -197,9 +183,6 @@ pub struct Plan {
     /// How good the best order can be; `None` where the order was not searched for.
     #[serde(default)]
     pub bound: Option<PlanBound>,
-    /// What no order can know better than, where that was worked out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub error_bound: Option<PlanErrorBound>,
     /// What is not known of the bound, and why; `None` where all is known.
     #[serde(default)]
     pub bound_remark: Option<String>,

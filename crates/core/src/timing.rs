@@ -1,24 +1,34 @@
 //! How long the parts of a campaign take.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What ends the dwell at a point. Campaigns write it in snake case.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+/// How long the steps of a campaign last, jump included. All steps last equally long.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-#[schemars(transform = crate::schema::names_alone)]
-pub enum DwellEnd {
-    /// The time that the plan has for it.
-    #[default]
-    Planned,
-    /// What its readings tell: when more time there tells less of all points than elsewhere, as long as that takes.
-    WhenCertain,
+pub enum Dwell {
+    /// This long, s, > 0.
+    Fixed(f64),
+    /// As long as warm-up, steps and cool-down together may take, s, > 0.
+    TimeBudget(f64),
+    /// As long as the efficiencies need to reach this forecast standard error (rms over the points, fraction, > 0).
+    RequiredSigmaEta(f64),
 }
 
-impl DwellEnd {
-    /// Whether the plan alone has the say.
-    pub fn is_planned(&self) -> bool {
-        *self == DwellEnd::Planned
+impl Dwell {
+    /// Usual time at a point, s: two minutes (Burke et al.).
+    pub const USUAL_S: f64 = 120.0;
+
+    /// The dwell, s, if the campaign states it; `None` if the planner chooses it.
+    pub fn fixed_s(self) -> Option<f64> {
+        match self {
+            Dwell::Fixed(dwell_s) => Some(dwell_s),
+            Dwell::TimeBudget(_) | Dwell::RequiredSigmaEta(_) => None,
+        }
+    }
+
+    /// The dwell, s, or the usual one as long as the planner has not chosen it.
+    pub fn fixed_or_usual_s(self) -> f64 {
+        self.fixed_s().unwrap_or(Self::USUAL_S)
     }
 }
 
@@ -30,9 +40,6 @@ pub struct Timing {
     pub warm_up_s: f64,
     /// Time without flow after the last step, s, >= 0.
     pub cool_down_s: f64,
-    /// Time at each point, jump included, s, > 0; the longest where each step's dwell is chosen.
-    pub dwell_s: f64,
-    /// What ends the dwell; the longest is `dwell_s` in any case.
-    #[serde(default, skip_serializing_if = "DwellEnd::is_planned")]
-    pub ends: DwellEnd,
+    /// Time at each point.
+    pub dwell: Dwell,
 }

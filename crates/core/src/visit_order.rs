@@ -8,44 +8,52 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 // Without descriptions of its own the schema is one list of names: a message can say which of them was meant.
 #[schemars(transform = crate::schema::names_alone)]
+#[schemars(extend("x-removed" = {
+    "sum_gradient": "write `order: thermal_gradient`, its new name",
+    "worst_gradient": "write `order: min_gradient`, its new name",
+    "information": "write `order: thermal_gradient`, which needs no more rig time for the same error",
+    "time": "write `order: thermal_gradient` with `required_sigma_eta`, which chooses one dwell for all steps",
+    "best": "write `order: thermal_gradient`; `mapper plan --compare` shows the other orders",
+    "greedy": "write `order: thermal_gradient`, which looks at the whole order",
+}))]
 pub enum VisitOrder {
-    /// Largest sum of the housing's temperature changes within the windows.
+    /// Largest sum of the housing's temperature changes within the windows (Burke et al., figure 13 b).
     #[default]
-    SumGradient,
-    /// Largest smallest change.
-    WorstGradient,
-    /// Smallest mean square of what the identification method is forecast to err.
-    Information,
-    /// As `information`, with `required_sigma_eta`: each step's dwell is chosen so that its point reaches that error.
-    Time,
-    /// Whichever of the other orders is forecast to give the smallest error for the time it takes.
-    Best,
-    /// By speed, on each line from the widest valve opening to the narrowest, as conventional mapping goes.
+    ThermalGradient,
+    /// Largest minimum of these changes.
+    MinGradient,
+    /// By speed, on each line from the widest valve opening to the narrowest (Burke et al., figure 13 a).
     SpeedLines,
-    /// Next comes the point whose jump moves the housing most.
-    Greedy,
     /// As in the grid.
     Listed,
+    /// As `speed_lines`, but each step lasts until T2 and the housing no longer drift: conventional mapping, for comparison.
+    Conventional,
 }
 
 impl VisitOrder {
+    /// All of them.
+    pub const ALL: [VisitOrder; 5] = [
+        VisitOrder::ThermalGradient,
+        VisitOrder::MinGradient,
+        VisitOrder::SpeedLines,
+        VisitOrder::Listed,
+        VisitOrder::Conventional,
+    ];
+
     /// Name in campaigns and plans.
     pub fn name(self) -> &'static str {
         match self {
-            VisitOrder::SumGradient => "sum_gradient",
-            VisitOrder::WorstGradient => "worst_gradient",
-            VisitOrder::Information => "information",
-            VisitOrder::Time => "time",
-            VisitOrder::Best => "best",
+            VisitOrder::ThermalGradient => "thermal_gradient",
+            VisitOrder::MinGradient => "min_gradient",
             VisitOrder::SpeedLines => "speed_lines",
-            VisitOrder::Greedy => "greedy",
             VisitOrder::Listed => "listed",
+            VisitOrder::Conventional => "conventional",
         }
     }
 
-    /// Whether the order needs to know what the identification will find at each step.
-    pub fn needs_method(self) -> bool {
-        matches!(self, VisitOrder::Information | VisitOrder::Time | VisitOrder::Best)
+    /// Whether the planner searches for the order.
+    pub fn is_searched(self) -> bool {
+        matches!(self, VisitOrder::ThermalGradient | VisitOrder::MinGradient)
     }
 }
 
@@ -55,8 +63,7 @@ mod tests {
 
     #[test]
     fn the_name_in_plans_is_the_name_in_campaigns() {
-        use VisitOrder::*;
-        for order in [SumGradient, WorstGradient, Information, Time, Best, SpeedLines, Greedy, Listed] {
+        for order in VisitOrder::ALL {
             assert_eq!(serde_json::to_value(order).unwrap(), order.name());
         }
     }

@@ -44,9 +44,6 @@ pub struct Expected {
     pub h_w_m2k: f64,
     /// Standard error of it, W/(m2 K).
     pub sigma_h_w_m2k: f64,
-    /// Standard error of the efficiency where nothing that the method can find (alpha_A, the probe, the direction factor) is as
-    /// declared, fraction: what the recording says without the declaration.
-    pub open_sigma_eta: f64,
 }
 
 /// Fits noise-free rows as a recording is fitted, and says what the declared uncertainties will do to the result.
@@ -74,13 +71,7 @@ pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) 
     let [eta, h] = Correlation::of(&fit, &samples.t_s, config.noise_colour).standard_errors_for(noise);
     let [offset_eta, offset_h] = declared.bias_standard_errors;
     let sigma_eta = eta.hypot(offset_eta);
-    let found = Expected {
-        eta: fit.eta,
-        sigma_eta,
-        open_sigma_eta: sigma_eta,
-        h_w_m2k: fit.h_w_m2k,
-        sigma_h_w_m2k: h.hypot(offset_h),
-    };
+    let found = Expected { eta: fit.eta, sigma_eta, h_w_m2k: fit.h_w_m2k, sigma_h_w_m2k: h.hypot(offset_h) };
     (found.eta.is_finite() && found.sigma_eta.is_finite() && found.sigma_h_w_m2k.is_finite()).then_some(found)
 }
 

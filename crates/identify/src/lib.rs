@@ -43,11 +43,9 @@ pub use error::{IdentifyError, StepError};
 pub use expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use findings::code;
 pub use identify::{Identified, identify, identify_beside, identify_each, identify_recording};
-pub use joint::campaign_information::{CampaignInformation, Known, StepInformation, StepSoFar, WorthNow};
-pub use joint::expected::{ExpectedStep, expected_together};
+pub use joint::MAX_RESTING_ETA;
+pub use joint::expected::{ExpectedStep, ExpectedTogether, expected_together};
 pub use joint::surface::EfficiencySurface;
-pub use joint::tangent::VarianceTangent;
-pub use joint::worth::StepWorth;
 pub use mapper_core::{
     Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings, SettleBands, WindowRule,
 };

@@ -208,7 +208,6 @@ impl StepForecast {
             dt2_k: change(|row| row.t2_k),
             dtc_k: change(|row| row.tc_k),
             sigma_eta: None,
-            open_sigma_eta: None,
             sigma_h_rel: None,
             bias_eta: None,
             bias_h_rel: None,

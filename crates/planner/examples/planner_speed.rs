@@ -1,11 +1,11 @@
 //! Orders grids of any size on the nominal machine and says what that gives and takes.
 //!
-//! `planner_speed POINTS [ORDER] [EFFORT] [SEED]`: 18 is the grid of docs/planner.md, others are rectangular grids from
+//! `planner_speed POINTS [ORDER] [EFFORT] [SEED] [DWELL]`: 18 is the grid of docs/planner.md, others are rectangular grids from
 //! 50 to 150 krpm and opening 0.5 to 2.5. Prints one line: points, order, effort, seed, sum, smallest, bounds, seconds.
 
 #![allow(clippy::print_stdout, reason = "what it prints is what it is for")]
 
-use mapper_core::{DwellEnd, Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
+use mapper_core::{Dwell, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
@@ -41,11 +41,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let count: usize = arguments.next().map_or(Ok(18), |text| text.parse())?;
     let order = match arguments.next().as_deref() {
-        Some("worst_gradient") => VisitOrder::WorstGradient,
-        _ => VisitOrder::SumGradient,
+        Some("min_gradient") => VisitOrder::MinGradient,
+        _ => VisitOrder::ThermalGradient,
     };
     let effort: f64 = arguments.next().map_or(Ok(1.0), |text| text.parse())?;
     let seed: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    let dwell_s: f64 = arguments.next().map_or(Ok(120.0), |text| text.parse())?;
     let (model, points) = (Model::nominal(), grid(count));
     let request = PlanRequest {
         campaign_name: "speed",
@@ -55,8 +56,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         follow_outlet: FollowOutlet::default(),
         points: &points,
         order,
-        timing: Timing { warm_up_s: 3600.0, dwell_s: 120.0, cool_down_s: 0.0, ends: DwellEnd::Planned },
-        window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 },
+        timing: Timing { warm_up_s: 3600.0, dwell: Dwell::Fixed(dwell_s), cool_down_s: 0.0 },
+        window: WindowRule::Fixed { start_s: 10.0, end_s: dwell_s - 10.0 },
         settle_bands: SettleBands::default(),
         limits: Limits {
             speed_max_rpm: 180e3,
@@ -68,28 +69,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             surge_margin_min_ratio: None,
             housing_gradient_max_k: None,
         },
-        repeats: None,
-        return_to_first: false,
+        repeats: Some(Repeats { jump: None, every_steps: 12, at_least: 2 }),
+        return_to_first: true,
         appended: None,
-        required_sigma_eta: None,
         method: None,
-        simulations: None,
         effort,
-        draft: false,
-        gradient_share: None,
+        bound: true,
         seed,
     };
     let started = Instant::now();
     let plan = make_plan(&request)?;
     let seconds = started.elapsed().as_secs_f64();
-    let bound =
-        plan.bound.map_or((f64::NAN, f64::NAN), |bound| (bound.sum_gradient_k, bound.worst_gradient_k));
+    let bound = plan.bound.map_or((f64::NAN, f64::NAN), |bound| (bound.sum_gradient_k, bound.min_gradient_k));
     println!(
         "{count} points, {}, effort {effort}, seed {seed}: {:.1} K in total (bound {:.1}), {:.2} K at minimum (bound {:.2}), {seconds:.2} s",
         plan.objective,
         plan.figures.sum_gradient_k,
         bound.0,
-        plan.figures.worst_gradient_k.unwrap_or(f64::NAN),
+        plan.figures.min_gradient_k.unwrap_or(f64::NAN),
         bound.1,
     );
     Ok(())

@@ -23,9 +23,7 @@ impl Chain for Fixed {
         self.1
     }
 
-    fn first(&self, _to: usize) -> (Option<f64>, ()) {
-        (None, ())
-    }
+    fn first(&self, _to: usize) {}
 
     fn step(&self, from: usize, to: usize, (): ()) -> (f64, ()) {
         (self.0[from * self.1 + to], ())
@@ -75,7 +73,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let chain = Fixed(weights, count);
     let given: Vec<usize> = (0..count).collect();
     let started = Instant::now();
-    let order = search(&chain, &given, Objective::Sum, Effort::usual(count, 1.0), seed);
+    let order = search(&chain, &given, Objective::Sum, Effort::usual(count, 1.0), seed).swap_remove(0);
     let seconds = started.elapsed().as_secs_f64();
     let sum_k: f64 = gradients_k(&chain, &order).iter().sum();
     let rows: Vec<&[f64]> = chain.0.chunks(count).collect();

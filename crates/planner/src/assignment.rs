@@ -1,8 +1,8 @@
 //! The assignment problem: each row one column, largest total weight. The method of successive shortest paths (Kuhn,
 //! Munkres; in the form of Jonker and Volgenant, Computing 38:325, 1987), O(n^3) at worst and far less as a rule.
 
-/// Largest total weight of a complete assignment of rows to columns; `weight(row, column)` is finite.
-pub fn largest_assignment(n: usize, weight: impl Fn(usize, usize) -> f64) -> f64 {
+/// Largest total weight of a complete assignment of rows to columns, and the column of each row; `weight(row, column)` is finite.
+pub(crate) fn largest_assignment(n: usize, weight: impl Fn(usize, usize) -> f64) -> (f64, Vec<usize>) {
     // Potentials of rows and columns, and the row of each column; index 0 stands for none.
     let (mut u, mut v) = (vec![0.0; n + 1], vec![0.0; n + 1]);
     let (mut row_of, mut way) = (vec![0usize; n + 1], vec![0usize; n + 1]);
@@ -45,11 +45,18 @@ pub fn largest_assignment(n: usize, weight: impl Fn(usize, usize) -> f64) -> f64
             column = before;
         }
     }
-    (1..=n).map(|j| weight(row_of[j] - 1, j - 1)).sum()
+    let mut column_of = vec![0; n];
+    (1..=n).for_each(|j| column_of[row_of[j] - 1] = j - 1);
+    (column_of.iter().enumerate().map(|(row, column)| weight(row, *column)).sum(), column_of)
 }
 
 /// Largest threshold at which all rows but `spared` of them still find columns of their own with at least that weight.
-pub fn bottleneck(rows: usize, columns: usize, spared: usize, weight: impl Fn(usize, usize) -> f64) -> f64 {
+pub(crate) fn bottleneck(
+    rows: usize,
+    columns: usize,
+    spared: usize,
+    weight: impl Fn(usize, usize) -> f64,
+) -> f64 {
     let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
     let mut thresholds: Vec<f64> = places.map(|(i, j)| weight(i, j)).collect();
     thresholds.retain(|w| w.is_finite());
@@ -127,7 +134,7 @@ mod tests {
             let total = |p: &Vec<usize>| p.iter().enumerate().map(|(i, j)| weight(i, *j)).sum::<f64>();
             let best = all.iter().map(total).fold(f64::NEG_INFINITY, f64::max);
             // Sums of at most six numbers below 10.
-            prop_assert!((largest_assignment(n, weight) - best).abs() < 1e-12);
+            prop_assert!((largest_assignment(n, weight).0 - best).abs() < 1e-12);
             // All rows, and all but the worst one.
             for spared in 0..n.min(2) {
                 let smallest = |p: &Vec<usize>| {

@@ -13,8 +13,8 @@ pub trait Chain {
         self.len() == 0
     }
 
-    /// The first step: its gradient, K, where a jump leads to it, and what it leaves.
-    fn first(&self, to: usize) -> (Option<f64>, Self::State);
+    /// What the first step, to which no jump leads, leaves.
+    fn first(&self, to: usize) -> Self::State;
 
     /// The step `from` -> `to` from `state`: gradient of the housing within the window, K (signed), and what it leaves.
     fn step(&self, from: usize, to: usize, state: Self::State) -> (f64, Self::State);
@@ -28,11 +28,6 @@ pub trait Chain {
     /// Whether the jump is allowed.
     fn admissible(&self, _from: usize, _to: usize) -> bool {
         true
-    }
-
-    /// Expected mean square error of the efficiency at `to` after a gradient.
-    fn mean_square_error(&self, _to: usize, _gradient_k: f64) -> f64 {
-        0.0
     }
 
     /// Largest allowed gradient, K.
@@ -58,8 +53,7 @@ pub(crate) fn way_back<C: Chain>(chain: &C, order: &[usize]) -> Option<(usize, u
 pub fn gradients_k<C: Chain>(chain: &C, order: &[usize]) -> Vec<f64> {
     let mut gradients = Vec::with_capacity(order.len());
     let Some(&first) = order.first() else { return gradients };
-    let (gradient_k, mut state) = chain.first(first);
-    gradients.extend(gradient_k.map(f64::abs));
+    let mut state = chain.first(first);
     for pair in order.windows(2) {
         let (gradient_k, next) = chain.step(pair[0], pair[1], state);
         gradients.push(gradient_k.abs());

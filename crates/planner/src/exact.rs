@@ -1,53 +1,7 @@
-//! Exact orders: dynamic programming for fixed weights, branch and bound under thermal memory.
+//! The best order of few points, by branch and bound under thermal memory.
 
 use crate::bound::Optimistic;
 use crate::chain::{Chain, way_back};
-
-/// Maximum number of points of [`best_path`]: its table has `n 2^n` entries.
-pub const HELD_KARP_POINTS: usize = 14;
-
-/// The path through all points with the largest sum of fixed weights (Held and Karp, J. SIAM 10:196, 1962), any start.
-///
-/// `None` above [`HELD_KARP_POINTS`], for no points, and where every path has a jump of weight minus infinity.
-pub fn best_path(n: usize, weight: impl Fn(usize, usize) -> f64) -> Option<(f64, Vec<usize>)> {
-    if n == 0 || n > HELD_KARP_POINTS {
-        return None;
-    }
-    let sets = 1usize << n;
-    let mut best = vec![f64::NEG_INFINITY; sets * n];
-    let mut before = vec![usize::MAX; sets * n];
-    for last in 0..n {
-        best[(1 << last) * n + last] = 0.0;
-    }
-    for set in 1..sets {
-        for last in (0..n).filter(|last| set >> last & 1 == 1) {
-            let so_far = best[set * n + last];
-            if so_far == f64::NEG_INFINITY {
-                continue;
-            }
-            for next in (0..n).filter(|next| set >> next & 1 == 0) {
-                let (place, sum) = ((set | 1 << next) * n + next, so_far + weight(last, next));
-                if sum > best[place] {
-                    (best[place], before[place]) = (sum, last);
-                }
-            }
-        }
-    }
-    let mut set = sets - 1;
-    let mut last = (0..n).max_by(|a, b| best[set * n + a].total_cmp(&best[set * n + b]))?;
-    let sum = best[set * n + last];
-    if sum == f64::NEG_INFINITY {
-        return None;
-    }
-    let mut path = vec![last];
-    while before[set * n + last] != usize::MAX {
-        let previous = before[set * n + last];
-        (set, last) = (set & !(1 << last), previous);
-        path.push(last);
-    }
-    path.reverse();
-    Some((sum, path))
-}
 
 /// Outcome of a branch and bound.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,7 +24,7 @@ pub(crate) enum Figure {
 pub(crate) fn branch_and_bound<C: Chain>(
     chain: &C,
     given: &[usize],
-    optimistic: &Optimistic,
+    optimistic: &Optimistic<'_>,
     figure: Figure,
     tolerance_ratio: f64,
     nodes: u64,
@@ -94,12 +48,8 @@ pub(crate) fn branch_and_bound<C: Chain>(
         used: vec![false; n],
     };
     for (first, &point) in given.iter().enumerate() {
-        let (gradient_k, state) = chain.first(point);
-        let so_far = match figure {
-            Figure::Sum => gradient_k.map_or(0.0, f64::abs),
-            Figure::Worst => gradient_k.map_or(f64::INFINITY, f64::abs),
-        };
-        walk.enter(first, state, so_far);
+        let so_far = if figure == Figure::Sum { 0.0 } else { f64::INFINITY };
+        walk.enter(first, chain.first(point), so_far);
     }
     Proof { proven: walk.left > 0, order: walk.best_order }
 }
@@ -119,7 +69,7 @@ fn value_of<C: Chain>(chain: &C, order: &[usize], figure: Figure) -> f64 {
 struct Walk<'a, C: Chain> {
     chain: &'a C,
     points: &'a [usize],
-    optimistic: &'a Optimistic,
+    optimistic: &'a Optimistic<'a>,
     best_into: Vec<f64>,
     figure: Figure,
     keep_ratio: f64,
@@ -218,9 +168,7 @@ mod tests {
         fn len(&self) -> usize {
             self.n
         }
-        fn first(&self, _: usize) -> (Option<f64>, ()) {
-            (None, ())
-        }
+        fn first(&self, _: usize) {}
         fn step(&self, from: usize, to: usize, (): ()) -> (f64, ()) {
             (self.weights[from * self.n + to], ())
         }
@@ -254,26 +202,15 @@ mod tests {
         fn brute_force_agrees(weights in prop::collection::vec(0.0..30.0f64, 49), n in 2usize..=7) {
             let mut chain = Fixed { weights: weights[..n * n].to_vec(), n, returns: false };
             let best = best_of_all(&chain, &mut Vec::new());
-            let (sum, path) = best_path(n, |i, j| chain.step(i, j, ()).0).unwrap();
-            // Sums of at most six numbers, in another order.
-            prop_assert!((sum - best).abs() < 1e-9);
-            prop_assert!((crate::chain::gradients_k(&chain, &path).iter().sum::<f64>() - best).abs() < 1e-9);
             // So small that the search has no excuse.
             let given: Vec<usize> = (0..n).collect();
-            let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7);
+            let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7).swap_remove(0);
             prop_assert!((Objective::Sum.figure(&chain, &found) - best).abs() < 1e-9);
             // The same with the way back to the first point.
             chain.returns = true;
             let best = best_of_all(&chain, &mut Vec::new());
-            let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7);
+            let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7).swap_remove(0);
             prop_assert!((Objective::Sum.figure(&chain, &found) - best).abs() < 1e-9);
         }
-    }
-
-    #[test]
-    fn too_many_points_are_refused() {
-        assert_eq!(best_path(HELD_KARP_POINTS + 1, |_, _| 1.0), None);
-        assert_eq!(best_path(0, |_, _| 1.0), None);
-        assert_eq!(best_path(1, |_, _| 1.0), Some((0.0, vec![0])));
     }
 }

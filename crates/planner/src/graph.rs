@@ -5,8 +5,8 @@
 //! is asked for.
 
 use crate::forecast::{Forecast, forecast};
-use crate::reach::reachable;
 use crate::request::{PlanError, PlanRequest};
+use crate::targets::reachable;
 use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S, readable, temperature};
 use mapper_physics::steady::SteadyState;
 use petgraph::graph::DiGraph;
@@ -93,6 +93,7 @@ pub(crate) fn rejections(
     forecast: &Forecast,
     p3_change_pa: f64,
     t3_k: f64,
+    dwell_s: f64,
 ) -> Vec<Rejection> {
     let limits = &request.limits;
     let mut found = Vec::new();
@@ -116,7 +117,6 @@ pub(crate) fn rejections(
         found.push(Rejection::HousingGradient { gradient_k, limit_k });
     }
     if let Some(slew_pa_s) = limits.p3_slew_max_pa_s() {
-        let dwell_s = request.timing.dwell_s;
         let (available_s, _) = request.window.of_step_s(forecast.predicted.settle_s, dwell_s);
         let needed_s = p3_change_pa.abs() / slew_pa_s;
         if needed_s > available_s {
@@ -131,7 +131,8 @@ pub(crate) fn jump(
     (from, start): (OperatingPoint, &SteadyState),
     (to, target): (OperatingPoint, &SteadyState),
 ) -> Result<JumpForecast, PlanError> {
-    let forecast = forecast(request, start.state, &target.boundary, request.timing.dwell_s, true)
+    let dwell_s = request.timing.dwell.fixed_or_usual_s();
+    let forecast = forecast(request, start.state, &target.boundary, dwell_s, true)
         .map_err(|source| PlanError::Forecast { to, source })?;
     let p3_change_pa = target.boundary.p3_pa - start.boundary.p3_pa;
     Ok(JumpForecast {
@@ -143,7 +144,7 @@ pub(crate) fn jump(
         highest_t2_k: forecast.highest_t2_k,
         p3_pa: target.boundary.p3_pa,
         p3_change_pa,
-        rejections: rejections(request, &forecast, p3_change_pa, target.boundary.t3_k),
+        rejections: rejections(request, &forecast, p3_change_pa, target.boundary.t3_k, dwell_s),
     })
 }
 

@@ -8,7 +8,6 @@
 
 use crate::chain::Chain;
 use crate::forecast::forecast;
-use crate::method::{ForecastRow, WorthOfStep};
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::OperatingPoint;
 use mapper_numerics::parallel;
@@ -19,9 +18,6 @@ use std::collections::HashSet;
 
 /// States that differ by less, K, lead to gradients that differ by less than any sensor sees.
 const ALIKE_K: f64 = 0.01;
-
-/// From fraction^2 to %^2: numbers about 1.
-pub(crate) const PERCENT2: f64 = 1e4;
 
 /// Scaled (c, t, w) of three of the six starts; the other three are their mirror images.
 const DESIGN: [[f64; 3]; 3] = [[-1.0, -1.0, -1.0], [0.2, -0.6, -1.0], [0.6, 0.0, 1.0]];
@@ -94,28 +90,21 @@ pub(crate) struct Response {
     settled: [f64; 2],
     /// What the first step of a campaign leaves, scaled.
     first: [f64; 2],
-    /// Mean square error of eta times the gradient squared, over the gradient, rising.
-    error: Vec<(f64, f64)>,
-    /// What the step is worth to a campaign that is identified as a whole, %^2, where that is known.
-    worth: Option<Surface>,
 }
 
 /// From the smallest to the largest.
 pub(crate) type Interval = (f64, f64);
 
-/// What a step to the point at a place is worth, fraction^2, by its rows.
-pub(crate) type WorthAt<'a> = dyn Fn(usize, &[ForecastRow]) -> Option<f64> + Sync + 'a;
+/// The scaled Tc and Tt that a dwell at a point can end in.
+pub(crate) type StateBox = (Interval, Interval);
 
 /// The reduced machine.
 #[derive(Debug, Clone)]
 pub(crate) struct Housing {
     pub(crate) responses: Vec<Response>,
-    /// Scaled (Tc, Tt) and scaled speed before a first step that begins with a jump.
-    start: Option<[f64; 3]>,
     forbidden: HashSet<(usize, usize)>,
     gradient_max_k: f64,
     alike: [f64; 2],
-    scale: Scale,
     /// Whether orders end where they begin.
     pub(crate) returns: bool,
 }
@@ -128,10 +117,10 @@ struct Scale {
 }
 
 impl Scale {
-    fn of(targets: &[SteadyState], also: Option<State>) -> Self {
+    fn of(targets: &[SteadyState]) -> Self {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
-        for state in targets.iter().map(|target| target.state).chain(also) {
+        for state in targets.iter().map(|target| target.state) {
             for (i, value) in [state.tc_k, state.tt_k, state.shaft_speed_rad_s].into_iter().enumerate() {
                 (low[i], high[i]) = (low[i].min(value), high[i].max(value));
             }
@@ -150,109 +139,27 @@ impl Scale {
 }
 
 impl Housing {
-    /// Simulates the starts of all points. `start`: the machine's state, where the first step begins with a jump.
+    /// Simulates steps of `dwell_s` to all points.
     pub(crate) fn of(
         request: &PlanRequest<'_>,
         points: &[OperatingPoint],
         targets: &[SteadyState],
-        start: Option<State>,
-        worth: Option<&dyn WorthOfStep>,
+        dwell_s: f64,
     ) -> Result<Self, PlanError> {
-        let dwells_s = vec![request.timing.dwell_s; points.len()];
-        match worth {
-            Some(worth) => Housing::of_dwells(
-                request,
-                points,
-                targets,
-                start,
-                &dwells_s,
-                Some(&|_, rows| worth.of(rows)),
-            ),
-            None => Housing::of_dwells(request, points, targets, start, &dwells_s, None),
-        }
-    }
-
-    /// The same where each point is held for a dwell of its own, and a step's worth goes with the point, given by its place.
-    pub(crate) fn of_dwells(
-        request: &PlanRequest<'_>,
-        points: &[OperatingPoint],
-        targets: &[SteadyState],
-        start: Option<State>,
-        dwells_s: &[f64],
-        worth: Option<&WorthAt<'_>>,
-    ) -> Result<Self, PlanError> {
-        let scale = Scale::of(targets, start);
-        let [slowest, fastest] = ends(targets).ok_or(PlanError::NoPoints)?;
-        let aims: Vec<(usize, &SteadyState, f64)> = targets
-            .iter()
-            .zip(dwells_s)
-            .enumerate()
-            .map(|(place, (target, dwell_s))| (place, target, *dwell_s))
-            .collect();
-        let one = |(place, target, dwell_s): &(usize, &SteadyState, f64)| {
-            response(
-                request,
-                target,
-                *dwell_s,
-                &scale,
-                [slowest, fastest],
-                start.is_none(),
-                worth.map(|worth| (worth, *place)),
-            )
-            .map_err(|source| PlanError::Forecast { to: points[*place], source })
+        let scale = Scale::of(targets);
+        let ends = ends(targets).ok_or(PlanError::NoPoints)?;
+        let aims: Vec<(OperatingPoint, &SteadyState)> = points.iter().copied().zip(targets).collect();
+        let one = |(to, target): &(OperatingPoint, &SteadyState)| {
+            response(request, target, dwell_s, &scale, ends)
+                .map_err(|source| PlanError::Forecast { to: *to, source })
         };
         Ok(Housing {
             responses: parallel::try_map(&aims, one)?,
-            start: start.map(|state| scale.scaled(&state)),
             forbidden: HashSet::new(),
             gradient_max_k: request.limits.housing_gradient_max_k.unwrap_or(f64::INFINITY),
             alike: [ALIKE_K / scale.half[0], ALIKE_K / scale.half[1]],
-            scale,
             returns: false,
         })
-    }
-
-    /// The same machine with what a step is worth in place of its gradient, so that all that looks for large sums of gradients
-    /// looks for a campaign that knows much. `None` where that is not known.
-    pub(crate) fn by_worth(&self) -> Option<Housing> {
-        let worths: Vec<Surface> =
-            self.responses.iter().map(|response| response.worth).collect::<Option<_>>()?;
-        // A constant for each step changes no order, and makes every worth positive.
-        let far = worths.iter().map(|worth| worth.0.iter().map(|k| k.abs()).sum::<f64>()).fold(0.0, f64::max);
-        let raised = |mut worth: Surface| {
-            worth.0[0] += 2.0 * far;
-            worth
-        };
-        let responses = self.responses.iter().zip(worths);
-        Some(Housing {
-            responses: responses
-                .map(|(response, worth)| Response { gradient_k: raised(worth), ..response.clone() })
-                .collect(),
-            gradient_max_k: f64::INFINITY,
-            ..self.clone()
-        })
-    }
-
-    /// What the step `from` -> `to` from `state` is worth, %^2, where that is known.
-    pub(crate) fn worth(&self, from: usize, to: usize, [c, t]: [f64; 2]) -> Option<f64> {
-        Some(self.responses[to].worth?.at(c, t, self.responses[from].speed))
-    }
-
-    /// The most that it is worth from any state of a box.
-    pub(crate) fn most_worth(&self, from: usize, to: usize, (c, t): (Interval, Interval)) -> Option<f64> {
-        Some(self.responses[to].worth?.range(c, t, self.responses[from].speed).1)
-    }
-
-    /// A state of the machine, scaled.
-    pub(crate) fn scaled(&self, state: &State) -> [f64; 2] {
-        let [c, t, _] = self.scale.scaled(state);
-        [c, t]
-    }
-
-    /// The starts from which each point was simulated.
-    pub(crate) fn starts(&self, targets: &[SteadyState]) -> Option<[[State; 2]; 3]> {
-        let [slowest, fastest] = ends(targets)?;
-        Some(starts(&self.scale, [slowest, fastest]))
     }
 
     /// Takes a jump out of the search.
@@ -263,14 +170,6 @@ impl Housing {
     /// Largest allowed gradient, K.
     pub(crate) fn gradient_max_k(&self) -> f64 {
         self.gradient_max_k
-    }
-
-    /// Scaled state after a first step.
-    pub(crate) fn first_state(&self, to: usize) -> [f64; 2] {
-        match self.start {
-            Some([c, t, w]) => self.responses[to].end.map(|end| end.at(c, t, w)),
-            None => self.responses[to].first,
-        }
     }
 }
 
@@ -302,50 +201,27 @@ fn response(
     dwell_s: f64,
     scale: &Scale,
     [slowest, fastest]: [&SteadyState; 2],
-    starts_cold: bool,
-    worth: Option<(&WorthAt<'_>, usize)>,
 ) -> Result<Response, mapper_physics::simulate::SimulationError> {
     let mut gradient_k = [[0.0; 2]; 3];
     let mut end = [[[0.0; 2]; 3]; 2];
-    let mut error = Vec::new();
-    let mut worths = worth.map(|_| [[0.0; 2]; 3]);
     for (i, pair) in starts(scale, [slowest, fastest]).into_iter().enumerate() {
         for (j, state) in pair.into_iter().enumerate() {
             let forecast = forecast(request, state, &target.boundary, dwell_s, true)?;
-            let predicted = &forecast.predicted;
-            let dtc_k = predicted.dtc_k.unwrap_or(0.0);
-            gradient_k[i][j] = dtc_k;
+            gradient_k[i][j] = forecast.predicted.dtc_k.unwrap_or(0.0);
             let left = scale.scaled(&forecast.end);
             end[0][i][j] = left[0];
             end[1][i][j] = left[1];
-            match (&mut worths, worth.and_then(|(worth, place)| worth(place, &forecast.rows))) {
-                (Some(worths), Some(worth)) => worths[i][j] = PERCENT2 * worth,
-                // Of a step that tells nothing there is nothing to choose by.
-                (worths, _) => *worths = None,
-            }
-            if let (Some(sigma), Some(bias)) = (predicted.sigma_eta, predicted.bias_eta) {
-                error.push((dtc_k, (sigma * sigma + bias * bias) * dtc_k * dtc_k));
-            }
         }
     }
-    error.sort_by(|a: &(f64, f64), b| a.0.total_cmp(&b.0));
-    let first = if starts_cold {
-        let first_step_s = request.timing.warm_up_s + dwell_s;
-        let [c, t, _] =
-            scale.scaled(&warmed_up(request.model, target.state, &target.boundary, first_step_s)?);
-        [c, t]
-    } else {
-        [0.0; 2]
-    };
+    let first_step_s = request.timing.warm_up_s + dwell_s;
+    let first = scale.scaled(&warmed_up(request.model, target.state, &target.boundary, first_step_s)?);
     let settled = scale.scaled(&target.state);
     Ok(Response {
         gradient_k: Surface::through(gradient_k),
         end: end.map(Surface::through),
         speed: settled[2],
         settled: [settled[0], settled[1]],
-        first,
-        error,
-        worth: worths.map(Surface::through),
+        first: [first[0], first[1]],
     })
 }
 
@@ -356,9 +232,8 @@ impl Chain for Housing {
         self.responses.len()
     }
 
-    fn first(&self, to: usize) -> (Option<f64>, [f64; 2]) {
-        let gradient_k = self.start.map(|[c, t, w]| self.responses[to].gradient_k.at(c, t, w));
-        (gradient_k, self.first_state(to))
+    fn first(&self, to: usize) -> [f64; 2] {
+        self.responses[to].first
     }
 
     #[inline]
@@ -379,18 +254,6 @@ impl Chain for Housing {
     #[inline]
     fn admissible(&self, from: usize, to: usize) -> bool {
         self.forbidden.is_empty() || !self.forbidden.contains(&(from, to))
-    }
-
-    fn mean_square_error(&self, to: usize, gradient_k: f64) -> f64 {
-        let table = &self.responses[to].error;
-        let after = table.partition_point(|(g, _)| *g < gradient_k);
-        let times_square = match (after.checked_sub(1).and_then(|i| table.get(i)), table.get(after)) {
-            (Some((g0, e0)), Some((g1, e1))) => e0 + (e1 - e0) * (gradient_k - g0) / (g1 - g0).max(1e-12),
-            (Some((_, e)), None) | (None, Some((_, e))) => *e,
-            (None, None) => 1.0,
-        };
-        // Below a tenth of a kelvin nothing is identified.
-        times_square / (gradient_k * gradient_k).max(0.01)
     }
 
     fn returns(&self) -> bool {

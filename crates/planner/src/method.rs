@@ -4,7 +4,7 @@
 
 pub use mapper_physics::forecast::ForecastRow;
 
-/// What the method will find in a window.
+/// What the method is expected to find in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MethodResult {
     /// Efficiency without noise, fraction.
@@ -15,60 +15,30 @@ pub struct MethodResult {
     pub h_w_m2k: f64,
     /// Its standard error, W/(m2 K).
     pub sigma_h_w_m2k: f64,
-    /// Standard error of the efficiency where nothing that the method can find by itself is as declared, fraction.
-    pub open_sigma_eta: f64,
+}
+
+/// What the method is expected to find in all steps of a campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MethodResults {
+    /// One result for each step, on a machine that is as declared.
+    pub steps: Vec<Option<MethodResult>>,
+    /// What the declaration is worth: by how much the efficiencies would be off (rms, one sigma, fraction) if the parameters that the method
+    /// may find had to be found from these steps.
+    pub resting_eta: f64,
+    /// Largest such error with which points are good, fraction.
+    pub max_resting_eta: f64,
 }
 
 /// An identification method, for planning.
 pub trait PredictedMethod: std::fmt::Debug + Sync {
-    /// What it makes of the rows of a window, which lie `interval_s` apart; `None` where it finds nothing.
-    fn predict(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult>;
+    /// The result of one step by itself, from the rows of its window, which lie `interval_s` apart; `None` if the method finds
+    /// nothing there, or looks at all steps together.
+    fn alone(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult>;
 
-    /// What it makes of the steps of a whole campaign, each from its jump to its end, where it looks at all of them together;
-    /// one result for each step. `None` where it looks at each step for itself, or comes to no end. `as_declared`: whether the
-    /// errors of a machine that is as declared are asked for too; else `sigma_eta` is `open_sigma_eta`.
-    fn together(&self, _steps: &[&[ForecastRow]], _as_declared: bool) -> Option<Vec<Option<MethodResult>>> {
-        None
-    }
+    /// The results of all steps of a campaign together, each given from its jump to its end; `None` if the method looks at each
+    /// step by itself, or its fit does not converge.
+    fn together(&self, steps: &[&[ForecastRow]]) -> Option<MethodResults>;
 
-    /// What single steps are worth to a campaign of these steps; `None` for a method that looks at each step for itself.
-    fn worth_to(&self, _steps: &[&[ForecastRow]]) -> Option<Box<dyn WorthOfStep>> {
-        None
-    }
-
-    /// A tangent of the variances that campaigns of the same points make, at one whose steps tell `times` as much as these; `measures`:
-    /// whether each step measures a point. `None` for a method that looks at each step for itself.
-    fn tangent_at(
-        &self,
-        _steps: &[&[ForecastRow]],
-        _measures: &[bool],
-        _times: f64,
-    ) -> Option<Box<dyn ErrorTangent>> {
-        None
-    }
-
-    /// Whether it looks at all steps together.
-    fn is_joint(&self) -> bool {
-        false
-    }
-
-    /// What conventional mapping makes of a settled point: apparent efficiency and its standard error, fractions.
-    fn predict_settled(&self, row: &ForecastRow) -> Option<(f64, f64)>;
-}
-
-/// What a step is worth to a planned campaign.
-pub trait WorthOfStep: std::fmt::Debug + Sync {
-    /// By how much the step makes all points more certain, less the variance of its own point, fraction^2; the rows lead from
-    /// its jump to its end.
-    fn of(&self, rows: &[ForecastRow]) -> Option<f64>;
-}
-
-/// A tangent of the sum of the variances of a campaign's points, by the information of all its steps: no campaign's sum is below `start`, less what
-/// its steps count for.
-pub trait ErrorTangent: std::fmt::Debug + Sync {
-    /// Where no step counts for anything, fraction^2.
-    fn start(&self) -> f64;
-
-    /// What a step in place of the campaign's step `place` counts for, fraction^2; the rows lead from its jump to its end.
-    fn of(&self, rows: &[ForecastRow], place: usize) -> Option<f64>;
+    /// The result of conventional mapping at a settled point: apparent efficiency and its standard error, fractions.
+    fn settled(&self, row: &ForecastRow) -> Option<(f64, f64)>;
 }

@@ -14,8 +14,6 @@ pub enum Objective {
         /// Target, K.
         target_k: f64,
     },
-    /// Minus the mean square error of the efficiency, %^2.
-    Information,
 }
 
 /// A step that is not allowed costs this much: more than any order can make up for.
@@ -32,7 +30,6 @@ impl Objective {
                 let missing_k = (target_k - size_k).max(0.0);
                 -missing_k * missing_k
             }
-            Objective::Information => -1e4 * chain.mean_square_error(to, gradient_k),
         };
         if size_k > chain.gradient_max_k() || !chain.admissible(from, to) {
             value - NOT_ALLOWED
@@ -41,21 +38,11 @@ impl Objective {
         }
     }
 
-    /// Value of the first step.
-    #[inline]
-    pub fn first_value<C: Chain>(self, chain: &C, to: usize, gradient_k: Option<f64>) -> f64 {
-        // Without a jump the first point is the same burden wherever the order begins.
-        gradient_k.map_or(0.0, |gradient_k| self.value(chain, to, to, gradient_k))
-    }
-
-    /// The figure itself of an order: sum, smallest gradient, minus mean square error; what is not allowed counts as in
-    /// the search.
+    /// The figure itself of an order: sum or smallest gradient; what is not allowed counts as in the search.
     pub fn figure<C: Chain>(self, chain: &C, order: &[usize]) -> f64 {
         let Some(&first) = order.first() else { return 0.0 };
-        let (gradient_k, mut state) = chain.first(first);
-        let mut sum = self.first_value(chain, first, gradient_k);
-        let mut smallest_k = gradient_k.map_or(f64::INFINITY, f64::abs);
-        let mut barred = 0.0;
+        let mut state = chain.first(first);
+        let (mut sum, mut smallest_k, mut barred) = (0.0, f64::INFINITY, 0.0);
         let jumps = order.windows(2).map(|pair| (pair[0], pair[1])).chain(way_back(chain, order));
         for (from, to) in jumps {
             let (gradient_k, next) = chain.step(from, to, state);
@@ -69,7 +56,7 @@ impl Objective {
         }
         match self {
             Objective::Worst { .. } => smallest_k.min(1e9) - barred,
-            Objective::Sum | Objective::Information => sum,
+            Objective::Sum => sum,
         }
     }
 }

@@ -1,32 +1,24 @@
 //! From a request to a plan.
 
-use crate::best::{best, cost_of};
-use crate::dwell::{FORECASTS, needed_s};
-use crate::figures::{duration_s, open_rms_error_eta};
-use crate::forecast::MOST_TOGETHER;
-use crate::reach::reachable;
-use crate::repeats::usual_jumps;
+use crate::figures::rms_error_eta;
+use crate::plan_builder::{Draft, PlanBuilder, max_steps};
 use crate::request::{PlanError, PlanRequest};
-use crate::stage::{Made, Sought, Stage};
-use mapper_core::{Jump, Plan, Repeats, VisitOrder};
-use mapper_numerics::statistics::mean;
+use crate::targets::reachable;
+use crate::visits::usual_jumps;
+use mapper_core::{Dwell, Jump, Plan, Repeats, WindowRule};
 use mapper_physics::steady::SteadyState;
 
-/// Effort of a search that only leads to another, over the usual, and the forecasts that it may take.
-const ROUGHLY_RATIO: f64 = 0.03;
-const ROUGH_FORECASTS: usize = 3;
-/// The same of one by what steps are worth: that is known to a few percent only, and thirty times the effort, or what
-/// steps are worth worked out again about the order that was found, finds plans that cost some 3 % less (docs/performance.md).
-const INFORMED_RATIO: f64 = 0.1;
-/// The same where dwells are found by price behind it.
-const DRAFTED_RATIO: f64 = 0.03;
-const FEW_POINTS: usize = 40;
-/// The dwell for which an order is sought then: at most so much of the longest, and so much of what equal steps would need, which
-/// priced ones undercut (decision 0048).
-const DRAFTED_DWELL_RATIO: f64 = 0.5;
-const UNDERCUT_RATIO: f64 = 0.85;
-/// Jumps tried for repeats where the request names none.
+/// Jumps tried for repeats if the request names none; each takes a whole search.
 const USUAL_JUMPS: usize = 3;
+/// Shortest dwell that is chosen, s: a window begins at [`WindowRule::EARLIEST_S`] at the earliest, and lasts at least as long.
+const SHORTEST_DWELL_S: f64 = 2.0 * WindowRule::EARLIEST_S;
+/// Longest dwell that is chosen, s: from five minutes on, conventional mapping would do (Burke et al.: 5 to 15 minutes a point).
+const LONGEST_DWELL_S: f64 = 300.0;
+/// Dwell at which a search for another begins, s: about a time constant of the housing.
+const FIRST_DWELL_S: f64 = 40.0;
+/// Forecasts that are made to find a dwell: with the power law between the last two, four to six find it to the second.
+const ROUNDS: usize = 8;
+
 /// Orders the points and forecasts every step.
 ///
 /// # Errors
@@ -35,107 +27,115 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
     if request.points.is_empty() {
         return Err(PlanError::NoPoints);
     }
-    if request.order.needs_method() && request.method.is_none() {
-        return Err(PlanError::NeedsMethod { order: request.order.name() });
-    }
-    if request.order == VisitOrder::Time && request.required_sigma_eta.is_none() {
-        return Err(PlanError::NeedsRequiredError);
-    }
-    if request.order == VisitOrder::Best {
-        return best(request, make_plan);
-    }
     let targets = reachable(request, request.points)?;
-    with_or_without_return(request, &targets)
-}
-
-/// The plan as asked for, or without the way back where that is what a limit forbids.
-fn with_or_without_return(request: &PlanRequest<'_>, targets: &[SteadyState]) -> Result<Plan, PlanError> {
-    let made = plan_to(request, targets);
+    let made = with_repeats(request, &targets);
     let (true, Err(PlanError::NoAdmissibleOrder(_))) = (request.return_to_first, &made) else { return made };
     // It may be the way back alone that is not allowed: nobody asked for it by name.
-    let mut plan = plan_to(&PlanRequest { return_to_first: false, ..request.clone() }, targets)?;
+    let mut plan = with_repeats(&PlanRequest { return_to_first: false, ..request.clone() }, &targets)?;
     plan.remarks.push("a limit forbids the way back to the first point at the end".to_owned());
     Ok(plan)
 }
 
 /// The plan with the repeats that the request asks for. `targets`: the steady states of its points.
-fn plan_to(request: &PlanRequest<'_>, targets: &[SteadyState]) -> Result<Plan, PlanError> {
-    let Some(repeats) = request.repeats else { return plan_with(request, targets, None) };
+fn with_repeats(request: &PlanRequest<'_>, targets: &[SteadyState]) -> Result<Plan, PlanError> {
+    let Some(repeats) = request.repeats else { return with_jump(request, targets, None) };
     if let Some(jump) = repeats.jump {
-        return plan_with(request, targets, Some((repeats, jump)));
+        return with_jump(request, targets, Some((repeats, jump)));
     }
     let mut barred = None;
     for jump in usual_jumps(request, targets)?.into_iter().take(USUAL_JUMPS) {
-        match plan_with(request, targets, Some((repeats, jump))) {
+        match with_jump(request, targets, Some((repeats, jump))) {
             // It may be the repeated jump itself that is not allowed from where the machine comes to it.
             Err(error @ PlanError::NoAdmissibleOrder(_)) => barred = Some(error),
             made => return made,
         }
     }
-    let mut plan = plan_with(request, targets, None).map_err(|error| barred.unwrap_or(error))?;
+    let mut plan = with_jump(request, targets, None).map_err(|error| barred.unwrap_or(error))?;
     plan.remarks.push("no jump between the points can be repeated, so that drift would not show".to_owned());
     Ok(plan)
 }
 
-/// The plan with one jump repeated, or none. `reached`: the steady states of the request's points.
-fn plan_with(
+/// The plan with one jump repeated, or none.
+fn with_jump(
     request: &PlanRequest<'_>,
-    reached: &[SteadyState],
+    targets: &[SteadyState],
     repeats: Option<(Repeats, Jump)>,
 ) -> Result<Plan, PlanError> {
-    let stage = Stage::of(request, reached, repeats)?;
-    let joint = request.method.is_some_and(|method| method.is_joint());
-    let longest_s = request.timing.dwell_s;
-    let usual = Sought { dwell_s: longest_s, effort: request.effort, forecasts: FORECASTS };
-    if !joint {
-        return Ok(stage.plan(stage.made(request.order, usual, None)?));
-    }
-    let informed = request.order.needs_method();
-    let first = if informed { VisitOrder::SumGradient } else { request.order };
-    let chosen = request.required_sigma_eta.is_some() && first != VisitOrder::Listed;
-    if !(informed || chosen) {
-        return Ok(stage.plan(stage.made(first, usual, None)?));
-    }
-    // An order is sought for the dwells that it will have, and what steps are worth is known about a campaign: both come from
-    // a rough first one.
-    let rough = Sought { effort: ROUGHLY_RATIO * request.effort, forecasts: ROUGH_FORECASTS, ..usual };
-    // Of few points an order is sought thoroughly in no time.
-    let many = request.points.len() > FEW_POINTS;
-    let drafted = informed && request.draft && many && request.required_sigma_eta.is_some();
-    let rough = match drafted {
-        true => Sought { dwell_s: (DRAFTED_DWELL_RATIO * longest_s).round(), forecasts: 1, ..rough },
-        false => rough,
+    let builder = PlanBuilder::of(request, targets, repeats)?;
+    let draft = match request.timing.dwell {
+        Dwell::Fixed(dwell_s) => builder.draft(dwell_s)?,
+        Dwell::TimeBudget(budget_s) => within_budget(request, &builder, budget_s)?,
+        Dwell::RequiredSigmaEta(sigma_eta) => reaching(&builder, sigma_eta)?,
     };
-    let mut made = stage.made(first, rough, None)?;
-    let dwell_s = |made: &Made| {
-        let dwells_s: Vec<f64> = made.steps().iter().map(|step| step.dwell_s).collect();
-        mean(&dwells_s).unwrap_or(longest_s).round()
+    builder.plan(draft)
+}
+
+/// The plan with the longest dwell, in whole seconds, that fits the time budget.
+fn within_budget(
+    request: &PlanRequest<'_>,
+    builder: &PlanBuilder<'_>,
+    budget_s: f64,
+) -> Result<Draft, PlanError> {
+    let steps_s = budget_s - request.timing.warm_up_s - request.timing.cool_down_s;
+    let dwell_s = |steps: usize| (steps_s / steps as f64).floor();
+    let steps = max_steps(request);
+    if dwell_s(steps) < SHORTEST_DWELL_S {
+        return Err(PlanError::BudgetTooShort {
+            budget_s,
+            steps,
+            dwell_s: dwell_s(steps).max(0.0),
+            shortest_s: SHORTEST_DWELL_S,
+            needed_s: budget_s - steps_s + steps as f64 * SHORTEST_DWELL_S,
+        });
+    }
+    let draft = builder.draft(dwell_s(steps))?;
+    // Where the order passes by the start of the repeated jump, a repeat takes one step instead of two.
+    let longer_s = dwell_s(draft.steps().len());
+    if longer_s > draft.dwell_s { builder.with_dwell(draft, longer_s) } else { Ok(draft) }
+}
+
+/// The plan with the shortest dwell, in whole seconds, whose expected error (rms over the points) is at most `required`; with the
+/// longest dwell if none reaches it.
+fn reaching(builder: &PlanBuilder<'_>, required: f64) -> Result<Draft, PlanError> {
+    // Steps that tell too little for an expected error miss it.
+    let error_of = |draft: &Draft| match rms_error_eta(draft.steps()) {
+        None if draft.is_predicted() => Ok(f64::INFINITY),
+        error => error.ok_or(PlanError::NoPredictedError),
     };
-    if let (true, Some(error)) = (drafted, open_rms_error_eta(made.steps())) {
-        // Where shorter steps will do, what steps are worth is known about those.
-        let needed_s = (UNDERCUT_RATIO * needed_s(request, dwell_s(&made), error)).round();
-        if needed_s < dwell_s(&made) {
-            made = stage.made(first, Sought { dwell_s: needed_s, ..rough }, None)?;
+    let mut draft = builder.draft(FIRST_DWELL_S)?;
+    // Dwell and error of the longest one that misses, and of the shortest one that reaches.
+    let mut misses: Option<(f64, f64)> = None;
+    let mut reaches: Option<(f64, f64)> = None;
+    for _ in 0..ROUNDS {
+        let (dwell_s, error) = (draft.dwell_s, error_of(&draft)?);
+        if error <= required {
+            reaches = Some((dwell_s, error))
+        } else {
+            misses = Some((dwell_s, error))
         }
-    }
-    if !informed {
-        made = stage.made(first, Sought { dwell_s: dwell_s(&made), ..usual }, None)?;
-        return Ok(stage.plan(made));
-    }
-    if let Some(method) = request.method {
-        let rows: Vec<_> = made.rows().iter().take(MOST_TOGETHER).map(Vec::as_slice).collect();
-        if let Some(worth) = method.worth_to(&rows) {
-            let (ratio, forecasts) = if drafted { (DRAFTED_RATIO, 1) } else { (INFORMED_RATIO, FORECASTS) };
-            let sought = Sought { dwell_s: dwell_s(&made), effort: ratio * request.effort, forecasts };
-            let other = stage.made(request.order, sought, Some(worth.as_ref()))?;
-            let cost = |made: &Made| {
-                cost_of(open_rms_error_eta(made.steps()), duration_s(request, made.steps()) / 60.0)
-            };
-            if cost(&other) < cost(&made) {
-                made = other;
-            }
+        // Between two dwells the error is nearly a power of the dwell; beyond them it falls as noise averages, with the square root.
+        let power = match (misses, reaches) {
+            (Some(low), Some(high)) if low.1.is_finite() => (high.1 / low.1).ln() / (high.0 / low.0).ln(),
+            _ => -0.5,
+        };
+        let next_s = match (misses, reaches) {
+            (Some(low), Some(high)) if low.1.is_infinite() => (low.0 * high.0).sqrt().ceil(),
+            _ if error.is_infinite() => 2.0 * dwell_s,
+            _ => (dwell_s * (required / error).powf(1.0 / power)).ceil(),
+        };
+        let low_s = misses.map_or(SHORTEST_DWELL_S, |(dwell_s, _)| dwell_s + 1.0);
+        let high_s = reaches.map_or(LONGEST_DWELL_S, |(dwell_s, _)| dwell_s - 1.0);
+        if low_s > high_s {
+            break;
         }
+        draft = builder.with_dwell(draft, next_s.clamp(low_s, high_s))?;
     }
-    let plan = stage.plan(made);
-    Ok(Plan { objective: request.order.name().to_owned(), ..plan })
+    let dwell_s = reaches.map_or(LONGEST_DWELL_S, |(dwell_s, _)| dwell_s);
+    // The best order for the dwell that was found, if it reaches the error too.
+    let sought = builder.draft(dwell_s)?;
+    if reaches.is_none() || error_of(&sought)? <= required {
+        Ok(sought)
+    } else {
+        builder.with_dwell(draft, dwell_s)
+    }
 }

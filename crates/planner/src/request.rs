@@ -1,7 +1,6 @@
 //! What a plan is made from.
 
 use crate::method::PredictedMethod;
-use crate::simulations::Simulations;
 use mapper_core::{Jump, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::model::Model;
@@ -37,22 +36,14 @@ pub struct PlanRequest<'a> {
     pub repeats: Option<Repeats>,
     /// Whether the first point, which no jump leads to, is visited once more at the end.
     pub return_to_first: bool,
-    /// A jump to be made after all else, e.g. what a gap diagnosis asks for.
+    /// A jump to be made after all else, e.g. one that a gap diagnosis asks for.
     pub appended: Option<Jump>,
-    /// Standard error of the efficiency (fraction) that each point is to reach: no step lasts longer than that takes, nor
-    /// longer than `timing.dwell_s`. Without one all steps last that long.
-    pub required_sigma_eta: Option<f64>,
     /// The identification method; without one no errors are predicted.
     pub method: Option<&'a dyn PredictedMethod>,
-    /// Where simulated steps are kept, made for this model and the longest of the dwells; without one each is simulated anew.
-    pub simulations: Option<&'a Simulations>,
     /// Work of the search, 1 for the usual; larger searches longer, 0 hardly at all.
     pub effort: f64,
-    /// An order by what steps tell keeps this share of the largest sum of gradients, 0 to 1.
-    pub gradient_share: Option<f64>,
-    /// Whether whoever asks finds the dwells himself: steps then last about as long as each other, errors are the open ones alone, and
-    /// an order by what steps tell is sought with less effort.
-    pub draft: bool,
+    /// Whether to work out how good an order can be at all.
+    pub bound: bool,
     /// Seed of the search, passed on to simulated rigs.
     pub seed: u64,
 }
@@ -75,19 +66,30 @@ pub enum PlanError {
     /// No points.
     #[error("the campaign has no points; give its grid at least one")]
     NoPoints,
-    /// An order needs to know what the identification will make of a step.
+    /// The time budget leaves too little time at each point.
     #[error(
-        "the order {order} needs an identification method that looks at transients; set `identification.method: joint`"
+        "a time budget of {:.1} min leaves {dwell_s:.0} s for each of {steps} steps, and a step needs {shortest_s:.0} s; allow {:.0} min or more, or \
+         leave points out",
+        budget_s / 60.0,
+        (needed_s / 60.0).ceil()
     )]
-    NeedsMethod {
-        /// The order.
-        order: &'static str,
+    BudgetTooShort {
+        /// The budget, s.
+        budget_s: f64,
+        /// Steps of the plan.
+        steps: usize,
+        /// Time for each of them, s.
+        dwell_s: f64,
+        /// Shortest dwell that is chosen, s.
+        shortest_s: f64,
+        /// Budget for that dwell, s.
+        needed_s: f64,
     },
-    /// The shortest campaign for what?
+    /// A dwell cannot be chosen by an error that no method predicts.
     #[error(
-        "the order `time` needs the standard error that it has to reach; set `required_sigma_eta`, e.g. `0.5 %`"
+        "`required_sigma_eta` needs an identification method that predicts errors; set `identification.method: joint`, or give `timing.dwell`"
     )]
-    NeedsRequiredError,
+    NoPredictedError,
     /// No order of the points avoids jumps that are not allowed.
     #[error(
         "no order was found that avoids every forbidden jump: {}; widen the limits or leave points out",

@@ -8,6 +8,7 @@
 use crate::candidates::Candidates;
 use crate::chain::{Chain, gradients_k};
 use crate::objective::Objective;
+use mapper_numerics::parallel;
 use mapper_numerics::statistics::nearest_rank;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -15,8 +16,10 @@ use rand_pcg::Pcg64Mcg;
 /// Longest stretch that is reversed or shifted over: longer ones cost as much as they rarely gain.
 const LONGEST_STRETCH: usize = 50;
 
-/// Above this many points one start is all that a minute allows.
+/// Above this many points there is time for one start.
 const MANY_POINTS: usize = 500;
+/// Seeds of campaigns are small whole numbers: their starts lie apart by this.
+const SEEDS_APART: u64 = 1_000_003;
 /// Targets that a search for the largest smallest gradient sets itself.
 const TARGETS: u64 = 10;
 /// How much the second target lies above what the first has given, over the mean gradient of a greedy order; a target that
@@ -29,59 +32,69 @@ pub struct Effort {
     /// Moves tried in each start.
     pub moves: u64,
     /// Starts.
-    pub starts: u32,
+    pub starts: u64,
 }
 
 impl Effort {
-    /// Tuned so that 18 points take a fraction of a second, 200 some seconds, 2000 well below a minute; `factor` scales
-    /// it.
+    /// A fraction of a second for 50 points, some seconds for 2000; `factor` scales the moves. Ten times as many find sums that are
+    /// larger by less than 0.3 % (docs/planner.md).
     pub fn usual(points: usize, factor: f64) -> Self {
         let (moves, starts) = match points {
-            // Few points: many short starts find more than few long ones.
-            0..=40 => (60_000.0, 16),
-            41..=MANY_POINTS => (20_000.0 * points as f64, 2),
-            _ => (10_000.0 * points as f64, 1),
+            0..=40 => (10_000.0, 16),
+            // What repeats cost is seen when they are put into the orders that were found: the more of them the better.
+            41..=100 => (1_000.0 * points as f64, 8),
+            101..=MANY_POINTS => (1_000.0 * points as f64, 2),
+            _ => (1_000.0 * points as f64, 1),
         };
         Effort { moves: (moves * factor.clamp(0.0, 1e4)) as u64, starts }
     }
 }
 
-/// The best order found from `given`, which lists each point once.
-pub fn search<C: Chain>(
+/// The best order found from each start, the best of them first.
+///
+/// The first of `given` is a start too; no order found is worse than it.
+pub fn search<C: Chain + Sync>(
     chain: &C,
     given: &[usize],
     objective: Objective,
     effort: Effort,
     seed: u64,
-) -> Vec<usize> {
+) -> Vec<Vec<usize>> {
     search_among(chain, &Candidates::of(chain, given, objective), given, objective, effort, seed)
 }
 
-fn search_among<C: Chain>(
+fn search_among<C: Chain + Sync>(
     chain: &C,
     candidates: &Candidates,
     given: &[usize],
     objective: Objective,
     effort: Effort,
     seed: u64,
-) -> Vec<usize> {
-    let mut best = given.to_vec();
+) -> Vec<Vec<usize>> {
     if given.len() < 2 {
-        return best;
+        return vec![given.to_vec()];
     }
-    let mut best_figure = objective.figure(chain, &best);
     let greedy = greedy(chain, given, objective);
-    let mut random = Pcg64Mcg::seed_from_u64(seed);
-    for start in 0..effort.starts.max(1) {
-        let mut annealing =
-            Annealing::new(chain, candidates, if start == 0 { &greedy } else { &best }, objective);
-        annealing.run(effort.moves, start % 2 == 1, &mut random, &mut best, &mut best_figure);
-    }
-    best
+    let starts: Vec<u64> = (0..effort.starts.max(1)).collect();
+    let one = |start: &u64| {
+        let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(SEEDS_APART).wrapping_add(*start));
+        let mut best = given.to_vec();
+        let mut best_figure = objective.figure(chain, &best);
+        Annealing::new(chain, candidates, &greedy, objective).run(
+            effort.moves,
+            &mut random,
+            &mut best,
+            &mut best_figure,
+        );
+        (best_figure, best)
+    };
+    let mut found = parallel::map(&starts, one);
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.into_iter().map(|(_, order)| order).collect()
 }
 
 /// The order with the largest smallest gradient found from `given`: targets that rise as they are met.
-pub fn search_worst<C: Chain>(chain: &C, given: &[usize], effort: Effort, seed: u64) -> Vec<usize> {
+pub fn search_worst<C: Chain + Sync>(chain: &C, given: &[usize], effort: Effort, seed: u64) -> Vec<usize> {
     let worst_k = |order: &[usize]| Objective::Worst { target_k: 0.0 }.figure(chain, order);
     let mut order = greedy(chain, given, Objective::Sum);
     let mean_k = gradients_k(chain, &order).iter().sum::<f64>() / (given.len() as f64 - 1.0).max(1.0);
@@ -89,11 +102,12 @@ pub fn search_worst<C: Chain>(chain: &C, given: &[usize], effort: Effort, seed: 
     let candidates = Candidates::of(chain, given, Objective::Worst { target_k: mean_k });
     let (mut best_k, mut rise_k) = (worst_k(&order), mean_k);
     // Many points need more moves to agree on the smallest gradient than on their sum.
-    let times = if given.len() > MANY_POINTS { 2 } else { 1 } * u64::from(effort.starts.max(1));
+    let times = if given.len() > MANY_POINTS { 2 } else { 1 } * effort.starts.max(1);
     let each = Effort { moves: effort.moves.saturating_mul(times) / TARGETS, starts: 1 };
     for round in 0..TARGETS {
         let objective = Objective::Worst { target_k: best_k.max(0.0) + rise_k };
-        let found = search_among(chain, &candidates, &order, objective, each, seed.wrapping_add(round));
+        let found = search_among(chain, &candidates, &order, objective, each, seed.wrapping_add(round))
+            .swap_remove(0);
         let found_k = worst_k(&found);
         let risen_k = found_k - best_k;
         if risen_k > 0.0 {
@@ -132,7 +146,7 @@ pub(crate) fn greedy<C: Chain>(chain: &C, given: &[usize], objective: Objective)
         let to = remaining.remove(next);
         state = Some(match (state, order.last()) {
             (Some(state), Some(&from)) => chain.step(from, to, state).1,
-            _ => chain.first(to).1,
+            _ => chain.first(to),
         });
         order.push(to);
     }
@@ -223,10 +237,7 @@ impl<'a, C: Chain> Annealing<'a, C> {
                 let (gradient_k, next) = self.chain.step(from, to, state);
                 (self.objective.value(self.chain, from, to, gradient_k), next)
             }
-            _ => {
-                let (gradient_k, next) = self.chain.first(to);
-                (self.objective.first_value(self.chain, to, gradient_k), next)
-            }
+            _ => (0.0, self.chain.first(to)),
         }
     }
 
@@ -403,14 +414,7 @@ impl<'a, C: Chain> Annealing<'a, C> {
         !self.pieces.is_empty()
     }
 
-    fn run(
-        &mut self,
-        moves: u64,
-        gently: bool,
-        random: &mut Pcg64Mcg,
-        best: &mut Vec<usize>,
-        best_figure: &mut f64,
-    ) {
+    fn run(&mut self, moves: u64, random: &mut Pcg64Mcg, best: &mut Vec<usize>, best_figure: &mut f64) {
         // Typical change of value, from moves that are not made.
         let sizes: Vec<f64> = (0..200)
             .map(|_| {
@@ -420,7 +424,7 @@ impl<'a, C: Chain> Annealing<'a, C> {
             .filter(|size| *size > 0.0 && *size < 1e5)
             .collect();
         let typical = nearest_rank(&sizes, 0.5).unwrap_or(1.0);
-        let (hottest, coldest) = (typical * if gently { 0.1 } else { 0.5 }, typical * 5e-4);
+        let (hottest, coldest) = (0.5 * typical, 5e-4 * typical);
         const STAGES: u64 = 200;
         for stage in 0..STAGES {
             let share = stage as f64 / (STAGES - 1) as f64;

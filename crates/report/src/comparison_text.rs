@@ -1,84 +1,55 @@
-//! A plan beside conventional mapping and the same points under other orders.
+//! A plan compared with the same points in other orders and by conventional mapping.
 
-use crate::number::percent;
-use mapper_planner::{Comparison, STABLE_DRIFT_K_MIN, WayOfMapping};
+use crate::number::{number, percent};
+use crate::table;
+use crate::wrapped::wrapped;
+use mapper_core::Plan;
+use mapper_planner::STABLE_DRIFT_K_MIN;
 use serde_json::{Value, json};
-use std::fmt::Write;
 
-/// For machines: minutes and predicted errors of each way.
-pub fn comparison_json(comparison: &Comparison) -> Value {
-    let entry = |way: &WayOfMapping| {
-        json!({
-            "minutes": way.minutes,
-            "sum_gradient_k": way.sum_gradient_k,
-            "worst_error_eta": way.worst_error_eta,
-            "rms_error_eta": way.rms_error_eta,
-            "open_rms_error_eta": way.open_rms_error_eta,
-            "order": way.order,
-        })
-    };
-    let orders: Vec<Value> = comparison
-        .orders
-        .iter()
-        .map(|(name, way)| {
-            let mut value = entry(way);
-            value["name"] = name.as_str().into();
-            value
-        })
-        .collect();
-    json!({
-        "proposed": entry(&comparison.proposed),
-        "conventional": entry(&comparison.conventional),
-        "orders": orders,
-        "front": comparison.front(),
-        "beaten_by": comparison.beaten_by().map(|(name, _)| name),
-    })
+/// Time of the steps, minutes.
+fn minutes(plan: &Plan) -> f64 {
+    plan.steps.iter().map(|step| step.dwell_s).sum::<f64>() / 60.0
 }
 
-/// For people.
-pub fn comparison_text(comparison: &Comparison) -> String {
-    let mut text =
-        "\nPredicted error of the efficiency, %points (minutes without soak, warm-up and cool-down):\n"
-            .to_owned();
-    let mut line = |name: &str, way: &WayOfMapping| {
-        let gradient = way.sum_gradient_k.map_or_else(|| "-".to_owned(), |sum_k| format!("{sum_k:.0}"));
-        // Writing to a String cannot fail.
-        let _ = writeln!(
-            text,
-            "  {name:<36}{:>6.0} min   rms {:>5}   open {:>5}   worst {:>5}   gradients {gradient:>5} K",
-            way.minutes,
-            percent(way.rms_error_eta, 2),
-            percent(way.open_rms_error_eta, 2),
-            percent(way.worst_error_eta, 2),
-        );
+/// For machines: gradients, minutes and predicted errors by order, the plan first.
+pub fn comparison_json(plan: &Plan, others: &[Plan]) -> Value {
+    let entry = |plan: &Plan| {
+        json!({
+            "order": plan.objective,
+            "minutes": minutes(plan),
+            "sum_gradient_k": plan.figures.sum_gradient_k,
+            "min_gradient_k": plan.figures.min_gradient_k,
+            "rms_error_eta": plan.figures.rms_error_eta,
+            "rms_error_undeclared_eta": plan.figures.rms_error_undeclared_eta,
+            "worst_error_eta": plan.figures.worst_error_eta,
+        })
     };
-    line("this plan", &comparison.proposed);
-    for (name, way) in &comparison.orders {
-        line(&format!("order: {name}"), way);
-    }
-    line("conventional, with stabilisation", &comparison.conventional);
-    let _ = writeln!(
-        text,
-        "Orders: the best for the time it takes first. Open: where alpha_A, probe and direction factor have to be found. Conventional: T2 and housing must drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is that of heat transfer and of the same offsets."
+    std::iter::once(plan).chain(others).map(entry).collect()
+}
+
+/// For people, in 80 columns.
+pub fn comparison_text(plan: &Plan, others: &[Plan]) -> String {
+    let mut rows = table::with_heads(
+        &["order", "steps min", "total K", "least K", "rms pts", "worst pts", "undeclared pts"]
+            .map(str::to_owned),
     );
-    let front = comparison.front();
-    if front.len() > 1 {
-        let _ = writeln!(
-            text,
-            "No other order beats these in gradients, open error and minutes at once, the largest gradients first: {}.",
-            front.join("; ")
-        );
+    for plan in std::iter::once(plan).chain(others) {
+        let figures = &plan.figures;
+        rows.add_row([
+            plan.objective.clone(),
+            format!("{:.0}", minutes(plan)),
+            format!("{:.0}", figures.sum_gradient_k),
+            number(figures.min_gradient_k, 1),
+            percent(figures.rms_error_eta, 2),
+            percent(figures.worst_error_eta, 2),
+            percent(figures.rms_error_undeclared_eta, 2),
+        ]);
     }
-    if let Some((name, way)) = comparison.beaten_by() {
-        let proposed = &comparison.proposed;
-        let _ = writeln!(
-            text,
-            "`order: {name}` is forecast to do better than this plan: open {} points in {:.0} min, against {} in {:.0} min.",
-            percent(way.open_rms_error_eta, 2),
-            way.minutes,
-            percent(proposed.open_rms_error_eta, 2),
-            proposed.minutes
-        );
-    }
-    text
+    let legend = format!(
+        "total, least: sum and minimum of the thermal gradients. rms, worst: expected error of the efficiency over the points, one sigma, if the machine is as \
+         declared; undeclared: rms if alpha_A, probe and heating/cooling ratio have to be found. \
+         conventional: each point until T2 and housing drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is heat transfer."
+    );
+    format!("\n{rows}\n\n{}", wrapped(&legend, 80, 0))
 }

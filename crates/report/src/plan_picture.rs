@@ -55,10 +55,10 @@ pub fn plan_svg(campaign: &Campaign, model: &Model, plan: &Plan, along_lines: Op
 }
 
 fn numbered_every(steps: usize) -> usize {
-    match steps {
-        0..=ALL_NUMBERED => 1,
-        ..=FIFTH_NUMBERED => 5,
-        _ => 10,
+    match () {
+        () if steps <= ALL_NUMBERED => 1,
+        () if steps <= FIFTH_NUMBERED => 5,
+        () => 10,
     }
 }
 

@@ -26,7 +26,6 @@ mod speed_control;
 mod stopping;
 mod surge_search;
 mod surge_watch;
-mod until_certain;
 mod way_out;
 mod with_readers;
 
@@ -48,5 +47,4 @@ pub use source::{PlanSteps, StepSource, StepSourceError};
 pub use speed_control::{ResponseAt, SpeedControl, SpeedControlLimits};
 pub use surge_search::{Held, Hold, SurgeSearch};
 pub use surge_watch::SurgeWatch;
-pub use until_certain::{Certainty, DwellBounds, UntilCertain};
 pub use with_readers::{Reader, WithReaders};

@@ -52,7 +52,7 @@ impl Session {
         from_caller: Receiver<Option<StepResult>>,
     ) -> Self {
         Session {
-            dwell_s: request.timing.dwell_s,
+            dwell_s: request.timing.dwell.fixed_or_usual_s(),
             request,
             results: Vec::new(),
             nominal: Nominal::new(),

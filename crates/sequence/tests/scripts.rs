@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
-    CommonErrors, DwellEnd, IdentifiedPoint, Limits, Method, OperatingPoint, SettleBands, StepKind, Timing,
+    CommonErrors, Dwell, IdentifiedPoint, Limits, Method, OperatingPoint, SettleBands, StepKind, Timing,
     Verdict, WindowRule,
 };
 use mapper_physics::model::Model;
@@ -19,7 +19,7 @@ fn request() -> SequenceRequest {
     });
     SequenceRequest {
         points: points.collect(),
-        timing: Timing { warm_up_s: 60.0, dwell_s: 120.0, cool_down_s: 0.0, ends: DwellEnd::Planned },
+        timing: Timing { warm_up_s: 60.0, dwell: Dwell::Fixed(120.0), cool_down_s: 0.0 },
         window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 },
         settle_bands: SettleBands::default(),
         model: Model::nominal(),

@@ -203,10 +203,9 @@ fn campaign(dwell_s: u32, more: &str) -> String {
     let text = include_str!("../../../campaigns/turbo_a.yaml");
     let replaced = [
         ("  virtual_lab: {}\n", "  stand: {}\n".to_owned()),
-        ("order: information ", "order: listed ".to_owned()),
-        ("required_sigma_eta: 0.5 %\n", String::new()),
+        ("order: thermal_gradient ", "order: listed ".to_owned()),
         ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", String::new()),
-        ("  dwell: 120 s ", format!("  dwell: {dwell_s} s ")),
+        ("  dwell: 40 s ", format!("  dwell: {dwell_s} s ")),
         ("  warm_up: 2 min ", "  warm_up: 1 s ".to_owned()),
         ("method: joint ", "method: dynamic ".to_owned()),
         ("  formats: [csv, json, svg]\n", "  formats: []\n".to_owned()),

@@ -90,8 +90,8 @@ fn fingerprint(recorded: &Recorded) -> Option<String> {
     let (read, file) = (&recorded.read, &recorded.path);
     let of_campaign = || {
         let campaign = attached_campaign(read, file).ok()??;
-        let mapper_core::Timing { dwell_s, .. } = campaign.timing;
-        let same = (&campaign.machine, campaign.boundary, campaign.follow_outlet, &campaign.points, dwell_s);
+        let dwell = campaign.timing.dwell;
+        let same = (&campaign.machine, campaign.boundary, campaign.follow_outlet, &campaign.points, dwell);
         serde_json::to_string(&same).ok()
     };
     let of_hashes =

@@ -1,7 +1,7 @@
 //! What a stand may do to tell causes apart: the planner's jumps, steps of T3 and oil that limits and rig accept, and a soak.
 
 use crate::declared::identification_with;
-use crate::planning::with_plan_request;
+use crate::planning::PlanInputs;
 use crate::{Registry, SessionError};
 use mapper_campaign::Campaign;
 use mapper_core::{OperatingPoint, RigMode, SetpointRanges, Setpoints};
@@ -28,7 +28,7 @@ const SOAK_S: f64 = 1800.0;
 /// All that may be done.
 ///
 /// # Errors
-/// As [`with_plan_request`].
+/// As [`PlanInputs::of`].
 pub(crate) fn experiments(
     registry: &Registry,
     campaign: &Campaign,
@@ -71,21 +71,20 @@ fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<AllowedJump>,
     if campaign.points.len() > MAX_POINTS {
         return Ok(Vec::new());
     }
-    with_plan_request(campaign, model, |request| {
-        // Whether a jump is allowed does not hang on what it would tell.
-        let request = PlanRequest { method: None, ..request.clone() };
-        let Ok(graph) = mapper_planner::jump_graph(&request) else { return Ok(Vec::new()) };
-        let allowed = graph.edge_weights().filter(|jump| jump.rejections.is_empty());
-        Ok(allowed
-            .map(|jump| AllowedJump {
-                from: jump.from,
-                to: jump.to,
-                from_p3_pa: jump.p3_pa - jump.p3_change_pa,
-                to_p3_pa: jump.p3_pa,
-                dwell_s: request.timing.dwell_s,
-            })
-            .collect())
-    })
+    let inputs = PlanInputs::of(campaign)?;
+    // Whether a jump is allowed does not depend on the error that is expected after it.
+    let request = PlanRequest { method: None, ..inputs.request(campaign, model) };
+    let Ok(graph) = mapper_planner::jump_graph(&request) else { return Ok(Vec::new()) };
+    let allowed = graph.edge_weights().filter(|jump| jump.rejections.is_empty());
+    Ok(allowed
+        .map(|jump| AllowedJump {
+            from: jump.from,
+            to: jump.to,
+            from_p3_pa: jump.p3_pa - jump.p3_change_pa,
+            to_p3_pa: jump.p3_pa,
+            dwell_s: request.timing.dwell.fixed_or_usual_s(),
+        })
+        .collect())
 }
 
 /// The slowest and the fastest points, each with the smallest and the largest opening.

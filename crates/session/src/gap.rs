@@ -3,8 +3,8 @@
 use crate::declared::identification_with;
 use crate::experiments::experiments;
 use crate::fusing::{Fused, fused, recordings};
-use crate::planned::plan;
 use crate::planning::nominal_model;
+use crate::planning::plan;
 use crate::recorded::{Recorded, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;

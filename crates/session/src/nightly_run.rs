@@ -7,7 +7,7 @@ use crate::observers::Recorder;
 use crate::program::PROGRAM;
 use crate::recorded::Recorded;
 use crate::variant::{Variant, VariantError};
-use crate::{ErrorKind, Session, SessionError, planned, run_directory};
+use crate::{ErrorKind, Session, SessionError, planning, run_directory};
 use mapper_campaign::Campaign;
 use mapper_core::{Method, Plan};
 use mapper_history::{RunKey, RunRow};
@@ -80,7 +80,7 @@ impl NightlyRun {
     }
 
     fn fill(&self, row: &mut RunRow, session: &Session<'_>, directory: &Path) -> Result<(), SessionError> {
-        let plan = planned::plan(&self.campaign, &self.model)?;
+        let plan = planning::plan(&self.campaign, &self.model)?;
         row.campaign_sha256 = plan.made_from.campaign_sha256.clone();
         row.model_sha256 = plan.made_from.model_sha256.clone();
         match self.recorded(&plan, session, directory)? {
@@ -98,14 +98,14 @@ impl NightlyRun {
     /// `Err` within: a guard stopped the run, and why.
     ///
     /// # Errors
-    /// [`SessionError`] where the campaign cannot be planned, run or identified.
+    /// [`SessionError`] where the campaign cannot be planning, run or identified.
     pub fn points(
         &self,
         session: &Session<'_>,
         directory: &Path,
         methods: &[Method],
     ) -> Result<Result<Vec<Value>, String>, SessionError> {
-        let plan = planned::plan(&self.campaign, &self.model)?;
+        let plan = planning::plan(&self.campaign, &self.model)?;
         let recording = match self.recorded(&plan, session, directory)? {
             Ok(recorded) => recorded.path,
             Err(stopped) => return Ok(Err(stopped)),

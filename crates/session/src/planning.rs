@@ -1,13 +1,15 @@
-//! What the plan of a campaign is made from.
+//! The plan of a campaign, and what it is made from.
 
 use crate::SessionError;
 use crate::declared::identification;
-use crate::predicted_method::{Dynamic, Joint};
+use crate::predicted_method::{Forecaster, Scope};
+use crate::surge::count_surge_search;
+use crate::zero_forecast;
 use mapper_campaign::Campaign;
-use mapper_core::{JointSettings, Method};
+use mapper_core::{JointSettings, MadeFrom, Method, OperatingPoint, Plan};
 use mapper_identify::{IdentifyConfig, ZeroSettings, expected_after_zero};
 use mapper_physics::model::Model;
-use mapper_planner::{PlanRequest, PredictedMethod, Simulations};
+use mapper_planner::{PlanRequest, PredictedMethod, made_from, make_plan, sha256_hex};
 
 /// The nominal model of a campaign.
 ///
@@ -17,38 +19,67 @@ pub fn nominal_model(campaign: &Campaign) -> Result<Model, SessionError> {
     Ok(mapper_campaign::nominal_model(campaign)?)
 }
 
-/// Does something with what the plan of a campaign is made from.
+/// The plan of a campaign with a grid, with what seeking surge behind it takes.
 ///
 /// # Errors
-/// Those of `then`.
-pub fn with_plan_request<T, E: From<SessionError>>(
-    campaign: &Campaign,
-    model: &Model,
-    then: impl FnOnce(&PlanRequest<'_>) -> Result<T, E>,
-) -> Result<T, E> {
-    then(&PlanMaterial::of(campaign)?.request(campaign, model))
+/// [`SessionError::Plan`] where points cannot be reached or no order is allowed.
+pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
+    plan_of(campaign, &PlanInputs::of(campaign)?.request(campaign, model))
 }
 
-/// What a plan's request borrows besides campaign and model.
+/// The same of a request that was made from the campaign.
+///
+/// # Errors
+/// As [`plan`].
+pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, SessionError> {
+    let mut plan = make_plan(request)?;
+    plan.remarks.extend(zero_forecast::sentence(campaign));
+    count_surge_search(campaign, request.model, &mut plan);
+    Ok(plan)
+}
+
+/// The points of a campaign in the order of its plan, which is not forecast any further.
+///
+/// # Errors
+/// As [`plan`].
+pub(crate) fn best_order(campaign: &Campaign, model: &Model) -> Result<Vec<OperatingPoint>, SessionError> {
+    let inputs = PlanInputs::of(campaign)?;
+    let request = PlanRequest { method: None, bound: false, ..inputs.request(campaign, model) };
+    Ok(make_plan(&request)?.steps.into_iter().map(|step| step.to).collect())
+}
+
+/// What the plan of a campaign is made from: a plan whose hashes differ is stale.
+///
+/// # Errors
+/// [`SessionError::Json`] where the campaign cannot be written as JSON.
+pub(crate) fn fingerprint(campaign: &Campaign, model: &Model) -> Result<MadeFrom, SessionError> {
+    let Some(script) = &campaign.sequence else {
+        return Ok(made_from(&PlanInputs::of(campaign)?.request(campaign, model)));
+    };
+    let without_script = Campaign { sequence: None, repeats: None, ..campaign.clone() };
+    let script_sha256 = Some(sha256_hex(&script.text));
+    Ok(MadeFrom { script_sha256, ..fingerprint(&without_script, model)? })
+}
+
+/// What a request for a plan borrows besides campaign and model.
 #[derive(Debug)]
-pub(crate) struct PlanMaterial {
+pub struct PlanInputs {
     canonical: String,
     method: Option<Box<dyn PredictedMethod>>,
-    simulations: Simulations,
 }
 
-impl PlanMaterial {
-    pub(crate) fn of(campaign: &Campaign) -> Result<Self, SessionError> {
-        let canonical = serde_json::to_string(campaign)?;
-        Ok(PlanMaterial {
-            canonical,
-            method: predicted_method(campaign),
-            simulations: Simulations::new(campaign.timing.dwell_s, campaign.points.len()),
-        })
+impl PlanInputs {
+    /// Those of a campaign.
+    ///
+    /// # Errors
+    /// [`SessionError::Json`] where the campaign cannot be written as JSON.
+    pub fn of(campaign: &Campaign) -> Result<Self, SessionError> {
+        Ok(PlanInputs { canonical: serde_json::to_string(campaign)?, method: predicted_method(campaign) })
     }
 
-    /// `campaign`: the one that this was made of, and `model` always the same.
-    pub(crate) fn request<'a>(&'a self, campaign: &'a Campaign, model: &'a Model) -> PlanRequest<'a> {
+    /// The request for the plan of `campaign`, from which these were made.
+    pub fn request<'a>(&'a self, campaign: &'a Campaign, model: &'a Model) -> PlanRequest<'a> {
+        let transient = matches!(campaign.identification.method, Method::Joint | Method::Dynamic);
         PlanRequest {
             campaign_name: &campaign.name,
             campaign_canonical: &self.canonical,
@@ -63,31 +94,29 @@ impl PlanMaterial {
             limits: campaign.limits,
             appended: None,
             repeats: campaign.repeats,
-            return_to_first: campaign.return_to_first && self.method.is_some(),
-            required_sigma_eta: campaign.required_sigma_eta,
+            return_to_first: campaign.return_to_first && transient,
             method: self.method.as_deref(),
-            simulations: Some(&self.simulations),
             effort: 1.0,
-            draft: false,
-            gradient_share: campaign.gradient_share,
+            bound: true,
             seed: campaign.seed,
         }
     }
 }
 
-/// The campaign's method as the planner sees it, after the zero that the campaign asks for; `None` for a method that waits
-/// until nothing moves.
+/// The campaign's method as the planner sees it, after the zero that the campaign asks for; `None` for points that are imported.
 fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
     let config = identification_after_zero(campaign);
-    match campaign.identification.method {
-        Method::Joint if config.joint != JointSettings::all_off() => Some(Box::new(Joint::of(config))),
-        Method::Dynamic | Method::Joint => Some(Box::new(Dynamic::of(config))),
-        Method::Steady | Method::Imported => None,
-    }
+    let scope = match campaign.identification.method {
+        Method::Joint if config.joint != JointSettings::all_off() => Scope::AllSteps,
+        Method::Dynamic | Method::Joint => Scope::EachStep,
+        Method::Steady => Scope::Settled,
+        Method::Imported => return None,
+    };
+    Some(Box::new(Forecaster::of(config, scope)))
 }
 
 /// How the campaign's recording will be identified, as far as it is known before its zero.
-pub(crate) fn identification_after_zero(campaign: &Campaign) -> IdentifyConfig {
+fn identification_after_zero(campaign: &Campaign) -> IdentifyConfig {
     let config = identification(campaign);
     match campaign.zero {
         Some(soak) => expected_after_zero(config, &ZeroSettings::from(soak), soak.duration_s),

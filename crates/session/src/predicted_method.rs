@@ -1,138 +1,80 @@
 //! The identification methods as the planner sees them.
 
 use mapper_identify::{
-    Expected, ExpectedRow, ExpectedStep, IdentifyConfig, PressureTap, StepWorth, VarianceTangent, expected,
+    Expected, ExpectedRow, ExpectedStep, IdentifyConfig, MAX_RESTING_ETA, PressureTap, expected,
     expected_steady, expected_together,
 };
-use mapper_planner::{ErrorTangent, ForecastRow, MethodResult, PredictedMethod, WorthOfStep};
+use mapper_planner::{ForecastRow, MethodResult, MethodResults, PredictedMethod};
 
-/// The dynamic method with the campaign's settings.
-#[derive(Debug)]
-pub struct Dynamic {
-    config: IdentifyConfig,
+/// Which steps a method looks at together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scope {
+    /// Each by itself (`dynamic`).
+    EachStep,
+    /// All of them (`joint`).
+    AllSteps,
+    /// Settled points only (`steady`).
+    Settled,
 }
 
-impl Dynamic {
+/// The campaign's method, after its zero.
+#[derive(Debug)]
+pub(crate) struct Forecaster {
+    config: IdentifyConfig,
+    scope: Scope,
+}
+
+impl Forecaster {
     /// The method under `config`.
-    pub fn of(config: IdentifyConfig) -> Self {
+    pub(crate) fn of(config: IdentifyConfig, scope: Scope) -> Self {
         // A forecast's pressures are total ones.
         let total = PressureTap::Total;
-        Dynamic { config: IdentifyConfig { inlet_tap: total, outlet_tap: total, ..config } }
+        Forecaster { config: IdentifyConfig { inlet_tap: total, outlet_tap: total, ..config }, scope }
     }
 }
 
-impl PredictedMethod for Dynamic {
-    fn predict(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult> {
+impl PredictedMethod for Forecaster {
+    fn alone(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult> {
+        if self.scope != Scope::EachStep || window.is_empty() {
+            return None;
+        }
         let rows: Vec<ExpectedRow> = window.iter().map(expected_row).collect();
-        let found = expected(&rows, interval_s, &self.config)?;
-        Some(result(found))
+        Some(result(expected(&rows, interval_s, &self.config)?))
     }
 
-    fn predict_settled(&self, row: &ForecastRow) -> Option<(f64, f64)> {
+    fn together(&self, steps: &[&[ForecastRow]]) -> Option<MethodResults> {
+        if self.scope != Scope::AllSteps {
+            return None;
+        }
+        let rows: Vec<Vec<ExpectedRow>> =
+            steps.iter().map(|rows| rows.iter().map(expected_row).collect()).collect();
+        let steps: Vec<ExpectedStep<'_>> = rows
+            .iter()
+            .zip(steps)
+            .map(|(rows, step)| {
+                let (eta, h_w_m2k) = step.last().map_or((0.0, 0.0), |end| (end.efficiency, end.h_w_m2k));
+                ExpectedStep { rows, eta, h_w_m2k }
+            })
+            .collect();
+        let found = expected_together(&steps, &self.config)?;
+        Some(MethodResults {
+            steps: found.steps.into_iter().map(|found| found.map(result)).collect(),
+            resting_eta: found.resting_eta,
+            max_resting_eta: MAX_RESTING_ETA,
+        })
+    }
+
+    fn settled(&self, row: &ForecastRow) -> Option<(f64, f64)> {
         expected_steady(&expected_row(row), &self.config)
     }
 }
 
-/// The joint method with the campaign's settings, after its zero. Where a step is looked at by itself it is the dynamic one.
-#[derive(Debug)]
-pub struct Joint {
-    alone: Dynamic,
-}
-
-impl Joint {
-    /// The method under `config`.
-    pub fn of(config: IdentifyConfig) -> Self {
-        Joint { alone: Dynamic::of(config) }
-    }
-}
-
-impl PredictedMethod for Joint {
-    fn predict(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult> {
-        self.alone.predict(window, interval_s)
-    }
-
-    fn together(&self, steps: &[&[ForecastRow]], as_declared: bool) -> Option<Vec<Option<MethodResult>>> {
-        let rows = expected_rows(steps);
-        let found = expected_together(&expected_steps(&rows, steps), &self.alone.config, as_declared)?;
-        Some(found.into_iter().map(|found| found.map(result)).collect())
-    }
-
-    fn worth_to(&self, steps: &[&[ForecastRow]]) -> Option<Box<dyn WorthOfStep>> {
-        let rows = expected_rows(steps);
-        let worth = StepWorth::about(&expected_steps(&rows, steps), &self.alone.config)?;
-        Some(Box::new(Worth(worth)))
-    }
-
-    fn tangent_at(
-        &self,
-        steps: &[&[ForecastRow]],
-        measures: &[bool],
-        times: f64,
-    ) -> Option<Box<dyn ErrorTangent>> {
-        let rows = expected_rows(steps);
-        let steps = expected_steps(&rows, steps);
-        let tangent = VarianceTangent::at(&steps, measures, times, &self.alone.config)?;
-        Some(Box::new(Tangent(tangent)))
-    }
-
-    fn is_joint(&self) -> bool {
-        true
-    }
-
-    fn predict_settled(&self, row: &ForecastRow) -> Option<(f64, f64)> {
-        self.alone.predict_settled(row)
-    }
-}
-
-#[derive(Debug)]
-struct Worth(StepWorth);
-
-impl WorthOfStep for Worth {
-    fn of(&self, rows: &[ForecastRow]) -> Option<f64> {
-        let expected = expected_rows(&[rows]);
-        let step = expected_steps(&expected, &[rows]);
-        self.0.of(step.first()?)
-    }
-}
-
-#[derive(Debug)]
-struct Tangent(VarianceTangent);
-
-impl ErrorTangent for Tangent {
-    fn start(&self) -> f64 {
-        self.0.start()
-    }
-
-    fn of(&self, rows: &[ForecastRow], place: usize) -> Option<f64> {
-        let expected = expected_rows(&[rows]);
-        let step = expected_steps(&expected, &[rows]);
-        self.0.of(step.first()?, place)
-    }
-}
-
-fn expected_rows(steps: &[&[ForecastRow]]) -> Vec<Vec<ExpectedRow>> {
-    steps.iter().map(|rows| rows.iter().map(expected_row).collect()).collect()
-}
-
-fn expected_steps<'a>(rows: &'a [Vec<ExpectedRow>], steps: &[&[ForecastRow]]) -> Vec<ExpectedStep<'a>> {
-    let one = |(rows, step): (&'a Vec<ExpectedRow>, &&[ForecastRow])| {
-        let (eta, h_w_m2k) = step.last().map_or((0.0, 0.0), |end| (end.efficiency, end.h_w_m2k));
-        ExpectedStep { rows, eta, h_w_m2k }
-    };
-    rows.iter().zip(steps).map(one).collect()
-}
-
 fn result(found: Expected) -> MethodResult {
-    MethodResult {
-        eta: found.eta,
-        sigma_eta: found.sigma_eta,
-        h_w_m2k: found.h_w_m2k,
-        sigma_h_w_m2k: found.sigma_h_w_m2k,
-        open_sigma_eta: found.open_sigma_eta,
-    }
+    let Expected { eta, sigma_eta, h_w_m2k, sigma_h_w_m2k } = found;
+    MethodResult { eta, sigma_eta, h_w_m2k, sigma_h_w_m2k }
 }
 
-pub(crate) fn expected_row(row: &ForecastRow) -> ExpectedRow {
+fn expected_row(row: &ForecastRow) -> ExpectedRow {
     ExpectedRow {
         t_s: row.t_s,
         speed_rpm: row.speed_rpm,

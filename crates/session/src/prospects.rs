@@ -1,16 +1,16 @@
 //! What is known of a campaign before it is run: how long it takes, and what of it will come to nothing.
 
 use crate::drive::soak_s;
-use crate::planned::{plan, said_to_be_beaten};
+use crate::planning::{PlanInputs, plan_of};
 use crate::rehearsal::rehearse;
 use crate::{Session, SessionError};
 use mapper_campaign::{Campaign, Concern};
-use mapper_core::{Method, Plan, PlanStep, StepKind, WindowRule};
+use mapper_core::{Dwell, JointSettings, Method, Plan, PlanStep, StepKind, WindowRule};
 use mapper_identify::ZeroSettings;
 use mapper_physics::model::Model;
 use mapper_physics::standstill::{StandstillState, relax};
 use mapper_physics::thermocouple::time_constant_s;
-use mapper_planner::REACHED_RATIO;
+use mapper_planner::{PlanRequest, max_steps};
 
 /// How far from the cell's temperature a cold machine's housings are reckoned with, K, as the zero does when it finds the
 /// limit that Tc relaxes to.
@@ -23,25 +23,35 @@ const SOAK_STEP_S: f64 = 300.0;
 /// Time constants of the T2 probe that a window has at least: what it has brought along is below 1 % then.
 const PROBE_TIME_CONSTANTS: f64 = 5.0;
 
+/// Points up to which all steps of a campaign are simulated to find concerns; of more, every n-th point stands for the others, so that
+/// the largest grid takes seconds.
+const MAX_SIMULATED_POINTS: usize = 200;
+
+/// Effort of the search for the order whose steps are simulated: concerns hardly depend on the order.
+const QUICK_EFFORT: f64 = 0.05;
+
 /// What a campaign will be.
 #[derive(Debug)]
 pub struct Prospects {
-    /// Its plan, or the one that its script makes on the nominal machine.
-    pub plan: Plan,
-    /// Rig time from the beginning of the soak to the end of the cool-down, s.
+    /// Number of steps; the largest that there can be if the grid is too large to plan it here.
+    pub steps: usize,
+    /// Whether that is the exact number.
+    pub is_planned: bool,
+    /// Rig time from the beginning of the soak to the end of the cool-down, s; the longest for the largest number of steps.
     pub duration_s: f64,
     /// What is to be feared of it.
     pub concerns: Vec<Concern>,
 }
 
 impl Session<'_> {
-    /// Makes the plan, or rehearses the script, and looks at what will come of it.
+    /// Simulates the steps of the campaign, or rehearses its script, and looks for what will come to nothing.
     ///
     /// # Errors
     /// [`SessionError`] where there is no plan, or the script fails.
     pub fn prospects(&self, campaign: &Campaign, model: &Model) -> Result<Prospects, SessionError> {
+        let every = campaign.points.len().div_ceil(MAX_SIMULATED_POINTS).max(1);
         let plan = match &campaign.sequence {
-            None => plan(campaign, model)?,
+            None => plan_of_sample(campaign, model, every)?,
             Some(source) => rehearse(self, campaign, model, source)?.plan,
         };
         let concerns = [
@@ -49,14 +59,39 @@ impl Session<'_> {
             settling(campaign, &plan),
             probe(campaign, &plan),
             required_error(campaign, &plan),
-            order(&plan),
+            resting(campaign, &plan),
         ];
+        let is_planned = every == 1 || campaign.sequence.is_some();
+        let (steps, duration_s) = if is_planned {
+            (plan.steps.len(), plan.duration_s())
+        } else {
+            let inputs = PlanInputs::of(campaign)?;
+            let steps = max_steps(&inputs.request(campaign, model));
+            let dwell_s = plan.steps.first().map_or(0.0, |step| step.dwell_s);
+            (steps, plan.warm_up_s + plan.cool_down_s + plan.surge_search_s + steps as f64 * dwell_s)
+        };
         Ok(Prospects {
-            duration_s: soak_s(campaign) + plan.duration_s(),
+            steps,
+            is_planned,
+            duration_s: soak_s(campaign) + duration_s,
             concerns: concerns.into_iter().flatten().collect(),
-            plan,
         })
     }
+}
+
+/// The plan of every n-th point, without its bound.
+fn plan_of_sample(campaign: &Campaign, model: &Model, every: usize) -> Result<Plan, SessionError> {
+    let inputs = PlanInputs::of(campaign)?;
+    let mut request = PlanRequest { bound: false, effort: QUICK_EFFORT, ..inputs.request(campaign, model) };
+    if let Dwell::TimeBudget(budget_s) = request.timing.dwell {
+        let share = max_steps(&request) as f64;
+        let fixed_s = request.timing.warm_up_s + request.timing.cool_down_s;
+        if every > 1 {
+            request.timing.dwell = Dwell::Fixed(((budget_s - fixed_s) / share).max(1.0));
+        }
+    }
+    let points: Vec<_> = campaign.points.iter().copied().step_by(every).collect();
+    plan_of(campaign, &PlanRequest { points: &points, ..request })
 }
 
 /// A soak after which the housings are still on their way to the cell's temperature, from as far away as the zero reckons with.
@@ -135,33 +170,38 @@ fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     ))
 }
 
-/// A required error that the longest dwell does not reach.
-fn required_error(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
-    let required = campaign.required_sigma_eta.filter(|_| campaign.identification.method == Method::Joint)?;
-    let found = plan.figures.open_rms_error_eta?;
-    (found > REACHED_RATIO * required).then(|| {
+/// Steps that tell too little of alpha_A, probe and heating/cooling ratio for any good point.
+fn resting(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+    let joint = campaign.identification.method == Method::Joint && campaign.sequence.is_none();
+    let settings = campaign.identification.joint;
+    let unpredicted = joint && settings != JointSettings::all_off() && plan.figures.rms_error_eta.is_none();
+    unpredicted.then(|| {
         Concern::warning(
-            &["required_sigma_eta"],
-            format!(
-                "steps of up to {:.0} s reach {:.2} points of efficiency (rms, where alpha_A, the probe and the direction of the heat have to be \
-                 found), not the {:.2} that are required",
-                campaign.timing.dwell_s,
-                100.0 * found,
-                100.0 * required
-            ),
-            "lengthen `timing.dwell`, begin with a `zero`, or require less".to_owned(),
+            &["timing"],
+            "these steps tell too little of alpha_A, probe and heating/cooling ratio: the points will be doubtful (`rests_on_declaration`)"
+                .to_owned(),
+            "lengthen the dwell, add points, or hold what is known (`identification.joint`)".to_owned(),
         )
     })
 }
 
-/// Another order that is forecast to do better.
-fn order(plan: &Plan) -> Option<Concern> {
-    let said = said_to_be_beaten(plan)?;
-    Some(Concern::warning(
-        &["order"],
-        said.to_owned(),
-        "take that order, or know why this one is wanted".to_owned(),
-    ))
+/// A required error that the longest dwell does not reach.
+fn required_error(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+    let Dwell::RequiredSigmaEta(required) = campaign.timing.dwell else { return None };
+    let found = plan.figures.rms_error_eta?;
+    (found > required).then(|| {
+        Concern::warning(
+            &["timing", "required_sigma_eta"],
+            format!(
+                "steps of {:.0} s, the longest that are chosen, reach an expected error of {:.2} points of efficiency (rms), not the {:.2} that \
+                 are required",
+                plan.steps.first().map_or(0.0, |step| step.dwell_s),
+                100.0 * found,
+                100.0 * required
+            ),
+            "begin with a `zero`, or require less".to_owned(),
+        )
+    })
 }
 
 /// A window of which the declared T2 probe spends a large part on what came before.

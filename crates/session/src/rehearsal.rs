@@ -1,7 +1,7 @@
 //! A sequence script rehearsed on the nominal machine: what fails there never touches the rig.
 
 use crate::drive::drive;
-use crate::planned::plan;
+use crate::planning::{fingerprint, plan};
 use crate::scripted_steps::ScriptedSteps;
 use crate::surge::count_surge_search;
 use crate::{Session, SessionError};
@@ -34,7 +34,7 @@ pub fn rehearse(
     model: &Model,
     source: &SequenceSource,
 ) -> Result<Rehearsal, SessionError> {
-    let base = base_plan(campaign, model, source)?;
+    let base = base_plan(campaign, model)?;
     let choice = BackendChoice { name: REHEARSED_ON.to_owned(), settings: serde_json::json!({}) };
     // Only the script's own steps: a rehearsal has no sensors to be zeroed.
     let nominal = Campaign { backend: choice, zero: None, ..campaign.clone() };
@@ -101,15 +101,17 @@ impl StepSource for Rehearsing {
 }
 
 /// A plan without the script's steps: hashes and times.
-fn base_plan(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<Plan, SessionError> {
-    let without_script = Campaign { sequence: None, repeats: None, ..campaign.clone() };
-    let canonical = serde_json::to_string(&without_script)?;
-    // The planner plans one point alone: the script has the say over the others.
+fn base_plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
+    // The planner plans one point alone: the script decides on the others.
     let points = campaign.points.iter().copied().take(1).collect();
-    let mut plan =
-        plan(&Campaign { points, order: VisitOrder::Listed, surge_search: None, ..without_script }, model)?;
-    plan.objective = OBJECTIVE.to_owned();
-    plan.made_from.campaign_sha256 = mapper_planner::sha256_hex(&canonical);
-    plan.made_from.script_sha256 = Some(mapper_planner::sha256_hex(&source.text));
-    Ok(plan)
+    let one = Campaign {
+        sequence: None,
+        repeats: None,
+        points,
+        order: VisitOrder::Listed,
+        surge_search: None,
+        ..campaign.clone()
+    };
+    let (objective, made_from) = (OBJECTIVE.to_owned(), fingerprint(campaign, model)?);
+    Ok(Plan { objective, made_from, ..plan(&one, model)? })
 }

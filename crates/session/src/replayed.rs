@@ -29,26 +29,18 @@ struct GoesOn<'a> {
     making_again: bool,
     /// What the source sees of run time is later by this, s.
     later_s: f64,
-    /// Steps that hold, in the time that the source sees.
-    held: Vec<StepMarker>,
     notes: Vec<String>,
 }
 
-/// Drives the steps; those of a broken-off run from where they stood. Besides how it ended, the steps that held before, and how much
-/// later than this part's run time they stand, s.
+/// Drives the steps; those of a broken-off run from where they stood.
 pub(crate) fn going_on(
     broken_off: Option<&BrokenOff>,
     steps: &mut dyn StepSource,
     drive: impl FnOnce(&mut dyn StepSource) -> Result<RunEnd, RunError>,
-) -> (Result<RunEnd, RunError>, Vec<StepMarker>, f64) {
-    let Some(broken_off) = broken_off else { return (drive(steps), Vec::new(), 0.0) };
-    match GoesOn::after(broken_off, steps) {
-        Ok(mut goes_on) => {
-            let (held, later_s) = (goes_on.held.clone(), goes_on.later_s);
-            (drive(&mut goes_on), held, later_s)
-        }
-        Err(error) => (Err(StepSourceError::of(error).into()), Vec::new(), 0.0),
-    }
+) -> Result<RunEnd, RunError> {
+    let Some(broken_off) = broken_off else { return drive(steps) };
+    let mut goes_on = GoesOn::after(broken_off, steps).map_err(StepSourceError::of)?;
+    drive(&mut goes_on)
 }
 
 impl<'a> GoesOn<'a> {
@@ -57,7 +49,7 @@ impl<'a> GoesOn<'a> {
     /// # Errors
     /// [`SessionError::NotResumable`] where the source now yields another step than was recorded; what reading says.
     fn after(broken_off: &BrokenOff, inner: &'a mut dyn StepSource) -> Result<Self, SessionError> {
-        let mut told = Told { inner, broken_off, later_s: 0.0, last: None, held: Vec::new() };
+        let mut told = Told { inner, broken_off, later_s: 0.0, last: None, held: 0 };
         for part in &broken_off.parts {
             let path = broken_off.directory.join(&part.recording);
             let holds = |index: usize| index < AGAIN_FROM && part.saved.contains(&index);
@@ -81,11 +73,11 @@ impl<'a> GoesOn<'a> {
         let said = format!(
             "resumed: {} steps hold, and were told to the source of the steps again; {}nobody knows how far the housings have cooled, so they \
              are warmed up again{}",
-            held.len(),
+            held,
             if broken_off.soaked() { "the soak is not repeated; " } else { "" },
             if again.is_some() { ", and the last step that holds is made once more" } else { "" },
         );
-        Ok(GoesOn { inner, again, making_again: false, later_s, held, notes: vec![said] })
+        Ok(GoesOn { inner, again, making_again: false, later_s, notes: vec![said] })
     }
 
     fn seen(&self, marker: &StepMarker) -> StepMarker {
@@ -149,7 +141,7 @@ struct Told<'a, 'b> {
     broken_off: &'b BrokenOff,
     later_s: f64,
     last: Option<PlanStep>,
-    held: Vec<StepMarker>,
+    held: usize,
 }
 
 impl Told<'_, '_> {
@@ -167,7 +159,7 @@ impl Told<'_, '_> {
             self.inner.begins(&seen);
             pieces.tell(self.inner, seen.end_s);
             self.inner.after_step(&seen).map_err(|error| self.refused(error.to_string()))?;
-            self.held.push(seen);
+            self.held += 1;
         }
         if let Some(last) = steps.last() {
             self.later_s += last.end_s + BETWEEN_S;

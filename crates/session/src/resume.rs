@@ -14,10 +14,7 @@ pub(crate) const AGAIN_FROM: usize = StepMarker::AGAIN_FROM;
 
 /// Whether the steps of a campaign depend on what was measured.
 pub(crate) fn depends_on_readings(campaign: &Campaign) -> bool {
-    campaign.sequence.is_some()
-        || campaign.surge_search.is_some()
-        || campaign.on_drift.is_some()
-        || !campaign.timing.ends.is_planned()
+    campaign.sequence.is_some() || campaign.surge_search.is_some() || campaign.on_drift.is_some()
 }
 
 /// What is known of a run that was broken off.
@@ -76,29 +73,8 @@ impl BrokenOff {
     }
 
     /// Steps of the plan, by their place in it, that are in one of the recordings.
-    pub(crate) fn saved(&self, campaign: &Campaign, plan: &Plan) -> Result<BTreeSet<usize>, SessionError> {
-        if campaign.replan.is_off() {
-            return Ok(self.parts.iter().flat_map(|part| part.saved.iter().copied()).collect());
-        }
-        // In a run that was planned again a step's number is not its place in the plan: where it led to says which one it was.
-        let mut saved = BTreeSet::new();
-        for part in &self.parts {
-            let path = self.directory.join(&part.recording);
-            let steps = read_steps(&path, &ReadOptions::default())?;
-            // A step before the first missing one is made once more by a run that goes on.
-            let holds = |step: &&StepMarker| {
-                part.saved.contains(&step.index)
-                    && !(step.kind == StepKind::Repeat && step.index >= plan.steps.len())
-            };
-            for marker in steps.iter().filter(holds) {
-                let same = |step: &&PlanStep| {
-                    Some(step.to) == marker.to && step.kind == marker.kind && !saved.contains(&step.index)
-                };
-                let place = plan.steps.iter().find(same).map(|step| step.index);
-                saved.extend(place);
-            }
-        }
-        Ok(saved)
+    pub(crate) fn saved(&self) -> BTreeSet<usize> {
+        self.parts.iter().flat_map(|part| part.saved.iter().copied()).collect()
     }
 
     /// Whether one of the recordings has the soak.
@@ -118,20 +94,20 @@ impl BrokenOff {
                 return why(format!("{} changed since", differences.join(" and ")));
             }
         }
-        if self.directory.join(run_directory::POINTS).exists() && self.is_whole(campaign, plan)? {
+        if self.directory.join(run_directory::POINTS).exists() && self.is_whole(campaign, plan) {
             return why("all of its steps are there, and so is its map".to_owned());
         }
         Ok(())
     }
 
     /// Whether every step is there, and nothing but the map may be missing.
-    pub(crate) fn is_whole(&self, campaign: &Campaign, plan: &Plan) -> Result<bool, SessionError> {
+    pub(crate) fn is_whole(&self, campaign: &Campaign, plan: &Plan) -> bool {
         if depends_on_readings(campaign) {
             // Only the end of the run says that no further step would have come.
-            return Ok(self.parts.last().is_some_and(|part| part.completed));
+            return self.parts.last().is_some_and(|part| part.completed);
         }
-        let saved = self.saved(campaign, plan)?;
-        Ok(plan.steps.iter().all(|step| saved.contains(&step.index)))
+        let saved = self.saved();
+        plan.steps.iter().all(|step| saved.contains(&step.index))
     }
 
     /// What is done again and why, in a sentence.
@@ -141,15 +117,9 @@ impl BrokenOff {
             (true, true) => "the soak is not repeated: what sensors read at rest holds for the run",
             (true, false) => "the soak is repeated: the recording does not have it whole",
         };
-        let order = match campaign.replan.is_off() {
-            true => "",
-            false => {
-                "; what is missing goes by the plan as it stood before the run, and is not planned again"
-            }
-        };
         format!(
             "resumed: {} of {} steps hold; {soak}; nobody knows how far the housings have cooled, so they are warmed up again and the step before the first \
-             missing one is made once more{order}",
+             missing one is made once more",
             plan.steps.iter().filter(|step| saved.contains(&step.index)).count(),
             plan.steps.len()
         )

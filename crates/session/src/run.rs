@@ -1,24 +1,20 @@
 //! A whole run: plan, drive the rig, record, identify, assemble, report.
 
 use crate::aside::{Aside, Placed};
-use crate::certainty::DwellPrices;
 use crate::declared::identification;
 use crate::drive::{Pace, drive_paced, soak_s};
 use crate::ended::{Ended, doubt, sentence};
 use crate::estimates::Estimates;
-use crate::executed::StepsMade;
 use crate::files::{json_text, write_new};
 use crate::guards::{check_guards, drift_watch};
 use crate::held::Held;
 use crate::journal::{Entry, Identity, Journal, rig_sha256};
 use crate::observers::{Recorder, Teller};
-use crate::planned::plan;
-use crate::planning::nominal_model;
+use crate::planning::{fingerprint, nominal_model, plan};
 use crate::preflight::{check_room, check_setpoints};
 use crate::program::PROGRAM;
 use crate::recording_metadata::metadata;
 use crate::rehearsal::rehearse;
-use crate::replanned::{Replanned, SharedPrices};
 use crate::replayed::going_on;
 use crate::results::{Results, RunPart};
 use crate::resume::{BrokenOff, MissingSteps, depends_on_readings};
@@ -30,14 +26,10 @@ use crate::surge::hold_near_surge;
 use crate::{Session, SessionError, SessionEvent, run_directory};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
-use mapper_core::{Clock, Plan, RigDescription, UnpacedClock};
+use mapper_core::{Clock, MadeFrom, Plan, RigDescription, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
-use mapper_runner::{
-    Deadlined, Deadlines, PlanSteps, RunError, RunObserver, StepSource, StepSourceError, SurgeSearch,
-    UntilCertain,
-};
-use std::cell::RefCell;
+use mapper_runner::{Deadlined, Deadlines, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -84,17 +76,10 @@ impl<'a> RunRequest<'a> {
 pub struct PreparedRun<'a> {
     request: RunRequest<'a>,
     model: Model,
-    /// The plan as made; where a script decides, its forecast.
-    made: Plan,
-    /// The plan to be run.
+    /// The plan to be run; where a script decides, its forecast.
     plan: Plan,
     scripted: Option<ScriptedSteps>,
     sources: Sources,
-    /// What ends the steps, where it is not the plan.
-    prices: Option<DwellPrices>,
-    /// The plan as it was planned again.
-    replanned: Option<Plan>,
-    steps_made: StepsMade,
 }
 
 /// How a run ended. Whatever ended it, the rig is safe and what was recorded is kept.
@@ -130,40 +115,29 @@ impl<'s> Session<'s> {
         }
         self.registry.check_formats(campaign)?;
         let model = nominal_model(campaign)?;
-        let mut made = match &campaign.sequence {
-            None => plan(campaign, &model)?,
-            Some(source) => rehearse(self, campaign, &model, source)?.plan,
-        };
         let sources = self.registry.make_sources(campaign, &model)?;
         let rig = sources.backend.describe();
-        made.made_from.rig_sha256 = Some(rig_sha256(&rig)?);
+        let rig_sha256 = Some(rig_sha256(&rig)?);
         let kept = request.resume.as_ref().map(|broken_off| broken_off.directory.join(run_directory::PLAN));
-        let mut plan = match request.plan.or(kept.as_deref()) {
-            None => made.clone(),
-            Some(path) => stored_plan(path, &made, campaign)?,
+        let mut plan = match (request.plan.or(kept.as_deref()), &campaign.sequence) {
+            (Some(path), _) => {
+                let now = MadeFrom { rig_sha256: rig_sha256.clone(), ..fingerprint(campaign, &model)? };
+                stored_plan(path, &now, campaign)?
+            }
+            (None, None) => plan(campaign, &model)?,
+            (None, Some(source)) => rehearse(self, campaign, &model, source)?.plan,
         };
-        plan.made_from.rig_sha256.clone_from(&made.made_from.rig_sha256);
+        plan.made_from.rig_sha256 = rig_sha256;
         let scripted = match &campaign.sequence {
             Some(source) if request.plan.is_none() => Some(ScriptedSteps::new(campaign, &model, source)?),
             _ => None,
         };
-        let prices = DwellPrices::of(campaign, &model, &plan)?;
         check_guards(campaign, &rig)?;
         check_setpoints(&plan, &rig)?;
         if let Some(broken_off) = &request.resume {
             broken_off.check(campaign, &plan, &Identity::of(campaign, &plan, &rig)?)?;
         }
-        Ok(PreparedRun {
-            request,
-            model,
-            made,
-            plan,
-            scripted,
-            sources,
-            prices,
-            replanned: None,
-            steps_made: StepsMade::default(),
-        })
+        Ok(PreparedRun { request, model, plan, scripted, sources })
     }
 
     /// Prepares and runs.
@@ -292,7 +266,7 @@ impl PreparedRun<'_> {
     /// A run that was broken off behind its last step: the map alone is missing, and the rig is left alone.
     fn identify_whole(&self, session: &Session<'_>) -> Result<Option<RunOutcome>, SessionError> {
         let Some(broken_off) = &self.request.resume else { return Ok(None) };
-        if !broken_off.is_whole(self.request.campaign, &self.plan)? {
+        if !broken_off.is_whole(self.request.campaign, &self.plan) {
             return Ok(None);
         }
         let directory = broken_off.directory.clone();
@@ -359,15 +333,6 @@ impl PreparedRun<'_> {
         let resumes = self.request.resume.as_ref();
         let told_again = resumes.filter(|_| depends_on_readings(self.request.campaign));
         let by_plan = resumes.filter(|_| told_again.is_none());
-        let prices = self.prices.take().filter(|_| by_plan.is_none()).map(RefCell::new);
-        let replans = !self.request.campaign.replan.is_off();
-        let mut replanned = match prices.as_ref().filter(|_| replans) {
-            None => None,
-            Some(prices) => match Replanned::new(self.request.campaign, &self.model, &self.plan, prices) {
-                Ok(replanned) => Some(replanned),
-                Err(error) => return not_begun(recorder, error),
-            },
-        };
         // What was measured at rest holds for the whole run.
         let without_soak;
         let mut campaign = self.request.campaign;
@@ -378,27 +343,12 @@ impl PreparedRun<'_> {
         let steps: &mut dyn StepSource = match (&mut self.scripted, by_plan) {
             (Some(scripted), _) => scripted,
             (None, Some(broken_off)) => {
-                let saved = match broken_off.saved(campaign, &self.plan) {
-                    Ok(saved) => saved,
-                    Err(error) => return not_begun(recorder, error),
-                };
+                let saved = broken_off.saved();
                 let said = broken_off.said(campaign, &self.plan, &saved);
                 missing = MissingSteps::new(&self.plan, &saved, said);
                 &mut missing
             }
-            (None, None) => match &mut replanned {
-                Some(replanned) => replanned,
-                None => &mut planned,
-            },
-        };
-        let mut certain;
-        let mut shared = prices.as_ref().map(SharedPrices);
-        let steps: &mut dyn StepSource = match &mut shared {
-            None => steps,
-            Some(shared) => {
-                certain = UntilCertain::new(steps, shared);
-                &mut certain
-            }
+            (None, None) => &mut planned,
         };
         let hold = |point| hold_near_surge(campaign, &self.model, point);
         let mut search;
@@ -415,47 +365,39 @@ impl PreparedRun<'_> {
             duration_s: soak_s(campaign) + self.plan.duration_s(),
         };
         let (model, backend) = (&self.model, self.sources.backend.as_mut());
-        let ((end, held, later_s), drifted, recorder) = std::thread::scope(|scope| {
+        let (end, drifted, recorder) = std::thread::scope(|scope| {
             let begin = || Estimates::begin(scope, identification(campaign), session.on_event);
             let mut estimates = session.estimates.then(begin);
             let mut recorder = match pace.each_sample {
                 true => Placed::Aside(Aside::begin(scope, recorder)),
                 false => Placed::Here(recorder),
             };
-            let mut observers: Vec<&mut dyn RunObserver> =
-                vec![recorder.observer(), &mut teller, &mut self.steps_made];
+            let mut observers: Vec<&mut dyn RunObserver> = vec![recorder.observer(), &mut teller];
             observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
             let go = |steps: &mut dyn StepSource| {
                 going_on(told_again, steps, |steps| {
                     drive_paced(campaign, model, steps, backend, &mut observers, pace)
                 })
             };
-            let ((end, held, later_s), drifted) = match drift_watch(campaign, steps) {
+            let (end, drifted) = match drift_watch(campaign, steps) {
                 Ok(mut watch) => (go(&mut watch), watch.ended_by_drift().map(str::to_owned)),
                 Err(steps) => (go(steps), None),
             };
             let (recorder, recorded) = recorder.end();
             // What could not be written of the very end is told after it.
             let end = end.and_then(|end| recorded.map(|()| end).map_err(RunError::from));
-            ((end, held, later_s), drifted, recorder)
+            (end, drifted, recorder)
         });
-        self.steps_made.go_on(held, later_s);
-        self.replanned = replanned.map(|replanned| replanned.handed_out());
         let doubt = doubt(&end);
         let end = Ended::of(end, drifted);
         let finished = recorder.finish(&sentence(&end)).map_err(SessionError::from);
         (end, finished, doubt)
     }
 
-    /// The plan as it was run; where it was not all known before, it is written beside it.
+    /// The plan as it was run; a script's is written beside its forecast.
     fn executed(&self, directory: &Path) -> Result<Plan, SessionError> {
-        let certain = !self.request.campaign.timing.ends.is_planned();
-        let executed = match (&self.scripted, &self.replanned) {
-            (Some(steps), _) => steps.executed(&self.made),
-            (None, Some(replanned)) => self.steps_made.plan(replanned),
-            (None, None) if certain => self.steps_made.plan(&self.plan),
-            (None, None) => return Ok(self.plan.clone()),
-        };
+        let Some(steps) = &self.scripted else { return Ok(self.plan.clone()) };
+        let executed = steps.executed(&self.plan);
         write_new(&directory.join(run_directory::EXECUTED), json_text(&executed)?.as_bytes())?;
         Ok(executed)
     }
@@ -471,13 +413,6 @@ impl PreparedRun<'_> {
             campaign_yaml: Some(self.request.campaign_text.as_bytes().to_vec()),
         }
     }
-}
-
-/// A run whose steps could not be made.
-fn not_begun(recorder: Recorder, error: SessionError) -> (Ended, Result<(), SessionError>, Option<String>) {
-    let end = Ended::Failed(StepSourceError::of(error).into());
-    let finished = recorder.finish(&sentence(&end)).map_err(SessionError::from);
-    (end, finished, None)
 }
 
 /// Where results go: nothing is written over.

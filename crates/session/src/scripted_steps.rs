@@ -3,7 +3,7 @@
 use crate::SessionError;
 use crate::declared::identification;
 use crate::estimates::{keep, single_steps, two_last_steps};
-use crate::planned::plan;
+use crate::planning::best_order;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
 use mapper_core::{Plan, PlanStep, Recording, SampleBatch, StepMarker, step_number};
@@ -121,9 +121,9 @@ fn source_error(error: impl std::error::Error + Send + Sync + 'static) -> StepSo
 fn with_steps(mut plan: Plan, steps: Vec<PlanStep>) -> Plan {
     plan.steps = steps;
     let gradients = || plan.steps.iter().filter_map(|step| step.predicted.dtc_k).map(f64::abs);
-    let (sum_k, worst_k) = (gradients().sum(), gradients().min_by(f64::total_cmp));
+    let (sum_k, min_k) = (gradients().sum(), gradients().min_by(f64::total_cmp));
     plan.figures.sum_gradient_k = sum_k;
-    plan.figures.worst_gradient_k = worst_k;
+    plan.figures.min_gradient_k = min_k;
     plan.figures.worst_sigma_eta =
         plan.steps.iter().filter_map(|step| step.predicted.sigma_eta).max_by(f64::total_cmp);
     plan.figures.minutes = plan.duration_s() / 60.0;
@@ -151,8 +151,7 @@ fn request(campaign: &Campaign, model: &Model) -> SequenceRequest {
                 return_to_first: false,
                 ..planned.clone()
             };
-            let plan = plan(&subset, &machine).map_err(|error| error.to_string())?;
-            Ok(plan.steps.into_iter().map(|step| step.to).collect())
+            best_order(&subset, &machine).map_err(|error| error.to_string())
         }),
     }
 }

@@ -3,7 +3,7 @@
 use crate::SessionError;
 use crate::files::read_at_most;
 use mapper_campaign::Campaign;
-use mapper_core::{OperatingPoint, Plan, PlanStep, step_number};
+use mapper_core::{MadeFrom, OperatingPoint, Plan, PlanStep, step_number};
 use std::path::Path;
 
 /// Largest plan file that is read, bytes.
@@ -20,17 +20,17 @@ const RUN_MAX_S: f64 = 14.0 * 86_400.0;
 /// A plan's own numbers went through a file: so far they may lie beyond a limit, ratio.
 const ROUNDING_RATIO: f64 = 1e-9;
 
-/// A plan from a file, refused where what it was made from has changed; `made` is the plan made again.
+/// A plan from a file, refused where what it was made from is no longer `now`.
 ///
 /// # Errors
 /// [`SessionError::StalePlan`] with what has changed; [`SessionError::NotAPlan`] and [`SessionError::File`] where the
 /// file does not hold a plan; [`SessionError::WrongPlan`] where it asks for what no plan may ask for.
-pub fn stored_plan(path: &Path, made: &Plan, campaign: &Campaign) -> Result<Plan, SessionError> {
+pub fn stored_plan(path: &Path, now: &MadeFrom, campaign: &Campaign) -> Result<Plan, SessionError> {
     let bytes = read_at_most(path, FILE_MAX_BYTES)?;
     let wrong = |why: String| SessionError::WrongPlan { path: path.to_owned(), why };
     let stored: Plan = serde_json::from_slice(&bytes)
         .map_err(|source| SessionError::NotAPlan { path: path.to_owned(), source })?;
-    let (then, now) = (&stored.made_from, &made.made_from);
+    let then = &stored.made_from;
     // A plan that was made without a rig may be run on any.
     let other = |then: &Option<String>, now: &Option<String>| {
         then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)

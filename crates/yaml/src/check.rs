@@ -1,7 +1,8 @@
 //! The tree against the schema: every violation becomes a finding at its place.
 
 use crate::complaint::{
-    complain, example_of, example_sentence, keys_of, quoted, shortened, with_description, wrong_name,
+    complain, example_of, example_sentence, keys_of, quoted, replacement, shortened, with_description,
+    wrong_name,
 };
 use crate::finding::FindingKind;
 use crate::notes::Notes;
@@ -88,10 +89,17 @@ impl Check<'_> {
         for key in unexpected.iter().take(UNKNOWN_KEYS_LIMIT) {
             let mut full: Vec<Step> = steps.to_vec();
             full.push(Step::from(*key));
-            let complaint = Complaint {
-                kind: FindingKind::UnknownKey,
-                message: format!("there is no key `{}` {within}", shortened(key)),
-                remedy: format!("{}the keys are {}", guess(key, &known), known.join(", ")),
+            let complaint = match replacement(schema, key) {
+                Some(remedy) => Complaint {
+                    kind: FindingKind::UnknownKey,
+                    message: format!("the key `{key}` is no longer known {within}"),
+                    remedy: remedy.to_owned(),
+                },
+                None => Complaint {
+                    kind: FindingKind::UnknownKey,
+                    message: format!("there is no key `{}` {within}", shortened(key)),
+                    remedy: format!("{}the keys are {}", guess(key, &known), known.join(", ")),
+                },
             };
             let place = self.root.key_place(steps, key);
             self.note_at(&full, place, complaint);

@@ -94,12 +94,21 @@ fn needed(name: &str) -> &'static str {
 
 /// A name that is none of those allowed.
 pub(crate) fn wrong_name(options: &[&str], schema: &Map<String, Value>, value: &Value) -> Complaint {
+    if let Some(replacement) = value.as_str().and_then(|name| replacement(schema, name)) {
+        let message = format!("{} is no longer known", quoted(value));
+        return Complaint { kind: FindingKind::WrongValue, message, remedy: replacement.to_owned() };
+    }
     let guess = value.as_str().map(|text| guess(text, options)).unwrap_or_default();
     Complaint {
         kind: FindingKind::WrongValue,
         message: format!("{} is not one of {}", quoted(value), options.join(", ")),
         remedy: with_description(format!("{guess}write one of {}", options.join(", ")), Some(schema)),
     }
+}
+
+/// What replaces a key or a name that earlier versions had, by the keyword `x-removed` of its schema.
+pub(crate) fn replacement<'a>(schema: &'a Map<String, Value>, name: &str) -> Option<&'a str> {
+    schema.get("x-removed")?.get(name)?.as_str()
 }
 
 /// The keys that a mapping may have.

@@ -3,8 +3,18 @@
 use serde_json::Value;
 
 /// Keywords that describe and demand nothing; `x-min` and its like belong to `x-quantity`.
-const DESCRIBING: [&str; 9] =
-    ["$schema", "title", "description", "examples", "default", "format", "x-min", "x-max", "x-above"];
+const DESCRIBING: [&str; 10] = [
+    "$schema",
+    "title",
+    "description",
+    "examples",
+    "default",
+    "format",
+    "x-min",
+    "x-max",
+    "x-above",
+    "x-removed",
+];
 
 /// Keywords that are checked.
 const CHECKED: [&str; 21] = [

@@ -43,7 +43,8 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
             }
         }
     }
-    let mut bytes = serde_json::to_vec_pretty(&Written { format: LAYOUT, map }).map_err(ExportError::failed(FORMAT.name))?;
+    let mut bytes = serde_json::to_vec_pretty(&Written { format: LAYOUT, map })
+        .map_err(ExportError::failed(FORMAT.name))?;
     bytes.push(b'\n');
     Ok(bytes)
 }

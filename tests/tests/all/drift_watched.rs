@@ -47,7 +47,7 @@ fn a_run_whose_repeats_differ_does_as_the_campaign_says() {
 fn the_soak_stands_in_plan_and_dry_run() {
     let scratch = scratch();
     let minutes = |text: &str| {
-        let line = text.lines().find(|line| line.contains(" in total (")).unwrap_or_else(|| panic!("{text}"));
+        let line = text.lines().find(|line| line.starts_with("rig time")).unwrap_or_else(|| panic!("{text}"));
         line.to_owned()
     };
     let plan = |more: &str| {

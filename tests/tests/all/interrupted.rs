@@ -13,10 +13,9 @@ use std::time::Duration;
 /// A day of the rig's time: far from over when the recording holds a few steps.
 const LONG: &[(&str, &str)] = &[
     ("warm_up: 2 min ", "warm_up: 60 s "),
-    ("required_sigma_eta: 0.5 %\n", ""),
     // The order is not what is tried here, and its search would take most of the time.
-    ("order: information ", "order: listed "),
-    ("dwell: 120 s ", "dwell: 10 min "),
+    ("order: thermal_gradient ", "order: listed "),
+    ("dwell: 40 s ", "dwell: 10 min "),
 ];
 /// About fifty minutes of the rig's time, two steps of ten minutes.
 const SOME_STEPS_BYTES: u64 = 13_500_000;

@@ -72,16 +72,6 @@ fn a_killed_watch_over_repeats_goes_on_where_it_stood() {
 }
 
 #[test]
-fn a_killed_run_until_certain_goes_on_where_it_stood() {
-    goes_on("when_certain", || {
-        short(&[
-            ("  dwell: 120 s ", "  ends: when_certain\n  dwell: 120 s "),
-            ("order: information ", "required_sigma_eta: 0.5 %\norder: information "),
-        ])
-    });
-}
-
-#[test]
 fn a_killed_search_for_surge_begins_its_line_again() {
     let search = ("seed: 1 ", "surge_search: {}\nseed: 1 ");
     goes_on("surge_search", || short(&BY_ITSELF.iter().copied().chain([search]).collect::<Vec<_>>()));

@@ -12,7 +12,7 @@ fn run_into(campaign: &Path, out: &Path) -> Finished {
 
 /// The shipped campaign on a short grid, with a script beside it.
 fn scripted(script: &str, more: &[(&str, &str)]) -> CampaignFile {
-    let key = ("order: information ", "sequence: steps.rhai\norder: information ");
+    let key = ("order: thermal_gradient ", "sequence: steps.rhai\norder: thermal_gradient ");
     let replacements: Vec<_> = SHORT_GRID.iter().chain(more).copied().chain([key]).collect();
     let campaign = CampaignFile::shipped_with(&replacements);
     std::fs::write(campaign.directory().join("steps.rhai"), script).unwrap();

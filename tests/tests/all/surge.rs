@@ -15,8 +15,6 @@ fn run(search: &str, lab: &str, seed: u32, out: &Path) -> Value {
         ),
         ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 0.5]"),
         ("warm_up: 2 min ", "warm_up: 60 s "),
-        ("required_sigma_eta: 0.5 %\n", ""),
-        ("dwell: 120 s ", "dwell: 40 s "),
         ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
         ("method: joint ", "method: dynamic "),
         ("virtual_lab: {}", &lab),

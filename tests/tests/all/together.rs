@@ -51,9 +51,8 @@ fn two_recordings_make_one_map() {
         CampaignFile::shipped_with(&[
             (SPEEDS, speeds),
             (OPENINGS, few),
-            ("order: information ", "order: listed "),
-            ("required_sigma_eta: 0.5 %\n", ""),
-            ("dwell: 120 s ", "dwell: 60 s "),
+            ("order: thermal_gradient ", "order: listed "),
+            ("dwell: 40 s ", "dwell: 60 s "),
         ])
     };
     let (slow, fast) =

@@ -18,7 +18,6 @@ fn run(zero: &str, seed: u32, out: &Path) -> Value {
         ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
         ("method: joint ", "joint: {alpha_area: fixed, probe: fixed, direction: fixed}\n  method: joint "),
         // The same steps with a zero and without.
-        ("required_sigma_eta: 0.5 %\n", ""),
         ("seed: 1 ", &seed),
     ]);
     let arguments =

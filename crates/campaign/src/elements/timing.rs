@@ -1,58 +1,96 @@
 //! `timing:`
 
 use crate::checking::Check;
-use crate::si::si;
-use crate::units::{Duration, Quantity};
-use mapper_core::{DwellEnd, Timing};
+use crate::units::{Duration, Fraction, Quantity};
+use mapper_core::{Dwell, Timing};
 use mapper_yaml::FindingKind;
 use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// How long things take.
-#[derive(Deserialize, JsonSchema)]
-#[serde(remote = "Timing", deny_unknown_fields)]
-pub(crate) struct TimingElement {
+/// How long things take: `dwell`, `time_budget` or `required_sigma_eta` sets the time at each point, the same for all of them.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("x-removed" = {
+    "ends": "leave it out: all steps last equally long; `time_budget` or `required_sigma_eta` lets the planner choose how long",
+}))]
+pub(crate) struct TimingFile {
     /// Time at the first point before its step begins; 0 s if none is given.
-    #[serde(rename = "warm_up", default, deserialize_with = "si::<Duration, _>")]
-    #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "24 h"), example = &"10 min")]
-    warm_up_s: f64,
+    #[schemars(extend("x-min" = "0 s", "x-max" = "24 h"), example = &"10 min")]
+    warm_up: Option<Quantity<Duration>>,
     /// Time without flow after the last step; 0 s if none is given.
-    #[serde(rename = "cool_down", default, deserialize_with = "si::<Duration, _>")]
-    #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "24 h"), example = &"0 s")]
-    cool_down_s: f64,
+    #[schemars(extend("x-min" = "0 s", "x-max" = "24 h"), example = &"0 s")]
+    cool_down: Option<Quantity<Duration>>,
     /// Time at each point, jump included.
-    #[serde(rename = "dwell", deserialize_with = "si::<Duration, _>")]
-    #[schemars(with = "Quantity<Duration>", extend("x-above" = "0 s", "x-max" = "24 h"), example = &"120 s")]
-    dwell_s: f64,
-    /// What ends the dwell: `planned`, the time that the plan has for it; `when_certain`, what its readings tell, within the dwell. The latter needs `required_sigma_eta` and the joint method.
-    #[serde(default)]
-    #[schemars(example = &"when_certain")]
-    ends: DwellEnd,
+    #[schemars(extend("x-above" = "0 s", "x-max" = "24 h"), example = &"40 s")]
+    dwell: Option<Quantity<Duration>>,
+    /// Time that warm-up, all steps and cool-down may take together, in place of `dwell`: the planner chooses the dwell that fits. A soak before the warm-up and a search for surge come on top.
+    #[schemars(extend("x-above" = "0 s", "x-max" = "24 h"), example = &"45 min")]
+    time_budget: Option<Quantity<Duration>>,
+    /// Standard error of the efficiency (rms over the points) that the plan is to reach by its forecast, in place of `dwell`: the planner chooses the shortest dwell that does.
+    #[schemars(extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.3 %")]
+    required_sigma_eta: Option<Quantity<Fraction>>,
 }
 
-/// A dwell that ends when enough is known needs to be told what is enough, a method that says what is known, and a plan.
+impl TimingFile {
+    /// The timing of a file in which [`check`] found exactly one of the three ways to set the dwell.
+    pub(crate) fn timing(self) -> Timing {
+        let dwell = match (self.dwell, self.time_budget, self.required_sigma_eta) {
+            (_, Some(budget), _) => Dwell::TimeBudget(budget.inside),
+            (_, _, Some(sigma)) => Dwell::RequiredSigmaEta(sigma.inside),
+            (dwell, _, _) => Dwell::Fixed(dwell.map_or(0.0, |dwell| dwell.inside)),
+        };
+        let or_none = |time: Option<Quantity<Duration>>| time.map_or(0.0, |time| time.inside);
+        Timing { warm_up_s: or_none(self.warm_up), cool_down_s: or_none(self.cool_down), dwell }
+    }
+}
+
+/// The dwell is set in one way, and by a number where no planner chooses it.
 pub(crate) fn check(check: &mut Check<'_>) {
-    let path = steps!["timing", "ends"];
-    if check.text(&path) != Some("when_certain") {
+    let timing = steps!["timing"];
+    if check.get(&timing).is_none() {
         return;
     }
-    let method = check.text(&steps!["identification", "method"]);
-    if let Some(other) = method.filter(|method| *method != "joint") {
-        let message =
-            format!("what is known while a step goes on is that of `joint`, and the method is `{other}`");
-        check.note(
-            FindingKind::Conflict,
-            &path,
-            message,
-            "write `identification.method: joint`, or `ends: planned`",
-        );
-    } else if check.get(&steps!["sequence"]).is_some() {
-        let message = "a sequence script ends its steps itself".to_owned();
-        check.note(FindingKind::Conflict, &path, message, "leave `ends` or `sequence` out");
-    } else if check.get(&steps!["required_sigma_eta"]).is_none() {
-        let message = "`ends: when_certain` needs the error that is to be reached".to_owned();
-        check.note(FindingKind::MissingKey, &path, message, "add e.g. `required_sigma_eta: 1 %`");
+    let ways = ["dwell", "time_budget", "required_sigma_eta"];
+    let path_of = |way: &str| steps!["timing", way];
+    let given: Vec<&str> = ways.into_iter().filter(|way| check.get(&path_of(way)).is_some()).collect();
+    match given.as_slice() {
+        [] => {
+            let message = "`timing` does not say how long the steps last".to_owned();
+            let remedy = "add `dwell: 40 s`, or `time_budget: 45 min`, or `required_sigma_eta: 0.3 %`";
+            check.note(FindingKind::MissingKey, &timing, message, remedy);
+        }
+        [one] if *one != "dwell" => {
+            if check.get(&steps!["sequence"]).is_some() {
+                let message = format!("`{one}` is for the planner, and a sequence script sets its own steps");
+                check.note(FindingKind::Conflict, &path_of(one), message, "write `dwell` instead");
+            } else if check.text(&steps!["order"]) == Some("conventional") {
+                let message = format!(
+                    "`{one}` chooses the dwell, and under `order: conventional` each step lasts until nothing drifts"
+                );
+                check.note(
+                    FindingKind::Conflict,
+                    &path_of(one),
+                    message,
+                    "write `dwell` instead, the shortest of these steps",
+                );
+            } else if *one == "required_sigma_eta"
+                && check.text(&steps!["identification", "method"]) == Some("steady")
+            {
+                let message =
+                    "`steady` has no forecast error for a step that still moves, so no dwell can be chosen by it"
+                        .to_owned();
+                let remedy = "write `identification.method: joint`, or `dwell` instead";
+                check.note(FindingKind::Conflict, &path_of(one), message, remedy);
+            }
+        }
+        [_] => {}
+        [first, others @ ..] => {
+            for other in others {
+                let message = format!("`{other}` and `{first}` both set the time at each point");
+                check.note(FindingKind::Conflict, &path_of(other), message, "keep one of them");
+            }
+        }
     }
 }
 
@@ -63,19 +101,21 @@ mod tests {
 
     #[test]
     fn what_is_written_and_what_it_means() {
+        let fixed = |warm_up_s, cool_down_s, dwell_s| {
+            Some(Timing { warm_up_s, cool_down_s, dwell: Dwell::Fixed(dwell_s) })
+        };
+        let chosen = |dwell| Some(Timing { warm_up_s: 0.0, cool_down_s: 0.0, dwell });
         let table = [
-            ("{dwell: 2 min}", Some((0.0, 0.0, 120.0))),
-            ("{warm_up: 10 min, cool_down: 90 s, dwell: 1 h}", Some((600.0, 90.0, 3600.0))),
-            ("{warm_up: 10 min}", None),
+            ("{dwell: 2 min}", fixed(0.0, 0.0, 120.0)),
+            ("{warm_up: 10 min, cool_down: 90 s, dwell: 1 h}", fixed(600.0, 90.0, 3600.0)),
+            ("{time_budget: 45 min}", chosen(Dwell::TimeBudget(2700.0))),
+            ("{required_sigma_eta: 0.5 %}", chosen(Dwell::RequiredSigmaEta(0.005))),
             ("{dwell: 120}", None),
             ("{dwell: 2 min, dwel: 2 min}", None),
-            ("{dwell: 2 min, ends: when_certain}", Some((0.0, 0.0, 120.0))),
-            ("{dwell: 2 min, ends: soon}", None),
         ];
         for (text, expected) in table {
-            let timing: Option<Timing> = any_with(text, TimingElement::deserialize).ok();
-            let found = timing.map(|timing| (timing.warm_up_s, timing.cool_down_s, timing.dwell_s));
-            assert_eq!(found, expected, "{text}");
+            let timing = any_with(text, TimingFile::deserialize).ok().map(TimingFile::timing);
+            assert_eq!(timing, expected, "{text}");
         }
     }
 }

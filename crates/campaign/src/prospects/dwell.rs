@@ -10,7 +10,8 @@ pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
     if !matches!(identification.method, Method::Dynamic | Method::Joint) {
         return Vec::new();
     }
-    let dwell_s = campaign.timing.dwell_s;
+    // A dwell that the planner chooses is long enough for the window.
+    let Some(dwell_s) = campaign.timing.dwell.fixed_s() else { return Vec::new() };
     let (earliest_s, shortest_s) = (WindowRule::EARLIEST_S, WindowRule::SHORTEST_S);
     let needed_s = earliest_s + shortest_s;
     // A method that follows a step from its jump on needs no settled window.

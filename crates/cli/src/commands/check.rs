@@ -49,7 +49,7 @@ impl Check {
             Failure::new(Code::Failure, format!("failed to read {}: {error}", self.campaign.display()))
         })?;
         let warnings = mapper_campaign::warnings(&text, &self.campaign, &campaign, prospects.concerns);
-        let (steps, duration_s) = (prospects.plan.steps.len(), prospects.duration_s);
+        let (steps, duration_s) = (prospects.steps, prospects.duration_s);
         let lines = mapper_campaign::resolved_lines(&campaign, &model);
         if self.json {
             return output::print_json(&json!({
@@ -71,13 +71,14 @@ impl Check {
             Some(_) => " by its script on the nominal machine",
             None => "",
         };
+        let at_most = if prospects.is_planned { "" } else { "at most " };
         let number = match warnings.count() {
             0 => String::new(),
             1 => ", 1 warning".to_owned(),
             count => format!(", {count} warnings"),
         };
         output::print(&format!(
-            "{}: no mistakes{number}. {} points in {steps} steps on `{}` in {} of the rig's time{forecast}.\n{}{}",
+            "{}: no mistakes{number}. {} points in {at_most}{steps} steps on `{}` in {} of the rig's time{forecast}.\n{}{}",
             self.campaign.display(),
             campaign.points.len(),
             campaign.backend.name,

@@ -8,13 +8,12 @@ use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
 use mapper_campaign::units::{Kind, parse};
-use mapper_core::{OperatingPoint, Plan as StepPlan, VisitOrder};
+use mapper_core::{Jump, OperatingPoint, Plan as StepPlan, VisitOrder};
 use mapper_physics::model::Model;
-use mapper_planner::{PlanRequest, error_bound};
+use mapper_planner::{PlanRequest, make_plan, other_orders};
 use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
 use mapper_session::{
-    Rehearsal, Session, SessionError, compared, json_text, nominal_model, plan_of, rehearse,
-    with_plan_request,
+    PlanInputs, Rehearsal, Session, SessionError, json_text, nominal_model, plan_of, rehearse,
 };
 use std::path::PathBuf;
 
@@ -32,7 +31,7 @@ pub struct Plan {
     /// Draw the order on the map next to the one along speed lines, as figure 13 of the paper, in this new SVG file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
-    /// Also compare with conventional mapping and with the same points along speed lines
+    /// Also compare with the other orders of the same points and with conventional mapping
     #[arg(long)]
     pub compare: bool,
     /// Make this jump after all other steps, e.g. the one that a gap diagnosis asks for: 130krpm@0.5 50krpm@0.7
@@ -71,44 +70,36 @@ impl Plan {
         if let Some(source) = &campaign.sequence {
             return self.scripted(&campaign, &model, source);
         }
+        let inputs = PlanInputs::of(&campaign)?;
+        let request = inputs.request(&campaign, &model);
         if let [from, to] = self.why.as_slice() {
-            let jump = with_plan_request(&campaign, &model, |request| {
-                mapper_planner::explain_jump(request, *from, *to).map_err(SessionError::from)
-            })?;
+            let jump = mapper_planner::explain_jump(&request, *from, *to).map_err(SessionError::from)?;
             return match self.json {
                 true => output::print_json(&jump_json(&jump)),
                 false => output::print(&jump_text(&campaign, &jump)),
             };
         }
-        let (plan, comparison, along_lines) = with_plan_request(&campaign, &model, |request| {
-            let appended = match self.append.as_slice() {
-                [from, to] => Some(mapper_core::Jump { from: *from, to: *to }),
-                _ => None,
-            };
-            let effort = self.effort.unwrap_or(request.effort);
-            let asked = PlanRequest { effort, appended, ..request.clone() };
-            let mut plan = plan_of(&campaign, &asked)?;
-            if asked.order.needs_method() {
-                plan.error_bound = error_bound(&asked, &plan).map_err(SessionError::from)?;
-            }
-            let comparison = self.compare.then(|| compared(&campaign, request, &plan)).transpose()?;
-            // Limits that the plan keeps may forbid this order.
-            let along_lines = || {
-                let order = VisitOrder::SpeedLines;
-                plan_of(&campaign, &PlanRequest { order, appended: None, ..asked.clone() }).ok()
-            };
-            let along_lines = self.svg.is_some().then(along_lines).flatten();
-            Ok::<_, SessionError>((plan, comparison, along_lines))
-        })?;
+        let appended = match self.append.as_slice() {
+            [from, to] => Some(Jump { from: *from, to: *to }),
+            _ => None,
+        };
+        let request = PlanRequest { effort: self.effort.unwrap_or(request.effort), appended, ..request };
+        let plan = plan_of(&campaign, &request)?;
+        let others = match self.compare {
+            true => Some(other_orders(&request, &plan).map_err(SessionError::from)?),
+            false => None,
+        };
         self.store(&plan)?;
         if let Some(path) = &self.svg {
-            let picture = plan_svg(&campaign, &model, &plan, along_lines.as_ref());
-            self.replace.write(path, picture.as_bytes())?;
+            let request = PlanRequest { order: VisitOrder::SpeedLines, appended: None, ..request.clone() };
+            // Limits that the plan keeps may forbid this order.
+            let speed_lines = make_plan(&request).ok();
+            self.replace.write(path, plan_svg(&campaign, &model, &plan, speed_lines.as_ref()).as_bytes())?;
         }
         if self.json {
             let mut value = serde_json::to_value(&plan).map_err(SessionError::from)?;
-            if let Some(comparison) = &comparison {
-                value["comparison"] = comparison_json(comparison);
+            if let Some(others) = &others {
+                value["comparison"] = comparison_json(&plan, others);
             }
             if let Some(zero) = campaign.zero {
                 value["soak_s"] = zero.duration_s.into();
@@ -116,8 +107,8 @@ impl Plan {
             return output::print_json(&value);
         }
         let mut text = plan_text(&campaign, &plan);
-        if let Some(comparison) = &comparison {
-            text.push_str(&comparison_text(comparison));
+        if let Some(others) = &others {
+            text.push_str(&comparison_text(&plan, others));
         }
         output::print(&text)
     }

@@ -7,9 +7,8 @@ use crate::IdentifyConfig;
 use crate::config::coloured;
 use crate::dynamic::Estimate;
 use crate::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow};
-use crate::joint::parsimony::NO_EXTRA;
-use crate::joint::rows::{End, Row, StepRows, block_s_after, place};
-use crate::joint::solve::{Problem, ROUGHLY};
+use crate::joint::rows::{Row, StepRows, block_s_after, place};
+use crate::joint::solve::ROUGHLY;
 use crate::joint::start::{self, START_S};
 use crate::joint::{parsimony, smoothness};
 use mapper_numerics::coloured_noise::BlockNoise;
@@ -34,35 +33,37 @@ pub struct ExpectedStep<'a> {
 
 impl ExpectedStep<'_> {
     /// Where a fit may start.
-    pub(crate) fn estimate(&self) -> Estimate {
+    fn estimate(&self) -> Estimate {
         Estimate { eta: Some((self.eta, None)), h_w_m2k: Some((self.h_w_m2k, None)), ..Estimate::default() }
     }
 }
 
-/// Identifies noise-free steps together; one result for each step, `None` for a step that is too short. `None` for all where
-/// the fit comes to no end. `as_declared`: whether the errors of a machine that is as declared are worked out too; else they are
-/// those of one that is not.
+/// What the joint method will make of the steps of a campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExpectedTogether {
+    /// One result for each step on a machine that is as declared; `None` for a step that is too short.
+    pub steps: Vec<Option<Expected>>,
+    /// By how much the efficiencies would be off (rms over the steps, one sigma, fraction) if alpha_A, probe and heating/cooling ratio had
+    /// to be found from these steps. Above [`MAX_RESTING_ETA`](crate::MAX_RESTING_ETA) the points rest on the declaration and are doubtful.
+    pub resting_eta: f64,
+}
+
+/// Identifies noise-free steps together; `None` if the fit does not converge.
 ///
-/// After an isothermal zero `config` is that of [`expected_after_zero`](crate::expected_after_zero).
-pub fn expected_together(
-    steps: &[ExpectedStep<'_>],
-    config: &IdentifyConfig,
-    as_declared: bool,
-) -> Option<Vec<Option<Expected>>> {
+/// For the errors alpha_A, probe and heating/cooling ratio stand where they are declared: without evidence against the declaration, the
+/// method shrinks them towards it. After an isothermal zero `config` is that of [`expected_after_zero`](crate::expected_after_zero).
+pub fn expected_together(steps: &[ExpectedStep<'_>], config: &IdentifyConfig) -> Option<ExpectedTogether> {
     let condensed: Vec<StepRows> =
         steps.iter().enumerate().filter_map(|(position, step)| condensed(position, step, config)).collect();
-    let mut problem = expected_problem(steps, &condensed, config)?;
-    let judged = |problem: &Problem<'_>| {
-        Some(smoothness::smoothed(problem, &problem.covariance()?, &condensed, config.reference))
-    };
-    let open = judged(&problem)?;
-    let mut smoothed = open.clone();
-    if as_declared {
-        parsimony::settle(&mut problem)?;
-        // Intervals hold what a recording cannot exclude; here the machine is as declared.
-        problem.extra_variances = NO_EXTRA;
-        smoothed = judged(&problem)?;
-    }
+    let alone: Vec<Estimate> = steps.iter().map(ExpectedStep::estimate).collect();
+    let mut problem = start::problem(&condensed, &alone, config)?;
+    problem.minimise(ROUGHLY)?;
+    start::refine(&mut problem, &condensed, config);
+    problem.minimise(ROUGHLY)?;
+    let resting_eta = parsimony::resting_on_all(&problem)?;
+    parsimony::hold_refinements(&mut problem);
+    problem.minimise(ROUGHLY)?;
+    let smoothed = smoothness::smoothed(&problem, &problem.covariance()?, &condensed, config.reference);
     let mut found = vec![None; steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&condensed).enumerate() {
         let (eta, ln_h) = (smoothed.eta[i], smoothed.ln_h[i]);
@@ -71,37 +72,17 @@ pub fn expected_together(
         let expected = Expected {
             eta: eta.value,
             sigma_eta: eta.uncertainty.combined_standard_error(),
-            open_sigma_eta: open.eta[i].uncertainty.combined_standard_error(),
             h_w_m2k,
             sigma_h_w_m2k: h_w_m2k * ln_h.uncertainty.combined_standard_error(),
         };
-        let numbers =
-            [expected.eta, expected.sigma_eta, expected.open_sigma_eta, h_w_m2k, expected.sigma_h_w_m2k];
+        let numbers = [expected.eta, expected.sigma_eta, h_w_m2k, expected.sigma_h_w_m2k];
         found[step.position] = numbers.iter().all(|x| x.is_finite()).then_some(expected);
     }
-    Some(found)
-}
-
-/// The fit of a forecast, without a judgement on what is at work in it.
-pub(crate) fn expected_problem<'a>(
-    steps: &[ExpectedStep<'_>],
-    condensed: &'a [StepRows],
-    config: &IdentifyConfig,
-) -> Option<Problem<'a>> {
-    let alone: Vec<Estimate> = steps.iter().map(ExpectedStep::estimate).collect();
-    let mut problem = start::problem(condensed, &alone, config)?;
-    problem.minimise(ROUGHLY)?;
-    start::refine(&mut problem, condensed, config);
-    problem.minimise(ROUGHLY)?;
-    Some(problem)
+    Some(ExpectedTogether { steps: found, resting_eta })
 }
 
 /// The rows that the method would condense a recording's samples to.
-pub(crate) fn condensed(
-    position: usize,
-    step: &ExpectedStep<'_>,
-    config: &IdentifyConfig,
-) -> Option<StepRows> {
+fn condensed(position: usize, step: &ExpectedStep<'_>, config: &IdentifyConfig) -> Option<StepRows> {
     let first = step.rows.partition_point(|expected| expected.t_s < START_S);
     let first_s = step.rows.get(first)?.t_s;
     let mut rows: Vec<Row> = Vec::new();
@@ -133,21 +114,4 @@ fn row(expected: &ExpectedRow, noise: BlockNoise, config: &IdentifyConfig) -> Ro
 
 fn noise(block_s: f64, config: &IdentifyConfig) -> BlockNoise {
     BlockNoise::of_mean(coloured(config.noise_colour), block_s / DECLARED_INTERVAL_S, block_s)
-}
-
-/// The end that a condensed step would have at `end_s`; `None` where too little of it lies before.
-pub(crate) fn end_at(
-    condensed: &StepRows,
-    step: &ExpectedStep<'_>,
-    end_s: f64,
-    config: &IdentifyConfig,
-) -> Option<End> {
-    // Half a nanosecond: times are rounded.
-    let latest_s = end_s + 5e-10;
-    let before = step.rows.partition_point(|expected| expected.t_s <= latest_s);
-    let last = step.rows.get(before.checked_sub(1)?)?;
-    let rows = condensed.rows.partition_point(|row| row.t_s <= latest_s);
-    let noise = condensed.rows.get(rows.checked_sub(1)?)?.noise;
-    let row = row(last, noise, config);
-    (rows >= FEWEST_ROWS && row.place.0 > 0.0 && row.place.1 > 0.0).then_some(End { rows, row })
 }

@@ -5,8 +5,6 @@
 //! the map) is found once, from all of them. Why that is needed, what it assumes and what it can not do stands in
 //! `docs/identification.md`.
 
-pub(crate) mod as_it_lasts;
-pub(crate) mod campaign_information;
 pub(crate) mod common_part;
 pub(crate) mod expected;
 pub(crate) mod explained;
@@ -27,8 +25,6 @@ pub(crate) mod smoothness;
 pub(crate) mod solve;
 pub(crate) mod start;
 pub(crate) mod surface;
-pub(crate) mod tangent;
-pub(crate) mod worth;
 
 use crate::dynamic::Estimate;
 use crate::end_state::EndState;
@@ -52,7 +48,7 @@ const MOST_LOST_RATIO: f64 = 2.0;
 
 /// Error of the efficiencies, fraction, that only the declaration of alpha_A, probe and direction factor may keep away: more, and
 /// a machine that is not as declared passes for one that is.
-const MOST_RESTING: f64 = 0.0125;
+pub const MAX_RESTING_ETA: f64 = 0.0125;
 
 /// What the method makes of a recording.
 #[derive(Debug)]
@@ -180,7 +176,7 @@ pub(crate) fn estimate(
             let message = "no sensor uncertainty was declared: the interval holds noise alone".to_owned();
             own.remark(code::NOTHING_DECLARED, message);
         }
-        if resting > MOST_RESTING {
+        if resting > MAX_RESTING_ETA {
             let message = format!(
                 "the recording alone knows the efficiencies to {:.1} points only; the rest is trust in the declared alpha_A, probe and \
                  direction factor: record longer steps or larger gradients, or hold fixed what is known (`identification.joint`)",

@@ -31,13 +31,31 @@ pub(crate) const DECLARED_HOLDS: f64 = 0.5;
 /// Weight of a refinement above which it is left alone.
 const SURE: f64 = 0.999;
 
+/// Holds the refinements where they are declared.
+pub(crate) fn hold_refinements(problem: &mut Problem<'_>) {
+    for (index, _) in REFINEMENTS {
+        problem.active[index] = false;
+        problem.shared[index] = problem.priors[index].mean;
+    }
+}
+
 /// By how much the efficiencies would be off, fraction (rms of one standard error), if a refinement that is drawn to its
 /// declared value were at work after all: what is known of them without the declaration. 0 where none is drawn.
 pub(crate) fn resting_on_declaration(open: &Problem<'_>, settled: &Problem<'_>) -> Option<f64> {
-    let drawn = |(index, _): &(usize, f64)| {
-        open.active[*index] && settled.priors[*index].sigma < 0.5 * open.priors[*index].sigma
-    };
-    let drawn: Vec<usize> = REFINEMENTS.iter().filter(|one| drawn(one)).map(|(index, _)| *index).collect();
+    resting_on(open, |index| settled.priors[index].sigma < 0.5 * open.priors[index].sigma)
+}
+
+/// The same if all refinements that the method may find were at work.
+pub(crate) fn resting_on_all(open: &Problem<'_>) -> Option<f64> {
+    resting_on(open, |_| true)
+}
+
+fn resting_on(open: &Problem<'_>, drawn: impl Fn(usize) -> bool) -> Option<f64> {
+    let drawn: Vec<usize> = REFINEMENTS
+        .into_iter()
+        .map(|(index, _)| index)
+        .filter(|index| open.active[*index] && drawn(*index))
+        .collect();
     if drawn.is_empty() {
         return Some(0.0);
     }

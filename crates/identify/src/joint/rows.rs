@@ -48,13 +48,6 @@ pub(crate) struct StepRows {
     pub(crate) end: Row,
 }
 
-/// One end that a step may have: how many of its rows come before it, and what is read there.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct End {
-    pub(crate) rows: usize,
-    pub(crate) row: Row,
-}
-
 impl StepRows {
     /// Without the rows in which pressures, flow and speed still follow the jump.
     pub(crate) fn settled(&self) -> StepRows {

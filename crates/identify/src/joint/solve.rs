@@ -75,14 +75,6 @@ struct Normal {
     equations: Arrow<LOCAL>,
 }
 
-/// See [`Problem::fisher`].
-#[derive(Debug, Clone)]
-pub(crate) struct Fisher {
-    pub(crate) unknown: Vec<usize>,
-    pub(crate) information: DMatrix<f64>,
-    pub(crate) steps: Vec<(f64, DVector<f64>)>,
-}
-
 /// Covariance of everything, as far as it is needed.
 #[derive(Debug, Clone)]
 pub(crate) struct Covariance {
@@ -285,21 +277,6 @@ impl Problem<'_> {
         }
     }
 
-    /// The same of the shared parameters, by a step whose efficiency answers to them by `coupling`.
-    pub(crate) fn add_surface(
-        &self,
-        coupling: &SharedVector,
-        fitted: &[usize],
-        information: &mut DMatrix<f64>,
-    ) {
-        let surface_weight = 1.0 / (self.surface_sigma * self.surface_sigma);
-        for (a, index) in fitted.iter().enumerate() {
-            for (b, other) in fitted.iter().enumerate() {
-                information[(a, b)] += surface_weight * coupling[*index] * coupling[*other];
-            }
-        }
-    }
-
     fn cost(&self, shared: &SharedVector, locals: &[LocalVector]) -> f64 {
         let sharing: Vec<_> = self.members.iter().zip(locals).filter(|(member, _)| member.shares).collect();
         let costs = parallel::map(&sharing, |(member, local)| self.local_cost(member, shared, local));
@@ -380,24 +357,6 @@ impl Problem<'_> {
             }
         }
         Some(best)
-    }
-
-    /// All unknown parameters, offsets among them, as a Bayesian has them: their indices, what the steps tell of them beyond
-    /// what is known beforehand (Fisher information), and for each step the variance of its efficiency if they were known with
-    /// its answer to them. `None` where the equations are singular.
-    pub(crate) fn fisher(&self) -> Option<Fisher> {
-        let unknown = self.unknown();
-        let equations = self.normal(&unknown).equations;
-        let Reduced { matrix: mut information, inverses, .. } = equations.reduced(0.0)?;
-        for (row, index) in unknown.iter().enumerate() {
-            information[(row, row)] -= self.priors[*index].weight();
-        }
-        let of_step = |(block, inverse): (&ArrowBlock<LOCAL>, &Matrix4<f64>)| {
-            let answer = -(inverse * &block.mixed);
-            (inverse[(ETA, ETA)], answer.row(ETA).transpose())
-        };
-        let steps = equations.blocks.iter().zip(&inverses).map(of_step).collect();
-        Some(Fisher { unknown, information, steps })
     }
 
     /// What the recording alone knows of a shared parameter when all that are fitted are free: one over its variance by least

@@ -1,6 +1,6 @@
 //! The grid of docs/planner.md, a request, and a housing with one time constant per point.
 
-use mapper_core::{DwellEnd, Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
+use mapper_core::{Dwell, Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
@@ -26,7 +26,7 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
         follow_outlet: FollowOutlet::default(),
         points,
         order,
-        timing: Timing { warm_up_s: 3600.0, dwell_s: 120.0, cool_down_s: 0.0, ends: DwellEnd::Planned },
+        timing: Timing { warm_up_s: 3600.0, dwell: Dwell::Fixed(120.0), cool_down_s: 0.0 },
         window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 },
         settle_bands: SettleBands::default(),
         limits: Limits {
@@ -42,12 +42,9 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
         repeats: None,
         return_to_first: false,
         appended: None,
-        required_sigma_eta: None,
         method: None,
-        simulations: None,
         effort: 0.3,
-        draft: false,
-        gradient_share: None,
+        bound: true,
         seed: 1,
     }
 }
@@ -92,8 +89,8 @@ impl Chain for SimpleHousing {
         self.settled_k.len()
     }
 
-    fn first(&self, to: usize) -> (Option<f64>, f64) {
-        (None, self.settled_k[to])
+    fn first(&self, to: usize) -> f64 {
+        self.settled_k[to]
     }
 
     fn step(&self, _from: usize, to: usize, tc_k: f64) -> (f64, f64) {

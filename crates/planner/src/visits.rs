@@ -1,10 +1,10 @@
-//! Repeats for drift: one jump, made again at a spacing, where it costs least.
+//! The visits of a plan: its points in order, the repeats of one jump for drift, the return to the first point, an appended jump.
 
 use crate::chain::{Chain, way_back};
 use crate::graph::jump;
 use crate::objective::{NOT_ALLOWED, Objective};
 use crate::request::{PlanError, PlanRequest};
-use mapper_core::{Jump, OperatingPoint, StepKind};
+use mapper_core::{Jump, OperatingPoint, Repeats, StepKind};
 use mapper_physics::steady::SteadyState;
 
 /// Jumps that are looked at for one that may be repeated; each takes a simulation.
@@ -25,15 +25,13 @@ pub(crate) struct Visit {
 pub(crate) struct RepeatedJump {
     pub(crate) from: usize,
     pub(crate) to: usize,
-    pub(crate) every_steps: usize,
-    pub(crate) at_least: usize,
+    /// How often it is made.
+    pub(crate) count: usize,
 }
 
-impl RepeatedJump {
-    /// How often it is made among `points` points: at both ends, and in between at the spacing or closer.
-    pub(crate) fn count(&self, points: usize) -> usize {
-        (points.div_ceil(self.every_steps.max(1)) + 1).max(self.at_least).min(points.max(1))
-    }
+/// How often a jump is repeated among so many points: at both ends, and in between at the spacing or closer.
+pub(crate) fn repeat_count(repeats: Repeats, points: usize) -> usize {
+    (points.div_ceil(repeats.every_steps.max(1)) + 1).max(repeats.at_least).min(points.max(1))
 }
 
 /// Jumps that suit for repeats, best first, those alone that are allowed: far in speed at an opening in the middle, up
@@ -93,7 +91,7 @@ pub(crate) fn with_repeats<C: Chain>(
     objective: Objective,
 ) -> Vec<Visit> {
     let mut visits = plain(order);
-    let (points, count) = (order.len(), jump.count(order.len()));
+    let (points, count) = (order.len(), jump.count);
     let spacing = points as f64 / (count.max(2) - 1) as f64;
     let slack = (spacing / 4.0).floor() as usize;
     let mut inserted = 0;
@@ -163,10 +161,9 @@ fn put(visits: &[Visit], at: usize, jump: RepeatedJump) -> Vec<Visit> {
 }
 
 /// What the points are worth; the repeats themselves do not count, but for what is not allowed.
-fn value<C: Chain>(chain: &C, visits: &[Visit], objective: Objective) -> f64 {
+pub(crate) fn value<C: Chain>(chain: &C, visits: &[Visit], objective: Objective) -> f64 {
     let Some(first) = visits.first() else { return 0.0 };
-    let (gradient_k, mut state) = chain.first(first.index);
-    let mut sum = objective.first_value(chain, first.index, gradient_k);
+    let (mut state, mut sum) = (chain.first(first.index), 0.0);
     let order: Vec<usize> = visits.iter().map(|visit| visit.index).collect();
     let back = way_back(chain, &order).filter(|(last, first)| last != first);
     let jumps = visits.windows(2).map(|pair| (pair[0].index, pair[1].index, pair[1].kind));

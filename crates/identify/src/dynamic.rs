@@ -35,6 +35,8 @@ const POOR_FIT_REMEDY: &str = "declare the noise and the probe that T2 really ha
 pub(crate) struct Estimate {
     pub(crate) eta: Option<(f64, Option<EstimateUncertainty>)>,
     pub(crate) h_w_m2k: Option<(f64, Option<EstimateUncertainty>)>,
+    /// 95 % intervals of eta and h where they are not those of a normal distribution.
+    pub(crate) intervals: Option<[(f64, f64); 2]>,
     /// What the errors that points share do to eta and h: see [`CommonErrors`](mapper_core::CommonErrors).
     pub(crate) common: [Vec<f64>; 2],
     pub(crate) window: Option<Window>,

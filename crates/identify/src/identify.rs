@@ -353,7 +353,10 @@ fn point(
         let (value, uncertainty) = quantity?;
         Some(confidence_interval_95(value, uncertainty?.combined_standard_error()))
     };
-    let (eta_interval, h_interval) = (interval(estimate.eta), interval(estimate.h_w_m2k));
+    let (eta_interval, h_interval) = match estimate.intervals {
+        Some([eta, h]) => (Some(eta), Some(h)),
+        None => (interval(estimate.eta), interval(estimate.h_w_m2k)),
+    };
     IdentifiedPoint {
         step: step.index,
         kind: step.kind,

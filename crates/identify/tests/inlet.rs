@@ -44,9 +44,9 @@ fn without_noise_the_law_before_the_wheel_is_told() {
             let told = thermal.inlet.unwrap();
             assert_eq!((told.convection, told.origin), (inlet, Origin::Fitted), "{told:?}");
             let ((eta, h), alpha) = (worst(&points, &campaign), thermal.alpha_area_ratio.value.unwrap());
-            // As without noise elsewhere: what the surface misses of the map, up to a quarter of a point.
+            // What the surface misses of the map at eighteen points, up to a third of a point.
             assert!(
-                (alpha - 0.3).abs() < 0.005 && eta < 0.0025 && h < 0.015,
+                (alpha - 0.3).abs() < 0.007 && eta < 0.0035 && h < 0.015,
                 "alpha {alpha}, eta {eta}, h {h}"
             );
         }
@@ -77,7 +77,8 @@ fn with_noise_either_law_before_the_wheel_lies_in_the_intervals() {
             }
         }
         assert!(alphas >= 5, "{inlet:?}: {alphas} of 6");
-        assert!(eta.held() > 0.85 && h.held() > 0.85, "{inlet:?}: {} {}", eta.held(), h.held());
+        // The points of a campaign hold or miss together: five of six again.
+        assert!(eta.held() > 0.8 && h.held() > 0.8, "{inlet:?}: {} {}", eta.held(), h.held());
     }
 }
 

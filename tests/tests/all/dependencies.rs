@@ -29,7 +29,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-observe",   &["core", "numerics", "physics"]),
     // Priors, coordinates and sizes of causes are those of the diagnosis with steps.
     ("mapper-driven",    &["core", "numerics", "physics", "observe", "gap"]),
-    ("mapper-identify",  &["core", "numerics", "physics", "observe"]),
+    ("mapper-inference", &["numerics"]),
+    ("mapper-identify",  &["core", "inference", "numerics", "physics", "observe"]),
     ("mapper-assemble",  &["core", "numerics", "physics", "identify"]),
     ("mapper-drift",     &["core", "numerics", "physics", "observe", "identify"]),
     ("mapper-gap",       &["core", "numerics", "physics", "observe"]),

@@ -10,7 +10,7 @@ use crate::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow};
 use crate::joint::rows::{Row, StepRows, block_s_after, place};
 use crate::joint::solve::ROUGHLY;
 use crate::joint::start::{self, START_S};
-use crate::joint::{parsimony, smoothness};
+use crate::joint::{refinements, smoothness};
 use mapper_numerics::coloured_noise::BlockNoise;
 
 /// Fewest rows of a step that the method takes.
@@ -58,12 +58,12 @@ pub fn expected_together(steps: &[ExpectedStep<'_>], config: &IdentifyConfig) ->
     let alone: Vec<Estimate> = steps.iter().map(ExpectedStep::estimate).collect();
     let mut problem = start::problem(&condensed, &alone, config)?;
     problem.minimise(ROUGHLY)?;
-    start::refine(&mut problem, &condensed, config);
+    start::refine(&mut problem, &condensed, config)?;
     problem.minimise(ROUGHLY)?;
-    let resting_eta = parsimony::resting_on_all(&problem)?;
-    parsimony::hold_refinements(&mut problem);
+    let resting_eta = refinements::resting_on_declaration(&problem, |_| true)?;
+    refinements::hold(&mut problem);
     problem.minimise(ROUGHLY)?;
-    let smoothed = smoothness::smoothed(&problem, &problem.covariance()?, &condensed, config.reference);
+    let smoothed = smoothness::smoothed(&problem, &problem.covariance()?, None, &condensed, config.reference);
     let mut found = vec![None; steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&condensed).enumerate() {
         let (eta, ln_h) = (smoothed.eta[i], smoothed.ln_h[i]);

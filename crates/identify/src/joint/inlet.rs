@@ -8,13 +8,19 @@
 //! to speak for the wrong one by odds of hundreds to one. So both are fitted and weighed, such faults
 //! counted in; where the recording does not decide, the difference is carried on as an error of everything that it moves.
 
-use crate::joint::parameters::{ALPHA, INLET, LN_COEFFICIENT, Prior};
-use crate::joint::parsimony::{ALPHA_FLOOR, DECLARED_HOLDS};
+use crate::joint::parameters::{ALPHA, INLET, LN_COEFFICIENT, PROBE_MM2, Prior};
 use crate::joint::solve::{Covariance, FULLY, Problem};
 use mapper_core::{FoundInlet, InletConvection, Origin};
+use nalgebra::DMatrix;
 
 /// Standard errors of alpha_A below which the readings differ by less than what is left open of it anyway.
 const AT_WORK_SIGMAS: f64 = 2.0;
+/// What small errors of the model can pass for, as a change of alpha_A: a clearance that grows by a percent as the housing warms up by 100 K
+/// looks like 0.06.
+const PASSES_FOR_ALPHA: f64 = 0.025;
+/// Least spread of the points about the surface of efficiencies, fraction, where the readings are weighed: a true map that drops more
+/// steeply than the surface speaks for the wrong one.
+const LEAST_SURFACE_SIGMA: f64 = 3e-3;
 /// Probability of the other reading below which the recording has decided.
 const DECIDED: f64 = 0.05;
 /// Share of the distance between the readings that is one standard deviation at least where it has not: the 95 % interval
@@ -36,13 +42,28 @@ fn convection_of(power: f64) -> InletConvection {
     if power == 0.0 { InletConvection::Shared } else { InletConvection::Own }
 }
 
-/// Weighs both readings on a problem that is at its minimum, takes the likelier one, and gives the covariance there.
-pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Covariance> {
-    let covariance = problem.covariance()?;
-    let error = covariance.error_of(ALPHA).unwrap_or(0.0);
-    if problem.shared[ALPHA].abs() <= AT_WORK_SIGMAS * error {
-        return Some(covariance);
+/// Weighs both readings on a problem that is at its minimum, and takes the likelier one. What they leave open is the standard deviation of
+/// its prior; `None` where it makes no difference.
+pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<f64>> {
+    let error = problem.covariance()?.error_of(ALPHA).unwrap_or(0.0);
+    if problem.shared[ALPHA] <= AT_WORK_SIGMAS * error {
+        return Some(None);
     }
+    let tight = problem.surface_sigma;
+    let moved_to = |problem: &mut Problem<'_>, surface_sigma: f64| {
+        problem.surface_sigma = surface_sigma;
+        problem.active[PROBE_MM2] = problem.probe_fitted;
+        problem.minimise(FULLY)
+    };
+    if tight < LEAST_SURFACE_SIGMA {
+        moved_to(problem, LEAST_SURFACE_SIGMA)?;
+    }
+    let left_open = weighed(problem)?;
+    moved_to(problem, tight)?;
+    Some(left_open)
+}
+
+fn weighed(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     let declared = FoundInlet {
         convection: convection_of(problem.shared[INLET]),
         diameter_m: problem.setting.inlet_diameter_m,
@@ -52,14 +73,12 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Covariance> {
     };
     problem.inlet = Some(declared);
     let Some(mut other) = problem.inlet_sought.then(|| otherwise(problem)).flatten() else {
-        return Some(covariance);
+        return Some(None);
     };
     let seen = 0.5 * (problem.square() - other.square()) * share_of_noise(problem)?;
-    let ln_odds = seen + ((1.0 - DECLARED_HOLDS) / DECLARED_HOLDS).ln();
-    let mut left = 1.0 / (1.0 + (-ln_odds).exp());
-    // With alpha_A fitted the likelier reading is taken. With alpha_A held, so is this, unless the recording decides.
-    let enough = if problem.active[ALPHA] { 0.5 } else { 1.0 - DECIDED };
-    if left > enough {
+    let mut left = 1.0 / (1.0 + (-seen).exp());
+    // The declared reading stands unless the recording decides against it: where it does not, the other one has other efficiencies.
+    if left > 1.0 - DECIDED {
         std::mem::swap(problem, &mut other);
         left = 1.0 - left;
     }
@@ -74,9 +93,30 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Covariance> {
     let sigma = if decided { left.sqrt() } else { left.sqrt().max(OPEN_SIGMA) };
     problem.priors[INLET] = Prior { mean: problem.shared[INLET], sigma };
     problem.active[INLET] = true;
-    let covariance = problem.covariance()?;
-    problem.priors[INLET].sigma *= stretch(problem, &other, &covariance);
-    problem.covariance()
+    let stretched = sigma * stretch(problem, &other, &problem.covariance()?);
+    problem.active[INLET] = false;
+    Some(Some(stretched))
+}
+
+/// Carries what the readings leave open into the covariance: by how much everything moves from one towards the other.
+pub(crate) fn carry(problem: &mut Problem<'_>, sigma: f64, without: &Covariance) -> Option<Covariance> {
+    problem.priors[INLET].sigma = sigma;
+    problem.active[INLET] = true;
+    let mut with = problem.covariance()?;
+    let own = with.row_of(INLET)?;
+    let moved = with.shared.column(own) / sigma;
+    let place = |row: usize| if row < own { Some(row) } else { row.checked_sub(1).filter(|_| row > own) };
+    with.shared = DMatrix::from_fn(moved.len(), moved.len(), |a, b| {
+        let known = place(a).zip(place(b)).map_or(0.0, |(a, b)| without.shared[(a, b)]);
+        known + moved[a] * moved[b]
+    });
+    for (i, answer) in with.answers.iter().enumerate() {
+        let (own_before, mixed_before) = &without.own[i];
+        let alone = own_before - mixed_before * without.answers[i].transpose();
+        let mixed = answer * &with.shared;
+        with.own[i] = (alone + &mixed * answer.transpose(), mixed);
+    }
+    Some(with)
 }
 
 /// By how much less the readings are told apart than noise alone says: its share of the variance, noise and faults of the model, of a
@@ -91,7 +131,7 @@ fn share_of_noise(problem: &Problem<'_>) -> Option<f64> {
     let ln_ratio = mapper_numerics::statistics::mean(&ln_ratios)?;
     // The change of alpha_A that passes for the whole way from one reading to the other.
     let way = (alpha * (1.0 - alpha) * ln_ratio).abs();
-    let by_faults = ALPHA_FLOOR / way;
+    let by_faults = PASSES_FOR_ALPHA / way;
     let share = (by_noise / by_noise.hypot(by_faults)).powi(2);
     share.is_finite().then_some(share)
 }
@@ -127,6 +167,9 @@ fn otherwise<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
         other.shared[ALPHA] = odds / (1.0 + odds);
         other.shared[LN_COEFFICIENT] += ((1.0 - alpha) * (1.0 + odds)).ln();
     }
+    // The probe says nothing of the inlet; one that rests on its bound in one fit alone would.
+    other.active[PROBE_MM2] = false;
     other.minimise(FULLY)?;
+    other.active[PROBE_MM2] = problem.active[PROBE_MM2];
     Some(other)
 }

@@ -3,6 +3,7 @@
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
+use crate::joint::refinements::{ALPHA_MODEL_ERROR, Refinements};
 use crate::joint::smoothness::{Judged, STRAIN_SIGMAS, Smoothed};
 use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
 use crate::width;
@@ -22,6 +23,8 @@ const SLOW_SQUARE: f64 = 1.3;
 const STRETCH_ROWS: usize = 10;
 /// Scatter of the points about the convection law above which it is not a law, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;
+/// Standard errors by which alpha_A may come out outside 0 to 1 by chance.
+const BY_CHANCE_SIGMAS: f64 = 3.0;
 /// Standard errors by which a number must lie outside its range to count against the model.
 const OUTSIDE_SIGMAS: f64 = 2.0;
 /// Exponents of the Reynolds number that pipe-like flow may have: 0.33 is laminar, 0.8 turbulent, and Burke et al. have 1.13.
@@ -127,6 +130,7 @@ pub(crate) fn doubts(
     problem: &Problem<'_>,
     covariance: &Covariance,
     smoothed: &Smoothed,
+    refinements: Option<&Refinements>,
     config: &IdentifyConfig,
 ) -> Vec<String> {
     let mut doubts = Vec::new();
@@ -157,10 +161,10 @@ pub(crate) fn doubts(
         ));
     }
     let error = |index: usize| covariance.error_of(index);
-    if let Some(sigma) = error(ALPHA) {
-        let alpha = problem.shared[ALPHA];
+    if let Some((off, sigma)) = refinements.and_then(|refinements| refinements.free(ALPHA)) {
+        let alpha = problem.priors[ALPHA].mean + off;
         let outside = (-alpha).max(alpha - 1.0);
-        if outside > OUTSIDE_SIGMAS * sigma {
+        if outside > BY_CHANCE_SIGMAS * sigma.hypot(ALPHA_MODEL_ERROR) {
             doubts.push(format!("alpha_A comes out as {alpha:.3} +/- {:.3}, outside 0 to 1", 1.96 * sigma));
         }
     }
@@ -202,12 +206,12 @@ pub(crate) fn doubts(
             smoothed.strain
         ));
     }
-    doubts.extend(split_doubt(problem));
+    doubts.extend(split_doubt(problem, refinements));
     doubts
 }
 
 /// Fits steps whose T2 rises and steps whose T2 falls apart: what they share must be the same.
-fn split_doubt(problem: &Problem<'_>) -> Option<String> {
+fn split_doubt(problem: &Problem<'_>, refinements: Option<&Refinements>) -> Option<String> {
     let rises = |member: &Member<'_>| match (member.measured_k.first(), member.measured_k.last()) {
         (Some(first), Some(last)) => last > first,
         _ => false,
@@ -215,6 +219,10 @@ fn split_doubt(problem: &Problem<'_>) -> Option<String> {
     let half = |rising: bool| {
         let mut half = problem.clone();
         half.members.retain(|member| member.shares && rises(member) == rising);
+        // A half knows less than the whole: what the whole takes for neutral is not sought again.
+        for index in refinements.map_or(&[][..], |refinements| &refinements.indices) {
+            half.active[*index] &= refinements.is_some_and(|found| found.probability(*index) > 0.5);
+        }
         if half.members.len() < 4 {
             return None;
         }

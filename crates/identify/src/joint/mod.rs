@@ -13,12 +13,11 @@ pub(crate) mod input_noise;
 pub(crate) mod judge;
 pub(crate) mod model;
 pub(crate) mod parameters;
-pub(crate) mod parsimony;
 pub(crate) mod profile;
 pub(crate) mod quantity;
+pub(crate) mod refinements;
 pub(crate) mod regions;
 pub(crate) mod rows;
-mod seen;
 pub(crate) mod shared;
 pub(crate) mod smoothing;
 pub(crate) mod smoothness;
@@ -29,7 +28,8 @@ pub(crate) mod surface;
 use crate::dynamic::Estimate;
 use crate::end_state::EndState;
 use crate::findings::{Findings, code};
-use crate::joint::parameters::{FLOW_GAIN, OFFSETS, PROBE_MM2, SHARED};
+use crate::joint::parameters::{FLOW_GAIN, INLET, OFFSETS, PROBE_MM2, SHARED};
+use crate::joint::refinements::{Gain, Refinements};
 use crate::joint::smoothness::{Judged, Smoothed};
 use crate::joint::solve::{Covariance, FULLY, Problem, ROUGHLY};
 use crate::two_parameter::TwoParameter;
@@ -126,9 +126,10 @@ pub(crate) fn estimate(
     let mut as_fitted = vec![None; recording.steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
         let own = &mut findings[step.position];
-        let (Judged { value: eta, uncertainty: eta_error }, ln_h) = (smoothed.eta[i], smoothed.ln_h[i]);
-        let h_w_m2k =
-            problem.setting.h_at_end(&step.end, &problem.shared, &member.local).0 * ln_h.value.exp();
+        let (Judged { value: eta, uncertainty: eta_error, interval, .. }, ln_h) =
+            (smoothed.eta[i], smoothed.ln_h[i]);
+        let fitted_h_w_m2k = problem.setting.h_at_end(&step.end, &problem.shared, &member.local).0;
+        let h_w_m2k = fitted_h_w_m2k * ln_h.value.exp();
         let h_error = EstimateUncertainty {
             noise_standard_error: h_w_m2k * ln_h.uncertainty.noise_standard_error,
             bias_standard_error: h_w_m2k * ln_h.uncertainty.bias_standard_error,
@@ -153,6 +154,10 @@ pub(crate) fn estimate(
         estimates[step.position] = Estimate {
             eta: Some((eta, Some(eta_error))),
             h_w_m2k: Some((h_w_m2k, Some(h_error))),
+            intervals: Some([
+                interval,
+                (fitted_h_w_m2k * ln_h.interval.0.exp(), fitted_h_w_m2k * ln_h.interval.1.exp()),
+            ]),
             common: [
                 smoothed.common[0][i].clone(),
                 smoothed.common[1][i].iter().map(|by_ln_h| h_w_m2k * by_ln_h).collect(),
@@ -218,20 +223,28 @@ impl<'a> Attempt<'a> {
             let member = problem.members.get_mut(*index)?;
             (member.shares, member.barred) = (false, true);
         }
-        let (covariance, resting) = fitted(&mut problem, steps, config)?;
+        let Fitted { covariance, refined, inlet_sigma, resting } = fitted(&mut problem, steps, config)?;
         let before = smoothness::as_fitted(&problem, &covariance, steps);
-        let mut smoothed = smoothness::smoothed(&problem, &covariance, steps, config.reference);
-        if smoothed.strain > smoothness::STRAIN_SIGMAS {
+        let smoothed =
+            |problem: &Problem<'_>, covariance: &Covariance, refined: &Option<(Refinements, Gain)>| {
+                let refined = refined.as_ref().map(|(refinements, gain)| (refinements, gain));
+                smoothness::smoothed(problem, covariance, refined, steps, config.reference)
+            };
+        let mut found = smoothed(&problem, &covariance, &refined);
+        if found.strain > smoothness::STRAIN_SIGMAS {
             // The declaration does not hold: the offsets then have the spread that they show.
-            let strain = smoothed.strain;
+            let strain = found.strain;
             for prior in &mut problem.priors[OFFSETS..FLOW_GAIN] {
                 prior.sigma *= strain;
             }
-            smoothed = smoothness::smoothed(&problem, &problem.covariance()?, steps, config.reference);
-            smoothed.strain = strain;
+            let refinements = refined.as_ref().map(|(refinements, _)| refinements.clone());
+            let (strained, gain) = self::covariance(&mut problem, refinements.as_ref(), inlet_sigma)?;
+            found = smoothed(&problem, &strained, &refinements.zip(gain));
+            found.strain = strain;
         }
-        let thermal = shared::thermal_model(&problem, &covariance, &smoothed, steps, config);
-        Some(Attempt { problem, covariance, smoothed, before, thermal, resting, left_out: None })
+        let refinements = refined.as_ref().map(|(refinements, _)| refinements);
+        let thermal = shared::thermal_model(&problem, &covariance, &found, refinements, steps, config);
+        Some(Attempt { problem, covariance, smoothed: found, before, thermal, resting, left_out: None })
     }
 
     /// The fit without the region of the map that disagrees most, if there is one.
@@ -292,24 +305,57 @@ fn carefully(config: &IdentifyConfig) -> IdentifyConfig {
     IdentifyConfig { joint: held, ..config.clone() }
 }
 
-/// Fits, learns from the fit how noisy steps are and how far points may scatter, leaves out what fits far worse, and
-/// fits again. With the covariance comes how far the points rest on what is declared, fraction.
-fn fitted(
-    problem: &mut Problem<'_>,
-    steps: &[rows::StepRows],
-    config: &IdentifyConfig,
-) -> Option<(Covariance, f64)> {
+/// A problem at its minimum.
+struct Fitted {
+    covariance: Covariance,
+    /// `None` where no refinement is looked for.
+    refined: Option<(Refinements, Gain)>,
+    /// What is left open of h before the wheel.
+    inlet_sigma: Option<f64>,
+    /// How far the efficiencies rest on what is declared, fraction.
+    resting: f64,
+}
+
+/// Fits, learns from the fit how noisy steps are and how far points may scatter, leaves out what fits far worse, fits again, and weighs
+/// the refinements.
+fn fitted(problem: &mut Problem<'_>, steps: &[rows::StepRows], config: &IdentifyConfig) -> Option<Fitted> {
     for _ in 0..ROUNDS {
         problem.minimise(ROUGHLY)?;
-        start::refine(problem, steps, config);
+        start::refine(problem, steps, config)?;
         problem.explained = input_noise::explained(problem, steps, config);
         judge::exclude(problem);
         // A probe that came to rest on its bound may leave it under better weights.
         problem.active[PROBE_MM2] = problem.probe_fitted;
     }
     problem.minimise(FULLY)?;
+    let inlet_sigma = inlet::settle(problem)?;
     let open = problem.clone();
-    parsimony::settle(problem)?;
-    let resting = parsimony::resting_on_declaration(&open, problem)?;
-    Some((inlet::settle(problem)?, resting))
+    let refinements = refinements::settle(problem)?;
+    let (covariance, gain) = covariance(problem, refinements.as_ref(), inlet_sigma)?;
+    let resting = match &refinements {
+        Some(found) => refinements::resting_on_declaration(&open, |index| found.probability(index) < 0.5)?,
+        None => 0.0,
+    };
+    Some(Fitted { covariance, refined: refinements.zip(gain), inlet_sigma, resting })
+}
+
+/// The covariance of a problem that stands at the mean of the mixture, with what the mixture and the readings of the inlet leave open; and
+/// how everything answers to the refinements.
+fn covariance(
+    problem: &mut Problem<'_>,
+    refinements: Option<&Refinements>,
+    inlet_sigma: Option<f64>,
+) -> Option<(Covariance, Option<Gain>)> {
+    problem.active[INLET] = false;
+    let mut covariance = problem.covariance()?;
+    let mut gain = match refinements {
+        Some(refinements) => Some(refinements.apply(&mut covariance)?),
+        None => None,
+    };
+    if let Some(sigma) = inlet_sigma {
+        covariance = inlet::carry(problem, sigma, &covariance)?;
+        let row = covariance.row_of(INLET)?;
+        gain = gain.map(|gain| gain.with_row(row));
+    }
+    Some((covariance, gain))
 }

@@ -1,8 +1,8 @@
 //! The reading of T2 that a step's rows give under given parameters, and its derivatives.
 
 use crate::joint::parameters::{
-    ALPHA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, INLET, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL,
-    LocalVector, OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
+    ALPHA, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, INLET, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION,
+    LOCAL, LocalVector, OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
 };
 use crate::joint::rows::Row;
 use crate::joint::surface::{TERM_COUNT, dot};
@@ -395,5 +395,5 @@ impl Setting {
 /// The surface's coefficients among the shared parameters.
 pub(crate) fn surface_of(shared: &SharedVector) -> &[f64; TERM_COUNT] {
     const NONE: [f64; TERM_COUNT] = [0.0; TERM_COUNT];
-    shared.get(SURFACE..).and_then(|tail| tail.try_into().ok()).unwrap_or(&NONE)
+    shared.get(SURFACE..BENDS).and_then(|tail| tail.try_into().ok()).unwrap_or(&NONE)
 }

@@ -25,8 +25,12 @@ pub(crate) const FLOW_GAIN: usize = OFFSETS + OFFSET_CHANNELS.len();
 pub(crate) const INLET: usize = FLOW_GAIN + 1;
 /// Index of the first coefficient of the efficiency surface.
 pub(crate) const SURFACE: usize = INLET + 1;
+/// Index of the first bend of the efficiencies that an offset brings, in the order of [`OFFSET_CHANNELS`] and in units of that offset. The fit
+/// takes the readings for exact, so that an offset bends the efficiencies it finds; without these the surface would resist, and the
+/// refinements would give way.
+pub(crate) const BENDS: usize = SURFACE + TERM_COUNT;
 /// Number of shared parameters.
-pub(crate) const SHARED: usize = SURFACE + TERM_COUNT;
+pub(crate) const SHARED: usize = BENDS + OFFSET_CHANNELS.len();
 
 /// Efficiency at the step's end, fraction.
 pub(crate) const ETA: usize = 0;
@@ -65,17 +69,6 @@ pub(crate) const PROBE_SIGMA_MM2: f64 = 10.0;
 /// The same of the logarithm of the direction factor.
 pub(crate) const LN_DIRECTION_SIGMA: f64 = 0.5;
 
-/// Standard deviation beforehand of a refinement; `None` of what is none. A refinement that the recording speaks against
-/// is drawn to its declared value by a narrower prior later, which is knowledge and no ignorance.
-pub(crate) fn sigma_beforehand(index: usize) -> Option<f64> {
-    match index {
-        ALPHA => Some(ALPHA_SIGMA),
-        PROBE_MM2 => Some(PROBE_SIGMA_MM2),
-        LN_DIRECTION => Some(LN_DIRECTION_SIGMA),
-        _ => None,
-    }
-}
-
 /// Symbol of a shared parameter for people.
 pub(crate) fn symbol(index: usize) -> String {
     match index {
@@ -88,6 +81,7 @@ pub(crate) fn symbol(index: usize) -> String {
         INLET => "h before the wheel".to_owned(),
         _ => match OFFSET_CHANNELS.get(index.wrapping_sub(OFFSETS)) {
             Some(channel) => format!("offset of {channel}"),
+            None if index >= BENDS => format!("bend {}", index - BENDS),
             None => format!("efficiency surface {}", index.saturating_sub(SURFACE)),
         },
     }

@@ -4,9 +4,10 @@ use crate::IdentifyConfig;
 use crate::joint::judge;
 use crate::joint::parameters::{
     ALPHA, EXPONENT, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS,
-    PROBE_MM2, PROBE_SIGMA_MM2, SURFACE, sigma_beforehand, symbol,
+    PROBE_MM2, PROBE_SIGMA_MM2, SURFACE, symbol,
 };
 use crate::joint::profile;
+use crate::joint::refinements::Refinements;
 use crate::joint::rows::StepRows;
 use crate::joint::smoothness::Smoothed;
 use crate::joint::solve::{Covariance, Problem};
@@ -22,11 +23,13 @@ pub(crate) fn thermal_model(
     problem: &Problem<'_>,
     covariance: &Covariance,
     smoothed: &Smoothed,
+    refinements: Option<&Refinements>,
     steps: &[StepRows],
     config: &IdentifyConfig,
 ) -> ThermalModel {
-    let of =
-        |index: usize, transform: &dyn Fn(f64) -> f64| value(problem, covariance, smoothed, index, transform);
+    let of = |index: usize, transform: &dyn Fn(f64) -> f64| {
+        value(problem, covariance, smoothed, refinements, index, transform)
+    };
     let reynolds: Vec<f64> = steps
         .iter()
         .zip(&problem.members)
@@ -75,7 +78,7 @@ pub(crate) fn thermal_model(
             .map(|(i, channel)| (*channel, of(OFFSETS + i, &|x| x)))
             .collect(),
         entangled,
-        doubts: judge::doubts(problem, covariance, smoothed, config),
+        doubts: judge::doubts(problem, covariance, smoothed, refinements, config),
     }
 }
 
@@ -84,6 +87,7 @@ fn value(
     problem: &Problem<'_>,
     covariance: &Covariance,
     smoothed: &Smoothed,
+    refinements: Option<&Refinements>,
     index: usize,
     transform: &dyn Fn(f64) -> f64,
 ) -> SharedValue {
@@ -101,8 +105,10 @@ fn value(
             bias += covariance.shared[(row, other)].powi(2) * problem.priors[*index].weight();
         }
     }
-    let beforehand = sigma_beforehand(index).unwrap_or(problem.priors[index].sigma);
-    let uninformed = variance.sqrt() > UNINFORMED_RATIO * beforehand;
+    let beforehand = problem.priors[index].sigma;
+    // Of a refinement the recording's own word counts, not what was believed beforehand.
+    let known = refinements.and_then(|refinements| refinements.free(index)).map_or(sigma, |(_, error)| error);
+    let uninformed = known > UNINFORMED_RATIO * beforehand;
     let is_offset = (OFFSETS..=FLOW_GAIN).contains(&index);
     SharedValue {
         // An offset has its declared spread even where the recording adds nothing.

@@ -10,10 +10,11 @@
 use crate::joint::common_part::common_part;
 use crate::joint::parameters::{OFFSETS, SURFACE};
 use crate::joint::quantity::{Quantity, is_offset, of_shared, quantities};
+use crate::joint::refinements::{Gain, Refinements};
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
 use crate::joint::surface::{SLOW_LOSS, SurfaceScale};
-use mapper_core::{EstimateUncertainty, ReferenceState};
+use mapper_core::{EstimateUncertainty, ReferenceState, confidence_interval_95};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::median;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -46,6 +47,11 @@ pub(crate) const STRAIN_SIGMAS: f64 = 3.0;
 pub(crate) struct Judged {
     pub(crate) value: f64,
     pub(crate) uncertainty: EstimateUncertainty,
+    /// Its 95 % interval: about the value where it is normally distributed, else the shortest one.
+    pub(crate) interval: (f64, f64),
+    /// Standard error without what the interval holds beyond the mixture of refinements, and that, which all numbers share.
+    error: f64,
+    added: f64,
 }
 
 /// The numbers of all points, and the offsets.
@@ -82,6 +88,7 @@ struct Solved {
 pub(crate) fn smoothed(
     problem: &Problem<'_>,
     covariance: &Covariance,
+    refined: Option<(&Refinements, &Gain)>,
     steps: &[StepRows],
     reference: ReferenceState,
 ) -> Smoothed {
@@ -103,16 +110,22 @@ pub(crate) fn smoothed(
             solve(&etas, &coordinates, problem)
         }
     };
-    judged(covariance, &etas, &ln_hs, &solved)
+    judged(covariance, refined, &etas, &ln_hs, &solved)
 }
 
 /// All numbers as the fit has them, with the offsets as declared: what smoothness has taken off can no longer be held against a map that is known.
 pub(crate) fn as_fitted(problem: &Problem<'_>, covariance: &Covariance, steps: &[StepRows]) -> Smoothed {
     let (etas, ln_hs) = quantities(problem, covariance, steps);
-    judged(covariance, &etas, &ln_hs, &[])
+    judged(covariance, None, &etas, &ln_hs, &[])
 }
 
-fn judged(covariance: &Covariance, etas: &[Quantity], ln_hs: &[Quantity], solved: &[Solved]) -> Smoothed {
+fn judged(
+    covariance: &Covariance,
+    refined: Option<(&Refinements, &Gain)>,
+    etas: &[Quantity],
+    ln_hs: &[Quantity],
+    solved: &[Solved],
+) -> Smoothed {
     let shared: Vec<Quantity> = (0..covariance.fitted.len()).map(|row| of_shared(covariance, row)).collect();
     let carried = (0..covariance.fitted.len()).filter(|row| is_offset(covariance.fitted[*row]));
     // Errors that offsets and what is assumed bring, before and after.
@@ -151,13 +164,15 @@ fn judged(covariance: &Covariance, etas: &[Quantity], ln_hs: &[Quantity], solved
         let variance: f64 =
             parts.iter().map(|(weight, own, variance, _)| weight * (variance + (own - value).powi(2))).sum();
         let bias: f64 = parts.iter().map(|(weight, _, _, bias)| weight * bias).sum::<f64>().min(variance);
-        Judged {
-            value,
-            uncertainty: EstimateUncertainty {
-                noise_standard_error: (variance - bias).max(0.0).sqrt(),
-                bias_standard_error: bias.max(0.0).sqrt(),
-            },
-        }
+        let mixed = refined
+            .and_then(|(refinements, gain)| refinements.interval(gain, &quantity.answer, value, variance));
+        let error = variance.max(0.0).sqrt();
+        let (interval, added) = mixed.unwrap_or_else(|| (confidence_interval_95(value, error), 0.0));
+        let uncertainty = EstimateUncertainty {
+            noise_standard_error: (variance + added * added - bias).max(0.0).sqrt(),
+            bias_standard_error: bias.max(0.0).sqrt(),
+        };
+        Judged { value, uncertainty, interval, error, added }
     };
     let shared: Vec<(f64, f64)> = shared
         .iter()
@@ -169,8 +184,12 @@ fn judged(covariance: &Covariance, etas: &[Quantity], ln_hs: &[Quantity], solved
     let best = solved.iter().max_by(|a, b| a.weight.total_cmp(&b.weight));
     let common = [(etas, &eta), (ln_hs, &ln_h)].map(|(quantities, judged)| {
         let (covariance, own) = together(quantities, etas, best);
-        let errors: Vec<f64> = judged.iter().map(|one| one.uncertainty.combined_standard_error()).collect();
-        common_part(&covariance, &own, &errors)
+        let errors: Vec<f64> = judged.iter().map(|one| one.error).collect();
+        let mut changes = common_part(&covariance, &own, &errors);
+        if refined.is_some() {
+            changes.iter_mut().zip(judged).for_each(|(changes, one)| changes.push(one.added));
+        }
+        changes
     });
     Smoothed { eta, ln_h, common, shared, strain }
 }

@@ -61,8 +61,6 @@ pub(crate) struct Problem<'a> {
     pub(crate) explained: Explained,
     /// Whether the probe is sought, be it on its bound for now.
     pub(crate) probe_fitted: bool,
-    /// Variance of shared parameters beyond that of the fit: whether they are at work at all.
-    pub(crate) extra_variances: SharedVector,
     /// Whether the recording is asked what h before the wheel follows.
     pub(crate) inlet_sought: bool,
     /// What came of that; `None` where it makes no difference.
@@ -359,6 +357,14 @@ impl Problem<'_> {
         Some(best)
     }
 
+    /// Values of some shared parameters after one undamped step, whatever their bounds.
+    pub(crate) fn full_step(&self, indices: &[usize]) -> Option<Vec<f64>> {
+        let fitted = self.fitted();
+        let (change, _) = self.normal(&fitted).equations.step(0.0)?;
+        let row = |index: &usize| fitted.iter().position(|other| other == index);
+        indices.iter().map(|index| Some(self.shared[*index] + change[row(index)?])).collect()
+    }
+
     /// What the recording alone knows of a shared parameter when all that are fitted are free: one over its variance by least
     /// squares, minus the prior's part. It need not be fitted itself.
     pub(crate) fn information(&self, index: usize) -> Option<f64> {
@@ -370,6 +376,13 @@ impl Problem<'_> {
         let reduced = self.normal(&fitted).equations.reduced(0.0)?.matrix;
         let variance = reduced.cholesky()?.inverse()[(row, row)];
         Some(1.0 / variance - self.priors[index].weight())
+    }
+
+    /// The same problem with readings that have no offset and no gain.
+    pub(crate) fn with_exact_readings(&self) -> Self {
+        let mut exact = self.clone();
+        exact.active[OFFSETS..SURFACE].fill(false);
+        exact
     }
 
     /// Covariance at the minimum; `None` where the equations are singular.
@@ -393,11 +406,9 @@ impl Problem<'_> {
         let mut inverse = inverse;
         for (row, index) in fitted[..sought].iter().enumerate() {
             let pulled = inverse.column(row).into_owned();
-            let pull =
-                if *index == PROBE_MM2 { self.explained.pull_variance(self.shared[PROBE_MM2]) } else { 0.0 };
-            let variance = pull + self.extra_variances[*index] / pulled[row].powi(2);
-            if variance > 0.0 {
-                inverse += variance * &pulled * pulled.transpose();
+            if *index == PROBE_MM2 {
+                inverse +=
+                    self.explained.pull_variance(self.shared[PROBE_MM2]) * &pulled * pulled.transpose();
             }
         }
         let inverse = inverse;

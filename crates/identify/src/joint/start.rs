@@ -8,11 +8,10 @@ use crate::joint::explained::Explained;
 use crate::joint::inlet;
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
-    ALPHA, ALPHA_SIGMA, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, INLET, LN_COEFFICIENT, LN_DEVIATION,
+    ALPHA, ALPHA_SIGMA, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, INLET, LN_COEFFICIENT, LN_DEVIATION,
     LN_DIRECTION, LN_DIRECTION_SIGMA, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, PROBE_SIGMA_MM2, Prior,
     SHARED, SLOPE, SURFACE,
 };
-use crate::joint::parsimony::NO_EXTRA;
 use crate::joint::rows::{StepRows, condensed};
 use crate::joint::solve::{Member, Problem};
 use crate::joint::surface::{SurfaceScale, TERM_COUNT, dot};
@@ -22,24 +21,32 @@ use crate::{IdentifyConfig, WindowRule, commands};
 use mapper_core::{Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, Window};
 use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
 use mapper_numerics::parallel;
-use mapper_numerics::statistics::{mean, median, robust_sigma};
+use mapper_numerics::statistics::{mean, median};
 use mapper_physics::air;
+use nalgebra::DVector;
 
 /// Start of what is used of a step, after the last change of a command, s: h and efficiency are followed while the
 /// operating point settles. Where noise could pass for a slow probe the seconds right after the jump are needed, which
 /// tell the two apart by tens of kelvin; without noise they only show where the surface is none.
 pub(crate) const START_S: f64 = 3.0;
-pub(crate) const START_WITH_NOISE_S: f64 = 1.5;
-/// Minimum spread of the points' efficiencies about the surface: maps are not polynomials.
-const LEAST_SURFACE_SIGMA: f64 = 3e-3;
+pub(crate) const START_WITH_NOISE_S: f64 = 2.0;
+/// Expected spread of the points' efficiencies about the surface, fraction: maps are not polynomials.
+const SURFACE_SIGMA: f64 = 1e-3;
 /// Share of what the surface moves a prediction by that is wrong: surfaces through a few points bend otherwise than maps.
 const SHAPE_ERROR_RATIO: f64 = 0.03;
 /// Residual of a step on its own, over that of the median step and in K, beyond which it is kept out until it has shown
 /// that it fits the others.
 const SUSPECT_RATIO: f64 = 6.0;
 const SUSPECT_K: f64 = 0.5;
-/// Minimum spread of the points' h about the law, ratio.
-const LEAST_LAW_SIGMA: f64 = 3e-3;
+/// Expected spread of the points' h about the law, ratio.
+const LAW_SIGMA: f64 = 3e-3;
+/// Weight of what is expected of a spread, in points.
+const PRIOR_WEIGHT: f64 = 4.0;
+/// Standard deviations at which a point stops to count for a larger spread.
+const FAR_SIGMAS: f64 = 3.0;
+/// Spreads tried on either side of the expected one, and their distance in logarithms: from a thirtieth to thirty times.
+const SPREADS: i32 = 34;
+const SPREAD_STEP: f64 = 0.1;
 /// Standard deviation of a sample of T2 where nothing is declared, K; refined from the residual.
 const UNDECLARED_NOISE_K: f64 = 0.1;
 
@@ -161,6 +168,8 @@ pub(crate) fn problem<'a>(
             let sigma = config.declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);
             priors[OFFSETS + i] = Prior { mean: 0.0, sigma };
             active[OFFSETS + i] = sigma > 0.0;
+            priors[BENDS + i] = priors[OFFSETS + i];
+            active[BENDS + i] = shaped && sigma > 0.0;
         }
         let sigma =
             config.declared.get(&Channel::CompressorFlow).map_or(0.0, |declared| declared.gain_sigma_ratio);
@@ -201,7 +210,6 @@ pub(crate) fn problem<'a>(
         surface_sigma,
         explained: Explained::default(),
         probe_fitted: choice.probe == Choice::Fitted,
-        extra_variances: NO_EXTRA,
         inlet_sought: choice.inlet_h == Choice::Fitted,
         inlet: None,
     })
@@ -244,7 +252,9 @@ pub(crate) fn member<'a>(
         course: Course { rows: &step.rows, terms },
         measured_k: step.rows.iter().map(|row| row.t2_k).collect(),
         whitening: whitening(step, config, UNDECLARED_NOISE_K, UNDECLARED_NOISE_K, |_| 0.0),
-        coupling: std::array::from_fn(|i| i.checked_sub(SURFACE).map_or(0.0, |k| end_terms[k])),
+        coupling: std::array::from_fn(|i| {
+            i.checked_sub(SURFACE).and_then(|k| end_terms.get(k)).copied().unwrap_or(0.0)
+        }),
         local,
         priors: own,
         shares: true,
@@ -267,23 +277,64 @@ fn whitening(
     WhiteningFilter::new(noise, config.noise_colour.time_constant_s, sigma_k, white_sigma_k)
 }
 
-/// Takes the noise of each step and the spreads of the points about surface and law from what was found.
-pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
+/// Takes the noise of each step and the spreads of the points about surface and law from what was found; `None` where the equations are
+/// singular.
+pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Option<()> {
     weigh(problem, steps, config);
-    // Medians: one bad step must not make room for itself.
-    let spread =
-        |off: &dyn Fn(&Member<'_>) -> f64| robust_sigma(problem.members.iter().map(off)).unwrap_or(0.0);
-    let off_surface = spread(&|member| member.off_surface(&problem.shared, &member.local));
-    let off_law = spread(&|member| member.local[LN_DEVIATION]);
+    let covariance = problem.with_exact_readings().covariance()?;
+    let of_steps = || problem.members.iter().zip(&covariance.own).filter(|(member, _)| member.shares);
+    let off_surface: Vec<(f64, f64)> = of_steps()
+        .map(|(member, (own, mixed))| {
+            let coupling = DVector::from_iterator(
+                covariance.fitted.len(),
+                covariance.fitted.iter().map(|index| member.coupling[*index]),
+            );
+            let by_shared = &covariance.shared * &coupling;
+            let variance =
+                own[(ETA, ETA)] - 2.0 * mixed.row(ETA).transpose().dot(&coupling) + coupling.dot(&by_shared);
+            (member.off_surface(&problem.shared, &member.local), variance)
+        })
+        .collect();
+    let off_law: Vec<(f64, f64)> = of_steps()
+        .map(|(member, (own, _))| (member.local[LN_DEVIATION], own[(LN_DEVIATION, LN_DEVIATION)]))
+        .collect();
     if problem.setting.shaped {
-        problem.surface_sigma = off_surface.clamp(LEAST_SURFACE_SIGMA, 0.02);
+        problem.surface_sigma = spread(&off_surface, problem.surface_sigma, SURFACE_SIGMA);
     }
     if problem.setting.with_law {
-        let sigma = off_law.clamp(LEAST_LAW_SIGMA, 0.1);
+        let before = problem.members.first().map_or(LAW_SIGMA, |member| member.priors[LN_DEVIATION].sigma);
+        let sigma = spread(&off_law, before, LAW_SIGMA);
         for member in &mut problem.members {
             member.priors[LN_DEVIATION].sigma = sigma;
         }
     }
+    Some(())
+}
+
+/// Standard deviation of a normal distribution about 0 from which the numbers come whose posterior means and variances under another one,
+/// `under_sigma`, are given: the most probable one under an inverse chi-square prior about `expected`.
+fn spread(posteriors: &[(f64, f64)], under_sigma: f64, expected: f64) -> f64 {
+    // Values and variances by the recording alone.
+    let seen: Vec<(f64, f64)> = posteriors
+        .iter()
+        .filter_map(|(value, variance)| {
+            let information = 1.0 / variance - under_sigma.powi(-2);
+            (information > 0.0).then(|| (value / (variance * information), 1.0 / information))
+        })
+        .collect();
+    let ln_density = |sigma: f64| -> f64 {
+        let of_point = |(value, variance): &(f64, f64)| {
+            let total = sigma * sigma + variance;
+            // A bad step must not make room for itself.
+            -0.5 * (total.ln() + (value * value / total).min(FAR_SIGMAS * FAR_SIGMAS))
+        };
+        let prior = -PRIOR_WEIGHT * (sigma.ln() + 0.5 * (expected / sigma).powi(2));
+        seen.iter().map(of_point).sum::<f64>() + prior
+    };
+    (-SPREADS..=SPREADS)
+        .map(|k| expected * (f64::from(k) * SPREAD_STEP).exp())
+        .max_by(|a, b| ln_density(*a).total_cmp(&ln_density(*b)))
+        .unwrap_or(expected)
 }
 
 /// How the efficiency that is found answers to the offsets, by how T2 answers to the readings and to the efficiency; `None` where it
@@ -321,7 +372,7 @@ pub(crate) fn weigh(problem: &mut Problem<'_>, steps: &[StepRows], config: &Iden
         };
         let by_eta = problem.setting.by_efficiency(&step.end, &problem.shared, &member.local);
         if let Some(coupled) = coupled(&slopes, by_eta).filter(|_| problem.setting.shaped) {
-            problem.members[i].coupling[OFFSETS..FLOW_GAIN].copy_from_slice(&coupled);
+            problem.members[i].coupling[BENDS..].copy_from_slice(&coupled);
         }
         let white_sigma_k = if expected > 0.0 { declared[1].max(0.1 * sigma_k) } else { sigma_k };
         let terms = &problem.members[i].course.terms;

@@ -1,0 +1,213 @@
+//! Which refinements of eqs. 1-3 are at work: alpha_A, the probe, the ratio of heating to cooling.
+//!
+//! Each one that is free costs the points some certainty, also on a machine that needs none of it, and the small errors of any
+//! model look like a little of each. So each is neutral or free, and all sets are weighed on the one Gaussian that a fit with all
+//! of them free gives ([`mapper_inference::mixture`]). The fit then stands at the mean of the mixture, is linearised there once more
+//! (the probe's lag is far from linear), and what the mixture leaves open is carried into every number of every point.
+
+use crate::joint::parameters::{ALPHA, ETA, LN_DIRECTION, OFFSETS, PROBE_MM2, SURFACE};
+use crate::joint::solve::{Covariance, FULLY, Problem};
+use mapper_core::standard_error_of;
+use mapper_inference::interval;
+use mapper_inference::mixture::{Draw, Mixture, Parameter};
+use mapper_numerics::statistics::mean;
+use nalgebra::{DMatrix, DVector};
+
+/// What small errors of the model can pass for, as a change of alpha_A: it moves an efficiency by a quarter of a point, which is what
+/// offsets leave open of it. `benches/identification.py compare` shows what it does: with 0.025 twice the error at alpha_A 0.05.
+pub(crate) const ALPHA_MODEL_ERROR: f64 = 0.005;
+/// Of each refinement: standard deviation of its slab, and what small errors of the model can pass for. Compressors have 0 to 0.3 of their
+/// area before the wheel; probes of 0.5 to 3 mm are sold, and half a millimetre is a sheathed thermocouple; heated and cooled
+/// boundary layers differ by up to a third (Gnielinski's (Pr/Pr_w)^0.11 and (T/T_w)^0.45 between 300 and 600 K).
+const REFINEMENTS: [(usize, f64, f64); 3] =
+    [(ALPHA, 0.1, ALPHA_MODEL_ERROR), (PROBE_MM2, 2.0, 0.1), (LN_DIRECTION, 0.2, 0.015)];
+/// Share of the cases in which an interval contains the truth.
+const COVERAGE: f64 = 0.95;
+/// Linearisations after the first: the mean of the mixture moves by less than a tenth of its error with another one.
+const RELINEARISATIONS: usize = 1;
+
+/// What the refinements may be.
+#[derive(Debug, Clone)]
+pub(crate) struct Refinements {
+    /// Shared parameters, by index.
+    pub(crate) indices: Vec<usize>,
+    pub(crate) mixture: Mixture,
+    /// Where the fit stands, as distances from what is declared.
+    at: DVector<f64>,
+    /// Values that fit best with all of them free, as distances from what is declared, and their standard errors.
+    free: Vec<(f64, f64)>,
+}
+
+/// How every shared parameter answers to the refinements: their regression on them.
+#[derive(Debug, Clone)]
+pub(crate) struct Gain(pub(crate) DMatrix<f64>);
+
+/// The refinements that a problem looks for.
+fn sought(problem: &Problem<'_>) -> Vec<(usize, f64, f64)> {
+    let looked_for =
+        |index: usize| if index == PROBE_MM2 { problem.probe_fitted } else { problem.active[index] };
+    REFINEMENTS.into_iter().filter(|(index, ..)| looked_for(*index)).collect()
+}
+
+/// Holds the refinements where they are declared.
+pub(crate) fn hold(problem: &mut Problem<'_>) {
+    for (index, ..) in REFINEMENTS {
+        problem.active[index] = false;
+        problem.shared[index] = problem.priors[index].mean;
+    }
+}
+
+/// By how much the efficiencies would be off, fraction (rms of one standard error), if the refinements that `neutral` picks were at work:
+/// what is known of the efficiencies without their declaration.
+pub(crate) fn resting_on_declaration(open: &Problem<'_>, neutral: impl Fn(usize) -> bool) -> Option<f64> {
+    let sought: Vec<_> = sought(open).into_iter().filter(|(index, ..)| neutral(*index)).collect();
+    if sought.is_empty() {
+        return Some(0.0);
+    }
+    let mut held = open.clone();
+    sought.iter().for_each(|(index, ..)| held.active[*index] = false);
+    let (open, held) = (open.covariance()?, held.covariance()?);
+    let variance = |covariance: &Covariance, i: usize| covariance.own.get(i).map(|(own, _)| own[(ETA, ETA)]);
+    let of_steps: Vec<f64> = (0..open.own.len())
+        .filter_map(|i| Some((variance(&open, i)? - variance(&held, i)?).max(0.0)))
+        .collect();
+    Some(mean(&of_steps)?.sqrt())
+}
+
+/// Weighs the refinements of a problem that is at its minimum, and moves it to the mean of the mixture; `Some(None)` where none is looked
+/// for.
+pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<Refinements>> {
+    let sought = sought(problem);
+    if sought.is_empty() {
+        return Some(None);
+    }
+    let indices: Vec<usize> = sought.iter().map(|(index, ..)| *index).collect();
+    let declared = |problem: &Problem<'_>, index: usize| problem.priors[index].mean;
+    let mut refinements = None;
+    for round in 0..=RELINEARISATIONS {
+        indices.iter().for_each(|index| problem.active[*index] = true);
+        let covariance = problem.covariance()?;
+        let best = problem.full_step(&indices)?;
+        let rows: Vec<usize> = indices.iter().filter_map(|index| covariance.row_of(*index)).collect();
+        let spread = DMatrix::from_fn(rows.len(), rows.len(), |a, b| covariance.shared[(rows[a], rows[b])]);
+        let found = DVector::from_iterator(
+            indices.len(),
+            indices.iter().zip(&best).map(|(index, best)| best - declared(problem, *index)),
+        );
+        let parameters: Vec<Parameter> = sought
+            .iter()
+            .map(|(index, slab_sigma, model_error)| {
+                // A share of an area and the square of a diameter.
+                let (lowest, highest) = match *index {
+                    ALPHA => (0.0, 1.0),
+                    PROBE_MM2 => (0.0, f64::INFINITY),
+                    _ => (f64::NEG_INFINITY, f64::INFINITY),
+                };
+                Parameter {
+                    slab_sigma: *slab_sigma,
+                    low: lowest - declared(problem, *index),
+                    high: highest - declared(problem, *index),
+                    model_error: *model_error,
+                    fitted_under_sigma: problem.priors[*index].sigma,
+                }
+            })
+            .collect();
+        let mixture = Mixture::of(&found, &spread, &parameters)?;
+        let at = mixture.mean()?;
+        for (index, at) in indices.iter().zip(at.iter()) {
+            problem.shared[*index] = declared(problem, *index) + at;
+            problem.active[*index] = false;
+        }
+        let free = found.iter().zip(spread.diagonal().iter()).map(|(x, v)| (*x, v.sqrt())).collect();
+        problem.minimise(FULLY)?;
+        if round == RELINEARISATIONS {
+            refinements = Some(Refinements { indices: indices.clone(), mixture, at, free });
+        }
+    }
+    indices.iter().for_each(|index| problem.active[*index] = true);
+    Some(refinements)
+}
+
+impl Refinements {
+    /// Where one of them stands among the others.
+    fn place(&self, index: usize) -> Option<usize> {
+        self.indices.iter().position(|other| *other == index)
+    }
+
+    /// Probability of a refinement to be at work; 0 where it is not looked for.
+    pub(crate) fn probability(&self, index: usize) -> f64 {
+        self.place(index).map_or(0.0, |place| self.mixture.off_neutral[place])
+    }
+
+    /// The value that fits best with all of them free, as a distance from what is declared, and its standard error; `None` where it is not
+    /// looked for.
+    pub(crate) fn free(&self, index: usize) -> Option<(f64, f64)> {
+        self.place(index).map(|place| self.free[place])
+    }
+
+    /// Puts the mixture in the place of the refinements' Gaussian. The offsets keep their declared spread and do not answer: what a
+    /// refinement has to be says nothing of them that could be relied on.
+    pub(crate) fn apply(&self, covariance: &mut Covariance) -> Option<Gain> {
+        let rows: Vec<usize> = self.indices.iter().filter_map(|index| covariance.row_of(*index)).collect();
+        let columns =
+            |matrix: &DMatrix<f64>| DMatrix::from_fn(matrix.nrows(), rows.len(), |i, a| matrix[(i, rows[a])]);
+        let block = |matrix: &DMatrix<f64>| {
+            DMatrix::from_fn(rows.len(), rows.len(), |a, b| matrix[(rows[a], rows[b])])
+        };
+        // What is left when the offsets, which are independent of each other, are known.
+        let mut by_noise = covariance.shared.clone();
+        for (row, index) in covariance.fitted.iter().enumerate() {
+            if (OFFSETS..SURFACE).contains(index) {
+                let with = covariance.shared.column(row).into_owned();
+                by_noise -= &with * with.transpose() / covariance.shared[(row, row)];
+            }
+        }
+        let gain = columns(&by_noise) * block(&by_noise).cholesky()?.inverse();
+        let shared = &covariance.shared;
+        let across = columns(shared) * gain.transpose();
+        let change = block(shared) + self.mixture.covariance()?;
+        let changed = shared - &across - across.transpose() + &gain * change * gain.transpose();
+        for ((own, mixed), answer) in covariance.own.iter_mut().zip(&covariance.answers) {
+            let after = answer * &changed;
+            *own += (&after - &*mixed) * answer.transpose();
+            *mixed = after;
+        }
+        covariance.shared = changed;
+        Some(Gain(gain))
+    }
+
+    /// 95 % interval of a number that the fit gives with a normal distribution, this value and variance, and that answers to the
+    /// shared parameters in this way. The interval is the shortest one of the mixture, joined with that of all refinements free: a
+    /// small refinement that the mixture takes for neutral must not make an interval too narrow. With it comes, signed, the standard error
+    /// that this adds, which all numbers share.
+    pub(crate) fn interval(
+        &self,
+        gain: &Gain,
+        answer: &DVector<f64>,
+        value: f64,
+        variance: f64,
+    ) -> Option<((f64, f64), f64)> {
+        let by_refinement = gain.0.tr_mul(answer);
+        let centres = |draws: &[Draw]| -> Vec<(f64, f64)> {
+            let centre = |draw: &Draw| value + by_refinement.dot(&(&draw.values - &self.at));
+            draws.iter().map(|draw| (draw.weight, centre(draw))).collect()
+        };
+        let mixed = centres(&self.mixture.draws);
+        let spread: f64 = mixed.iter().map(|(weight, centre)| weight * (centre - value).powi(2)).sum();
+        let sigma = (variance - spread).max(0.0).sqrt();
+        let (low, high) = interval::shortest(&mixed, sigma, COVERAGE)?;
+        let free = centres(&self.mixture.all_free);
+        let (free_low, free_high) = interval::shortest(&free, sigma, COVERAGE)?;
+        let (low, high) = (low.min(free_low), high.max(free_high));
+        let added = (standard_error_of(low, high).powi(2) - variance).max(0.0).sqrt();
+        let moved: f64 = free.iter().map(|(weight, centre)| weight * (centre - value)).sum();
+        Some(((low, high), added.copysign(moved)))
+    }
+}
+
+impl Gain {
+    /// With a row for one more parameter, which does not answer.
+    pub(crate) fn with_row(self, row: usize) -> Self {
+        Gain(self.0.insert_row(row, 0.0))
+    }
+}

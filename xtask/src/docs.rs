@@ -1,5 +1,6 @@
 //! `cargo xtask docs`: documents that the program itself writes.
 
+use crate::constants;
 use crate::error::Error;
 use crate::step::{command, output, run, say};
 use crate::workspace;
@@ -17,7 +18,8 @@ pub enum Mode {
 }
 
 /// What is generated below docs: files, and folders with all that is in them.
-const GENERATED: &[&str] = &["reproduction.md", "reproduction", "sequences.md", "turbo_a.svg", "real-data"];
+const GENERATED: &[&str] =
+    &["constants.md", "reproduction.md", "reproduction", "sequences.md", "turbo_a.svg", "real-data"];
 
 /// The README's picture is the map of this campaign.
 const SHIPPED: &str = "campaigns/turbo_a.yaml";
@@ -42,6 +44,7 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
         let others = scope.spawn(|| {
             let page = output(command(&programs.sequence_docs, &[]))? + "\n";
             write(&made.join("sequences.md"), page.as_bytes())?;
+            write(&made.join("constants.md"), constants::page()?.as_bytes())?;
             mapped(&programs, &made)?;
             measured(&programs, &made)
         });

@@ -1,5 +1,6 @@
 //! Chores of the repository: `cargo xtask quick`, `test`, `fleet-test`, `fmt`, `docs` and `performance`.
 
+mod constants;
 mod docs;
 mod error;
 mod fleet_test;

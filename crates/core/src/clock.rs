@@ -4,6 +4,11 @@
 pub trait Clock {
     /// Returns when the run may go on to `t_s` (seconds since arming).
     fn wait_until(&mut self, t_s: f64);
+
+    /// Whether time goes on when nobody waits, as on a rig. By default it does not.
+    fn goes_on_by_itself(&self) -> bool {
+        false
+    }
 }
 
 /// Never waits: simulated rigs run as fast as they can.
@@ -43,6 +48,10 @@ impl<W: Wall> PacedClock<W> {
 }
 
 impl<W: Wall> Clock for PacedClock<W> {
+    fn goes_on_by_itself(&self) -> bool {
+        true
+    }
+
     fn wait_until(&mut self, t_s: f64) {
         let now_s = self.wall.now_s();
         let start_s = *self.start_s.get_or_insert(now_s);

@@ -196,7 +196,9 @@ impl Feed {
                 (kept.state.now.phase, kept.state.now.step) = (what.clone(), None);
                 vec![self.tick(kept)]
             }
-            SessionEvent::PointIdentified(_) | SessionEvent::PiecesDone { .. } => Vec::new(),
+            SessionEvent::RigReleased
+            | SessionEvent::PointIdentified(_)
+            | SessionEvent::PiecesDone { .. } => Vec::new(),
         }
     }
 

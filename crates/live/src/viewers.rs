@@ -131,6 +131,7 @@ impl Viewers {
             SessionEvent::RunStarted { .. }
             | SessionEvent::RigTime { .. }
             | SessionEvent::PointIdentified(_)
+            | SessionEvent::RigReleased
             | SessionEvent::Progress { .. }
             | SessionEvent::PiecesDone { .. } => {}
         }

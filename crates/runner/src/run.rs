@@ -150,7 +150,7 @@ pub(crate) fn words_of(panic: &(dyn std::any::Any + Send)) -> String {
 impl Run<'_, '_> {
     fn forward(&mut self) -> Result<(), Halt> {
         self.with.observer.on_start(&self.with.backend.describe())?;
-        let mut next = self.with.steps.next_step()?;
+        let mut next = self.next_step()?;
         self.pass_notes()?;
         if let Some(first) = &next {
             if let Some(soak) = self.with.steps.soak() {
@@ -171,13 +171,24 @@ impl Run<'_, '_> {
             if self.protection.stop_after_step.load(Ordering::Relaxed) {
                 return Err(Halt::Interrupted);
             }
-            next = self.with.steps.next_step()?;
+            next = self.next_step()?;
             self.pass_notes()?;
         }
         self.with.backend.make_safe()?;
         (self.sent, self.told) = (None, Told::default());
         let end_s = self.now_s + self.with.steps.cool_down_s();
         self.watch(end_s, false, false)
+    }
+
+    /// The next step. While it is being made a stop is obeyed, and a rig that runs by itself is watched.
+    fn next_step(&mut self) -> Result<Option<PlanStep>, Halt> {
+        while !self.with.steps.is_ready() {
+            self.look_for_a_stop(false, self.now_s)?;
+            if self.sent.is_some() && self.with.clock.goes_on_by_itself() {
+                self.watch(self.now_s + self.sample_s, false, true)?;
+            }
+        }
+        Ok(self.with.steps.next_step()?)
     }
 
     /// One step, from its jump to its end, and again where a guard says so.

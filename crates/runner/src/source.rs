@@ -47,7 +47,13 @@ pub trait StepSource {
         self.inner().map_or(0.0, StepSource::cool_down_s)
     }
 
-    /// The next step; `None` ends the run. Its index counts up from 0.
+    /// Whether the next step is there. One that is still being made is waited for only for some milliseconds, so that rig and operator
+    /// are not forgotten meanwhile. Always by default.
+    fn is_ready(&mut self) -> bool {
+        self.inner_mut().is_none_or(StepSource::is_ready)
+    }
+
+    /// The next step; `None` ends the run. Its index counts up from 0. Waits where [`is_ready`](Self::is_ready) does not say that it is there.
     ///
     /// # Errors
     /// [`StepSourceError`] ends the run in its safe state.

@@ -5,14 +5,15 @@ mod faults;
 
 use mapper_backends::virtual_lab::{LabSettings, VirtualLab};
 use mapper_core::{
-    Backend, BackendError, Channel, Event, EventKind, GuardName, MadeFrom, OperatingPoint, Plan, PlanFigures,
-    PlanStep, Predicted, Reaction, RigDescription, SampleBatch, Setpoints, SignalGuard, StepKind, StepMarker,
-    UnpacedClock,
+    Backend, BackendError, Channel, Event, EventKind, GuardName, MadeFrom, OperatingPoint, PacedClock, Plan,
+    PlanFigures, PlanStep, Predicted, Reaction, RigDescription, SampleBatch, Setpoints, SignalGuard,
+    StepKind, StepMarker, UnpacedClock, Wall,
 };
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_runner::{
-    Guard, ObserverError, Operator, PlanSteps, Protection, RunEnd, RunError, RunObserver, Runner, SignalWatch,
+    Guard, ObserverError, Operator, PlanSteps, Protection, RunEnd, RunError, RunObserver, Runner,
+    SignalWatch, StepSource, StepSourceError,
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -211,6 +212,99 @@ fn the_operator_stops_at_the_next_poll() {
     let end = run(&mut notebook, Vec::new(), &STOP).unwrap();
     assert_eq!(end, RunEnd::Interrupted { t_s: 15.0 });
     assert_eq!(notebook.events, [EventKind::Interrupted, EventKind::SafeState]);
+}
+
+/// Gives one step of half a second, then makes the next one for ever, as a script may.
+struct NeverReady<'a> {
+    first: Option<PlanStep>,
+    looks: u32,
+    /// Raised at the third look.
+    stop: &'a AtomicBool,
+    stops: bool,
+}
+
+impl StepSource for NeverReady<'_> {
+    fn is_ready(&mut self) -> bool {
+        self.looks += 1;
+        self.stop.store(self.stops && self.looks > 3, Ordering::Relaxed);
+        self.first.is_some()
+    }
+
+    fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
+        Ok(self.first.take())
+    }
+}
+
+/// A wall that passes only while somebody waits.
+struct Idle(std::cell::Cell<f64>);
+
+impl Wall for &Idle {
+    fn now_s(&self) -> f64 {
+        self.0.get()
+    }
+    fn wait_s(&self, duration_s: f64) {
+        self.0.set(self.0.get() + duration_s);
+    }
+}
+
+fn never_ready(stop: &AtomicBool, stops: bool) -> NeverReady<'_> {
+    let first = plan().steps.pop().map(|step| PlanStep { index: 0, dwell_s: 0.5, ..step });
+    NeverReady { first, looks: 0, stop, stops }
+}
+
+/// A step that is never made hinders nobody: the operator stops the run all the same.
+#[test]
+fn the_operator_stops_while_a_step_is_being_made() {
+    let (stop, mut rig, mut notebook) = (AtomicBool::new(false), Watched::new(), Notebook::default());
+    let mut steps = never_ready(&stop, true);
+    let end = Runner {
+        steps: &mut steps,
+        backend: &mut rig,
+        clock: &mut UnpacedClock,
+        guards: Vec::new(),
+        observer: &mut notebook,
+        speed: None,
+        stop: &stop,
+    }
+    .run()
+    .unwrap();
+    assert_eq!(end, RunEnd::Interrupted { t_s: 0.5 });
+    assert!(rig.made_safe && rig.disarmed);
+}
+
+/// On a rig that goes on by itself guards see every sample meanwhile: the shaft passes their limit after the step's end.
+#[test]
+fn guards_look_while_a_step_is_being_made() {
+    let (stop, mut rig, mut notebook) = (AtomicBool::new(false), Watched::new(), Notebook::default());
+    let guard = SignalWatch::new(SignalGuard {
+        name: GuardName::Overspeed,
+        channel: Channel::ShaftSpeed,
+        above: Some(80e3),
+        below: None,
+        change: None,
+        hysteresis: 0.0,
+        dwell_s: 0.2,
+        age_s: 3.0,
+        frozen_s: None,
+        reaction: Reaction::Safe,
+    });
+    let wall = Idle(std::cell::Cell::new(0.0));
+    let mut steps = never_ready(&stop, false);
+    let end = Runner {
+        steps: &mut steps,
+        backend: &mut rig,
+        clock: &mut PacedClock::new(&wall, 1.0),
+        guards: vec![Box::new(guard)],
+        observer: &mut notebook,
+        speed: None,
+        stop: &stop,
+    }
+    .run()
+    .unwrap();
+    let RunEnd::Tripped(trip) = end else { panic!("{end:?}") };
+    assert!(trip.t_s > 0.5, "{trip:?}");
+    assert!(rig.made_safe && rig.disarmed);
+    assert!(notebook.samples.windows(2).all(|pair| pair[1].0 - pair[0].0 < 0.11), "no gap in the samples");
 }
 
 #[test]

@@ -18,6 +18,14 @@ pub enum SequenceError {
     /// The script's thread could not be started.
     #[error("the thread of the sequence script could not be started: {0}")]
     Thread(#[source] std::io::Error),
+    /// The script computes for too long between two steps.
+    #[error(
+        "the sequence script has computed for {limit_s} s since its last step and was ended; let it do less between two steps"
+    )]
+    TooSlow {
+        /// Limit, s.
+        limit_s: u64,
+    },
     /// The script's thread is gone: a fault of the program.
     #[error("the sequence script ended without a result: this is a fault of the program")]
     Lost,
@@ -137,13 +145,16 @@ pub(crate) fn throw(message: String, remedy: &str) -> Box<EvalAltResult> {
 const REMEDY_MARK: char = '\n';
 
 fn words(error: EvalAltResult) -> (String, String) {
-    use crate::sandbox::{CALL_DEPTH_LIMIT, OPERATION_LIMIT};
+    use crate::sandbox::{CALL_DEPTH_LIMIT, Ended, OPERATION_LIMIT};
     match error {
         EvalAltResult::ErrorRuntime(thrown, _) => thrown_words(thrown),
-        EvalAltResult::ErrorTooManyOperations(_) => (
+        EvalAltResult::ErrorTerminated(why, _) if why.clone().try_cast() == Some(Ended::OutOfOperations) => (
             format!("the sequence script took more than {OPERATION_LIMIT} operations and was stopped"),
             "look for a loop that does not end, or that goes through all points for each point".to_owned(),
         ),
+        EvalAltResult::ErrorTerminated(..) => {
+            ("the sequence script was ended from outside".to_owned(), String::new())
+        }
         EvalAltResult::ErrorStackOverflow(_) => (
             format!("functions of the sequence script call each other more than {CALL_DEPTH_LIMIT} deep"),
             "use a loop instead of a function that calls itself".to_owned(),

@@ -4,15 +4,21 @@ use crate::error::{ScriptError, SequenceError};
 use crate::names::Unknown;
 use crate::request::SequenceRequest;
 use crate::result::StepResult;
-use crate::sandbox::{SCRIPT_LIMIT, STACK_BYTES, engine};
+use crate::sandbox::{Budget, SCRIPT_LIMIT, STACK_BYTES, engine};
 use crate::session::{Session, lock};
 use crate::step::{FromScript, SequenceStep};
 use crate::{api, names};
 use rhai::{AST, Engine, EvalAltResult, Scope};
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// How long is waited at once for a script's next step: a stop is seen within this.
+const WAIT: Duration = Duration::from_millis(20);
+/// Waits that a script may take for one step: a minute, in which it could have a plan of the whole grid made several times.
+const WAITS_MAX: u32 = 3_000;
 
 /// A script's text, and the name it has in messages.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +35,13 @@ pub struct SequenceRunner {
     /// `None` once the script has ended.
     to_script: Option<SyncSender<Option<StepResult>>>,
     from_script: Option<Receiver<FromScript>>,
+    /// Whether the script has been asked for the step that it is to give next.
+    asked: bool,
+    /// Waits since then.
+    waits: u32,
+    /// What the script has given, until it is fetched.
+    answer: Option<Result<FromScript, SequenceError>>,
+    budget: Arc<Budget>,
     notes: Vec<String>,
     thread: Option<JoinHandle<()>>,
 }
@@ -39,39 +52,88 @@ impl SequenceRunner {
     /// # Errors
     /// [`SequenceError::Thread`] where no thread can be started.
     pub fn start(script: Script, request: SequenceRequest) -> Result<Self, SequenceError> {
-        let (to_script, from_caller) = sync_channel(0);
+        // Asking does not wait for a script that is still being read.
+        let (to_script, from_caller) = sync_channel(1);
         let (to_caller, from_script) = sync_channel(0);
+        let budget = Arc::new(Budget::default());
+        let shared = Arc::clone(&budget);
         let thread = std::thread::Builder::new()
             .name("sequence".to_owned())
             .stack_size(STACK_BYTES)
-            .spawn(move || run(&script, Session::new(request, to_caller, from_caller)))
+            .spawn(move || run(&script, &shared, Session::new(request, to_caller, from_caller)))
             .map_err(SequenceError::Thread)?;
         Ok(SequenceRunner {
             to_script: Some(to_script),
             from_script: Some(from_script),
+            asked: false,
+            waits: 0,
+            answer: None,
+            budget,
             notes: Vec::new(),
             thread: Some(thread),
         })
     }
 
-    /// Hands over what the last step has given (`None` before the first), and lets the script go on to its next step.
-    /// `Ok(None)` when the script has ended.
+    /// Hands over what the last step has given (`None` before the first), and lets the script go on to its next step, without waiting
+    /// for it. Nothing happens where the script is asked already.
+    pub fn ask(&mut self, finished: Option<StepResult>) {
+        if std::mem::replace(&mut self.asked, true) {
+            return;
+        }
+        self.waits = 0;
+        if self.to_script.as_ref().is_some_and(|to_script| to_script.send(finished).is_err()) {
+            self.answer = Some(Err(SequenceError::Lost));
+        }
+    }
+
+    /// Whether [`next_step`](Self::next_step) will return at once; waits some milliseconds for that. For the script that is to be ended
+    /// drop this.
+    pub fn is_ready(&mut self) -> bool {
+        let Some(from_script) = self.from_script.as_ref().filter(|_| self.to_script.is_some()) else {
+            return true;
+        };
+        if self.answer.is_some() || !self.asked {
+            return true;
+        }
+        self.answer = match from_script.recv_timeout(WAIT) {
+            Ok(answer) => Some(Ok(answer)),
+            Err(RecvTimeoutError::Disconnected) => Some(Err(SequenceError::Lost)),
+            Err(RecvTimeoutError::Timeout) if self.waits >= WAITS_MAX => {
+                self.budget.cancel();
+                Some(Err(SequenceError::TooSlow {
+                    limit_s: u64::from(WAITS_MAX) * WAIT.as_millis() as u64 / 1000,
+                }))
+            }
+            Err(RecvTimeoutError::Timeout) => {
+                self.waits += 1;
+                None
+            }
+        };
+        self.answer.is_some()
+    }
+
+    /// The script's next step, which it is asked for with what the last one has given (`None` before the first) where it was not
+    /// [asked](Self::ask) before. `Ok(None)` when the script has ended.
     ///
     /// # Errors
-    /// [`SequenceError::Script`] with the script's line; the script has ended then.
+    /// [`SequenceError::Script`] with the script's line, [`SequenceError::TooSlow`] where it computes for too long; the script has ended
+    /// then.
     pub fn next_step(&mut self, finished: Option<StepResult>) -> Result<Option<SequenceStep>, SequenceError> {
-        let (Some(to_script), Some(from_script)) = (&self.to_script, &self.from_script) else {
+        if self.to_script.is_none() {
             return Ok(None);
-        };
-        let answer = to_script.send(finished).ok().and_then(|()| from_script.recv().ok());
-        if !matches!(answer, Some(FromScript::Step(..))) {
+        }
+        self.ask(finished);
+        while !self.is_ready() {}
+        self.asked = false;
+        let answer = self.answer.take().unwrap_or(Err(SequenceError::Lost));
+        if !matches!(answer, Ok(FromScript::Step(..))) {
             self.to_script = None;
         }
         let (outcome, notes) = match answer {
-            Some(FromScript::Step(step, notes)) => (Ok(Some(*step)), notes),
-            Some(FromScript::Done(notes)) => (Ok(None), notes),
-            Some(FromScript::Failed(error, notes)) => (Err(SequenceError::Script(error)), notes),
-            None => (Err(SequenceError::Lost), Vec::new()),
+            Ok(FromScript::Step(step, notes)) => (Ok(Some(*step)), notes),
+            Ok(FromScript::Done(notes)) => (Ok(None), notes),
+            Ok(FromScript::Failed(error, notes)) => (Err(SequenceError::Script(error)), notes),
+            Err(error) => (Err(error), Vec::new()),
         };
         self.notes.extend(notes);
         outcome
@@ -85,11 +147,12 @@ impl SequenceRunner {
 
 impl Drop for SequenceRunner {
     fn drop(&mut self) {
-        // Both ends go before the thread is waited for: it may stand at either.
+        // The script ends at its next operation. Both ends go before the thread is waited for: it may stand at either.
+        self.budget.cancel();
         self.to_script = None;
         self.from_script = None;
         if let Some(thread) = self.thread.take() {
-            // The script is waiting for its step or about to end; a panic of its thread has been told as `Lost`.
+            // A panic of its thread has been told as `Lost`.
             let _ = thread.join();
         }
     }
@@ -107,8 +170,8 @@ fn compile(engine: &Engine, script: &Script) -> Result<AST, Box<ScriptError>> {
 }
 
 /// The life of a script's thread.
-fn run(script: &Script, session: Session) {
-    let mut engine = engine(session.request.points.len());
+fn run(script: &Script, budget: &Arc<Budget>, session: Session) {
+    let mut engine = engine(session.request.points.len(), budget);
     let session = Arc::new(Mutex::new(session));
     api::register(&mut engine, &session);
     let compiled = compile(&engine, script).and_then(|ast| match names::check(&engine, &ast) {

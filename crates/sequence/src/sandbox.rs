@@ -5,9 +5,11 @@ use rhai::packages::{
     BasicMathPackage, BasicStringPackage, LogicPackage, MoreStringPackage, Package,
 };
 use rhai::{Dynamic, Engine, EvalAltResult, Position};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// Operations of a whole script. The order of a second for plain ones; time is bounded without a clock, so that a
-/// script does the same on every machine.
+/// Operations of a whole script, those of its closures included. The order of a second for plain ones; time is bounded without a
+/// clock first, so that a script does the same on every machine.
 pub(crate) const OPERATION_LIMIT: u64 = 5_000_000;
 /// Depth of calls.
 pub(crate) const CALL_DEPTH_LIMIT: usize = 32;
@@ -28,8 +30,40 @@ pub(crate) const SCRIPT_LIMIT: usize = 256 << 10;
 /// Stack of a script's thread, bytes: room for values nested as deeply as an array is long.
 pub(crate) const STACK_BYTES: usize = 256 << 20;
 
+/// What a script has used, and whether it is to end: shared by all that it calls.
+#[derive(Debug, Default)]
+pub(crate) struct Budget {
+    operations: AtomicU64,
+    cancelled: AtomicBool,
+}
+
+/// Why a script was ended from outside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ended {
+    /// It used up its operations.
+    OutOfOperations,
+    /// Whoever runs it does not want it any more.
+    Cancelled,
+}
+
+impl Budget {
+    /// Ends the script at its next operation.
+    pub(crate) fn cancel(&self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+
+    /// Counts one operation.
+    fn operation(&self) -> Option<Ended> {
+        if self.cancelled.load(Ordering::Relaxed) {
+            return Some(Ended::Cancelled);
+        }
+        let before = self.operations.fetch_add(1, Ordering::Relaxed);
+        (before >= OPERATION_LIMIT).then_some(Ended::OutOfOperations)
+    }
+}
+
 /// An engine with arithmetic, strings, arrays and maps, and nothing else: no modules, no `eval`, no clock, no `sleep`.
-pub(crate) fn engine(grid_points: usize) -> Engine {
+pub(crate) fn engine(grid_points: usize, budget: &Arc<Budget>) -> Engine {
     let mut engine = Engine::new_raw();
     ArithmeticPackage::new().register_into_engine(&mut engine);
     LogicPackage::new().register_into_engine(&mut engine);
@@ -56,8 +90,10 @@ pub(crate) fn engine(grid_points: usize) -> Engine {
             _ => Ok(None),
         }
     });
+    // The engine counts the operations of a closure by themselves each time it is called, so they are counted here.
+    let budget = Arc::clone(budget);
+    engine.on_progress(move |_| budget.operation().map(Dynamic::from));
     engine
-        .set_max_operations(OPERATION_LIMIT)
         .set_max_call_levels(CALL_DEPTH_LIMIT)
         .set_max_expr_depths(EXPRESSION_DEPTH_LIMIT, EXPRESSION_DEPTH_LIMIT)
         .set_max_string_size(STRING_LIMIT)

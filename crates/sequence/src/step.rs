@@ -23,6 +23,7 @@ pub struct SequenceStep {
 }
 
 /// What comes from the script's thread, with the notes since the last time.
+#[derive(Debug)]
 pub(crate) enum FromScript {
     Step(Box<SequenceStep>, Vec<String>),
     Done(Vec<String>),

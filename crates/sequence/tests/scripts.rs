@@ -247,6 +247,16 @@ fn hostile_scripts_end_with_an_error() {
         ("while true { let x = 1; }", "operations"),
         ("for i in 0..9_000_000_000_000 { let x = i; }", "operations"),
         ("loop { try { loop { } } catch { } }", "operations"),
+        ("let a = [0]; a.map(|x| { loop { } });", "operations"),
+        ("let a = [0]; a.for_each(|| { loop { } });", "operations"),
+        ("let a = [2, 1]; a.sort(|x, y| { loop { } });", "operations"),
+        ("let a = [0]; a.filter(|x| { while true { } });", "operations"),
+        ("let a = [0]; a.reduce(|sum, x| { loop { } });", "operations"),
+        (
+            "let a = []; a.pad(4000, 0); a.map(|x| { let b = []; b.pad(4000, 0); b.map(|y| y + 1) });",
+            "operations",
+        ),
+        ("let a = [0]; loop { try { a.map(|x| { loop { } }); } catch { } }", "operations"),
         ("fn f(n) { f(n + 1) }\nf(0);", "deep"),
         ("fn f(n) { try { f(n + 1) } catch { f(n + 1) } }\nf(0);", ""),
         ("let s = \"x\"; loop { s += s; }", "too large"),
@@ -381,4 +391,40 @@ fn t3_and_oil_hold_from_where_they_are_set() {
     assert!(said.contains("krpm"), "{said}");
     let said = run("oil(\"-80 degC\");", request().limits).unwrap_err();
     assert!(said.contains("193.15 K"), "{said}");
+}
+
+/// Whoever drops a script does not wait until it has used up its operations, wherever it computes.
+#[test]
+fn a_script_that_computes_ends_when_it_is_dropped() {
+    for text in [
+        "loop { }",
+        "let a = [0]; a.map(|x| { loop { } });",
+        "jump(grid()[0]); let a = []; a.pad(4000, 0); a.sort(|x, y| { loop { } });",
+    ] {
+        let mut runner = start(text);
+        runner.ask(None);
+        // Whether it has come to its loop or not: both end.
+        runner.is_ready();
+        drop(runner);
+    }
+}
+
+/// A step that is asked for is given once, however often it is looked for.
+#[test]
+fn a_step_that_is_asked_for_is_given_once() {
+    let mut runner = start("for point in grid() { jump(point); }");
+    let mut steps = 0;
+    loop {
+        runner.ask(None);
+        while !runner.is_ready() {}
+        assert!(runner.is_ready());
+        match runner.next_step(None).unwrap() {
+            Some(_) => steps += 1,
+            None => break,
+        }
+        if steps > 6 {
+            break;
+        }
+    }
+    assert_eq!(steps, 6);
 }

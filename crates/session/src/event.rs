@@ -27,6 +27,8 @@ pub enum SessionEvent {
     StepEnded(StepMarker),
     /// The rig or the runner has something to tell: a guard that tripped, surge, a stop, the safe state, a note.
     Told(Event),
+    /// The rig is safe and let go; what follows is made from the recording.
+    RigReleased,
     /// The last good reading of each channel.
     Readings {
         /// Run time, s.

@@ -226,6 +226,7 @@ impl PreparedRun<'_> {
         };
         let (end, finished, doubt) = self.drive_and_record(session, recorder, pace);
         held.give_back(doubt, &directory)?;
+        session.tell(SessionEvent::RigReleased);
         if let Ended::Failed(error @ RunError::NotArmed(_)) = end {
             return Err(self.never_begun(error, &directory));
         }

@@ -61,6 +61,11 @@ impl StepSource for ScriptedSteps {
         self.cool_down_s
     }
 
+    fn is_ready(&mut self) -> bool {
+        self.script.ask(self.finished.take());
+        self.script.is_ready()
+    }
+
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
         let next = self.script.next_step(self.finished.take()).map_err(source_error)?;
         let Some(next) = next else { return Ok(None) };

@@ -228,6 +228,7 @@ impl Shown {
                 }
             }
             SessionEvent::StepEnded(_)
+            | SessionEvent::RigReleased
             | SessionEvent::Readings { .. }
             | SessionEvent::PointEstimated(_)
             | SessionEvent::PointIdentified(_) => {}

@@ -76,6 +76,18 @@ impl Running {
         self.child.as_ref().unwrap().id()
     }
 
+    /// Waits until the process has a handler for SIGINT.
+    pub(crate) fn watches_for_signals(&self) {
+        loop {
+            let status = std::fs::read_to_string(format!("/proc/{}/status", self.id())).unwrap();
+            let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap().trim();
+            if u64::from_str_radix(caught, 16).unwrap() & 0b10 != 0 {
+                return;
+            }
+            std::thread::yield_now();
+        }
+    }
+
     /// Sends a signal, e.g. `INT`.
     pub(crate) fn signal(&self, name: &str) {
         let id = self.id().to_string();

@@ -38,6 +38,30 @@ fn ctrl_c_ends_the_run_with_its_step_and_a_second_one_at_once() {
     }
 }
 
+/// While it plans a run has touched nothing, and any signal ends it; no directory is left behind.
+#[test]
+fn a_signal_while_planning_ends_the_run_and_touches_nothing() {
+    for signal in ["INT", "TERM", "HUP"] {
+        // Some seconds of planning.
+        let speeds: Vec<String> = (0..60).map(|k| format!("{} krpm", 50 + k)).collect();
+        let openings: Vec<String> = (0..30).map(|k| format!("{:.2}", 0.7 + 0.05 * f64::from(k))).collect();
+        let (speeds, openings) =
+            (format!("  speeds: [{}]", speeds.join(", ")), format!("  openings: [{}]", openings.join(", ")));
+        let campaign = CampaignFile::shipped_with(&[
+            (
+                "  speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]",
+                &speeds,
+            ),
+            ("  openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", &openings),
+        ]);
+        let running = Running::start_with(&campaign, &[]);
+        running.watches_for_signals();
+        running.signal(signal);
+        running.finished().exits(130);
+        assert!(!campaign.runs().exists(), "{signal}: nothing was touched");
+    }
+}
+
 /// A plan belongs to the campaign that it was made from.
 #[test]
 fn a_campaign_that_was_edited_after_its_plan_was_made_is_not_run_by_it() {

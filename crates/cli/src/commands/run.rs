@@ -2,6 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
+use crate::interrupt::Phase;
 use crate::shown::ShownArguments;
 use crate::wall::SystemWall;
 use crate::{interrupt, manner, output, registry, rig_states};
@@ -11,7 +12,8 @@ use mapper_core::{PacedClock, Verdict};
 use mapper_live::{Asked, LiveError, LiveRun, Onlookers, TlsFiles};
 use mapper_report::plan_text;
 use mapper_session::{
-    BrokenOff, Ended, Operator, PreparedRun, RunOutcome, RunRequest, Session, SessionError, run_directory,
+    BrokenOff, Ended, Operator, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
+    SessionEvent, run_directory,
     soak_s, start_time_ns,
 };
 use mapper_terminal::results_text;
@@ -80,7 +82,10 @@ impl Run {
         let states = rig_states::directory(None);
         let started_ns = u64::try_from(started.as_nanosecond()).unwrap_or(0);
         let onlookers = self.onlookers().map_err(Failure::of_live)?;
-        let on_event = |event: &_| {
+        let on_event = |event: &SessionEvent| {
+            if matches!(event, SessionEvent::RigReleased) {
+                stop.enter(Phase::Results);
+            }
             progress.show(event);
             onlookers.show(event);
         };
@@ -108,6 +113,7 @@ impl Run {
             progress.clear();
             return self.dry(&campaign, &prepared, &parent);
         }
+        stop.enter(Phase::Rig);
         let pace = self.pace.or((!prepared.rig().simulated_time).then_some(1.0));
         let looked_at = LiveRun {
             campaign: &campaign,

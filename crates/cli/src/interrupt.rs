@@ -74,6 +74,7 @@ pub fn run_stop() -> Result<RunStop, Failure> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
     let stop = RunStop::default();
+    stop.enter(Phase::Planning);
     let raised = stop.clone();
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).map_err(failed)?;
     let watch = move || signals.forever().for_each(|signal| raised.signalled(signal == SIGINT));
@@ -85,6 +86,7 @@ pub fn run_stop() -> Result<RunStop, Failure> {
 #[cfg(not(unix))]
 pub fn run_stop() -> Result<RunStop, Failure> {
     let stop = RunStop::default();
+    stop.enter(Phase::Planning);
     let raised = stop.clone();
     ctrlc::set_handler(move || raised.signalled(true)).map_err(failed)?;
     Ok(stop)

@@ -272,7 +272,7 @@ fn the_operator_stops_while_a_step_is_being_made() {
     assert!(rig.made_safe && rig.disarmed);
 }
 
-/// On a rig that goes on by itself guards see every sample meanwhile: the shaft passes their limit after the step's end.
+/// On a rig that goes on by itself guards see every sample meanwhile: the shaft is above their limit for long enough after the step's end.
 #[test]
 fn guards_look_while_a_step_is_being_made() {
     let (stop, mut rig, mut notebook) = (AtomicBool::new(false), Watched::new(), Notebook::default());
@@ -283,7 +283,7 @@ fn guards_look_while_a_step_is_being_made() {
         below: None,
         change: None,
         hysteresis: 0.0,
-        dwell_s: 0.2,
+        dwell_s: 2.0,
         age_s: 3.0,
         frozen_s: None,
         reaction: Reaction::Safe,

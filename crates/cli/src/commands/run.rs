@@ -2,7 +2,6 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::interrupt::Phase;
 use crate::shown::ShownArguments;
 use crate::wall::SystemWall;
 use crate::{interrupt, manner, output, registry, rig_states};
@@ -12,7 +11,7 @@ use mapper_core::{PacedClock, Verdict};
 use mapper_live::{Asked, LiveError, LiveRun, Onlookers, TlsFiles};
 use mapper_report::plan_text;
 use mapper_session::{
-    BrokenOff, Ended, Operator, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
+    BrokenOff, Ended, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
     SessionEvent, run_directory,
     soak_s, start_time_ns,
 };

@@ -5,7 +5,7 @@ use crate::workspace;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Crates whose results rest on numbers that somebody chose.
+/// Crates whose results rest on chosen numbers.
 const CRATES: [&str; 6] = ["inference", "identify", "gap", "drift", "driven", "discover"];
 
 const HEAD: &str = "\
@@ -88,7 +88,7 @@ fn constants(text: &str) -> Vec<Constant> {
     found
 }
 
-/// `NAME: TYPE = VALUE;`, where the value has a digit and is no text.
+/// `NAME: TYPE = VALUE;`, where the value is numeric.
 fn constant(statement: &str, source: &str) -> Option<Constant> {
     let (head, value) = statement.trim_end_matches(';').split_once(" = ")?;
     let (name, kind) = head.split_once(':')?;

@@ -5,7 +5,7 @@ pub trait Clock {
     /// Returns when the run may go on to `t_s` (seconds since arming).
     fn wait_until(&mut self, t_s: f64);
 
-    /// Whether time goes on when nobody waits, as on a rig. By default it does not.
+    /// Whether time passes without [`wait_until`](Self::wait_until), as on a rig. By default it does not.
     fn goes_on_by_itself(&self) -> bool {
         false
     }

@@ -5,12 +5,12 @@
 //! Gaussian (the Savage-Dickey density ratio: Dickey, Ann. Math. Stat. 42:204, 1971; spike and slab: Mitchell and Beauchamp, JASA 83:1023,
 //! 1988). Beforehand every *number* of parameters off neutral is equally likely, and so is every set of that number, which corrects for
 //! how many could be named (Scott and Berger, Ann. Stat. 38:2587, 2010). A machine that differs in one respect from its declaration
-//! is then rather believed to differ in another.
+//! is then more likely to differ in another.
 
 use mapper_numerics::statistics::BoundedNormal;
 use nalgebra::{DMatrix, DVector};
 
-/// Draws of each set: the interval of a bounded parameter then errs by less than a hundredth of its width.
+/// Draws of each set: means and probabilities are then within some thousandths of sums over a grid, as the test shows.
 const DRAWS: usize = 128;
 /// Weight of a set below which it is not drawn from: what it could add to a 95 % interval is a fiftieth of what lies beyond it.
 const LEAST_WEIGHT: f64 = 1e-3;

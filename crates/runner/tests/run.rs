@@ -180,21 +180,26 @@ fn a_plan_is_run_in_time_and_without_gaps() {
     assert!(notebook.events.is_empty());
 }
 
-#[test]
-fn a_tripped_guard_makes_the_rig_safe_and_says_so() {
-    let mut notebook = Notebook::default();
-    let guard = SignalWatch::new(SignalGuard {
+/// Trips where the shaft has turned faster than 80 krpm for so long.
+fn overspeed(dwell_s: f64) -> SignalWatch {
+    SignalWatch::new(SignalGuard {
         name: GuardName::Overspeed,
         channel: Channel::ShaftSpeed,
         above: Some(80e3),
         below: None,
         change: None,
         hysteresis: 0.0,
-        dwell_s: 0.2,
+        dwell_s,
         age_s: 3.0,
         frozen_s: None,
         reaction: Reaction::Safe,
-    });
+    })
+}
+
+#[test]
+fn a_tripped_guard_makes_the_rig_safe_and_says_so() {
+    let mut notebook = Notebook::default();
+    let guard = overspeed(0.2);
     let end = run(&mut notebook, vec![Box::new(guard)], &AtomicBool::new(false)).unwrap();
     let RunEnd::Tripped(trip) = end else { panic!("{end:?}") };
     assert!((30.0..32.0).contains(&trip.t_s), "{trip:?}");
@@ -235,7 +240,7 @@ impl StepSource for NeverReady<'_> {
     }
 }
 
-/// A wall that passes only while somebody waits.
+/// A wall clock that passes only during waits.
 struct Idle(std::cell::Cell<f64>);
 
 impl Wall for &Idle {
@@ -252,7 +257,7 @@ fn never_ready(stop: &AtomicBool, stops: bool) -> NeverReady<'_> {
     NeverReady { first, looks: 0, stop, stops }
 }
 
-/// A step that is never made hinders nobody: the operator stops the run all the same.
+/// A step that is never made does not delay a stop by the operator.
 #[test]
 fn the_operator_stops_while_a_step_is_being_made() {
     let (stop, mut rig, mut notebook) = (AtomicBool::new(false), Watched::new(), Notebook::default());
@@ -276,18 +281,7 @@ fn the_operator_stops_while_a_step_is_being_made() {
 #[test]
 fn guards_look_while_a_step_is_being_made() {
     let (stop, mut rig, mut notebook) = (AtomicBool::new(false), Watched::new(), Notebook::default());
-    let guard = SignalWatch::new(SignalGuard {
-        name: GuardName::Overspeed,
-        channel: Channel::ShaftSpeed,
-        above: Some(80e3),
-        below: None,
-        change: None,
-        hysteresis: 0.0,
-        dwell_s: 2.0,
-        age_s: 3.0,
-        frozen_s: None,
-        reaction: Reaction::Safe,
-    });
+    let guard = overspeed(2.0);
     let wall = Idle(std::cell::Cell::new(0.0));
     let mut steps = never_ready(&stop, false);
     let end = Runner {

@@ -152,7 +152,7 @@ impl Drop for SequenceRunner {
         self.to_script = None;
         self.from_script = None;
         if let Some(thread) = self.thread.take() {
-            // A panic of its thread has been told as `Lost`.
+            // A panic of its thread has been reported as `Lost`.
             let _ = thread.join();
         }
     }

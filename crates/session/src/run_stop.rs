@@ -20,7 +20,7 @@ pub enum Phase {
 pub enum Signalled {
     /// A flag that the run obeys.
     Raised,
-    /// Nothing yet; whoever asks has to be told.
+    /// Nothing yet: the run goes on, and the user needs an answer.
     Answered,
     /// The process may end.
     Ends,

@@ -33,8 +33,7 @@ pub(crate) struct Member<'a> {
     pub(crate) measured_k: Vec<f64>,
     pub(crate) whitening: WhiteningFilter,
     /// What the shared parameters make of the point's efficiency: the surface's terms at the step's end, and for each
-    /// offset what it does to the efficiency found. So the surface goes through the points as the readings have them, and
-    /// its smoothness says nothing of the offsets, which bend a map as well as nature does.
+    /// offset's bend what that offset does to the efficiency found.
     pub(crate) coupling: SharedVector,
     pub(crate) local: LocalVector,
     /// Of the step's parameters; that of the efficiency is not used: see `surface_sigma`.

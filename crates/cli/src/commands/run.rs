@@ -12,8 +12,7 @@ use mapper_live::{Asked, LiveError, LiveRun, Onlookers, TlsFiles};
 use mapper_report::plan_text;
 use mapper_session::{
     BrokenOff, Ended, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
-    SessionEvent, run_directory,
-    soak_s, start_time_ns,
+    SessionEvent, run_directory, soak_s, start_time_ns,
 };
 use mapper_terminal::results_text;
 use serde_json::json;

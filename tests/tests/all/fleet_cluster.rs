@@ -9,7 +9,22 @@ fn on(cluster: &Cluster, arguments: Vec<&str>) -> Finished {
     cluster.on(mapper_command(arguments)).output().unwrap().into()
 }
 
-/// Ids of the processes that work in `directory` now.
+/// Who has begun an item in `directory` and not ended it.
+fn under_way(directory: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(directory.join("begun")).into_iter().flatten().flatten();
+    let part = |hash: std::ffi::OsString| directory.join("parts").join(hash).with_extension("part");
+    entries
+        .filter(|entry| !part(entry.file_name()).exists())
+        .filter_map(|entry| std::fs::read_to_string(entry.path()).ok())
+        .collect()
+}
+
+/// Whether the process `id` has begun an item in `directory` and not ended it.
+fn holds_an_item(directory: &Path, id: &str) -> bool {
+    under_way(directory).iter().any(|who| who.contains(&format!("process {id} ")))
+}
+
+/// Ids of the processes that work on an item in `directory` now.
 fn workers(directory: &Path) -> Vec<String> {
     let wanted = format!("fleet\0work\0{}\0", directory.display());
     let entries = std::fs::read_dir("/proc").unwrap().flatten();
@@ -17,6 +32,7 @@ fn workers(directory: &Path) -> Vec<String> {
     ids.filter(|id| {
         std::fs::read(format!("/proc/{id}/cmdline"))
             .is_ok_and(|line| String::from_utf8_lossy(&line).contains(&wanted))
+            && holds_an_item(directory, id)
     })
     .collect()
 }
@@ -54,10 +70,12 @@ fn killed_and_failed_items_are_named_and_a_retry_finishes() {
     while killed.len() < 3 {
         cluster.wait_for("worker", || workers(&there).iter().any(|id| !killed.contains(id)));
         let Some(id) = workers(&there).into_iter().find(|id| !killed.contains(id)) else { continue };
-        // The one process, by its own id.
-        if Command::new("kill").args(["-9", &id]).status().unwrap().success() {
-            killed.push(id);
+        // The one process, by its own id. One that was killed between two items loses none.
+        let killed_it = Command::new("kill").args(["-9", &id]).status().unwrap().success();
+        if !killed_it || !holds_an_item(&there, &id) {
+            continue;
         }
+        killed.push(id);
         if killed.len() == 2 {
             cluster.restart_controller();
         }
@@ -71,7 +89,7 @@ fn killed_and_failed_items_are_named_and_a_retry_finishes() {
     assert!(said.contains("missing: nightly_a") && said.contains("nothing merged"), "{said}");
     let status = on(&cluster, fleet("status", &there, &["--json"])).exits(0).json();
     let lost = status["status"]["missing"].as_array().unwrap();
-    assert!(lost.len() >= 3, "at least what was under way: {lost:?}");
+    assert!(lost.len() >= 3, "at least what was under way when {killed:?} were killed: {lost:?}");
 
     let again = on(&cluster, fleet("retry", &there, &["--json"])).exits(0).json();
     assert_ne!(again["work"], sent["work"]);

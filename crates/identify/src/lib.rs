@@ -16,6 +16,7 @@ mod dynamic;
 mod end_state;
 mod error;
 mod expected;
+mod faults;
 mod findings;
 mod fit;
 mod flow_drift;
@@ -23,7 +24,7 @@ mod followed;
 mod identify;
 mod joint;
 mod needs;
-mod nominal_map;
+mod nominal_rig;
 mod objections;
 mod one_fit;
 mod probe;
@@ -41,6 +42,8 @@ pub use config::{DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, 
 pub use course::{T2Course, t2_course};
 pub use error::{IdentifyError, StepError};
 pub use expected::{Expected, ExpectedRow, expected, expected_steady};
+pub use faults::found::{FoundFault, Suspect};
+pub use faults::rows::Machine;
 pub use findings::code;
 pub use identify::{Identified, identify, identify_beside, identify_each, identify_recording};
 pub use joint::MAX_RESTING_ETA;
@@ -50,7 +53,7 @@ pub use mapper_core::{
     Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings, SettleBands, WindowRule,
 };
 pub use needs::{method_for, needs};
-pub use nominal_map::{NominalRig, doubt_off_the_nominal_map};
+pub use nominal_rig::NominalRig;
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
 pub use two_parameter::TwoParameter;

@@ -7,16 +7,26 @@ mod common;
 mod lab;
 
 use lab::{Campaign, Machine, campaign, eighteen, measured};
-use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, ReferenceState, StepKind, Verdict};
-use mapper_identify::{IdentifyConfig, code, doubt_off_the_nominal_map, identify};
+use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, StepKind, Verdict};
+use mapper_identify::{IdentifyConfig, NominalRig, code, identify, identify_beside};
 use mapper_physics::model::Model;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 fn found(clean: &Campaign, seed: u64, method: Method) -> Vec<IdentifiedPoint> {
+    found_beside(clean, seed, method, None)
+}
+
+fn found_beside(
+    clean: &Campaign,
+    seed: u64,
+    method: Method,
+    nominal: Option<NominalRig<'_>>,
+) -> Vec<IdentifiedPoint> {
     let (recording, declared) = measured(&clean.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(seed));
-    identify(&recording, &IdentifyConfig { method, declared, ..IdentifyConfig::default() }).unwrap()
+    let config = IdentifyConfig { method, declared, ..IdentifyConfig::default() };
+    identify_beside(&recording, &config, nominal).unwrap().points.into_iter().map(Result::unwrap).collect()
 }
 
 /// The dynamic method's common errors are what it makes of the readings when all of them are off: T2 by its declared offset.
@@ -120,13 +130,12 @@ fn one_bad_region_does_not_condemn_the_rest() {
 #[test]
 fn the_nominal_map_tells_an_offset_beyond_its_declaration() {
     let clean = campaign(&eighteen(), 120.0, Machine::default());
-    let map = Model::nominal().map;
+    let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
+    let nominal = NominalRig { model: &model, tolerances: &tolerances };
     let doubted = |recording: &Campaign, seed: u64| {
-        let mut points = found(recording, seed, Method::Joint);
-        let tolerances = ModelTolerances::default();
-        doubt_off_the_nominal_map(&mut points, map.as_ref(), ReferenceState::SAE, &tolerances);
+        let points = found_beside(recording, seed, Method::Joint, Some(nominal));
         let named = |point: &IdentifiedPoint| {
-            let told = [code::OFF_THE_NOMINAL_MAP, code::SCALED_CHANNEL];
+            let told = [code::OFF_THE_NOMINAL_MAP, code::CONTRADICTED_CHANNEL];
             point.warnings.iter().any(|warning| told.contains(&warning.code.as_str()))
         };
         points.iter().filter(|point| named(point) && point.verdict != Verdict::Good).count()
@@ -162,7 +171,7 @@ fn repeats_alone_tell_no_heat_balance() {
     for seed in 0..12 {
         for point in found(&clean, seed, Method::Joint) {
             assert!(
-                point.warnings.iter().all(|warning| warning.code != code::SCALED_CHANNEL),
+                point.warnings.iter().all(|warning| warning.code != code::CONTRADICTED_CHANNEL),
                 "seed {seed}: {point:?}"
             );
         }

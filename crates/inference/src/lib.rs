@@ -1,9 +1,11 @@
 //! Bayesian inference on a linear-Gaussian model: which parameters differ from neutral, and what follows for everything else.
 //!
 //! [`mixture`] weighs every set of parameters that may differ from neutral on one Gaussian, and draws from the mixture of all
-//! sets. [`interval`] gives the shortest interval of a number that depends on such draws.
+//! sets. [`hypotheses`] finds which of many faults explain the residuals of linear balances. [`interval`] gives the shortest interval of a
+//! number that depends on such draws.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod hypotheses;
 pub mod interval;
 pub mod mixture;

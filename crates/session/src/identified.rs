@@ -9,8 +9,8 @@ use mapper_assemble::{RepeatedJump, repeated_jumps};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{IdentifiedPoint, Method, Recording, StepMarker, StepOrigin, ThermalModel, joined};
 use mapper_identify::{
-    IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_beside, isothermal_zero,
-    method_for,
+    FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_beside,
+    isothermal_zero, method_for,
 };
 use mapper_observe::FusedChannel;
 use mapper_record::ChannelMap;
@@ -41,6 +41,8 @@ pub struct Identified {
     pub thermal: Option<ThermalModel>,
     /// What the two-parameter method makes of the same steps (joint method).
     pub two_parameter: Vec<TwoParameter>,
+    /// Faults of sensors or machine without which the recording contradicts itself.
+    pub faults: Vec<FoundFault>,
     /// What became of channels with several sensors.
     pub sensors: Vec<FusedChannel>,
     /// What came of the zero.
@@ -73,6 +75,7 @@ impl Identified {
             "points": self.points,
             "thermal": self.thermal,
             "two_parameter": self.two_parameter,
+            "faults": self.faults,
             "zero": self.zero,
             "score": self.score,
             "recording_warnings": warnings,
@@ -180,6 +183,7 @@ impl Session<'_> {
             points,
             thermal: found.thermal,
             two_parameter: found.two_parameter,
+            faults: found.faults,
             sensors,
             zero,
             score,

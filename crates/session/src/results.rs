@@ -259,6 +259,7 @@ impl Session<'_> {
             "points": identified.points,
             "thermal": identified.thermal,
             "two_parameter": identified.two_parameter,
+            "faults": identified.faults,
             "zero": identified.zero,
         });
         if !identified.sensors.is_empty() {

@@ -2,8 +2,10 @@
 
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
-use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
-use crate::joint::refinements::{ALPHA_MODEL_ERROR, Refinements};
+use crate::joint::parameters::{
+    ALPHA, ALPHA_MODEL_ERROR, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2,
+};
+use crate::joint::refinements::Refinements;
 use crate::joint::smoothness::{Judged, STRAIN_SIGMAS, Smoothed};
 use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
 use crate::width;

@@ -27,6 +27,7 @@ pub(crate) mod surface;
 
 use crate::dynamic::Estimate;
 use crate::end_state::EndState;
+use crate::faults::efficiency::FittedEfficiencies;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{FLOW_GAIN, INLET, OFFSETS, PROBE_MM2, SHARED};
 use crate::joint::refinements::{Gain, Refinements};
@@ -58,19 +59,8 @@ pub(crate) struct Joint {
     pub(crate) thermal: Option<ThermalModel>,
     /// What the two-parameter method makes of the steps that it can use.
     pub(crate) two_parameter: Vec<TwoParameter>,
-    /// The efficiencies before the smoothness of the map had its say, one for each step; empty where nothing was fitted together.
-    pub(crate) as_fitted: Vec<Option<AsFitted>>,
-}
-
-/// An efficiency as the fit has it.
-#[derive(Debug, Clone)]
-pub(crate) struct AsFitted {
-    /// Fraction.
-    pub(crate) eta: f64,
-    /// One standard error, fraction.
-    pub(crate) error: f64,
-    /// What one standard deviation of each error that the points share does to it, fraction.
-    pub(crate) common: Vec<f64>,
+    /// The efficiencies before the smoothness of the map had its say; `None` where nothing was fitted together.
+    pub(crate) fitted: Option<FittedEfficiencies>,
 }
 
 /// Identifies all steps. `end_states` and `findings`: one for each step; no end state, no estimate. `alone`: each step by
@@ -94,7 +84,7 @@ pub(crate) fn estimate(
     }
     if config.joint == JointSettings::all_off() {
         findings.iter_mut().zip(told).for_each(|(findings, told)| findings.take(told));
-        return Joint { estimates: alone, thermal: None, two_parameter: Vec::new(), as_fitted: Vec::new() };
+        return Joint { estimates: alone, thermal: None, two_parameter: Vec::new(), fitted: None };
     }
     let steps = start::steps(recording, end_states, config, findings);
     let careful = carefully(config);
@@ -119,11 +109,11 @@ pub(crate) fn estimate(
             findings[step.position].doubt(code::FIT_FAILED, message);
             estimates[step.position] = alone[step.position].clone();
         }
-        return Joint { estimates, thermal: None, two_parameter, as_fitted: Vec::new() };
+        return Joint { estimates, thermal: None, two_parameter, fitted: None };
     };
-    let Attempt { problem, smoothed, before, thermal, resting, left_out, .. } = attempt;
+    let fitted = smoothness::as_measured(&attempt.problem, &steps);
+    let Attempt { problem, smoothed, thermal, resting, left_out, .. } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
-    let mut as_fitted = vec![None; recording.steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
         let own = &mut findings[step.position];
         let (Judged { value: eta, uncertainty: eta_error, interval, .. }, ln_h) =
@@ -139,11 +129,6 @@ pub(crate) fn estimate(
             own.refuse(code::FIT_FAILED, "the fit gives no finite number for this step".to_owned());
             continue;
         }
-        as_fitted[step.position] = Some(AsFitted {
-            eta: before.eta[i].value,
-            error: before.eta[i].uncertainty.combined_standard_error(),
-            common: before.common[0][i].clone(),
-        });
         let (first, last) = (step.rows.first(), step.rows.last());
         let change =
             |read: fn(&rows::Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
@@ -193,7 +178,7 @@ pub(crate) fn estimate(
             own.doubt(code::MODEL_DOUBTED, doubt.clone());
         }
     }
-    Joint { estimates, thermal: Some(thermal), two_parameter, as_fitted }
+    Joint { estimates, thermal: Some(thermal), two_parameter, fitted }
 }
 
 /// A fit with what is made of it.
@@ -201,8 +186,6 @@ struct Attempt<'a> {
     problem: Problem<'a>,
     covariance: Covariance,
     smoothed: Smoothed,
-    /// The same before the smoothness of the map had its say.
-    before: Smoothed,
     thermal: ThermalModel,
     /// By how much the efficiencies would be off if what was drawn to its declared value were not as declared, fraction.
     resting: f64,
@@ -224,7 +207,6 @@ impl<'a> Attempt<'a> {
             (member.shares, member.barred) = (false, true);
         }
         let Fitted { covariance, refined, inlet_sigma, resting } = fitted(&mut problem, steps, config)?;
-        let before = smoothness::as_fitted(&problem, &covariance, steps);
         let smoothed =
             |problem: &Problem<'_>, covariance: &Covariance, refined: &Option<(Refinements, Gain)>| {
                 let refined = refined.as_ref().map(|(refinements, gain)| (refinements, gain));
@@ -244,7 +226,7 @@ impl<'a> Attempt<'a> {
         }
         let refinements = refined.as_ref().map(|(refinements, _)| refinements);
         let thermal = shared::thermal_model(&problem, &covariance, &found, refinements, steps, config);
-        Some(Attempt { problem, covariance, smoothed: found, before, thermal, resting, left_out: None })
+        Some(Attempt { problem, covariance, smoothed: found, thermal, resting, left_out: None })
     }
 
     /// The fit without the region of the map that disagrees most, if there is one.

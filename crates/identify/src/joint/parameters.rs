@@ -69,6 +69,15 @@ pub(crate) const PROBE_SIGMA_MM2: f64 = 10.0;
 /// The same of the logarithm of the direction factor.
 pub(crate) const LN_DIRECTION_SIGMA: f64 = 0.5;
 
+/// What small errors of the model can pass for, as a change of alpha_A: it moves an efficiency by a quarter of a point, which is what
+/// offsets leave open of it. `benches/identification.py` calibrates it: with 0.025 the error at an undeclared alpha_A of 0.05 is 2.1 points instead of 0.4.
+pub(crate) const ALPHA_MODEL_ERROR: f64 = 0.005;
+/// Of each refinement: standard deviation of its slab, and what small errors of the model can pass for. Compressors have 0 to 0.3 of their
+/// area before the wheel; probes of 0.5 to 3 mm are sold, and half a millimetre is a sheathed thermocouple; heated and cooled
+/// boundary layers differ by up to a third (Gnielinski's (Pr/Pr_w)^0.11 and (T/T_w)^0.45 between 300 and 600 K).
+pub(crate) const REFINEMENTS: [(usize, f64, f64); 3] =
+    [(ALPHA, 0.1, ALPHA_MODEL_ERROR), (PROBE_MM2, 2.0, 0.1), (LN_DIRECTION, 0.2, 0.015)];
+
 /// Symbol of a shared parameter for people.
 pub(crate) fn symbol(index: usize) -> String {
     match index {

@@ -5,7 +5,7 @@
 //! of them free gives ([`mapper_inference::mixture`]). The fit then stands at the mean of the mixture, is linearised there once more
 //! (the probe's lag is far from linear), and what the mixture leaves open is carried into every number of every point.
 
-use crate::joint::parameters::{ALPHA, ETA, LN_DIRECTION, OFFSETS, PROBE_MM2, SURFACE};
+use crate::joint::parameters::{ALPHA, ETA, OFFSETS, PROBE_MM2, REFINEMENTS, SURFACE};
 use crate::joint::solve::{Covariance, FULLY, Problem};
 use mapper_core::standard_error_of;
 use mapper_inference::interval;
@@ -13,14 +13,6 @@ use mapper_inference::mixture::{Draw, Mixture, Parameter};
 use mapper_numerics::statistics::mean;
 use nalgebra::{DMatrix, DVector};
 
-/// What small errors of the model can pass for, as a change of alpha_A: it moves an efficiency by a quarter of a point, which is what
-/// offsets leave open of it. `benches/identification.py` calibrates it: with 0.025 the error at an undeclared alpha_A of 0.05 is 2.1 points instead of 0.4.
-pub(crate) const ALPHA_MODEL_ERROR: f64 = 0.005;
-/// Of each refinement: standard deviation of its slab, and what small errors of the model can pass for. Compressors have 0 to 0.3 of their
-/// area before the wheel; probes of 0.5 to 3 mm are sold, and half a millimetre is a sheathed thermocouple; heated and cooled
-/// boundary layers differ by up to a third (Gnielinski's (Pr/Pr_w)^0.11 and (T/T_w)^0.45 between 300 and 600 K).
-const REFINEMENTS: [(usize, f64, f64); 3] =
-    [(ALPHA, 0.1, ALPHA_MODEL_ERROR), (PROBE_MM2, 2.0, 0.1), (LN_DIRECTION, 0.2, 0.015)];
 /// Share of the cases in which an interval contains the truth.
 const COVERAGE: f64 = 0.95;
 /// Linearisations after the first: another one changes the error of five classes of `benches/identification.py` by less than 0.001 points.

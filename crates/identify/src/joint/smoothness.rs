@@ -7,14 +7,16 @@
 //! the weights that the points give them. On a map that bends much by itself the offsets then keep their declared spread;
 //! on a flat one they lose about half of it. Everything that errs with the efficiencies is corrected along with them.
 
+use crate::faults::efficiency::FittedEfficiencies;
+use crate::faults::readings::CHANNELS;
 use crate::joint::common_part::common_part;
-use crate::joint::parameters::{OFFSETS, SURFACE};
+use crate::joint::parameters::{FLOW_GAIN, OFFSET_CHANNELS, OFFSETS, SURFACE};
 use crate::joint::quantity::{Quantity, is_offset, of_shared, quantities};
 use crate::joint::refinements::{Gain, Refinements};
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
 use crate::joint::surface::{SLOW_LOSS, SurfaceScale};
-use mapper_core::{EstimateUncertainty, ReferenceState, confidence_interval_95};
+use mapper_core::{Channel, EstimateUncertainty, ReferenceState, confidence_interval_95};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::median;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -113,10 +115,47 @@ pub(crate) fn smoothed(
     judged(covariance, refined, &etas, &ln_hs, &solved)
 }
 
-/// All numbers as the fit has them, with the offsets as declared: what smoothness has taken off can no longer be held against a map that is known.
-pub(crate) fn as_fitted(problem: &Problem<'_>, covariance: &Covariance, steps: &[StepRows]) -> Smoothed {
-    let (etas, ln_hs) = quantities(problem, covariance, steps);
-    judged(covariance, None, &etas, &ln_hs, &[])
+/// The efficiencies as the steps alone have them, and what errors of the readings do to them: what smoothness has taken off can no longer
+/// be held against a map. Steps that have no say in what is shared are left out.
+pub(crate) fn as_measured(problem: &Problem<'_>, steps: &[StepRows]) -> Option<FittedEfficiencies> {
+    let problem = &problem.without_a_surface()?;
+    let covariance = &problem.covariance()?;
+    let (etas, _) = quantities(problem, covariance, steps);
+    let kept: Vec<usize> = (0..etas.len()).filter(|i| problem.members[*i].shares).collect();
+    // With an error of a reading known, the efficiency would be the higher by what it is found too low without.
+    let answer = |i: usize, row: usize| etas[i].by_shared[row] / covariance.shared[(row, row)];
+    let carried: Vec<usize> =
+        (0..covariance.fitted.len()).filter(|row| is_offset(covariance.fitted[*row])).collect();
+    let by_readings = |i: usize, j: usize| {
+        let one = |row: &usize| answer(i, *row) * answer(j, *row) * covariance.shared[(*row, *row)];
+        carried.iter().map(one).sum::<f64>()
+    };
+    let by_reading = |i: usize| {
+        CHANNELS.map(|channel| {
+            let row = carried.iter().find(|row| channel_of(covariance.fitted[**row]) == Some(channel))?;
+            let per_unit = -answer(i, *row);
+            let flow_kg_s = steps[i].end.flow_kg_s;
+            // The parameter of the flow meter is a gain.
+            Some(if channel == Channel::CompressorFlow { per_unit / flow_kg_s } else { per_unit })
+        })
+    };
+    Some(FittedEfficiencies {
+        positions: kept.iter().map(|i| steps[*i].position).collect(),
+        eta: kept.iter().map(|i| etas[*i].value).collect(),
+        covariance: DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
+            let (i, j) = (kept[i], kept[j]);
+            0.5 * (etas[i].by_eta[j] + etas[j].by_eta[i]) - by_readings(i, j)
+        }),
+        by_reading: kept.iter().map(|i| by_reading(*i)).collect(),
+    })
+}
+
+/// The channel to whose error a shared parameter belongs.
+fn channel_of(index: usize) -> Option<Channel> {
+    if index == FLOW_GAIN {
+        return Some(Channel::CompressorFlow);
+    }
+    OFFSET_CHANNELS.get(index.checked_sub(OFFSETS)?).copied()
 }
 
 fn judged(

@@ -4,7 +4,7 @@
 use crate::joint::explained::Explained;
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
-    ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, SHARED, SURFACE, SharedVector,
+    ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, REFINEMENTS, SHARED, SURFACE, SharedVector,
 };
 use mapper_core::FoundInlet;
 use mapper_numerics::coloured_noise::WhiteningFilter;
@@ -24,6 +24,9 @@ const DAMPING: DampingRule =
 pub(crate) const ROUGHLY: f64 = 1e-4;
 /// The same for the last fit: noise-free recordings are told by less than any standard error.
 pub(crate) const FULLY: f64 = 0.0;
+
+/// Spread of the efficiencies about a surface that says nothing, fraction.
+pub(crate) const NO_SURFACE_SIGMA: f64 = 1e3;
 
 /// One step in the fit.
 #[derive(Debug, Clone)]
@@ -375,6 +378,18 @@ impl Problem<'_> {
         let reduced = self.normal(&fitted).equations.reduced(0.0)?.matrix;
         let variance = reduced.cholesky()?.inverse()[(row, row)];
         Some(1.0 / variance - self.priors[index].weight())
+    }
+
+    /// The problem at its minimum when no efficiency is drawn to a surface: what each step and what all share say by themselves.
+    pub(crate) fn without_a_surface(&self) -> Option<Self> {
+        let mut free = self.clone();
+        free.surface_sigma = NO_SURFACE_SIGMA;
+        free.active[SURFACE..].fill(false);
+        for (index, slab_sigma, _) in REFINEMENTS {
+            free.priors[index].sigma = slab_sigma;
+        }
+        free.minimise(ROUGHLY)?;
+        Some(free)
     }
 
     /// The same problem with readings that have no offset and no gain.

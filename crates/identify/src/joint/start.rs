@@ -13,7 +13,7 @@ use crate::joint::parameters::{
     SHARED, SLOPE, SURFACE,
 };
 use crate::joint::rows::{StepRows, condensed};
-use crate::joint::solve::{Member, Problem};
+use crate::joint::solve::{Member, NO_SURFACE_SIGMA, Problem};
 use crate::joint::surface::{SurfaceScale, TERM_COUNT, dot};
 use crate::samples::Samples;
 use crate::window;
@@ -201,7 +201,7 @@ pub(crate) fn problem<'a>(
             Member { shares, ..member(step, found, &scale, mean_eta, config) }
         })
         .collect();
-    let surface_sigma = if shaped { 0.005 } else { 1e3 };
+    let surface_sigma = if shaped { 0.005 } else { NO_SURFACE_SIGMA };
     Some(Problem {
         setting,
         members,

@@ -92,7 +92,7 @@ impl SurfaceScale {
 }
 
 /// Middle and half of the range; a range of a tenth of the middle at least, so that a single point has one.
-fn middle_and_half_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+pub(crate) fn middle_and_half_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     let middle = 0.5 * (low + high);

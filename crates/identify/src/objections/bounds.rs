@@ -90,6 +90,7 @@ mod tests {
             p2_pa: 2e5,
             t1_k: 298.15,
             t2_k: 0.0,
+            tc_k: None,
             turbine_flow_kg_s: None,
             t3_k: Some(t3_k),
             t4_k: None,

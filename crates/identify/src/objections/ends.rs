@@ -7,7 +7,7 @@ use mapper_observe::plausible::is_reading;
 use mapper_physics::compression::isentropic_rise_ratio;
 
 /// Last part of a step, s.
-const LAST_S: f64 = 10.0;
+pub(crate) const LAST_S: f64 = 10.0;
 
 /// Medians over the last seconds of a step, total pressures, SI (speed in rpm).
 #[derive(Debug, Clone, Copy)]
@@ -21,6 +21,8 @@ pub(crate) struct Ends {
     pub(crate) p2_pa: f64,
     pub(crate) t1_k: f64,
     pub(crate) t2_k: f64,
+    /// Housing; `None` where it was not recorded.
+    pub(crate) tc_k: Option<f64>,
     /// Turbine side; `None` where it was not recorded.
     pub(crate) turbine_flow_kg_s: Option<f64>,
     pub(crate) t3_k: Option<f64>,
@@ -57,6 +59,7 @@ pub(crate) fn ends(recording: &Recording, config: &IdentifyConfig) -> Vec<Option
                 p2_pa: taps::total_pa(config.outlet_tap, at(Channel::P2)?, flow_kg_s, t2_k),
                 t1_k,
                 t2_k,
+                tc_k: at(Channel::Tc),
                 turbine_flow_kg_s: at(Channel::TurbineFlow),
                 t3_k: at(Channel::T3),
                 t4_k: at(Channel::T4),

@@ -8,35 +8,23 @@ mod bounds;
 mod clock;
 pub(crate) mod ends;
 mod frozen;
-mod head;
-pub(crate) mod housing;
-mod linear;
 mod noise;
-mod nominal_rig;
 pub(crate) mod objection;
 mod plausible;
 mod shaft_power;
 mod specific_speed;
 mod steps;
-mod valve;
-mod work;
 
 use crate::IdentifyConfig;
-use crate::dynamic::Estimate;
-use crate::nominal_map::NominalRig;
 use crate::objections::ends::{Ends, ends};
-use crate::objections::housing::Balance;
 use crate::objections::objection::Objection;
-use mapper_core::{Method, Recording};
+use mapper_core::Recording;
 
-/// All objections. `alone`: what the two-parameter method makes of each step; empty where there is no housing temperature.
+/// All objections, and the ends of the steps to which there is none.
 pub(crate) fn objections(
     recording: &Recording,
-    alone: &[Estimate],
     config: &IdentifyConfig,
-    nominal: Option<&NominalRig<'_>>,
-    balance: Balance,
-) -> Vec<Objection> {
+) -> (Vec<Objection>, Vec<Option<Ends>>) {
     let mut ends = ends(recording, config);
     let mut found = steps::objections(recording);
     found.extend(plausible::objections(recording, config));
@@ -47,24 +35,9 @@ pub(crate) fn objections(
     leave_out(&mut ends, &found);
     found.extend(specific_speed::objections(&ends));
     found.extend(bounds::objections(&ends));
-    found.extend(valve::objections(recording, &ends, config));
     found.extend(shaft_power::objections(&ends));
-    // What is said already would only be said again by those that fit all steps.
-    if found.iter().all(|objection| 2 * objection.steps.len() <= ends.len()) {
-        leave_out(&mut ends, &found);
-        let heads = head::objections(&ends);
-        // The work is reckoned with the head.
-        let works = if heads.is_empty() { work::objections(&ends, alone, config) } else { Vec::new() };
-        found.extend(heads);
-        found.extend(works);
-        if found.is_empty() && config.method != Method::Steady && balance == Balance::Asked {
-            found.extend(housing::objections(recording, config));
-        }
-        if let Some(nominal) = nominal.filter(|_| found.is_empty()) {
-            found.extend(nominal_rig::objections(&ends, nominal, config));
-        }
-    }
-    found
+    leave_out(&mut ends, &found);
+    (found, ends)
 }
 
 /// Takes away the ends of steps to which there are objections.

@@ -12,30 +12,22 @@
 //! standard error says.
 
 use crate::IdentifyConfig;
-use crate::findings::code;
-use crate::objections::linear::{Coefficient, fit};
-use crate::objections::objection::Objection;
+use crate::faults::readings::{CHANNELS, PerChannel, Readings, span_s};
+use crate::faults::rows::{Rows, common, own};
 use crate::samples::Samples;
 use mapper_core::{Channel, Recording, StepKind, StepMarker, Window};
 use mapper_numerics::statistics::mean;
 use mapper_physics::air;
 
-/// Whether the heat balance of the housing may object. An apparent efficiency has nothing to do with Tc.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Balance {
-    Asked,
-    NotAsked,
-}
-
 /// Begin of what is looked at, after that of the step, s: speed, flow and probe have settled.
 const AFTER_S: f64 = 10.0;
 /// Part over which the housing's slope is taken, s.
 const PART_S: f64 = 18.0;
-/// Shortest step that is looked at, behind that begin, s. In less, a dozen independent readings tell neither the slope nor the share:
-/// of twelve sound campaigns of such steps alone five came out 2.7 to 3.9 K off, with errors of 0.3 to 0.9 K.
+/// Most parts of a step: more tell nothing new, and the effort grows with the cube.
+const MAX_PARTS: f64 = 8.0;
+/// Shortest step that is looked at, behind that begin, s: three times the correlation time of noise tell neither slope nor share.
 const SHORTEST_S: f64 = 27.0;
-/// Points from which on one balance can be told from another. Repeats add none: where they alone were long enough, ten steps at two
-/// places closed only with 3.4 to 3.8 K, in three of forty sound campaigns.
+/// Points from which on one balance can be told from another. Repeats add none.
 const FEWEST_POINTS: usize = 8;
 /// Rows of a part and of a step, at least.
 const FEWEST_ROWS: usize = 10;
@@ -46,74 +38,105 @@ const ALIKE: f64 = 20.0;
 /// What a balance lacks, W, and share of the conductance.
 const LACKS_W: f64 = 10.0;
 const LACKS_RATIO: f64 = 0.05;
-/// Difference of T2 and Tc, K, that a housing of one temperature does not explain, beside three declared standard deviations.
-const MOST_K: f64 = 1.0;
-const OFFSETS: f64 = 3.0;
-/// The same of what comes over the run, K: a housing of two walls makes 3 K.
-const MOST_CREEP_K: f64 = 3.0;
-/// Standard errors that a finding has at least.
-const SIGMAS: f64 = 8.0;
+/// Difference of T2 and Tc that a housing of more than one temperature makes, one standard deviation, K: 1 K is three of it.
+const UNEVEN_K: f64 = 0.35;
+/// The same of what comes over the run as it warms up, K: a housing of two walls makes up to 3 K.
+const UNEVEN_CREEP_K: f64 = 1.0;
 /// Middle of what Tc and T4 are, so that the constants stay small, K.
 const AROUND_K: f64 = 330.0;
+/// Heat capacity of the housing, J/K, its loss, W/K and W, and alpha_A: any that turbochargers have, one standard deviation each.
+const ANY_CAPACITY_J_K: f64 = 3e3;
+const ANY_LOSS_W_K: f64 = 50.0;
+const ANY_LOSS_W: f64 = 3e3;
+const ANY_SHARE: f64 = 0.5;
 
 /// A part of a step.
 struct Part {
     slope_k_s: f64,
-    tc_k: f64,
     t1_k: f64,
-    over_k: f64,
+    t2_k: f64,
+    tc_k: f64,
     conductance_w_k: f64,
-    /// Of `conductance x over`, one standard deviation, W.
-    error_w: f64,
+    /// Error of the conductance by noise, which all parts of a step share, one standard deviation, W/K.
+    conductance_error_w_k: f64,
     middle_s: f64,
 }
 
-pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Option<Objection> {
-    let steps: Vec<Vec<Part>> = recording
-        .steps
-        .iter()
-        .map(|step| parts(recording, step.start_s + AFTER_S, step.end_s, config))
-        .collect();
+impl Part {
+    /// What area before the wheel adds beyond its distance from T1, per share of it, K: compression carries that heat on, and the slope
+    /// of T2 over Tc counts it with the heat after the wheel.
+    fn carried_on_k(&self) -> f64 {
+        (self.t2_k - self.t1_k) / self.t1_k * (self.t2_k - self.tc_k)
+    }
+}
+
+pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, refused: &[bool]) -> Option<Rows> {
+    let steps: Vec<Vec<Part>> =
+        recording
+            .steps
+            .iter()
+            .zip(refused)
+            .map(|(step, refused)| {
+                if *refused {
+                    Vec::new()
+                } else {
+                    parts(recording, step.start_s + AFTER_S, step.end_s, config)
+                }
+            })
+            .collect();
     let is_point =
         |(step, parts): &(&StepMarker, &Vec<Part>)| step.kind == StepKind::Point && !parts.is_empty();
     if recording.steps.iter().zip(&steps).filter(is_point).count() < FEWEST_POINTS {
         return None;
     }
     let parts: Vec<&Part> = steps.iter().flatten().collect();
-    let (first_s, last_s) = parts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), part| {
-        (low.min(part.middle_s), high.max(part.middle_s))
-    });
-    let column =
-        |of: &dyn Fn(&Part) -> f64| parts.iter().map(|part| of(part) / part.error_w).collect::<Vec<f64>>();
-    let values = column(&|part| part.conductance_w_k * part.over_k);
-    let mut columns = vec![
-        column(&|part| part.slope_k_s),
-        column(&|part| part.tc_k - AROUND_K),
-        column(&|_| 1.0),
-        column(&|part| part.conductance_w_k * (part.tc_k - part.t1_k)),
-        column(&|part| part.conductance_w_k),
+    let step_of: Vec<usize> =
+        steps.iter().enumerate().flat_map(|(step, parts)| vec![step; parts.len()]).collect();
+    let (first_s, last_s) = span_s(recording)?;
+    let run_ratio = |part: &Part| (part.middle_s - first_s) / (last_s - first_s);
+    let column = |of: &dyn Fn(&Part) -> f64| parts.iter().map(|part| of(part)).collect::<Vec<f64>>();
+    let any = [
+        (column(&|part| part.slope_k_s), ANY_CAPACITY_J_K),
+        (column(&|part| part.tc_k - AROUND_K), ANY_LOSS_W_K),
+        (column(&|_| 1.0), ANY_LOSS_W),
+        (column(&|part| part.conductance_w_k * (part.tc_k - part.t1_k)), ANY_SHARE),
+        (column(&|part| part.conductance_w_k * part.carried_on_k()), ANY_SHARE),
+        (column(&|part| part.conductance_w_k), UNEVEN_K),
+        (column(&|part| part.conductance_w_k * (run_ratio(part) - 0.5)), UNEVEN_CREEP_K),
     ];
-    let apart = *fit(&columns, &values)?.last()?;
-    columns
-        .push(column(&|part| part.conductance_w_k * ((part.middle_s - first_s) / (last_s - first_s) - 0.5)));
-    let creep = *fit(&columns, &values)?.last()?;
-    let offset =
-        |channel: Channel| config.declared.get(&channel).map_or(0.0, |declared| declared.offset_sigma);
-    let most_k = MOST_K + OFFSETS * offset(Channel::T2).hypot(offset(Channel::Tc));
-    let told = |found: Coefficient, most_k: f64| found.value.abs() > most_k.max(SIGMAS * found.error);
-    // Tc is named, for T2 has more that speaks for it.
-    let said = if told(creep, MOST_CREEP_K) {
-        format!("creeps by {:+.1} +/- {:.1} K over the run", -creep.value, 2.0 * creep.error)
-    } else if told(apart, most_k) {
-        format!("reads {:+.1} +/- {:.1} K too much", -apart.value, 2.0 * apart.error)
-    } else {
-        return None;
+    let covariance = any
+        .iter()
+        .map(|(column, sigma)| common(column, *sigma))
+        .fold(own(parts.iter().map(|part| LACKS_W + LACKS_RATIO * part.conductance_w_k)), |sum, one| {
+            sum + one
+        });
+    let by_conductance = column(&|part| part.conductance_error_w_k * (part.t2_k - part.tc_k));
+    let of_the_same_step = common(&by_conductance, 1.0)
+        .map_with_location(|i, j, shared| if step_of[i] == step_of[j] { shared } else { 0.0 });
+    let covariance = covariance + of_the_same_step;
+    let by_reading = |part: &&Part| -> PerChannel {
+        CHANNELS.map(|channel| match channel {
+            Channel::T2 => part.conductance_w_k,
+            Channel::Tc => -part.conductance_w_k,
+            _ => 0.0,
+        })
     };
-    let message = format!(
-        "the housing's heat balance, with what the gas gives it by T2 - Tc and what it stores by the slope of Tc, closes only if Tc {said} \
-         beside T2: Tc or T2 is off or creeps, or the thermocouple is not where the heat is; compare them at standstill (`zero`)"
-    );
-    Some(Objection::new(code::SCALED_CHANNEL, message, (0..recording.steps.len()).collect()))
+    // A gain of T2 scales the conductance too, which capacity and loss take up: what is left is its error at the housing's temperature.
+    let readings = |part: &&Part| {
+        let values = CHANNELS.map(|channel| match channel {
+            Channel::T1 => part.t1_k,
+            Channel::T2 | Channel::Tc => part.tc_k,
+            _ => f64::NAN,
+        });
+        Readings { values, run_ratio: run_ratio(part) }
+    };
+    Some(Rows {
+        residual: column(&|part| part.conductance_w_k * (part.t2_k - part.tc_k)),
+        covariance,
+        readings: parts.iter().map(readings).collect(),
+        by_reading: parts.iter().map(by_reading).collect(),
+        by_machine: Vec::new(),
+    })
 }
 
 /// The parts of a step; none where T2 does not say how far it follows the housing.
@@ -126,7 +149,7 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
     if !SHARES.contains(&(1.0 - kept)) {
         return Vec::new();
     }
-    let count = ((end_s - start_s) / PART_S).floor().min(8.0) as usize;
+    let count = ((end_s - start_s) / PART_S).floor().min(MAX_PARTS) as usize;
     let whole = samples.len();
     let part = |place: usize| {
         let range = place * whole / count..(place + 1) * whole / count;
@@ -135,7 +158,7 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
         }
         let of = |column: &[f64]| mean(&column[range.clone()]);
         let (middle_s, tc_k, t1_k) = (of(&samples.t_s)?, of(&samples.tc_k)?, of(&samples.t1_k)?);
-        let over_k = of(&samples.t2_k)? - tc_k;
+        let t2_k = of(&samples.t2_k)?;
         let capacity_w_k = of(&samples.flow_kg_s)? * air::heat_capacity_j_kgk(t1_k);
         let (top, bottom) = range.clone().fold((0.0, 0.0), |(top, bottom), i| {
             let since_s = samples.t_s[i] - middle_s;
@@ -143,16 +166,15 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
         });
         let conductance_w_k = capacity_w_k * (1.0 - kept) / kept;
         // d((1 - kept)/kept) = -d kept/kept^2.
-        let by_kept_w = capacity_w_k * error / (kept * kept) * over_k;
-        let error_w = by_kept_w.hypot(LACKS_W + LACKS_RATIO * conductance_w_k);
+        let conductance_error_w_k = capacity_w_k * error / (kept * kept);
         let slope_k_s = top / bottom;
-        (slope_k_s.is_finite() && error_w.is_finite()).then_some(Part {
+        (slope_k_s.is_finite() && conductance_error_w_k.is_finite()).then_some(Part {
             slope_k_s,
-            tc_k,
             t1_k,
-            over_k,
+            t2_k,
+            tc_k,
             conductance_w_k,
-            error_w,
+            conductance_error_w_k,
             middle_s,
         })
     };

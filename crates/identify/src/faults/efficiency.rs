@@ -1,0 +1,158 @@
+//! Efficiencies of the joint fit against a smooth map, or the declared one, as the logarithm of work over isentropic work: `-ln eta`.
+//!
+//! An error of a temperature adds to the work, so that large ones are nearly as linear as small ones, and a scale of all efficiencies
+//! is a constant. An error of one size counts in proportion to one over the rise, and so bends the map; what comes over the run is no map at all.
+
+use crate::faults::places::{Places, is_on_a_map};
+use crate::faults::readings::{PerChannel, Readings};
+use crate::faults::rows::{Machine, Rows, common, own};
+use crate::faults::smooth::{At, Smooth};
+use crate::nominal_rig::NominalRig;
+use mapper_core::ReferenceState;
+use mapper_physics::compression::isentropic_rise_ratio;
+use nalgebra::{DMatrix, DVector};
+
+/// Efficiencies as fitted, before the smoothness of the map has its say.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FittedEfficiencies {
+    /// Positions of the steps.
+    pub(crate) positions: Vec<usize>,
+    /// Fractions.
+    pub(crate) eta: Vec<f64>,
+    /// Their covariance, without the declared errors of the sensors.
+    pub(crate) covariance: DMatrix<f64>,
+    /// What an error of each reading of all steps does to each of them, per unit of the channel; `None` where no error of the channel is
+    /// declared, so that the fit does not know it.
+    pub(crate) by_reading: Vec<[Option<f64>; 7]>,
+}
+
+/// `-ln eta` of any compressor: it changes by 0.4 over a speed line and by some 0.1 over the speeds.
+const ANY_MAP: Smooth = Smooth {
+    terms: &[
+        (0, 0, 1.0),
+        (1, 0, 0.06),
+        (0, 1, 0.3),
+        (2, 0, 0.05),
+        (1, 1, 0.15),
+        (0, 2, 0.3),
+        (1, 2, 0.15),
+        (2, 1, 0.07),
+        (3, 0, 0.03),
+        (0, 3, 0.15),
+        (2, 2, 0.07),
+    ],
+    slow: 0.015,
+    amplitude: 0.03,
+    lengths: (0.7, 0.5),
+};
+/// What it does not follow, ratio: with it the chi-square of a measured map of 92 points is that of its points.
+const ANY_ROUGHNESS: f64 = 4e-3;
+/// Shape of a declared map's error, in units of its tolerance.
+const DECLARED_MAP: Smooth = Smooth { terms: &[], slow: 0.0, amplitude: 1.0, lengths: (0.7, 0.7) };
+/// What a declared map does not follow, ratio: a tenth of a point of efficiency.
+const ROUGHNESS: f64 = 1.5e-3;
+/// Heat between gas and housing that eqs. 1-3 lack or have too much of, ratio to what they have, one standard deviation. Judgement: most of
+/// what a law of convection lacks is in the fitted one.
+const HEAT_RATIO: f64 = 0.05;
+/// How far along its speed line a point may be misplaced by the tolerances of flow map and valve, in units of the line's
+/// largest flow and largest PR - 1, one standard deviation.
+const PLACE_RATIO: f64 = 0.01;
+
+/// Efficiencies that are used: beyond, a point says nothing of the work.
+const USED: std::ops::RangeInclusive<f64> = 0.05..=3.0;
+
+/// `readings`: of all steps, by position.
+pub(crate) fn rows(
+    fitted: &FittedEfficiencies,
+    readings: &[Option<Readings>],
+    reference: ReferenceState,
+    nominal: Option<&NominalRig<'_>>,
+) -> Option<Rows> {
+    // With the slope along the speed line.
+    let expected = |readings: &Readings| match nominal {
+        Some(nominal) => nominal.efficiency(readings).map(|(eta, slope)| (-eta.ln(), slope / eta)),
+        None => Some((0.0, 0.0)),
+    };
+    let known: Vec<(usize, Readings, (f64, f64))> = fitted
+        .positions
+        .iter()
+        .enumerate()
+        .filter_map(|(row, position)| {
+            let readings = (*readings.get(*position)?).filter(is_on_a_map)?;
+            let (ln_work, slope) = expected(&readings)?;
+            (USED.contains(&fitted.eta[row]) && ln_work.is_finite()).then_some((
+                row,
+                readings,
+                (ln_work, slope),
+            ))
+        })
+        .collect();
+    let count = known.len();
+    let readings: Vec<Readings> = known.iter().map(|(_, readings, _)| *readings).collect();
+    let places = Places::of(&readings, reference)?;
+    let at: Vec<At> = readings.iter().map(|readings| places.at(readings)).collect();
+    let residual: Vec<f64> =
+        known.iter().map(|(row, _, (ln_work, _))| -fitted.eta[*row].ln() - ln_work).collect();
+    let by_eta: Vec<f64> = known.iter().map(|(row, _, _)| -fitted.eta[*row].recip()).collect();
+    let measured = DMatrix::from_fn(count, count, |i, j| {
+        by_eta[i] * by_eta[j] * fitted.covariance[(known[i].0, known[j].0)]
+    });
+    let heat: Vec<f64> = known.iter().map(|(row, readings, _)| heat(readings, fitted.eta[*row])).collect();
+    let measured = measured + common(&heat, HEAT_RATIO);
+    let (covariance, by_machine, by_place): (_, _, Vec<PerChannel>) = match nominal {
+        Some(nominal) => {
+            let tolerances = nominal.tolerances;
+            let all = vec![1.0; count];
+            let shape = tolerances.efficiency_shape_ratio.powi(2) * DECLARED_MAP.covariance(&at);
+            let misplaced = known.iter().map(|(_, _, (_, slope))| (PLACE_RATIO * slope).hypot(ROUGHNESS));
+            let covariance = measured
+                + own(misplaced.collect::<Vec<_>>().into_iter())
+                + common(&all, tolerances.compressor_efficiency_ratio)
+                + shape;
+            let map = |readings: &Readings| expected(readings).map_or(f64::NAN, |(ln_work, _)| ln_work);
+            let by_place = readings.iter().map(|readings| readings.derivatives(map)).collect();
+            (covariance, vec![(Machine::Efficiency, vec![-1.0; count])], by_place)
+        }
+        None => {
+            let covariance = measured + own(vec![ANY_ROUGHNESS; count].into_iter()) + ANY_MAP.covariance(&at);
+            let weights = covariance.clone().cholesky()?.solve(&DVector::from_column_slice(&residual));
+            let map = |readings: &Readings| ANY_MAP.value(&places.at(readings), &at, &weights);
+            let by_place = readings.iter().map(|readings| readings.derivatives(map)).collect();
+            (covariance, Vec::new(), by_place)
+        }
+    };
+    let by_reading = (0..count).map(|i| {
+        let (row, readings, _) = &known[i];
+        let (by_fit, apparent) = (fitted.by_reading[*row], readings.derivatives(apparent));
+        std::array::from_fn(|channel| {
+            by_eta[i] * by_fit[channel].unwrap_or(apparent[channel]) - by_place[i][channel]
+        })
+    });
+    let by_reading = by_reading.collect();
+    let readings =
+        known.iter().map(|(row, readings, _)| as_gains_count(readings, fitted.eta[*row])).collect();
+    Some(Rows { residual, covariance, readings, by_reading, by_machine })
+}
+
+/// Efficiency of a compressor without heat.
+fn apparent(readings: &Readings) -> f64 {
+    isentropic_rise_k(readings) / (readings.t2_k() - readings.t1_k())
+}
+
+fn isentropic_rise_k(readings: &Readings) -> f64 {
+    readings.t1_k() * isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), readings.t1_k())
+}
+
+/// Temperature that the gas lost to the housing, over its rise by compression.
+fn heat(readings: &Readings, eta: f64) -> f64 {
+    let rise_k = isentropic_rise_k(readings) / eta;
+    (readings.t1_k() + rise_k - readings.t2_k()) / rise_k
+}
+
+/// Readings with the temperature at which a gain of T2 or Tc counts. Such a gain changes the slope of T2 over Tc too, which convection takes
+/// up: what is left is its error where both would be, at the temperature after compression without heat.
+fn as_gains_count(readings: &Readings, eta: f64) -> Readings {
+    let mut other = *readings;
+    [other.values[1], other.values[2]] = [readings.t1_k() + isentropic_rise_k(readings) / eta; 2];
+    other
+}

@@ -1,0 +1,140 @@
+//! A fault that was found, and its words.
+
+use crate::faults::rows::Machine;
+use mapper_core::Channel;
+use mapper_observe::sensor_fault::{FaultKind, SensorFault};
+use serde::{Serialize, Serializer};
+use std::fmt;
+
+/// What may be wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Suspect {
+    /// One or several sensors.
+    Sensor(SensorFault),
+    /// The machine is not as declared, ratio.
+    Machine(Machine),
+}
+
+/// A fault without which the balances of a recording do not close.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundFault {
+    /// The most probable one.
+    pub suspect: Suspect,
+    /// Its size, in the unit of the suspect.
+    pub value: f64,
+    /// One standard deviation of the size.
+    pub sigma: f64,
+    /// Others that explain the recording nearly as well: at least one twentieth as probable.
+    pub alternatives: Vec<Suspect>,
+}
+
+impl Suspect {
+    /// The channels concerned; none for a machine.
+    pub fn channels(&self) -> &'static [Channel] {
+        match self {
+            Suspect::Sensor(fault) => fault.channels,
+            Suspect::Machine(_) => &[],
+        }
+    }
+
+    /// Factor and unit in which people write its size.
+    fn scale(&self) -> (f64, &'static str) {
+        let Suspect::Sensor(SensorFault { channels, kind, .. }) = self else { return (100.0, "%") };
+        match (kind, channels) {
+            (FaultKind::Gain, _) | (FaultKind::Creep, [Channel::CompressorFlow | Channel::ShaftSpeed]) => {
+                (100.0, "%")
+            }
+            (_, [Channel::P1 | Channel::P2, ..]) => (1e-3, "kPa"),
+            (_, [Channel::CompressorFlow]) => (1e3, "g/s"),
+            (_, [Channel::ShaftSpeed]) => (1e-3, "krpm"),
+            _ => (1.0, "K"),
+        }
+    }
+}
+
+/// For a program: what it is, its size in SI units or as a ratio, what else it may be.
+impl Serialize for FoundFault {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Shown {
+            fault: String,
+            channels: &'static [Channel],
+            value: f64,
+            sigma: f64,
+            unit: &'static str,
+            alternatives: Vec<String>,
+        }
+        let unit = match self.suspect.scale().1 {
+            "%" => "1",
+            "kPa" => "Pa",
+            "g/s" => "kg/s",
+            "krpm" => "rpm",
+            other => other,
+        };
+        let alternatives = self.alternatives.iter().map(ToString::to_string).collect();
+        let (fault, channels) = (self.suspect.to_string(), self.suspect.channels());
+        Shown { fault, channels, value: self.value, sigma: self.sigma, unit, alternatives }
+            .serialize(serializer)
+    }
+}
+
+/// Without its size: `offset of T2`.
+impl fmt::Display for Suspect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Suspect::Sensor(fault) => {
+                let kind = match fault.kind {
+                    FaultKind::Offset => "offset",
+                    FaultKind::Gain => "gain error",
+                    FaultKind::Creep => "creep",
+                };
+                write!(f, "{kind} of {}", together(fault.channels))
+            }
+            Suspect::Machine(machine) => f.write_str(machine_name(*machine)),
+        }
+    }
+}
+
+/// With its size, its 95 % interval and what else it may be.
+impl fmt::Display for FoundFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (scale, unit) = self.suspect.scale();
+        let size = format!("{:+.2} +/- {:.2} {unit}", scale * self.value, 1.96 * scale * self.sigma);
+        match self.suspect {
+            Suspect::Sensor(fault) => {
+                let channels = together(fault.channels);
+                match fault.kind {
+                    FaultKind::Offset => write!(f, "{channels} reads {size} too much"),
+                    FaultKind::Gain => write!(f, "{channels} has a gain error of {size}"),
+                    FaultKind::Creep => write!(f, "{channels} creeps by {size} over the run"),
+                }?;
+            }
+            Suspect::Machine(machine) => {
+                write!(f, "the {} is {size} off its declaration", machine_name(machine))?
+            }
+        }
+        match self.alternatives.as_slice() {
+            [] => Ok(()),
+            others => {
+                let others: Vec<String> = others.iter().map(ToString::to_string).collect();
+                write!(f, " (or: {})", others.join("; "))
+            }
+        }
+    }
+}
+
+fn machine_name(machine: Machine) -> &'static str {
+    match machine {
+        Machine::FlowCapacity => "flow of the declared map",
+        Machine::Efficiency => "efficiency of the declared map",
+        Machine::ValveArea => "area of the declared valve",
+    }
+}
+
+fn together(channels: &[Channel]) -> String {
+    let names: Vec<String> = channels.iter().map(ToString::to_string).collect();
+    match names.as_slice() {
+        [rest @ .., last] if !rest.is_empty() => format!("{} and {last} together", rest.join(", ")),
+        _ => names.join(""),
+    }
+}

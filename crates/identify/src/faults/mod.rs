@@ -1,0 +1,147 @@
+//! Faults of sensors and machine, found by the balances that they break.
+//!
+//! Each balance is a law with a declared uncertainty: one opening of the valve has one area, heads go with the speed squared, the
+//! housing stores what the gas gives it, efficiency is a smooth function of the place on the map. The catalogue of sensor faults
+//! ([`mapper_observe::sensor_fault`]) and a machine of another scale are the hypotheses; [`mapper_inference::hypotheses`] finds the most
+//! probable set of them, at one rate of false alarms for the whole recording.
+
+pub(crate) mod efficiency;
+pub(crate) mod found;
+mod head;
+mod housing;
+mod places;
+pub(crate) mod readings;
+pub(crate) mod rows;
+mod smooth;
+mod valve;
+
+use crate::IdentifyConfig;
+use crate::faults::efficiency::FittedEfficiencies;
+use crate::faults::found::{FoundFault, Suspect};
+use crate::faults::readings::{CHANNELS, Readings, span_s};
+use crate::faults::rows::{MACHINE, Rows};
+use crate::findings::code;
+use crate::nominal_rig::NominalRig;
+use crate::objections::ends::Ends;
+use crate::objections::objection::Objection;
+use mapper_core::{Channel, Method, Recording};
+use mapper_inference::hypotheses::{Likelihood, Member, Priors};
+use mapper_observe::sensor_fault::CATALOGUE;
+
+/// Faults of a recording that are expected beforehand: one recording in ten has one. Judgement; the figures of docs/validation/faults.md were
+/// found with it.
+const EXPECTED_FAULTS: f64 = 0.1;
+/// What a machine may be off its declaration by, ratio, one standard deviation: another machine of the same series.
+const OTHER_MACHINE_RATIO: f64 = 0.05;
+/// Relative probability from which on an alternative is named: one in twenty.
+const ALTERNATIVE: f64 = 0.05;
+/// The same below which it is as good as excluded: one in a thousand.
+const HARMLESS: f64 = 1e-3;
+
+/// All balances of a recording, and what is known of the parameters beforehand. `ends`: of the steps that have a say. `fitted`: efficiencies
+/// of the joint fit, where there is one.
+pub(crate) fn likelihood(
+    recording: &Recording,
+    ends: &[Option<Ends>],
+    fitted: Option<&FittedEfficiencies>,
+    config: &IdentifyConfig,
+    nominal: Option<&NominalRig<'_>>,
+) -> Option<(Likelihood, Priors)> {
+    let priors = priors(config, nominal);
+    let mut likelihood = Likelihood::new(priors.always.len() + priors.hypotheses.len());
+    for rows in balances(recording, ends, fitted, config, nominal)? {
+        // A balance without a density says nothing.
+        let _ = likelihood.add(&rows.balance(&CATALOGUE));
+    }
+    Some((likelihood, priors))
+}
+
+/// Faults without which the balances of a recording do not close; empty where they do.
+pub(crate) fn find(likelihood: &Likelihood, priors: &Priors, method: Method) -> Vec<FoundFault> {
+    let of_the_housing = |index: usize| suspect(index).channels() == [Channel::Tc];
+    let harmless = |member: &Member| {
+        let others = member.alternatives.iter().take_while(|(_, relative)| *relative > HARMLESS);
+        of_the_housing(member.index) && others.into_iter().all(|(index, _)| of_the_housing(*index))
+    };
+    let members = likelihood.explain(priors).unwrap_or_default().members.into_iter();
+    // An apparent efficiency has nothing to do with the housing.
+    members
+        .filter(|member| method != Method::Steady || !harmless(member))
+        .map(|member| {
+            let others = member.alternatives.iter().take_while(|(_, relative)| *relative > ALTERNATIVE);
+            FoundFault {
+                suspect: suspect(member.index),
+                value: member.value,
+                sigma: member.sigma,
+                alternatives: others.map(|(index, _)| suspect(*index)).collect(),
+            }
+        })
+        .collect()
+}
+
+/// What speaks against all points where there are faults.
+pub(crate) fn objection(faults: &[FoundFault], steps: usize) -> Option<Objection> {
+    let sensors = faults.iter().any(|fault| matches!(fault.suspect, Suspect::Sensor(_)));
+    let code = if sensors { code::CONTRADICTED_CHANNEL } else { code::OFF_THE_NOMINAL_MAP };
+    let said: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    let message = format!(
+        "valve, head, heat of the housing and efficiencies do not agree unless {}: compare the channels at standstill (`zero`), and mend \
+         or declare what is off",
+        said.join(", and ")
+    );
+    (!faults.is_empty()).then(|| Objection::new(code, message, (0..steps).collect()))
+}
+
+/// Standard error with which the balances tell each suspect by itself, in its unit.
+pub(crate) fn standard_errors(likelihood: &Likelihood, priors: &Priors) -> Vec<(Suspect, f64)> {
+    let errors = likelihood.standard_errors(priors).unwrap_or_default();
+    errors.into_iter().enumerate().map(|(index, error)| (suspect(index), error)).collect()
+}
+
+/// The hypothesis at this position: the catalogue, then the machine.
+fn suspect(index: usize) -> Suspect {
+    match CATALOGUE.get(index) {
+        Some(fault) => Suspect::Sensor(*fault),
+        None => Suspect::Machine(MACHINE[index - CATALOGUE.len()]),
+    }
+}
+
+fn balances(
+    recording: &Recording,
+    ends: &[Option<Ends>],
+    fitted: Option<&FittedEfficiencies>,
+    config: &IdentifyConfig,
+    nominal: Option<&NominalRig<'_>>,
+) -> Option<Vec<Rows>> {
+    let (first_s, last_s) = span_s(recording)?;
+    let refused: Vec<bool> = ends.iter().map(Option::is_none).collect();
+    let all: Vec<Option<Readings>> =
+        ends.iter().map(|end| end.as_ref().map(|end| Readings::of(end, first_s, last_s))).collect();
+    let readings: Vec<Readings> = all.iter().flatten().copied().collect();
+    let opened: Vec<(f64, Readings)> =
+        ends.iter().flatten().map(|end| end.valve_opening_ratio).zip(readings.iter().copied()).collect();
+    let noise = readings::noise(config, recording);
+    let reference = config.reference;
+    let mut balances: Vec<Rows> = Vec::new();
+    balances.extend(valve::rows(&opened, &noise, nominal));
+    balances.extend(head::rows(&readings, &noise, reference, nominal));
+    balances.extend(housing::rows(recording, config, &refused));
+    balances.extend(fitted.and_then(|fitted| efficiency::rows(fitted, &all, reference, nominal)));
+    Some(balances)
+}
+
+fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
+    let declared = |channel: &Channel| config.declared.get(channel).copied().unwrap_or_default();
+    let meter = nominal.map_or(0.0, |nominal| nominal.tolerances.flow_meter_gain_ratio);
+    let gain = |channel: &Channel| {
+        let more = if *channel == Channel::CompressorFlow { meter } else { 0.0 };
+        declared(channel).gain_sigma_ratio.hypot(more)
+    };
+    let offsets = CHANNELS.iter().map(|channel| declared(channel).offset_sigma);
+    let machine = MACHINE.iter().map(|_| OTHER_MACHINE_RATIO);
+    Priors {
+        always: offsets.chain(CHANNELS.iter().map(gain)).collect(),
+        hypotheses: CATALOGUE.iter().map(|fault| fault.sigma).chain(machine).collect(),
+        expected: EXPECTED_FAULTS,
+    }
+}

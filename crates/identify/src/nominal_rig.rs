@@ -1,0 +1,70 @@
+//! The declared map beside a point: the speed that belongs to its flow and pressure ratio, and the efficiency there.
+
+use crate::faults::readings::Readings;
+use mapper_core::ModelTolerances;
+use mapper_numerics::polyline::NearestOnPolyline;
+use mapper_numerics::root::bisect;
+use mapper_physics::model::Model;
+
+/// What a campaign declares of its rig, and how far it may be off it.
+#[derive(Debug, Clone, Copy)]
+pub struct NominalRig<'a> {
+    /// Map, valve and geometry.
+    pub model: &'a Model,
+    /// One-sigma tolerances.
+    pub tolerances: &'a ModelTolerances,
+}
+
+/// Range about the measured speed in which the map's own is sought.
+const SPEEDS: (f64, f64) = (0.4, 2.5);
+/// Relative error of that speed, far below all tolerances.
+const SPEED_ERROR: f64 = 1e-7;
+/// Places of a speed line among which the nearest is sought.
+const PLACES: usize = 200;
+/// Beyond the surge point, share of the line's PR - 1: a rig may reach further than its map.
+const BEYOND_SURGE: f64 = 0.03;
+
+impl NominalRig<'_> {
+    /// Physical speed at which the map has a point's flow and pressure ratio, rpm; `None` where none near the measured one has.
+    pub(crate) fn speed_rpm(&self, readings: &Readings) -> Option<f64> {
+        let map = self.model.map.as_ref();
+        let reference = map.reference();
+        let flow_kg_s =
+            reference.corrected_flow_kg_s(readings.flow_kg_s(), readings.t1_k(), readings.p1_pa());
+        let ratio = readings.p2_pa() / readings.p1_pa();
+        let missing_kg_s = |speed_rpm: f64| {
+            let corrected_rpm = reference.corrected_speed_rpm(speed_rpm, readings.t1_k());
+            map.evaluate(corrected_rpm, ratio).flow_corrected_kg_s - flow_kg_s
+        };
+        let speed_rpm = readings.speed_rpm();
+        let (low, high) = (SPEEDS.0 * speed_rpm, SPEEDS.1 * speed_rpm);
+        (low > 0.0 && missing_kg_s(low) < 0.0 && missing_kg_s(high) > 0.0).then_some(())?;
+        Some(bisect(low, high, SPEED_ERROR * speed_rpm, |speed_rpm| missing_kg_s(speed_rpm) < 0.0).0)
+    }
+
+    /// Efficiency of the map at the place of the speed line that is nearest to a point, and its slope along the line per unit of the
+    /// line's largest flow and largest PR - 1. By flow near choke and by pressure ratio near surge at once: each alone says little of the
+    /// place at the other end.
+    pub(crate) fn efficiency(&self, readings: &Readings) -> Option<(f64, f64)> {
+        let map = self.model.map.as_ref();
+        let reference = map.reference();
+        let corrected_rpm = reference.corrected_speed_rpm(readings.speed_rpm(), readings.t1_k());
+        let flow_kg_s =
+            reference.corrected_flow_kg_s(readings.flow_kg_s(), readings.t1_k(), readings.p1_pa());
+        let (_, top) = map.surge_point(corrected_rpm);
+        let largest_kg_s = map.choke_flow_corrected_kg_s(corrected_rpm);
+        (top > 1.0 && largest_kg_s > 0.0).then_some(())?;
+        let places: Vec<((f64, f64), f64)> = (0..=PLACES)
+            .map(|k| {
+                let share = (1.0 + BEYOND_SURGE) * k as f64 / PLACES as f64;
+                let place = map.evaluate(corrected_rpm, 1.0 + (top - 1.0) * share);
+                ((place.flow_corrected_kg_s / largest_kg_s, share), place.efficiency)
+            })
+            .collect();
+        let line: Vec<(f64, f64)> = places.iter().map(|(at, _)| *at).collect();
+        let here = (flow_kg_s / largest_kg_s, (readings.p2_pa() / readings.p1_pa() - 1.0) / (top - 1.0));
+        let NearestOnPolyline { segment, share_ratio, .. } = NearestOnPolyline::of(&line, here)?;
+        let (((ax, ay), a), ((bx, by), b)) = (places[segment], places[segment + 1]);
+        Some((a + share_ratio * (b - a), (b - a) / (bx - ax).hypot(by - ay).max(1e-9)))
+    }
+}

@@ -119,7 +119,7 @@ pub fn identify_beside(
     let mut balances = likelihood(None);
     let mut faults = balances.as_ref().map(find).unwrap_or_default();
     let known: Vec<Option<EndState>> = states.iter().map(|state| state.as_ref().ok().copied()).collect();
-    let condemned = !faults.is_empty()
+    let condemned = faults.iter().any(|fault| !fault.is_harmless())
         || (0..known.len()).all(|step| objections.iter().any(|objection| objection.steps.contains(&step)));
     let together = |findings: &mut [Findings], alone: Vec<Estimate>, told: Vec<Findings>| {
         let known = without_the_refused(known.clone(), &objections, findings);
@@ -156,6 +156,9 @@ pub fn identify_beside(
         faults = balances.as_ref().map(find).unwrap_or_default();
     }
     objections.extend(faults::objection(&faults, ends.len()));
+    if let Some(remark) = faults::remark(&faults) {
+        findings.iter_mut().for_each(|findings| findings.remark(code::OFF_THE_NOMINAL_MAP, remark.clone()));
+    }
     // First what speaks against the readings: whatever else is said of a point rests on them.
     for objection in objections.iter().rev() {
         for position in &objection.steps {

@@ -10,9 +10,9 @@ mod common;
 #[path = "common/lab.rs"]
 mod lab;
 
-use lab::{Machine, campaign, measured};
-use mapper_core::{Method, ModelTolerances, Recording};
-use mapper_identify::{Identified, IdentifyConfig, NominalRig, Suspect, identify_beside};
+use lab::{Machine as LabMachine, campaign, measured};
+use mapper_core::{Method, ModelTolerances, Recording, Verdict};
+use mapper_identify::{Identified, IdentifyConfig, Machine, NominalRig, Suspect, identify_beside};
 use mapper_observe::sensor_fault::CATALOGUE;
 use mapper_physics::model::Model;
 use rand::seq::SliceRandom;
@@ -36,11 +36,11 @@ fn drawn(seed: u64) -> Drawn {
     let or = |rng: &mut Pcg64, neutral: f64, low: f64, high: f64| {
         if rng.random_bool(0.5) { neutral } else { rng.random_range(low..high) }
     };
-    let machine = Machine {
+    let machine = LabMachine {
         alpha: or(&mut rng, 0.0, 0.0, 0.2),
         probe_m: or(&mut rng, 0.0, 0.5e-3, 2e-3),
         direction: or(&mut rng, 1.0, 0.7, 1.1),
-        ..Machine::default()
+        ..LabMachine::default()
     };
     let mut points: Vec<(f64, f64)> = [0.5, 0.8, 1.2, 1.8]
         .into_iter()
@@ -94,6 +94,28 @@ fn outcome(drawn: &Drawn, suspect: &Suspect, size: f64) -> Outcome {
 
 fn machines() -> u64 {
     std::env::var("MAPPER_FAULT_MACHINES").map_or(6, |count| count.parse().unwrap())
+}
+
+/// A valve of 5 % more area than declared is named with its size, and no point rests on it.
+#[test]
+fn another_valve_is_named_and_leaves_the_points_as_they_are() {
+    let drawn = drawn(9002);
+    let (mut model, tolerances) = (Model::nominal(), ModelTolerances::default());
+    let good = |model: &Model| {
+        let nominal = NominalRig { model, tolerances: &tolerances };
+        let found = identify_beside(&drawn.recording, &drawn.config, Some(nominal)).unwrap();
+        let good = found.points.iter().flatten().filter(|point| point.verdict == Verdict::Good).count();
+        (good, found.faults)
+    };
+    let (good_as_declared, faults) = good(&model);
+    assert!(good_as_declared > 15 && faults.is_empty(), "{good_as_declared} good, {faults:?}");
+    model.params.outlet.valve_area_m2 /= 1.05;
+    let (good_with_another, faults) = good(&model);
+    assert_eq!(good_with_another, good_as_declared);
+    let [fault] = faults.as_slice() else { panic!("{faults:?}") };
+    assert_eq!(fault.suspect, Suspect::Machine(Machine::ValveArea));
+    // A tolerance of 0.5 % draws it towards none.
+    assert!((fault.value - 0.05).abs() < 3.0 * fault.sigma.hypot(0.005), "{fault}");
 }
 
 #[test]

@@ -79,17 +79,29 @@ pub(crate) fn find(likelihood: &Likelihood, priors: &Priors, method: Method) -> 
         .collect()
 }
 
-/// What speaks against all points where there are faults.
+/// What speaks against all points where there are faults that touch them.
 pub(crate) fn objection(faults: &[FoundFault], steps: usize) -> Option<Objection> {
+    if faults.iter().all(FoundFault::is_harmless) {
+        return None;
+    }
     let sensors = faults.iter().any(|fault| matches!(fault.suspect, Suspect::Sensor(_)));
     let code = if sensors { code::CONTRADICTED_CHANNEL } else { code::OFF_THE_NOMINAL_MAP };
-    let said: Vec<String> = faults.iter().map(ToString::to_string).collect();
     let message = format!(
-        "valve, head, heat of the housing and efficiencies do not agree unless {}: compare the channels at standstill (`zero`), and mend \
-         or declare what is off",
-        said.join(", and ")
+        "{}: compare the channels at standstill (`zero`), and mend or declare what is off",
+        described(faults)
     );
-    (!faults.is_empty()).then(|| Objection::new(code, message, (0..steps).collect()))
+    Some(Objection::new(code, message, (0..steps).collect()))
+}
+
+/// What is to be known of faults that leave the points as they are.
+pub(crate) fn remark(faults: &[FoundFault]) -> Option<String> {
+    let harmless = !faults.is_empty() && faults.iter().all(FoundFault::is_harmless);
+    harmless.then(|| format!("{}; the points do not rest on it", described(faults)))
+}
+
+fn described(faults: &[FoundFault]) -> String {
+    let said: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    format!("valve, head, heat of the housing and efficiencies do not agree unless {}", said.join(", and "))
 }
 
 /// Standard error with which the balances tell each suspect by itself, in its unit.

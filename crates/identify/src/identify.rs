@@ -133,7 +133,7 @@ pub fn identify_beside(
             joint.estimates
         }
         method => {
-            if whole && !alone.is_empty() {
+            if whole && nominal.is_some() && !alone.is_empty() {
                 // The other methods do not tell what a sensor does to an efficiency; their points stay theirs.
                 fitted = together(&mut findings.clone(), alone.clone(), told.clone()).fitted;
             }

@@ -110,16 +110,16 @@ pub fn identify_beside(
         Default::default()
     };
     let (mut objections, ends) = objections(recording, config);
-    // Faults are faults of a recording that else is one: not where half of it is refused.
+    // Where half of the recording is refused already, what is left contradicts itself for that reason.
     let whole = objections.iter().all(|objection| 2 * objection.steps.len() <= ends.len());
     let likelihood = |fitted: Option<&FittedEfficiencies>| {
-        faults::likelihood(recording, &ends, fitted, config, nominal.as_ref()).filter(|_| whole)
+        whole.then(|| faults::likelihood(recording, &ends, fitted, config, nominal.as_ref()))?
     };
     let find = |(likelihood, priors): &(Likelihood, Priors)| faults::find(likelihood, priors, config.method);
     let mut balances = likelihood(None);
     let mut faults = balances.as_ref().map(find).unwrap_or_default();
     let known: Vec<Option<EndState>> = states.iter().map(|state| state.as_ref().ok().copied()).collect();
-    let condemned = faults.iter().any(|fault| !fault.is_harmless())
+    let condemned = faults.iter().any(|fault| fault.touches_points)
         || (0..known.len()).all(|step| objections.iter().any(|objection| objection.steps.contains(&step)));
     let together = |findings: &mut [Findings], alone: Vec<Estimate>, told: Vec<Findings>| {
         let known = without_the_refused(known.clone(), &objections, findings);
@@ -134,7 +134,7 @@ pub fn identify_beside(
         }
         method => {
             if whole && nominal.is_some() && !alone.is_empty() {
-                // The other methods do not tell what a sensor does to an efficiency; their points stay theirs.
+                // Only the joint fit knows what an error of each sensor does to the efficiencies. The points stay those of the method.
                 fitted = together(&mut findings.clone(), alone.clone(), told.clone()).fitted;
             }
             if method == Method::Steady {

@@ -1,4 +1,4 @@
-//! The declared map beside a point: the speed that belongs to its flow and pressure ratio, and the efficiency there.
+//! What the declared map has for a measured point: the speed that belongs to its flow and pressure ratio, and the efficiency there.
 
 use crate::faults::readings::Readings;
 use mapper_core::ModelTolerances;

@@ -126,7 +126,7 @@ fn faults_are_found_and_named_and_none_is_invented() {
     let results = mapper_numerics::parallel::map(&seeds, |seed| {
         let drawn = drawn(*seed);
         let sound = found(&drawn, &drawn.recording);
-        let told: Vec<(usize, Suspect, f64)> = sound
+        let tellable: Vec<(usize, Suspect, f64)> = sound
             .tells
             .iter()
             .enumerate()
@@ -135,8 +135,8 @@ fn faults_are_found_and_named_and_none_is_invented() {
             .filter(|(index, (_, error))| SIGMAS * error < 10.0 * CATALOGUE[*index].sigma)
             .map(|(index, (suspect, error))| (index, *suspect, *error))
             .collect();
-        let outcomes: Vec<(usize, Outcome)> = (0..per_machine.min(told.len()))
-            .map(|k| told[(*seed as usize * per_machine + k) % told.len()])
+        let outcomes: Vec<(usize, Outcome)> = (0..per_machine.min(tellable.len()))
+            .map(|k| tellable[(*seed as usize * per_machine + k) % tellable.len()])
             .map(|(index, suspect, error)| {
                 let sign = if (*seed as usize + index).is_multiple_of(2) { 1.0 } else { -1.0 };
                 (index, outcome(&drawn, &suspect, sign * SIGMAS * error))

@@ -12,7 +12,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Most members of an explanation. Beyond, what is wrong is no longer a matter of single faults.
+/// Most members of an explanation: bounds the search. Judgement.
 const MAX_MEMBERS: usize = 4;
 
 /// Residuals with what may move them.

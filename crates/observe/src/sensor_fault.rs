@@ -13,7 +13,7 @@ pub enum FaultKind {
     Gain,
     /// Nothing at the start of the run and the size at its end, in between in proportion to the time: unit of the channel, but a ratio to the
     /// reading for flow and speed.
-    Creep,
+    Drift,
 }
 
 /// A fault of one or several sensors.
@@ -43,7 +43,7 @@ const fn fault(channels: &'static [Channel], kind: FaultKind, sigma: f64) -> Sen
 /// All faults that are looked for.
 pub const CATALOGUE: [SensorFault; 25] = {
     use Channel::{CompressorFlow, P1, P2, ShaftSpeed, T1, T2, Tc};
-    use FaultKind::{Creep, Gain, Offset};
+    use FaultKind::{Drift, Gain, Offset};
     [
         fault(&[T1], Offset, TEMPERATURE_K),
         fault(&[T2], Offset, TEMPERATURE_K),
@@ -51,24 +51,24 @@ pub const CATALOGUE: [SensorFault; 25] = {
         fault(&[T1, T2, Tc], Offset, TEMPERATURE_K),
         fault(&[T2], Gain, RATIO),
         fault(&[Tc], Gain, RATIO),
-        fault(&[T1], Creep, TEMPERATURE_K),
-        fault(&[T2], Creep, TEMPERATURE_K),
-        fault(&[Tc], Creep, TEMPERATURE_K),
-        fault(&[T1, T2, Tc], Creep, TEMPERATURE_K),
+        fault(&[T1], Drift, TEMPERATURE_K),
+        fault(&[T2], Drift, TEMPERATURE_K),
+        fault(&[Tc], Drift, TEMPERATURE_K),
+        fault(&[T1, T2, Tc], Drift, TEMPERATURE_K),
         fault(&[P1], Offset, PRESSURE_PA),
         fault(&[P2], Offset, PRESSURE_PA),
         fault(&[P1, P2], Offset, PRESSURE_PA),
         fault(&[P1], Gain, RATIO),
         fault(&[P2], Gain, RATIO),
         fault(&[P1, P2], Gain, RATIO),
-        fault(&[P1], Creep, PRESSURE_PA),
-        fault(&[P2], Creep, PRESSURE_PA),
-        fault(&[P1, P2], Creep, PRESSURE_PA),
+        fault(&[P1], Drift, PRESSURE_PA),
+        fault(&[P2], Drift, PRESSURE_PA),
+        fault(&[P1, P2], Drift, PRESSURE_PA),
         fault(&[CompressorFlow], Offset, 2e-3),
         fault(&[CompressorFlow], Gain, RATIO),
-        fault(&[CompressorFlow], Creep, RATIO),
+        fault(&[CompressorFlow], Drift, RATIO),
         fault(&[ShaftSpeed], Gain, RATIO),
-        fault(&[ShaftSpeed], Creep, RATIO),
+        fault(&[ShaftSpeed], Drift, RATIO),
         fault(&[ShaftSpeed], Offset, 1e3),
     ]
 };
@@ -84,8 +84,8 @@ impl SensorFault {
             FaultKind::Offset => 1.0,
             FaultKind::Gain if is_temperature(channel) => reading - CALIBRATED_AT_K,
             FaultKind::Gain => reading,
-            FaultKind::Creep if relative => run_ratio * reading,
-            FaultKind::Creep => run_ratio,
+            FaultKind::Drift if relative => run_ratio * reading,
+            FaultKind::Drift => run_ratio,
         }
     }
 }

@@ -26,13 +26,8 @@ pub struct FoundFault {
     pub sigma: f64,
     /// Others that explain the recording nearly as well: at least one twentieth as probable.
     pub alternatives: Vec<Suspect>,
-}
-
-impl FoundFault {
-    /// Whether it leaves the points as they are: no number of a point rests on the valve.
-    pub(crate) fn is_harmless(&self) -> bool {
-        self.suspect == Suspect::Machine(Machine::ValveArea) && self.alternatives.is_empty()
-    }
+    /// Whether a number of the points may rest on it; if not, they keep their verdicts.
+    pub touches_points: bool,
 }
 
 impl Suspect {
@@ -48,7 +43,7 @@ impl Suspect {
     fn scale(&self) -> (f64, &'static str) {
         let Suspect::Sensor(SensorFault { channels, kind, .. }) = self else { return (100.0, "%") };
         match (kind, channels) {
-            (FaultKind::Gain, _) | (FaultKind::Creep, [Channel::CompressorFlow | Channel::ShaftSpeed]) => {
+            (FaultKind::Gain, _) | (FaultKind::Drift, [Channel::CompressorFlow | Channel::ShaftSpeed]) => {
                 (100.0, "%")
             }
             (_, [Channel::P1 | Channel::P2, ..]) => (1e-3, "kPa"),
@@ -70,6 +65,7 @@ impl Serialize for FoundFault {
             sigma: f64,
             unit: &'static str,
             alternatives: Vec<String>,
+            touches_points: bool,
         }
         let unit = match self.suspect.scale().1 {
             "%" => "1",
@@ -80,8 +76,16 @@ impl Serialize for FoundFault {
         };
         let alternatives = self.alternatives.iter().map(ToString::to_string).collect();
         let (fault, channels) = (self.suspect.to_string(), self.suspect.channels());
-        Shown { fault, channels, value: self.value, sigma: self.sigma, unit, alternatives }
-            .serialize(serializer)
+        Shown {
+            fault,
+            channels,
+            value: self.value,
+            sigma: self.sigma,
+            unit,
+            alternatives,
+            touches_points: self.touches_points,
+        }
+        .serialize(serializer)
     }
 }
 
@@ -93,7 +97,7 @@ impl fmt::Display for Suspect {
                 let kind = match fault.kind {
                     FaultKind::Offset => "offset",
                     FaultKind::Gain => "gain error",
-                    FaultKind::Creep => "creep",
+                    FaultKind::Drift => "drift",
                 };
                 write!(f, "{kind} of {}", together(fault.channels))
             }
@@ -110,10 +114,14 @@ impl fmt::Display for FoundFault {
         match self.suspect {
             Suspect::Sensor(fault) => {
                 let channels = together(fault.channels);
+                let several = fault.channels.len() > 1;
+                let verb = |one, many| if several { many } else { one };
                 match fault.kind {
-                    FaultKind::Offset => write!(f, "{channels} reads {size} too much"),
-                    FaultKind::Gain => write!(f, "{channels} has a gain error of {size}"),
-                    FaultKind::Creep => write!(f, "{channels} creeps by {size} over the run"),
+                    FaultKind::Offset => write!(f, "{channels} {} {size} too high", verb("reads", "read")),
+                    FaultKind::Gain => write!(f, "{channels} {} a gain error of {size}", verb("has", "have")),
+                    FaultKind::Drift => {
+                        write!(f, "{channels} {} by {size} over the run", verb("drifts", "drift"))
+                    }
                 }?;
             }
             Suspect::Machine(machine) => {

@@ -7,9 +7,9 @@
 //! `K (T2 - Tc) = C dTc/dt + b Tc - a + alpha K (Tc - T1) + K d`
 //!
 //! with one heat capacity `C`, one loss `b` to oil, cell and turbine, and one share `alpha` before the wheel for the whole recording. `d`
-//! is what T2 reads more than Tc does of the same temperature. `K` changes by a factor of five over a map and `dTc/dt` its sign, so that `d` is
-//! told to some tenths of a kelvin, by no map and no other recording. A housing that is no single mass moves `d` and blurs it, which its
-//! standard error says.
+//! is what T2 reads more than Tc does of the same temperature. `K` changes by a factor of five over a map and `dTc/dt` its sign, so that
+//! this recording alone determines `d` to some tenths of a kelvin. A housing of several masses moves `d`, which is part of the declared
+//! uncertainty.
 
 use crate::IdentifyConfig;
 use crate::faults::readings::{CHANNELS, PerChannel, Readings, span_s};
@@ -23,11 +23,12 @@ use mapper_physics::air;
 const AFTER_S: f64 = 10.0;
 /// Part over which the housing's slope is taken, s.
 const PART_S: f64 = 18.0;
-/// Most parts of a step: more tell nothing new, and the effort grows with the cube.
-const MAX_PARTS: f64 = 8.0;
+/// Most parts of a step, and of all together: the effort grows with the cube.
+const MAX_PARTS: usize = 8;
+const MAX_PARTS_IN_ALL: usize = 1000;
 /// Shortest step that is looked at, behind that begin, s: three times the correlation time of noise tell neither slope nor share.
 const SHORTEST_S: f64 = 27.0;
-/// Points from which on one balance can be told from another. Repeats add none.
+/// Fewest points that determine the balance. Repeats do not count.
 const FEWEST_POINTS: usize = 8;
 /// Rows of a part and of a step, at least.
 const FEWEST_ROWS: usize = 10;
@@ -41,7 +42,7 @@ const LACKS_RATIO: f64 = 0.05;
 /// Difference of T2 and Tc that a housing of more than one temperature makes, one standard deviation, K: 1 K is three of it.
 const UNEVEN_K: f64 = 0.35;
 /// The same of what comes over the run as it warms up, K: a housing of two walls makes up to 3 K.
-const UNEVEN_CREEP_K: f64 = 1.0;
+const UNEVEN_DRIFT_K: f64 = 1.0;
 /// Middle of what Tc and T4 are, so that the constants stay small, K.
 const AROUND_K: f64 = 330.0;
 /// Heat capacity of the housing, J/K, its loss, W/K and W, and alpha_A: any that turbochargers have, one standard deviation each.
@@ -70,20 +71,21 @@ impl Part {
     }
 }
 
-pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, refused: &[bool]) -> Option<Rows> {
-    let steps: Vec<Vec<Part>> =
-        recording
-            .steps
-            .iter()
-            .zip(refused)
-            .map(|(step, refused)| {
-                if *refused {
-                    Vec::new()
-                } else {
-                    parts(recording, step.start_s + AFTER_S, step.end_s, config)
-                }
-            })
-            .collect();
+pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]) -> Option<Rows> {
+    let count = used.iter().filter(|used| **used).count();
+    let most = (MAX_PARTS_IN_ALL / count.max(1)).clamp(1, MAX_PARTS);
+    let steps: Vec<Vec<Part>> = recording
+        .steps
+        .iter()
+        .zip(used)
+        .map(|(step, used)| {
+            if *used {
+                parts(recording, step.start_s + AFTER_S, step.end_s, config, most)
+            } else {
+                Vec::new()
+            }
+        })
+        .collect();
     let is_point =
         |(step, parts): &(&StepMarker, &Vec<Part>)| step.kind == StepKind::Point && !parts.is_empty();
     if recording.steps.iter().zip(&steps).filter(is_point).count() < FEWEST_POINTS {
@@ -102,7 +104,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, refused: &[bo
         (column(&|part| part.conductance_w_k * (part.tc_k - part.t1_k)), ANY_SHARE),
         (column(&|part| part.conductance_w_k * part.carried_on_k()), ANY_SHARE),
         (column(&|part| part.conductance_w_k), UNEVEN_K),
-        (column(&|part| part.conductance_w_k * (run_ratio(part) - 0.5)), UNEVEN_CREEP_K),
+        (column(&|part| part.conductance_w_k * (run_ratio(part) - 0.5)), UNEVEN_DRIFT_K),
     ];
     let covariance = any
         .iter()
@@ -139,8 +141,8 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, refused: &[bo
     })
 }
 
-/// The parts of a step; none where T2 does not say how far it follows the housing.
-fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfig) -> Vec<Part> {
+/// At most `most` parts of a step; none where T2 does not say how far it follows the housing.
+fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfig, most: usize) -> Vec<Part> {
     if end_s - start_s < SHORTEST_S {
         return Vec::new();
     }
@@ -149,7 +151,7 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
     if !SHARES.contains(&(1.0 - kept)) {
         return Vec::new();
     }
-    let count = ((end_s - start_s) / PART_S).floor().min(MAX_PARTS) as usize;
+    let count = (((end_s - start_s) / PART_S).floor() as usize).min(most);
     let whole = samples.len();
     let part = |place: usize| {
         let range = place * whole / count..(place + 1) * whole / count;

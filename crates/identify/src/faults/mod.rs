@@ -3,7 +3,7 @@
 //! Each balance is a law with a declared uncertainty: one opening of the valve has one area, heads go with the speed squared, the
 //! housing stores what the gas gives it, efficiency is a smooth function of the place on the map. The catalogue of sensor faults
 //! ([`mapper_observe::sensor_fault`]) and a machine of another scale are the hypotheses; [`mapper_inference::hypotheses`] finds the most
-//! probable set of them, at one rate of false alarms for the whole recording.
+//! probable set of them.
 
 pub(crate) mod efficiency;
 pub(crate) mod found;
@@ -19,7 +19,7 @@ use crate::IdentifyConfig;
 use crate::faults::efficiency::FittedEfficiencies;
 use crate::faults::found::{FoundFault, Suspect};
 use crate::faults::readings::{CHANNELS, Readings, span_s};
-use crate::faults::rows::{MACHINE, Rows};
+use crate::faults::rows::{MACHINE, Machine, Rows};
 use crate::findings::code;
 use crate::nominal_rig::NominalRig;
 use crate::objections::ends::Ends;
@@ -35,8 +35,11 @@ const EXPECTED_FAULTS: f64 = 0.1;
 const OTHER_MACHINE_RATIO: f64 = 0.05;
 /// Relative probability from which on an alternative is named: one in twenty.
 const ALTERNATIVE: f64 = 0.05;
-/// The same below which it is as good as excluded: one in a thousand.
-const HARMLESS: f64 = 1e-3;
+/// The same below which it is excluded, when points stay good because of that: one in a thousand.
+const EXCLUDED: f64 = 1e-3;
+
+/// Most steps that are used, evenly spread: the effort grows with the cube, and these take a second.
+const MAX_STEPS: usize = 500;
 
 /// All balances of a recording, and what is known of the parameters beforehand. `ends`: of the steps that have a say. `fitted`: efficiencies
 /// of the joint fit, where there is one.
@@ -58,36 +61,34 @@ pub(crate) fn likelihood(
 
 /// Faults without which the balances of a recording do not close; empty where they do.
 pub(crate) fn find(likelihood: &Likelihood, priors: &Priors, method: Method) -> Vec<FoundFault> {
-    let of_the_housing = |index: usize| suspect(index).channels() == [Channel::Tc];
-    let harmless = |member: &Member| {
-        let others = member.alternatives.iter().take_while(|(_, relative)| *relative > HARMLESS);
-        of_the_housing(member.index) && others.into_iter().all(|(index, _)| of_the_housing(*index))
+    let likelier_than = |member: &Member, limit: f64| -> Vec<Suspect> {
+        let others = member.alternatives.iter().take_while(|(_, relative)| *relative > limit);
+        others.map(|(index, _)| suspect(*index)).collect()
     };
-    let members = likelihood.explain(priors).unwrap_or_default().members.into_iter();
-    // An apparent efficiency has nothing to do with the housing.
-    members
-        .filter(|member| method != Method::Steady || !harmless(member))
-        .map(|member| {
-            let others = member.alternatives.iter().take_while(|(_, relative)| *relative > ALTERNATIVE);
-            FoundFault {
-                suspect: suspect(member.index),
-                value: member.value,
-                sigma: member.sigma,
-                alternatives: others.map(|(index, _)| suspect(*index)).collect(),
-            }
-        })
-        .collect()
+    let found = |member: Member| FoundFault {
+        suspect: suspect(member.index),
+        value: member.value,
+        sigma: member.sigma,
+        alternatives: likelier_than(&member, ALTERNATIVE),
+        touches_points: touches_points(suspect(member.index), method)
+            || likelier_than(&member, EXCLUDED).into_iter().any(|other| touches_points(other, method)),
+    };
+    likelihood.explain(priors).unwrap_or_default().members.into_iter().map(found).collect()
+}
+
+/// Whether a number of a point rests on it: none does on the valve, and an apparent efficiency does not on the housing.
+fn touches_points(suspect: Suspect, method: Method) -> bool {
+    let housing = method == Method::Steady && suspect.channels() == [Channel::Tc];
+    !(housing || suspect == Suspect::Machine(Machine::ValveArea))
 }
 
 /// What speaks against all points where there are faults that touch them.
 pub(crate) fn objection(faults: &[FoundFault], steps: usize) -> Option<Objection> {
-    if faults.iter().all(FoundFault::is_harmless) {
-        return None;
-    }
+    faults.iter().any(|fault| fault.touches_points).then_some(())?;
     let sensors = faults.iter().any(|fault| matches!(fault.suspect, Suspect::Sensor(_)));
     let code = if sensors { code::CONTRADICTED_CHANNEL } else { code::OFF_THE_NOMINAL_MAP };
     let message = format!(
-        "{}: compare the channels at standstill (`zero`), and mend or declare what is off",
+        "{}: compare the channels at standstill (`zero`), and repair the sensor or declare its uncertainty",
         described(faults)
     );
     Some(Objection::new(code, message, (0..steps).collect()))
@@ -95,13 +96,13 @@ pub(crate) fn objection(faults: &[FoundFault], steps: usize) -> Option<Objection
 
 /// What is to be known of faults that leave the points as they are.
 pub(crate) fn remark(faults: &[FoundFault]) -> Option<String> {
-    let harmless = !faults.is_empty() && faults.iter().all(FoundFault::is_harmless);
-    harmless.then(|| format!("{}; the points do not rest on it", described(faults)))
+    let harmless = !faults.is_empty() && !faults.iter().any(|fault| fault.touches_points);
+    harmless.then(|| format!("{}; no point depends on it", described(faults)))
 }
 
 fn described(faults: &[FoundFault]) -> String {
-    let said: Vec<String> = faults.iter().map(ToString::to_string).collect();
-    format!("valve, head, heat of the housing and efficiencies do not agree unless {}", said.join(", and "))
+    let sizes: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    format!("valve, head, heat of the housing and efficiencies do not agree unless {}", sizes.join(", and "))
 }
 
 /// Standard error with which the balances tell each suspect by itself, in its unit.
@@ -126,18 +127,20 @@ fn balances(
     nominal: Option<&NominalRig<'_>>,
 ) -> Option<Vec<Rows>> {
     let (first_s, last_s) = span_s(recording)?;
-    let refused: Vec<bool> = ends.iter().map(Option::is_none).collect();
+    let every = ends.len().div_ceil(MAX_STEPS).max(1);
+    let used = ends.iter().enumerate().map(|(position, end)| end.as_ref().filter(|_| position % every == 0));
+    let used: Vec<Option<&Ends>> = used.collect();
     let all: Vec<Option<Readings>> =
-        ends.iter().map(|end| end.as_ref().map(|end| Readings::of(end, first_s, last_s))).collect();
+        used.iter().map(|end| end.map(|end| Readings::of(end, first_s, last_s))).collect();
     let readings: Vec<Readings> = all.iter().flatten().copied().collect();
     let opened: Vec<(f64, Readings)> =
-        ends.iter().flatten().map(|end| end.valve_opening_ratio).zip(readings.iter().copied()).collect();
+        used.iter().flatten().map(|end| end.valve_opening_ratio).zip(readings.iter().copied()).collect();
     let noise = readings::noise(config, recording);
     let reference = config.reference;
     let mut balances: Vec<Rows> = Vec::new();
     balances.extend(valve::rows(&opened, &noise, nominal));
     balances.extend(head::rows(&readings, &noise, reference, nominal));
-    balances.extend(housing::rows(recording, config, &refused));
+    balances.extend(housing::rows(recording, config, &used.iter().map(Option::is_some).collect::<Vec<_>>()));
     balances.extend(fitted.and_then(|fitted| efficiency::rows(fitted, &all, reference, nominal)));
     Some(balances)
 }

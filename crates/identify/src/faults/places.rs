@@ -1,8 +1,8 @@
 //! Where points lie on the map, in coordinates in which maps are smooth.
 //!
 //! A speed line is steep near choke and flat near surge, so that neither flow nor head orders its points well. The angle of the point in the
-//! plane of flow and head coefficient does at both ends: with it the efficiencies of a measured map of 92 points are smooth to 0.3 points, with
-//! the flow to 1.
+//! plane of flow and head coefficient does at both ends: the efficiencies of a public measured map of 93 points (TurboTools) are a smooth
+//! function of it to 0.3 points, and of the flow to 1.
 
 use crate::faults::readings::Readings;
 use crate::faults::smooth::At;

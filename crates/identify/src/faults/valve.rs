@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 
 /// Pressure over that behind the valve below which its flow says nothing of it, Pa.
 const MIN_DIFFERENCE_PA: f64 = 5e3;
-/// Pressure behind the valve less that of the inlet, which nobody measures, one standard deviation, Pa. Judgement: filters, silencers and
+/// Pressure behind the valve less that of the inlet, which is not measured, one standard deviation, Pa. Judgement: filters, silencers and
 /// exhaust lines have some hundred.
 const BEHIND_PA: f64 = 300.0;
 /// What the discharge coefficient of a valve varies with the pressure ratio, one standard deviation, and over which difference of its

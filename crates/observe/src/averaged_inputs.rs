@@ -5,14 +5,24 @@
 
 use crate::channels::{DRIVERS, boundary_condition};
 use crate::mean::BEFORE_S;
+use crate::schedule::Schedule;
 use mapper_core::{Channel, Recording};
 use mapper_physics::inputs::{Inputs, InputsError, InterpolatedInputs};
 use mapper_physics::params::BoundaryConditions;
 
 /// After a jump readings are taken as they are for this long, s: actuators need some tenths.
 const RAW_S: f64 = 3.0;
-/// Between jumps means over this long are taken, s.
-const MEAN_S: f64 = 10.0;
+/// Then means over some seconds. A loop that holds the speed trims P3 by a per cent within ten seconds of the jump, behind which a mean
+/// must not lag; it is not shorter than the steps in which the model is driven, which would see single ones of them.
+const AFTER_JUMP: Schedule = Schedule {
+    first_s: RAW_S,
+    lengths_s: &[(8.0, 0.5), (20.0, 1.0), (50.0, 5.0), (f64::INFINITY, 10.0)],
+    shortest_s: 0.1,
+    shortest_ratio: 0.5,
+};
+/// Means where no jump came before.
+const AT_REST: Schedule =
+    Schedule { first_s: 0.0, lengths_s: &[(f64::INFINITY, 10.0)], shortest_s: 0.1, shortest_ratio: 0.5 };
 
 /// Boundary conditions from jump to jump: never interpolated across one, however close to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,15 +111,14 @@ impl Nodes<'_> {
                 self.push(t_s, row);
             }
         }
-        let length_s = end_s - raw_end_s;
-        let parts = (length_s / MEAN_S).round().max(1.0) as usize;
-        if length_s > 0.0 {
-            for part in 0..parts {
-                let at = |share: f64| raw_end_s + length_s * share / parts as f64;
-                let (low_s, high_s) = (at(part as f64), at(part as f64 + 1.0));
-                let row = self.means(low_s, high_s - BEFORE_S, valve);
-                self.push(0.5 * (low_s + high_s), row);
-            }
+        let stretches = if after_jump {
+            AFTER_JUMP.stretches(start_s, end_s, 0.0)
+        } else {
+            AT_REST.stretches(start_s, end_s, 0.0)
+        };
+        for (low_s, high_s) in stretches {
+            let row = self.means(low_s, high_s - BEFORE_S, valve);
+            self.push(0.5 * (low_s + high_s), row);
         }
     }
 
@@ -139,5 +148,34 @@ impl Nodes<'_> {
             };
         }
         row
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::Series;
+
+    /// A loop that holds the speed trims P3 by 2 kPa within some seconds of the jump: the inputs follow to a hundredth of that, what
+    /// the line between two means of half a second allows (curvature 2 kPa / (2 s)^2, over 8 x 0.5^2 s^2, is 16 Pa).
+    #[test]
+    fn the_trim_of_a_speed_loop_is_followed() {
+        let jump_s = 20.0;
+        let p3_pa = |t_s: f64| match t_s - jump_s {
+            since_s if since_s < 0.0 => 120e3,
+            since_s => 200e3 + 2e3 * (1.0 - (-since_s / 2.0).exp()),
+        };
+        let t_s: Vec<f64> = (0..=800).map(|sample| 0.1 * f64::from(sample)).collect();
+        let values = t_s.iter().map(|t_s| p3_pa(*t_s)).collect();
+        let recording =
+            Recording { series: [(Channel::P3, Series { t_s, values })].into(), ..Recording::default() };
+        let nominal = BoundaryConditions::default();
+        let inputs = AveragedInputs::read(&recording, &nominal, &[(0.0, 1.0), (jump_s, 0.7)], 80.0).unwrap();
+        for t_s in (0..590).map(|tenth| jump_s + 0.95 + 0.1 * f64::from(tenth)) {
+            let off_pa = inputs.at(t_s).p3_pa - p3_pa(t_s);
+            assert!(off_pa.abs() < 20.0, "{off_pa} Pa off {} s after the jump", t_s - jump_s);
+        }
+        assert_eq!(inputs.at(jump_s - 1.0).valve_opening_ratio, 1.0);
+        assert_eq!(inputs.at(jump_s + 1.0).valve_opening_ratio, 0.7);
     }
 }

@@ -4,14 +4,19 @@
 //! stretch to the next, and follow an input sensor that steps: what the search for drift needs.
 
 use crate::channels::{DRIVERS, boundary_condition};
+use crate::lagged_command::{LaggedCommand, Level, Response, measured_valve_response};
 use crate::mean::BEFORE_S;
 use crate::schedule::Schedule;
+use crate::table::Table;
 use mapper_core::{Channel, Recording};
 use mapper_physics::inputs::{Inputs, InputsError, InterpolatedInputs};
 use mapper_physics::params::BoundaryConditions;
 
 /// After a jump readings are taken as they are for this long, s: actuators need some tenths.
 const RAW_S: f64 = 3.0;
+/// Lag beyond which it is not the valve that is slow, s: pneumatic and electric actuators of this size need 0.1 to 1 s, flow meters up to
+/// several seconds. Judgement.
+const SLOWEST_VALVE_S: f64 = 1.5;
 /// Then means over some seconds. A loop that holds the speed trims P3 by a per cent within ten seconds of the jump, behind which a mean
 /// must not lag; it is not shorter than the steps in which the model is driven, which would see single ones of them.
 const AFTER_JUMP: Schedule = Schedule {
@@ -63,10 +68,18 @@ impl AveragedInputs {
         end_s: f64,
     ) -> Result<AveragedInputs, InputsError> {
         let mut inputs = AveragedInputs { starts_s: Vec::new(), levels: Vec::new() };
-        for (index, (start_s, valve_opening_ratio)) in jumps.iter().enumerate() {
+        let level = |(start_s, valve_opening_ratio): &(f64, f64)| Level {
+            start_s: *start_s,
+            p3_pa: nominal.p3_pa,
+            valve_opening_ratio: *valve_opening_ratio,
+        };
+        let valve = valve_response(recording, nominal);
+        let command = LaggedCommand::new(jumps.iter().map(level).collect(), Response::lag(0.0), valve);
+        for (index, (start_s, _)) in jumps.iter().enumerate() {
             let next_s = jumps.get(index + 1).map_or(end_s, |next| next.0);
-            let mut nodes = Nodes { recording, nominal, t_s: Vec::new(), rows: Vec::new() };
-            nodes.level(*start_s, next_s, *valve_opening_ratio, index > 0);
+            let mut nodes =
+                Nodes { recording, nominal, command: &command, t_s: Vec::new(), rows: Vec::new() };
+            nodes.level(*start_s, next_s, index > 0);
             inputs.starts_s.push(*start_s);
             inputs.levels.push(InterpolatedInputs::new(nodes.t_s, nodes.rows)?);
         }
@@ -78,16 +91,24 @@ impl AveragedInputs {
     }
 }
 
+/// How the valve follows, as the recording tells; at once where it does not tell, or is slower than a valve: that is the flow meter.
+fn valve_response(recording: &Recording, nominal: &BoundaryConditions) -> Response {
+    let measured =
+        Table::new(recording).and_then(|table| measured_valve_response(&table, recording, nominal.p1_pa));
+    measured.filter(|valve| valve.lag_s < SLOWEST_VALVE_S).unwrap_or(Response::lag(0.0))
+}
+
 struct Nodes<'a> {
     recording: &'a Recording,
     nominal: &'a BoundaryConditions,
+    command: &'a LaggedCommand,
     t_s: Vec<f64>,
     rows: Vec<BoundaryConditions>,
 }
 
 impl Nodes<'_> {
     /// Nodes from one jump to the next.
-    fn level(&mut self, start_s: f64, end_s: f64, valve: f64, after_jump: bool) {
+    fn level(&mut self, start_s: f64, end_s: f64, after_jump: bool) {
         let raw_end_s = if after_jump { (start_s + RAW_S).min(end_s) } else { start_s };
         if after_jump {
             let t_s = self
@@ -96,12 +117,13 @@ impl Nodes<'_> {
                 .get(&Channel::P3)
                 .map(|series| series.slice(start_s, raw_end_s - BEFORE_S).0.to_vec())
                 .unwrap_or_default();
-            // The first node lies at the jump itself, so that the valve changes there.
+            // The first node lies at the jump itself, from which on the valve moves.
             let mut times = vec![start_s];
             times.extend(t_s.into_iter().filter(|t| *t > start_s));
             for t_s in times {
                 // Quantities that do not jump keep the mean of the whole stretch.
-                let mut row = self.means(start_s, raw_end_s, valve);
+                let mut row = self.means(start_s, raw_end_s);
+                row.valve_opening_ratio = self.command.valve_opening_ratio(t_s);
                 for channel in [Channel::P3, Channel::P4] {
                     let read = self.recording.series.get(&channel).and_then(|series| series.interpolate(t_s));
                     if let (Some(read), Some(value)) = (read, boundary_condition(&mut row, channel)) {
@@ -117,7 +139,7 @@ impl Nodes<'_> {
             AT_REST.stretches(start_s, end_s, 0.0)
         };
         for (low_s, high_s) in stretches {
-            let row = self.means(low_s, high_s - BEFORE_S, valve);
+            let row = self.means(low_s, high_s - BEFORE_S);
             self.push(0.5 * (low_s + high_s), row);
         }
     }
@@ -129,7 +151,8 @@ impl Nodes<'_> {
         }
     }
 
-    fn means(&self, start_s: f64, end_s: f64, valve_opening_ratio: f64) -> BoundaryConditions {
+    fn means(&self, start_s: f64, end_s: f64) -> BoundaryConditions {
+        let valve_opening_ratio = self.command.valve_opening_ratio(0.5 * (start_s + end_s));
         let mut row = BoundaryConditions { valve_opening_ratio, ..*self.nominal };
         if let Some(p3_pa) = self.recording.series.get(&Channel::P3Command).and_then(|c| c.held(start_s)) {
             row.p3_pa = p3_pa;
@@ -154,7 +177,8 @@ impl Nodes<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::Series;
+    use mapper_core::{Series, StepKind, StepMarker};
+    use mapper_physics::orifice;
 
     /// A loop that holds the speed trims P3 by 2 kPa within some seconds of the jump: the inputs follow to a hundredth of that, what
     /// the line between two means of half a second allows (curvature 2 kPa / (2 s)^2, over 8 x 0.5^2 s^2, is 16 Pa).
@@ -175,7 +199,57 @@ mod tests {
             let off_pa = inputs.at(t_s).p3_pa - p3_pa(t_s);
             assert!(off_pa.abs() < 20.0, "{off_pa} Pa off {} s after the jump", t_s - jump_s);
         }
-        assert_eq!(inputs.at(jump_s - 1.0).valve_opening_ratio, 1.0);
-        assert_eq!(inputs.at(jump_s + 1.0).valve_opening_ratio, 0.7);
+    }
+
+    /// The flow through a valve that turns by 0.5 1/s, as the orifice equation has it: the inputs have its opening, not the command.
+    #[test]
+    fn a_valve_that_takes_its_time_is_followed() {
+        let opening =
+            |t_s: f64, from: f64, to: f64| from + (to - from) * (0.5 * t_s / (to - from).abs()).min(1.0);
+        let level = |t_s: f64| if (t_s / 20.0) as u32 % 2 == 0 { (1.5, 0.5) } else { (0.5, 1.5) };
+        let truth = |t_s: f64| {
+            let (from, to) = level(t_s);
+            if t_s < 20.0 { to } else { opening(t_s % 20.0, from, to) }
+        };
+        let t_s: Vec<f64> = (0..1600).map(|sample| 0.1 * f64::from(sample)).collect();
+        let series = |value: &dyn Fn(f64) -> f64| Series {
+            values: t_s.iter().map(|t_s| value(*t_s)).collect(),
+            t_s: t_s.clone(),
+        };
+        let flow = |t_s: f64| orifice::flow_kg_s(2.4e-4 * truth(t_s), 160e3, 360.0, 100e3);
+        let step = |index: usize| {
+            let start_s = 20.0 * index as f64;
+            StepMarker {
+                index,
+                kind: StepKind::Point,
+                start_s,
+                end_s: start_s + 20.0,
+                from: None,
+                to: None,
+                p3_pa: 150e3,
+                valve_opening_ratio: level(start_s + 1.0).1,
+            }
+        };
+        let steps: Vec<StepMarker> = (0..8).map(step).collect();
+        let jumps: Vec<(f64, f64)> =
+            steps.iter().map(|step| (step.start_s, step.valve_opening_ratio)).collect();
+        let recording = Recording {
+            series: [
+                (Channel::ShaftSpeed, series(&|_| 120e3)),
+                (Channel::CompressorFlow, series(&flow)),
+                (Channel::P2, series(&|_| 160e3)),
+                (Channel::P3, series(&|_| 150e3)),
+                (Channel::T2, series(&|_| 360.0)),
+            ]
+            .into(),
+            steps,
+            ..Recording::default()
+        };
+        let inputs = AveragedInputs::read(&recording, &BoundaryConditions::default(), &jumps, 160.0).unwrap();
+        for since_s in [0.5, 1.0, 1.5, 2.5, 10.0] {
+            let off = inputs.at(40.0 + since_s).valve_opening_ratio - truth(40.0 + since_s);
+            // A twentieth of the jump: the flow through the orifice tells the opening no better while it moves.
+            assert!(off.abs() < 0.05, "{off} off {since_s} s after the jump");
+        }
     }
 }

@@ -60,12 +60,13 @@ def night(program, name, seed):
         recording = json.loads(run.stdout)["recording"]
         report = json.loads(subprocess.run([program, "drift", "--json", recording], capture_output=True, text=True, check=True).stdout)
     course = "step" if "from:" in drift else "rate_per_h"
-    found = report.get(course)
+    causes = [drift["cause"] for drift in report["drifts"]]
+    one = next((drift for drift in report["drifts"] if drift["cause"] == cause), None)
     return {
-        "found": report["cause"],
-        "right": report["cause"] == cause,
-        "onset": cause is not None and report["onset_s"] is not None and abs(report["onset_s"] - onset_s) <= TWO_REPEATS_S,
-        "size": size is not None and found is not None and report["low"] <= size <= report["high"],
+        "found": "+".join(causes) or None,
+        "right": causes == ([cause] if cause else []),
+        "onset": one is not None and abs(one["onset_s"] - onset_s) <= TWO_REPEATS_S,
+        "size": size is not None and one is not None and course in one and one["low"] <= size <= one["high"],
         "said": report["reason"],
     }
 

@@ -1,23 +1,98 @@
-//! Causes with their courses, weighed against the readings.
+//! Every cause with every course it may take, as hypotheses of one likelihood.
 
 use crate::cause::Cause;
 use crate::course::{Course, CourseKind};
+use crate::low_rank::LowRank;
 use crate::readings::Readings;
+use crate::request::Unsolvable;
+use mapper_inference::hypotheses::{Hypothesis, Likelihood, Priors};
 use nalgebra::DMatrix;
 
+/// Drifts that a campaign is expected to have beforehand: one campaign in two has one. Judgement: repeats are made where drift is expected.
+const EXPECTED_DRIFTS: f64 = 0.5;
+/// Causes that are seldom, against the others: judgement. Those read at the compressor, its machine and the flow meters drift; the rest is
+/// better looked after, and several sensors that drift alike have a common part, of which there are few.
+const SELDOM: f64 = 0.25;
+
 /// A cause, by its position among those that show, with a course.
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Candidate {
     pub cause: usize,
     pub course: Course,
 }
 
-/// All candidates weighed against the readings.
-pub(crate) struct Weighed {
-    /// Evidence of each (twice the log of the likelihood ratio at its best size).
-    pub evidence: Vec<f64>,
-    /// Best size of each, and one standard deviation of it.
-    pub size: Vec<f64>,
-    pub sigma: Vec<f64>,
+/// The causes that show, and all their courses.
+pub(crate) struct Candidates {
+    pub causes: Vec<Cause>,
+    pub all: Vec<Candidate>,
+    /// Each as the readings show it at size 1 (rate per hour, or step), a column each.
+    pub shown: DMatrix<f64>,
+    /// What is known of them beforehand.
+    pub priors: Priors,
+}
+
+impl Candidates {
+    /// All causes with `onsets` onsets over the campaign.
+    pub fn new(readings: &Readings, onsets: usize) -> Result<Candidates, Unsolvable> {
+        let shows = |cause: Cause| Some((cause, readings.signature(cause)?.readings));
+        let shown: Vec<(Cause, Vec<f64>)> = Cause::all().into_iter().filter_map(shows).collect();
+        let (start_s, end_s) = readings.span_s();
+        let courses = courses(start_s, end_s, onsets);
+        let all: Vec<Candidate> = (0..shown.len())
+            .flat_map(|cause| courses.iter().map(move |course| Candidate { cause, course: *course }))
+            .collect();
+        if all.is_empty() {
+            return Err(Unsolvable::NothingShows);
+        }
+        let weight = |cause: &Cause| if is_seldom(*cause) { SELDOM } else { 1.0 };
+        let weights: f64 = shown.iter().map(|(cause, _)| weight(cause)).sum();
+        let hypothesis = |Candidate { cause: family, course }: &Candidate| {
+            let cause = shown[*family].0;
+            let sigma = match course.kind {
+                CourseKind::Ramp => cause.sigma() * 3600.0 / (end_s - start_s),
+                CourseKind::Step => cause.sigma(),
+            };
+            let prior = EXPECTED_DRIFTS * weight(&cause) / weights / courses.len() as f64;
+            Hypothesis {
+                family: *family,
+                sigma,
+                ln_prior: prior.ln(),
+                at_least_zero: cause.is_at_least_zero(),
+            }
+        };
+        let hypotheses = all.iter().map(hypothesis).collect();
+        let value = |row: usize, column: usize| {
+            let Candidate { cause, course } = all[column];
+            shown[cause].1[row] * mean_of(readings, row, course)
+        };
+        Ok(Candidates {
+            shown: DMatrix::from_fn(readings.difference.len(), all.len(), value),
+            causes: shown.iter().map(|(cause, _)| *cause).collect(),
+            priors: Priors { always: Vec::new(), hypotheses },
+            all,
+        })
+    }
+
+    /// What the readings say of them, beside noise and constants.
+    pub fn likelihood(&self, noise: &LowRank, difference: &DMatrix<f64>) -> Likelihood {
+        let shown = noise.whiten(self.shown.clone());
+        let inverse = noise.inverse_times(&shown);
+        let pull = inverse.tr_mul(&noise.whiten(difference.clone()));
+        Likelihood::of(shown.tr_mul(&inverse), pull.column(0).into_owned())
+    }
+
+    pub fn cause(&self, index: usize) -> Cause {
+        self.causes[self.all[index].cause]
+    }
+}
+
+fn is_seldom(cause: Cause) -> bool {
+    use mapper_core::Channel::{CompressorFlow, P2, T1, T2, Tc, TurbineFlow};
+    match cause {
+        Cause::Sensors([channel]) => ![T1, T2, Tc, P2, CompressorFlow, TurbineFlow].contains(channel),
+        Cause::Sensors(_) => true,
+        Cause::Fouling | Cause::BearingFriction => false,
+    }
 }
 
 /// Ramps from the start on, steps from after it; both until there is too little left to see them.
@@ -41,32 +116,4 @@ pub(crate) fn mean_of(readings: &Readings, row: usize, course: Course) -> f64 {
     let block = &readings.blocks[row / readings.columns.len()];
     let offset_s = readings.steps[block.step].offset_s;
     course.mean(block.start_s + offset_s, block.end_s + offset_s)
-}
-
-/// Evidence, size and its standard deviation of each candidate.
-pub(crate) fn weigh(
-    causes: &[(Cause, Vec<f64>)],
-    candidates: &[Candidate],
-    whitened: &DMatrix<f64>,
-    shown: &DMatrix<f64>,
-    inverse: &DMatrix<f64>,
-) -> Weighed {
-    let along = inverse.tr_mul(whitened);
-    let mut weighed = Weighed { evidence: Vec::new(), size: Vec::new(), sigma: Vec::new() };
-    for (index, candidate) in candidates.iter().enumerate() {
-        let information = shown.column(index).dot(&inverse.column(index));
-        let (evidence, size) = evidence(causes[candidate.cause].0, along[(index, 0)], information);
-        weighed.evidence.push(evidence);
-        weighed.size.push(size);
-        weighed.sigma.push(if information > 0.0 { information.sqrt().recip() } else { f64::INFINITY });
-    }
-    weighed
-}
-
-/// Evidence and best size; a bearing takes power and never gives any.
-pub(crate) fn evidence(cause: Cause, along: f64, information: f64) -> (f64, f64) {
-    if information <= 0.0 || !information.is_finite() || (cause == Cause::BearingFriction && along < 0.0) {
-        return (0.0, 0.0);
-    }
-    (along * along / information, along / information)
 }

@@ -1,14 +1,15 @@
 //! What may drift.
 
 use mapper_core::{Channel, Dimension, with_unit};
+use mapper_observe::sensor_fault::drifts;
 use mapper_physics::bearing_friction::at_150_krpm;
 use serde::{Serialize, Serializer};
 
 /// One thing that may drift.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
-    /// A sensor reads more and more beside: offset in K, Pa or rpm, gain of a flow meter.
-    Sensor(Channel),
+    /// One or several sensors read more and more beside, alike: by K or Pa, of flow and speed by a ratio to the reading.
+    Sensors(&'static [Channel]),
     /// The compressor fouls: its efficiency changes by the rate, its map's flow by 0.6 of it.
     Fouling,
     /// The bearing takes power c omega^2 from the shaft.
@@ -29,51 +30,46 @@ pub enum CauseKind {
 pub(crate) const FOULING_FLOW_SHARE: f64 = 0.6;
 
 impl Cause {
-    /// All causes that are considered, in the order of the table. Speed pick-ups count pulses and do not drift.
-    pub const ALL: [Cause; 14] = [
-        Cause::Sensor(Channel::T1),
-        Cause::Sensor(Channel::T2),
-        Cause::Sensor(Channel::Tc),
-        Cause::Sensor(Channel::P2),
-        Cause::Sensor(Channel::CompressorFlow),
-        Cause::Sensor(Channel::TurbineFlow),
-        Cause::Fouling,
-        Cause::BearingFriction,
-        Cause::Sensor(Channel::P1),
-        Cause::Sensor(Channel::P3),
-        Cause::Sensor(Channel::T3),
-        Cause::Sensor(Channel::P4),
-        Cause::Sensor(Channel::T4),
-        Cause::Sensor(Channel::Tt),
-    ];
+    /// All causes that are considered: the drifts of the catalogue of sensor faults, and what a machine does.
+    pub fn all() -> Vec<Cause> {
+        let sensors = drifts().map(|fault| Cause::Sensors(fault.channels));
+        sensors.chain([Cause::Fouling, Cause::BearingFriction]).collect()
+    }
 
-    /// Name in JSON.
-    pub fn name(self) -> &'static str {
+    /// Name in JSON; of several sensors with a plus sign between them.
+    pub fn name(self) -> String {
         match self {
-            Cause::Sensor(channel) => channel.info().symbol,
-            Cause::Fouling => "fouling",
-            Cause::BearingFriction => "bearing_friction",
+            Cause::Sensors(channels) => {
+                channels.iter().map(|channel| channel.info().symbol).collect::<Vec<_>>().join("+")
+            }
+            Cause::Fouling => "fouling".to_owned(),
+            Cause::BearingFriction => "bearing_friction".to_owned(),
         }
     }
 
     /// Sensor or machine.
     pub fn kind(self) -> CauseKind {
         match self {
-            Cause::Sensor(_) => CauseKind::Sensor,
+            Cause::Sensors(_) => CauseKind::Sensor,
             Cause::Fouling | Cause::BearingFriction => CauseKind::Machine,
         }
     }
 
-    /// Whether it is a gain: relative change of a flow's reading.
-    pub(crate) fn is_gain(self) -> bool {
-        matches!(self, Cause::Sensor(channel) if channel.info().dimension == Dimension::MassFlow)
+    /// The sensors that drift; none where the machine does.
+    pub fn channels(self) -> &'static [Channel] {
+        match self {
+            Cause::Sensors(channels) => channels,
+            Cause::Fouling | Cause::BearingFriction => &[],
+        }
     }
 
     /// Unit of its size.
     pub fn unit(self) -> &'static str {
         match self {
-            Cause::Sensor(_) if self.is_gain() => "1",
-            Cause::Sensor(channel) => channel.info().dimension.unit(),
+            Cause::Sensors(channels) => match channels.first() {
+                Some(channel) if !is_relative(*channel) => channel.info().dimension.unit(),
+                _ => "1",
+            },
             Cause::Fouling => "1",
             Cause::BearingFriction => "W s^2/rad^2",
         }
@@ -87,31 +83,38 @@ impl Cause {
         }
     }
 
-    /// A drift over a campaign that surprises nobody, unit of the cause: the width of the prior of its size.
-    pub(crate) fn usual_size(self) -> f64 {
+    /// How large its drift over a campaign is, one standard deviation, unit of the cause.
+    pub(crate) fn sigma(self) -> f64 {
         match self {
-            Cause::Sensor(channel) => match channel.info().dimension {
-                Dimension::MassFlow => 0.015,
-                Dimension::Pressure => 500.0,
-                Dimension::Temperature => 1.0,
-                Dimension::RotationalSpeed => 300.0,
-                Dimension::Ratio => 0.02,
-            },
+            Cause::Sensors(channels) => {
+                drifts().find(|fault| fault.channels == channels).map_or(0.0, |fault| fault.sigma)
+            }
+            // Judgement: a compressor that has lost 2 % of its efficiency is cleaned.
             Cause::Fouling => 0.02,
-            // 1e-6 of it takes 185 W at 130 krpm.
+            // Judgement: it takes 185 W at 130 krpm.
             Cause::BearingFriction => 1e-6,
         }
     }
+
+    /// Whether it cannot be below zero: a bearing takes power and never gives any.
+    pub(crate) fn is_at_least_zero(self) -> bool {
+        self == Cause::BearingFriction
+    }
+}
+
+/// Whether the drift of a channel is a ratio to its reading.
+pub(crate) fn is_relative(channel: Channel) -> bool {
+    matches!(channel.info().dimension, Dimension::MassFlow | Dimension::RotationalSpeed)
 }
 
 impl std::fmt::Display for Cause {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
+        f.write_str(&self.name())
     }
 }
 
 impl Serialize for Cause {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
+        serializer.serialize_str(&self.name())
     }
 }

@@ -1,12 +1,12 @@
 //! The report in words and numbers.
 
-use crate::cause::Cause;
+use crate::cause::{Cause, CauseKind};
 use crate::corrected::{corrected_points, identified};
 use crate::course::CourseKind;
-use crate::decide::Decision;
+use crate::decide::{Decision, Found};
 use crate::fit::Fit;
 use crate::refine::Refined;
-use crate::report::{DriftReport, DriftVerdict, RateOrStep};
+use crate::report::{DriftReport, DriftVerdict, FoundDrift, RateOrStep};
 use crate::request::DriftRequest;
 use crate::visits::group;
 use mapper_core::{IdentifiedPoint, Recording};
@@ -20,66 +20,93 @@ pub(crate) fn conclude(
 ) -> DriftReport {
     let points: Vec<Vec<IdentifiedPoint>> =
         recordings.iter().map(|recording| identified(recording, request)).collect();
-    let (readings, fit) = (&refined.readings, &refined.fit);
-    let groups = groups.iter().map(|visits| group(request, recordings, readings, &points, visits)).collect();
-    let verdict = match (decision.flagged, decision.clear) {
-        (false, _) => DriftVerdict::None,
-        (true, false) => DriftVerdict::Unclear,
-        (true, true) => decision.cause.kind().into(),
-    };
-    let found = decision.flagged.then_some(decision.cause);
-    let (own, others): (Vec<_>, Vec<_>) =
-        decision.probabilities.iter().copied().partition(|alternative| alternative.cause == found);
-    let corrected_points = if decision.flagged {
-        corrected_points(request, recordings, refined, &points, decision.cause)
-    } else {
-        Vec::new()
-    };
-    let only_found = |value: f64| decision.flagged.then_some(value);
+    let groups =
+        groups.iter().map(|visits| group(request, recordings, &refined.readings, &points, visits)).collect();
+    let drifts: Vec<FoundDrift> =
+        decision.found.iter().zip(&refined.fits.drifts).map(|(found, fit)| drift(found, fit)).collect();
+    let verdict = verdict(&drifts);
+    let corrected_points =
+        if drifts.is_empty() { Vec::new() } else { corrected_points(request, recordings, refined, &points) };
     DriftReport {
         verdict,
-        cause: found,
-        probability: own.first().map_or(0.0, |alternative| alternative.probability),
-        alternatives: others,
-        onset_s: only_found(fit.course.onset_s),
-        onset_low_s: only_found(fit.onset_low_s),
-        onset_high_s: only_found(fit.onset_high_s),
-        size: decision.flagged.then(|| size(fit)),
-        low: only_found(fit.low),
-        high: only_found(fit.high),
-        unit: found.map(Cause::unit),
-        reason: reason(decision, fit, verdict),
-        evidence: decision.evidence,
-        threshold: decision.threshold,
+        reason: reason(decision, &drifts, verdict),
+        drifts,
+        alone: decision.alone.clone(),
         detection_limits: decision.limits.clone(),
         groups,
         corrected_points,
     }
 }
 
-fn reason(decision: &Decision, fit: &Fit, verdict: DriftVerdict) -> String {
+fn drift(found: &Found, fit: &Fit) -> FoundDrift {
+    FoundDrift {
+        cause: found.cause,
+        probability: found.probability,
+        alternatives: found.alternatives.clone(),
+        onset_s: fit.course.onset_s,
+        onset_low_s: fit.onset_low_s,
+        onset_high_s: fit.onset_high_s,
+        size: match fit.course.kind {
+            CourseKind::Ramp => RateOrStep::RatePerH(fit.size),
+            CourseKind::Step => RateOrStep::Step(fit.size),
+        },
+        low: fit.low,
+        high: fit.high,
+        unit: found.cause.unit(),
+    }
+}
+
+fn verdict(drifts: &[FoundDrift]) -> DriftVerdict {
+    let any = |kind: CauseKind| drifts.iter().any(|drift| drift.cause.kind() == kind);
+    match (any(CauseKind::Sensor), any(CauseKind::Machine)) {
+        (false, false) => DriftVerdict::None,
+        _ if !drifts.iter().all(FoundDrift::is_clear) => DriftVerdict::Unclear,
+        (true, false) => DriftVerdict::Sensor,
+        (false, true) => DriftVerdict::Machine,
+        (true, true) => DriftVerdict::SensorAndMachine,
+    }
+}
+
+fn reason(decision: &Decision, drifts: &[FoundDrift], verdict: DriftVerdict) -> String {
     let left_out = match decision.left_out {
         (0, _) => String::new(),
         (count, all) => {
-            format!("; {count} of {all} stretches are left out because the model cannot follow them")
+            format!(" {count} of {all} stretches are left out because the model cannot follow them.")
         }
     };
-    let compared = format!(
-        "the best cause has an evidence of {:.1}; one drift-free campaign in a hundred reaches {:.1}{left_out}",
-        decision.evidence, decision.threshold
-    );
     if verdict == DriftVerdict::None {
-        return format!("Nothing drifted: {compared}.");
+        let probability =
+            decision.alone.iter().find(|one| one.cause.is_none()).map_or(1.0, |none| none.probability);
+        return format!("Nothing drifted, with a probability of {}.{left_out}", percent(probability));
     }
-    let size = match size(fit) {
-        RateOrStep::RatePerH(rate) => format!("drifts by {} per hour from", decision.cause.show(rate)),
-        RateOrStep::Step(step) => format!("steps by {} at", decision.cause.show(step)),
+    let what: Vec<String> = drifts.iter().map(described).collect();
+    let corrected: Vec<String> = drifts.iter().map(|drift| correction(drift.cause)).collect();
+    let (what, corrected) = (what.join("; "), corrected.join(" "));
+    match verdict {
+        DriftVerdict::Unclear => format!(
+            "Something drifted, but the recording does not show what; most probable: {what}. {corrected}{left_out}"
+        ),
+        _ => format!("{what}. {corrected}{left_out}"),
+    }
+}
+
+fn described(drift: &FoundDrift) -> String {
+    let size = match drift.size {
+        RateOrStep::RatePerH(rate) => format!("drifts by {} per hour from", drift.cause.show(rate)),
+        RateOrStep::Step(step) => format!("steps by {} at", drift.cause.show(step)),
     };
-    let what = format!("{} {size} {:.0} s on", decision.cause, fit.course.onset_s);
-    let corrected = match decision.cause {
-        Cause::Sensor(channel) => format!(
-            "The corrected points have this subtracted from the reading of {}; the recording is unchanged.",
-            channel.symbol()
+    format!(
+        "{} {size} {:.0} s on, with a probability of {}",
+        drift.cause,
+        drift.onset_s,
+        percent(drift.probability)
+    )
+}
+
+fn correction(cause: Cause) -> String {
+    match cause {
+        Cause::Sensors(_) => format!(
+            "The corrected points have this subtracted from the reading of {cause}; the recording is unchanged."
         ),
         Cause::Fouling => {
             "The efficiency of the corrected points is that of the machine at the campaign's start."
@@ -89,19 +116,10 @@ fn reason(decision: &Decision, fit: &Fit, verdict: DriftVerdict) -> String {
             "Friction does not change the compressor's efficiency; the corrected points are the fitted ones."
                 .to_owned()
         }
-    };
-    match verdict {
-        DriftVerdict::Unclear => format!(
-            "Something drifted ({compared}), but the recording does not show what; most probable: {what}. {corrected}"
-        ),
-        _ => format!("{what} ({compared}). {corrected}"),
     }
 }
 
-/// Rate or step of a fit.
-fn size(fit: &Fit) -> RateOrStep {
-    match fit.course.kind {
-        CourseKind::Ramp => RateOrStep::RatePerH(fit.size),
-        CourseKind::Step => RateOrStep::Step(fit.size),
-    }
+/// Never more certain than the assumptions are.
+fn percent(probability: f64) -> String {
+    if probability > 0.995 { "more than 99.5 %".to_owned() } else { format!("{:.0} %", 100.0 * probability) }
 }

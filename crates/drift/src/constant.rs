@@ -10,3 +10,22 @@ pub(crate) struct Constant {
     /// Heat-transfer coefficient at the end of each step, W/(m2 K).
     pub h_w_m2k: Vec<f64>,
 }
+
+impl Constant {
+    /// The same, so many times as large.
+    pub fn times(&self, factor: f64) -> Constant {
+        let times = |values: &[f64]| values.iter().map(|value| factor * value).collect();
+        Constant { readings: times(&self.readings), eta: times(&self.eta), h_w_m2k: times(&self.h_w_m2k) }
+    }
+
+    /// Both together.
+    pub fn plus(mut self, other: Constant) -> Constant {
+        let add = |into: &mut Vec<f64>, from: &[f64]| {
+            into.iter_mut().zip(from).for_each(|(into, from)| *into += from);
+        };
+        add(&mut self.readings, &other.readings);
+        add(&mut self.eta, &other.eta);
+        add(&mut self.h_w_m2k, &other.h_w_m2k);
+        self
+    }
+}

@@ -1,11 +1,13 @@
 //! The points of the map without the drift.
 
 use crate::blocks::CampaignStep;
-use crate::cause::Cause;
+use crate::cause::{Cause, CauseKind};
+use crate::constant::Constant;
+use crate::fit::Fit;
 use crate::refine::Refined;
 use crate::report::CorrectedPoint;
 use crate::request::DriftRequest;
-use crate::take_off::take_off;
+use crate::take_off::without_drifts;
 use mapper_core::{Channel, IdentifiedPoint, Recording};
 use mapper_identify::identify_each;
 use mapper_observe::mean::mean_between;
@@ -28,25 +30,26 @@ pub(crate) fn point_of<'a>(
     points.get(step.run)?.iter().find(|point| point.step == step.index)
 }
 
-/// All points, the drift taken out.
+/// All points, the drifts taken out.
 pub(crate) fn corrected_points(
     request: &DriftRequest<'_>,
     recordings: &[&Recording],
     refined: &Refined,
     points: &[Vec<IdentifiedPoint>],
-    cause: Cause,
 ) -> Vec<CorrectedPoint> {
-    let Refined { readings, constants, fit } = refined;
-    let signature = readings.signature(cause);
+    let Refined { readings, constants, fits } = refined;
+    let drifts = &fits.drifts;
+    let of_sensors = drifts.iter().any(|fit| fit.cause.kind() == CauseKind::Sensor);
+    let signatures: Vec<(&Fit, Constant)> =
+        drifts.iter().filter_map(|fit| Some((fit, readings.signature(fit.cause)?))).collect();
     let corrected: Vec<Vec<IdentifiedPoint>> = (0..recordings.len())
-        .map(|run| match cause {
-            Cause::Sensor(channel) => {
-                let offset_s =
-                    readings.steps.iter().find(|step| step.run == run).map_or(0.0, |step| step.offset_s);
-                let drift_at = |t_s: f64| fit.drift_at(t_s + offset_s);
-                identified(&take_off(recordings[run], channel, &drift_at), request)
+        .map(|run| {
+            if !of_sensors {
+                return points[run].clone();
             }
-            Cause::Fouling | Cause::BearingFriction => points[run].clone(),
+            let offset_s =
+                readings.steps.iter().find(|step| step.run == run).map_or(0.0, |step| step.offset_s);
+            identified(&without_drifts(recordings[run], drifts, offset_s), request)
         })
         .collect();
     readings
@@ -54,20 +57,21 @@ pub(crate) fn corrected_points(
         .iter()
         .enumerate()
         .filter_map(|(position, step)| {
-            let drift = fit.drift_at(step.end_s + step.offset_s);
+            let at = |fit: &Fit| fit.drift_at(step.end_s + step.offset_s);
             // A step that the model cannot follow has no point.
             let (mut eta, mut h_w_m2k) =
                 *readings.step_ends.get(position).filter(|(eta, _)| eta.is_finite())?;
-            for (constant, size) in constants.iter().zip(fit.constants.iter()) {
+            for (constant, size) in constants.iter().zip(fits.constants.iter()) {
                 eta += constant.eta[position] * size;
                 h_w_m2k += constant.h_w_m2k[position] * size;
             }
-            if let Some(signature) = &signature {
-                eta += signature.eta[position] * drift;
-                h_w_m2k += signature.h_w_m2k[position] * drift;
+            for (fit, signature) in &signatures {
+                eta += signature.eta[position] * at(fit);
+                h_w_m2k += signature.h_w_m2k[position] * at(fit);
             }
             // What the machine at the campaign's start would have had at this operating point.
-            let fouled = if cause == Cause::Fouling { 1.0 + drift } else { 1.0 };
+            let fouling = drifts.iter().find(|fit| fit.cause == Cause::Fouling);
+            let fouled = 1.0 + fouling.map_or(0.0, at);
             let weights = DVector::from_iterator(constants.len(), constants.iter().map(|c| c.eta[position]));
             let identified = point_of(&corrected, step).and_then(|point| point.eta);
             let recorded = point_of(points, step);
@@ -80,11 +84,11 @@ pub(crate) fn corrected_points(
                 ),
                 valve: step.valve_opening_ratio,
                 eta: eta / fouled,
-                sigma_eta: fit.noise.variance(&weights).max(0.0).sqrt(),
+                sigma_eta: fits.noise.variance(&weights).max(0.0).sqrt(),
                 h_w_m2k,
                 eta_identified: identified.map(|eta| eta / fouled),
                 eta_uncorrected: recorded.and_then(|point| point.eta),
-                correction: drift,
+                corrections: drifts.iter().map(at).collect(),
             })
         })
         .collect()

@@ -6,7 +6,7 @@ use crate::decide;
 use crate::drive::{Drive, predict};
 use crate::nuisance;
 use crate::readings::Readings;
-use crate::refine::Refined;
+use crate::refine::{Refined, columns};
 use crate::repeats;
 use crate::report::DriftReport;
 use crate::request::{DriftError, DriftRequest, Unsolvable};
@@ -44,14 +44,8 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     let declared = request.declared();
     let constants = nuisance::constants(&readings, &declared);
     let own = own_covariances(&recordings, &readings, &declared);
-    let columns = DMatrix::from_fn(readings.difference.len(), constants.len(), |row, column| {
-        constants[column].readings[row]
-    });
-    let (decision, fit) = decide::decide(&readings, own, &columns, request.seed)?;
-    let mut refined = Refined { readings, constants, fit };
-    if decision.flagged {
-        refined = refined.around(&mut drives, &declared, &decision);
-    }
+    let decision = decide::decide(&readings, own, &columns(&constants, &readings))?;
+    let refined = Refined::new(readings, constants, &mut drives, &declared, &decision)?;
     Ok(conclude(request, &recordings, &refined, &groups, &decision))
 }
 
@@ -75,7 +69,7 @@ fn read<'a>(
             Drive::new(run, recording, request.model, &request.boundary, &steps, &all_blocks)
         })
         .collect::<Result<_, _>>()?;
-    let (base, turned) = predict(&mut drives, None)?;
+    let (base, turned) = predict(&mut drives, &[])?;
     let all: Vec<_> = all_blocks
         .iter()
         .zip(&base.means)

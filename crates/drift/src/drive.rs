@@ -87,7 +87,7 @@ impl<'a> Drive<'a> {
     /// follow.
     fn predict(
         &self,
-        planted: Option<Planted>,
+        planted: &[Planted],
         turned: Option<(Knob, f64)>,
     ) -> Result<Prediction, (usize, DriveError)> {
         let mut state = self.start;
@@ -125,7 +125,7 @@ impl<'a> Drive<'a> {
                 if let Some((knob, by)) = turned {
                     knob.turn(&mut model.params, by);
                 }
-                if let Some(planted) = planted {
+                for planted in planted {
                     planted.drift_machine(&mut model.params, from_s + offset_s, to_s + offset_s);
                 }
                 let before = stretch.times_s.partition_point(|t_s| *t_s < from_s);
@@ -157,10 +157,7 @@ impl<'a> Drive<'a> {
     }
 
     /// The run with what is planted, and with each knob turned beside it, over all cores.
-    pub fn predict_all(
-        &mut self,
-        planted: Option<Planted>,
-    ) -> Result<(Prediction, Vec<Prediction>), DriveError> {
+    pub fn predict_all(&mut self, planted: &[Planted]) -> Result<(Prediction, Vec<Prediction>), DriveError> {
         loop {
             // What is left out is left out in all, so that their differences stay smooth.
             let (index, error) = match self.try_all(planted) {
@@ -176,10 +173,7 @@ impl<'a> Drive<'a> {
         }
     }
 
-    fn try_all(
-        &self,
-        planted: Option<Planted>,
-    ) -> Result<(Prediction, Vec<Prediction>), (usize, DriveError)> {
+    fn try_all(&self, planted: &[Planted]) -> Result<(Prediction, Vec<Prediction>), (usize, DriveError)> {
         let base = self.predict(planted, None)?;
         let turned =
             parallel::map(&KNOBS, |knob| self.predict(planted, Some((*knob, difference_step(*knob)))));
@@ -191,7 +185,7 @@ impl<'a> Drive<'a> {
 /// What the model says of all runs with what is planted, and with each knob turned beside it.
 pub(crate) fn predict(
     drives: &mut [Drive<'_>],
-    planted: Option<Planted>,
+    planted: &[Planted],
 ) -> Result<(Prediction, Vec<Prediction>), DriftError> {
     let mut base = Prediction::empty();
     let mut turned = vec![Prediction::empty(); KNOBS.len()];
@@ -229,7 +223,7 @@ fn start_state(
 /// Inputs with the drift of a sensor subtracted.
 struct Undrifted<'a> {
     inputs: Shifted<'a, AveragedInputs>,
-    planted: Option<Planted>,
+    planted: &'a [Planted],
     /// What is added to run time for the time of the campaign, s.
     offset_s: f64,
 }
@@ -237,7 +231,7 @@ struct Undrifted<'a> {
 impl Inputs for Undrifted<'_> {
     fn at(&self, t_s: f64) -> BoundaryConditions {
         let mut boundary = self.inputs.at(t_s);
-        if let Some(planted) = self.planted {
+        for planted in self.planted {
             planted.undrift(&mut boundary, t_s + self.offset_s);
         }
         boundary
@@ -248,6 +242,6 @@ impl Inputs for Undrifted<'_> {
     }
 
     fn is_constant_after(&self, t_s: f64) -> bool {
-        !self.planted.is_some_and(|planted| planted.input_drifts()) && self.inputs.is_constant_after(t_s)
+        !self.planted.iter().any(Planted::input_drifts) && self.inputs.is_constant_after(t_s)
     }
 }

@@ -1,6 +1,6 @@
-//! Size and onset of one cause, with everything that is constant fitted beside it.
+//! Sizes and onsets of what is found, with everything that is constant fitted beside it.
 
-use crate::candidates::{Candidate, courses, mean_of, weigh};
+use crate::candidates::{courses, mean_of};
 use crate::cause::Cause;
 use crate::course::{Course, CourseKind};
 use crate::low_rank::LowRank;
@@ -9,12 +9,17 @@ use crate::request::{DriftError, Unsolvable};
 use mapper_numerics::statistics::{CHI_SQUARE_1_95, NORMAL_975};
 use nalgebra::{DMatrix, DVector};
 
-/// Onsets on the fine grid of the cause that is found.
+/// Onsets on the fine grid of a cause that is found: closer than the stretches that are compared.
 const FINE_ONSETS: usize = 280;
-/// Evidence that is not a difference.
+/// Evidence (twice the ln of a likelihood ratio) that is not a difference.
 const AS_GOOD: f64 = 0.1;
+/// Rounds in which the onsets of several drifts are fitted in turn.
+const ROUNDS: usize = 2;
+
 /// A cause with its best course and size.
+#[derive(Debug, Clone)]
 pub(crate) struct Fit {
+    pub cause: Cause,
     /// Best course.
     pub course: Course,
     /// Rate or step, unit of the cause.
@@ -25,10 +30,6 @@ pub(crate) struct Fit {
     /// 95 % interval of the onset, time of the campaign, s.
     pub onset_low_s: f64,
     pub onset_high_s: f64,
-    /// Most probable constants beside it, in standard deviations.
-    pub constants: DVector<f64>,
-    /// Noise and constants.
-    pub noise: LowRank,
 }
 
 impl Fit {
@@ -38,51 +39,115 @@ impl Fit {
     }
 }
 
-/// Fits a cause with courses of one kind. `noise` has the constants in it.
+/// All that drifts, with what is constant.
+pub(crate) struct Fits {
+    pub drifts: Vec<Fit>,
+    /// Most probable constants, in standard deviations.
+    pub constants: DVector<f64>,
+    /// Noise and constants.
+    pub noise: LowRank,
+}
+
+/// Fits each cause with a course of the kind given, from the onset given on, all beside each other.
 pub(crate) fn fit(
     readings: &Readings,
-    noise: LowRank,
-    cause: Cause,
-    kind: CourseKind,
-) -> Result<Fit, DriftError> {
-    let nothing = || Unsolvable::Hidden { cause };
-    let signature = readings.signature(cause).ok_or_else(nothing)?;
+    own: &[DMatrix<f64>],
+    columns: &DMatrix<f64>,
+    found: &[(Cause, Course)],
+) -> Result<Fits, DriftError> {
+    let mut found = found.to_vec();
+    let mut drifts = Vec::new();
+    for _ in 0..if found.len() > 1 { ROUNDS } else { 1 } {
+        drifts.clear();
+        for place in 0..found.len() {
+            let others: Vec<(Cause, Course)> =
+                found.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, one)| *one).collect();
+            let noise = LowRank::new(own, &beside(readings, columns, &others)?)?;
+            let fit = fit_one(readings, &noise, found[place])?;
+            found[place].1 = fit.course;
+            drifts.push(fit);
+        }
+    }
+    let mut left = DMatrix::from_column_slice(readings.difference.len(), 1, &readings.difference);
+    for Fit { cause, course, size, .. } in &drifts {
+        let shown = column(readings, *cause, *course)?;
+        left.iter_mut().zip(shown).for_each(|(left, shown)| *left -= size * shown);
+    }
+    let noise = LowRank::new(own, columns)?;
+    let constants = noise.constants(&noise.whiten(left)).column(0).into_owned();
+    Ok(Fits { drifts, constants, noise })
+}
+
+/// The constants, and the other drifts as large as they may be.
+fn beside(
+    readings: &Readings,
+    columns: &DMatrix<f64>,
+    others: &[(Cause, Course)],
+) -> Result<DMatrix<f64>, DriftError> {
     let (start_s, end_s) = readings.span_s();
-    let fine: Vec<Candidate> = courses(start_s, end_s, FINE_ONSETS)
-        .into_iter()
-        .filter(|course| course.kind == kind)
-        .map(|course| Candidate { cause: 0, course })
-        .collect();
-    let shown = noise.whiten(DMatrix::from_fn(readings.difference.len(), fine.len(), |row, column| {
-        signature.readings[row] * mean_of(readings, row, fine[column].course)
-    }));
+    let mut all = columns.clone().resize_horizontally(columns.ncols() + others.len(), 0.0);
+    for (place, (cause, course)) in others.iter().enumerate() {
+        let sigma = match course.kind {
+            CourseKind::Ramp => cause.sigma() * 3600.0 / (end_s - start_s),
+            CourseKind::Step => cause.sigma(),
+        };
+        let shown = column(readings, *cause, *course)?;
+        all.column_mut(columns.ncols() + place)
+            .iter_mut()
+            .zip(shown)
+            .for_each(|(all, shown)| *all = sigma * shown);
+    }
+    Ok(all)
+}
+
+/// A cause of size 1 with a course, as the readings show it.
+fn column(readings: &Readings, cause: Cause, course: Course) -> Result<Vec<f64>, DriftError> {
+    let signature = readings.signature(cause).ok_or(Unsolvable::Hidden { cause })?;
+    let at = |(row, value): (usize, &f64)| value * mean_of(readings, row, course);
+    Ok(signature.readings.iter().enumerate().map(at).collect())
+}
+
+/// One cause with courses of one kind. `noise` has everything else in it.
+fn fit_one(readings: &Readings, noise: &LowRank, (cause, begun): (Cause, Course)) -> Result<Fit, DriftError> {
+    let nothing = || Unsolvable::Hidden { cause };
+    let (start_s, end_s) = readings.span_s();
+    let fine: Vec<Course> =
+        courses(start_s, end_s, FINE_ONSETS).into_iter().filter(|course| course.kind == begun.kind).collect();
+    let mut shown = DMatrix::zeros(readings.difference.len(), fine.len());
+    for (index, course) in fine.iter().enumerate() {
+        shown.set_column(index, &DVector::from_vec(column(readings, cause, *course)?));
+    }
+    let shown = noise.whiten(shown);
     let inverse = noise.inverse_times(&shown);
     let difference = DMatrix::from_column_slice(readings.difference.len(), 1, &readings.difference);
-    let whitened = noise.whiten(difference);
-    let profile = weigh(&[(cause, signature.readings)], &fine, &whitened, &shown, &inverse);
-    let best = (0..fine.len())
-        .max_by(|a, b| profile.evidence[*a].total_cmp(&profile.evidence[*b]))
-        .ok_or_else(nothing)?;
+    let pull = inverse.tr_mul(&noise.whiten(difference));
+    let information: Vec<f64> = (0..fine.len())
+        .map(|index| shown.column(index).dot(&inverse.column(index)).max(f64::MIN_POSITIVE))
+        .collect();
+    let size = |index: usize| {
+        let size = pull[index] / information[index];
+        if cause.is_at_least_zero() { size.max(0.0) } else { size }
+    };
+    let sigma = |index: usize| information[index].sqrt().recip();
+    let evidence = |index: usize| size(index).powi(2) * information[index];
+    let best = (0..fine.len()).max_by(|a, b| evidence(*a).total_cmp(&evidence(*b))).ok_or_else(nothing)?;
     // Where nothing is read for a while, all onsets within are equally good: the middle one is the least wrong.
-    let as_good = |index: &usize| profile.evidence[*index] > profile.evidence[best] - AS_GOOD;
+    let as_good = |index: &usize| evidence(*index) > evidence(best) - AS_GOOD;
     let first = (0..=best).rev().take_while(as_good).last().unwrap_or(best);
     let last = (best..fine.len()).take_while(as_good).last().unwrap_or(best);
     let peak = first.midpoint(last);
-    let within: Vec<usize> = (0..fine.len())
-        .filter(|index| profile.evidence[*index] > profile.evidence[peak] - CHI_SQUARE_1_95)
-        .collect();
+    let within: Vec<usize> =
+        (0..fine.len()).filter(|index| evidence(*index) > evidence(peak) - CHI_SQUARE_1_95).collect();
     let extreme = |value: &dyn Fn(usize) -> f64, sign: f64| {
         sign * within.iter().map(|index| sign * value(*index)).fold(f64::NEG_INFINITY, f64::max)
     };
-    let left = &whitened - shown.columns(peak, 1) * profile.size[peak];
     Ok(Fit {
-        course: fine[peak].course,
-        size: profile.size[peak],
-        low: extreme(&|index| profile.size[index] - NORMAL_975 * profile.sigma[index], -1.0),
-        high: extreme(&|index| profile.size[index] + NORMAL_975 * profile.sigma[index], 1.0),
-        onset_low_s: extreme(&|index| fine[index].course.onset_s, -1.0),
-        onset_high_s: extreme(&|index| fine[index].course.onset_s, 1.0),
-        constants: noise.constants(&left).column(0).into_owned(),
-        noise,
+        cause,
+        course: fine[peak],
+        size: size(peak),
+        low: extreme(&|index| size(index) - NORMAL_975 * sigma(index), -1.0),
+        high: extreme(&|index| size(index) + NORMAL_975 * sigma(index), 1.0),
+        onset_low_s: extreme(&|index| fine[index].onset_s, -1.0),
+        onset_high_s: extreme(&|index| fine[index].onset_s, 1.0),
     })
 }

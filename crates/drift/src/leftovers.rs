@@ -1,5 +1,6 @@
 //! What the best explanation leaves: stretches that the model cannot follow, and noise beyond what is declared.
 
+use crate::candidates::Candidates;
 use crate::low_rank::LowRank;
 use crate::readings::Readings;
 use crate::request::Unsolvable;
@@ -19,13 +20,13 @@ pub(crate) fn leave_out(
     readings: &Readings,
     columns: &DMatrix<f64>,
     difference: &DMatrix<f64>,
-    shown: &DMatrix<f64>,
+    candidates: &Candidates,
 ) -> Result<usize, Unsolvable> {
     let count = readings.columns.len();
     let mut out = vec![false; own.len()];
     for _ in 0..LEAVE_OUT_ROUNDS {
         let noise = LowRank::new(own, columns)?;
-        let left = unexplained(&noise, difference, shown);
+        let left = unexplained(&noise, difference, candidates);
         let sizes: Vec<f64> = (0..own.len())
             .map(|block| {
                 left.rows(block * count, count).iter().map(|value| value * value).sum::<f64>() / count as f64
@@ -47,25 +48,14 @@ pub(crate) fn leave_out(
     Ok(out.iter().filter(|out| **out).count())
 }
 
-/// What constants and the best cause leave, whitened.
-fn unexplained(noise: &LowRank, difference: &DMatrix<f64>, shown: &DMatrix<f64>) -> DMatrix<f64> {
-    let whitened = noise.whiten(difference.clone());
-    let whitened_shown = noise.whiten(shown.clone());
-    let inverse_difference = noise.inverse_times(&whitened);
-    let along = whitened_shown.tr_mul(&inverse_difference);
-    let inverse_shown = noise.inverse_times(&whitened_shown);
-    let mut best = (0.0, 0, 0.0);
-    for index in 0..shown.ncols() {
-        let information = whitened_shown.column(index).dot(&inverse_shown.column(index));
-        if information > 0.0 {
-            let evidence = along[(index, 0)].powi(2) / information;
-            if evidence > best.0 {
-                best = (evidence, index, along[(index, 0)] / information);
-            }
-        }
+/// What constants and the most probable causes leave, whitened.
+fn unexplained(noise: &LowRank, difference: &DMatrix<f64>, candidates: &Candidates) -> DMatrix<f64> {
+    let explained = candidates.likelihood(noise, difference).explain(&candidates.priors).unwrap_or_default();
+    let mut left = difference.clone();
+    for member in explained.members {
+        left -= candidates.shown.columns(member.index, 1) * member.value;
     }
-    let explained = &whitened - whitened_shown.columns(best.1, 1) * best.2;
-    noise.inverse_times(&explained)
+    noise.inverse_times(&noise.whiten(left))
 }
 
 /// Raises each channel's own noise to what the best explanation leaves.
@@ -74,9 +64,9 @@ pub(crate) fn inflate(
     readings: &Readings,
     noise: &LowRank,
     difference: &DMatrix<f64>,
-    shown: &DMatrix<f64>,
+    candidates: &Candidates,
 ) {
-    let left = unexplained(noise, difference, shown);
+    let left = unexplained(noise, difference, candidates);
     let count = readings.columns.len();
     let rows = left.nrows() as f64;
     // Constants take their share of the degrees of freedom.

@@ -3,8 +3,8 @@
 //!
 //! The nominal model is driven by the recorded boundary conditions through all steps; what the readings differ from it
 //! is explained by what is constant over the campaign (declared tolerances and offsets, and a deviation of each operating
-//! point that its repeats share) and, one after the other, by each cause with each course over time. Only what repeats
-//! show can count against the constants. docs/drift.md has the method with its measured error rates.
+//! point that its repeats share) and by the most probable set of causes, each with a course over time
+//! ([`mapper_inference::hypotheses`]). Only what repeats show can count against the constants. docs/drift.md has the method with its measured error rates.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod blocks;
@@ -38,8 +38,8 @@ pub use cause::{Cause, CauseKind};
 pub use course::{Course, CourseKind};
 pub use diagnose::diagnose;
 pub use report::{
-    Alternative, CorrectedPoint, DetectionLimit, DriftReport, DriftVerdict, RateOrStep, RepeatGroup, Visit,
-    VisitChannel,
+    Alternative, CorrectedPoint, DetectionLimit, DriftReport, DriftVerdict, FoundDrift, RateOrStep,
+    RepeatGroup, Visit, VisitChannel,
 };
 pub use request::{DriftError, DriftRequest, RecordedRun, Unsolvable};
 pub use take_off::without_drift;

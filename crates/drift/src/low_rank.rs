@@ -48,11 +48,6 @@ impl LowRank {
         self.inner.solve(&self.columns.tr_mul(whitened))
     }
 
-    /// What constants of these sizes add to the whitened readings.
-    pub fn shown(&self, constants: &DMatrix<f64>) -> DMatrix<f64> {
-        &self.columns * constants
-    }
-
     /// Variance of a linear function of the constants, after the readings.
     pub fn variance(&self, weights: &DVector<f64>) -> f64 {
         weights.dot(&self.inner.solve(weights))

@@ -28,7 +28,7 @@ impl Planted {
 
     /// Whether something that drives the model was read wrong.
     pub fn input_drifts(&self) -> bool {
-        matches!(self.cause, Cause::Sensor(channel) if DRIVERS.contains(&channel))
+        self.cause.channels().iter().any(|channel| DRIVERS.contains(channel))
     }
 
     /// The machine as it is on average over a part of the campaign, time of the campaign, s.
@@ -40,14 +40,14 @@ impl Planted {
                 Knob::Flow.turn(params, FOULING_FLOW_SHARE * now);
             }
             Cause::BearingFriction => Knob::Friction.turn(params, now),
-            Cause::Sensor(_) => {}
+            Cause::Sensors(_) => {}
         }
     }
 
     /// Takes the drift of a sensor off the input that was read with it.
     pub fn undrift(&self, boundary: &mut BoundaryConditions, t_s: f64) {
-        if let Cause::Sensor(channel) = self.cause {
-            Knob::Input(channel).shift(boundary, -self.size * self.course.at(t_s));
+        for channel in self.cause.channels().iter().filter(|channel| DRIVERS.contains(channel)) {
+            Knob::Input(*channel).shift(boundary, -self.size * self.course.at(t_s));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! All readings beside the model.
 
 use crate::blocks::{Block, CampaignStep};
-use crate::cause::{Cause, FOULING_FLOW_SHARE};
+use crate::cause::{Cause, FOULING_FLOW_SHARE, is_relative};
 use crate::constant::Constant;
 use crate::knobs::{KNOBS, difference_step};
 use crate::prediction::Prediction;
@@ -56,45 +56,50 @@ impl Readings {
 
     /// A cause of unit size all the time, as readings and points show it; `None` where nothing shows it.
     pub fn signature(&self, cause: Cause) -> Option<Constant> {
-        let of_knob = |knob: Knob, factor: f64| {
-            let answer = self.answer(knob)?;
-            let times = |values: &[f64]| values.iter().map(|value| factor * value).collect();
-            Some(Constant {
-                readings: times(&answer.readings),
-                eta: times(&answer.eta),
-                h_w_m2k: times(&answer.h_w_m2k),
-            })
-        };
         match cause {
+            Cause::Sensors(channels) => {
+                self.sum(channels.iter().filter_map(|channel| self.of_sensor(*channel)))
+            }
             Cause::Fouling => {
-                let (mut sum, flow) =
-                    (of_knob(Knob::Efficiency, 1.0)?, of_knob(Knob::Flow, FOULING_FLOW_SHARE)?);
-                let add = |into: &mut Vec<f64>, from: &[f64]| {
-                    into.iter_mut().zip(from).for_each(|(into, from)| *into += from);
-                };
-                add(&mut sum.readings, &flow.readings);
-                add(&mut sum.eta, &flow.eta);
-                add(&mut sum.h_w_m2k, &flow.h_w_m2k);
-                Some(sum)
+                let of = |knob, factor| Some(self.answer(knob)?.times(factor));
+                self.sum([of(Knob::Efficiency, 1.0)?, of(Knob::Flow, FOULING_FLOW_SHARE)?].into_iter())
             }
-            Cause::BearingFriction => of_knob(Knob::Friction, 1.0),
-            // An input that reads too high drives the model too high: the truth lies below.
-            Cause::Sensor(channel) if DRIVERS.contains(&channel) => of_knob(Knob::Input(channel), -1.0),
-            Cause::Sensor(channel) => {
-                let output = OUTPUTS.iter().position(|output| *output == channel)?;
-                let column = self.columns.iter().position(|column| *column == output)?;
-                let count = self.columns.len();
-                let readings = (0..self.difference.len())
-                    .map(|row| match row % count == column {
-                        true if cause.is_gain() => self.model[row],
-                        true => 1.0,
-                        false => 0.0,
-                    })
-                    .collect();
-                let steps = self.steps.len();
-                Some(Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] })
-            }
+            Cause::BearingFriction => self.answer(Knob::Friction).cloned(),
         }
+    }
+
+    /// The part of a signature that the model has once the cause is planted: all but what the sensors of outputs add.
+    pub fn planted_signature(&self, cause: Cause) -> Option<Constant> {
+        match cause {
+            Cause::Sensors(channels) => {
+                let inputs = channels.iter().filter(|channel| DRIVERS.contains(channel));
+                self.sum(inputs.filter_map(|channel| self.of_sensor(*channel)))
+            }
+            Cause::Fouling | Cause::BearingFriction => self.signature(cause),
+        }
+    }
+
+    fn of_sensor(&self, channel: Channel) -> Option<Constant> {
+        // An input that reads too high drives the model too high: the truth lies below.
+        if DRIVERS.contains(&channel) {
+            return Some(self.answer(Knob::Input(channel))?.times(-1.0));
+        }
+        let output = OUTPUTS.iter().position(|output| *output == channel)?;
+        let column = self.columns.iter().position(|column| *column == output)?;
+        let count = self.columns.len();
+        let of_row = |row: usize| match row % count == column {
+            true if is_relative(channel) => self.model[row],
+            true => 1.0,
+            false => 0.0,
+        };
+        let steps = self.steps.len();
+        let readings = (0..self.difference.len()).map(of_row).collect();
+        Some(Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] })
+    }
+
+    /// `None` where there is nothing to add, or it shows nowhere.
+    fn sum(&self, parts: impl Iterator<Item = Constant>) -> Option<Constant> {
+        parts.reduce(Constant::plus).filter(|sum| sum.readings.iter().any(|value| *value != 0.0))
     }
 
     /// The same readings beside another prediction; `None` where it does not say all that the first one said.

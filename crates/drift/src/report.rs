@@ -1,6 +1,7 @@
 //! The answer, as it is printed and written as JSON.
 
-use crate::cause::{Cause, CauseKind};
+use crate::cause::Cause;
+use crate::course::{Course, CourseKind};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -8,23 +9,16 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DriftVerdict {
-    /// Nothing beyond what chance shows in one drift-free campaign of a hundred.
+    /// It is more probable that nothing drifted than that anything did.
     None,
-    /// A sensor drifts.
+    /// One or more sensors drift.
     Sensor,
     /// The machine changes.
     Machine,
+    /// The machine changes and a sensor drifts.
+    SensorAndMachine,
     /// Something may have moved, but the recording cannot tell what; or it cannot tell whether: `reason` says.
     Unclear,
-}
-
-impl From<CauseKind> for DriftVerdict {
-    fn from(kind: CauseKind) -> Self {
-        match kind {
-            CauseKind::Sensor => DriftVerdict::Sensor,
-            CauseKind::Machine => DriftVerdict::Machine,
-        }
-    }
 }
 
 /// How fast, or how far.
@@ -51,7 +45,7 @@ pub struct Alternative {
 pub struct DetectionLimit {
     /// The cause.
     pub cause: Cause,
-    /// Steady drift over the whole campaign whose expected evidence meets the threshold, unit of the cause.
+    /// Steady drift over the whole campaign that is expected to be as probable as none, unit of the cause.
     pub change: f64,
     /// Unit.
     pub unit: &'static str,
@@ -129,8 +123,50 @@ pub struct CorrectedPoint {
     pub eta_identified: Option<f64>,
     /// Efficiency identified from this step as recorded, fraction.
     pub eta_uncorrected: Option<f64>,
-    /// What was subtracted from the drifting quantity at the end of this step, unit of the cause.
-    pub correction: f64,
+    /// What was subtracted at the end of this step, for each drift in their order, unit of its cause.
+    pub corrections: Vec<f64>,
+}
+
+/// Something that drifts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FoundDrift {
+    /// What drifts.
+    pub cause: Cause,
+    /// Probability that it is this, beside the other drifts; the rest is that of `alternatives`.
+    pub probability: f64,
+    /// What may stand in its place, none included, most probable first.
+    pub alternatives: Vec<Alternative>,
+    /// Onset, time of the campaign, s.
+    pub onset_s: f64,
+    /// Lower end of its 95 % interval, s.
+    pub onset_low_s: f64,
+    /// Upper end of its 95 % interval, s.
+    pub onset_high_s: f64,
+    /// Rate or step.
+    #[serde(flatten)]
+    pub size: RateOrStep,
+    /// Lower end of the 95 % interval of rate or step.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Unit of the drifting quantity; a rate is per hour.
+    pub unit: &'static str,
+}
+
+impl FoundDrift {
+    /// Whether it is more probable than all that may stand in its place.
+    pub fn is_clear(&self) -> bool {
+        self.probability >= 0.5
+    }
+
+    /// Its size at a time of the campaign, s; unit of the cause.
+    pub fn at(&self, t_s: f64) -> f64 {
+        let (kind, size) = match self.size {
+            RateOrStep::RatePerH(rate) => (CourseKind::Ramp, rate),
+            RateOrStep::Step(step) => (CourseKind::Step, step),
+        };
+        size * Course { kind, onset_s: self.onset_s }.at(t_s)
+    }
 }
 
 /// What is said of a campaign.
@@ -138,38 +174,17 @@ pub struct CorrectedPoint {
 pub struct DriftReport {
     /// In a word.
     pub verdict: DriftVerdict,
-    /// What drifts; `None` where nothing does or it is not known.
-    pub cause: Option<Cause>,
-    /// Probability of the cause, or of no drift.
-    pub probability: f64,
-    /// All others, most probable first.
-    pub alternatives: Vec<Alternative>,
-    /// Onset, time of the campaign, s.
-    pub onset_s: Option<f64>,
-    /// Lower end of its 95 % interval, s.
-    pub onset_low_s: Option<f64>,
-    /// Upper end of its 95 % interval, s.
-    pub onset_high_s: Option<f64>,
-    /// Rate or step.
-    #[serde(flatten)]
-    pub size: Option<RateOrStep>,
-    /// Lower end of the 95 % interval of rate or step.
-    pub low: Option<f64>,
-    /// Upper end.
-    pub high: Option<f64>,
-    /// Unit of the drifting quantity; a rate is per hour.
-    pub unit: Option<&'static str>,
+    /// What drifts, the most probable set; empty where nothing does or it is not known.
+    pub drifts: Vec<FoundDrift>,
+    /// No drift, and each cause as the only one, most probable first; sums to 1. Empty where there is no verdict.
+    pub alone: Vec<Alternative>,
     /// In sentences: why there is no verdict, what was found, what was corrected.
     pub reason: String,
-    /// Evidence of the best cause, and what one drift-free campaign in a hundred reaches (twice the log of the ratio).
-    pub evidence: f64,
-    /// That threshold.
-    pub threshold: f64,
     /// Smallest drift that is seen, per cause.
     pub detection_limits: Vec<DetectionLimit>,
     /// Repeated jumps.
     pub groups: Vec<RepeatGroup>,
-    /// Points of the map without the drift; empty where nothing drifts.
+    /// Points of the map without the drifts; empty where nothing drifts.
     pub corrected_points: Vec<CorrectedPoint>,
 }
 
@@ -178,19 +193,9 @@ impl DriftReport {
     pub fn without_verdict(reason: String) -> Self {
         DriftReport {
             verdict: DriftVerdict::Unclear,
-            cause: None,
-            probability: 0.0,
-            alternatives: Vec::new(),
-            onset_s: None,
-            onset_low_s: None,
-            onset_high_s: None,
-            size: None,
-            low: None,
-            high: None,
-            unit: None,
+            drifts: Vec::new(),
+            alone: Vec::new(),
             reason,
-            evidence: 0.0,
-            threshold: 0.0,
             detection_limits: Vec::new(),
             groups: Vec::new(),
             corrected_points: Vec::new(),

@@ -31,8 +31,6 @@ pub struct DriftRequest<'a> {
     pub tolerances: ModelTolerances,
     /// Declared uncertainty, window, geometry.
     pub identification: &'a IdentifyConfig,
-    /// Seed of the simulated drift-free campaigns that set the threshold.
-    pub seed: u64,
 }
 
 impl DriftRequest<'_> {

@@ -70,9 +70,9 @@ impl Stretch {
     }
 
     /// Parts of a stretch in each of which the machine is one and the same: the whole of it, but for a machine that drifts.
-    pub(crate) fn parts(&self, start_s: f64, planted: Option<Planted>) -> Vec<(f64, f64)> {
+    pub(crate) fn parts(&self, start_s: f64, planted: &[Planted]) -> Vec<(f64, f64)> {
         let mut edges = vec![start_s];
-        if let Some(Planted { course, .. }) = planted.filter(Planted::machine_changes) {
+        for Planted { course, .. } in planted.iter().filter(|planted| planted.machine_changes()) {
             let count = ((self.end_s - start_s) / PART_S).ceil().clamp(1.0, MOST_PARTS);
             edges.extend(
                 (1..count as usize).map(|part| start_s + (self.end_s - start_s) * part as f64 / count),

@@ -1,33 +1,37 @@
-//! A recording with the drift of a sensor subtracted from its readings.
+//! A recording with the drift of its sensors subtracted from their readings.
 
-use crate::cause::Cause;
-use crate::course::{Course, CourseKind};
-use crate::report::{DriftReport, RateOrStep};
+use crate::cause::is_relative;
+use crate::fit::Fit;
+use crate::report::{DriftReport, FoundDrift};
 use mapper_core::{Channel, Recording};
 
-/// The first recording with the drift of its sensor, as reported, subtracted; `None` where no sensor was found to drift.
+/// The first recording with the drift of its sensors, as reported, subtracted; `None` where no sensor was found to drift.
 pub fn without_drift(recording: &Recording, report: &DriftReport) -> Option<Recording> {
-    let (Some(Cause::Sensor(channel)), Some(onset_s), Some(size)) =
-        (report.cause, report.onset_s, report.size)
-    else {
-        return None;
-    };
-    let (kind, size) = match size {
-        RateOrStep::RatePerH(rate) => (CourseKind::Ramp, rate),
-        RateOrStep::Step(step) => (CourseKind::Step, step),
-    };
-    let course = Course { kind, onset_s };
-    Some(take_off(recording, channel, &|t_s| size * course.at(t_s)))
+    let of_sensors = |drift: &&FoundDrift| !drift.cause.channels().is_empty();
+    report.drifts.iter().find(of_sensors)?;
+    let mut recording = recording.clone();
+    for drift in &report.drifts {
+        take_off(&mut recording, drift.cause.channels(), &|t_s| drift.at(t_s));
+    }
+    Some(recording)
 }
 
-/// The recording with `drift_at` (run time, s) subtracted from the readings of a channel.
-pub(crate) fn take_off(recording: &Recording, channel: Channel, drift_at: &dyn Fn(f64) -> f64) -> Recording {
+/// The recording of a run that begins `offset_s` after the campaign with what was fitted subtracted.
+pub(crate) fn without_drifts(recording: &Recording, drifts: &[Fit], offset_s: f64) -> Recording {
     let mut recording = recording.clone();
-    if let Some(series) = recording.series.get_mut(&channel) {
-        for (t_s, value) in series.t_s.iter().zip(&mut series.values) {
-            let drift = drift_at(*t_s);
-            *value = if Cause::Sensor(channel).is_gain() { *value / (1.0 + drift) } else { *value - drift };
-        }
+    for fit in drifts {
+        take_off(&mut recording, fit.cause.channels(), &|t_s| fit.drift_at(t_s + offset_s));
     }
     recording
+}
+
+/// Subtracts `drift_at` (run time, s) from the readings of channels.
+fn take_off(recording: &mut Recording, channels: &[Channel], drift_at: &dyn Fn(f64) -> f64) {
+    for channel in channels {
+        let Some(series) = recording.series.get_mut(channel) else { continue };
+        for (t_s, value) in series.t_s.iter().zip(&mut series.values) {
+            let drift = drift_at(*t_s);
+            *value = if is_relative(*channel) { *value / (1.0 + drift) } else { *value - drift };
+        }
+    }
 }

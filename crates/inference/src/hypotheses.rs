@@ -2,18 +2,27 @@
 //!
 //! A balance is a vector of residuals `r` that would be zero but for errors: `r = C x + e`, with `e ~ N(0, S)` and one column of `C` for
 //! each parameter `x`. Some parameters always differ from zero by as much as is declared of them (`x ~ N(0, sigma^2)`). The others are
-//! hypotheses: each is exactly zero unless it is a member of the explanation, and then `x ~ N(0, sigma^2)` as well. Beforehand each
-//! hypothesis is a member with probability `expected / count`, independent of the others.
+//! hypotheses: each is exactly zero unless it is a member of the explanation, and then `x ~ N(0, sigma^2)` as well. Hypotheses that are
+//! the same cause in another form, as a drift with another onset, make a family, and at most one of a family is a member.
 //!
 //! The evidence of a set has a closed form (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, sect. 2.7), so that
-//! nothing is drawn and nothing is fitted. If the residuals are as described, a single member that is more probable than none comes up in at
-//! most a share `expected` of all recordings in which nothing is wrong, by Markov's inequality, for a Bayes factor has mean 1 there. In
-//! fact far less: it takes some 4.5 standard errors, and 30 hypotheses have that in one of 5,000.
+//! nothing is drawn and nothing is fitted. That of a family is the sum over its hypotheses, each with its share of the prior. If the
+//! residuals are as described, a family that is more probable than none comes up in at most a share of all recordings in which nothing is
+//! wrong that is the sum of all priors, by Markov's inequality, for a Bayes factor has mean 1 there. In fact far less: it takes some 4.5
+//! standard errors, and 30 hypotheses have that in one of 5,000.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use std::collections::BTreeMap;
 
 /// Most members of an explanation: bounds the search. Judgement.
 const MAX_MEMBERS: usize = 4;
+/// Most changes of the explanation on the way to the best: each member is found, replaced and taken back once. Where every family is one
+/// hypothesis the search ends by itself, since each change makes the set more probable.
+const MAX_CHANGES: usize = 4 * MAX_MEMBERS;
+/// Sets from which the search starts, beside the empty one: bounds its time. Judgement.
+const MAX_STARTS: usize = 6;
+/// Gain, ln of odds, that is none: rounding.
+const NO_GAIN: f64 = 1e-9;
 
 /// Residuals with what may move them.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,27 +42,54 @@ pub struct Likelihood {
     pull: DVector<f64>,
 }
 
-/// One standard deviation of each parameter beforehand, in the order of the balances' columns.
+/// A parameter that is zero unless it is a member of the explanation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hypothesis {
+    /// Its family: hypotheses of which at most one is a member.
+    pub family: usize,
+    /// One standard deviation beforehand, if it is a member.
+    pub sigma: f64,
+    /// ln of the probability beforehand that it is a member.
+    pub ln_prior: f64,
+    /// Whether it is never below zero.
+    pub at_least_zero: bool,
+}
+
+/// What is known of the parameters beforehand, in the order of the balances' columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Priors {
-    /// Of the parameters that always differ from zero: the first columns.
+    /// One standard deviation of the parameters that always differ from zero: the first columns.
     pub always: Vec<f64>,
-    /// Of the hypotheses: the columns after them.
-    pub hypotheses: Vec<f64>,
-    /// Expected number of members, above 0 and at most 1.
-    pub expected: f64,
+    /// The columns after them.
+    pub hypotheses: Vec<Hypothesis>,
+}
+
+impl Priors {
+    /// Hypotheses that are all families of their own and equally probable; `expected` of them, above 0 and at most 1, are members on average.
+    pub fn even(always: Vec<f64>, sigmas: &[f64], expected: f64) -> Priors {
+        let ln_prior = (expected / sigmas.len() as f64).ln();
+        let hypothesis = |(family, sigma): (usize, &f64)| Hypothesis {
+            family,
+            sigma: *sigma,
+            ln_prior,
+            at_least_zero: false,
+        };
+        Priors { always, hypotheses: sigmas.iter().enumerate().map(hypothesis).collect() }
+    }
 }
 
 /// A hypothesis that belongs to the explanation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Member {
-    /// Position among the hypotheses.
+    /// Position among the hypotheses: the most probable one of its family.
     pub index: usize,
     /// Its size: mean and standard deviation, given the other members.
     pub value: f64,
     /// One standard deviation of `value`.
     pub sigma: f64,
-    /// Hypotheses that could stand in its place, most probable first, with their probability relative to it (at most about 1).
+    /// ln of the probability of its family over that of nothing in its place.
+    pub ln_odds: f64,
+    /// Families that could stand in its place, most probable first, with their probability relative to its own (at most about 1).
     pub alternatives: Vec<(usize, f64)>,
 }
 
@@ -64,12 +100,20 @@ pub struct Explanation {
     pub members: Vec<Member>,
     /// ln of its probability over that of the empty one.
     pub ln_odds: f64,
+    /// ln of the probability of each family as the only member over that of none; families that show nothing are not in it.
+    pub alone: BTreeMap<usize, f64>,
 }
 
 impl Likelihood {
     /// Of this number of parameters, without any balance.
     pub fn new(parameters: usize) -> Self {
         Likelihood { precision: DMatrix::zeros(parameters, parameters), pull: DVector::zeros(parameters) }
+    }
+
+    /// Of hypotheses alone, where the parameters that always differ from zero belong to the covariance `S` already: `C' S^-1 C` and
+    /// `C' S^-1 r`.
+    pub fn of(precision: DMatrix<f64>, pull: DVector<f64>) -> Self {
+        Likelihood { precision, pull }
     }
 
     /// Adds a balance that errs independently of the others. `None` where its covariance is not positive definite, a number is not finite or
@@ -92,6 +136,21 @@ impl Likelihood {
         Some(())
     }
 
+    /// What is known of the other parameters where the first ones are as declared: they are integrated out.
+    fn given(&self, always: &[f64]) -> Option<Likelihood> {
+        let (first, count) = (always.len(), self.pull.len());
+        let scale = DMatrix::from_diagonal(&DVector::from_column_slice(always));
+        let own = self.precision.view((0, 0), (first, first));
+        let shared = &scale * self.precision.view((0, first), (first, count - first));
+        let pull = &scale * self.pull.rows(0, first);
+        let factor = (DMatrix::identity(first, first) + &scale * own * &scale).cholesky()?;
+        let rest = self.precision.view((first, first), (count - first, count - first));
+        Some(Likelihood {
+            precision: rest - shared.tr_mul(&factor.solve(&shared)),
+            pull: self.pull.rows(first, count - first) - shared.tr_mul(&factor.solve(&pull)),
+        })
+    }
+
     /// The scaled posterior precision `1 + D H D` of some parameters, factored, and their scaled pull.
     fn posterior(&self, free: &[(usize, f64)]) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
         let count = free.len();
@@ -103,90 +162,192 @@ impl Likelihood {
         Some((matrix.cholesky()?, pull))
     }
 
-    /// ln of the evidence of these parameters (index, standard deviation beforehand) over that of none.
-    fn ln_evidence(&self, free: &[(usize, f64)]) -> Option<f64> {
-        let (factor, pull) = self.posterior(free)?;
-        let ln_root_determinant: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
-        Some(0.5 * pull.dot(&factor.solve(&pull)) - ln_root_determinant)
-    }
-
     /// Standard error with which the balances tell the size of each hypothesis by itself; infinite where they do not.
     pub fn standard_errors(&self, priors: &Priors) -> Option<Vec<f64>> {
-        let always: Vec<(usize, f64)> = priors.always.iter().copied().enumerate().collect();
-        let (factor, _) = self.posterior(&always)?;
-        let error = |index: usize| {
-            let own = always.len() + index;
-            let shared = DVector::from_iterator(
-                always.len(),
-                always.iter().map(|(other, sigma)| sigma * self.precision[(*other, own)]),
-            );
-            let information = self.precision[(own, own)] - shared.dot(&factor.solve(&shared));
-            information.max(0.0).sqrt().recip()
+        let information = self.given(&priors.always)?.precision.diagonal();
+        Some(information.iter().map(|information| information.max(0.0).sqrt().recip()).collect())
+    }
+
+    /// Size of a hypothesis, beside parameters that are as declared, whose expected residuals make its family as probable as nothing; infinite
+    /// where no size does.
+    pub fn smallest_seen(&self, priors: &Priors, index: usize) -> Option<f64> {
+        let given = self.given(&priors.always)?;
+        let family = priors.hypotheses[index].family;
+        let ln_odds = |size: f64| {
+            let of_family = priors.hypotheses.iter().enumerate().filter(|(_, other)| other.family == family);
+            let each = of_family.map(|(other, Hypothesis { sigma, ln_prior, .. })| {
+                let scaled = 1.0 + sigma * sigma * given.precision[(other, other)];
+                let pull = sigma * size * given.precision[(other, index)];
+                0.5 * pull * pull / scaled - 0.5 * scaled.ln() + ln_prior
+            });
+            each.fold(f64::NEG_INFINITY, ln_sum)
         };
-        Some((0..priors.hypotheses.len()).map(error).collect())
+        // The odds grow with the size: between nothing and a multiple that is surely seen, halved until it is known to rounding.
+        let (mut low, mut high) = (0.0, 1e6 * priors.hypotheses[index].sigma);
+        if ln_odds(high) < 0.0 {
+            return Some(f64::INFINITY);
+        }
+        for _ in 0..100 {
+            let middle = 0.5 * (low + high);
+            if ln_odds(middle) < 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(high)
     }
 
     /// The most probable set of hypotheses, found by adding, swapping and removing members until nothing is more probable.
     pub fn explain(&self, priors: &Priors) -> Option<Explanation> {
-        let always: Vec<(usize, f64)> = priors.always.iter().copied().enumerate().collect();
-        let count = priors.hypotheses.len();
-        let cost = (count as f64 / priors.expected).ln();
-        let free = |members: &[usize]| -> Vec<(usize, f64)> {
-            let hypotheses = members.iter().map(|i| (always.len() + i, priors.hypotheses[*i]));
-            always.iter().copied().chain(hypotheses).collect()
-        };
-        let nothing = self.ln_evidence(&always)?;
-        let ln_odds = |members: &[usize]| {
-            let evidence = self.ln_evidence(&free(members)).unwrap_or(f64::NEG_INFINITY);
-            evidence - nothing - cost * members.len() as f64
-        };
-        let (mut members, mut best) = (Vec::new(), 0.0);
-        while let Some((odds, better)) = neighbours(&members, count)
-            .into_iter()
-            .map(|set| (ln_odds(&set), set))
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .filter(|(odds, _)| *odds > best + 1e-9)
-        {
-            (best, members) = (odds, better);
-        }
-        let (factor, pull) = self.posterior(&free(&members))?;
-        let (solved, inverse) = (factor.solve(&pull), factor.inverse());
-        let member = |(place, index): (usize, &usize)| {
-            let row = always.len() + place;
-            let sigma = priors.hypotheses[*index];
-            let mut alternatives: Vec<(usize, f64)> = (0..count)
-                .filter(|other| !members.contains(other))
-                .map(|other| {
-                    let mut set = members.clone();
-                    set[place] = other;
-                    (other, (ln_odds(&set) - best).exp())
-                })
-                .collect();
-            alternatives.sort_by(|a, b| b.1.total_cmp(&a.1));
-            Member {
-                index: *index,
-                value: sigma * solved[row],
-                sigma: sigma * inverse[(row, row)].max(0.0).sqrt(),
-                alternatives,
-            }
-        };
-        Some(Explanation { members: members.iter().enumerate().map(member).collect(), ln_odds: best })
+        let likelihood = self.given(&priors.always)?;
+        let search = Search { likelihood: &likelihood, hypotheses: &priors.hypotheses };
+        // From nothing, and from each of the most probable families: two of three causes that nearly add up to each other are left by no
+        // single swap.
+        let mut starts: Vec<Offer> =
+            search.offers(&[]).into_values().filter(|offer| offer.ln_total > 0.0).collect();
+        starts.sort_by(|a, b| b.ln_total.total_cmp(&a.ln_total));
+        let starts = starts.iter().take(MAX_STARTS).map(|offer| vec![offer.index]);
+        let ends = starts.chain([Vec::new()]).map(|start| search.climb(start));
+        let best = ends.max_by(|a, b| search.ln_odds(a).total_cmp(&search.ln_odds(b)))?;
+        search.explanation(&best)
     }
 }
 
-/// All sets that differ from this one by a member more, a member less or one member in another's place.
-fn neighbours(members: &[usize], count: usize) -> Vec<Vec<usize>> {
-    let without = |place: usize| -> Vec<usize> {
-        members.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, member)| *member).collect()
-    };
-    let others = || (0..count).filter(|other| !members.contains(other));
-    let with = |set: Vec<usize>, other: usize| set.into_iter().chain([other]).collect::<Vec<usize>>();
-    let mut sets: Vec<Vec<usize>> = (0..members.len()).map(without).collect();
-    sets.extend((0..members.len()).flat_map(|place| others().map(move |other| with(without(place), other))));
-    if members.len() < MAX_MEMBERS {
-        sets.extend(others().map(|other| with(members.to_vec(), other)));
+/// A family in a place of the explanation.
+#[derive(Debug, Clone, Copy)]
+struct Offer {
+    /// Its most probable hypothesis.
+    index: usize,
+    /// ln of the odds of the set with that one.
+    ln_odds: f64,
+    /// The same of the whole family.
+    ln_total: f64,
+}
+
+struct Search<'a> {
+    /// Of the hypotheses alone.
+    likelihood: &'a Likelihood,
+    hypotheses: &'a [Hypothesis],
+}
+
+impl Search<'_> {
+    fn free(&self, members: &[usize]) -> Vec<(usize, f64)> {
+        members.iter().map(|index| (*index, self.hypotheses[*index].sigma)).collect()
     }
-    sets
+
+    /// ln of the probability of a set over that of the empty one.
+    fn ln_odds(&self, members: &[usize]) -> f64 {
+        let Some((factor, pull)) = self.likelihood.posterior(&self.free(members)) else {
+            return f64::NEG_INFINITY;
+        };
+        let scaled = factor.solve(&pull);
+        let below = |(index, value): (&usize, &f64)| self.hypotheses[*index].at_least_zero && *value < 0.0;
+        if members.iter().zip(scaled.iter()).any(below) {
+            return f64::NEG_INFINITY;
+        }
+        let ln_root_determinant: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+        let ln_prior: f64 = members.iter().map(|index| self.hypotheses[*index].ln_prior).sum();
+        0.5 * pull.dot(&scaled) - ln_root_determinant + ln_prior
+    }
+
+    /// Every family that has no member among `rest`, beside those.
+    fn offers(&self, rest: &[usize]) -> BTreeMap<usize, Offer> {
+        let mut offers: BTreeMap<usize, Offer> = BTreeMap::new();
+        let mut set = rest.to_vec();
+        for (index, hypothesis) in self.hypotheses.iter().enumerate() {
+            if rest.iter().any(|member| self.hypotheses[*member].family == hypothesis.family) {
+                continue;
+            }
+            set.push(index);
+            let ln_odds = self.ln_odds(&set);
+            set.pop();
+            if ln_odds == f64::NEG_INFINITY {
+                continue;
+            }
+            let offer = Offer { index, ln_odds, ln_total: ln_odds };
+            let join = |known: &mut Offer| {
+                let ln_total = ln_sum(known.ln_total, ln_odds);
+                *known = Offer { ln_total, ..if ln_odds > known.ln_odds { offer } else { *known } };
+            };
+            offers.entry(hypothesis.family).and_modify(join).or_insert(offer);
+        }
+        offers
+    }
+
+    /// Where changes of one member at a time lead from this set.
+    fn climb(&self, mut members: Vec<usize>) -> Vec<usize> {
+        for _ in 0..MAX_CHANGES {
+            let Some(better) = self.better(&members) else { break };
+            members = better;
+        }
+        members
+    }
+
+    /// The set that gains most by one member more, one less, or another one in a place; `None` where none gains.
+    fn better(&self, members: &[usize]) -> Option<Vec<usize>> {
+        let places = (members.len() + 1).min(MAX_MEMBERS);
+        let mut best: (f64, Option<Vec<usize>>) = (NO_GAIN, None);
+        let mut try_set = |gain: f64, set: Vec<usize>| {
+            if gain > best.0 {
+                best = (gain, Some(set));
+            }
+        };
+        for place in 0..places {
+            let rest = without(members, place);
+            let offers = self.offers(&rest);
+            let nothing = self.ln_odds(&rest);
+            let family = members.get(place).map(|index| self.hypotheses[*index].family);
+            let now =
+                family.map_or(nothing, |family| offers.get(&family).map_or(nothing, |own| own.ln_total));
+            try_set(nothing - now, rest.clone());
+            for (other, offer) in &offers {
+                let set: Vec<usize> = rest.iter().copied().chain([offer.index]).collect();
+                // Of the own family the best hypothesis may be another one than it was when the rest was another.
+                let own = Some(*other) == family;
+                let gain = if own { offer.ln_odds - self.ln_odds(members) } else { offer.ln_total - now };
+                try_set(gain, set);
+            }
+        }
+        best.1
+    }
+
+    fn explanation(&self, members: &[usize]) -> Option<Explanation> {
+        let free = self.free(members);
+        let (factor, pull) = self.likelihood.posterior(&free)?;
+        let (solved, inverse) = (factor.solve(&pull), factor.inverse());
+        let member = |(place, index): (usize, &usize)| {
+            let rest = without(members, place);
+            let mut offers = self.offers(&rest);
+            let own = offers.remove(&self.hypotheses[*index].family)?;
+            let mut alternatives: Vec<(usize, f64)> = offers
+                .into_iter()
+                .map(|(family, offer)| (family, (offer.ln_total - own.ln_total).exp()))
+                .collect();
+            alternatives.sort_by(|a, b| b.1.total_cmp(&a.1));
+            let sigma = free[place].1;
+            Some(Member {
+                index: *index,
+                value: sigma * solved[place],
+                sigma: sigma * inverse[(place, place)].max(0.0).sqrt(),
+                ln_odds: own.ln_total - self.ln_odds(&rest),
+                alternatives,
+            })
+        };
+        let members_found: Option<Vec<Member>> = members.iter().enumerate().map(member).collect();
+        let alone = self.offers(&[]).into_iter().map(|(family, offer)| (family, offer.ln_total)).collect();
+        Some(Explanation { members: members_found?, ln_odds: self.ln_odds(members), alone })
+    }
+}
+
+/// ln(exp(a) + exp(b)).
+fn ln_sum(a: f64, b: f64) -> f64 {
+    let (large, small) = (a.max(b), a.min(b));
+    if small == f64::NEG_INFINITY { large } else { large + (small - large).exp().ln_1p() }
+}
+
+fn without(members: &[usize], place: usize) -> Vec<usize> {
+    members.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, member)| *member).collect()
 }
 
 #[cfg(test)]
@@ -218,14 +379,16 @@ mod tests {
             let mut likelihood = Likelihood::new(3);
             let balance = Balance { residual, covariance, columns };
             likelihood.add(&balance).unwrap();
-            let free: Vec<(usize, f64)> = sigmas.iter().copied().enumerate().collect();
             let scaled = &balance.columns * DMatrix::from_diagonal(&DVector::from_vec(sigmas.clone()));
             let whole = &balance.covariance + &scaled * scaled.transpose();
             let expected =
                 ln_density(&balance.residual, &whole) - ln_density(&balance.residual, &balance.covariance);
-            prop_assert!((likelihood.ln_evidence(&free).unwrap() - expected).abs() < 1e-9);
+            // Prior odds of 1: the ln of the odds is that of the evidence.
+            let all = Priors::even(Vec::new(), &sigmas, 3.0);
+            let search = Search { likelihood: &likelihood, hypotheses: &all.hypotheses };
+            prop_assert!((search.ln_odds(&[0, 1, 2]) - expected).abs() < 1e-9);
             // Generalised least squares of the last parameter with the others in the covariance.
-            let priors = Priors { always: sigmas[..2].to_vec(), hypotheses: vec![1.0], expected: 0.1 };
+            let priors = Priors::even(sigmas[..2].to_vec(), &[1.0], 0.1);
             let first = balance.columns.columns(0, 2) * DMatrix::from_diagonal(&DVector::from_row_slice(&sigmas[..2]));
             let factor = (&balance.covariance + &first * first.transpose()).cholesky().unwrap();
             let last = balance.columns.column(2).into_owned();
@@ -241,7 +404,7 @@ mod tests {
         use rand_distr::{Distribution, StandardNormal};
         let mut rng = rand_pcg::Pcg64::seed_from_u64(7);
         let columns = columns(30, 9);
-        let priors = Priors { always: vec![0.3; 2], hypotheses: vec![2.0; 7], expected: 0.1 };
+        let priors = Priors::even(vec![0.3; 2], &[2.0; 7], 0.1);
         let (mut alarms, mut named) = (0, 0);
         let draws = 2000;
         for _ in 0..draws {
@@ -264,6 +427,39 @@ mod tests {
         assert!(alarms <= draws / 100, "{alarms} alarms in {draws} sound draws");
         // Two of the columns are nearly one, so that a few draws name the other.
         assert!(named > draws * 9 / 10, "{named} of {draws} named");
+    }
+
+    /// All sets of at most two of eight hypotheses in six families, against the search: never worse where the best has two members at most.
+    #[test]
+    fn no_set_of_two_is_better_than_what_is_found() {
+        use rand::SeedableRng;
+        use rand_distr::{Distribution, StandardNormal};
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(11);
+        let columns = columns(12, 8);
+        let mut priors = Priors::even(Vec::new(), &[2.0; 8], 0.5);
+        // Two families of two; one parameter is never negative.
+        priors.hypotheses[1].family = 0;
+        priors.hypotheses[3].family = 2;
+        priors.hypotheses[5].at_least_zero = true;
+        for _ in 0..300 {
+            let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+            let (a, b) = (1.5 * normal(), 1.5 * normal());
+            let residual =
+                DVector::from_fn(12, |row, _| normal() + a * columns[(row, 2)] + b * columns[(row, 5)]);
+            let mut likelihood = Likelihood::new(8);
+            let covariance = DMatrix::identity(12, 12);
+            likelihood.add(&Balance { residual, covariance, columns: columns.clone() }).unwrap();
+            let search = Search { likelihood: &likelihood, hypotheses: &priors.hypotheses };
+            let family = |index: usize| priors.hypotheses[index].family;
+            let singles = (0..8).map(|one| vec![one]);
+            let pairs = (0..8).flat_map(|one| (one + 1..8).map(move |other| vec![one, other]));
+            let sets = singles.chain(pairs.filter(|set| family(set[0]) != family(set[1])));
+            let best = sets.map(|set| search.ln_odds(&set)).fold(0.0, f64::max);
+            let found = likelihood.explain(&priors).unwrap();
+            // A family of two can be more probable than a single hypothesis that is the most probable by itself: by ln 2 a family at most.
+            assert!(found.ln_odds > best - 2.0 * 2.0_f64.ln(), "{} below {best}", found.ln_odds);
+            assert!(found.members.iter().all(|member| member.index != 5 || member.value >= 0.0));
+        }
     }
 
     #[test]

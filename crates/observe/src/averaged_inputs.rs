@@ -206,7 +206,7 @@ mod tests {
     fn a_valve_that_takes_its_time_is_followed() {
         let opening =
             |t_s: f64, from: f64, to: f64| from + (to - from) * (0.5 * t_s / (to - from).abs()).min(1.0);
-        let level = |t_s: f64| if (t_s / 20.0) as u32 % 2 == 0 { (1.5, 0.5) } else { (0.5, 1.5) };
+        let level = |t_s: f64| if ((t_s / 20.0) as u32).is_multiple_of(2) { (1.5, 0.5) } else { (0.5, 1.5) };
         let truth = |t_s: f64| {
             let (from, to) = level(t_s);
             if t_s < 20.0 { to } else { opening(t_s % 20.0, from, to) }

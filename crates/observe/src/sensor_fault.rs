@@ -73,6 +73,25 @@ pub const CATALOGUE: [SensorFault; 25] = {
     ]
 };
 
+/// The turbine side, which identification does not need: what of it drifts.
+const TURBINE_DRIFTS: [SensorFault; 6] = {
+    use Channel::{P3, P4, T3, T4, Tt, TurbineFlow};
+    use FaultKind::Drift;
+    [
+        fault(&[TurbineFlow], Drift, RATIO),
+        fault(&[P3], Drift, PRESSURE_PA),
+        fault(&[T3], Drift, TEMPERATURE_K),
+        fault(&[P4], Drift, PRESSURE_PA),
+        fault(&[T4], Drift, TEMPERATURE_K),
+        fault(&[Tt], Drift, TEMPERATURE_K),
+    ]
+};
+
+/// Everything of which drift is known, both sides.
+pub fn drifts() -> impl Iterator<Item = SensorFault> {
+    CATALOGUE.into_iter().chain(TURBINE_DRIFTS).filter(|fault| fault.kind == FaultKind::Drift)
+}
+
 impl SensorFault {
     /// Error of a channel's reading by a fault of size 1. `run_ratio`: time since the start of the run over its length.
     pub fn error_per_unit(&self, channel: Channel, reading: f64, run_ratio: f64) -> f64 {

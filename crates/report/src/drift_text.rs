@@ -2,34 +2,29 @@
 
 use crate::{number, table};
 use mapper_core::half_width_95;
-use mapper_drift::{Cause, DriftReport, RateOrStep, RepeatGroup};
+use mapper_drift::{Alternative, Cause, DriftReport, RateOrStep, RepeatGroup};
 use std::fmt::Write;
 
 /// The answer for people.
 pub fn drift_text(report: &DriftReport) -> String {
     let mut text = format!("{}\n", report.reason);
-    if let (Some(low), Some(high), Some(cause)) = (report.low, report.high, report.cause) {
+    for drift in &report.drifts {
+        let per_hour = if matches!(drift.size, RateOrStep::RatePerH(_)) { " per hour" } else { "" };
         let _ = writeln!(
             text,
-            "95 % interval: {} to {}{}",
-            cause.show(low),
-            cause.show(high),
-            match report.size {
-                Some(RateOrStep::RatePerH(_)) => " per hour",
-                _ => "",
-            }
+            "{}: {} to {}{per_hour} (95 %), onset from {:.0} s to {:.0} s of the campaign{}",
+            drift.cause,
+            drift.cause.show(drift.low),
+            drift.cause.show(drift.high),
+            drift.onset_low_s,
+            drift.onset_high_s,
+            instead(&drift.alternatives)
         );
     }
-    if let (Some(low_s), Some(high_s)) = (report.onset_low_s, report.onset_high_s) {
-        let _ = writeln!(text, "Onset: {low_s:.0} s to {high_s:.0} s of the campaign.");
-    }
-    if report.probability > 0.0 {
-        let cause = |cause: Option<Cause>| cause.map_or("no drift", Cause::name);
-        let _ = write!(text, "Probability: {} {:.1} %", cause(report.cause), 100.0 * report.probability);
-        for alternative in report.alternatives.iter().filter(|other| other.probability > 5e-4).take(4) {
-            let _ = write!(text, ", {} {:.1} %", cause(alternative.cause), 100.0 * alternative.probability);
-        }
-        text.push_str(".\n");
+    if report.drifts.is_empty() && !report.alone.is_empty() {
+        let others: Vec<Alternative> =
+            report.alone.iter().filter(|alternative| alternative.cause.is_some()).copied().collect();
+        let _ = writeln!(text, "Not excluded{}", instead(&others));
     }
     for group in &report.groups {
         let _ = write!(text, "\nFrom {} to {}\n{}\n", group.from, group.to, group_table(group));
@@ -50,6 +45,15 @@ pub fn drift_text(report: &DriftReport) -> String {
         text.push_str(".\n");
     }
     text
+}
+
+/// The most probable of what may be instead.
+fn instead(alternatives: &[Alternative]) -> String {
+    let cause = |cause: Option<Cause>| cause.map_or_else(|| "no drift".to_owned(), Cause::name);
+    let likely = alternatives.iter().filter(|other| other.probability > 5e-3).take(4);
+    let likely: Vec<String> =
+        likely.map(|other| format!("{} {:.0} %", cause(other.cause), 100.0 * other.probability)).collect();
+    if likely.is_empty() { ".".to_owned() } else { format!("; or {}.", likely.join(", ")) }
 }
 
 fn group_table(group: &RepeatGroup) -> comfy_table::Table {

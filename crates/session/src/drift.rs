@@ -62,7 +62,6 @@ impl Session<'_> {
             boundary: campaign.boundary,
             tolerances: campaign.tolerances,
             identification: &config,
-            seed: campaign.seed,
         })?;
         Ok(Drift { report, sensors, zero })
     }

@@ -69,19 +69,9 @@ impl Gap {
     }
 }
 
-/// Verdict, cause, course and size of what drifted.
+/// What drifted, without the points.
 fn drift_json(drift: &DriftReport) -> Value {
-    json!({
-        "verdict": drift.verdict,
-        "cause": drift.cause,
-        "probability": drift.probability,
-        "onset_s": drift.onset_s,
-        "size": drift.size,
-        "low": drift.low,
-        "high": drift.high,
-        "unit": drift.unit,
-        "reason": drift.reason,
-    })
+    json!({"verdict": drift.verdict, "drifts": drift.drifts, "reason": drift.reason})
 }
 
 impl Session<'_> {
@@ -168,7 +158,7 @@ impl Session<'_> {
         let mut model = nominal_model(campaign)?;
         // A recording in which drift cannot be looked for may still have a gap.
         let drift = self.drift(slice::from_ref(recorded), campaign, map).ok();
-        let drift = drift.map(|drift| drift.report).filter(|report| report.cause.is_some());
+        let drift = drift.map(|drift| drift.report).filter(|report| !report.drifts.is_empty());
         let config = identification_with(campaign, map);
         let Fused { recordings, config, channels } =
             fused(recordings(slice::from_ref(recorded)), config, Some(campaign), map);
@@ -349,7 +339,7 @@ const SURELY_OUTSIDE: f64 = 0.9;
 /// Puts what drifted beside the diagnosis, which names no culprit for it.
 fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     let Some(drift) = drift else { return };
-    let taken_off = drift.cause.is_some_and(|cause| cause.kind() == CauseKind::Sensor);
+    let taken_off = drift.drifts.iter().all(|drift| drift.cause.kind() == CauseKind::Sensor);
     let consequence = if taken_off {
         "this was subtracted from its reading before the diagnosis"
     } else {

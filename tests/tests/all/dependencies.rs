@@ -32,7 +32,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-inference", &["numerics"]),
     ("mapper-identify",  &["core", "inference", "numerics", "physics", "observe"]),
     ("mapper-assemble",  &["core", "numerics", "physics", "identify"]),
-    ("mapper-drift",     &["core", "numerics", "physics", "observe", "identify"]),
+    ("mapper-drift",     &["core", "numerics", "physics", "observe", "inference", "identify"]),
     ("mapper-gap",       &["core", "numerics", "physics", "observe"]),
     ("mapper-discover",  &["core", "numerics", "physics", "gap"]),
     ("mapper-history",   &["numerics"]),

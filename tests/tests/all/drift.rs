@@ -1,7 +1,7 @@
 //! Drift planted in the virtual lab, found by `mapper drift` in what was recorded.
 
 use mapper_tests::{DriftCampaign, mapper};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Twice the time between visits of the repeated jump, s.
@@ -12,17 +12,18 @@ fn drift(recordings: &[&Path]) -> Value {
     mapper(["drift".as_ref(), "--json".as_ref()].into_iter().chain(paths)).exits(0).json()
 }
 
-fn number(report: &Value, key: &str) -> f64 {
-    report[key].as_f64().unwrap_or_else(|| panic!("{key} in {}", report["reason"]))
-}
-
-/// Cause, course with size per hour or step, and onset are as planted.
+/// One drift: cause, course with size per hour or step, and onset are as planted.
 fn is_found(report: &Value, verdict: &str, cause: &str, (course, size): (&str, f64), onset_s: f64) {
-    assert_eq!([&report["verdict"], &report["cause"]], [verdict, cause], "{}", report["reason"]);
-    assert!(report[course].is_number(), "{}", report["reason"]);
-    let (low, high) = (number(report, "low"), number(report, "high"));
+    let reason = &report["reason"];
+    let drifts = report["drifts"].as_array().unwrap();
+    assert_eq!((report["verdict"].as_str(), drifts.len()), (Some(verdict), 1), "{reason}");
+    let drift = &drifts[0];
+    let number = |key: &str| drift[key].as_f64().unwrap_or_else(|| panic!("{key} in {reason}"));
+    assert_eq!(drift["cause"], cause, "{reason}");
+    assert!(drift[course].is_number(), "{reason}");
+    let (low, high) = (number("low"), number("high"));
     assert!(low <= size && size <= high, "{size} is not in {low} to {high}");
-    assert!((number(report, "onset_s") - onset_s).abs() < TWO_REPEATS_S, "{}", report["reason"]);
+    assert!((number("onset_s") - onset_s).abs() < TWO_REPEATS_S, "{reason}");
 }
 
 #[test]
@@ -31,12 +32,7 @@ fn planted_drifts_are_found_and_none_is_none() {
         drift(&[&DriftCampaign { drift: drift_key, seed, ..DriftCampaign::default() }.recording()])
     };
     let none = judge("", 21);
-    assert_eq!(
-        [&none["verdict"], &none["cause"]],
-        [&Value::from("none"), &Value::Null],
-        "{}",
-        none["reason"]
-    );
+    assert_eq!((&none["verdict"], &none["drifts"]), (&"none".into(), &json!([])), "{}", none["reason"]);
     // At four to six times the printed limit.
     let t2 = judge("{cause: T2, change: 0.5 K, over: 1 h, from: 10 min}", 22);
     is_found(&t2, "sensor", "T2", ("rate_per_h", 0.5), 600.0);
@@ -61,7 +57,12 @@ fn nights_of_one_campaign_are_judged_together_and_another_machine_is_refused() {
     let second = night(31, "{cause: m_c, change: 1 %, over: 10 h, from: -5 h}", same_rig);
     let third = night(31, "{cause: m_c, change: 1 %, over: 10 h, from: -10 h}", same_rig);
     let report = drift(&[&first, &second, &third]);
-    assert_eq!([&report["verdict"], &report["cause"]], ["sensor", "m_c"], "{}", report["reason"]);
+    assert_eq!(
+        [&report["verdict"], &report["drifts"][0]["cause"]],
+        ["sensor", "m_c"],
+        "{}",
+        report["reason"]
+    );
     assert_eq!(report["groups"][0]["visits"].as_array().unwrap().len(), 12);
     // The first night alone has nothing.
     assert_eq!(drift(&[&first])["verdict"], "none");
@@ -82,7 +83,7 @@ fn nights_of_one_campaign_are_judged_together_and_another_machine_is_refused() {
     let renamed = short_night(34, &[("  serial_number: TA-0001\n", "  serial_number: TA-0002\n")]);
     for other in [rebuilt, renamed] {
         let refused = drift(&[&first, &other]);
-        assert_eq!([&refused["verdict"], &refused["cause"]], [&Value::from("unclear"), &Value::Null]);
+        assert_eq!((&refused["verdict"], &refused["drifts"]), (&"unclear".into(), &json!([])));
         let reason = refused["reason"].as_str().unwrap();
         assert!(reason.starts_with("No verdict") && reason.contains("machine"), "{reason}");
     }
@@ -105,7 +106,7 @@ fn the_gap_diagnosis_looks_for_drift_first() {
         ["gap".into(), "diagnose".into(), file.path.clone(), "--recording".into(), recording];
     let diagnosis =
         mapper(arguments.iter().map(PathBuf::as_path).chain([Path::new("--json")])).exits(0).json();
-    assert_eq!([&diagnosis["drift"]["verdict"], &diagnosis["drift"]["cause"]], ["sensor", "T2"]);
+    assert_eq!([&diagnosis["drift"]["verdict"], &diagnosis["drift"]["drifts"][0]["cause"]], ["sensor", "T2"]);
     assert_eq!(diagnosis["verdict"], "within_tolerance", "{}", diagnosis["candidates"][0]);
     let warning = diagnosis["warnings"][0].as_str().unwrap();
     assert!(warning.contains("T2 drifts by") && warning.contains("subtracted from"), "{warning}");

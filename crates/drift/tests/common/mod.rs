@@ -228,7 +228,7 @@ pub fn campaign(seed: u64, planted: Option<Planted>) -> Campaign {
                         params.compressor.flow_scale_ratio *= 1.0 + 0.6 * now;
                     }
                     Cause::BearingFriction => params.bearing_friction_w_s2 += now,
-                    Cause::Sensor(_) => {}
+                    Cause::Sensors(_) => {}
                 }
             }
             let model = Model::new(params, map.clone());
@@ -269,8 +269,8 @@ pub fn campaign(seed: u64, planted: Option<Planted>) -> Campaign {
                 walk = stay * walk + (1.0 - stay * stay).sqrt() * normal();
                 let gain = if *channel == Channel::CompressorFlow { flow_gain } else { 1.0 };
                 let drift = match planted {
-                    Some(Planted { cause: Cause::Sensor(drifting), course, size })
-                        if drifting == *channel =>
+                    Some(Planted { cause: Cause::Sensors(drifting), course, size })
+                        if drifting.contains(channel) =>
                     {
                         size * course.at(*t_s)
                     }
@@ -320,7 +320,6 @@ fn ask(runs: &[RecordedRun<'_>], identification: &IdentifyConfig) -> DriftReport
         boundary: BoundaryConditions::default(),
         tolerances: ModelTolerances::default(),
         identification,
-        seed: 1,
     })
     .unwrap()
 }
@@ -329,4 +328,14 @@ fn ask(runs: &[RecordedRun<'_>], identification: &IdentifyConfig) -> DriftReport
 pub fn draw(seed: u64) -> impl FnMut() -> f64 {
     let mut rng = Pcg64::seed_from_u64(seed);
     move || rng.random::<f64>()
+}
+
+/// Puts another sensor's drift into the readings of a campaign.
+pub fn drift_reading(recording: &mut Recording, channel: Channel, course: Course, size: f64) {
+    let series = recording.series.get_mut(&channel).unwrap();
+    let relative = matches!(channel, Channel::CompressorFlow | Channel::TurbineFlow);
+    for (t_s, value) in series.t_s.iter().zip(&mut series.values) {
+        let drift = size * course.at(*t_s);
+        *value = if relative { *value * (1.0 + drift) } else { *value + drift };
+    }
 }

@@ -154,9 +154,6 @@ fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
     };
     let offsets = CHANNELS.iter().map(|channel| declared(channel).offset_sigma);
     let machine = MACHINE.iter().map(|_| OTHER_MACHINE_RATIO);
-    Priors {
-        always: offsets.chain(CHANNELS.iter().map(gain)).collect(),
-        hypotheses: CATALOGUE.iter().map(|fault| fault.sigma).chain(machine).collect(),
-        expected: EXPECTED_FAULTS,
-    }
+    let sigmas: Vec<f64> = CATALOGUE.iter().map(|fault| fault.sigma).chain(machine).collect();
+    Priors::even(offsets.chain(CHANNELS.iter().map(gain)).collect(), &sigmas, EXPECTED_FAULTS)
 }

@@ -100,7 +100,7 @@ impl Live {
                 operator.say(format!("operator, on the live page: {what}"));
                 of_ask.asked(asked);
             }),
-            open: Mutex::default(),
+            connections: Arc::default(),
         });
         let for_thread = served.clone();
         let _ = std::thread::Builder::new()
@@ -126,7 +126,7 @@ impl Live {
         served.hub.publish(&feed.ended(outcome, page));
         served.hub.close();
         let until = Instant::now() + FAREWELL;
-        while served.are_open() && Instant::now() < until {
+        while served.connections.are_open() && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(5));
         }
     }

@@ -1,21 +1,17 @@
 //! The server: a thread for each of few connections, one request each.
 
 use crate::access::Access;
+use crate::connections::{Connection, Connections};
 use crate::hub::Hub;
 use crate::pressed::Pressed;
 use crate::request::{ARRIVES_WITHIN, Request, read_request};
 use crate::tls::{Punctual, Tls};
-use std::collections::HashMap;
 use std::io::{ErrorKind, Read, Write};
-use std::net::{IpAddr, TcpListener, TcpStream};
+use std::net::{TcpListener, TcpStream};
+use std::sync::Arc;
 use std::sync::mpsc::RecvTimeoutError;
-use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Connections at once; further ones are closed.
-const CONNECTIONS_MAX: usize = 32;
-/// Connections of one address at once: nobody without the token takes all of them from the operator.
-const CONNECTIONS_OF_ONE_MAX: usize = 8;
 /// Longest time that a browser may keep one read or write waiting.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Bytes of a page that are written at once.
@@ -36,73 +32,35 @@ pub(crate) struct Served {
     pub(crate) snapshot: Box<dyn Fn() -> Arc<str> + Send + Sync>,
     /// Does what a button asks for.
     pub(crate) ask: Box<dyn Fn(Pressed) + Send + Sync>,
-    /// Connections that are open, by address.
-    pub(crate) open: Mutex<HashMap<IpAddr, usize>>,
-}
-
-impl Served {
-    /// Whether any connection is open.
-    pub(crate) fn are_open(&self) -> bool {
-        self.open.lock().is_ok_and(|open| !open.is_empty())
-    }
-}
-
-/// Counts a connection as long as it is there.
-struct Slot {
-    served: Arc<Served>,
-    address: IpAddr,
-}
-
-impl Slot {
-    /// `None` where there is none left for this address.
-    fn take(served: &Arc<Served>, address: IpAddr) -> Option<Slot> {
-        let mut open = served.open.lock().ok()?;
-        let all: usize = open.values().sum();
-        let own = open.entry(address).or_default();
-        if all >= CONNECTIONS_MAX || *own >= CONNECTIONS_OF_ONE_MAX {
-            return None;
-        }
-        *own += 1;
-        Some(Slot { served: served.clone(), address })
-    }
-}
-
-impl Drop for Slot {
-    fn drop(&mut self) {
-        let Ok(mut open) = self.served.open.lock() else { return };
-        if let Some(own) = open.get_mut(&self.address) {
-            *own -= 1;
-        }
-        open.retain(|_, own| *own > 0);
-    }
+    /// Who is connected.
+    pub(crate) connections: Arc<Connections>,
 }
 
 /// Answers until the process ends.
 pub(crate) fn serve(listener: &TcpListener, served: &Arc<Served>) {
     for stream in listener.incoming().filter_map(Result::ok) {
-        let Some(slot) = stream.peer_addr().ok().and_then(|peer| Slot::take(served, peer.ip())) else {
-            continue;
-        };
-        // Where no thread can be started the slot is dropped with what it should have run.
+        let Some(connection) = served.connections.admit(&stream) else { continue };
+        let served = served.clone();
+        // Where no thread can be started the connection is dropped with what it should have run.
         let _ = std::thread::Builder::new().name("live".to_owned()).spawn(move || {
             // A browser that goes away ends its own connection.
-            let _ = connected(stream, &slot.served);
+            let _ = connected(stream, &served, &connection);
         });
     }
 }
 
-fn connected(stream: TcpStream, served: &Served) -> std::io::Result<()> {
+fn connected(stream: TcpStream, served: &Served, connection: &Connection) -> std::io::Result<()> {
     stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     stream.set_nodelay(true)?;
     let mut stream = Punctual { stream, until: Instant::now() + ARRIVES_WITHIN };
     match &served.tls {
-        None => answer(&mut stream, served),
-        Some(tls) => tls.over(stream, |stream| answer(stream, served)),
+        None => answer(&mut stream, served, connection),
+        Some(tls) => tls.over(stream, |stream| answer(stream, served, connection)),
     }
 }
 
-fn answer(stream: &mut (impl Read + Write), served: &Served) -> std::io::Result<()> {
+fn answer(stream: &mut (impl Read + Write), served: &Served, connection: &Connection) -> std::io::Result<()> {
     let Some(request) = read_request(stream) else { return plain(stream, "400 Bad Request") };
     let access = &served.access;
     if !access.calls_by_name(&request) || access.is_of_another_page(&request) {
@@ -112,7 +70,7 @@ fn answer(stream: &mut (impl Read + Write), served: &Served) -> std::io::Result<
         // Without data of the run: it is read before anybody can show a token.
         ("GET", "/") => page(stream, &served.page),
         ("GET", "/events") if !access.has_token(&request) => plain(stream, "401 Unauthorized"),
-        ("GET", "/events") => events(stream, served),
+        ("GET", "/events") => events(stream, served, connection),
         ("POST", path) => match asked(path) {
             None => plain(stream, "404 Not Found"),
             Some(_) if !may_ask(access, &request) => plain(stream, "403 Forbidden"),
@@ -163,10 +121,11 @@ fn page(stream: &mut impl Write, page: &str) -> std::io::Result<()> {
 }
 
 /// The whole state, then every message, until one side goes away.
-fn events(stream: &mut impl Write, served: &Served) -> std::io::Result<()> {
+fn events(stream: &mut impl Write, served: &Served, connection: &Connection) -> std::io::Result<()> {
     let Some(messages) = served.hub.join((served.snapshot)()) else {
         return plain(stream, "503 Service Unavailable");
     };
+    connection.stays();
     write!(stream, "HTTP/1.1 200 OK\r\n{HEADERS}Content-Type: text/event-stream\r\n\r\n")?;
     loop {
         match messages.recv_timeout(HEARTBEAT) {
@@ -174,5 +133,64 @@ fn events(stream: &mut impl Write, served: &Served) -> std::io::Result<()> {
             Err(RecvTimeoutError::Timeout) => write!(stream, ":\n\n")?,
             Err(RecvTimeoutError::Disconnected) => return Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{BufRead, BufReader};
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// From one address, as through a tunnel: all streams that there are, and more silent lines than there is room for, some of them in the
+    /// middle of a request or of the page. The button is answered and the page is read.
+    #[test]
+    fn a_button_gets_through_whoever_holds_lines_open() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        let asked = Arc::new(AtomicUsize::new(0));
+        let of_ask = asked.clone();
+        let served = Arc::new(Served {
+            page: "x".repeat(1 << 22),
+            access: Access::new(address, None, false),
+            hub: Hub::default(),
+            tls: None,
+            snapshot: Box::new(|| "{}".into()),
+            ask: Box::new(move |_| {
+                of_ask.fetch_add(1, Ordering::SeqCst);
+            }),
+            connections: Arc::default(),
+        });
+        std::thread::spawn(move || serve(&listener, &served));
+        let send = |head: &str| {
+            let mut stream = TcpStream::connect(address).unwrap();
+            stream.set_read_timeout(Some(PATIENCE)).unwrap();
+            stream.write_all(head.as_bytes()).unwrap();
+            stream
+        };
+        let first_line = |stream: &mut TcpStream| {
+            let mut line = String::new();
+            BufReader::new(stream).read_line(&mut line).unwrap();
+            line.trim_end().to_owned()
+        };
+        let mut held: Vec<TcpStream> = Vec::new();
+        for _ in 0..20 {
+            let mut stream = send(&format!("GET /events HTTP/1.1\r\nHost: {address}\r\n\r\n"));
+            assert!(!first_line(&mut stream).is_empty());
+            held.push(stream);
+        }
+        for round in 0..50 {
+            held.push(send(""));
+            held.push(send("POST /ask/sa"));
+            held.push(send(&format!("GET / HTTP/1.1\r\nHost: {address}\r\n\r\n")));
+            let origin = format!("Host: {address}\r\nOrigin: http://{address}");
+            let mut button = send(&format!("POST /ask/safe HTTP/1.1\r\n{origin}\r\n\r\n"));
+            assert_eq!(first_line(&mut button), "HTTP/1.1 204 No Content", "round {round}");
+        }
+        assert_eq!(asked.load(Ordering::SeqCst), 50);
+        let mut page = send(&format!("GET / HTTP/1.1\r\nHost: {address}\r\n\r\n"));
+        let mut read = Vec::new();
+        page.read_to_end(&mut read).unwrap();
+        assert!(read.len() > 1 << 22);
     }
 }

@@ -1,0 +1,112 @@
+//! Who is connected, and who has to go for another.
+
+use std::net::{IpAddr, Shutdown, TcpStream};
+use std::sync::{Arc, Mutex, MutexGuard};
+
+/// Connections whose request has not been heard yet, or that read the page; a further one takes the place of the oldest of them. A
+/// browser sends a request within milliseconds of connecting, so that a button gets through whoever else holds lines open.
+const BRIEF_MAX: usize = 32;
+
+/// The connections that are open.
+#[derive(Debug, Default)]
+pub(crate) struct Connections {
+    open: Mutex<Vec<Open>>,
+}
+
+#[derive(Debug)]
+struct Open {
+    number: u64,
+    address: IpAddr,
+    /// To end it from outside; `None` once it is a stream, which the hub counts.
+    brief: Option<TcpStream>,
+}
+
+/// A connection as long as it is there.
+#[derive(Debug)]
+pub(crate) struct Connection {
+    all: Arc<Connections>,
+    number: u64,
+}
+
+impl Connections {
+    /// One more. Where there are too many that have not shown what they want, the oldest of the address with most of them is ended.
+    /// `None` where the connection is gone already.
+    pub(crate) fn admit(self: &Arc<Connections>, stream: &TcpStream) -> Option<Connection> {
+        let (address, own) = (stream.peer_addr().ok()?.ip(), stream.try_clone().ok()?);
+        let mut open = self.lock();
+        let brief = |open: &[Open], of: Option<IpAddr>| {
+            let counts = |one: &&Open| one.brief.is_some() && of.is_none_or(|address| one.address == address);
+            open.iter().filter(counts).count()
+        };
+        if brief(&open, None) >= BRIEF_MAX {
+            // The first of equals is the oldest: they stand in the order in which they came.
+            let most = open.iter().map(|one| brief(&open, Some(one.address))).max();
+            let leaves = |one: &Open| one.brief.is_some() && Some(brief(&open, Some(one.address))) == most;
+            let position = open.iter().position(leaves)?;
+            if let Some(stream) = open.remove(position).brief {
+                // Its thread finds it closed and ends.
+                let _ = stream.shutdown(Shutdown::Both);
+            }
+        }
+        let number = open.last().map_or(0, |last| last.number + 1);
+        open.push(Open { number, address, brief: Some(own) });
+        Some(Connection { all: self.clone(), number })
+    }
+
+    /// Whether any is open.
+    pub(crate) fn are_open(&self) -> bool {
+        !self.lock().is_empty()
+    }
+
+    /// A thread that panicked while it held the list left it whole.
+    fn lock(&self) -> MutexGuard<'_, Vec<Open>> {
+        self.open.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+impl Connection {
+    /// It has asked for a stream and was let in: no other takes its place.
+    pub(crate) fn stays(&self) {
+        if let Some(own) = self.all.lock().iter_mut().find(|one| one.number == self.number) {
+            own.brief = None;
+        }
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        self.all.lock().retain(|one| one.number != self.number);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Read;
+    use std::net::TcpListener;
+
+    #[test]
+    fn the_oldest_makes_room_and_a_stream_does_not() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let all = Arc::new(Connections::default());
+        let mut clients = Vec::new();
+        let mut come = || {
+            let client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+            let (stream, _) = listener.accept().unwrap();
+            clients.push(client);
+            (all.admit(&stream).unwrap(), stream)
+        };
+        let held: Vec<_> = (0..BRIEF_MAX).map(|_| come()).collect();
+        held[0].0.stays();
+        let more: Vec<_> = (0..3).map(|_| come()).collect();
+        // The stream does not count; of the brief ones the two oldest have gone.
+        let ended = |client: &mut TcpStream| {
+            client.set_read_timeout(Some(std::time::Duration::from_millis(1))).unwrap();
+            matches!(client.read(&mut [0]), Ok(0))
+        };
+        let gone: Vec<usize> = (0..clients.len()).filter(|place| ended(&mut clients[*place])).collect();
+        assert_eq!(gone, [1, 2]);
+        drop((held, more));
+        assert!(!all.are_open());
+    }
+}

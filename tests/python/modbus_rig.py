@@ -2,7 +2,8 @@
 
 Usage: modbus_rig.py [PORT]. Prints the port, then serves until standard input is closed. Holding registers: readings from 0 as singles (two
 registers each, in the order of CHANNELS), setpoints from 100, air 110, heartbeat 111, tripped 112. As a PLC has to, it cuts the air by
-itself where the heartbeat stands still.
+itself where the heartbeat stands still. Register 150 says how the server misbehaves from then on (MISDEEDS),
+151 how it does.
 """
 
 import asyncio
@@ -13,6 +14,7 @@ import struct
 import sys
 import time
 
+from pymodbus.pdu import ExceptionResponse
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
@@ -21,6 +23,10 @@ SETPOINTS = ["p3_pa", "t3_k", "valve_opening_ratio", "oil_temperature_k"]
 READ_HOLDING, WRITE_HOLDING = 3, 16
 ALL_DEVICES = 0
 WATCHDOG_S = 2.0
+MISDEED = 150
+# Of writes below register 150: acknowledges another register, fewer registers, is busy each other time (exception 6), fails for ever
+# (exception 4); of all: closes the connection after each answer.
+MISDEEDS = HONEST, OTHER_REGISTER, FEWER_REGISTERS, BUSY_ONCE, DEVICE_FAILURE, CLOSES = range(6)
 
 root = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(root / "drivers/python"))
@@ -37,7 +43,33 @@ def number(registers):
     return struct.unpack(">f", struct.pack(">2H", *registers))[0]
 
 
-async def live(server, filled):
+class Misdeeds:
+    """Changes what goes out, as register 150 says."""
+
+    def __init__(self):
+        self.kind, self.writes, self.server = HONEST, 0, None
+
+    def trace(self, sending, pdu):
+        if not sending:
+            return pdu
+        if self.kind == CLOSES:
+            for connection in list(self.server.active_connections.values()):
+                asyncio.get_running_loop().call_later(0.002, connection.close)
+        if pdu.function_code != WRITE_HOLDING or pdu.address >= MISDEED:
+            return pdu
+        self.writes += 1
+        if self.kind == OTHER_REGISTER:
+            pdu.address += 1
+        elif self.kind == FEWER_REGISTERS:
+            pdu.count -= 1
+        elif self.kind == DEVICE_FAILURE or (self.kind == BUSY_ONCE and self.writes % 2):
+            refusal = ExceptionResponse(pdu.function_code, exception_code=6 if self.kind == BUSY_ONCE else 4)
+            refusal.transaction_id, refusal.dev_id = pdu.transaction_id, pdu.dev_id
+            return refusal
+        return pdu
+
+
+async def live(server, filled, misdeeds):
     """The rig follows its registers, and fills them; says when it has done so first."""
 
     async def get(register, count):
@@ -54,6 +86,8 @@ async def live(server, filled):
         now = time.monotonic()
         values = [number(await get(100 + 2 * i, 2)) for i in range(4)]
         air, heartbeat = await get(110, 2)
+        (misdeeds.kind,) = await get(MISDEED, 1)
+        await put(MISDEED + 1, [misdeeds.kind])
         if heartbeat != beat:
             beat, beaten = heartbeat, now
         if now - beaten > WATCHDOG_S:
@@ -73,10 +107,11 @@ async def main():
         registers[100 + 2 * i : 102 + 2 * i] = words(value)
     device = SimDevice(id=ALL_DEVICES, simdata=SimData(0, values=registers, datatype=DataType.REGISTERS))
     address = ("127.0.0.1", int(sys.argv[1]) if len(sys.argv) > 1 else 0)
-    server = ModbusTcpServer(device, address=address)
+    misdeeds = Misdeeds()
+    server = misdeeds.server = ModbusTcpServer(device, address=address, trace_pdu=misdeeds.trace)
     await server.serve_forever(background=True)
     filled = asyncio.Event()
-    living = asyncio.create_task(live(server, filled))
+    living = asyncio.create_task(live(server, filled, misdeeds))
     # Whoever arms it looks at its readings first.
     await filled.wait()
     print(server.transport.sockets[0].getsockname()[1], flush=True)

@@ -8,8 +8,8 @@ use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use tokio::time::timeout;
-use tokio_modbus::client::{Context, tcp};
-use tokio_modbus::prelude::{ExceptionCode, Reader, Slave, Writer};
+use tokio_modbus::client::{Client, Context, tcp};
+use tokio_modbus::prelude::{ExceptionCode, Reader, Request, Response, Slave};
 
 /// Why a call failed.
 #[derive(Debug, thiserror::Error)]
@@ -22,8 +22,21 @@ pub(crate) enum LinkError {
     Failed { address: SocketAddr, words: String },
     /// The controller refuses.
     #[error("{address} refuses {what}: {words}")]
-    Refused { address: SocketAddr, what: String, words: String },
+    Refused { address: SocketAddr, what: String, code: ExceptionCode, words: String },
 }
+
+impl LinkError {
+    /// Whether the controller asks to be asked again (Modbus Application Protocol 1.1b3, sect. 7: acknowledge, server device busy).
+    fn asks_for_patience(&self) -> bool {
+        matches!(
+            self,
+            LinkError::Refused { code: ExceptionCode::Acknowledge | ExceptionCode::ServerDeviceBusy, .. }
+        )
+    }
+}
+
+/// A controller that is busy is asked again so soon.
+const AGAIN: Duration = Duration::from_millis(40);
 
 /// Which registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Deserialize)]
@@ -73,8 +86,20 @@ impl Link {
         left.map_or(self.within, |left| left.min(self.within))
     }
 
-    /// Reads registers.
+    /// Reads registers; once more where the controller had closed a connection that was kept, or is busy.
     pub(crate) fn read(&mut self, table: Table, block: Block) -> Result<Vec<u16>, LinkError> {
+        let was_kept = self.connection.is_some();
+        match self.read_once(table, block) {
+            Err(LinkError::Failed { .. }) if was_kept => self.read_once(table, block),
+            Err(busy) if busy.asks_for_patience() => {
+                self.pause();
+                self.read_once(table, block)
+            }
+            answer => answer,
+        }
+    }
+
+    fn read_once(&mut self, table: Table, block: Block) -> Result<Vec<u16>, LinkError> {
         let Block { start, count } = block;
         let registers =
             self.call(format!("registers {start} to {}", start + (count - 1)), async |link| match table {
@@ -89,24 +114,56 @@ impl Link {
         Err(LinkError::Failed { address: self.address, words })
     }
 
-    /// Writes registers; tried once more on a new connection, since writing the same twice does no harm.
+    /// Writes registers; tried once more, on a new connection where that failed, since writing the same twice does no harm. A controller
+    /// that is busy is asked for as long as a request may take.
     pub(crate) fn write(&mut self, start: u16, registers: &[u16]) -> Result<(), LinkError> {
-        let what = || format!("a value for register {start}");
-        match self.call(what(), async |link| link.write_multiple_registers(start, registers).await) {
-            Err(LinkError::Late { .. } | LinkError::Failed { .. }) => {
-                self.call(what(), async |link| link.write_multiple_registers(start, registers).await)
-            }
-            answer => answer,
+        let until = Instant::now() + self.left();
+        let mut answer = self.write_once(start, registers);
+        while answer.as_ref().is_err_and(LinkError::asks_for_patience) && Instant::now() + AGAIN < until {
+            self.pause();
+            answer = self.write_once(start, registers);
+        }
+        match answer {
+            Err(_) => self.write_once(start, registers),
+            done => done,
         }
     }
 
-    /// What an exception says, and where it is about the unit.
+    /// What is acknowledged has to be what was written: a gateway that mixes up its answers has not written it, or somewhere else.
+    fn write_once(&mut self, start: u16, registers: &[u16]) -> Result<(), LinkError> {
+        let request = || Request::WriteMultipleRegisters(start, registers.into());
+        let answer =
+            self.call(format!("a value for register {start}"), async |link| link.call(request()).await)?;
+        let words = match answer {
+            Response::WriteMultipleRegisters(address, count)
+                if address == start && usize::from(count) == registers.len() =>
+            {
+                return Ok(());
+            }
+            Response::WriteMultipleRegisters(address, count) => format!(
+                "{} registers from {start} on were written, and {count} from {address} on acknowledged",
+                registers.len()
+            ),
+            other => format!("a write was answered with {other:?}"),
+        };
+        self.connection = None;
+        Err(LinkError::Failed { address: self.address, words })
+    }
+
+    /// A moment for a controller that is busy.
+    fn pause(&self) {
+        let pause = AGAIN.min(self.left());
+        self.runtime.block_on(async { tokio::time::sleep(pause).await });
+    }
+
+    /// What an exception says, with its number, which is what manuals list, and where it is about the unit.
     fn words(&self, code: ExceptionCode) -> String {
+        let number = u8::from(code);
         match code {
             ExceptionCode::GatewayPathUnavailable | ExceptionCode::GatewayTargetDevice => {
-                format!("{code}: it has no unit {}; look at `unit`", self.unit)
+                format!("exception {number}, {code}: it has no unit {}; look at `unit`", self.unit)
             }
-            code => code.to_string(),
+            code => format!("exception {number}, {code}"),
         }
     }
 
@@ -132,7 +189,7 @@ impl Link {
             Some(Err(error)) => Err(LinkError::Failed { address, words: error.to_string() }),
             Some(Ok(answer)) => {
                 self.connection = Some(connection);
-                answer.map_err(|code| LinkError::Refused { address, what, words: self.words(code) })
+                answer.map_err(|code| LinkError::Refused { address, what, code, words: self.words(code) })
             }
         }
     }

@@ -23,7 +23,10 @@ pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
         blocks(&pieces.collect::<Vec<_>>()).into_iter().map(move |block| (table, block))
     };
     let blocks = tables.into_iter().flat_map(pieces).collect();
-    Ok(rig(settings.stand(), Registers { settings, link, blocks, last: BTreeMap::new() }))
+    Ok(rig(
+        settings.stand(),
+        Registers { settings, link, blocks, last: BTreeMap::new(), failing: None, remark: None },
+    ))
 }
 
 struct Registers {
@@ -32,6 +35,10 @@ struct Registers {
     blocks: Vec<(Table, Block)>,
     /// What stood in the registers when they were read last.
     last: BTreeMap<(Table, u16), u16>,
+    /// Why registers cannot be read, and how many samples have lacked them; `None` while all are.
+    failing: Option<(String, usize)>,
+    /// What is to be said of that.
+    remark: Option<String>,
 }
 
 impl Registers {
@@ -39,6 +46,24 @@ impl Registers {
         (place.register..place.register + place.form.count())
             .filter_map(|at| self.last.get(&(place.table, at)).copied())
             .collect()
+    }
+
+    /// Says once why registers cannot be read, and how many samples that cost once they can.
+    fn note(&mut self, failed: Option<LinkError>) {
+        match (failed.map(|error| error.to_string()), &mut self.failing) {
+            (None, None) => {}
+            (None, Some((_, samples))) => {
+                self.remark =
+                    Some(format!("all registers are read again, after {samples} samples that lack some"));
+                self.failing = None;
+            }
+            (Some(why), Some((known, samples))) if why == *known => *samples += 1,
+            (Some(why), failing) => {
+                let before = failing.as_ref().map_or(0, |(_, samples)| *samples);
+                self.remark = Some(format!("samples lack registers: {why}"));
+                *failing = Some((why, before + 1));
+            }
+        }
     }
 
     /// An order in which everything that was read last could be.
@@ -100,17 +125,22 @@ impl Controller for Registers {
 
     fn read(&mut self, _: f64) -> BTreeMap<Channel, Reading> {
         let mut all = BTreeMap::new();
+        let mut failed = None;
         for (table, block) in self.blocks.clone() {
             match self.link.read(table, block) {
                 Ok(registers) => {
                     all.extend((block.start..).zip(registers).map(|(at, value)| ((table, at), value)));
                 }
-                Err(LinkError::Refused { .. }) => {}
+                Err(refused @ LinkError::Refused { .. }) => failed = Some(refused),
                 // The others are not asked for: each would wait for its own deadline.
-                Err(_) => break,
+                Err(error) => {
+                    failed = Some(error);
+                    break;
+                }
             }
         }
         self.last = all;
+        self.note(failed);
         let reading = |(channel, place): (&Channel, &Place)| {
             (*channel, Reading::good(self.settings.value(place, &self.words(place))))
         };
@@ -157,6 +187,10 @@ impl Controller for Registers {
                     .to_owned()
             }
         }
+    }
+
+    fn remark(&mut self) -> Option<String> {
+        self.remark.take()
     }
 
     fn close(&mut self) {

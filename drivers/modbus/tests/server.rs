@@ -77,6 +77,20 @@ impl Stand {
         answer[9..].chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect()
     }
 
+    /// How the server misbehaves from now on (MISDEEDS of modbus_rig.py), by function 6.
+    fn misbehave(&self, how: u8) {
+        let mut stream = TcpStream::connect(format!("127.0.0.1:{}", self.port)).unwrap();
+        let request = [0, 1, 0, 0, 0, 6, 255, 6, 0, 150, 0, how];
+        stream.write_all(&request).unwrap();
+        let mut answer = [0; 12];
+        stream.read_exact(&mut answer).unwrap();
+        assert_eq!(answer, request);
+        let begun = Instant::now();
+        while self.registers(151, 1) != [u16::from(how)] {
+            assert!(begun.elapsed().as_secs() < 60, "the server does not take it");
+        }
+    }
+
     fn armed(&self) -> Driver {
         let mut rig = Stand::driver(&self.settings());
         rig.arm().unwrap();
@@ -201,6 +215,55 @@ fn readings_that_cannot_be_are_refused_before_anything_is_written() {
     // What is right is armed, and writes.
     let mut rig = stand.armed();
     assert_ne!(stand.registers(100, 12), before);
+    rig.make_safe().unwrap();
+    rig.disarm().unwrap();
+}
+
+/// As modbus_rig.py has them.
+const HONEST: u8 = 0;
+const OTHER_REGISTER: u8 = 1;
+const FEWER_REGISTERS: u8 = 2;
+const BUSY_ONCE: u8 = 3;
+const DEVICE_FAILURE: u8 = 4;
+const CLOSES: u8 = 5;
+
+/// An answer that acknowledges something else is none, for setpoints and for the safe state alike; a controller that is busy once is asked
+/// again; the number of an exception is said.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn only_what_was_written_counts_as_acknowledged() {
+    let stand = Stand::new("0");
+    let mut rig = stand.armed();
+    let lost = |result: Result<(), BackendError>| match result {
+        Err(BackendError::Lost { source, .. }) => source.to_string(),
+        other => panic!("{other:?}"),
+    };
+    for misdeed in [OTHER_REGISTER, FEWER_REGISTERS, DEVICE_FAILURE] {
+        stand.misbehave(misdeed);
+        lost(rig.make_safe());
+        let said = lost(rig.set(&SETPOINTS));
+        assert_eq!(said.contains("exception 4"), misdeed == DEVICE_FAILURE, "{said}");
+        stand.misbehave(HONEST);
+        rig.set(&SETPOINTS).unwrap();
+    }
+    stand.misbehave(BUSY_ONCE);
+    rig.set(&SETPOINTS).unwrap();
+    rig.make_safe().unwrap();
+    rig.disarm().unwrap();
+}
+
+/// Some controllers close a connection after each answer: every sample has its readings all the same.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_server_that_closes_after_each_answer_costs_no_sample() {
+    let stand = Stand::new("0");
+    let (mut rig, mut t_s) = (stand.armed(), 0.0);
+    until(&mut rig, &mut t_s, reads);
+    stand.misbehave(CLOSES);
+    for _ in 0..40 {
+        t_s += 0.5;
+        assert!(reads(&rig.poll(t_s).unwrap()), "{t_s} s");
+    }
     rig.make_safe().unwrap();
     rig.disarm().unwrap();
 }

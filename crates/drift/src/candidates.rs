@@ -14,6 +14,10 @@ const EXPECTED_DRIFTS: f64 = 0.5;
 /// better looked after, and several sensors that drift alike have a common part, of which there are few.
 const SELDOM: f64 = 0.25;
 
+/// Onsets beside one that was found, within a step of the grid to either side: a step of P2 that is dated 40 s late leaves twenty standard
+/// errors in one stretch, which other causes would take up.
+const CLOSER: usize = 16;
+
 /// A cause, by its position among those that show, with a course.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Candidate {
@@ -32,27 +36,43 @@ pub(crate) struct Candidates {
 }
 
 impl Candidates {
-    /// All causes with `onsets` onsets over the campaign.
-    pub fn new(readings: &Readings, onsets: usize) -> Result<Candidates, Unsolvable> {
+    /// All causes with `onsets` onsets over the campaign, and closer ones about those that are `known`.
+    pub fn new(
+        readings: &Readings,
+        onsets: usize,
+        known: &[(Cause, Course)],
+    ) -> Result<Candidates, Unsolvable> {
         let shows = |cause: Cause| Some((cause, readings.signature(cause)?.readings));
         let shown: Vec<(Cause, Vec<f64>)> = Cause::all().into_iter().filter_map(shows).collect();
         let (start_s, end_s) = readings.span_s();
         let courses = courses(start_s, end_s, onsets);
-        let all: Vec<Candidate> = (0..shown.len())
+        let mut all: Vec<Candidate> = (0..shown.len())
             .flat_map(|cause| courses.iter().map(move |course| Candidate { cause, course: *course }))
             .collect();
+        let on_grid = all.len();
+        let spacing_s = (end_s - start_s) / onsets as f64;
+        for (known, course) in known {
+            let Some(cause) = shown.iter().position(|(cause, _)| cause == known) else { continue };
+            let closer =
+                (0..CLOSER).map(|part| (2.0 * (part as f64 + 0.5) / CLOSER as f64 - 1.0) * spacing_s);
+            let onsets_s = closer.map(|by_s| course.onset_s + by_s).chain([course.onset_s]);
+            let within = onsets_s.filter(|onset_s| (start_s..end_s).contains(onset_s));
+            all.extend(within.map(|onset_s| Candidate { cause, course: Course { onset_s, ..*course } }));
+        }
         if all.is_empty() {
             return Err(Unsolvable::NothingShows);
         }
         let weight = |cause: &Cause| if is_seldom(*cause) { SELDOM } else { 1.0 };
         let weights: f64 = shown.iter().map(|(cause, _)| weight(cause)).sum();
-        let hypothesis = |Candidate { cause: family, course }: &Candidate| {
+        let hypothesis = |(place, Candidate { cause: family, course }): (usize, &Candidate)| {
             let cause = shown[*family].0;
             let sigma = match course.kind {
                 CourseKind::Ramp => cause.sigma() * 3600.0 / (end_s - start_s),
                 CourseKind::Step => cause.sigma(),
             };
-            let prior = EXPECTED_DRIFTS * weight(&cause) / weights / courses.len() as f64;
+            // Those beside one of the grid share its prior.
+            let share = if place < on_grid { 1.0 } else { 1.0 / CLOSER as f64 };
+            let prior = share * EXPECTED_DRIFTS * weight(&cause) / weights / courses.len() as f64;
             Hypothesis {
                 family: *family,
                 sigma,
@@ -60,7 +80,7 @@ impl Candidates {
                 at_least_zero: cause.is_at_least_zero(),
             }
         };
-        let hypotheses = all.iter().map(hypothesis).collect();
+        let hypotheses = all.iter().enumerate().map(hypothesis).collect();
         let value = |row: usize, column: usize| {
             let Candidate { cause, course } = all[column];
             shown[cause].1[row] * mean_of(readings, row, course)

@@ -16,8 +16,8 @@ pub(crate) fn conclude(
     recordings: &[&Recording],
     refined: &Refined,
     groups: &[Vec<usize>],
-    decision: &Decision,
 ) -> DriftReport {
+    let decision = &refined.decision;
     let points: Vec<Vec<IdentifiedPoint>> =
         recordings.iter().map(|recording| identified(recording, request)).collect();
     let groups =

@@ -37,7 +37,7 @@ pub(crate) fn corrected_points(
     refined: &Refined,
     points: &[Vec<IdentifiedPoint>],
 ) -> Vec<CorrectedPoint> {
-    let Refined { readings, constants, fits } = refined;
+    let Refined { readings, constants, fits, .. } = refined;
     let drifts = &fits.drifts;
     let of_sensors = drifts.iter().any(|fit| fit.cause.kind() == CauseKind::Sensor);
     let signatures: Vec<(&Fit, Constant)> =

@@ -25,6 +25,13 @@ pub(crate) struct Found {
     pub alternatives: Vec<Alternative>,
 }
 
+impl Decision {
+    /// What is found, by cause and course.
+    pub fn courses(&self) -> Vec<(Cause, Course)> {
+        self.found.iter().map(|found| (found.cause, found.course)).collect()
+    }
+}
+
 /// What is found.
 pub(crate) struct Decision {
     /// Nothing where nothing drifts.
@@ -38,12 +45,14 @@ pub(crate) struct Decision {
     pub own: Vec<DMatrix<f64>>,
 }
 
+/// `own` is the declared covariance of each stretch; onsets about those that are `known` already are tried more closely.
 pub(crate) fn decide(
     readings: &Readings,
     mut own: Vec<DMatrix<f64>>,
     columns: &DMatrix<f64>,
+    known: &[(Cause, Course)],
 ) -> Result<Decision, DriftError> {
-    let candidates = Candidates::new(readings, ONSETS)?;
+    let candidates = Candidates::new(readings, ONSETS, known)?;
     let difference = DMatrix::from_column_slice(readings.difference.len(), 1, &readings.difference);
     let left_out = leave_out(&mut own, readings, columns, &difference, &candidates)?;
     // The noise that the best explanation leaves says how much more there is than declared.

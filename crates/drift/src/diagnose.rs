@@ -2,11 +2,9 @@
 
 use crate::blocks::{self, Block, CampaignStep, mean_variance_ratio};
 use crate::conclude::conclude;
-use crate::decide;
 use crate::drive::{Drive, predict};
-use crate::nuisance;
 use crate::readings::Readings;
-use crate::refine::{Refined, columns};
+use crate::refine::Refined;
 use crate::repeats;
 use crate::report::DriftReport;
 use crate::request::{DriftError, DriftRequest, Unsolvable};
@@ -42,11 +40,9 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     }
     let (readings, mut drives) = read(request, &recordings, steps)?;
     let declared = request.declared();
-    let constants = nuisance::constants(&readings, &declared);
     let own = own_covariances(&recordings, &readings, &declared);
-    let decision = decide::decide(&readings, own, &columns(&constants, &readings))?;
-    let refined = Refined::new(readings, constants, &mut drives, &declared, &decision)?;
-    Ok(conclude(request, &recordings, &refined, &groups, &decision))
+    let refined = Refined::new(readings, &own, &mut drives, &declared)?;
+    Ok(conclude(request, &recordings, &refined, &groups))
 }
 
 /// Reads all stretches and drives the model through all runs.

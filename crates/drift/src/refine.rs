@@ -5,7 +5,7 @@ use crate::candidates::mean_of;
 use crate::cause::{Cause, CauseKind};
 use crate::constant::Constant;
 use crate::course::Course;
-use crate::decide::Decision;
+use crate::decide::{Decision, decide};
 use crate::drive::{Drive, predict};
 use crate::fit::{Fit, Fits, fit};
 use crate::nuisance;
@@ -21,28 +21,28 @@ const ROUNDS: usize = 2;
 /// that of the nominal machine. A recording of another program's simulation is 9 % off where noise allows for 3 %.
 const MACHINE_SIZE_ERROR: f64 = 0.1;
 
-/// Readings, constants and fits around what was found.
+/// What a drift that was found may be dated wrongly by, s: the distance of the onsets that are tried, on a campaign of an hour.
+const DATED_S: f64 = 11.0;
+
+/// Readings, constants, what is decided and fits around what was found.
 pub(crate) struct Refined {
     pub readings: Readings,
     pub constants: Vec<Constant>,
+    pub decision: Decision,
     pub fits: Fits,
 }
 
 impl Refined {
-    /// Fits what was found, then again around that, in rounds; what was found last stays where the model cannot follow it further.
+    /// Decides and fits, then again around what was found, in rounds; what was found last stays where the model cannot follow it further.
     pub fn new(
         readings: Readings,
-        constants: Vec<Constant>,
+        own: &[DMatrix<f64>],
         drives: &mut [Drive<'_>],
         declared: &Declared,
-        decision: &Decision,
     ) -> Result<Refined, DriftError> {
-        let found: Vec<(Cause, Course)> =
-            decision.found.iter().map(|found| (found.cause, found.course)).collect();
-        let fits = fit(&readings, &decision.own, &columns(&constants, &readings), &found)?;
-        let mut refined = Refined { readings, constants, fits };
+        let mut refined = Refined::of(readings, own, declared, &[])?;
         for _ in 0..ROUNDS {
-            match refined.round(drives, declared, &decision.own) {
+            match refined.round(own, drives, declared) {
                 Some(better) => refined = better,
                 None => break,
             }
@@ -58,8 +58,31 @@ impl Refined {
         Ok(refined)
     }
 
-    /// `None` where there is nothing to plant, or the model cannot follow what is planted.
-    fn round(&self, drives: &mut [Drive<'_>], declared: &Declared, own: &[DMatrix<f64>]) -> Option<Refined> {
+    /// Of these readings, beside what is known; first with onsets on a grid, then with closer ones about what was found.
+    fn of(
+        readings: Readings,
+        own: &[DMatrix<f64>],
+        declared: &Declared,
+        known: &[Fit],
+    ) -> Result<Refined, DriftError> {
+        let constants = nuisance::constants(&readings, declared);
+        let columns = columns(&constants, &readings);
+        let decided = |known: &[Fit]| -> Result<(Decision, Fits), DriftError> {
+            let courses: Vec<(Cause, Course)> = known.iter().map(|fit| (fit.cause, fit.course)).collect();
+            let decision =
+                decide(&readings, own.to_vec(), &with_dates(&columns, &readings, known), &courses)?;
+            let fits = fit(&readings, &decision.own, &columns, &decision.courses())?;
+            Ok((decision, fits))
+        };
+        let (mut decision, mut fits) = decided(known)?;
+        if known.is_empty() && !fits.drifts.is_empty() {
+            (decision, fits) = decided(&fits.drifts)?;
+        }
+        Ok(Refined { readings, constants, decision, fits })
+    }
+
+    /// `None` where there is nothing to plant, the model cannot follow what is planted, or nothing is found around it.
+    fn round(&self, own: &[DMatrix<f64>], drives: &mut [Drive<'_>], declared: &Declared) -> Option<Refined> {
         let drifts = &self.fits.drifts;
         let planted: Vec<Planted> = drifts
             .iter()
@@ -71,7 +94,6 @@ impl Refined {
         }
         let (base, turned) = predict(drives, &planted).ok()?;
         let mut readings = self.readings.around(base, &turned)?;
-        let constants = nuisance::constants(&readings, declared);
         // What is planted is fitted again as a whole: its linear part is given back to the readings.
         for Planted { cause, course, size } in planted {
             let signature = readings.planted_signature(cause)?;
@@ -81,14 +103,29 @@ impl Refined {
                 readings.steps.iter().map(|step| size * course.at(step.end_s + step.offset_s)).collect();
             readings.give_back(&signature, &of_rows, &of_steps);
         }
-        let found: Vec<(Cause, Course)> = drifts.iter().map(|fit| (fit.cause, fit.course)).collect();
-        let fits = fit(&readings, own, &columns(&constants, &readings), &found).ok()?;
-        Some(Refined { readings, constants, fits })
+        let refined = Refined::of(readings, own, declared, drifts).ok()?;
+        (!refined.fits.drifts.is_empty()).then_some(refined)
     }
 }
 
+/// The constants, and of each drift that is known what an error of its date does: otherwise that of a large one would be a drift of others.
+fn with_dates(columns: &DMatrix<f64>, readings: &Readings, known: &[Fit]) -> DMatrix<f64> {
+    let mut all = columns.clone().resize_horizontally(columns.ncols() + known.len(), 0.0);
+    for (place, Fit { cause, course, size, .. }) in known.iter().enumerate() {
+        let Some(signature) = readings.signature(*cause) else { continue };
+        let dated = |row: usize, by_s: f64| {
+            mean_of(readings, row, Course { onset_s: course.onset_s + by_s, ..*course })
+        };
+        for (row, value) in signature.readings.iter().enumerate() {
+            all[(row, columns.ncols() + place)] =
+                0.5 * size * value * (dated(row, DATED_S) - dated(row, -DATED_S));
+        }
+    }
+    all
+}
+
 /// Constants as the readings show them, a column each.
-pub(crate) fn columns(constants: &[Constant], readings: &Readings) -> DMatrix<f64> {
+fn columns(constants: &[Constant], readings: &Readings) -> DMatrix<f64> {
     DMatrix::from_fn(readings.difference.len(), constants.len(), |row, column| {
         constants[column].readings[row]
     })

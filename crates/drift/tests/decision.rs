@@ -98,6 +98,22 @@ fn two_drifts_at_once_are_both_named() {
     assert!(report.corrected_points.iter().all(|point| point.corrections.len() == 2));
 }
 
+/// Ten times the limit, between two onsets of the grid, and a machine that changes at once by thirty times its limit: what one drift dated or
+/// sized roughly would leave is no drift of others.
+#[test]
+fn a_large_step_is_one_drift() {
+    let at = |onset_s: f64| Course { kind: CourseKind::Step, onset_s };
+    for (seed, planted) in [
+        (20, Planted { cause: Cause::Sensors(&[Channel::P2]), course: at(1708.0), size: 600.0 }),
+        (21, Planted { cause: Cause::BearingFriction, course: at(1695.5), size: 8.65e-7 }),
+    ] {
+        let report = judge(&campaign(seed, Some(planted)).recording);
+        let drift = only(&report);
+        assert_eq!(drift.cause, planted.cause, "{}", report.reason);
+        assert!((drift.onset_s - planted.course.onset_s).abs() < 120.0, "{}", drift.onset_s);
+    }
+}
+
 /// A barometer that drifts moves both absolute pressures, and neither by itself explains that.
 #[test]
 fn a_common_reference_that_drifts_is_named_as_one_cause() {

@@ -98,7 +98,8 @@ impl Candidates {
         let shown = noise.whiten(self.shown.clone());
         let inverse = noise.inverse_times(&shown);
         let pull = inverse.tr_mul(&noise.whiten(difference.clone()));
-        Likelihood::of(shown.tr_mul(&inverse), pull.column(0).into_owned())
+        // Not `tr_mul`, which takes dot products one by one: five times as slow for a thousand columns.
+        Likelihood::of(shown.transpose() * &inverse, pull.column(0).into_owned())
     }
 
     pub fn cause(&self, index: usize) -> Cause {

@@ -54,10 +54,9 @@ pub(crate) fn decide(
 ) -> Result<Decision, DriftError> {
     let candidates = Candidates::new(readings, ONSETS, known)?;
     let difference = DMatrix::from_column_slice(readings.difference.len(), 1, &readings.difference);
-    let left_out = leave_out(&mut own, readings, columns, &difference, &candidates)?;
+    let (left_out, noise, left) = leave_out(&mut own, readings, columns, &difference, &candidates)?;
     // The noise that the best explanation leaves says how much more there is than declared.
-    let noise = LowRank::new(&own, columns)?;
-    inflate(&mut own, readings, &noise, &difference, &candidates);
+    inflate(&mut own, readings, &noise, &left);
     let noise = LowRank::new(&own, columns)?;
 
     let likelihood = candidates.likelihood(&noise, &difference);

@@ -14,19 +14,19 @@ const LEAVE_OUT_ROUNDS: usize = 4;
 const AS_GOOD_AS_NOTHING: f64 = 1e8;
 
 /// Leaves out stretches that stand far out of all others even beside the best explanation: the model cannot follow the
-/// machine there (surge, a valve at its stop). Gives their number.
+/// machine there (surge, a valve at its stop). Gives their number, the noise without them, and what the best explanation leaves then.
 pub(crate) fn leave_out(
     own: &mut [DMatrix<f64>],
     readings: &Readings,
     columns: &DMatrix<f64>,
     difference: &DMatrix<f64>,
     candidates: &Candidates,
-) -> Result<usize, Unsolvable> {
+) -> Result<(usize, LowRank, DMatrix<f64>), Unsolvable> {
     let count = readings.columns.len();
     let mut out = vec![false; own.len()];
+    let mut noise = LowRank::new(own, columns)?;
+    let mut left = unexplained(&noise, difference, candidates);
     for _ in 0..LEAVE_OUT_ROUNDS {
-        let noise = LowRank::new(own, columns)?;
-        let left = unexplained(&noise, difference, candidates);
         let sizes: Vec<f64> = (0..own.len())
             .map(|block| {
                 left.rows(block * count, count).iter().map(|value| value * value).sum::<f64>() / count as f64
@@ -44,8 +44,10 @@ pub(crate) fn leave_out(
             out[block] = true;
             own[block] *= AS_GOOD_AS_NOTHING;
         }
+        noise = LowRank::new(own, columns)?;
+        left = unexplained(&noise, difference, candidates);
     }
-    Ok(out.iter().filter(|out| **out).count())
+    Ok((out.iter().filter(|out| **out).count(), noise, left))
 }
 
 /// What constants and the most probable causes leave, whitened.
@@ -58,15 +60,8 @@ fn unexplained(noise: &LowRank, difference: &DMatrix<f64>, candidates: &Candidat
     noise.inverse_times(&noise.whiten(left))
 }
 
-/// Raises each channel's own noise to what the best explanation leaves.
-pub(crate) fn inflate(
-    own: &mut [DMatrix<f64>],
-    readings: &Readings,
-    noise: &LowRank,
-    difference: &DMatrix<f64>,
-    candidates: &Candidates,
-) {
-    let left = unexplained(noise, difference, candidates);
+/// Raises each channel's own noise to what the best explanation leaves (`left`, whitened by `noise`).
+pub(crate) fn inflate(own: &mut [DMatrix<f64>], readings: &Readings, noise: &LowRank, left: &DMatrix<f64>) {
     let count = readings.columns.len();
     let rows = left.nrows() as f64;
     // Constants take their share of the degrees of freedom.

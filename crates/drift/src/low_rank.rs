@@ -27,7 +27,7 @@ impl LowRank {
         if whitened.iter().any(|value| !value.is_finite()) {
             return Err(Unsolvable::NotFinite);
         }
-        let inner = DMatrix::identity(whitened.ncols(), whitened.ncols()) + whitened.tr_mul(&whitened);
+        let inner = DMatrix::identity(whitened.ncols(), whitened.ncols()) + whitened.transpose() * &whitened;
         let inner = Cholesky::new(inner).ok_or(Unsolvable::Dependent)?;
         Ok(LowRank { factors, columns: whitened, inner })
     }
@@ -45,7 +45,7 @@ impl LowRank {
 
     /// Most probable constants, in standard deviations, for whitened readings.
     pub fn constants(&self, whitened: &DMatrix<f64>) -> DMatrix<f64> {
-        self.inner.solve(&self.columns.tr_mul(whitened))
+        self.inner.solve(&(self.columns.transpose() * whitened))
     }
 
     /// Variance of a linear function of the constants, after the readings.

@@ -2,7 +2,7 @@
 
 use crate::declared::identification_with;
 use crate::fusing::{Fused, fused, recordings};
-use crate::recorded::{Recorded, attached_campaign, same_machine};
+use crate::recorded::{Recorded, all_differ, attached_campaign, same_machine};
 use crate::{Session, SessionError, planning};
 use mapper_campaign::Campaign;
 use mapper_core::Recording;
@@ -34,6 +34,7 @@ impl Session<'_> {
         campaign: &Campaign,
         map: &ChannelMap,
     ) -> Result<Drift, SessionError> {
+        all_differ(recorded)?;
         for (index, recorded) in recorded.iter().enumerate() {
             if let Err(other) = same_machine(recorded, campaign) {
                 let reason = format!("No verdict: recording {}: {other}.", index + 1);

@@ -1,5 +1,6 @@
 //! Why a session could not do what it was asked.
 
+use crate::error_kind::ErrorKind;
 use crate::variant::VariantError;
 use mapper_campaign::{CampaignError, NightlyError};
 use mapper_core::{BackendError, ExportError, ImportError};
@@ -16,23 +17,6 @@ use mapper_runner::{RunError, StepSourceError};
 use mapper_sequence::SequenceError;
 use std::io;
 use std::path::{Path, PathBuf};
-
-/// What kind of trouble it is: what an exit code or a status page tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ErrorKind {
-    /// A file could not be read or written, or the program is at fault.
-    Failure,
-    /// The campaign or another input has mistakes.
-    BadInput,
-    /// There is no plan, or the plan given is stale.
-    NoPlan,
-    /// The rig failed.
-    Rig,
-    /// The recording does not hold what is needed.
-    BadRecording,
-    /// Stopped by the operator.
-    Interrupted,
-}
 
 /// A name as a shell takes it for one word.
 fn word(name: &str) -> String {
@@ -151,6 +135,18 @@ pub enum SessionError {
         path: PathBuf,
         /// What is wrong.
         why: String,
+    },
+    /// A recording that was given twice.
+    #[error(
+        "{} and {} hold the same readings; give each recording once, or its noise would count as new evidence",
+        .first.display(),
+        .second.display()
+    )]
+    SameRecording {
+        /// One of them.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
     },
     /// A run that cannot go on.
     #[error("{} cannot be resumed: {why}", .run.display())]
@@ -443,7 +439,8 @@ impl SessionError {
             | E::Fmu(_)
             | E::Drift(DriftError::NoRun)
             | E::Export(ExportError::NeedsFit { .. })
-            | E::Script(_) => ErrorKind::BadInput,
+            | E::Script(_)
+            | E::SameRecording { .. } => ErrorKind::BadInput,
             E::Unguarded { .. }
             | E::GuardBlind { .. }
             | E::RigInUse { .. }

@@ -2,7 +2,7 @@
 
 use crate::declared::{identification_of, identification_with};
 use crate::fusing::fused;
-use crate::recorded::{Recorded, same_machine};
+use crate::recorded::{Recorded, all_differ, same_machine};
 use crate::surge::marks_of;
 use crate::{Session, SessionError, SessionEvent};
 use mapper_assemble::{RepeatedJump, repeated_jumps};
@@ -129,6 +129,7 @@ impl Session<'_> {
         method: Option<Method>,
         truths: AwaitedTruths<'_>,
     ) -> Result<Identified, SessionError> {
+        all_differ(&recorded)?;
         let campaign = same_campaign(&recorded)?.cloned();
         let campaign = campaign.as_ref();
         let mut config = match (campaign, &map.machine) {

@@ -1,5 +1,6 @@
 //! A recording read from a file, with the campaign that says what was recorded.
 
+use crate::resume::BrokenOff;
 use crate::run_directory;
 use crate::{Registry, SessionError};
 use mapper_campaign::{Campaign, CampaignError};
@@ -45,6 +46,38 @@ impl Recorded {
         Ok(Recorded::of(file, read, campaign))
     }
 
+    /// As [`read`](Recorded::read), but all recordings of a run directory: one that was broken off and went on has several, and of each the
+    /// steps that hold.
+    ///
+    /// # Errors
+    /// As [`read`](Recorded::read).
+    pub fn read_run(
+        registry: &Registry,
+        path: &Path,
+        map: &ChannelMap,
+        given: Option<&Campaign>,
+    ) -> Result<Vec<Recorded>, SessionError> {
+        let Some(parts) = broken_off(path) else {
+            return Ok(vec![Recorded::read(registry, path, map, given)?]);
+        };
+        let first = Recorded::read(registry, &path.join(run_directory::RECORDING), map, given)?;
+        let mut broken_off = parts;
+        if let Some(campaign) = &first.campaign {
+            broken_off.keep_what_goes_on(campaign)?;
+        }
+        let last = broken_off.parts.len() - 1;
+        let mut all = Vec::new();
+        for (place, part) in broken_off.parts.iter().enumerate() {
+            let mut recorded = Recorded::read(registry, &path.join(&part.recording), map, given)?;
+            // The last part may have ended with the run or been broken off: what it has whole holds.
+            if place < last {
+                recorded.read.recording.steps.retain(|step| part.saved.contains(&step.index));
+            }
+            all.push(recorded);
+        }
+        Ok(all)
+    }
+
     /// What was read of a file, with the approaches to surge taken off.
     pub(crate) fn of(path: PathBuf, mut read: ReadReport, campaign: Option<Campaign>) -> Recorded {
         let approaches = read.recording.split_off_approaches();
@@ -58,6 +91,30 @@ impl Recorded {
     pub fn known(&self, remedy: &'static str) -> Result<&Campaign, SessionError> {
         self.campaign.as_ref().ok_or(SessionError::MachineUnknown { remedy })
     }
+}
+
+/// The journal of a run that went on after it was broken off; `None` for anything else.
+fn broken_off(path: &Path) -> Option<BrokenOff> {
+    let broken_off = path.is_dir().then(|| BrokenOff::read(path).ok())??;
+    (broken_off.parts.len() > 1).then_some(broken_off)
+}
+
+/// Refuses a recording that was given twice: its noise would count as new evidence.
+///
+/// # Errors
+/// [`SessionError::SameRecording`] with both paths, whatever the files are called.
+pub(crate) fn all_differ(recorded: &[Recorded]) -> Result<(), SessionError> {
+    for (place, second) in recorded.iter().enumerate() {
+        let series = &second.read.recording.series;
+        let same = |first: &&Recorded| !series.is_empty() && first.read.recording.series == *series;
+        if let Some(first) = recorded[..place].iter().find(same) {
+            return Err(SessionError::SameRecording {
+                first: first.path.clone(),
+                second: second.path.clone(),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// The campaign attached to a recording; `None` where it carries none.

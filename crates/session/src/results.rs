@@ -78,8 +78,12 @@ impl Told {
     /// What recordings say of themselves.
     pub(crate) fn of(recorded: &[Recorded]) -> Told {
         let campaign = recorded.first().and_then(|first| first.campaign.clone());
-        let plan = match recorded {
-            [only] => only.read.plan_json.as_deref().and_then(|json| serde_json::from_slice(json).ok()),
+        // Recordings of one run have one plan.
+        let plans: Vec<Option<&[u8]>> = recorded.iter().map(|one| one.read.plan_json.as_deref()).collect();
+        let plan = match plans.as_slice() {
+            [Some(first), others @ ..] if others.iter().all(|other| *other == Some(*first)) => {
+                serde_json::from_slice(first).ok()
+            }
             _ => None,
         };
         let file = recorded.first().and_then(|first| first.path.file_stem());
@@ -198,32 +202,31 @@ impl Session<'_> {
         self.written(&told, identified, (first, further), remarks, directory)
     }
 
-    /// The page of one run or recording, with the maps of others to hold it against and the diagnosis of its gap, where one was
+    /// The page of one run, whose recordings are `shown`, with the maps of others to hold it against and the diagnosis of its gap, where one was
     /// made. Nothing is written.
     ///
     /// # Errors
     /// As [`Session::identify`].
     pub fn page(
         &self,
-        shown: Recorded,
-        others: Vec<Recorded>,
+        shown: Vec<Recorded>,
+        others: Vec<Vec<Recorded>>,
         channels: &ChannelMap,
         gap: Option<&Gap>,
     ) -> Result<String, SessionError> {
-        let several = [shown];
-        let told = Told::of(&several);
-        let [shown] = several;
-        let mut remarks = remarks_of(&shown, false);
-        let identified = self.identify(vec![shown], channels, None)?;
+        let told = Told::of(&shown);
+        let mut remarks: Vec<String> =
+            shown.iter().flat_map(|one| remarks_of(one, shown.len() > 1)).collect();
+        let identified = self.identify(shown, channels, None)?;
         let told = Told { outcome: identified_by(identified.config.method), ..told };
         remarks.extend(identified.remarks.iter().cloned());
         let map = compressor_map(&told.machine, &identified, &mut remarks);
         let reference = identified.config.reference;
         let mut other_maps: Vec<(String, CompressorMap)> = Vec::new();
         for other in others {
-            let name = name_of(&other.path);
-            let machine = Told::of(std::slice::from_ref(&other)).machine;
-            let identified = self.identify(vec![other], channels, None)?;
+            let name = other.first().map_or_else(String::new, |first| name_of(&first.path));
+            let machine = Told::of(&other).machine;
+            let identified = self.identify(other, channels, None)?;
             match compressor_map(&machine, &identified, &mut Vec::new()) {
                 Some(map) => other_maps.push((name, map.at_reference(reference))),
                 None => remarks.push(format!("{name} has no map to hold this one against")),

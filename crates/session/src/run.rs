@@ -235,9 +235,9 @@ impl PreparedRun<'_> {
             finished?;
         }
         parts.push(RunPart { recording: recording.clone(), saved: None });
-        let results_directory = results_directory(&directory, parts.len())?;
-        let executed = self.executed(&results_directory);
-        let results = self.results(session, executed, &end, &results_directory, &parts);
+        set_aside(&directory)?;
+        let executed = self.executed(&directory);
+        let results = self.results(session, executed, &end, &directory, &parts);
         Ok(RunOutcome { directory, recording, end, results })
     }
 
@@ -274,6 +274,7 @@ impl PreparedRun<'_> {
         let parts = self.parts_before(&directory);
         let recording = parts.last().map_or_else(PathBuf::new, |part| part.recording.clone());
         let end = Ended::Completed;
+        set_aside(&directory)?;
         let results = self.results(session, Ok(self.plan.clone()), &end, &directory, &parts);
         Ok(Some(RunOutcome { directory, recording, end, results }))
     }
@@ -416,12 +417,24 @@ impl PreparedRun<'_> {
     }
 }
 
-/// Where results go: nothing is written over.
-fn results_directory(run: &Path, parts: usize) -> Result<PathBuf, SessionError> {
-    if !run.join(run_directory::POINTS).exists() && !run.join(run_directory::REPORT).exists() {
-        return Ok(run.to_owned());
+/// Results that a part of the run left before, all together or some of them, go into a directory of their own, so that the newest stand on
+/// top and nothing is written over.
+fn set_aside(run: &Path) -> Result<(), SessionError> {
+    let entries = std::fs::read_dir(run).map_err(SessionError::file("read", run))?;
+    let results: Vec<_> = entries
+        .filter_map(Result::ok)
+        .map(|entry| entry.file_name())
+        .filter(|name| name.to_str().is_some_and(run_directory::is_result))
+        .collect();
+    if results.is_empty() {
+        return Ok(());
     }
-    let directory = run.join(format!("results-{parts}"));
-    std::fs::create_dir_all(&directory).map_err(SessionError::file("create", &directory))?;
-    Ok(directory)
+    let free = (1..).map(|number| run.join(format!("results-{number}"))).find(|path| !path.exists());
+    let Some(aside) = free else { return Ok(()) };
+    std::fs::create_dir(&aside).map_err(SessionError::file("create", &aside))?;
+    for name in results {
+        let (from, to) = (run.join(&name), aside.join(&name));
+        std::fs::rename(&from, &to).map_err(SessionError::file("move", &from))?;
+    }
+    Ok(())
 }

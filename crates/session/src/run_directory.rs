@@ -25,6 +25,11 @@ pub const REPORT: &str = "report.md";
 /// The same and more as a page for a browser.
 pub const PAGE: &str = "report.html";
 
+/// Whether a file of this name is made from what was recorded: points, map, report, page, and the steps of a script.
+pub(crate) fn is_result(name: &str) -> bool {
+    [POINTS, REPORT, PAGE, EXECUTED].contains(&name) || name.starts_with("map.")
+}
+
 /// Creates `<parent>/<campaign>-<time>`, with `-2`, `-3`, ... behind it where that exists already.
 ///
 /// # Errors

@@ -168,6 +168,23 @@ fn a_killed_run_goes_on_and_has_each_point_once() {
         }
         let again = done(with_states(&campaign, &arguments)).exits(4);
         assert!(again.stderr.contains("all of its steps are there"), "{}", again.stderr);
+        // The run is one thing for every command, and its newest results stand on top.
+        let identified = mapper(["identify".as_ref(), run.as_os_str(), "--json".as_ref()]).exits(0).json();
+        assert!(points(&identified) == found, "killed at {bytes} bytes");
+        let on_top = std::fs::read_to_string(run.join("points.json")).unwrap();
+        assert!(points(&serde_json::from_str(&on_top).unwrap()) == found);
+    }
+}
+
+/// Recordings that hold the same readings are one, whatever their files are called.
+#[test]
+fn a_recording_that_is_given_twice_is_refused() {
+    let campaign = short(&[]);
+    let run = killed_at(&campaign, 1_000_000);
+    let copy = run.join("copy.mcap");
+    std::fs::copy(run.join("recording.mcap"), &copy).unwrap();
+    for command in ["identify", "drift"] {
+        mapper([command.as_ref(), run.as_os_str(), copy.as_os_str()]).exits(3);
     }
 }
 

@@ -43,10 +43,9 @@ impl Drift {
         let (files, given) = self.sources()?;
         let map = channel_map(self.channels.as_deref())?;
         let registry = registry::registry();
-        let recorded: Vec<Recorded> = files
-            .iter()
-            .map(|file| Recorded::read(&registry, file, &map, given.as_ref()))
-            .collect::<Result<_, SessionError>>()?;
+        let read = |file: &PathBuf| Recorded::read_run(&registry, file, &map, given.as_ref());
+        let runs = files.iter().map(read).collect::<Result<Vec<_>, SessionError>>()?;
+        let recorded: Vec<Recorded> = runs.into_iter().flatten().collect();
         // clap asks for one.
         let Some(first) = recorded.first() else { return Ok(()) };
         let campaign = first.known("Give it with `--campaign FILE`")?;

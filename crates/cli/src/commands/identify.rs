@@ -44,8 +44,9 @@ impl Identify {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
         let registry = registry::registry();
-        let read = |path: &PathBuf| Recorded::read(&registry, path, &map, given.as_ref());
-        let recorded = self.recordings.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let read = |path: &PathBuf| Recorded::read_run(&registry, path, &map, given.as_ref());
+        let runs = self.recordings.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let recorded: Vec<Recorded> = runs.into_iter().flatten().collect();
         let path = recorded.first().map(|first| first.path.clone());
         let warnings: Vec<String> =
             recorded.iter().flat_map(|one| &one.read.warnings).map(ToString::to_string).collect();

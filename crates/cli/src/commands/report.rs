@@ -41,11 +41,12 @@ impl Report {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
         let registry = registry::registry();
-        let read = |path: &PathBuf| Recorded::read(&registry, path, &map, given.as_ref());
-        let mut recorded = self.runs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-        let others = recorded.split_off(1.min(recorded.len()));
-        let shown = recorded.pop().ok_or(SessionError::NoRecording)?;
-        let gap = self.gap.as_deref().map(|file| diagnosed(file, &registry, &shown, &map)).transpose()?;
+        let read = |path: &PathBuf| Recorded::read_run(&registry, path, &map, given.as_ref());
+        let mut runs = self.runs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let others = runs.split_off(1.min(runs.len()));
+        let shown = runs.pop().ok_or(SessionError::NoRecording)?;
+        let first = shown.first().ok_or(SessionError::NoRecording)?;
+        let gap = self.gap.as_deref().map(|file| diagnosed(file, &registry, first, &map)).transpose()?;
         let page = Session::new(&registry).page(shown, others, &map, gap.as_ref())?;
         self.replace.write(&self.out, page.as_bytes())?;
         match self.json {

@@ -1,6 +1,6 @@
 """The small rig of drivers/python in real time behind asyncua, an OPC UA server that shares no code with the driver.
 
-Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps] [--sessions N]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
+Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps] [--sessions N] [--misdeed KIND] [--answers CODE]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
 reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean); text, flag, table, whole (of other types). As a PLC has to, it cuts the
 air by itself where the heartbeat stands still. Values that no stand could bear are refused with BadOutOfRange.
 
@@ -8,6 +8,8 @@ With --secure it takes signed and encrypted sessions alone, of the user `lab` wi
 where there is none yet, valid for a year or as many days as said. With --stamps it prints `SECONDS read RPM` for each speed that it hands out and `SECONDS told NAMES` for each set-point that it
 takes, on the clock of time.monotonic(): behind its decryption, so that a session may be encrypted. With --sessions it holds so many sessions at a time and
 refuses others with BadTooManySessions, as small PLCs do: a session, also one that nobody was let into, is held until its client closes it.
+With --misdeed, and once the air is on: `boolean`, T2 becomes a truth value; `future`, readings are stamped an hour ahead; `uncertain`, all of them are. With --answers CODE writes of
+setpoints are answered with that status.
 """
 
 import argparse
@@ -97,7 +99,10 @@ async def make(arguments):
     nodes["tripped"] = await stand.add_variable(ua.NodeId("tripped", index), "tripped", False, ua.VariantType.Boolean)
     for name in [*SETPOINTS, "air", "heartbeat", "flag", "whole"]:
         await nodes[name].set_writable()
-    refuse_what_is_too_much(server, index)
+    refuse_what_is_too_much(server, index, arguments.answers)
+    if arguments.misdeed == "boolean":
+        # asyncua keeps the type of a node; not every PLC does.
+        server.iserver.aspace._is_expected_variant_type = lambda *_: True
     if arguments.sessions is not None:
         hold_at_most(server.iserver, arguments.sessions)
     return server, nodes
@@ -131,8 +136,8 @@ def hold_at_most(iserver, most):
     iserver.create_session, UaProcessor.close = limited, close_of_connection
 
 
-def refuse_what_is_too_much(server, index):
-    """Writes beyond the stand's own limits are refused, as a PLC does."""
+def refuse_what_is_too_much(server, index, answers):
+    """Writes beyond the stand's own limits are refused, as a PLC does; others are answered with Good, or with the status named."""
     service = server.iserver.attribute_service
     write = service.write
 
@@ -145,7 +150,8 @@ def refuse_what_is_too_much(server, index):
                 continue
             single = ua.WriteParameters()
             single.NodesToWrite = [one]
-            results += await write(single, user)
+            written = await write(single, user)
+            results += [ua.StatusCode(getattr(ua.StatusCodes, answers))] if limit and answers else written
         return results
 
     service.write = checked
@@ -174,12 +180,17 @@ def stamp(server, index):
     service.read, service.write = stamped_read, stamped_write
 
 
-async def live(nodes, seed, filled):
+async def live(server, nodes, seed, filled, misdeed):
     """The rig follows its nodes, and fills them; says when it has done so first."""
 
-    async def put(name, value, kind):
+    async def put(name, value, kind, misdeed=None):
         now = datetime.datetime.now(datetime.timezone.utc)
-        await nodes[name].write_value(ua.DataValue(ua.Variant(value, kind), SourceTimestamp=now, ServerTimestamp=now))
+        taken = now + datetime.timedelta(hours=1) if misdeed == "future" else now
+        status = ua.StatusCode(ua.StatusCodes.UncertainLastUsableValue if misdeed == "uncertain" else ua.StatusCodes.Good)
+        if misdeed == "boolean" and name == "T2":
+            value, kind = True, ua.VariantType.Boolean
+        stamped = ua.DataValue(ua.Variant(value, kind), status, SourceTimestamp=taken, ServerTimestamp=now)
+        await server.write_attribute_value(nodes[name].nodeid, stamped)
 
     rig = rig_module.PythonRig({"noise": 1, "seed": seed})
     rig.arm()
@@ -199,7 +210,7 @@ async def live(nodes, seed, filled):
         times, columns, _ = rig.poll(now - begun)
         if times:
             for name in CHANNELS:
-                await put(name, columns[name][-1], ua.VariantType.Double)
+                await put(name, columns[name][-1], ua.VariantType.Double, misdeed if air else None)
             filled.set()
         await asyncio.sleep(0.02)
 
@@ -214,6 +225,8 @@ async def main():
     parser.add_argument("--password", default="hunter2")
     parser.add_argument("--days", type=int, default=365)
     parser.add_argument("--sessions", type=int)
+    parser.add_argument("--misdeed", choices=["boolean", "future", "uncertain"])
+    parser.add_argument("--answers")
     arguments = parser.parse_args()
     logging.disable(logging.ERROR)
     if not arguments.port:
@@ -223,7 +236,7 @@ async def main():
     server, nodes = await make(arguments)
     async with server:
         filled = asyncio.Event()
-        living = asyncio.create_task(live(nodes, arguments.seed, filled))
+        living = asyncio.create_task(live(server, nodes, arguments.seed, filled, arguments.misdeed))
         # Whoever arms it looks at its readings first.
         await filled.wait()
         print(arguments.port, flush=True)

@@ -6,7 +6,7 @@ use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Provenance, Quality, RigDescription,
     RigMode, SampleBatch, Setpoints,
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How often the heartbeat counts, s.
 const HEARTBEAT_S: f64 = 0.5;
@@ -101,6 +101,8 @@ struct Armed {
     heartbeat: u16,
     /// When it counted last, s.
     beaten_s: f64,
+    /// What was said of readings that are not good.
+    said: BTreeSet<(Channel, Quality)>,
 }
 
 impl<C: Controller> Rig<C> {
@@ -126,6 +128,26 @@ impl<C: Controller> Rig<C> {
         let count = f64::from(armed.heartbeat);
         // Where it does not arrive the controller cuts the air by itself, which is what it is for.
         let _ = self.write(&[(Target::Heartbeat, count)]);
+    }
+
+    /// Names the channels whose readings are not good by the controller's word, each once for each quality.
+    fn doubts(&mut self, readings: &BTreeMap<Channel, Reading>) -> Option<String> {
+        let said = &mut self.armed.as_mut()?.said;
+        let of = |(channel, reading): (&Channel, &Reading)| (*channel, reading.quality);
+        let doubted = readings.iter().map(of).filter(|(_, quality)| *quality != Quality::Good);
+        let new: Vec<String> = doubted
+            .filter(|doubt| said.insert(*doubt))
+            .map(|(channel, quality)| {
+                let word = if quality == Quality::Uncertain { "uncertain" } else { "bad" };
+                format!("{} {word}", channel.symbol())
+            })
+            .collect();
+        (!new.is_empty()).then(|| {
+            format!(
+                "readings are not good by the controller's word: {}; the recording has the quality of each, look at the sensors there",
+                new.join(", ")
+            )
+        })
     }
 
     /// The lowest that the heater may be told, K.
@@ -206,8 +228,15 @@ impl<C: Controller> Backend for Rig<C> {
             self.controller.close();
             return Err(self.lost(error));
         }
-        self.armed =
-            Some(Armed { told: None, safe: false, sequence: 0, last_s: -1.0, heartbeat: 0, beaten_s: 0.0 });
+        self.armed = Some(Armed {
+            told: None,
+            safe: false,
+            sequence: 0,
+            last_s: -1.0,
+            heartbeat: 0,
+            beaten_s: 0.0,
+            said: BTreeSet::new(),
+        });
         Ok(())
     }
 
@@ -251,13 +280,14 @@ impl<C: Controller> Backend for Rig<C> {
             };
             ChannelColumn { channel, values: vec![value] }
         };
+        let doubts = self.doubts(&readings);
         let note = |message| Event { t_s: until_s, kind: EventKind::Note, message };
         Ok(SampleBatch {
             first_sequence,
             t_s: vec![until_s],
             columns: self.channels().into_iter().map(column).collect(),
             provenance: provenance(&readings, until_s),
-            events: self.controller.remark().map(note).into_iter().collect(),
+            events: self.controller.remark().into_iter().chain(doubts).map(note).collect(),
             ..SampleBatch::default()
         })
     }

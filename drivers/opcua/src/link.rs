@@ -3,7 +3,7 @@
 use crate::login::{reach, try_login};
 use crate::settings::{Security, User};
 use crate::store::{APPLICATION_URI, Store, StoreError, fingerprint, server};
-use crate::value::words;
+use crate::value::{is_written, words};
 use futures::{StreamExt, pin_mut};
 use mapper_controller::Target;
 use opcua::client::services::Read;
@@ -419,7 +419,7 @@ impl Link {
                 answers.len()
             )));
         }
-        match values.iter().zip(answers).find(|(_, status)| !status.is_good()) {
+        match values.iter().zip(answers).find(|(_, status)| !is_written(**status)) {
             None => Ok(()),
             Some(((node, _, value), status)) => Err(LinkError::Refused {
                 server: self.server(),

@@ -36,6 +36,10 @@ struct Nodes {
     remark: Option<String>,
 }
 
+/// A source timestamp may be ahead of the answer by so much, s: clocks of controllers on one net are kept within milliseconds to some tenths
+/// (NTP), and a reading has to be no older than 3 s.
+const FUTURE_S: f64 = 1.0;
+
 fn between_s(earlier: &DateTime, later: &DateTime) -> f64 {
     // A tick is 100 ns.
     (later.ticks() - earlier.ticks()) as f64 * 1e-7
@@ -68,6 +72,12 @@ impl Nodes {
     fn source_t_s(&self, value: &DataValue, sent: &DateTime, t_s: f64) -> Option<f64> {
         let taken = value.source_timestamp.as_ref().filter(|taken| !taken.is_null() && !sent.is_null())?;
         (self.checked.settings.timestamps == Timestamps::Source).then(|| t_s - between_s(taken, sent))
+    }
+
+    /// Whether a value is stamped later than the server's own answer: nobody can say how old it is.
+    fn is_from_the_future(&self, value: &DataValue, sent: &DateTime) -> bool {
+        let age_s = self.source_t_s(value, sent, 0.0).map_or(0.0, |source_t_s| -source_t_s);
+        age_s < -FUTURE_S
     }
 
     /// What stands at a node that is written: values of another type would be refused.
@@ -206,8 +216,10 @@ impl Controller for Nodes {
         let reading =
             |((channel, _, scale), value): (&(Channel, NodeId, crate::settings::Scale), DataValue)| {
                 let mut quality = quality(&value);
-                let inside = value.value.as_ref().map_or(f64::NAN, |value| scale.inside(number(value)));
-                if inside.is_nan() {
+                // A node may become another one while it runs: a truth value is no reading.
+                let there = value.value.as_ref().filter(|there| is_number(there));
+                let inside = there.map_or(f64::NAN, |there| scale.inside(number(there)));
+                if inside.is_nan() || self.is_from_the_future(&value, &answer.sent) {
                     quality = Quality::Bad;
                 }
                 (

@@ -63,14 +63,28 @@ pub(crate) fn like(there: &Variant, number: f64) -> Option<Variant> {
     })
 }
 
-/// How good a value is, by its status: an absent status is a good one.
+/// Without the bits that say more than the code (Part 4 of the specification, 7.39).
+fn code(status: StatusCode) -> u32 {
+    status.bits() & 0xFFFF_0000
+}
+
+/// How good a value is, by its status: an absent status is a good one. A value that was entered by hand or cut off at a limit is a number,
+/// and not the sensor's (Part 8, 6.3).
 pub(crate) fn quality(value: &DataValue) -> Quality {
+    let by_hand = [StatusCode::GoodLocalOverride, StatusCode::GoodClamped].map(code);
     match value.status {
         None => Quality::Good,
+        Some(status) if by_hand.contains(&code(status)) => Quality::Uncertain,
         Some(status) if status.is_good() => Quality::Good,
         Some(status) if status.is_uncertain() => Quality::Uncertain,
         Some(_) => Quality::Bad,
     }
+}
+
+/// Whether a value that was written stands there now, as it was written: `Good` alone says so. `GoodClamped` says that another value does, and
+/// `GoodCompletesAsynchronously` that nobody knows yet.
+pub(crate) fn is_written(status: StatusCode) -> bool {
+    code(status) == StatusCode::Good.bits()
 }
 
 /// A status as people look it up: `BadOutOfRange (0x803C0000)`.
@@ -115,8 +129,19 @@ mod tests {
     fn a_status_is_a_quality() {
         let with = |status| quality(&DataValue { status, ..DataValue::null() });
         assert_eq!(with(None), Quality::Good);
-        assert_eq!(with(Some(StatusCode::GoodClamped)), Quality::Good);
+        assert_eq!(with(Some(StatusCode::GoodClamped)), Quality::Uncertain);
+        assert_eq!(with(Some(StatusCode::GoodLocalOverride)), Quality::Uncertain);
+        assert_eq!(with(Some(StatusCode::GoodOverload)), Quality::Good);
         assert_eq!(with(Some(StatusCode::UncertainLastUsableValue)), Quality::Uncertain);
         assert_eq!(with(Some(StatusCode::BadSensorFailure)), Quality::Bad);
+        assert!(is_written(StatusCode::Good));
+        let others = [
+            StatusCode::GoodClamped,
+            StatusCode::GoodCompletesAsynchronously,
+            StatusCode::GoodOverload,
+            StatusCode::UncertainLastUsableValue,
+            StatusCode::BadOutOfRange,
+        ];
+        assert!(!others.into_iter().any(is_written));
     }
 }

@@ -422,3 +422,41 @@ fn a_server_is_trusted_by_its_whole_address_and_only_where_it_is() {
     assert!(words.contains(&format!("nobody answers at {place}: Connection refused")), "{words}");
     assert!(!words.contains("Os {") && words.contains("Is the server on"), "{words}");
 }
+
+/// Only `Good` says that a value stands there as it was written.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_write_that_is_not_simply_good_is_lost() {
+    for code in ["GoodClamped", "GoodCompletesAsynchronously"] {
+        let stand = Stand::with(&["--answers", code]);
+        stand.trust();
+        let lost = words(stand.driver(PASSWORD).arm().unwrap_err());
+        assert!(lost.contains(code), "{lost}");
+    }
+}
+
+/// What a node becomes while the rig runs: a truth value, and readings from the future, are none; uncertain ones are readings, and are said to be.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn readings_that_turn_bad_are_none_and_uncertain_ones_are_said() {
+    for misdeed in ["boolean", "future", "uncertain"] {
+        let stand = Stand::with(&["--misdeed", misdeed]);
+        stand.trust();
+        let mut rig = stand.armed();
+        rig.set(&setpoints(150e3)).unwrap();
+        let mut t_s = 0.0;
+        let expected = if misdeed == "uncertain" { Quality::Uncertain } else { Quality::Bad };
+        let (noted, marked) = (std::cell::Cell::new(false), std::cell::Cell::new(false));
+        let seen = |batch: &SampleBatch| {
+            // 1 is what a truth value would be as a number.
+            assert_ne!(batch.last(Channel::T2), Some(1.0));
+            let of_t2 = batch.provenance.iter().find(|one| one.channel == Channel::T2);
+            marked.set(marked.get() || of_t2.is_some_and(|of_t2| of_t2.quality.last() == Some(&expected)));
+            noted.set(noted.get() || !batch.events.is_empty());
+            noted.get() && marked.get()
+        };
+        until(&mut rig, &mut t_s, seen);
+        rig.make_safe().unwrap();
+        rig.disarm().unwrap();
+    }
+}

@@ -2,7 +2,7 @@
 //! of a small change that has always been there, while the metal lags behind a real one.
 
 use crate::candidates::mean_of;
-use crate::cause::{Cause, CauseKind};
+use crate::cause::Cause;
 use crate::constant::Constant;
 use crate::course::Course;
 use crate::decide::{Decision, decide};
@@ -17,10 +17,6 @@ use nalgebra::DMatrix;
 
 /// Rounds: each leaves about a tenth of what the one before had wrong.
 const ROUNDS: usize = 2;
-/// How far, relative, the size of a change of the machine may be off beside what noise does: the model's answer to it is
-/// that of the nominal machine. A recording of another program's simulation is 9 % off where noise allows for 3 %.
-const MACHINE_SIZE_ERROR: f64 = 0.1;
-
 /// What a drift that was found may be dated wrongly by, s: the distance of the onsets that are tried, on a campaign of an hour.
 const DATED_S: f64 = 11.0;
 
@@ -45,14 +41,6 @@ impl Refined {
             match refined.round(own, drives, declared) {
                 Some(better) => refined = better,
                 None => break,
-            }
-        }
-        for Fit { cause, size, low, high, .. } in &mut refined.fits.drifts {
-            if cause.kind() == CauseKind::Machine {
-                let wider = |end: f64| {
-                    *size + (end - *size).signum() * (end - *size).hypot(MACHINE_SIZE_ERROR * *size)
-                };
-                (*low, *high) = (wider(*low), wider(*high));
             }
         }
         Ok(refined)

@@ -110,6 +110,32 @@ def row(machine, order, runs):
     ]
 
 
+def ranks(values):
+    order = sorted(range(len(values)), key=values.__getitem__)
+    return [order.index(place) for place in range(len(values))]
+
+
+def forecasts(mapper, folder, machine, arguments, pool, seeds):
+    """How the stated errors of plans with these orders and dwells compare with the realised ones: ratios, and Spearman's rank correlation."""
+    plans = []
+    for order in arguments.orders.split(";"):
+        for dwell in arguments.dwells.split(","):
+            runs = list(pool.map(lambda seed: mapped(mapper, campaign(folder, machine, order, seed, dwell)), seeds))
+            errors = [error(p) for _, _, points in runs for p in points if p["eta"] is not None]
+            realised = math.sqrt(sum(e * e for e in errors) / len(errors))
+            stated = [[figures.get(key) for _, figures, _ in runs] for key in ("rms_error_eta", "rms_error_undeclared_eta")]
+            plans.append([realised] + [None if None in of else 100 * statistics.median(of) for of in stated])
+            print(machine, order, dwell, plans[-1], file=sys.stderr, flush=True)
+    for name, place in (("as declared", 1), ("undeclared", 2)):
+        known = [(plan[0], plan[place]) for plan in plans if plan[place] is not None]
+        if len(known) < 3:
+            continue
+        ratios = sorted(realised / stated for realised, stated in known)
+        a, b = (ranks([pair[side] for pair in known]) for side in (0, 1))
+        rho = 1 - 6 * sum((x - y) ** 2 for x, y in zip(a, b)) / (len(known) * (len(known) ** 2 - 1))
+        print(f"| {machine} | {name} | {len(known)} of {len(plans)} | {ratios[0]:.2f} to {ratios[-1]:.2f} | {rho:.2f} |", flush=True)
+
+
 HEADS = [
     "machine", "order", "steps, min", "total gradient, K", "expected rms", "rms", "median seed", "worst seed", "worst point",
     "eta covered", "h covered", "good",
@@ -124,6 +150,7 @@ def main():
     parser.add_argument("--machines", default=",".join(MACHINES))
     parser.add_argument("--orders", default=";".join(ORDERS))
     parser.add_argument("--dwell", help="another dwell than the campaign's, s")
+    parser.add_argument("--dwells", help="hold stated errors against realised ones for each order with each of these dwells, s: 20,30,40,60,80")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--write", help="the page to write")
     arguments = parser.parse_args()
@@ -136,10 +163,15 @@ def main():
             write_table(folder / "bent.csv", 0.06, 0.0)
             write_table(folder / "steep.csv", 0.02, 1.2)
             shutil.copy(ROOT / "campaigns" / "stabilised.rhai", folder)
+            if arguments.dwells:
+                forecasts(mapper, folder, machine, arguments, pool, seeds)
+                continue
             for order in arguments.orders.split(";") + (WAYS if machine == "turbo_a" and arguments.write else []):
                 one = lambda seed: mapped(mapper, campaign(folder, machine, order, seed, arguments.dwell))
                 rows.append(row(machine, order, list(pool.map(one, seeds))))
                 print(" | ".join(rows[-1]), file=sys.stderr, flush=True)
+    if arguments.dwells:
+        return
     table = [HEADS, ["---"] * 2 + ["---:"] * (len(HEADS) - 2), *rows]
     text = "\n".join("| " + " | ".join(cells) + " |" for cells in table)
     if arguments.write:

@@ -1,7 +1,9 @@
 //! The guard over one channel: value, change, age, quality, and whether it moves at all.
 
 use crate::guard::{Guard, Told, Trip};
-use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, readable};
+use mapper_core::{
+    Channel, Dimension, Quality, Reaction, SampleBatch, SignalGuard, measurable, plausible, readable,
+};
 use std::collections::VecDeque;
 
 /// A violation that goes on after it has tripped trips again after so long, s.
@@ -10,6 +12,9 @@ const AGAIN_S: f64 = 10.0;
 const NEAR_RATIO: f64 = 0.03;
 /// Time over which the slope is taken, s.
 const SLOPE_S: f64 = 0.5;
+/// A reading that moves by no more than this share of itself stands still (4 mK of 400 K, 2 Pa of 200 kPa): amplifiers of thermocouples and
+/// pressure transducers are noisier, and a jump of the setpoints moves a reading by a hundred times as much.
+const STILL_RATIO: f64 = 1e-5;
 /// Readings of which a change is made are at least so far apart, as a share of its time: no rig is too fast for memory.
 const CHANGE_RESOLUTION_RATIO: f64 = 1e-3;
 
@@ -31,8 +36,8 @@ pub struct SignalWatch {
     quiet_until_s: Option<f64>,
     /// Times and readings of the change's window.
     recent: VecDeque<(f64, f64)>,
-    /// Since when the reading has been the same to the bit, s.
-    same_since_s: Option<f64>,
+    /// Since when the reading has stood still, s, and where.
+    still: Option<(f64, f64)>,
 }
 
 impl SignalWatch {
@@ -48,7 +53,7 @@ impl SignalWatch {
             beyond_since_s: None,
             quiet_until_s: None,
             recent: VecDeque::new(),
-            same_since_s: None,
+            still: None,
         }
     }
 
@@ -87,8 +92,8 @@ impl SignalWatch {
             None => self.anchor = Some((t_s, value)),
         }
         self.last_good_s = Some(t_s);
-        let same = self.last_value.is_some_and(|before| before.to_bits() == value.to_bits());
-        self.same_since_s = if same { self.same_since_s.or(Some(t_s)) } else { Some(t_s) };
+        let stands = |(_, there): &(f64, f64)| (value - there).abs() <= STILL_RATIO * there.abs();
+        self.still = self.still.filter(stands).or(Some((t_s, value)));
         self.last_value = Some(value);
         // Hysteresis: once beyond, it has to come back by more than it went over.
         let slack = if self.beyond_since_s.is_some() { self.spec.hysteresis } else { 0.0 };
@@ -132,18 +137,26 @@ impl SignalWatch {
 
     /// A reading that has not moved although the setpoints have.
     fn frozen(&mut self, t_s: f64, told: &Told) -> Option<Trip> {
-        let (frozen_s, same_s, jumped_s) = (self.spec.frozen_s?, self.same_since_s?, told.jumped_s?);
+        let (frozen_s, (same_s, _), jumped_s) = (self.spec.frozen_s?, self.still?, told.jumped_s?);
         let since_jump_s = t_s - jumped_s;
         // It has to have been the same since before the jump.
         if !told.running || since_jump_s < frozen_s || same_s > jumped_s {
             return None;
         }
         let value = readable(self.last_value?, self.spec.channel.unit());
-        let what = format!(
-            "is frozen: {value} to the last bit since {same_s:.1} s, though the setpoints jumped at {jumped_s:.1} s"
-        );
+        let what =
+            format!("is frozen: {value} since {same_s:.1} s, though the setpoints jumped at {jumped_s:.1} s");
         self.trip(t_s, self.spec.reaction.max(Reaction::Safe), &what)
     }
+}
+
+/// Whether a sensor can read this, now: what it cannot is no reading, however long it lasts, and a limit is not held against it. Shaft and
+/// flow begin from rest while the rig already runs.
+fn can_be(channel: Channel, value: f64, running: bool) -> bool {
+    let from_rest = matches!(channel.info().dimension, Dimension::RotationalSpeed | Dimension::MassFlow);
+    value.is_finite()
+        && measurable(channel.info().dimension).contains(&value)
+        && (!running || from_rest || plausible(channel).running.contains(&value))
 }
 
 impl Guard for SignalWatch {
@@ -158,7 +171,10 @@ impl Guard for SignalWatch {
                 let source_s = provenance.and_then(|from| from.source_t_s.get(index)).copied();
                 let taken_s = source_s.map_or(*t_s, |source_s| source_s.min(*t_s));
                 let new = self.last_good_s.is_none_or(|last_s| taken_s > last_s);
-                if value.is_finite() && taken_s.is_finite() && !bad && new {
+                // Too high is too high, whatever it is that reads so.
+                let above = value.is_finite() && self.spec.above.is_some_and(|high| *value > high);
+                let read = above || can_be(self.spec.channel, *value, told.running);
+                if read && taken_s.is_finite() && !bad && new {
                     let trip = self.one(taken_s, *value, told);
                     found = found.or(trip);
                 }
@@ -192,7 +208,7 @@ impl Guard for SignalWatch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{Channel, ChannelColumn, GuardName, LargestChange, Provenance};
+    use mapper_core::{ChannelColumn, GuardName, LargestChange, Provenance};
 
     fn spec() -> SignalGuard {
         SignalGuard {
@@ -295,6 +311,32 @@ mod tests {
         }
     }
 
+    /// degC for K, Pa for kPa and the like begin in the middle of a run: a limit is not held against them, and they are silence after a while.
+    #[test]
+    fn a_reading_that_cannot_be_is_silence_and_one_above_its_limit_is_not() {
+        for (channel, good, wrong) in [
+            (Channel::T2, 390.0, 117.0),
+            (Channel::T2, 390.0, -50.0),
+            (Channel::P2, 180e3, 180.0),
+            (Channel::P2, 180e3, 1e12),
+            (Channel::CompressorFlow, 0.08, -5.0),
+        ] {
+            let spec = SignalGuard { channel, above: None, ..spec() };
+            let at = |first, value: f64, count| SampleBatch {
+                columns: vec![ChannelColumn { channel, values: vec![value; count] }],
+                ..batch(first, &vec![value; count])
+            };
+            let mut guard = SignalWatch::new(spec.clone());
+            assert_eq!(look(&mut guard, &at(0, good, 20), 1.9), None, "{channel} {good}");
+            let trip = look(&mut guard, &at(20, wrong, 10), 2.9).unwrap();
+            assert_eq!(trip.reaction, Reaction::Safe, "{channel} {wrong}");
+        }
+        // A broken wire that reads 5000 K trips as a temperature that is too high does.
+        let mut guard = SignalWatch::new(spec());
+        let trip = look(&mut guard, &batch(0, &[5000.0; 3]), 0.2).unwrap();
+        assert_eq!(trip.reaction, Reaction::Hold);
+    }
+
     #[test]
     fn a_change_and_a_frozen_reading_are_seen() {
         let change = Some(LargestChange { change: 5.0, within_s: 1.0 });
@@ -307,8 +349,11 @@ mod tests {
         assert_eq!(guard.look(&batch(0, &[300.0; 100]), 9.9, &told(9.5)), None);
         let mut moved = guard.clone();
         assert_eq!(moved.look(&batch(100, &[300.1; 30]), 12.9, &told(9.5)), None);
-        let trip = guard.look(&batch(100, &[300.0; 30]), 12.9, &told(9.5)).unwrap();
+        let trip = guard.clone().look(&batch(100, &[300.0; 30]), 12.9, &told(9.5)).unwrap();
         assert_eq!(trip.reaction, Reaction::Safe);
+        // A digit that flickers is no movement.
+        let flicker: Vec<f64> = (0..30).map(|i| 300.0 + 1e-3 * f64::from(i % 2)).collect();
+        assert!(guard.look(&batch(100, &flicker), 12.9, &told(9.5)).is_some());
         assert!((trip.t_s - 11.5).abs() < 0.11 && trip.reason.contains("frozen"), "{trip:?}");
     }
 }

@@ -136,6 +136,12 @@ pub enum SessionError {
         /// What is wrong.
         why: String,
     },
+    /// Nothing came of a recording.
+    #[error("no point was identified: the recording has no step that is long enough to be one. {why}")]
+    NoPoints {
+        /// What is known of it.
+        why: String,
+    },
     /// A recording that was given twice.
     #[error(
         "{} and {} hold the same readings; give each recording once, or its noise would count as new evidence",
@@ -469,7 +475,7 @@ impl SessionError {
                 ErrorKind::Failure
             }
             E::LogOption(_) => ErrorKind::BadInput,
-            E::Log(_) => ErrorKind::BadRecording,
+            E::Log(_) | E::NoPoints { .. } => ErrorKind::BadRecording,
             E::Twin(_) | E::TwinFile { .. } => ErrorKind::BadInput,
             E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
                 ErrorKind::BadRecording

@@ -95,6 +95,15 @@ impl Identified {
         self.points.iter().map(|scored| &scored.point)
     }
 
+    /// That there is a point at all.
+    ///
+    /// # Errors
+    /// [`SessionError::NoPoints`] with what is known of the recording, `warnings` of its reader among it.
+    pub fn has_points(&self, warnings: &[String]) -> Result<(), SessionError> {
+        let why: Vec<&str> = warnings.iter().chain(&self.remarks).map(String::as_str).collect();
+        if self.points.is_empty() { Err(SessionError::NoPoints { why: why.join("; ") }) } else { Ok(()) }
+    }
+
     /// Jumps that were made more than once.
     pub fn repeats(&self) -> Vec<RepeatedJump> {
         let points: Vec<IdentifiedPoint> = self.points_alone().cloned().collect();

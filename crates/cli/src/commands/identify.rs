@@ -62,6 +62,7 @@ impl Identify {
             };
         }
         let found = session.identify(recorded, &map, method)?;
+        found.has_points(&warnings)?;
         match self.json {
             true => output::print_json(&found.json(path.as_deref(), &warnings)),
             false => output::print(&identified_text(&display, &found, MORE, &warnings, self.shown.shown())),

@@ -27,14 +27,9 @@ pub fn tests(profile: &str) -> Command {
     }
 }
 
-/// The examples in the documentation. `--doc` runs rustdoc on crates with `doctest = false` as well, forty of them for nothing.
+/// The examples in the documentation.
 pub fn documentation_tests() -> Command {
-    let mut command =
-        step::command(workspace::cargo(), &["test", "--all-features", "--doc", "--no-fail-fast"]);
-    for package in workspace::libraries_with_doc_tests() {
-        command.arg("--package").arg(package);
-    }
-    command
+    step::command(workspace::cargo(), &["test", "--workspace", "--all-features", "--doc", "--no-fail-fast"])
 }
 
 /// Runs a command with its output shown, and counts the tests in it. `Ok(false)` where some failed.

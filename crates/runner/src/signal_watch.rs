@@ -326,7 +326,7 @@ mod tests {
                 columns: vec![ChannelColumn { channel, values: vec![value; count] }],
                 ..batch(first, &vec![value; count])
             };
-            let mut guard = SignalWatch::new(spec.clone());
+            let mut guard = SignalWatch::new(spec);
             assert_eq!(look(&mut guard, &at(0, good, 20), 1.9), None, "{channel} {good}");
             let trip = look(&mut guard, &at(20, wrong, 10), 2.9).unwrap();
             assert_eq!(trip.reaction, Reaction::Safe, "{channel} {wrong}");

@@ -78,13 +78,21 @@ fn every_command_of_the_tour_does_what_it_says() {
     let gap_rig = FOUR_POINTS.iter().fold(shipped, changed);
     fs::write(folder.join("campaigns/gap_rig.yaml"), &gap_rig).unwrap();
     let lab = "    weather: wandering\n";
-    let with_effect = changed(gap_rig, &(lab, &format!("{lab}    effects: {{stem_conduction: 5 %}}\n")));
+    let with_effect =
+        changed(gap_rig.clone(), &(lab, &format!("{lab}    effects: {{stem_conduction: 5 %}}\n")));
     fs::write(folder.join("my_gap_rig.yaml"), with_effect).unwrap();
-    mapper_in(folder, ["run", "campaigns/gap_rig.yaml", "--out", "elsewhere"]).exits(0);
-    let recording = only_run(&folder.join("elsewhere")).join("recording.mcap");
-    for name in ["rig", "monday", "tuesday"] {
-        let to = folder.join(format!("{name}.mcap"));
-        python("as_another_program.py", [recording.as_os_str(), to.as_os_str()]);
+    // Two days of one rig: the same readings twice would be one recording.
+    for (seed, names) in [("seed: 1", &["rig", "monday"][..]), ("seed: 2", &["tuesday"])] {
+        let of_day = gap_rig.replace("\nseed: 1", &format!("\n{seed}"));
+        fs::write(folder.join("campaigns/day.yaml"), of_day).unwrap();
+        let out = folder.join(names[0]);
+        mapper_in(folder, ["run".as_ref(), "campaigns/day.yaml".as_ref(), "--out".as_ref(), out.as_os_str()])
+            .exits(0);
+        let recording = only_run(&out).join("recording.mcap");
+        for name in names {
+            let to = folder.join(format!("{name}.mcap"));
+            python("as_another_program.py", [recording.as_os_str(), to.as_os_str()]);
+        }
     }
     for (day, seed) in [("monday", 11), ("tuesday", 12), ("wednesday", 13)] {
         run_of_a_day(folder, day, seed);

@@ -12,19 +12,19 @@ pub fn drift_text(report: &DriftReport) -> String {
         let per_hour = if matches!(drift.size, RateOrStep::RatePerH(_)) { " per hour" } else { "" };
         let _ = writeln!(
             text,
-            "{}: {} to {}{per_hour} (95 %), onset from {:.0} s to {:.0} s of the campaign{}",
+            "{}: {} to {}{per_hour} (95 %), onset from {:.0} s to {:.0} s of the campaign{}.",
             drift.cause,
             drift.cause.show(drift.low),
             drift.cause.show(drift.high),
             drift.onset_low_s,
             drift.onset_high_s,
-            instead(&drift.alternatives)
+            likely(&drift.alternatives).map(|others| format!("; or {others}")).unwrap_or_default()
         );
     }
-    if report.drifts.is_empty() && !report.alone.is_empty() {
-        let others: Vec<Alternative> =
-            report.alone.iter().filter(|alternative| alternative.cause.is_some()).copied().collect();
-        let _ = writeln!(text, "Not excluded{}", instead(&others));
+    if report.drifts.is_empty()
+        && let Some(others) = likely(&report.alone)
+    {
+        let _ = writeln!(text, "Not excluded: {others}.");
     }
     for group in &report.groups {
         let _ = write!(text, "\nFrom {} to {}\n{}\n", group.from, group.to, group_table(group));
@@ -47,13 +47,16 @@ pub fn drift_text(report: &DriftReport) -> String {
     text
 }
 
-/// The most probable of what may be instead.
-fn instead(alternatives: &[Alternative]) -> String {
-    let cause = |cause: Option<Cause>| cause.map_or_else(|| "no drift".to_owned(), Cause::name);
-    let likely = alternatives.iter().filter(|other| other.probability > 5e-3).take(4);
-    let likely: Vec<String> =
-        likely.map(|other| format!("{} {:.0} %", cause(other.cause), 100.0 * other.probability)).collect();
-    if likely.is_empty() { ".".to_owned() } else { format!("; or {}.", likely.join(", ")) }
+/// The most probable causes, and none among the alternatives of one, with their probabilities; `None` where there are none worth a word.
+fn likely(alternatives: &[Alternative]) -> Option<String> {
+    let named = |other: &Alternative| {
+        let cause = other.cause.map_or_else(|| "no drift".to_owned(), Cause::name);
+        format!("{cause} {:.0} %", 100.0 * other.probability)
+    };
+    // Half a per cent would be rounded to none.
+    let worth = alternatives.iter().filter(|other| (5e-3..0.5).contains(&other.probability));
+    let words: Vec<String> = worth.take(4).map(named).collect();
+    (!words.is_empty()).then(|| words.join(", "))
 }
 
 fn group_table(group: &RepeatGroup) -> comfy_table::Table {

@@ -34,7 +34,6 @@ impl Session<'_> {
         campaign: &Campaign,
         map: &ChannelMap,
     ) -> Result<Drift, SessionError> {
-        all_differ(recorded)?;
         for (index, recorded) in recorded.iter().enumerate() {
             if let Err(other) = same_machine(recorded, campaign) {
                 let reason = format!("No verdict: recording {}: {other}.", index + 1);
@@ -45,6 +44,7 @@ impl Session<'_> {
                 });
             }
         }
+        all_differ(recorded)?;
         let mut model = planning::nominal_model(campaign)?;
         let config = identification_with(campaign, map);
         let Fused { recordings, config, channels } = fused(recordings(recorded), config, Some(campaign), map);

@@ -138,8 +138,8 @@ impl Session<'_> {
         method: Option<Method>,
         truths: AwaitedTruths<'_>,
     ) -> Result<Identified, SessionError> {
-        all_differ(&recorded)?;
         let campaign = same_campaign(&recorded)?.cloned();
+        all_differ(&recorded)?;
         let campaign = campaign.as_ref();
         let mut config = match (campaign, &map.machine) {
             (Some(campaign), _) => identification_with(campaign, map),

@@ -48,8 +48,8 @@ fn too_few_steps_have_no_expected_error() {
     assert!(held.rms_error_eta.unwrap() < undeclared);
 }
 
-/// The rms of the errors is the forecast's, within what the draws of what all points share know of it: of 18 a standard
-/// deviation to 17 %, three of which are half.
+/// The rms of the errors is the forecast's, within what the draws of what all points share know of it: of 12 a standard
+/// deviation to 20 %, three of which are six tenths. `benches/orders.py` has forty seeds.
 #[test]
 fn seeds_err_as_forecast() {
     let first = Campaign { order: VisitOrder::SpeedLines, ..small(&[AS_DECLARED]) };
@@ -57,7 +57,7 @@ fn seeds_err_as_forecast() {
     let registry = Registry { backends: vec![virtual_lab::PLUGIN], formats: FORMATS, ..Registry::default() };
     let session = Session::new(&registry);
     let (mut square, mut count) = (0.0, 0.0);
-    for seed in 1..=18 {
+    for seed in 1..=12 {
         let campaign = Campaign { seed, ..first.clone() };
         let folder = tempfile::tempdir().unwrap();
         let results = session.run(RunRequest::new(&campaign, "", folder.path())).unwrap().results.unwrap();
@@ -69,7 +69,7 @@ fn seeds_err_as_forecast() {
         }
     }
     let ratio = f64::sqrt(square / count) / forecast;
-    assert!(count >= 18.0 * 12.0 && (0.5..1.5).contains(&ratio), "{ratio} of {forecast}");
+    assert!(count >= 12.0 * 12.0 && (0.4..1.6).contains(&ratio), "{ratio} of {forecast}");
 }
 
 /// Longer steps have more samples and larger gradients: the forecast error falls.

@@ -66,10 +66,7 @@ impl Candidates {
         let weights: f64 = shown.iter().map(|(cause, _)| weight(cause)).sum();
         let hypothesis = |(place, Candidate { cause: family, course }): (usize, &Candidate)| {
             let cause = shown[*family].0;
-            let sigma = match course.kind {
-                CourseKind::Ramp => cause.sigma() * 3600.0 / (end_s - start_s),
-                CourseKind::Step => cause.sigma(),
-            };
+            let sigma = cause.sigma_of(course.kind, end_s - start_s);
             // Those beside one of the grid share its prior.
             let share = if place < on_grid { 1.0 } else { 1.0 / CLOSER as f64 };
             let prior = share * EXPECTED_DRIFTS * weight(&cause) / weights / courses.len() as f64;

@@ -1,5 +1,6 @@
 //! What may drift.
 
+use crate::course::CourseKind;
 use mapper_core::{Channel, Dimension, with_unit};
 use mapper_observe::sensor_fault::drifts;
 use mapper_physics::bearing_friction::at_150_krpm;
@@ -84,7 +85,7 @@ impl Cause {
     }
 
     /// How large its drift over a campaign is, one standard deviation, unit of the cause.
-    pub(crate) fn sigma(self) -> f64 {
+    fn sigma(self) -> f64 {
         match self {
             Cause::Sensors(channels) => {
                 drifts().find(|fault| fault.channels == channels).map_or(0.0, |fault| fault.sigma)
@@ -93,6 +94,14 @@ impl Cause {
             Cause::Fouling => 0.02,
             // Judgement: it takes 185 W at 130 krpm.
             Cause::BearingFriction => 1e-6,
+        }
+    }
+
+    /// The same of a course of this kind over a campaign of this length, s: a rate per hour, or a step.
+    pub(crate) fn sigma_of(self, kind: CourseKind, campaign_s: f64) -> f64 {
+        match kind {
+            CourseKind::Ramp => self.sigma() * 3600.0 / campaign_s,
+            CourseKind::Step => self.sigma(),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::candidates::{courses, mean_of};
 use crate::cause::Cause;
-use crate::course::{Course, CourseKind};
+use crate::course::Course;
 use crate::low_rank::LowRank;
 use crate::readings::Readings;
 use crate::request::{DriftError, Unsolvable};
@@ -10,7 +10,7 @@ use mapper_numerics::statistics::{CHI_SQUARE_1_95, NORMAL_975};
 use nalgebra::{DMatrix, DVector};
 
 /// Onsets on the fine grid of a cause that is found: closer than the stretches that are compared.
-const FINE_ONSETS: usize = 280;
+pub(crate) const FINE_ONSETS: usize = 280;
 /// Evidence (twice the ln of a likelihood ratio) that is not a difference.
 const AS_GOOD: f64 = 0.1;
 /// Rounds in which the onsets of several drifts are fitted in turn.
@@ -87,10 +87,7 @@ fn beside(
     let (start_s, end_s) = readings.span_s();
     let mut all = columns.clone().resize_horizontally(columns.ncols() + others.len(), 0.0);
     for (place, (cause, course)) in others.iter().enumerate() {
-        let sigma = match course.kind {
-            CourseKind::Ramp => cause.sigma() * 3600.0 / (end_s - start_s),
-            CourseKind::Step => cause.sigma(),
-        };
+        let sigma = cause.sigma_of(course.kind, end_s - start_s);
         let shown = column(readings, *cause, *course)?;
         all.column_mut(columns.ncols() + place)
             .iter_mut()

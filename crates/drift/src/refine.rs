@@ -7,7 +7,7 @@ use crate::constant::Constant;
 use crate::course::Course;
 use crate::decide::{Decision, decide};
 use crate::drive::{Drive, predict};
-use crate::fit::{Fit, Fits, fit};
+use crate::fit::{FINE_ONSETS, Fit, Fits, fit};
 use crate::nuisance;
 use crate::planted::Planted;
 use crate::readings::Readings;
@@ -17,9 +17,6 @@ use nalgebra::DMatrix;
 
 /// Rounds: each leaves about a tenth of what the one before had wrong.
 const ROUNDS: usize = 2;
-/// What a drift that was found may be dated wrongly by, s: the distance of the onsets that are tried, on a campaign of an hour.
-const DATED_S: f64 = 11.0;
-
 /// Readings, constants, what is decided and fits around what was found.
 pub(crate) struct Refined {
     pub readings: Readings,
@@ -98,6 +95,9 @@ impl Refined {
 
 /// The constants, and of each drift that is known what an error of its date does: otherwise that of a large one would be a drift of others.
 fn with_dates(columns: &DMatrix<f64>, readings: &Readings, known: &[Fit]) -> DMatrix<f64> {
+    let (start_s, end_s) = readings.span_s();
+    // As far as the onsets are apart that the fit tries.
+    let dated_s = (end_s - start_s) / FINE_ONSETS as f64;
     let mut all = columns.clone().resize_horizontally(columns.ncols() + known.len(), 0.0);
     for (place, Fit { cause, course, size, .. }) in known.iter().enumerate() {
         let Some(signature) = readings.signature(*cause) else { continue };
@@ -106,7 +106,7 @@ fn with_dates(columns: &DMatrix<f64>, readings: &Readings, known: &[Fit]) -> DMa
         };
         for (row, value) in signature.readings.iter().enumerate() {
             all[(row, columns.ncols() + place)] =
-                0.5 * size * value * (dated(row, DATED_S) - dated(row, -DATED_S));
+                0.5 * size * value * (dated(row, dated_s) - dated(row, -dated_s));
         }
     }
     all

@@ -12,7 +12,7 @@ use mapper_campaign::{Campaign, nominal_model};
 use mapper_fleet::Engine;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::coordinate::coordinates;
-use mapper_gap::diagnose::{Diagnosed, Question, diagnose, prior};
+use mapper_gap::diagnose::{Diagnosed, Question, diagnose, weight};
 use mapper_gap::fit::Fit;
 use mapper_gap::report::Verdict;
 use mapper_gap::study::{Study, members};
@@ -173,8 +173,8 @@ fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Obs
         causes,
         verdict: diagnosis.verdict,
         sigma: case.sigmas.iter().copied().reduce(f64::min),
-        nothing: null.score + prior(calibration, study, null),
-        candidates: fits.iter().map(|fit| (names(fit), fit.score + prior(calibration, study, fit))).collect(),
+        nothing: weight(calibration, study, null),
+        candidates: fits.iter().map(|fit| (names(fit), weight(calibration, study, fit))).collect(),
         features: adequacy.features(),
         errors_sigma: named.map_or_else(Vec::new, |fit| errors_sigma(case, study, fit)),
     }

@@ -13,7 +13,7 @@ use crate::sentence::{Told, tell};
 use mapper_gap::additions::additions;
 use mapper_gap::adequacy::adequacy;
 use mapper_gap::calibration::Calibration;
-use mapper_gap::diagnose::{Diagnosed, prior};
+use mapper_gap::diagnose::{Diagnosed, weight};
 use mapper_gap::first_step::with_start_read;
 use mapper_gap::fit::{Effort, Fit, fit};
 use mapper_gap::how_far::channels_on;
@@ -242,8 +242,8 @@ fn propose(
     // Beyond nothing, and beyond the catalogue.
     let inside = fits
         .iter()
-        .map(|fit| fit.score + prior(calibration, study, fit))
-        .fold(null.score + prior(calibration, study, null), f64::max);
+        .map(|fit| weight(calibration, study, fit))
+        .fold(weight(calibration, study, null), f64::max);
     if best.score() + PRIOR_LAW.ln() - inside < calibration.threshold {
         return Vec::new();
     }

@@ -13,14 +13,32 @@ impl Study {
         self.effects.len() - 1
     }
 
-    /// Adds a candidate: an effect of the catalogue that begins with a step. Gives its index.
-    pub fn add_late(&mut self, effect: usize, course: Course) -> usize {
-        let known = (self.catalogue..self.effects.len())
-            .find(|i| self.courses[*i] == course && Arc::ptr_eq(&self.effects[*i], &self.effects[effect]));
-        known.unwrap_or_else(|| {
-            self.effects.push(self.effects[effect].clone());
-            self.courses.push(course);
-            self.effects.len() - 1
-        })
+    /// Adds as candidates every effect of the catalogue that begins with a step other than the first, or grows from it.
+    pub(crate) fn add_onsets(&mut self) {
+        let last = self.steps.len().saturating_sub(1);
+        for effect in 0..self.catalogue {
+            // What grows over a single step begins with it.
+            let courses =
+                (1..=last).map(Course::From).chain((1..last).map(Course::Growing)).collect::<Vec<_>>();
+            for course in courses {
+                self.effects.push(self.effects[effect].clone());
+                self.courses.push(course);
+            }
+        }
+    }
+
+    /// Candidates with an onset of an effect of the catalogue.
+    pub(crate) fn onsets_of(&self, effect: usize) -> impl Iterator<Item = usize> {
+        let is_one = move |index: &usize| {
+            self.courses[*index].onset().is_some()
+                && Arc::ptr_eq(&self.effects[*index], &self.effects[effect])
+        };
+        (self.catalogue..self.effects.len()).filter(is_one)
+    }
+
+    /// The effect of the catalogue that a candidate is, whenever it begins; the candidate itself where it is in no catalogue.
+    pub(crate) fn family(&self, index: usize) -> usize {
+        let same = |known: &usize| Arc::ptr_eq(&self.effects[*known], &self.effects[index]);
+        (0..self.catalogue).find(same).unwrap_or(index)
     }
 }

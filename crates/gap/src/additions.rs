@@ -5,9 +5,14 @@ use crate::fit::Fit;
 use crate::projector::Projector;
 use crate::selection::Selection;
 use crate::study::{Hypothesis, Study, members};
-use crate::whiten::Linearised;
+use crate::whiten::{Linearised, rows_of_step};
+use mapper_numerics::parallel;
+use mapper_physics::effect::EffectParameter;
+use nalgebra::DVector;
+use std::ops::Range;
 
 /// What one more effect would do beside a fit.
+#[derive(Debug)]
 pub struct Addition {
     /// Which.
     pub effect: usize,
@@ -17,7 +22,13 @@ pub struct Addition {
     pub start: Hypothesis,
 }
 
-/// Every further effect beside a fit, in closed form from one run each.
+/// Steps beyond which a straight line is not believed, in those that were taken: effects bend.
+const MAX_REACH: f64 = 3.0;
+/// Share of a step off neutral at which a fit begins at least: some effects have no slope where they vanish.
+const OFF_NEUTRAL: f64 = 0.1;
+
+/// Every further effect beside a fit, in closed form from a run each; where two parameters work together, from several starts. Of effects that
+/// begin with a step, where the study has them, as if nothing before it had been changed and nothing lasted.
 pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> Vec<Addition> {
     let Some(projector) = Projector::new(study, linearised, selection, &base.effect_columns) else {
         return Vec::new();
@@ -28,68 +39,122 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
     for (right, nuisance) in right_residual.iter_mut().zip(&base.hypothesis.nuisances) {
         *right -= nuisance;
     }
-    let used = members(&base.hypothesis);
-    let mut starts: Vec<(usize, Hypothesis)> = Vec::new();
-    for index in (0..study.catalogue).filter(|index| !used.contains(index)) {
-        starts.extend(starts_of(study, &base.hypothesis, index).into_iter().map(|start| (index, start)));
-    }
-    let mut best: Vec<Addition> = Vec::new();
-    for (index, start) in starts {
-        // A whole typical step: some effects have no slope where they vanish.
-        let parameters = &study.effects[index].info().parameters;
-        let single = parameters.len() == 1;
-        let mut near = start.clone();
-        if let (true, Some((_, values))) = (single, near.effects.last_mut()) {
-            let (neutral, step) = (parameters[0].neutral, values[0] - parameters[0].neutral);
-            values[0] = (neutral + step).clamp(parameters[0].low, parameters[0].high);
-        }
-        let Ok(there) = study.predict(&near) else { continue };
-        let mut change: Vec<f64> =
-            there.values.iter().zip(&base.prediction.values).map(|(t, b)| t - b).collect();
-        linearised.whiten(study, &mut change);
-        let right = projector.right(&change);
-        let own = projector.product(&change, &right, &change, &right);
-        let seen = projector.product(&change, &right, &base.residual, &right_residual);
-        let mut share = if own > 1e-9 { seen / own } else { 0.0 };
-        let mut addition = Addition { effect: index, gain: 0.0, start };
-        if single {
-            let parameter = &parameters[0];
-            let step = parameter.typical_step;
-            // The straight estimate, kept within the range; not far beyond the step that was taken, for effects bend.
-            let value =
-                (parameter.neutral + share.clamp(-3.0, 3.0) * step).clamp(parameter.low, parameter.high);
-            share = (value - parameter.neutral) / step;
-            let value = if value == parameter.neutral { parameter.neutral + 0.1 * step } else { value };
-            if let Some((_, values)) = addition.start.effects.last_mut() {
-                values[0] = value.clamp(parameter.low, parameter.high);
-            }
-            addition.gain = 2.0 * share * seen - share * share * own;
-        } else {
-            addition.gain = if share > 0.0 { seen * seen / own } else { 0.0 };
-        }
-        match best.iter_mut().find(|other| other.effect == index) {
-            Some(other) if other.gain >= addition.gain => {}
-            Some(other) => *other = addition,
-            None => best.push(addition),
-        }
-    }
-    best
+    let rows = (0..study.steps.len()).map(|step| rows_of_step(study, step)).collect();
+    let look = Look { study, linearised, projector: &projector, base, right_residual, rows };
+    let used: Vec<usize> = members(&base.hypothesis).iter().map(|member| study.family(*member)).collect();
+    let effects: Vec<usize> = (0..study.catalogue).filter(|effect| !used.contains(effect)).collect();
+    let found = parallel::map(&effects, |effect| match study.effects[*effect].info().parameters.as_slice() {
+        [parameter] => look.at_one(*effect, parameter),
+        several => corners(several).into_iter().filter_map(|corner| look.at(*effect, corner)).collect(),
+    });
+    found.into_iter().flatten().collect()
 }
 
-/// Where the search for an effect begins: a typical step from neutral, and where two parameters work together, several.
-pub(crate) fn starts_of(study: &Study, base: &Hypothesis, index: usize) -> Vec<Hypothesis> {
-    let parameters = &study.effects[index].info().parameters;
-    let with = |values: Vec<f64>| {
-        let mut start = base.clone();
-        start.effects.push((index, values));
+struct Look<'a> {
+    study: &'a Study,
+    linearised: &'a Linearised,
+    projector: &'a Projector<'a>,
+    base: &'a Fit,
+    right_residual: DVector<f64>,
+    /// Rows of each step.
+    rows: Vec<Range<usize>>,
+}
+
+impl Look<'_> {
+    fn with(&self, effect: usize, values: Vec<f64>) -> Hypothesis {
+        let mut start = self.base.hypothesis.clone();
+        start.effects.push((effect, values));
         start
-    };
-    if let [parameter] = parameters.as_slice() {
-        let value = parameter.neutral + parameter.typical_step;
-        return vec![with(vec![value.clamp(parameter.low, parameter.high)])];
     }
-    // Corners of the inner part of each range.
-    let places = |p: &mapper_physics::effect::EffectParameter| {
+
+    /// What values of an effect change, whitened.
+    fn change(&self, effect: usize, values: Vec<f64>) -> Option<Vec<f64>> {
+        let there = self.study.predict(&self.with(effect, values)).ok()?;
+        let mut change: Vec<f64> =
+            there.values.iter().zip(&self.base.prediction.values).map(|(t, b)| t - b).collect();
+        self.linearised.whiten(self.study, &mut change);
+        Some(change)
+    }
+
+    /// Squared length of a change, and what the residual has of it, nuisances free.
+    fn products(&self, change: &[f64]) -> (f64, f64) {
+        let right = self.projector.right(change);
+        let own = self.projector.product(change, &right, change, &right);
+        (own, self.projector.product(change, &right, &self.base.residual, &self.right_residual))
+    }
+
+    /// An effect with several parameters, from one of their values.
+    fn at(&self, effect: usize, values: Vec<f64>) -> Option<Addition> {
+        let (own, seen) = self.products(&self.change(effect, values.clone())?);
+        let gain = if own > 1e-9 && seen > 0.0 { seen * seen / own } else { 0.0 };
+        Some(Addition { effect, gain, start: self.with(effect, values) })
+    }
+
+    /// An effect with one parameter, and as it begins with each step.
+    fn at_one(&self, effect: usize, parameter: &EffectParameter) -> Vec<Addition> {
+        let step_to =
+            |by: f64| (parameter.neutral + by).clamp(parameter.low, parameter.high) - parameter.neutral;
+        let step = step_to(parameter.typical_step);
+        let looked = self.change(effect, vec![parameter.neutral + step]).map(|change| {
+            let products = self.products(&change);
+            (step, change, products)
+        });
+        let Some((mut step, mut change, mut products)) = looked else { return Vec::new() };
+        let opposite = step_to(-step);
+        // The line is drawn on the side that it points to.
+        if products.1 < -OFF_NEUTRAL * products.0
+            && opposite != 0.0
+            && let Some(other) = self.change(effect, vec![parameter.neutral + opposite])
+        {
+            let of_other = self.products(&other);
+            if of_other.1 > 0.0 {
+                (step, change, products) = (opposite, other, of_other);
+            }
+        }
+        let mut found = vec![self.along(effect, parameter, step, products)];
+        let steps = self.rows.len();
+        let mut masked = vec![0.0; change.len()];
+        for late in self.study.onsets_of(effect) {
+            let course = self.study.courses[late];
+            for (step, rows) in self.rows.iter().enumerate() {
+                let share = course.share(step, steps);
+                for row in rows.clone() {
+                    masked[row] = share * change[row];
+                }
+            }
+            let products = self.products(&masked);
+            if products.0 > 1.0 {
+                found.push(self.along(late, parameter, step, products));
+            }
+        }
+        found
+    }
+
+    /// The best along the line through a step.
+    fn along(
+        &self,
+        effect: usize,
+        parameter: &EffectParameter,
+        step: f64,
+        (own, seen): (f64, f64),
+    ) -> Addition {
+        let at = |share: f64| (parameter.neutral + share * step).clamp(parameter.low, parameter.high);
+        let wanted = if own > 1e-9 { (seen / own).clamp(-MAX_REACH, MAX_REACH) } else { 0.0 };
+        let share = (at(wanted) - parameter.neutral) / step;
+        let gain = 2.0 * share * seen - share * share * own;
+        let off = if wanted < 0.0 { wanted.min(-OFF_NEUTRAL) } else { wanted.max(OFF_NEUTRAL) };
+        let off = if at(off) == parameter.neutral { OFF_NEUTRAL } else { off };
+        Addition {
+            effect,
+            gain: if step == 0.0 { 0.0 } else { gain },
+            start: self.with(effect, vec![at(off)]),
+        }
+    }
+}
+
+/// Where the search begins for an effect of several parameters: the corners of the inner part of their ranges.
+fn corners(parameters: &[EffectParameter]) -> Vec<Vec<f64>> {
+    let places = |p: &EffectParameter| {
         let coordinate = Coordinate::new(p);
         let (low, high) = (coordinate.of(p.low), coordinate.of(p.high));
         [0.33, 0.6].map(|share| coordinate.value(low + share * (high - low)))
@@ -101,5 +166,5 @@ pub(crate) fn starts_of(study: &Study, base: &Hypothesis, index: usize) -> Vec<H
             .flat_map(|corner| places(parameter).map(|value| [corner.clone(), vec![value]].concat()))
             .collect();
     }
-    corners.into_iter().map(with).collect()
+    corners
 }

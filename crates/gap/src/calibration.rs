@@ -19,16 +19,13 @@ pub struct Calibration {
     pub prior_single: f64,
     /// Prior of all pairs together.
     pub prior_pair: f64,
-    /// Prior of all triples together; each further effect makes it less likely by [`FURTHER_RATIO`].
+    /// Prior of all triples together; each further effect is less likely by this factor again.
     pub prior_triple: f64,
     /// Widens the parameters' standard errors.
     pub interval_factor: f64,
     /// Logistic of an outside cause: offset, and slopes of the [`counted`] misfit, scatter and gain of one more effect.
     pub outside: [f64; 4],
 }
-
-/// How much rarer each effect beyond the third is.
-pub const FURTHER_RATIO: f64 = 0.3;
 
 /// The data file.
 const TEXT: &str = include_str!("../calibration.json");

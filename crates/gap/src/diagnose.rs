@@ -7,27 +7,24 @@ use crate::another_machine::another_machine;
 use crate::assumed::assumed;
 use crate::calibration::Calibration;
 use crate::experiment::Experiment;
-use crate::fit::{Effort, Fit, fit};
+use crate::fit::{Effort, Fit};
 use crate::folds::Folds;
 pub use crate::gap_error::GapError;
 use crate::healthy::Healthy;
 use crate::how_far::{Compared, how_far};
-use crate::late::late;
-use crate::more::extend;
 use crate::next::{Suggested, look_beside, next};
 use crate::place::{Gain, places};
 use crate::problem::Problem;
 use crate::report::{Diagnosis, Verdict};
-use crate::select::{Search, does_something, keep_best, refit, search};
+use crate::select::{Search, ranked, refit, search, search_onsets};
 use crate::selection::Selection;
 use crate::smallest_seen::smallest_seen;
 use crate::study::{Hypothesis, Prediction, Study, members};
 use crate::usable::usable;
-pub use crate::weigh::prior;
-use crate::weigh::{by_weight, rivals, suspicions, weigh, weight};
+pub use crate::weigh::weight;
+use crate::weigh::{rivals, suspicions, weigh};
 use crate::whiten::Linearised;
 use mapper_core::Recording;
-use mapper_numerics::parallel;
 use mapper_observe::declared::Declared;
 use mapper_observe::table::Table;
 use mapper_observe::told::as_told;
@@ -140,13 +137,14 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     // Hold-outs are chosen by place, before anything is fitted.
     let folds = Folds::of(&study);
     let everywhere = Selection::all(&study);
-    let found = search(Search {
+    let at = |linearised| Search {
         study: &study,
-        nominal: &linearised,
-        linearised: &linearised,
+        linearised,
         selection: &everywhere,
-        progress,
-    })?;
+        calibration: &calibration,
+        onsets: false,
+    };
+    let found = search(at(&linearised), progress)?;
     progress(0.65, "closest causes");
     let null = found.null;
     let beside = found.refound.as_ref().map_or(&linearised, |(linearised, _)| linearised);
@@ -167,13 +165,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         }
     }
     let effort = Effort { iterations: 5, enough: 0.1, ..Effort::default() };
-    let mut fits: Vec<Fit> = Vec::new();
-    let again = parallel::map(&finalists, |f| fit(&study, beside, &f.hypothesis, &everywhere, effort));
-    for fitted in again.into_iter().flatten() {
-        keep_best(&mut fits, fitted);
-    }
-    fits.retain(|fit| does_something(&study, fit));
-    by_weight(&calibration, &study, &mut fits);
+    let mut fits = refit(&at(beside), &finalists, effort);
     // Close races are run where the best stands, not where nothing is off.
     let refound = match (fits.first(), &found.refound) {
         (Some(best), Some((_, there))) if members(&best.hypothesis) != *there => {
@@ -183,29 +175,28 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     };
     let beside = refound.as_ref().unwrap_or(beside);
     if refound.is_some() {
-        let finals = Search {
-            study: &study,
-            nominal: &linearised,
-            linearised: beside,
-            selection: &everywhere,
-            progress,
-        };
-        refit(finals, &mut fits, 4, effort);
-        by_weight(&calibration, &study, &mut fits);
+        let (closest, others) = fits.split_at(fits.len().min(4));
+        let again = refit(&at(beside), &closest.iter().collect::<Vec<_>>(), effort);
+        fits = ranked(&at(beside), again.iter().chain(closest).chain(others));
     }
-    progress(0.75, "three and more causes");
-    let mut one_more = extend(&study, beside, &everywhere, &calibration, &null, &mut fits);
+    progress(0.75, "what one more would do");
+    let mut one_more = most_gain(&study, beside, &everywhere, fits.first().unwrap_or(&null));
     let mut left = adequacy(&study, &linearised, fits.first().unwrap_or(&null), one_more);
     if calibration.outside(left.features()) > 0.5 && study.steps.len() >= LEAST_STEPS {
         progress(0.8, "causes that begin");
-        late(&mut study, beside, &everywhere, &calibration, &null, &mut fits);
-        let begun = fits.first().filter(|best| {
-            best.hypothesis.effects.iter().any(|(index, _)| study.courses[*index].onset().is_some())
-        });
-        if let Some(best) = begun {
-            one_more = most_gain(&study, beside, &everywhere, best);
-            left = adequacy(&study, &linearised, best, one_more);
-        }
+        study.add_onsets();
+        let at = Search {
+            study: &study,
+            linearised: beside,
+            selection: &everywhere,
+            calibration: &calibration,
+            onsets: true,
+        };
+        search_onsets(at, &null, &mut fits);
+        fits.truncate(FINALISTS);
+        let best = fits.first().unwrap_or(&null);
+        one_more = most_gain(&study, beside, &everywhere, best);
+        left = adequacy(&study, &linearised, best, one_more);
     }
     progress(0.88, "what is left");
     let best = fits.first().unwrap_or(&null);

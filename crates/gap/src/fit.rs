@@ -1,15 +1,17 @@
 //! The best fit of a hypothesis, nuisances and their priors included, and how well it is supported.
 //!
-//! Gauss and Newton on the whitened residuals. What effects do is taken again from runs of the model in each iteration
+//! Gauss-Newton on the whitened residuals. What effects do is taken again from runs of the model in each iteration
 //! (they are strong, and bend); what nuisances do is taken once, where nothing is off (they are small), but the
 //! residual is always that of the model itself.
 
 use crate::coordinate::{Coordinate, coordinates, parameters, set_parameter};
-use crate::normal::{Normal, nuisance_products};
+use crate::normal::{PRIOR_STEPS, normal_matrix, nuisance_products};
 use crate::selection::{Selection, dot_over};
 use crate::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::whiten::Linearised;
+use mapper_inference::descent::{End, Model, Normal, Reach, Until, descend};
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// A hypothesis at its best.
 #[derive(Debug, Clone)]
@@ -61,64 +63,115 @@ pub fn fit(
     selection: &Selection,
     effort: Effort,
 ) -> Result<Fit, PredictError> {
-    let rows = selection.rows(study);
     let coordinates = coordinates(study, start);
-    let nuisance_products = nuisance_products(study, linearised, selection);
-    let mut hypothesis = start.clone();
-    let mut prediction = study.predict(&hypothesis)?;
-    let mut residual = linearised.residual(study, &prediction);
-    let mut cost = cost_of(&rows, &residual, &hypothesis);
-    let mut effect_columns = Vec::new();
-    let mut normal = Normal::default();
-    let mut beside = FINE;
-    for iteration in 0..effort.iterations.max(1) {
-        effect_columns = changes_beside(study, linearised, &hypothesis, &prediction, &coordinates, beside);
-        normal = Normal::new(&rows, linearised, &nuisance_products, &effect_columns, &residual, &hypothesis);
-        if iteration + 1 == effort.iterations.max(1) {
-            break;
-        }
-        let Some((step, promised)) = bounded_step(&normal, &hypothesis, &coordinates, effort.most_sigmas)
-        else {
-            break;
-        };
-        if promised < effort.enough {
-            break;
-        }
-        let mut accepted = false;
-        let mut share = 1.0;
-        for _ in 0..5 {
-            let moved = moved(&hypothesis, &step, share, &coordinates, effort.most_sigmas);
-            if let Ok(there) = study.predict(&moved) {
-                let there_residual = linearised.residual(study, &there);
-                let there_cost = cost_of(&rows, &there_residual, &moved);
-                if there_cost < cost {
-                    (hypothesis, prediction, residual, cost) = (moved, there, there_residual, there_cost);
-                    accepted = true;
-                    break;
-                }
-            }
-            share *= 0.35;
-        }
-        if !accepted {
-            // Near surge the cost has small steps: a slope taken over more of the way sees past them.
-            if beside == COARSE {
-                break;
-            }
-            beside = COARSE;
-        }
-    }
+    let at = coordinates.iter().zip(parameters(start)).map(|(coordinate, value)| coordinate.of(value));
+    let unknowns = DVector::from_iterator(
+        start.nuisances.len() + coordinates.len(),
+        start.nuisances.iter().copied().chain(at),
+    );
+    let mut fitted = Fitted {
+        study,
+        linearised,
+        start,
+        rows: selection.rows(study),
+        nuisance_products: nuisance_products(study, linearised, selection),
+        coordinates,
+        most_sigmas: effort.most_sigmas,
+        effect_columns: Vec::new(),
+    };
+    let until = Until { iterations: effort.iterations, enough: effort.enough };
+    let point = fitted.at_hypothesis(start.clone())?;
+    let End { unknowns, point, normal } = descend(&mut fitted, unknowns, point, until);
+    let Point { hypothesis, prediction, residual } = point;
+    let cost = cost_of(&fitted.rows, &residual, &hypothesis);
     let nuisances = hypothesis.nuisances.len();
-    let (score, covariance) = normal.evidence(cost, nuisances);
+    let effects = unknowns.len() - nuisances;
+    let each = 0.5 * (2.0 * std::f64::consts::PI).ln() - PRIOR_STEPS.ln();
+    let score = normal
+        .half_ln_determinant()
+        .map_or(f64::NEG_INFINITY, |half| -0.5 * cost - half + effects as f64 * each);
+    let unknown = || DMatrix::from_element(effects, effects, f64::INFINITY);
     Ok(Fit {
         hypothesis,
         cost,
         score,
         residual,
         prediction,
-        effect_columns,
-        covariance,
+        effect_columns: fitted.effect_columns,
+        covariance: normal.covariance_from(nuisances).unwrap_or_else(unknown),
         precision: normal.matrix,
     })
+}
+
+/// A hypothesis' nuisances, in sigmas, and behind them its effects' coordinates, as unknowns.
+struct Fitted<'a> {
+    study: &'a Study,
+    linearised: &'a Linearised,
+    start: &'a Hypothesis,
+    rows: Vec<Range<usize>>,
+    nuisance_products: DMatrix<f64>,
+    coordinates: Vec<Coordinate>,
+    most_sigmas: f64,
+    /// At the last point at which slopes were taken.
+    effect_columns: Vec<Vec<f64>>,
+}
+
+struct Point {
+    hypothesis: Hypothesis,
+    prediction: Prediction,
+    residual: Vec<f64>,
+}
+
+impl Fitted<'_> {
+    fn at_hypothesis(&self, hypothesis: Hypothesis) -> Result<Point, PredictError> {
+        let prediction = self.study.predict(&hypothesis)?;
+        let residual = self.linearised.residual(self.study, &prediction);
+        Ok(Point { hypothesis, prediction, residual })
+    }
+}
+
+impl Model for Fitted<'_> {
+    type Point = Point;
+
+    fn at(&self, unknowns: &DVector<f64>) -> Option<Point> {
+        let mut hypothesis = self.start.clone();
+        for (nuisance, sigmas) in hypothesis.nuisances.iter_mut().zip(unknowns.iter()) {
+            *nuisance = sigmas.clamp(-self.most_sigmas, self.most_sigmas);
+        }
+        let n = hypothesis.nuisances.len();
+        for (place, coordinate) in self.coordinates.iter().enumerate() {
+            set_parameter(&mut hypothesis, place, coordinate.value(unknowns[n + place]));
+        }
+        self.at_hypothesis(hypothesis).ok()
+    }
+
+    fn cost(&self, _: &DVector<f64>, point: &Point) -> f64 {
+        cost_of(&self.rows, &point.residual, &point.hypothesis)
+    }
+
+    fn normal(&mut self, _: &DVector<f64>, point: &Point, reach: Reach) -> Normal {
+        let Point { hypothesis, prediction, residual } = point;
+        let Fitted { study, linearised, coordinates, rows, .. } = self;
+        // Near surge the cost has small steps: a slope taken over more of the way sees past them.
+        let beside = if reach == Reach::Fine { FINE } else { COARSE };
+        let columns = changes_beside(study, linearised, hypothesis, prediction, coordinates, beside);
+        let matrix = normal_matrix(rows, linearised, &self.nuisance_products, &columns);
+        let ask = |column: &Vec<f64>| dot_over(rows, column, residual);
+        let pulled = linearised.columns.iter().zip(&hypothesis.nuisances).map(|(c, sigmas)| ask(c) - sigmas);
+        let pull = DVector::from_iterator(matrix.nrows(), pulled.chain(columns.iter().map(ask)));
+        self.effect_columns = columns;
+        Normal { matrix, pull }
+    }
+
+    fn room(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
+        let n = unknowns.len() - self.coordinates.len();
+        let of_nuisances = unknowns.iter().take(n).map(|u| (-self.most_sigmas - u, self.most_sigmas - u));
+        let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(n)).map(|(coordinate, at)| {
+            let (low, high) = coordinate.ends();
+            ((low - at).clamp(-MOST_STEPS, 0.0), (high - at).clamp(0.0, MOST_STEPS))
+        });
+        of_nuisances.chain(of_effects).collect()
+    }
 }
 
 fn cost_of(rows: &[std::ops::Range<usize>], residual: &[f64], hypothesis: &Hypothesis) -> f64 {
@@ -180,56 +233,3 @@ fn changes_beside(
 pub const MOST_SIGMAS: f64 = 6.0;
 /// Maximum number of typical steps an effect moves in one iteration: effects bend.
 const MOST_STEPS: f64 = 2.0;
-
-/// The step to the minimum cost within all bounds: unknowns that would leave theirs are held there, and the others
-/// solved for again.
-fn bounded_step(
-    normal: &Normal,
-    hypothesis: &Hypothesis,
-    coordinates: &[Coordinate],
-    most_sigmas: f64,
-) -> Option<(DVector<f64>, f64)> {
-    let values = parameters(hypothesis);
-    // Room below and above.
-    let mut room: Vec<(f64, f64)> =
-        hypothesis.nuisances.iter().map(|u| (-most_sigmas - u, most_sigmas - u)).collect();
-    room.extend(coordinates.iter().zip(&values).map(|(coordinate, value)| {
-        let at = coordinate.of(*value);
-        let ends = [coordinate.of(coordinate.low), coordinate.of(coordinate.high)];
-        (
-            (ends[0].min(ends[1]) - at).clamp(-MOST_STEPS, 0.0),
-            (ends[0].max(ends[1]) - at).clamp(0.0, MOST_STEPS),
-        )
-    }));
-    let mut held: Vec<Option<f64>> = vec![None; room.len()];
-    for _ in 0..room.len() {
-        let (step, promised) = normal.solve(&held)?;
-        let outside = |i: usize| step[i] < room[i].0 - 1e-9 || step[i] > room[i].1 + 1e-9;
-        let leaving: Vec<usize> = (0..room.len()).filter(|i| held[*i].is_none() && outside(*i)).collect();
-        if leaving.is_empty() {
-            return Some((step, promised));
-        }
-        for i in leaving {
-            held[i] = Some(step[i].clamp(room[i].0.min(0.0), room[i].1.max(0.0)));
-        }
-    }
-    None
-}
-
-fn moved(
-    hypothesis: &Hypothesis,
-    step: &DVector<f64>,
-    share: f64,
-    coordinates: &[Coordinate],
-    most_sigmas: f64,
-) -> Hypothesis {
-    let n = hypothesis.nuisances.len();
-    let mut moved = hypothesis.clone();
-    for (i, nuisance) in moved.nuisances.iter_mut().enumerate() {
-        *nuisance = (*nuisance + share * step[i]).clamp(-most_sigmas, most_sigmas);
-    }
-    for (j, (coordinate, value)) in coordinates.iter().zip(parameters(hypothesis)).enumerate() {
-        set_parameter(&mut moved, j, coordinate.value(coordinate.of(value) + share * step[n + j]));
-    }
-    moved
-}

@@ -1,338 +1,182 @@
-//! Which effects, alone or two together, explain a recording best.
-//!
-//! Every single effect is fitted with runs of the model. What a second effect would add is first estimated in closed
-//! form beside the best singles; the most promising pairs are then fitted likewise.
+//! Which effects explain a recording best: the causes of [`mapper_inference::search`], fitted by runs of the model.
 
-use crate::additions::{additions, starts_of};
+use crate::additions::{Addition, additions};
+use crate::calibration::Calibration;
 use crate::fit::{Effort, Fit, fit};
-use crate::projector::Projector;
-use crate::screen::{Screened, screen};
 use crate::selection::Selection;
 use crate::study::{Hypothesis, PredictError, Study, members};
+use crate::weigh::{prior, weight};
 use crate::whiten::Linearised;
-use mapper_numerics::parallel;
-
-/// All hypotheses that were fitted, the empty one first, then best first.
-#[derive(Debug)]
-pub struct Found {
-    /// Nothing but tolerances.
-    pub null: Fit,
-    /// Singles and pairs, best score first.
-    pub fits: Vec<Fit>,
-    /// Linearised beside the best single, where the nominal point is far from it, and that single.
-    pub refound: Option<(Linearised, Vec<usize>)>,
-}
-
-/// A single must take at least this off the cost to be worth a second look.
-const WORTH: f64 = 6.0;
-/// Where a single takes at least this off the cost, nuisances are linearised again beside it: tolerances of what an
-/// effect changes act otherwise beside it than where nothing is off.
-const STRONG: f64 = 30.0;
-
-/// A single that promises less than this off the cost in a straight line is not fitted: it would not be named by ten times as
-/// much.
-const PROMISES: f64 = 0.5;
+use mapper_inference::search::{Causes, Known, Limits, Offer, climb, extend};
 
 /// What the search works with.
 #[derive(Clone, Copy)]
 pub struct Search<'a> {
     /// The recording.
     pub study: &'a Study,
-    /// Linearised where nothing is off.
-    pub nominal: &'a Linearised,
-    /// Linearised where the fits begin: there too, or beside the best so far.
+    /// Linearised where the fits begin: where nothing is off, or beside the best so far.
     pub linearised: &'a Linearised,
     /// Steps that count.
     pub selection: &'a Selection,
-    /// Told the share done, and what comes.
-    pub progress: &'a (dyn Fn(f64, &str) + Sync),
+    /// Numbers behind the probabilities.
+    pub calibration: &'a Calibration,
+    /// Whether causes that begin with a step are looked for, beside what is known, or those that act throughout.
+    pub onsets: bool,
 }
 
-/// Searches singles and pairs on the steps of the selection.
+/// Judgement: bounds the time. The slack is the evidence that a cause has to have over nothing.
+const LIMITS: Limits = Limits { members: 4, starts: 2, fits: 6, slack: 3.0 };
+/// Where a single takes at least this off the cost, nuisances are linearised again beside it: tolerances of what an
+/// effect changes act otherwise beside it than where nothing is off.
+const STRONG: f64 = 30.0;
+/// A further effect that leaves more than this share of the excess cost is one of many that chip at a cause of another kind:
+/// nothing is built upon it.
+const HALVED: f64 = 0.5;
+
+const QUICK: Effort = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0 };
+const EFFORT: Effort = Effort { iterations: 6, enough: 0.3, most_sigmas: crate::fit::MOST_SIGMAS };
+
+/// All sets that were fitted.
+#[derive(Debug)]
+pub struct Found {
+    /// Nothing but tolerances.
+    pub null: Fit,
+    /// Sets of effects, most probable first.
+    pub fits: Vec<Fit>,
+    /// Linearised beside the best single, where the nominal point is far from it, and that single.
+    pub refound: Option<(Linearised, Vec<usize>)>,
+}
+
+/// Searches all effects of the catalogue on the steps of the selection.
 ///
 /// # Errors
 /// [`PredictError`] where the nominal model cannot follow the recording.
-pub fn search(search: Search<'_>) -> Result<Found, PredictError> {
-    let Search { study, selection, progress, .. } = search;
-    let null = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
+pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Found, PredictError> {
+    let Search { study, linearised, selection, .. } = search;
+    let null = fit(study, linearised, &study.nothing(), selection, Effort::default())?;
     progress(0.15, "single effects");
-    let mut singles = singles(search);
-    let refound = match singles.first() {
-        Some(best) if null.cost - best.cost > STRONG => {
-            let beside = search.linearised.at(study, &best.hypothesis).ok();
-            beside.map(|linearised| (linearised, members(&best.hypothesis)))
-        }
-        _ => None,
-    };
-    let linearised = refound.as_ref().map_or(search.linearised, |(linearised, _)| linearised);
-    let beside = Search { linearised, ..search };
-    if refound.is_some() {
-        refit(beside, &mut singles, 4, Effort::default());
-    }
-    progress(0.5, "pairs");
-    let mut fits = if singles.first().is_some_and(|first| null.cost - first.cost > WORTH) {
-        pairs(beside, &singles)
-    } else {
-        Vec::new()
-    };
-    fits.retain(|pair| does_something(study, pair));
-    if let Some(best) = fits.first() {
-        // A single that stood off its best would make any partner look useful: each member alone, from where the pair stands.
-        let starts: Vec<Hypothesis> = members(&best.hypothesis)
-            .into_iter()
-            .map(|dropped| {
-                let mut start = best.hypothesis.clone();
-                start.effects.retain(|(index, _)| *index != dropped);
-                start
-            })
-            .collect();
-        let alone = parallel::map(&starts, |start| {
-            fit(
-                study,
-                linearised,
-                start,
-                selection,
-                Effort { iterations: 6, enough: 0.2, ..Effort::default() },
-            )
+    // From where nothing is off, not from the null's nuisances, which may have bent far to stand in for an effect.
+    let untouched = fit(study, linearised, &study.nothing(), selection, Effort { iterations: 1, ..QUICK })?;
+    let singles: Vec<Start> =
+        additions(study, linearised, selection, &untouched).into_iter().map(|a| (a.start, QUICK)).collect();
+    let mut known = Known::default();
+    known.keep(&search, null.clone());
+    known.fit_all(&search, &singles);
+    again(&search, &mut known, 7, EFFORT);
+    let refound =
+        known.ranked(&search).first().filter(|best| null.cost - best.cost > STRONG).and_then(|best| {
+            let beside = linearised.at(study, &best.hypothesis).ok()?;
+            Some((beside, members(&best.hypothesis)))
         });
-        for fitted in alone.into_iter().flatten() {
-            keep_best(&mut singles, fitted);
-        }
+    let search = match &refound {
+        Some((beside, _)) => Search { linearised: beside, ..search },
+        None => search,
+    };
+    if refound.is_some() {
+        again(&search, &mut known, 4, Effort::default());
     }
-    fits.append(&mut singles);
-    sort(&mut fits);
-    Ok(Found { null, fits, refound })
+    progress(0.4, "several effects");
+    extend(&search, &mut known, LIMITS);
+    Ok(Found { null, fits: known.ranked(&search), refound })
 }
 
-/// Fits of all single effects, best first.
-fn singles(search: Search<'_>) -> Vec<Fit> {
-    let Search { study, linearised, selection, .. } = search;
-    let mut starts: Vec<Hypothesis> = Vec::new();
-    for index in 0..study.catalogue {
-        starts.extend(starts_of(study, &study.nothing(), index));
-    }
-    let quick = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0 };
-    let tried = parallel::map(&starts, |start| {
-        let (started, promised) = linear_start(study, linearised, selection, start)?;
-        // What promises nothing is looked at where the line puts it, and no closer.
-        let effort = if promised < PROMISES { Effort { iterations: 1, ..quick } } else { quick };
-        fit(study, linearised, &started, selection, effort).ok()
-    });
-    let mut singles: Vec<Fit> = Vec::new();
-    for fitted in tried.into_iter().flatten() {
-        keep_best(&mut singles, fitted);
-    }
-    singles.retain(acts);
-    sort(&mut singles);
-    refit(search, &mut singles, 7, Effort { iterations: 6, enough: 0.2, ..Effort::default() });
-    singles
+/// Adds sets with effects that begin with a step, for which the study has candidates by now.
+pub fn search_onsets(search: Search<'_>, null: &Fit, fits: &mut Vec<Fit>) {
+    let mut known = Known::default();
+    std::iter::once(null).chain(fits.iter()).for_each(|fit| known.keep(&search, fit.clone()));
+    climb(&search, &mut known, fits.first().unwrap_or(null), LIMITS);
+    *fits = known.ranked(&search);
 }
 
-/// Fits the best few more thoroughly.
-pub fn refit(search: Search<'_>, fits: &mut Vec<Fit>, count: usize, effort: Effort) {
-    let best: Vec<Hypothesis> = fits.iter().take(count).map(|f| f.hypothesis.clone()).collect();
-    let again =
-        parallel::map(&best, |start| fit(search.study, search.linearised, start, search.selection, effort));
-    for fitted in again.into_iter().flatten() {
-        keep_best(fits, fitted);
-    }
-    sort(fits);
+/// Fits the best few again, more thoroughly.
+fn again(search: &Search<'_>, known: &mut Known<Fit>, count: usize, effort: Effort) {
+    let best: Vec<Start> =
+        known.ranked(search).into_iter().take(count).map(|fit| (fit.hypothesis, effort)).collect();
+    known.fit_all(search, &best);
 }
 
-/// Pairs that are fitted because they promise most beside the best singles.
-const BESIDE: usize = 6;
-/// Pairs that are fitted because the closed form promises most of them, whatever their members do alone.
-const SCREENED: usize = 3;
+/// Fits of these hypotheses again, most probable first; of the same effects the more probable one.
+pub fn refit(search: &Search<'_>, fits: &[&Fit], effort: Effort) -> Vec<Fit> {
+    let mut known = Known::default();
+    let starts: Vec<Start> = fits.iter().map(|fit| (fit.hypothesis.clone(), effort)).collect();
+    known.fit_all(search, &starts);
+    known.ranked(search)
+}
 
-/// Fits of the most promising pairs: beside the best singles, and beside the partners that these ask for.
-fn pairs(search: Search<'_>, singles: &[Fit]) -> Vec<Fit> {
-    let Search { study, linearised, selection, progress, .. } = search;
-    let mut wanted: Vec<Wanted> = Vec::new();
-    let mut bases: Vec<usize> = (0..singles.len().min(2)).collect();
-    for round in 0..2 {
-        let found = parallel::map(&bases, |base| additions(study, linearised, selection, &singles[*base]));
-        for (base, added) in bases.iter().zip(found) {
-            for addition in added {
-                let cost = singles[*base].cost - addition.gain;
-                let mut names = vec![singles[*base].hypothesis.effects[0].0, addition.effect];
-                names.sort_unstable();
-                let candidate = Wanted { cost, names, partner: addition.effect, start: addition.start };
-                match wanted.iter_mut().find(|other| other.names == candidate.names) {
-                    Some(other) if other.cost <= cost => {}
-                    Some(other) => *other = candidate,
-                    None => wanted.push(candidate),
-                }
+/// The most probable fit of each set, most probable first.
+pub fn ranked<'a>(search: &Search<'_>, fits: impl Iterator<Item = &'a Fit>) -> Vec<Fit> {
+    let mut known = Known::default();
+    fits.for_each(|fit| known.keep(search, fit.clone()));
+    known.ranked(search)
+}
+
+/// A hypothesis, and how thoroughly it is fitted.
+type Start = (Hypothesis, Effort);
+
+impl Causes for Search<'_> {
+    type Fit = Fit;
+    type Start = Start;
+
+    fn members(&self, fit: &Fit) -> Vec<usize> {
+        members(&fit.hypothesis)
+    }
+
+    fn family(&self, cause: usize) -> usize {
+        self.study.family(cause)
+    }
+
+    fn ln_odds(&self, fit: &Fit) -> f64 {
+        weight(self.calibration, self.study, fit)
+    }
+
+    fn offers(&self, base: &Fit) -> Vec<Offer<Start>> {
+        let before = prior(self.calibration, self.study, &base.hypothesis);
+        let offer = |addition: Addition| {
+            let prior = prior(self.calibration, self.study, &addition.start);
+            Offer {
+                cause: addition.effect,
+                ln_gain: 0.5 * addition.gain + prior - before,
+                start: (addition.start, EFFORT),
             }
-        }
-        wanted.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        if round == 0 {
-            let place = |effect: usize| singles.iter().position(|f| f.hypothesis.effects[0].0 == effect);
-            let mut next: Vec<usize> = Vec::new();
-            for base in wanted.iter().take(8).filter_map(|w| place(w.partner)) {
-                if !next.contains(&base) && !bases.contains(&base) && next.len() < 2 {
-                    next.push(base);
-                }
-            }
-            bases = next;
-        }
+        };
+        let asked =
+            |addition: &Addition| self.onsets == self.study.courses[addition.effect].onset().is_some();
+        let additions = additions(self.study, self.linearised, self.selection, base);
+        additions.into_iter().filter(asked).map(offer).collect()
     }
-    progress(0.65, "pairs");
-    // Pairs that neither of the best singles is a member of: by the straight line from where nothing is off.
-    let known = |s: &Screened| wanted.iter().take(BESIDE).any(|w| w.names == s.names);
-    let mut screened = screen(study, search.nominal, selection, singles);
-    screened.retain(|s| !known(s));
-    wanted.truncate(BESIDE);
-    wanted.extend(screened.into_iter().take(SCREENED).map(|s| Wanted {
-        cost: s.cost,
-        partner: s.names[1],
-        names: s.names,
-        start: s.start,
-    }));
-    // A second effect that promises nothing beside the best single costs time; two show what pairs there are.
-    let least = singles.first().map_or(f64::INFINITY, |best| best.cost - WORTH);
-    let starts: Vec<Hypothesis> = wanted
-        .into_iter()
-        .enumerate()
-        .filter(|(place, w)| *place < 2 || w.cost < least)
-        .map(|(_, w)| w.start)
-        .collect();
-    let effort = Effort { iterations: 5, enough: 0.5, ..Effort::default() };
-    let fitted = parallel::map(&starts, |start| fit(study, linearised, start, selection, effort));
-    let mut pairs = Vec::new();
-    for fitted in fitted.into_iter().flatten() {
-        keep_best(&mut pairs, fitted);
+
+    fn without(&self, fit: &Fit, cause: usize) -> Start {
+        let mut start = fit.hypothesis.clone();
+        start.effects.retain(|(index, _)| *index != cause);
+        (start, EFFORT)
     }
-    sort(&mut pairs);
-    refit(search, &mut pairs, 2, Effort::default());
-    swap(search, &mut pairs);
-    pairs
-}
 
-/// Above this share of the number of values, the best pair's cost says that it is not the right one.
-const INADEQUATE: f64 = 1.1;
-
-/// Where even the best pair leaves too much, what a third effect would do beside it may be what one of the two should
-/// have done: each member in turn gives way to the three that promise most.
-fn swap(search: Search<'_>, pairs: &mut Vec<Fit>) {
-    let Search { study, linearised, selection, .. } = search;
-    let values: usize = selection.rows(study).iter().map(ExactSizeIterator::len).sum();
-    let Some(best) = pairs.first().filter(|best| best.cost > INADEQUATE * values as f64) else { return };
-    let mut thirds = additions(study, linearised, selection, best);
-    thirds.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let mut starts: Vec<Hypothesis> = Vec::new();
-    for third in thirds.into_iter().take(3) {
-        for dropped in members(&best.hypothesis) {
-            let mut start = third.start.clone();
-            start.effects.retain(|(index, _)| *index != dropped);
-            starts.push(start);
-        }
+    fn fit(&self, (start, effort): &Start) -> Option<Fit> {
+        let fitted = fit(self.study, self.linearised, start, self.selection, *effort).ok()?;
+        does_something(self.study, &fitted).then_some(fitted)
     }
-    let effort = Effort { iterations: 6, enough: 0.5, ..Effort::default() };
-    for fitted in
-        parallel::map(&starts, |start| fit(study, linearised, start, selection, effort)).into_iter().flatten()
-    {
-        keep_best(pairs, fitted);
+
+    fn goes_on(&self, from: &Fit, to: &Fit) -> bool {
+        let values: usize = self.selection.rows(self.study).iter().map(ExactSizeIterator::len).sum();
+        let excess = |fit: &Fit| (fit.cost - values as f64).max(0.0);
+        to.hypothesis.effects.len() < 3 || excess(to) < HALVED * excess(from)
     }
-    sort(pairs);
-    refit(search, pairs, 2, Effort::default());
-}
-
-/// A pair worth a fit.
-struct Wanted {
-    cost: f64,
-    names: Vec<usize>,
-    partner: usize,
-    start: Hypothesis,
-}
-
-/// Best score first.
-pub fn sort(fits: &mut [Fit]) {
-    fits.sort_by(|a, b| b.score.total_cmp(&a.score));
 }
 
 /// Whether each effect of a fit does something: one that the fit left at its neutral value, or that this machine has no place
 /// for (convection before the wheel without area there), explains nothing, and a pair with it is not a pair.
-pub fn does_something(study: &Study, fitted: &Fit) -> bool {
-    acts(fitted)
-        && fitted.hypothesis.effects.iter().all(|(index, values)| {
-            study.effects[*index].info().parameters.iter().zip(values).any(|(parameter, value)| {
-                (value - parameter.neutral).abs() > NEUTRAL_STEPS * parameter.typical_step.abs()
-            })
-        })
-}
-
-/// Whether each effect of a fit changes anything on this machine.
-fn acts(fitted: &Fit) -> bool {
+fn does_something(study: &Study, fitted: &Fit) -> bool {
     let mut columns = fitted.effect_columns.as_slice();
-    fitted.hypothesis.effects.iter().all(|(_, values)| {
+    fitted.hypothesis.effects.iter().all(|(index, values)| {
         let (own, rest) = columns.split_at(values.len().min(columns.len()));
         columns = rest;
-        own.iter().any(|column| column.iter().any(|change| *change != 0.0))
+        let acts = own.iter().any(|column| column.iter().any(|change| *change != 0.0));
+        let parameters = study.effects[*index].info().parameters.iter();
+        acts && parameters.zip(values).any(|(parameter, value)| {
+            (value - parameter.neutral).abs() > NEUTRAL_STEPS * parameter.typical_step.abs()
+        })
     })
 }
 
 /// This near to neutral, in typical steps, an effect is not there.
 const NEUTRAL_STEPS: f64 = 1e-3;
-
-/// Keeps one fit for each set of effects: the better.
-pub fn keep_best(fits: &mut Vec<Fit>, fitted: Fit) {
-    let names = members(&fitted.hypothesis);
-    match fits.iter_mut().find(|other| members(&other.hypothesis) == names) {
-        Some(other) if other.cost <= fitted.cost => {}
-        Some(other) => *other = fitted,
-        None => fits.push(fitted),
-    }
-}
-
-/// The start of a single, moved to where a straight line says its best lies, and what the line promises off the cost; infinity
-/// where there is no line.
-fn linear_start(
-    study: &Study,
-    linearised: &Linearised,
-    selection: &Selection,
-    start: &Hypothesis,
-) -> Option<(Hypothesis, f64)> {
-    let (index, values) = start.effects.first()?;
-    let parameters = &study.effects[*index].info().parameters;
-    let [parameter] = parameters.as_slice() else { return Some((start.clone(), f64::INFINITY)) };
-    let projector = Projector::new(study, linearised, selection, &[])?;
-    let residual = linearised.residual(study, &linearised.base);
-    let right_residual = projector.right(&residual);
-    // How many times `step` a straight line through neutral and it asks for.
-    let share_of = |step: f64| -> Option<(f64, f64)> {
-        let mut there = start.clone();
-        there.effects = vec![(*index, vec![parameter.neutral + step])];
-        let there = study.predict(&there).ok()?;
-        let mut change: Vec<f64> =
-            there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
-        linearised.whiten(study, &mut change);
-        let right = projector.right(&change);
-        let own = projector.product(&change, &right, &change, &right);
-        let seen = projector.product(&change, &right, &residual, &right_residual);
-        Some(if own > 1e-9 { ((seen / own).clamp(-4.0, 4.0), seen * seen / own) } else { (0.0, 0.0) })
-    };
-    let mut step = values[0] - parameter.neutral;
-    if step == 0.0 {
-        return Some((start.clone(), f64::INFINITY));
-    }
-    let (mut share, mut promised) = share_of(step)?;
-    let opposite = (parameter.neutral - step).clamp(parameter.low, parameter.high) - parameter.neutral;
-    if share < -0.1 && opposite != 0.0 {
-        // Effects bend: the line is drawn on the side it points to.
-        if let Some((there, gain)) = share_of(opposite).filter(|(there, _)| *there > 0.0) {
-            (step, share, promised) = (opposite, there, promised.max(gain));
-        }
-    }
-    // Where the line says nothing, stand a little off neutral: at neutral some effects have no slope.
-    let share = if share.abs() < 0.1 { 0.1 * if share < 0.0 { -1.0 } else { 1.0 } } else { share };
-    let mut moved = study.nothing();
-    let value = (parameter.neutral + share * step).clamp(parameter.low, parameter.high);
-    let value = if value == parameter.neutral {
-        (parameter.neutral + 0.1 * step).clamp(parameter.low, parameter.high)
-    } else {
-        value
-    };
-    moved.effects = vec![(*index, vec![value])];
-    // From where nothing is off, not from the null's nuisances, which may have bent far to stand in for the effect.
-    Some((moved, promised))
-}

@@ -401,6 +401,21 @@ impl Study {
         Ok(Prediction { values, slopes })
     }
 
+    /// For each step, its blocks' times after its start, s, and the place on the speed line there (beyond 1: surge).
+    pub(crate) fn surge_positions(
+        &self,
+        hypothesis: &Hypothesis,
+    ) -> Result<Vec<Vec<(f64, f64)>>, PredictError> {
+        let mut positions = vec![Vec::new(); self.steps.len()];
+        self.drive(hypothesis, &self.times_s, |index, _, _, _, outputs| {
+            if let Some((step, block)) = self.places[index] {
+                let since_s = self.steps[step].blocks[block].since_jump_s;
+                positions[step].push((since_s, outputs.surge_position_ratio));
+            }
+        })?;
+        Ok(positions)
+    }
+
     /// The model at the end of each step.
     ///
     /// # Errors
@@ -473,11 +488,8 @@ impl Study {
             mean_reading(&column.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>())
         };
         let guess = state_as_read(&boundary, read);
-        let mut start = if self.rested {
-            settle(&rig.model, &boundary, guess)?
-        } else {
-            settle(&with_metal_held(&rig.model), &boundary, guess)?
-        };
+        let held = (!self.rested).then(|| with_metal_held(&rig.model));
+        let mut start = settle(held.as_ref().unwrap_or(&rig.model), &boundary, guess)?;
         for (knob, by) in &circumstances.knobs {
             knob.start(&mut start, *by);
         }

@@ -1,14 +1,14 @@
 //! Scores turned into probabilities, and what is said of each cause.
 
 use crate::adequacy::Adequacy;
-use crate::calibration::{Calibration, FURTHER_RATIO};
+use crate::calibration::Calibration;
 use crate::coordinate::{coordinates, parameters};
 use crate::course::Course;
 use crate::fit::Fit;
 use crate::in_words;
 use crate::next::{Rivals, SETTLED};
 use crate::report::{Candidate, Estimate, Onset};
-use crate::study::Study;
+use crate::study::{Hypothesis, Study};
 use mapper_core::half_width_95;
 use std::collections::BTreeMap;
 
@@ -26,36 +26,31 @@ pub(crate) struct Weighed {
     pub named: bool,
 }
 
-/// Share of causes that begin with a step among all.
-const LATE_RATIO: f64 = 0.1;
+/// Share of causes that begin with a step among all. Judgement: one in two hundred, for what begins is seldom and looks like a cause of
+/// another kind.
+const LATE_RATIO: f64 = 0.005;
 
 /// Logarithm of what is known of a cause before any data: pairs are rarer than singles, and many; causes that begin while a
 /// recording is made are rarer still, and may begin with any step.
-pub fn prior(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
+pub(crate) fn prior(calibration: &Calibration, study: &Study, hypothesis: &Hypothesis) -> f64 {
     let count = study.catalogue.max(2) as f64;
-    let effects = fit.hypothesis.effects.len();
+    let effects = hypothesis.effects.len();
     let of_number = match effects {
         0 => calibration.prior_none.ln(),
         1 => (calibration.prior_single / count).ln(),
         2 => (calibration.prior_pair / (0.5 * count * (count - 1.0))).ln(),
         _ => {
             let sets: f64 = (0..effects).map(|i| ((count - i as f64) / (i as f64 + 1.0)).max(0.1).ln()).sum();
-            calibration.prior_triple.ln() + (effects - 3) as f64 * FURTHER_RATIO.ln() - sets
+            (effects - 2) as f64 * calibration.prior_triple.ln() - sets
         }
     };
-    let late = fit.hypothesis.effects.iter().filter(|(index, _)| study.courses[*index] != Course::Throughout);
+    let late = hypothesis.effects.iter().filter(|(index, _)| study.courses[*index] != Course::Throughout);
     of_number + late.count() as f64 * (LATE_RATIO / (2.0 * study.steps.len().max(1) as f64)).ln()
 }
 
 /// Evidence of a fit, prior included.
-pub(crate) fn weight(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
-    fit.score + prior(calibration, study, fit)
-}
-
-/// Best first, priors included.
-pub(crate) fn by_weight(calibration: &Calibration, study: &Study, fits: &mut [Fit]) {
-    let weight = |fit: &Fit| weight(calibration, study, fit);
-    fits.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+pub fn weight(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
+    fit.score + prior(calibration, study, &fit.hypothesis)
 }
 
 /// Whether all effects of `part` are among those of `whole`, whenever they begin.

@@ -183,12 +183,27 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 const NEAR_SURGE: f64 = 0.975;
 /// Length of a jump, s.
 const JUMP_S: f64 = 3.0;
+/// Time after the last surge cycle in which no reading counts, s: when it ends is chaotic, and the shaft needs some seconds to forget it.
+const AFTER_SURGE_S: f64 = 15.0;
+/// Factor on the noise of what says nothing.
+const SAYS_NOTHING: f64 = 1e4;
 
-/// For each step, whether its jump starts or ends near surge.
-fn surge_jumps(study: &Study, nothing: &Hypothesis) -> Vec<bool> {
-    let Ok(points) = study.points(nothing) else { return vec![false; study.steps.len()] };
-    let near = |step: usize| points.get(step).is_none_or(|p| p.surge_position_ratio > NEAR_SURGE);
-    (0..study.steps.len()).map(|step| near(step) || (step > 0 && near(step - 1))).collect()
+/// For each step the time after its jump, s, in which flow and outlet pressure say nothing, and that in which no reading does.
+fn lost_to_surge(study: &Study, nothing: &Hypothesis) -> Vec<(f64, f64)> {
+    let Ok(positions) = study.surge_positions(nothing) else {
+        return vec![(JUMP_S, 0.0); study.steps.len()];
+    };
+    let last = |step: usize| positions.get(step).and_then(|of_step| of_step.last());
+    let near = |step: usize| last(step).is_none_or(|(_, position)| *position > NEAR_SURGE);
+    let lost = |step: usize| {
+        let jump_s = if near(step) || (step > 0 && near(step - 1)) { JUMP_S } else { 0.0 };
+        let in_surge = positions[step].iter().filter(|(_, position)| *position > 1.0);
+        let ends_s = in_surge.map(|(since_s, _)| since_s + AFTER_SURGE_S).fold(0.0, f64::max);
+        (jump_s, ends_s)
+    };
+    (0..study.steps.len())
+        .map(|step| if study.steps[step].jumped { lost(step) } else { (0.0, 0.0) })
+        .collect()
 }
 
 /// Covariance of the values of each group.
@@ -198,7 +213,7 @@ fn covariances(
     base: &Prediction,
     changes: &[Vec<f64>],
 ) -> Vec<DMatrix<f64>> {
-    let surge_jumps = surge_jumps(study, nothing);
+    let lost_to_surge = lost_to_surge(study, nothing);
     // Response of every value to a unit of each input, from that of its offset.
     let responses: Vec<(InputNoise, &Vec<f64>, f64)> = DRIVERS
         .iter()
@@ -246,14 +261,11 @@ fn covariances(
                 let samples = block.samples.len().max(1) as f64;
                 covariance[(i, i)] += (base.slopes[row] * study.scatter_s).powi(2) / samples;
             }
-            if surge_jumps[group.step]
-                && matches!(OUTPUTS[group.output], Channel::CompressorFlow | Channel::P2)
-            {
-                for (i, block) in blocks.iter().enumerate() {
-                    if study.steps[group.step].jumped && block.since_jump_s < JUMP_S {
-                        covariance[(i, i)] += 1e4 * sigma * sigma;
-                    }
-                }
+            let (jump_s, surge_s) = lost_to_surge[group.step];
+            let moves = matches!(OUTPUTS[group.output], Channel::CompressorFlow | Channel::P2);
+            let lost_s = if moves { jump_s.max(surge_s) } else { surge_s };
+            for (i, _) in blocks.iter().enumerate().filter(|(_, block)| block.since_jump_s < lost_s) {
+                covariance[(i, i)] += (SAYS_NOTHING * sigma).powi(2);
             }
             if let Some(more) = study.noise_besides.get(place) {
                 covariance += more;

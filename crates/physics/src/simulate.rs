@@ -119,7 +119,8 @@ impl SizedIntegrator {
     }
 }
 
-fn tolerances<const N: usize>(relative_ratio: f64) -> Tolerances<N> {
+/// Of the error of a step in all states, by that relative to their sizes.
+pub(crate) fn tolerances<const N: usize>(relative_ratio: f64) -> Tolerances<N> {
     // Absolute parts: a thousandth of each state's usual size.
     Tolerances { relative_ratio, absolute: std::array::from_fn(|i| 1e-3 * STATE_SIZES[i] * relative_ratio) }
 }

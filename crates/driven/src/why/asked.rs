@@ -1,7 +1,7 @@
 //! What of the catalogue can be asked on a side, how small it would be seen, and why the rest cannot be asked.
 
 use super::diagnosis::NotAsked;
-use super::fit::{Fit, Normal, Question, whitened};
+use super::fit::{BESIDE, Fit, Question, normal, whitened};
 use super::side::Side;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::coordinate::Coordinate;
@@ -76,10 +76,10 @@ pub(crate) fn smallest<S: Side>(
     let base = Hypothesis { effects: Vec::new(), nuisances: found.hypothesis.nuisances.clone() };
     let Some(said) = question.predict(&base) else { return (Vec::new(), Vec::new()) };
     let whitenings = question.whitenings(counts, &found.left_k);
-    let slopes = question.slopes(&base, &said, &[]);
+    let slopes = question.slopes(&base, &said, &[], BESIDE);
     let none: Vec<Vec<f64>> = said.iter().map(|column| vec![0.0; column.len()]).collect();
-    let normal = Normal::new(&whitenings, &slopes, &none, &question.nothing().nuisances, &[]);
-    let Some(cholesky) = normal.matrix.clone().cholesky() else { return (Vec::new(), Vec::new()) };
+    let (normal, columns) = normal(&whitenings, &slopes, &none, &vec![(0.0, 1.0); unknowns]);
+    let Some(cholesky) = normal.matrix.cholesky() else { return (Vec::new(), Vec::new()) };
     let count = asked.len().max(2) as f64;
     let against =
         calibration.threshold + calibration.prior_none.ln() - (calibration.prior_single / count).ln();
@@ -96,7 +96,7 @@ pub(crate) fn smallest<S: Side>(
             let dot = |column: &[Vec<f64>]| -> f64 {
                 column.iter().flatten().zip(change.iter().flatten()).map(|(a, b)| a * b).sum()
             };
-            let right = nalgebra::DVector::from_fn(unknowns, |i, _| dot(&normal.columns[i]));
+            let right = nalgebra::DVector::from_fn(unknowns, |i, _| dot(&columns[i]));
             let taken = cholesky.solve(&right);
             let whole = dot(&change);
             let most =

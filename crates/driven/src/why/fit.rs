@@ -1,6 +1,6 @@
 //! A hypothesis at its best under the rows that count, and how well it is supported (Laplace's approximation).
 //!
-//! Gauss and Newton on whitened residuals, as in `mapper-gap`; but what the model leaves beside the noise is found with
+//! Gauss-Newton on whitened residuals, as in `mapper-gap`; but what the model leaves beside the noise is found with
 //! everything else, for nobody declares it of a machine on an engine.
 
 use super::noise::Whitening;
@@ -8,9 +8,10 @@ use super::side::{Side, Smooth};
 use mapper_gap::coordinate::{Coordinate, parameters, set_parameter};
 use mapper_gap::normal::PRIOR_STEPS;
 use mapper_gap::study::Hypothesis;
+use mapper_inference::descent::{End, Model, Normal, Reach, Until, descend};
 use mapper_numerics::minimise::minimise;
 use mapper_physics::effect::{Effect, Rig, add};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::sync::Arc;
 
 /// What every hypothesis is held against.
@@ -52,12 +53,13 @@ const LEAST_LEFT: f64 = -2.0;
 /// An unknown so many standard deviations off is beyond what is known of any machine.
 const MOST_SIGMAS: f64 = 5.0;
 /// Most that an unknown, or an effect in typical steps, moves at once.
-const MOST_MOVED: (f64, f64) = (2.0, 2.0);
+const MOST_MOVED: f64 = 2.0;
 /// Iterations, and what one has to promise in the cost.
-const ITERATIONS: usize = 14;
+const ITERATIONS: usize = 15;
 const ENOUGH: f64 = 0.02;
-/// Distance of the runs beside a hypothesis from which slopes are taken, in the coordinates' units.
-const BESIDE: f64 = 0.02;
+/// Distance of the runs beside a hypothesis from which slopes are taken, in the coordinates' units, and where such slopes lead nowhere.
+pub(crate) const BESIDE: f64 = 0.02;
+const BESIDE_COARSE: f64 = 0.2;
 
 impl<S: Side> Question<'_, S> {
     /// Nothing but what is not known.
@@ -147,85 +149,66 @@ impl<S: Side> Question<'_, S> {
 
     /// The best fit from where `start` stands to the rows that `counts` says; `None` where the model has no answer there.
     pub(crate) fn fit(&self, start: &Hypothesis, counts: &[bool]) -> Option<Fit> {
-        let mut hypothesis = start.clone();
-        let mut predicted = self.predict(&hypothesis)?;
         let coordinates = self.coordinates(start);
-        let known = self.known(start);
-        let pulls = |hypothesis: &Hypothesis| -> Vec<(f64, f64)> {
-            let values = parameters(hypothesis).into_iter().zip(coordinates.iter().zip(&known));
-            values
-                .map(|(value, (coordinate, (middle, over)))| (coordinate.of(value) - middle, *over))
-                .collect()
-        };
-        let of_effects = |hypothesis: &Hypothesis| {
-            pulls(hypothesis).iter().map(|(off, over)| over * off * off).sum::<f64>()
-        };
-        let all_left =
-            |residual: &[Vec<f64>], prior: &dyn Fn(&Smooth) -> (f64, f64)| -> Vec<(f64, f64, f64)> {
-                let each = residual.iter().zip(S::smooth()).enumerate();
-                each.map(|(channel, (residual, smooth))| self.left(counts, channel, residual, prior(smooth)))
-                    .collect()
-            };
-        let inside = |smooth: &Smooth| (smooth.median_k, smooth.width);
-        let mut residual = self.residual(&predicted);
-        let mut left_k: Vec<f64> = all_left(&residual, &inside).into_iter().map(|(k, ..)| k).collect();
-        let mut slopes = self.slopes(&hypothesis, &predicted, &coordinates);
-        for _ in 0..ITERATIONS {
-            let whitenings = self.whitenings(counts, &left_k);
-            let cost = |residual: &[Vec<f64>], hypothesis: &Hypothesis| {
-                let squares = |column: Vec<f64>| column.iter().map(|w| w * w).sum::<f64>();
-                whitened(&whitenings, residual).into_iter().map(squares).sum::<f64>()
-                    + hypothesis.nuisances.iter().map(|z| z * z).sum::<f64>()
-                    + of_effects(hypothesis)
-            };
-            let before = cost(&residual, &hypothesis);
-            let normal =
-                Normal::new(&whitenings, &slopes, &residual, &hypothesis.nuisances, &pulls(&hypothesis));
-            let Some((step, promised)) = normal.bounded_step(&hypothesis, &coordinates) else { break };
-            if promised < ENOUGH {
-                break;
-            }
-            let mut accepted = false;
-            let mut share = 1.0;
-            for _ in 0..5 {
-                let there = moved(&hypothesis, &step, share, &coordinates);
-                if let Some(said) = self.predict(&there) {
-                    let off = self.residual(&said);
-                    if cost(&off, &there) < before {
-                        (hypothesis, predicted, residual) = (there, said, off);
-                        accepted = true;
-                        break;
-                    }
-                }
-                share *= 0.35;
-            }
-            if !accepted {
-                break;
-            }
-            left_k = all_left(&residual, &inside).into_iter().map(|(k, ..)| k).collect();
-            slopes = self.slopes(&hypothesis, &predicted, &coordinates);
-        }
-        let normal = Normal::new(
-            &self.whitenings(counts, &left_k),
-            &slopes,
-            &residual,
-            &hypothesis.nuisances,
-            &pulls(&hypothesis),
+        let at = coordinates.iter().zip(parameters(start)).map(|(coordinate, value)| coordinate.of(value));
+        let unknowns = DVector::from_iterator(
+            start.nuisances.len() + coordinates.len(),
+            start.nuisances.iter().copied().chain(at),
         );
+        let known = self.known(start);
+        let mut fitted = Fitted { question: self, start, counts, coordinates, known, whitenings: Vec::new() };
+        let point = fitted.at(&unknowns)?;
+        let until = Until { iterations: ITERATIONS, enough: ENOUGH };
+        let End { unknowns, point, normal } = descend(&mut fitted, unknowns, point, until);
         let half_ln_determinant = normal.half_ln_determinant()?;
         let outside = |smooth: &Smooth| match smooth.width {
             0.0 => (smooth.median_k, 0.0),
             _ => (OUTSIDE_RATIO * smooth.median_k, OUTSIDE_WIDTH),
         };
         let evidence = |prior: &dyn Fn(&Smooth) -> (f64, f64)| {
-            let misfit: f64 =
-                all_left(&residual, prior).into_iter().map(|(_, misfit, width)| width - misfit).sum();
-            let off =
-                0.5 * (hypothesis.nuisances.iter().map(|z| z * z).sum::<f64>() + of_effects(&hypothesis));
-            misfit - off - half_ln_determinant + known.iter().map(|(_, over)| 0.5 * over.ln()).sum::<f64>()
+            let left = self.all_left(counts, &point.residual, prior);
+            let misfit: f64 = left.into_iter().map(|(_, misfit, width)| width - misfit).sum();
+            let of_effects: f64 = fitted.known.iter().map(|(_, over)| 0.5 * over.ln()).sum();
+            misfit - 0.5 * fitted.off_priors(&unknowns) - half_ln_determinant + of_effects
         };
         let (score, score_outside) = (evidence(&inside), evidence(&outside));
+        let left_k = self.left_k(counts, &point.residual);
+        let Point { hypothesis, predicted, .. } = point;
         Some(Fit { score, score_outside, left_k, predicted, precision: normal.matrix, hypothesis })
+    }
+
+    /// What else may be seen beside a fit, by straight lines.
+    pub(crate) fn beside(&self, fit: &Fit, counts: &[bool]) -> Option<BesideFit<'_, '_, S>> {
+        let whitenings = self.whitenings(counts, &fit.left_k);
+        let coordinates = self.coordinates(&fit.hypothesis);
+        let slopes = self.slopes(&fit.hypothesis, &fit.predicted, &coordinates, BESIDE);
+        let columns = slopes.iter().map(|slope| whitened(&whitenings, slope)).collect();
+        let residual = whitened(&whitenings, &self.residual(&fit.predicted));
+        let precision = fit.precision.clone().cholesky()?;
+        Some(BesideFit {
+            question: self,
+            predicted: fit.predicted.clone(),
+            whitenings,
+            columns,
+            residual,
+            precision,
+        })
+    }
+
+    /// What is left of each channel, its misfit, and the logarithm of the evidence's width.
+    fn all_left(
+        &self,
+        counts: &[bool],
+        residual: &[Vec<f64>],
+        prior: &dyn Fn(&Smooth) -> (f64, f64),
+    ) -> Vec<(f64, f64, f64)> {
+        let each = residual.iter().zip(S::smooth()).enumerate();
+        each.map(|(channel, (residual, smooth))| self.left(counts, channel, residual, prior(smooth)))
+            .collect()
+    }
+
+    fn left_k(&self, counts: &[bool], residual: &[Vec<f64>]) -> Vec<f64> {
+        self.all_left(counts, residual, &inside).into_iter().map(|(k, ..)| k).collect()
     }
 
     /// Changes for a unit of each unknown and each coordinate, by runs beside the hypothesis.
@@ -234,6 +217,7 @@ impl<S: Side> Question<'_, S> {
         hypothesis: &Hypothesis,
         here: &[Vec<f64>],
         coordinates: &[Coordinate],
+        beside: f64,
     ) -> Vec<Vec<Vec<f64>>> {
         let of = |moved: &Hypothesis, by: f64| -> Vec<Vec<f64>> {
             let Some(there) = self.predict(moved) else {
@@ -248,14 +232,14 @@ impl<S: Side> Question<'_, S> {
         let mut slopes = Vec::with_capacity(hypothesis.nuisances.len() + coordinates.len());
         for place in 0..hypothesis.nuisances.len() {
             let mut moved = hypothesis.clone();
-            moved.nuisances[place] += BESIDE;
-            slopes.push(of(&moved, BESIDE));
+            moved.nuisances[place] += beside;
+            slopes.push(of(&moved, beside));
         }
         for (place, (coordinate, value)) in coordinates.iter().zip(parameters(hypothesis)).enumerate() {
             let at = coordinate.of(value);
             // To the side where there is room.
             let room = |x: &f64| (coordinate.of(coordinate.value(*x)) - x).abs() < 1e-9;
-            let away = [at + BESIDE, at - BESIDE].into_iter().find(room).unwrap_or(at - BESIDE);
+            let away = [at + beside, at - beside].into_iter().find(room).unwrap_or(at - beside);
             let mut moved = hypothesis.clone();
             set_parameter(&mut moved, place, coordinate.value(away));
             slopes.push(of(&moved, away - at));
@@ -278,91 +262,126 @@ fn dot(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
 }
 
-/// Products of whitened slopes, unknowns first, with what is known beforehand of each.
-pub(crate) struct Normal {
-    pub(crate) matrix: DMatrix<f64>,
-    pub(crate) columns: Vec<Vec<Vec<f64>>>,
-    right: DVector<f64>,
+/// A fit at its best, with the slopes of all that is free in it.
+pub(crate) struct BesideFit<'a, 'q, S> {
+    question: &'a Question<'q, S>,
+    predicted: Vec<Vec<f64>>,
+    whitenings: Vec<Whitening>,
+    columns: Vec<Vec<Vec<f64>>>,
+    residual: Vec<Vec<f64>>,
+    precision: Cholesky<f64, Dyn>,
 }
 
-impl Normal {
-    pub(crate) fn new(
-        whitenings: &[Whitening],
-        slopes: &[Vec<Vec<f64>>],
-        residual: &[Vec<f64>],
-        unknowns: &[f64],
-        pulls: &[(f64, f64)],
-    ) -> Self {
-        let columns: Vec<_> = slopes.iter().map(|slope| whitened(whitenings, slope)).collect();
-        let residual = whitened(whitenings, residual);
-        // How far each stands from the middle of what is known, and its precision.
-        let known: Vec<(f64, f64)> =
-            unknowns.iter().map(|z| (*z, 1.0)).chain(pulls.iter().copied()).collect();
-        let matrix = DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
-            dot(&columns[i], &columns[j]) + if i == j { known[i].1 } else { 0.0 }
-        });
-        let right =
-            DVector::from_fn(columns.len(), |i, _| dot(&columns[i], &residual) - known[i].1 * known[i].0);
-        Normal { matrix, columns, right }
-    }
-
-    fn half_ln_determinant(&self) -> Option<f64> {
-        let cholesky = self.matrix.clone().cholesky()?;
-        Some(cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum())
-    }
-
-    /// The step to the least cost within all bounds, and what it promises: what would leave its range is held at its end and the
-    /// others are solved for again.
-    fn bounded_step(
-        &self,
-        hypothesis: &Hypothesis,
-        coordinates: &[Coordinate],
-    ) -> Option<(DVector<f64>, f64)> {
-        let within = |low: f64, high: f64, most: f64| (low.clamp(-most, 0.0), high.clamp(0.0, most));
-        let mut room: Vec<(f64, f64)> = hypothesis
-            .nuisances
+impl<S: Side> BesideFit<'_, '_, S> {
+    /// What the change from the fit to a hypothesis would take off the cost in any strength, all else free. At its best a fit has no slope
+    /// along what is free, so that the residual needs no projection.
+    pub(crate) fn gain(&self, there: &Hypothesis) -> Option<f64> {
+        let there = self.question.predict(there)?;
+        let change: Vec<Vec<f64>> = there
             .iter()
-            .map(|z| within(-MOST_SIGMAS - z, MOST_SIGMAS - z, MOST_MOVED.0))
+            .zip(&self.predicted)
+            .map(|(t, h)| t.iter().zip(h).map(|(t, h)| t - h).collect())
             .collect();
-        room.extend(coordinates.iter().zip(parameters(hypothesis)).map(|(coordinate, value)| {
-            let (low, high) = coordinate.ends();
-            let at = coordinate.of(value);
-            within(low - at, high - at, MOST_MOVED.1)
-        }));
-        let mut held: Vec<Option<f64>> = vec![None; room.len()];
-        for _ in 0..room.len() {
-            let free: Vec<usize> = (0..held.len()).filter(|i| held[*i].is_none()).collect();
-            let mut step = DVector::from_fn(held.len(), |i, _| held[i].unwrap_or(0.0));
-            let pushed = &self.matrix * &step;
-            let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| self.matrix[(free[i], free[j])]);
-            let right = DVector::from_fn(free.len(), |i, _| self.right[free[i]] - pushed[free[i]]);
-            let part = matrix.cholesky()?.solve(&right);
-            for (place, index) in free.iter().enumerate() {
-                step[*index] = part[place];
-            }
-            let outside = |i: &usize| step[*i] < room[*i].0 - 1e-9 || step[*i] > room[*i].1 + 1e-9;
-            let leaving: Vec<usize> = free.into_iter().filter(outside).collect();
-            if leaving.is_empty() {
-                let promised = 2.0 * step.dot(&self.right) - step.dot(&(&self.matrix * &step));
-                return Some((step, promised));
-            }
-            for i in leaving {
-                held[i] = Some(step[i].clamp(room[i].0, room[i].1));
-            }
-        }
-        None
+        let change = whitened(&self.whitenings, &change);
+        let right = DVector::from_fn(self.columns.len(), |i, _| dot(&self.columns[i], &change));
+        let own = dot(&change, &change) - right.dot(&self.precision.solve(&right));
+        let seen = dot(&change, &self.residual);
+        Some(if own > 0.0 && seen > 0.0 { seen * seen / own } else { 0.0 })
     }
 }
 
-fn moved(hypothesis: &Hypothesis, step: &DVector<f64>, share: f64, coordinates: &[Coordinate]) -> Hypothesis {
-    let unknowns = hypothesis.nuisances.len();
-    let mut moved = hypothesis.clone();
-    for (z, by) in moved.nuisances.iter_mut().zip(step.iter()) {
-        *z += share * by;
+/// What a model of this kind leaves: median, and width of its logarithm.
+fn inside(smooth: &Smooth) -> (f64, f64) {
+    (smooth.median_k, smooth.width)
+}
+
+/// A hypothesis' unknowns, in standard normal numbers, and behind them its effects' coordinates.
+struct Fitted<'a, 'q, S> {
+    question: &'a Question<'q, S>,
+    start: &'a Hypothesis,
+    counts: &'a [bool],
+    coordinates: Vec<Coordinate>,
+    known: Vec<(f64, f64)>,
+    /// By what is left at the last point that was accepted.
+    whitenings: Vec<Whitening>,
+}
+
+struct Point {
+    hypothesis: Hypothesis,
+    predicted: Vec<Vec<f64>>,
+    residual: Vec<Vec<f64>>,
+}
+
+impl<S: Side> Fitted<'_, '_, S> {
+    /// Distance of each unknown from the middle of what is known of it, and the precision of that.
+    fn pulls(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
+        let n = unknowns.len() - self.known.len();
+        let of_effects =
+            unknowns.iter().skip(n).zip(&self.known).map(|(at, (middle, over))| (at - middle, *over));
+        unknowns.iter().take(n).map(|z| (*z, 1.0)).chain(of_effects).collect()
     }
-    for (place, (coordinate, value)) in coordinates.iter().zip(parameters(hypothesis)).enumerate() {
-        let to = coordinate.value(coordinate.of(value) + share * step[unknowns + place]);
-        set_parameter(&mut moved, place, to);
+
+    fn off_priors(&self, unknowns: &DVector<f64>) -> f64 {
+        self.pulls(unknowns).iter().map(|(off, over)| over * off * off).sum()
     }
-    moved
+}
+
+impl<S: Side> Model for Fitted<'_, '_, S> {
+    type Point = Point;
+
+    fn at(&self, unknowns: &DVector<f64>) -> Option<Point> {
+        let mut hypothesis = self.start.clone();
+        let n = hypothesis.nuisances.len();
+        hypothesis.nuisances.copy_from_slice(&unknowns.as_slice()[..n]);
+        for (place, coordinate) in self.coordinates.iter().enumerate() {
+            set_parameter(&mut hypothesis, place, coordinate.value(unknowns[n + place]));
+        }
+        let predicted = self.question.predict(&hypothesis)?;
+        let residual = self.question.residual(&predicted);
+        Some(Point { hypothesis, predicted, residual })
+    }
+
+    fn cost(&self, unknowns: &DVector<f64>, point: &Point) -> f64 {
+        let white = whitened(&self.whitenings, &point.residual);
+        dot(&white, &white) + self.off_priors(unknowns)
+    }
+
+    fn normal(&mut self, unknowns: &DVector<f64>, point: &Point, reach: Reach) -> Normal {
+        let beside = if reach == Reach::Fine { BESIDE } else { BESIDE_COARSE };
+        let slopes = self.question.slopes(&point.hypothesis, &point.predicted, &self.coordinates, beside);
+        normal(&self.whitenings, &slopes, &point.residual, &self.pulls(unknowns)).0
+    }
+
+    fn room(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
+        let within = |low: f64, high: f64| (low.clamp(-MOST_MOVED, 0.0), high.clamp(0.0, MOST_MOVED));
+        let n = unknowns.len() - self.coordinates.len();
+        let of_unknowns = unknowns.iter().take(n).map(|z| within(-MOST_SIGMAS - z, MOST_SIGMAS - z));
+        let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(n)).map(|(coordinate, at)| {
+            let (low, high) = coordinate.ends();
+            within(low - at, high - at)
+        });
+        of_unknowns.chain(of_effects).collect()
+    }
+
+    fn accept(&mut self, point: &Point) {
+        let left_k = self.question.left_k(self.counts, &point.residual);
+        self.whitenings = self.question.whitenings(self.counts, &left_k);
+    }
+}
+
+/// The normal equations of whitened slopes, unknowns first, with the distance of each from what is known of it and the precision of that;
+/// and the whitened slopes.
+pub(crate) fn normal(
+    whitenings: &[Whitening],
+    slopes: &[Vec<Vec<f64>>],
+    residual: &[Vec<f64>],
+    pulls: &[(f64, f64)],
+) -> (Normal, Vec<Vec<Vec<f64>>>) {
+    let columns: Vec<_> = slopes.iter().map(|slope| whitened(whitenings, slope)).collect();
+    let residual = whitened(whitenings, residual);
+    let matrix = DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
+        dot(&columns[i], &columns[j]) + if i == j { pulls[i].1 } else { 0.0 }
+    });
+    let pull = DVector::from_fn(columns.len(), |i, _| dot(&columns[i], &residual) - pulls[i].1 * pulls[i].0);
+    (Normal { matrix, pull }, columns)
 }

@@ -6,6 +6,7 @@ use mapper_gap::calibration::Calibration;
 use mapper_gap::coordinate::Coordinate;
 use mapper_gap::next::SETTLED;
 use mapper_gap::study::{Hypothesis, members};
+use mapper_inference::search::{Causes, Known, Limits, Offer, extend};
 use mapper_numerics::parallel;
 use mapper_physics::effect::EffectInfo;
 
@@ -17,12 +18,6 @@ pub(crate) struct Found {
     pub(crate) fits: Vec<Fit>,
 }
 
-/// A single has to take so much off the evidence against it before pairs are looked at.
-const WORTH: f64 = 3.0;
-/// Singles beside which a second effect is looked for.
-const BASES: usize = 3;
-/// Pairs that are fitted are those of the first so many singles.
-const PARTNERS: usize = 8;
 /// Prior of something outside the catalogue, beside any of it: as rare as what the catalogue's priors leave.
 pub(crate) const PRIOR_OUTSIDE: f64 = 0.1;
 
@@ -67,61 +62,90 @@ fn starts(info: &EffectInfo) -> Vec<Vec<f64>> {
     starts
 }
 
-/// Fits nothing, each of the effects `asked`, and pairs of the best.
+/// Judgement: bounds the time. What a line promises is in units of what the model leaves, which a cause makes small: all are worth a look.
+const LIMITS: Limits = Limits { members: 2, starts: 3, fits: 6, slack: f64::INFINITY };
+
+/// Fits nothing, each of the effects `asked`, and the pairs of them that promise most.
 pub(crate) fn search<S: Side>(
     question: &Question<'_, S>,
     asked: &[usize],
     counts: &[bool],
     calibration: &Calibration,
 ) -> Option<Found> {
+    let search = Search { question, asked, counts, calibration };
     let null = question.fit(&question.nothing(), counts)?;
-    let by_weight = |fits: &mut Vec<Fit>| {
-        let weight = |fit: &Fit| weight(calibration, asked.len(), fit);
-        fits.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
-    };
-    let beside = |base: &Hypothesis, effect: usize| -> Vec<Hypothesis> {
+    let mut known = Known::default();
+    known.keep(&search, null.clone());
+    let beside = |effect: &usize| search.starts(&question.nothing(), *effect);
+    known.fit_all(&search, &asked.iter().flat_map(beside).collect::<Vec<_>>());
+    let best = known.ranked(&search).first().map_or(f64::NEG_INFINITY, |best| best.score);
+    if best - null.score > calibration.threshold {
+        extend(&search, &mut known, LIMITS);
+    }
+    Some(Found { null, fits: known.ranked(&search) })
+}
+
+struct Search<'a, S> {
+    question: &'a Question<'a, S>,
+    asked: &'a [usize],
+    counts: &'a [bool],
+    calibration: &'a Calibration,
+}
+
+impl<S: Side> Search<'_, S> {
+    fn starts(&self, base: &Hypothesis, effect: usize) -> Vec<Hypothesis> {
         let with = |values: Vec<f64>| {
             let mut start = base.clone();
             start.effects.push((effect, values));
             start
         };
-        starts(question.effects[effect].info()).into_iter().map(with).collect()
-    };
-    let tried: Vec<Hypothesis> =
-        asked.iter().flat_map(|effect| beside(&question.nothing(), *effect)).collect();
-    let mut fits = best_of_each(fitted(question, &tried, counts));
-    by_weight(&mut fits);
-    let worth = fits.first().is_some_and(|best| best.score - null.score > WORTH);
-    if worth {
-        let mut tried: Vec<Hypothesis> = Vec::new();
-        for base in fits.iter().take(BASES) {
-            let partners = fits.iter().take(PARTNERS).map(|fit| fit.hypothesis.effects[0].0);
-            for partner in partners.filter(|partner| members(&base.hypothesis) != [*partner]) {
-                tried.extend(beside(&base.hypothesis, partner));
-            }
-        }
-        let pairs = best_of_each(fitted(question, &tried, counts));
-        fits.extend(pairs);
-        by_weight(&mut fits);
+        starts(self.question.effects[effect].info()).into_iter().map(with).collect()
     }
-    Some(Found { null, fits })
 }
 
-fn fitted<S: Side>(question: &Question<'_, S>, tried: &[Hypothesis], counts: &[bool]) -> Vec<Fit> {
-    parallel::map(tried, |start| question.fit(start, counts)).into_iter().flatten().collect()
-}
+impl<S: Side> Causes for Search<'_, S> {
+    type Fit = Fit;
+    type Start = Hypothesis;
 
-/// Of fits with the same effects the best.
-fn best_of_each(fits: Vec<Fit>) -> Vec<Fit> {
-    let mut best: Vec<Fit> = Vec::new();
-    for fit in fits {
-        match best.iter_mut().find(|other| members(&other.hypothesis) == members(&fit.hypothesis)) {
-            Some(other) if other.score >= fit.score => {}
-            Some(other) => *other = fit,
-            None => best.push(fit),
-        }
+    fn members(&self, fit: &Fit) -> Vec<usize> {
+        members(&fit.hypothesis)
     }
-    best
+
+    fn family(&self, cause: usize) -> usize {
+        cause
+    }
+
+    fn ln_odds(&self, fit: &Fit) -> f64 {
+        weight(self.calibration, self.asked.len(), fit)
+    }
+
+    fn offers(&self, base: &Fit) -> Vec<Offer<Hypothesis>> {
+        let Some(beside) = self.question.beside(base, self.counts) else { return Vec::new() };
+        let used = members(&base.hypothesis);
+        let others: Vec<usize> = self.asked.iter().copied().filter(|effect| !used.contains(effect)).collect();
+        let starts = others
+            .iter()
+            .flat_map(|cause| self.starts(&base.hypothesis, *cause).into_iter().map(|start| (*cause, start)));
+        let starts: Vec<(usize, Hypothesis)> = starts.collect();
+        let offered = parallel::map(&starts, |(cause, start)| {
+            Some(Offer { cause: *cause, ln_gain: 0.5 * beside.gain(start)?, start: start.clone() })
+        });
+        offered.into_iter().flatten().collect()
+    }
+
+    fn without(&self, fit: &Fit, cause: usize) -> Hypothesis {
+        let mut start = fit.hypothesis.clone();
+        start.effects.retain(|(index, _)| *index != cause);
+        start
+    }
+
+    fn fit(&self, start: &Hypothesis) -> Option<Fit> {
+        self.question.fit(start, self.counts)
+    }
+
+    fn goes_on(&self, _: &Fit, _: &Fit) -> bool {
+        true
+    }
 }
 
 /// Scores turned into probabilities.

@@ -1,0 +1,214 @@
+//! The most probable values of the unknowns of a nonlinear model: Gauss-Newton within bounds.
+
+use nalgebra::{DMatrix, DVector};
+
+/// A model whose whitened residuals depend on unknowns. Its cost is their sum of squares and that of the unknowns' distances from their
+/// priors, in standard deviations.
+pub trait Model {
+    /// What the model gives for values of the unknowns.
+    type Point;
+
+    /// What it gives there; `None` where it has no answer.
+    fn at(&self, unknowns: &DVector<f64>) -> Option<Self::Point>;
+
+    /// The cost of a point.
+    fn cost(&self, unknowns: &DVector<f64>, point: &Self::Point) -> f64;
+
+    /// The normal equations there, with slopes that are taken over a small part of the way or over a large one.
+    fn normal(&mut self, unknowns: &DVector<f64>, point: &Self::Point, reach: Reach) -> Normal;
+
+    /// How far each unknown may move, down (at most 0) and up, in one iteration.
+    fn room(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)>;
+
+    /// Called at each point that is accepted: a model may estimate its noise again there.
+    fn accept(&mut self, _: &Self::Point) {}
+}
+
+/// Over how much of the way slopes are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reach {
+    /// Where the cost is smooth.
+    Fine,
+    /// Where it has small steps, which the fine slope does not see past.
+    Coarse,
+}
+
+/// When a descent ends.
+#[derive(Debug, Clone, Copy)]
+pub struct Until {
+    /// Points at which slopes are taken, at most; at the last of them nothing is moved any more.
+    pub iterations: usize,
+    /// An iteration that promises less than this in the cost is not made.
+    pub enough: f64,
+}
+
+/// Where a descent ends.
+#[derive(Debug, Clone)]
+pub struct End<Point> {
+    /// The unknowns.
+    pub unknowns: DVector<f64>,
+    /// What the model gives there.
+    pub point: Point,
+    /// The normal equations there.
+    pub normal: Normal,
+}
+
+/// Tries along a step, and the factor by which each is shorter than the one before.
+const TRIES: usize = 5;
+const SHORTER: f64 = 0.35;
+
+/// Goes down from where the unknowns stand, and from what the model gives there.
+pub fn descend<M: Model>(
+    model: &mut M,
+    mut unknowns: DVector<f64>,
+    mut point: M::Point,
+    until: Until,
+) -> End<M::Point> {
+    model.accept(&point);
+    let mut reach = Reach::Fine;
+    let mut normal = model.normal(&unknowns, &point, reach);
+    for _ in 1..until.iterations {
+        let Some((step, promised)) = normal.step(&model.room(&unknowns)) else { break };
+        if promised < until.enough {
+            break;
+        }
+        let before = model.cost(&unknowns, &point);
+        let tries = (0..TRIES).map(|tries| &unknowns + &step * SHORTER.powi(tries as i32));
+        let lower = tries.into_iter().find_map(|there| {
+            let found = model.at(&there)?;
+            (model.cost(&there, &found) < before).then_some((there, found))
+        });
+        match lower {
+            Some((there, found)) => {
+                (unknowns, point) = (there, found);
+                model.accept(&point);
+            }
+            None if reach == Reach::Coarse => break,
+            None => reach = Reach::Coarse,
+        }
+        normal = model.normal(&unknowns, &point, reach);
+    }
+    End { unknowns, point, normal }
+}
+
+/// The normal equations of an iteration: half the cost's second derivatives, and half its slope downwards.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Normal {
+    /// Precision of the unknowns, priors included.
+    pub matrix: DMatrix<f64>,
+    /// What pulls at each of them.
+    pub pull: DVector<f64>,
+}
+
+impl Normal {
+    /// The step to the least cost within the room of each unknown, and what it promises: what would leave its room furthest is held at its end, and
+    /// the others are solved for again.
+    pub fn step(&self, room: &[(f64, f64)]) -> Option<(DVector<f64>, f64)> {
+        let mut held: Vec<Option<f64>> = vec![None; room.len()];
+        for _ in 0..=room.len() {
+            let free: Vec<usize> = (0..held.len()).filter(|i| held[*i].is_none()).collect();
+            let mut step = DVector::from_fn(held.len(), |i, _| held[i].unwrap_or(0.0));
+            let pushed = &self.matrix * &step;
+            let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| self.matrix[(free[i], free[j])]);
+            let right = DVector::from_fn(free.len(), |i, _| self.pull[free[i]] - pushed[free[i]]);
+            let part = matrix.cholesky()?.solve(&right);
+            for (place, index) in free.iter().enumerate() {
+                step[*index] = part[place];
+            }
+            let beyond = |i: &usize| (room[*i].0 - step[*i]).max(step[*i] - room[*i].1);
+            let furthest = free.into_iter().max_by(|a, b| beyond(a).total_cmp(&beyond(b)));
+            let Some(leaving) = furthest.filter(|i| beyond(i) > ROUNDING) else {
+                let promised = 2.0 * step.dot(&self.pull) - step.dot(&(&self.matrix * &step));
+                return Some((step, promised));
+            };
+            held[leaving] = Some(step[leaving].clamp(room[leaving].0.min(0.0), room[leaving].1.max(0.0)));
+        }
+        None
+    }
+
+    /// Half the logarithm of the determinant of the precision (Laplace's approximation of the evidence takes it off); `None` where the
+    /// precision is not positive definite.
+    pub fn half_ln_determinant(&self) -> Option<f64> {
+        let cholesky = self.matrix.clone().cholesky()?;
+        Some(cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum())
+    }
+
+    /// Covariance of the unknowns from the `first` on, the others free.
+    pub fn covariance_from(&self, first: usize) -> Option<DMatrix<f64>> {
+        let inverse = self.matrix.clone().cholesky()?.inverse();
+        let count = inverse.nrows() - first;
+        Some(inverse.view((first, first), (count, count)).into_owned())
+    }
+}
+
+/// What a step may be beyond its room.
+const ROUNDING: f64 = 1e-9;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Residuals `x - 1` and `10 (y - x^2)`, hardly any prior: the banana of Rosenbrock (1960), whose minimum is 0 at (1, 1).
+    struct Banana {
+        low: f64,
+    }
+
+    impl Model for Banana {
+        type Point = [f64; 2];
+
+        fn at(&self, x: &DVector<f64>) -> Option<[f64; 2]> {
+            Some([x[0] - 1.0, 10.0 * (x[1] - x[0] * x[0])])
+        }
+
+        fn cost(&self, _: &DVector<f64>, residual: &[f64; 2]) -> f64 {
+            residual.iter().map(|r| r * r).sum()
+        }
+
+        fn normal(&mut self, x: &DVector<f64>, residual: &[f64; 2], _: Reach) -> Normal {
+            let slopes = DMatrix::from_row_slice(2, 2, &[1.0, 0.0, -20.0 * x[0], 10.0]);
+            let residual = DVector::from_row_slice(residual);
+            Normal { matrix: slopes.tr_mul(&slopes), pull: -slopes.tr_mul(&residual) }
+        }
+
+        fn room(&self, x: &DVector<f64>) -> Vec<(f64, f64)> {
+            vec![(self.low - x[0], 5.0), (-5.0, 5.0)]
+        }
+    }
+
+    #[test]
+    fn the_minimum_is_found_within_bounds_and_at_them() {
+        let until = Until { iterations: 60, enough: 1e-20 };
+        let end = |low: f64, x: f64| {
+            let mut banana = Banana { low };
+            let start = DVector::from_row_slice(&[x, 1.0]);
+            let point = banana.at(&start).unwrap();
+            descend(&mut banana, start, point, until).unknowns
+        };
+        let free = end(-5.0, -1.2);
+        assert!((free[0] - 1.0).abs() < 1e-6 && (free[1] - 1.0).abs() < 1e-6, "{free}");
+        // From 1.5 on the least cost is at the bound, in the valley.
+        let bound = end(1.5, 3.0);
+        assert!((bound[0] - 1.5).abs() < 1e-6 && (bound[1] - 2.25).abs() < 1e-6, "{bound}");
+    }
+
+    /// Against all ways of holding unknowns at the ends of their room.
+    #[test]
+    fn a_step_within_room_solves_for_the_others() {
+        let matrix = DMatrix::from_row_slice(3, 3, &[4.0, 1.0, 0.5, 1.0, 3.0, 0.2, 0.5, 0.2, 2.0]);
+        let normal = Normal { matrix: matrix.clone(), pull: DVector::from_row_slice(&[8.0, -1.0, 1.0]) };
+        let (step, promised) = normal.step(&[(-1.0, 1.0); 3]).unwrap();
+        assert!((step[0] - 1.0).abs() < 1e-12);
+        // The gradient vanishes along what is free.
+        let gradient = &matrix * &step - &normal.pull;
+        assert!(gradient[1].abs() < 1e-12 && gradient[2].abs() < 1e-12);
+        let cost = |s: &DVector<f64>| s.dot(&(&matrix * s)) - 2.0 * s.dot(&normal.pull);
+        assert!((promised + cost(&step)).abs() < 1e-12);
+        for axis in 0..3 {
+            for by in [-0.01, 0.01] {
+                let mut other = step.clone();
+                other[axis] = (other[axis] + by).clamp(-1.0, 1.0);
+                assert!(cost(&other) >= cost(&step) - 1e-12);
+            }
+        }
+    }
+}

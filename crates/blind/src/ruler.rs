@@ -49,6 +49,7 @@ pub(crate) fn declared(campaign: &Campaign) -> Declared {
         noise_colour: NoiseColour::default(),
         tolerances: campaign.tolerances,
         nominal: campaign.boundary,
+        common_offsets: Vec::new(),
     }
 }
 

@@ -41,6 +41,7 @@ impl DriftRequest<'_> {
             noise_colour: self.identification.noise_colour,
             tolerances: self.tolerances,
             nominal: self.boundary,
+            common_offsets: Vec::new(),
         }
     }
 }

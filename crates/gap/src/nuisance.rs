@@ -2,7 +2,7 @@
 //! with its declared size as prior, in every hypothesis.
 
 use crate::shape::{SHAPE_SUM, SHAPES};
-use mapper_core::Channel;
+use mapper_core::{Channel, Dimension};
 use mapper_observe::channels::{self, DRIVERS};
 use mapper_observe::declared::Declared;
 use mapper_observe::knob::Knob;
@@ -19,6 +19,8 @@ pub const OUTPUTS: [Channel; 9] = {
 pub enum NuisanceKind {
     /// Fixed offset of a sensor.
     Offset(Channel),
+    /// Offset that all sensors of a dimension have in common which were compared at rest.
+    CommonOffset(Dimension),
     /// Gain of the compressor's flow meter.
     FlowMeterGain,
     /// One quantity of machine, cell or start.
@@ -36,6 +38,8 @@ impl std::fmt::Display for NuisanceKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             NuisanceKind::Offset(channel) => write!(f, "offset of {channel}"),
+            NuisanceKind::CommonOffset(Dimension::Pressure) => f.write_str("common offset of the pressures"),
+            NuisanceKind::CommonOffset(_) => f.write_str("common offset of the temperatures"),
             NuisanceKind::FlowMeterGain => f.write_str("flow_meter_gain"),
             NuisanceKind::Knob(Knob::Flow) => f.write_str("flow_map"),
             NuisanceKind::Knob(Knob::Efficiency) => f.write_str("compressor_efficiency"),
@@ -100,6 +104,9 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     all.extend((0..SHAPES).map(|i| (K::Shape(i), t.efficiency_shape_ratio / SHAPE_SUM)));
     let sensors = DRIVERS.iter().chain(OUTPUTS.iter().filter(|channel| !DRIVERS.contains(channel)));
     all.extend(sensors.map(|channel| (K::Offset(*channel), declared.offset_sigma(*channel))));
+    all.extend(declared.common_offsets.iter().filter_map(|common| {
+        Some((K::CommonOffset(common.channels.first()?.info().dimension), common.sigma))
+    }));
     all.extend((0..OUTPUTS.len()).map(|i| (K::Delay(i), DELAY_SIGMA_S)));
     all.into_iter()
         .filter(|(_, sigma)| *sigma > 0.0)
@@ -121,9 +128,21 @@ pub struct Circumstances {
 }
 
 /// Puts one nuisance of size `value` (in the unit of what it changes) into a rig.
-pub fn apply(kind: NuisanceKind, value: f64, rig: &mut Rig, circumstances: &mut Circumstances) {
+pub fn apply(
+    declared: &Declared,
+    kind: NuisanceKind,
+    value: f64,
+    rig: &mut Rig,
+    circumstances: &mut Circumstances,
+) {
     use NuisanceKind as K;
     match kind {
+        K::CommonOffset(dimension) => {
+            let all = declared.common_offsets.iter().flat_map(|common| &common.channels);
+            for channel in all.filter(|channel| channel.info().dimension == dimension) {
+                rig.instruments.path_mut(*channel).offset += value;
+            }
+        }
         K::Offset(channel) => rig.instruments.path_mut(channel).offset += value,
         K::FlowMeterGain => rig.instruments.path_mut(Channel::CompressorFlow).gain_ratio *= 1.0 + value,
         // The cell's temperature is read too high by it, so that the model is driven with less.

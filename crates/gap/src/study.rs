@@ -273,7 +273,7 @@ impl Study {
             }
         }
         for (nuisance, sigmas) in self.nuisances.iter().zip(&hypothesis.nuisances) {
-            apply(nuisance.kind, nuisance.value(*sigmas), &mut rig, &mut circumstances);
+            apply(&self.declared, nuisance.kind, nuisance.value(*sigmas), &mut rig, &mut circumstances);
         }
         if circumstances.shape != [0.0; SHAPES] {
             rig.model.map =

@@ -5,16 +5,18 @@
 mod common;
 
 use common::{Visits, boundary, declared};
-use mapper_core::{Channel, OperatingPoint, Recording, Series};
+use mapper_core::{Channel, Dimension, OperatingPoint, Recording, Series};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};
 use mapper_gap::experiment::{AllowedJump, Experiment};
 use mapper_gap::joint::{Fate, Value, over_recordings};
+use mapper_gap::nuisance::NuisanceKind;
 use mapper_gap::outlook::{apart, apart_at_first_sight};
 use mapper_gap::report::Verdict;
 use mapper_gap::study::Study;
 use mapper_gap::twin::{Found, hold};
 use mapper_gap::usable::usable;
+use mapper_observe::declared::CommonOffset;
 use mapper_observe::table::Table;
 use mapper_physics::effect::{Effect, Rig, add};
 use mapper_physics::model::Model;
@@ -89,6 +91,35 @@ fn ask_beside(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Di
         calibration: Calibration::shipped().unwrap(),
         progress: &|_, _| {},
     })
+}
+
+/// What several sensors have in common moves the prediction as their own offsets of the same size do together: the model sees both as
+/// shifted readings and shifted inputs.
+#[test]
+fn a_common_offset_is_all_of_the_single_ones() {
+    let recording = record(&[], 3);
+    let channels = vec![Channel::T1, Channel::T2, Channel::Tc, Channel::TOil];
+    let mut declared = declared();
+    declared.common_offsets = vec![CommonOffset { channels: channels.clone(), sigma: 0.15 }];
+    let study =
+        Study::new(&recording, Table::new(&recording).unwrap(), declared, Model::nominal(), Vec::new());
+    let shifted = |kinds: &[NuisanceKind], by_k: f64| {
+        let mut there = study.nothing();
+        for (nuisance, sigmas) in study.nuisances.iter().zip(&mut there.nuisances) {
+            if kinds.contains(&nuisance.kind) {
+                *sigmas = by_k / nuisance.sigma;
+            }
+        }
+        study.predict(&there).unwrap().values
+    };
+    let single: Vec<NuisanceKind> = channels.into_iter().map(NuisanceKind::Offset).collect();
+    let (together, each) =
+        (shifted(&[NuisanceKind::CommonOffset(Dimension::Temperature)], 0.4), shifted(&single, 0.4));
+    let nothing = shifted(&[], 0.4);
+    assert!(together.iter().zip(&nothing).any(|(a, b)| (a - b).abs() > 0.3));
+    for (a, b) in together.iter().zip(&each) {
+        assert!((a - b).abs() < 1e-9 * b.abs(), "{a} {b}");
+    }
 }
 
 #[test]

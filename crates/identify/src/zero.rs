@@ -2,7 +2,8 @@
 //!
 //! After a long soak at standstill (shaft at rest, oil and cell at one temperature) T1, T2, Tc and T_oil see one
 //! temperature, P1 and P2 one pressure. Their differences are offsets, to within how even the rig really was. What they
-//! have in common stays unknown; it shifts an efficiency by its share of the absolute temperature only, which is nothing.
+//! have in common stays as uncertain as their declared offsets leave it. It shifts an efficiency by its share of the absolute temperature
+//! only, which is nothing; a diagnosis of the whole machine sees it.
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
@@ -11,6 +12,7 @@ use crate::relaxation;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, Soak, StepMarker};
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::mean;
+use mapper_observe::declared::CommonOffset;
 use mapper_observe::plausible::is_reading;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -78,6 +80,9 @@ pub struct IsothermalZero {
     pub offsets: BTreeMap<Channel, f64>,
     /// One standard deviation of what is left of each offset, K or Pa.
     pub left_sigma: BTreeMap<Channel, f64>,
+    /// What is left of all offsets of one dimension in common: what sensors read together is no truer than their declared offsets let it be.
+    #[serde(default)]
+    pub common: Vec<CommonOffset>,
 }
 
 /// Why a recording has no isothermal zero.
@@ -220,6 +225,11 @@ fn zero_of(
             }
             common = of_others;
         }
+        let weight: f64 = readings.iter().map(|reading| reading.total.powi(-2)).sum();
+        zero.common.push(CommonOffset {
+            channels: readings.iter().map(|reading| reading.channel).collect(),
+            sigma: weight.sqrt().recip(),
+        });
         for reading in readings {
             zero.offsets.insert(reading.channel, reading.mean - common);
             zero.left_sigma.insert(reading.channel, reading.own);

@@ -34,6 +34,11 @@ impl ZeroOutcome {
             .map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
     }
 
+    /// The zero, where one was found.
+    pub fn found(&self) -> Option<&IsothermalZero> {
+        if let ZeroOutcome::Found(zero) = self { Some(zero) } else { None }
+    }
+
     /// Takes the offsets off a recording, and leaves what is not known of them in the configuration; both stay as they are
     /// where no zero was found.
     pub fn take_off(&self, recording: Recording, config: IdentifyConfig) -> (Recording, IdentifyConfig) {

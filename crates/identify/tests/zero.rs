@@ -11,6 +11,7 @@ use mapper_identify::{
     IdentifyConfig, NoZero, ZeroSettings, identify, isothermal_zero, isothermal_zero_with_a_fault, zeroed,
 };
 use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 /// Puts a soak of `soak_s` at 298.15 K and 100 kPa before a campaign.
@@ -110,4 +111,39 @@ fn a_broken_sensor_is_held_against_the_others() {
     assert!((zero.offsets[&Channel::T2] - 4.0).abs() < 1e-9, "{:?}", zero.offsets);
     assert!(zero.offsets[&Channel::T1].abs() < 1e-9 && zero.offsets[&Channel::Tc].abs() < 1e-9);
     assert!(matches!(shift(Channel::Tc, -4.0), Err(NoZero::Uneven { .. })));
+}
+
+/// Sensors that are compared with each other leave what they have in common: over draws of their offsets its spread is what the zero says.
+#[test]
+fn what_all_sensors_have_in_common_stays_as_uncertain_as_stated() {
+    let clean = campaign(&eighteen()[..2], 120.0, Machine::default());
+    let soaked = with_soak(&clean.recording, 300.0);
+    let sigmas = [(Channel::T1, 0.25), (Channel::T2, 0.25), (Channel::Tc, 0.5)];
+    let declared = |sigma: f64| DeclaredUncertainty { offset_sigma: sigma, ..DeclaredUncertainty::default() };
+    let config = IdentifyConfig {
+        declared: sigmas.map(|(channel, sigma)| (channel, declared(sigma))).into(),
+        ..IdentifyConfig::default()
+    };
+    let mut rng = Pcg64::seed_from_u64(9);
+    let draws = 60;
+    let mut squares = 0.0;
+    for _ in 0..draws {
+        let mut recording = soaked.clone();
+        let mut offsets = Vec::new();
+        for (channel, sigma) in sigmas {
+            let normal: f64 = StandardNormal.sample(&mut rng);
+            offsets.push((channel, sigma * normal));
+            let series = recording.series.get_mut(&channel).unwrap();
+            series.values.iter_mut().for_each(|value| *value += sigma * normal);
+        }
+        let zero = isothermal_zero(&recording, &config, &ZeroSettings::default()).unwrap();
+        let common = zero.common.iter().find(|common| common.channels.contains(&Channel::T1)).unwrap();
+        // Every sensor is left with the same error.
+        let left: Vec<f64> = offsets.iter().map(|(channel, off)| off - zero.offsets[channel]).collect();
+        assert!(left.iter().all(|other| (other - left[0]).abs() < 1e-9), "{left:?}");
+        squares += (left[0] / common.sigma).powi(2);
+    }
+    // Chi-square of 60 draws: three standard errors.
+    let mean = squares / f64::from(draws);
+    assert!((mean - 1.0).abs() < 3.0 * (2.0 / f64::from(draws)).sqrt(), "{mean}");
 }

@@ -2,6 +2,7 @@
 
 use mapper_core::{Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour};
 use mapper_physics::params::BoundaryConditions;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Declared uncertainty of every sensor of a recording, by the one rule that holds everywhere.
@@ -44,6 +45,17 @@ pub struct Declared {
     pub tolerances: ModelTolerances,
     /// Nominal boundary conditions, for what is not recorded.
     pub nominal: BoundaryConditions,
+    /// Offsets that several sensors have in common, beside their own.
+    pub common_offsets: Vec<CommonOffset>,
+}
+
+/// An offset that several sensors of one dimension have in common: what an isothermal zero, which compares them with each other, leaves.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct CommonOffset {
+    /// The sensors.
+    pub channels: Vec<Channel>,
+    /// One standard deviation, K or Pa.
+    pub sigma: f64,
 }
 
 impl Declared {

@@ -176,6 +176,7 @@ impl Session<'_> {
                 noise_colour: map.noise_colour.unwrap_or_default(),
                 tolerances: campaign.tolerances,
                 nominal: campaign.boundary,
+                common_offsets: zero.found().map_or_else(Vec::new, |zero| zero.common.clone()),
             };
             Zeroed { recording, declared, zero, off_at_rest }
         };
@@ -227,6 +228,7 @@ impl Session<'_> {
                 noise_colour: map.noise_colour.unwrap_or_default(),
                 tolerances: campaign.tolerances,
                 nominal: campaign.boundary,
+                common_offsets: Vec::new(),
             },
             model,
             effects,

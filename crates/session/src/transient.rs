@@ -76,6 +76,7 @@ impl Session<'_> {
                     noise_colour: map.noise_colour.unwrap_or_default(),
                     tolerances: campaign.tolerances,
                     nominal: campaign.boundary,
+                    common_offsets: Vec::new(),
                 },
                 calibration: &Calibration::shipped().map_err(SessionError::Calibration)?,
                 fit_until_s,

@@ -105,6 +105,7 @@ mod tests {
             noise_colour: Default::default(),
             tolerances: Default::default(),
             nominal: Default::default(),
+            common_offsets: Vec::new(),
         };
         let calm = calm(&rows, &declared);
         let off = |range: Range<usize>| {

@@ -167,5 +167,6 @@ pub fn declared() -> Declared {
         noise_colour: Default::default(),
         tolerances: Default::default(),
         nominal: BoundaryConditions::default(),
+        common_offsets: Vec::new(),
     }
 }

@@ -162,5 +162,6 @@ pub fn declared() -> Declared {
         noise_colour: NoiseColour::default(),
         tolerances,
         nominal: boundary(),
+        common_offsets: Vec::new(),
     }
 }

@@ -235,7 +235,7 @@ impl CampaignFile {
         let (points, point_paths) = self.grid.points(&lines, boundary.t1_k);
         let sensors = self.sensors.declarations();
         let probe_diameter_m = sensors.get(&Channel::T2).map_or(0.0, |sensor| sensor.probe_diameter_m);
-        let machine = self.machine.machine(probe_diameter_m, origin, files)?;
+        let mut machine = self.machine.machine(probe_diameter_m, origin, files)?;
         let alpha_area_ratio = machine.params.compressor.alpha_area_ratio;
         let speed_control = speed_control(self.speed_control);
         let timing = self.timing.timing();
@@ -246,6 +246,7 @@ impl CampaignFile {
             speed_is_held: speed_control.is_some(),
         };
         let guards = self.guards.map(|guards| guards.guards(&by));
+        machine.params.compressor.humidity_kg_kg = self.report.air(&boundary).humidity_kg_kg;
         let campaign = Campaign {
             name: self.campaign,
             description: self.description,

@@ -5,6 +5,7 @@ use crate::ensemble::draws;
 use crate::parameters::{COUNT, PARAMETERS, Parameter};
 use crate::{Declared, DrivenError, Predicted, Readings, Values, predict};
 use mapper_numerics::statistics::{mean, quantile, rms};
+use mapper_physics::air::Air;
 use mapper_physics::params::Params;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -188,7 +189,8 @@ fn trace(rows: &Readings, predicted: &[Predicted], noisy: &[Vec<f64>]) -> Trace 
     let every = || 0..rows.len();
     let apparent = |i: usize| {
         let (t1_k, ratio) = (rows.t1_k[i], rows.p2_pa[i] / rows.p1_pa[i]);
-        t1_k * mapper_physics::compression::isentropic_rise_ratio(ratio, t1_k) / (rows.t2_k[i] - t1_k)
+        t1_k * mapper_physics::compression::isentropic_rise_ratio(ratio, t1_k, Air::DRY)
+            / (rows.t2_k[i] - t1_k)
     };
     Trace {
         t_s: rows.t_s.clone(),

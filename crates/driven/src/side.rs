@@ -83,7 +83,7 @@ pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usi
                 .clamp(EFFICIENCY.0, EFFICIENCY.1);
         let (mut tc_k, mut reading_k) =
             state.unwrap_or((0.5 * (t1_k + rows.t2_k[i]) + start_over_k, rows.t2_k[i] - t2_offset_k));
-        let rise = isentropic_rise_ratio(rows.p2_pa[i] / rows.p1_pa[i], t1_k);
+        let rise = isentropic_rise_ratio(rows.p2_pa[i] / rows.p1_pa[i], t1_k, compressor.air());
         let h_w_m2k = h_ratio
             * nusselt::coefficient_w_m2k(
                 compressor.nusselt_coefficient,
@@ -95,6 +95,7 @@ pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usi
             );
         let gas = compress(
             &CompressionInputs {
+                air: compressor.air(),
                 t1_k,
                 tc_k,
                 flow_kg_s,

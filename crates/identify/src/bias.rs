@@ -119,9 +119,9 @@ fn sensitivity(fit: &Fit, samples: &Samples, geometry: Geometry, channel: Channe
                     Channel::CompressorFlow => Row { flow_kg_s: row.flow_kg_s + by, ..row },
                     Channel::T1 => {
                         let t1_k = row.t1_k + by;
-                        Row { t1_k, rise_ratio: isentropic_rise_ratio(pressures, t1_k), ..row }
+                        Row { t1_k, rise_ratio: isentropic_rise_ratio(pressures, t1_k, geometry.air), ..row }
                     }
-                    _ => Row { rise_ratio: isentropic_rise_ratio(pressures, row.t1_k), ..row },
+                    _ => Row { rise_ratio: isentropic_rise_ratio(pressures, row.t1_k, geometry.air), ..row },
                 }
             };
             -(fitted_k(moved(step)) - fitted_k(moved(-step))) / (2.0 * step)

@@ -3,6 +3,7 @@
 use mapper_core::{Channel, InletConvection, JointSettings, Method, ReferenceState, SettleBands, WindowRule};
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use mapper_numerics::coloured_noise::ColouredNoise;
+use mapper_physics::air::Air;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -32,8 +33,12 @@ pub struct IdentifyConfig {
     pub probe_diameter_m: f64,
     /// Which refinements the joint method makes.
     pub joint: JointSettings,
-    /// Reference state of corrected quantities.
+    /// Reference state of corrected quantities, dry air.
     pub reference: ReferenceState,
+    /// The air that is compressed.
+    pub air: Air,
+    /// One standard deviation of its humidity, kg/kg: part of the intervals of the joint method.
+    pub humidity_sigma_kg_kg: f64,
     /// What the tap of P1 reads.
     pub inlet_tap: PressureTap,
     /// What the tap of P2 reads.
@@ -62,12 +67,21 @@ impl Default for IdentifyConfig {
             probe_diameter_m: 0.0,
             joint: JointSettings::default(),
             reference: ReferenceState::SAE,
+            air: Air::DRY,
+            humidity_sigma_kg_kg: 0.0,
             inlet_tap: PressureTap::Total,
             outlet_tap: PressureTap::Total,
             declared: BTreeMap::new(),
             noise_colour: NoiseColour::default(),
             thresholds: Thresholds::default(),
         }
+    }
+}
+
+impl IdentifyConfig {
+    /// Corrected flow, kg/s: what dry air in the reference state would flow at the same Mach numbers.
+    pub(crate) fn corrected_flow_kg_s(&self, flow_kg_s: f64, t1_k: f64, p1_pa: f64) -> f64 {
+        self.reference.corrected_flow_kg_s(flow_kg_s * self.air.dry_flow_ratio(), t1_k, p1_pa)
     }
 }
 

@@ -60,7 +60,10 @@ pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) 
         p1_pa: column(|row| row.p1_pa),
         p2_pa: column(|row| row.p2_pa),
         flow_kg_s: column(|row| row.flow_kg_s),
-        rise_ratio: column(|row| isentropic_rise_ratio(row.p2_pa / row.p1_pa, row.t1_k)),
+        rise_ratio: rows
+            .iter()
+            .map(|row| isentropic_rise_ratio(row.p2_pa / row.p1_pa, row.t1_k, config.air))
+            .collect(),
         lost: 0,
     };
     let geometry = Geometry::of(config);
@@ -78,7 +81,7 @@ pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) 
 /// Apparent efficiency of a settled point (conventional mapping), and its standard error from declared offsets and gains,
 /// fractions. `None` where the temperature rise gives no efficiency.
 pub fn expected_steady(row: &ExpectedRow, config: &IdentifyConfig) -> Option<(f64, f64)> {
-    let means = Means { t1_k: row.t1_k, t2_k: row.t2_k, p1_pa: row.p1_pa, p2_pa: row.p2_pa };
+    let means = Means { t1_k: row.t1_k, t2_k: row.t2_k, p1_pa: row.p1_pa, p2_pa: row.p2_pa, air: config.air };
     let eta = means.apparent_eta();
     let sigma = uncertainty(&means, &Samples::default(), config).0.bias_standard_error;
     (eta.is_finite() && eta > 0.0 && sigma.is_finite()).then_some((eta, sigma))

@@ -5,7 +5,7 @@ use crate::IdentifyConfig;
 use crate::followed::{Followed, Probe};
 use crate::samples::Samples;
 use mapper_core::InletConvection;
-use mapper_physics::air;
+use mapper_physics::air::Air;
 use mapper_physics::compression::{CompressionInputs, compress, compressed_k};
 use mapper_physics::inlet_convection::InletLaw;
 use mapper_physics::params::Params;
@@ -28,6 +28,7 @@ pub(crate) struct Geometry {
     /// The law of h before the wheel, where it is not h.
     pub(crate) inlet: Option<InletLaw>,
     pub(crate) probe: Probe,
+    pub(crate) air: Air,
 }
 
 impl Geometry {
@@ -43,6 +44,7 @@ impl Geometry {
             internal_area_m2: config.internal_area_m2,
             inlet: (config.inlet_convection == InletConvection::Own).then_some(own),
             probe: Probe { diameter_m: config.probe_diameter_m, pipe_diameter_m: config.outlet_diameter_m },
+            air: config.air,
         }
     }
 
@@ -122,6 +124,7 @@ pub(crate) fn t2_k(geometry: Geometry, row: Row, eta: f64, h_w_m2k: f64) -> f64 
         inlet_h_ratio: geometry.inlet_h_ratio(row, eta),
         alpha_area_ratio: geometry.alpha_area_ratio,
         internal_area_m2: geometry.internal_area_m2,
+        air: geometry.air,
     };
     compress(&inputs, None).t2_k
 }
@@ -284,9 +287,9 @@ fn start(samples: &Samples, geometry: Geometry) -> [f64; 2] {
         let before = geometry.inlet_h_ratio(row, 1.0 / apparent)
             * geometry.alpha_area_ratio
             * geometry.internal_area_m2
-            / (row.flow_kg_s * air::heat_capacity_j_kgk(row.t1_k));
+            / (row.flow_kg_s * geometry.air.heat_capacity_j_kgk(row.t1_k));
         let after = (1.0 - geometry.alpha_area_ratio) * geometry.internal_area_m2
-            / (row.flow_kg_s * air::heat_capacity_j_kgk(*t2_k));
+            / (row.flow_kg_s * geometry.air.heat_capacity_j_kgk(*t2_k));
         let columns = [
             row.t1_k * row.rise_ratio,
             before * (row.tc_k - row.t1_k) * (1.0 + row.rise_ratio * apparent) + after * (row.tc_k - t2_k),

@@ -284,7 +284,7 @@ fn point(
         speed_rpm: state.speed_rpm,
         valve_opening_ratio: step.valve_opening_ratio,
         flow_kg_s: state.flow_kg_s,
-        flow_corrected_kg_s: config.reference.corrected_flow_kg_s(state.flow_kg_s, state.t1_k, state.p1_pa),
+        flow_corrected_kg_s: config.corrected_flow_kg_s(state.flow_kg_s, state.t1_k, state.p1_pa),
         speed_corrected_rpm: config.reference.corrected_speed_rpm(state.speed_rpm, state.t1_k),
         pressure_ratio: state.pressure_ratio,
         t1_k: state.t1_k,

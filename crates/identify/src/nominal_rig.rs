@@ -30,7 +30,7 @@ impl NominalRig<'_> {
         let map = self.model.map.as_ref();
         let reference = map.reference();
         let flow_kg_s =
-            reference.corrected_flow_kg_s(readings.flow_kg_s(), readings.t1_k(), readings.p1_pa());
+            reference.corrected_flow_kg_s(readings.dry_flow_kg_s(), readings.t1_k(), readings.p1_pa());
         let ratio = readings.p2_pa() / readings.p1_pa();
         let missing_kg_s = |speed_rpm: f64| {
             let corrected_rpm = reference.corrected_speed_rpm(speed_rpm, readings.t1_k());
@@ -50,7 +50,7 @@ impl NominalRig<'_> {
         let reference = map.reference();
         let corrected_rpm = reference.corrected_speed_rpm(readings.speed_rpm(), readings.t1_k());
         let flow_kg_s =
-            reference.corrected_flow_kg_s(readings.flow_kg_s(), readings.t1_k(), readings.p1_pa());
+            reference.corrected_flow_kg_s(readings.dry_flow_kg_s(), readings.t1_k(), readings.p1_pa());
         let (_, top) = map.surge_point(corrected_rpm);
         let largest_kg_s = map.choke_flow_corrected_kg_s(corrected_rpm);
         (top > 1.0 && largest_kg_s > 0.0).then_some(())?;

@@ -64,7 +64,7 @@ impl Samples {
             let complete = readings.into_iter().all(|(channel, value)| is_reading(channel, value))
                 && flow_kg_s > SMALLEST_FLOW_KG_S
                 && (!with_housing || is_reading(Channel::Tc, tc_k));
-            let rise_ratio = isentropic_rise_ratio(p2_pa / p1_pa, t1_k);
+            let rise_ratio = isentropic_rise_ratio(p2_pa / p1_pa, t1_k, config.air);
             if !complete || !rise_ratio.is_finite() {
                 samples.lost += 1;
                 continue;

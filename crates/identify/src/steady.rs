@@ -11,6 +11,7 @@ use crate::samples::Samples;
 use crate::{IdentifyConfig, width};
 use mapper_core::{Channel, EstimateUncertainty, Recording, Window};
 use mapper_numerics::statistics::{mean, standard_deviation};
+use mapper_physics::air::Air;
 use mapper_physics::compression::isentropic_rise_ratio;
 use mapper_physics::thermocouple::time_constant_s;
 
@@ -25,12 +26,14 @@ pub(crate) struct Means {
     pub(crate) t2_k: f64,
     pub(crate) p1_pa: f64,
     pub(crate) p2_pa: f64,
+    pub(crate) air: Air,
 }
 
 impl Means {
     /// `T1 (PR^kappa - 1)/(T2 - T1)` with `kappa = R/cp(T1)`.
     pub(crate) fn apparent_eta(&self) -> f64 {
-        self.t1_k * isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k) / (self.t2_k - self.t1_k)
+        self.t1_k * isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k, self.air)
+            / (self.t2_k - self.t1_k)
     }
 
     fn moved(self, channel: Channel, by: f64) -> Self {
@@ -78,6 +81,7 @@ pub(crate) fn estimate(
     let trend = Samples::of(recording, trend_window, config, false);
     let lag_k = lag_k(&samples, &trend, config);
     let means = Means {
+        air: config.air,
         t1_k: of(&samples.t1_k),
         t2_k: of(&samples.t2_k) + lag_k,
         p1_pa: of(&samples.p1_pa),

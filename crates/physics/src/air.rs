@@ -1,8 +1,10 @@
-//! Dry air: gas constant, heat capacity, viscosity, conductivity.
+//! Air, dry and moist: gas constant, heat capacity, viscosity, conductivity.
 //!
 //! Closed forms of the virtual laboratory, standing for the tables of the paper's reference 12. Domain: 250 to 800 K, at
 //! pressures of a few bar, where air is a perfect gas. Against tabulated dry air the heat capacity is within 1 %, the
 //! viscosity within 2 %, the conductivity within 5 % up to 700 K and 7 % at 800 K. Nothing is cut at the ends.
+
+use serde::{Deserialize, Serialize};
 
 /// Specific gas constant of dry air, J/(kg K).
 pub const GAS_CONSTANT_J_KGK: f64 = 287.05;
@@ -44,6 +46,62 @@ pub fn isentropic_exponent(temperature_k: f64) -> f64 {
     GAS_CONSTANT_J_KGK / heat_capacity_j_kgk(temperature_k)
 }
 
+/// Air as it is in a cell, a perfect gas: viscosity and conductivity are those of dry air (40 g/kg change them by 1 %).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Air {
+    /// Water per dry air, kg/kg, 0 to about 0.06.
+    pub humidity_kg_kg: f64,
+}
+
+impl Air {
+    /// Without water.
+    pub const DRY: Air = Air { humidity_kg_kg: 0.0 };
+
+    /// Of this relative humidity (0..1) at a temperature (-20 to 50 degC) and a pressure, Pa. The pressure of saturated vapour is that of Buck
+    /// (Buck Research CR-1A manual, 1996), enhanced by 0.4 % in air.
+    ///
+    /// ```
+    /// use mapper_physics::air::Air;
+    /// let air = Air::of_relative_humidity(0.5, 298.15, 101_325.0);
+    /// assert!((air.humidity_kg_kg - 0.00993).abs() < 5e-5);
+    /// ```
+    pub fn of_relative_humidity(relative_ratio: f64, temperature_k: f64, pressure_pa: f64) -> Air {
+        let t_c = temperature_k - 273.15;
+        let (a, b, c, at_0_pa) =
+            if t_c < 0.0 { (23.036, 333.7, 279.82, 611.15) } else { (18.678, 234.5, 257.14, 611.21) };
+        let saturated_pa = 1.004 * at_0_pa * ((a - t_c / b) * t_c / (c + t_c)).exp();
+        let vapour_pa = (relative_ratio * saturated_pa).min(0.5 * pressure_pa);
+        Air { humidity_kg_kg: VAPOUR_MASS_RATIO * vapour_pa / (pressure_pa - vapour_pa) }
+    }
+
+    /// Specific gas constant, J/(kg K).
+    #[inline]
+    pub fn gas_constant_j_kgk(self) -> f64 {
+        moist_gas_constant_j_kgk(self.humidity_kg_kg)
+    }
+
+    /// Isobaric heat capacity, J/(kg K).
+    #[inline]
+    pub fn heat_capacity_j_kgk(self, temperature_k: f64) -> f64 {
+        moist_heat_capacity_ratio(self.humidity_kg_kg) * heat_capacity_j_kgk(temperature_k)
+    }
+
+    /// Exponent `kappa = R/cp(T)` of the isentropic temperature ratio `PR^kappa`.
+    #[inline]
+    pub fn isentropic_exponent(self, temperature_k: f64) -> f64 {
+        self.gas_constant_j_kgk() / self.heat_capacity_j_kgk(temperature_k)
+    }
+
+    /// Flow that dry air would have at the same Mach numbers over this one's: `sqrt(R/R_dry)`. Corrected flows are those of dry air.
+    #[inline]
+    pub fn dry_flow_ratio(self) -> f64 {
+        (self.gas_constant_j_kgk() / GAS_CONSTANT_J_KGK).sqrt()
+    }
+}
+
+/// Molar mass of water over that of dry air.
+const VAPOUR_MASS_RATIO: f64 = 0.62198;
+
 /// Gas constant of air with `humidity_kg_kg` of water per dry air, `R (1 + 0.6078 w)`, J/(kg K).
 #[inline]
 pub fn moist_gas_constant_j_kgk(humidity_kg_kg: f64) -> f64 {
@@ -78,6 +136,21 @@ mod tests {
         assert!((heat_capacity_j_kgk(800.0) / 1099.0 - 1.0).abs() < 0.01);
         assert!((viscosity_pa_s(800.0) / 369.8e-7 - 1.0).abs() < 0.025);
         assert!((conductivity_w_mk(800.0) / 57.3e-3 - 1.0).abs() < 0.07);
+    }
+
+    /// Humidity ratios of CoolProp 6 (`HAPropsSI('W', ...)`), which has real vapour: within 0.5 %.
+    #[test]
+    fn relative_humidity_is_that_of_coolprop() {
+        for (t_k, p_pa, relative, expected) in [
+            (298.15, 101_325.0, 0.5, 0.009_925_74),
+            (308.15, 101_325.0, 0.8, 0.029_064_5),
+            (273.15, 100e3, 0.9, 0.003_454_21),
+            (253.15, 100e3, 0.5, 0.000_322_682),
+            (318.15, 95e3, 0.3, 0.019_530_7),
+        ] {
+            let found = Air::of_relative_humidity(relative, t_k, p_pa).humidity_kg_kg;
+            assert!((found / expected - 1.0).abs() < 5e-3, "{found} at {t_k} K");
+        }
     }
 
     /// The mixture rule itself with R = 461.5 J/(kg K) and cp = 1850 J/(kg K) of vapour, per kg of moist air. The linear

@@ -7,7 +7,7 @@
 //! pressure ratios up to about 6, beyond which cp at the inlet no longer stands for the whole compression. Eq. 3 is the
 //! one-node form of a heat exchanger: the gas never passes the metal's temperature.
 
-use crate::air;
+use crate::air::Air;
 use crate::power::power;
 
 /// What the gas meets on its way through the compressor.
@@ -31,6 +31,8 @@ pub struct CompressionInputs {
     pub alpha_area_ratio: f64,
     /// Internal area A_c, m2.
     pub internal_area_m2: f64,
+    /// The gas.
+    pub air: Air,
 }
 
 /// Temperatures and heats along the way.
@@ -50,8 +52,8 @@ pub struct Compression {
 
 /// `PR^kappa - 1` with `kappa = R/cp(T1)`: the isentropic temperature rise over the inlet temperature.
 #[inline]
-pub fn isentropic_rise_ratio(pressure_ratio: f64, t1_k: f64) -> f64 {
-    power(pressure_ratio, air::isentropic_exponent(t1_k)) - 1.0
+pub fn isentropic_rise_ratio(pressure_ratio: f64, t1_k: f64, air: Air) -> f64 {
+    power(pressure_ratio, air.isentropic_exponent(t1_k)) - 1.0
 }
 
 /// Gas temperature after adiabatic compression from `inlet_k` (eq. 2), K.
@@ -105,12 +107,13 @@ pub fn after_wheel(
 /// compression without heat transfer, the identification T2' itself (pass `None`).
 #[inline]
 pub fn compress(inputs: &CompressionInputs, bulk_heat_capacity_k: Option<f64>) -> Compression {
-    let &CompressionInputs { t1_k, tc_k, flow_kg_s, isentropic_rise_ratio, efficiency, h_w_m2k, .. } = inputs;
+    let &CompressionInputs { t1_k, tc_k, flow_kg_s, isentropic_rise_ratio, efficiency, h_w_m2k, air, .. } =
+        inputs;
     let before_w_k = h_w_m2k * inputs.inlet_h_ratio * (inputs.alpha_area_ratio * inputs.internal_area_m2);
     let after_w_k = h_w_m2k * ((1.0 - inputs.alpha_area_ratio) * inputs.internal_area_m2);
-    let (q1_w, t1_prime_k) = before_wheel(before_w_k, t1_k, tc_k, flow_kg_s, air::heat_capacity_j_kgk(t1_k));
+    let (q1_w, t1_prime_k) = before_wheel(before_w_k, t1_k, tc_k, flow_kg_s, air.heat_capacity_j_kgk(t1_k));
     let t2_prime_k = compressed_k(t1_prime_k, isentropic_rise_ratio, efficiency);
-    let cp = air::heat_capacity_j_kgk(bulk_heat_capacity_k.unwrap_or(t2_prime_k));
+    let cp = air.heat_capacity_j_kgk(bulk_heat_capacity_k.unwrap_or(t2_prime_k));
     let (q2_w, t2_k) = after_wheel(after_w_k, t2_prime_k, tc_k, flow_kg_s, cp);
     Compression { t1_prime_k, t2_prime_k, t2_k, q1_w, q2_w }
 }
@@ -137,12 +140,13 @@ mod tests {
                         t1_k,
                         tc_k,
                         flow_kg_s,
-                        isentropic_rise_ratio: isentropic_rise_ratio(pr, t1_k),
+                        isentropic_rise_ratio: isentropic_rise_ratio(pr, t1_k, Air::DRY),
                         efficiency,
                         h_w_m2k,
                         inlet_h_ratio,
                         alpha_area_ratio,
                         internal_area_m2: 29e-3,
+                        air: Air::DRY,
                     }
                 },
             )
@@ -153,7 +157,7 @@ mod tests {
     /// 480.6 K. cp held at the inlet's costs 0.2 % and 0.3 %.
     #[test]
     fn a_text_book_compression() {
-        let rise = isentropic_rise_ratio(4.0, 300.0);
+        let rise = isentropic_rise_ratio(4.0, 300.0, Air::DRY);
         assert!((compressed_k(300.0, rise, 1.0) / 444.8 - 1.0).abs() < 3e-3);
         assert!((compressed_k(300.0, rise, 0.8) / 480.6 - 1.0).abs() < 4e-3);
     }
@@ -164,7 +168,7 @@ mod tests {
         fn ideal_compression_is_isentropic(pr in 1.0..4.0f64, t1_k in 250.0..330.0f64) {
             let ideal = CompressionInputs {
                 t1_k, tc_k: 350.0, flow_kg_s: 0.05, efficiency: 1.0, h_w_m2k: 0.0, inlet_h_ratio: 1.0, alpha_area_ratio: 0.3,
-                isentropic_rise_ratio: isentropic_rise_ratio(pr, t1_k), internal_area_m2: 29e-3,
+                isentropic_rise_ratio: isentropic_rise_ratio(pr, t1_k, Air::DRY), internal_area_m2: 29e-3, air: Air::DRY,
             };
             let isentropic_k = t1_k * pr.powf(287.05 / (1002.5 + 275e-6 * (t1_k - 200.0).powi(2)));
             // Two roundings apart.
@@ -183,7 +187,7 @@ mod tests {
         #[test]
         fn heat_is_conserved(inputs in inputs()) {
             let gas = compress(&inputs, None);
-            let lost_w = inputs.flow_kg_s * air::heat_capacity_j_kgk(gas.t2_prime_k) * (gas.t2_prime_k - gas.t2_k);
+            let lost_w = inputs.flow_kg_s * crate::air::heat_capacity_j_kgk(gas.t2_prime_k) * (gas.t2_prime_k - gas.t2_k);
             prop_assert!((lost_w - gas.q2_w).abs() <= 1e-9 * (1.0 + gas.q2_w.abs()));
         }
     }

@@ -66,6 +66,7 @@ pub fn hold_speed(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::air::Air;
 
     /// With T3 and oil at T2 the temperature rise gives the map's own efficiency, but for what is lost to the cell.
     #[test]
@@ -75,7 +76,8 @@ mod tests {
         let follow = FollowOutlet { turbine_inlet: true, oil: true };
         let error = |held: &SteadyState| {
             let outputs = &held.outputs;
-            let rise = crate::compression::isentropic_rise_ratio(outputs.pressure_ratio, boundary.t1_k);
+            let rise =
+                crate::compression::isentropic_rise_ratio(outputs.pressure_ratio, boundary.t1_k, Air::DRY);
             (boundary.t1_k * rise / (outputs.t2_k - boundary.t1_k) - outputs.efficiency).abs()
         };
         for speed_rpm in [50e3, 80e3] {

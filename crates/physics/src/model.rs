@@ -83,11 +83,11 @@ impl Model {
     #[inline]
     pub fn prepare_at(&self, t_s: f64, boundary: &BoundaryConditions) -> PreparedModel<'_> {
         let reference = self.map.reference();
-        let humidity_kg_kg = self.params.compressor.humidity_kg_kg;
-        let moist_cp_ratio = air::moist_heat_capacity_ratio(humidity_kg_kg);
-        let gas_constant_j_kgk = air::moist_gas_constant_j_kgk(humidity_kg_kg);
+        let air = self.params.compressor.air();
+        let moist_cp_ratio = air::moist_heat_capacity_ratio(air.humidity_kg_kg);
+        let gas_constant_j_kgk = air.gas_constant_j_kgk();
         let moist_flow_ratio = (air::GAS_CONSTANT_J_KGK / gas_constant_j_kgk).sqrt();
-        let cp1_j_kgk = moist_cp_ratio * air::heat_capacity_j_kgk(boundary.t1_k);
+        let cp1_j_kgk = air.heat_capacity_j_kgk(boundary.t1_k);
         PreparedModel {
             model: self,
             t_s,

@@ -1,5 +1,6 @@
 //! Every parameter of the lumped turbocharger model, with Appendix A's values as default.
 
+use crate::air::Air;
 pub use crate::boundary::BoundaryConditions;
 use mapper_core::{InletConvection, ReferenceState};
 use serde::{Deserialize, Serialize};
@@ -134,6 +135,13 @@ pub struct OutletParams {
     pub valve_area_m2: f64,
     /// Discharge coefficient of the valve.
     pub discharge_coefficient: f64,
+}
+
+impl CompressorParams {
+    /// The air that is compressed.
+    pub fn air(&self) -> Air {
+        Air { humidity_kg_kg: self.humidity_kg_kg }
+    }
 }
 
 impl Default for Params {

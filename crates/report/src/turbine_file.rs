@@ -6,7 +6,7 @@
 //! is taken for air. Expansion is from the total inlet pressure to the outlet pressure as tapped.
 
 use mapper_core::{Channel, IdentifiedPoint, Recording, one_line};
-use mapper_physics::air;
+use mapper_physics::air::{self, Air};
 use mapper_physics::compression::isentropic_rise_ratio;
 use serde::Serialize;
 use std::fmt::Write;
@@ -54,7 +54,7 @@ fn turbine_point(recording: &Recording, point: &IdentifiedPoint) -> Option<Turbi
         * t3_k
         * (1.0 - expansion_ratio.powf(-air::isentropic_exponent(t3_k)));
     let compressor_w = point.eta.filter(|eta| *eta > 0.0).map(|eta| {
-        let rise_k = point.t1_k * isentropic_rise_ratio(point.pressure_ratio, point.t1_k) / eta;
+        let rise_k = point.t1_k * isentropic_rise_ratio(point.pressure_ratio, point.t1_k, Air::DRY) / eta;
         point.flow_kg_s * air::heat_capacity_j_kgk(point.t1_k + 0.5 * rise_k) * rise_k
     });
     Some(TurbinePoint {

@@ -5,6 +5,7 @@ use crate::outcome::{extremes, worst};
 use crate::picture::{krpm, speed_colour, target_speeds_rpm};
 use crate::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Scatter};
+use mapper_physics::air::Air;
 use mapper_physics::compression::isentropic_rise_ratio;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
@@ -33,7 +34,7 @@ impl Place {
 
 pub(crate) fn apparent_eta(steady: &SteadyState) -> f64 {
     let (t1_k, outputs) = (steady.boundary.t1_k, &steady.outputs);
-    t1_k * isentropic_rise_ratio(outputs.pressure_ratio, t1_k) / (outputs.t2_k - t1_k)
+    t1_k * isentropic_rise_ratio(outputs.pressure_ratio, t1_k, Air::DRY) / (outputs.t2_k - t1_k)
 }
 
 /// The settled point at a turbine inlet temperature; `None` where no P3 holds the speed.

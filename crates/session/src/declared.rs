@@ -29,6 +29,8 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         probe_diameter_m: campaign.machine.params.t2_probe_diameter_m,
         joint: chosen.joint,
         internal_area_m2: campaign.machine.params.compressor.internal_area_m2,
+        air: campaign.machine.params.compressor.air(),
+        humidity_sigma_kg_kg: campaign.report.humidity_sigma_kg_kg(&campaign.boundary),
         reference: campaign.reference,
         inlet_tap: tap(Channel::P1),
         outlet_tap: tap(Channel::P2),

@@ -40,7 +40,7 @@ impl WorkPoint {
 /// Isentropic specific work at the map's reference state, J/kg.
 pub fn isentropic_work_j_kg(reference: ReferenceState, pressure_ratio: f64) -> f64 {
     let t_k = reference.t_ref_k;
-    air::heat_capacity_j_kgk(t_k) * t_k * isentropic_rise_ratio(pressure_ratio, t_k)
+    air::heat_capacity_j_kgk(t_k) * t_k * isentropic_rise_ratio(pressure_ratio, t_k, air::Air::DRY)
 }
 
 /// The points with an efficiency that lie outside choke.

@@ -5,6 +5,8 @@ use crate::checking::Check;
 use crate::si::si_if_given;
 use crate::units::{Fraction, Pressure, Quantity, Temperature};
 use mapper_core::Channel;
+use mapper_physics::air::Air;
+use mapper_physics::params::BoundaryConditions;
 use mapper_yaml::FindingKind;
 use mapper_yaml::steps;
 use schemars::JsonSchema;
@@ -27,7 +29,7 @@ pub struct Report {
     #[serde(rename(deserialize = "barometer"), default, deserialize_with = "si_if_given::<Pressure, _>")]
     #[schemars(with = "Option<Quantity<Pressure>>", extend("x-min" = "50 kPa", "x-max" = "120 kPa"))]
     pub barometer_pa: Option<f64>,
-    /// Relative humidity in the cell.
+    /// Relative humidity in the cell, whose air the compressor takes in. The air is dry where it is not given.
     #[serde(rename(deserialize = "humidity"), default, deserialize_with = "si_if_given::<Fraction, _>")]
     #[schemars(with = "Option<Quantity<Fraction>>", extend("x-min" = "0 %", "x-max" = "100 %"), example = &"50 %")]
     pub humidity_ratio: Option<f64>,
@@ -40,6 +42,31 @@ pub struct Report {
     #[schemars(with = "Option<Quantity<Temperature>>", extend("x-min" = "200 K", "x-max" = "400 K"))]
     pub cell_temperature_k: Option<f64>,
 }
+
+impl Report {
+    /// Air of a relative humidity in the cell.
+    fn air_of(&self, relative_ratio: f64, boundary: &BoundaryConditions) -> Air {
+        let temperature_k = self.cell_temperature_k.unwrap_or(boundary.ambient_temperature_k);
+        let pressure_pa = self.barometer_pa.unwrap_or(boundary.p1_pa);
+        Air::of_relative_humidity(relative_ratio, temperature_k, pressure_pa)
+    }
+
+    /// The air that the compressor takes in: by the humidity in the cell, dry where it is not given.
+    pub(crate) fn air(&self, boundary: &BoundaryConditions) -> Air {
+        self.humidity_ratio.map_or(Air::DRY, |ratio| self.air_of(ratio, boundary))
+    }
+
+    /// One standard deviation of its humidity, kg/kg. Where none is given it lies anywhere between dry and saturated.
+    pub fn humidity_sigma_kg_kg(&self, boundary: &BoundaryConditions) -> f64 {
+        let saturated_kg_kg = self.air_of(1.0, boundary).humidity_kg_kg;
+        saturated_kg_kg * if self.humidity_ratio.is_some() { HYGROMETER_RATIO } else { ANYWHERE_RATIO }
+    }
+}
+
+/// Standard uncertainty of a relative humidity that is read off a hygrometer. Judgement: capacitive ones are sold with 2 to 3 %.
+const HYGROMETER_RATIO: f64 = 0.03;
+/// Root mean square of a humidity that is uniform between 0 and saturation, over saturation.
+const ANYWHERE_RATIO: f64 = 0.577_350_269_189_625_8;
 
 /// A channel that has a sensor, by its symbol.
 struct SensorSymbol;

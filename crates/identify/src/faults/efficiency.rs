@@ -142,7 +142,8 @@ fn apparent(readings: &Readings) -> f64 {
 }
 
 fn isentropic_rise_k(readings: &Readings) -> f64 {
-    readings.t1_k() * isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), readings.t1_k())
+    readings.t1_k()
+        * isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), readings.t1_k(), readings.air)
 }
 
 /// Temperature that the gas lost to the housing, over its rise by compression.

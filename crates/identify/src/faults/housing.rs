@@ -17,7 +17,6 @@ use crate::faults::rows::{Rows, common, own};
 use crate::samples::Samples;
 use mapper_core::{Channel, Recording, StepKind, StepMarker, Window};
 use mapper_numerics::statistics::mean;
-use mapper_physics::air;
 
 /// Begin of what is looked at, after that of the step, s: speed, flow and probe have settled.
 const AFTER_S: f64 = 10.0;
@@ -130,7 +129,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
             Channel::T2 | Channel::Tc => part.tc_k,
             _ => f64::NAN,
         });
-        Readings { values, run_ratio: run_ratio(part) }
+        Readings { values, run_ratio: run_ratio(part), air: config.air }
     };
     Some(Rows {
         residual: column(&|part| part.conductance_w_k * (part.t2_k - part.tc_k)),
@@ -161,7 +160,7 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
         let of = |column: &[f64]| mean(&column[range.clone()]);
         let (middle_s, tc_k, t1_k) = (of(&samples.t_s)?, of(&samples.tc_k)?, of(&samples.t1_k)?);
         let t2_k = of(&samples.t2_k)?;
-        let capacity_w_k = of(&samples.flow_kg_s)? * air::heat_capacity_j_kgk(t1_k);
+        let capacity_w_k = of(&samples.flow_kg_s)? * config.air.heat_capacity_j_kgk(t1_k);
         let (top, bottom) = range.clone().fold((0.0, 0.0), |(top, bottom), i| {
             let since_s = samples.t_s[i] - middle_s;
             (top + since_s * samples.tc_k[i], bottom + since_s * since_s)

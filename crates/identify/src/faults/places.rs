@@ -75,6 +75,6 @@ pub(crate) fn is_on_a_map(readings: &Readings) -> bool {
 /// compressors without its constants.
 fn coefficients(readings: &Readings) -> (f64, f64) {
     let (t1_k, speed_rpm) = (readings.t1_k(), readings.speed_rpm());
-    let rise_k = t1_k * isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), t1_k);
+    let rise_k = t1_k * isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), t1_k, readings.air);
     (readings.flow_kg_s() * t1_k / (readings.p1_pa() * speed_rpm), rise_k / (speed_rpm * speed_rpm))
 }

@@ -4,6 +4,7 @@ use crate::IdentifyConfig;
 use crate::config::coloured;
 use crate::objections::ends::{Ends, LAST_S};
 use mapper_core::{Channel, Recording};
+use mapper_physics::air::Air;
 
 /// The channels of the compressor, in the order of all arrays here.
 pub(crate) const CHANNELS: [Channel; 7] = [
@@ -26,6 +27,8 @@ pub(crate) struct Readings {
     pub(crate) values: PerChannel,
     /// Time since the first step's start over the whole run's length.
     pub(crate) run_ratio: f64,
+    /// The air that is compressed.
+    pub(crate) air: Air,
 }
 
 /// Start of the first and end of the last step, s.
@@ -50,8 +53,14 @@ impl Readings {
                 end.flow_kg_s,
                 end.speed_rpm,
             ],
+            air: end.air,
             run_ratio: (end.end_s - first_s) / (last_s - first_s).max(f64::MIN_POSITIVE),
         }
+    }
+
+    /// Flow that dry air would have at the same Mach numbers, kg/s.
+    pub(crate) fn dry_flow_kg_s(&self) -> f64 {
+        self.flow_kg_s() * self.air.dry_flow_ratio()
     }
 
     pub(crate) fn t1_k(&self) -> f64 {

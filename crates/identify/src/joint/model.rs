@@ -1,13 +1,13 @@
 //! The reading of T2 that a step's rows give under given parameters, and its derivatives.
 
 use crate::joint::parameters::{
-    ALPHA, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, INLET, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION,
-    LOCAL, LocalVector, OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
+    ALPHA, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, HUMIDITY, INLET, LN_COEFFICIENT, LN_DEVIATION,
+    LN_DIRECTION, LOCAL, LocalVector, OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
 };
 use crate::joint::rows::Row;
 use crate::joint::surface::{TERM_COUNT, dot};
 use crate::probe::{self, Lag, follow};
-use mapper_physics::air;
+use mapper_physics::air::{self, Air};
 use mapper_physics::compression::{CompressionInputs, compress, compressed_k, isentropic_rise_ratio};
 use mapper_physics::inlet_convection::InletLaw;
 use mapper_physics::nusselt;
@@ -18,6 +18,8 @@ pub(crate) struct Setting {
     pub(crate) internal_area_m2: f64,
     pub(crate) outlet_diameter_m: f64,
     pub(crate) inlet_diameter_m: f64,
+    /// The air that is compressed.
+    pub(crate) air: Air,
     /// Reynolds number at which the law's coefficient is taken.
     pub(crate) reynolds_reference: f64,
     /// Whether h follows the law; else it holds still within a step.
@@ -51,6 +53,8 @@ struct Gas {
     flow_kg_s: f64,
     rise_ratio: f64,
     eta: f64,
+    /// The air that is compressed.
+    air: Air,
 }
 
 /// Convection on the way, one row.
@@ -163,6 +167,7 @@ impl Setting {
                 inlet_h_ratio,
                 alpha_area_ratio: before_m2 / (before_m2 + after_m2),
                 internal_area_m2: before_m2 + after_m2,
+                air: gas.air,
             };
             // Without the law the identification is that of the paper, which takes cp at T2'.
             compress(&inputs, self.with_law.then_some(bulk_k))
@@ -183,12 +188,14 @@ impl Setting {
         let offset = |index: usize| shared[OFFSETS + index];
         let t1_k = row.t1_k - offset(0);
         let pressure_ratio = (row.p2_pa - offset(4)) / (row.p1_pa - offset(3));
+        let air = Air { humidity_kg_kg: self.air.humidity_kg_kg + shared[HUMIDITY] };
         let slope = if self.shaped { local[SLOPE] * dot(terms, surface_of(shared)) } else { 0.0 };
         Gas {
             t1_k,
             tc_k: row.tc_k - offset(2),
             flow_kg_s: row.flow_kg_s / (1.0 + shared[FLOW_GAIN]),
-            rise_ratio: isentropic_rise_ratio(pressure_ratio, t1_k),
+            rise_ratio: isentropic_rise_ratio(pressure_ratio, t1_k, air),
+            air,
             eta: (local[ETA] + slope).max(0.02),
         }
     }
@@ -321,7 +328,8 @@ impl Setting {
             if active[OFFSETS] {
                 let (step, t1_k) = (gas.t1_k * STEP_RATIO, gas.t1_k * (1.0 + STEP_RATIO));
                 let pressure_ratio = (row.p2_pa - shared[OFFSETS + 4]) / (row.p1_pa - shared[OFFSETS + 3]);
-                let moved = Gas { t1_k, rise_ratio: isentropic_rise_ratio(pressure_ratio, t1_k), ..gas };
+                let moved =
+                    Gas { t1_k, rise_ratio: isentropic_rise_ratio(pressure_ratio, t1_k, gas.air), ..gas };
                 let convection = self.h(&moved, shared, deviation);
                 put(OFFSETS, -(self.t2_k(&moved, convection, alpha, ln_direction) - t2_k) / step);
             }
@@ -332,7 +340,7 @@ impl Setting {
             }
             if active[OFFSETS + 3] || active[OFFSETS + 4] {
                 let by_rise = full(Gas { rise_ratio: gas.rise_ratio + STEP_RATIO, ..gas }, STEP_RATIO);
-                let by_ln_ratio = by_rise * (1.0 + gas.rise_ratio) * air::isentropic_exponent(gas.t1_k);
+                let by_ln_ratio = by_rise * (1.0 + gas.rise_ratio) * gas.air.isentropic_exponent(gas.t1_k);
                 put(OFFSETS + 3, by_ln_ratio / (row.p1_pa - shared[OFFSETS + 3]));
                 put(OFFSETS + 4, -by_ln_ratio / (row.p2_pa - shared[OFFSETS + 4]));
             }
@@ -340,6 +348,12 @@ impl Setting {
                 let step = gas.flow_kg_s * STEP_RATIO;
                 let by_flow = full(Gas { flow_kg_s: gas.flow_kg_s + step, ..gas }, step);
                 put(FLOW_GAIN, -by_flow * gas.flow_kg_s / (1.0 + shared[FLOW_GAIN]));
+            }
+            if active[HUMIDITY] {
+                let pressure_ratio = (row.p2_pa - shared[OFFSETS + 4]) / (row.p1_pa - shared[OFFSETS + 3]);
+                let air = Air { humidity_kg_kg: gas.air.humidity_kg_kg + STEP_RATIO };
+                let rise_ratio = isentropic_rise_ratio(pressure_ratio, gas.t1_k, air);
+                put(HUMIDITY, full(Gas { air, rise_ratio, ..gas }, STEP_RATIO));
             }
         }
         self.through_probe(course.rows, gas_k, columns, shared, local, active)

@@ -20,9 +20,11 @@ pub(crate) const OFFSET_CHANNELS: [Channel; 5] =
     [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2];
 /// Index of the flow meter's gain error, ratio.
 pub(crate) const FLOW_GAIN: usize = OFFSETS + OFFSET_CHANNELS.len();
+/// Index of the humidity's error, kg/kg.
+pub(crate) const HUMIDITY: usize = FLOW_GAIN + 1;
 /// Index of how far h before the wheel follows the inlet's own law: 0 is h after the wheel, 1 is that law, and in between
 /// it moves as a power. Never sought: next to alpha_A a recording says next to nothing of it.
-pub(crate) const INLET: usize = FLOW_GAIN + 1;
+pub(crate) const INLET: usize = HUMIDITY + 1;
 /// Index of the first coefficient of the efficiency surface.
 pub(crate) const SURFACE: usize = INLET + 1;
 /// Index of the first bend of the efficiencies that an offset brings, in the order of [`OFFSET_CHANNELS`] and in units of that offset. The fit
@@ -87,6 +89,7 @@ pub(crate) fn symbol(index: usize) -> String {
         PROBE_MM2 => "probe diameter".to_owned(),
         LN_DIRECTION => "direction factor".to_owned(),
         FLOW_GAIN => "gain of m_c".to_owned(),
+        HUMIDITY => "humidity".to_owned(),
         INLET => "h before the wheel".to_owned(),
         _ => match OFFSET_CHANNELS.get(index.wrapping_sub(OFFSETS)) {
             Some(channel) => format!("offset of {channel}"),

@@ -1,7 +1,7 @@
 //! Numbers that err with the parameters of a joint fit, and how they err together.
 
 use crate::joint::parameters::{
-    ETA, EXPONENT, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SharedVector,
+    ETA, EXPONENT, HUMIDITY, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SharedVector,
 };
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
@@ -24,7 +24,7 @@ pub(crate) struct Quantity {
 }
 
 pub(crate) fn is_offset(index: usize) -> bool {
-    (OFFSETS..=FLOW_GAIN).contains(&index)
+    (OFFSETS..=HUMIDITY).contains(&index)
 }
 
 /// A shared parameter, about what the fit has.

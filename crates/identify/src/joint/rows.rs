@@ -152,6 +152,8 @@ pub(crate) fn place(
     t1_k: f64,
     p1_pa: f64,
 ) -> (f64, f64) {
-    let reference = &config.reference;
-    (reference.corrected_speed_rpm(speed_rpm, t1_k), reference.corrected_flow_kg_s(flow_kg_s, t1_k, p1_pa))
+    (
+        config.reference.corrected_speed_rpm(speed_rpm, t1_k),
+        config.corrected_flow_kg_s(flow_kg_s, t1_k, p1_pa),
+    )
 }

@@ -3,10 +3,11 @@
 use crate::IdentifyConfig;
 use crate::joint::judge;
 use crate::joint::parameters::{
-    ALPHA, EXPONENT, FLOW_GAIN, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS,
-    PROBE_MM2, PROBE_SIGMA_MM2, SURFACE, symbol,
+    ALPHA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS, PROBE_MM2,
+    PROBE_SIGMA_MM2, SURFACE, symbol,
 };
 use crate::joint::profile;
+use crate::joint::quantity::is_offset;
 use crate::joint::refinements::Refinements;
 use crate::joint::rows::StepRows;
 use crate::joint::smoothness::Smoothed;
@@ -109,7 +110,7 @@ fn value(
     // Of a refinement the recording's own word counts, not what was believed beforehand.
     let known = refinements.and_then(|refinements| refinements.free(index)).map_or(sigma, |(_, error)| error);
     let uninformed = known > UNINFORMED_RATIO * beforehand;
-    let is_offset = (OFFSETS..=FLOW_GAIN).contains(&index);
+    let is_offset = is_offset(index);
     SharedValue {
         // An offset has its declared spread even where the recording adds nothing.
         value: (!uninformed || is_offset).then_some(told),

@@ -8,9 +8,9 @@ use crate::joint::explained::Explained;
 use crate::joint::inlet;
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
-    ALPHA, ALPHA_SIGMA, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, INLET, LN_COEFFICIENT, LN_DEVIATION,
-    LN_DIRECTION, LN_DIRECTION_SIGMA, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, PROBE_SIGMA_MM2, Prior,
-    SHARED, SLOPE, SURFACE,
+    ALPHA, ALPHA_SIGMA, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, HUMIDITY, INLET, LN_COEFFICIENT,
+    LN_DEVIATION, LN_DIRECTION, LN_DIRECTION_SIGMA, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2,
+    PROBE_SIGMA_MM2, Prior, SHARED, SLOPE, SURFACE,
 };
 use crate::joint::rows::{StepRows, condensed};
 use crate::joint::solve::{Member, NO_SURFACE_SIGMA, Problem};
@@ -133,6 +133,7 @@ pub(crate) fn problem<'a>(
     };
     let ln_reference = steps.iter().map(|step| reynolds(step).ln()).sum::<f64>() / steps.len() as f64;
     let setting = Setting {
+        air: config.air,
         internal_area_m2: config.internal_area_m2,
         outlet_diameter_m: config.outlet_diameter_m,
         inlet_diameter_m: config.inlet_diameter_m,
@@ -177,6 +178,8 @@ pub(crate) fn problem<'a>(
             config.declared.get(&Channel::CompressorFlow).map_or(0.0, |declared| declared.gain_sigma_ratio);
         priors[FLOW_GAIN] = Prior { mean: 0.0, sigma };
         active[FLOW_GAIN] = sigma > 0.0;
+        priors[HUMIDITY] = Prior { mean: 0.0, sigma: config.humidity_sigma_kg_kg };
+        active[HUMIDITY] = config.humidity_sigma_kg_kg > 0.0;
     }
     let etas: Vec<f64> = steps
         .iter()

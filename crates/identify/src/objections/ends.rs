@@ -4,6 +4,7 @@ use crate::{IdentifyConfig, taps};
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::is_reading;
+use mapper_physics::air::Air;
 use mapper_physics::compression::isentropic_rise_ratio;
 
 /// Last part of a step, s.
@@ -27,12 +28,14 @@ pub(crate) struct Ends {
     pub(crate) turbine_flow_kg_s: Option<f64>,
     pub(crate) t3_k: Option<f64>,
     pub(crate) t4_k: Option<f64>,
+    /// The air that is compressed.
+    pub(crate) air: Air,
 }
 
 impl Ends {
     /// Temperature rise of isentropic compression, K.
     pub(crate) fn isentropic_rise_k(&self) -> f64 {
-        self.t1_k * isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k)
+        self.t1_k * isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k, self.air)
     }
 }
 
@@ -63,6 +66,7 @@ pub(crate) fn ends(recording: &Recording, config: &IdentifyConfig) -> Vec<Option
                 turbine_flow_kg_s: at(Channel::TurbineFlow),
                 t3_k: at(Channel::T3),
                 t4_k: at(Channel::T4),
+                air: config.air,
             };
             (end.p1_pa > 0.0 && end.p2_pa > 0.0 && end.isentropic_rise_k().is_finite()).then_some(end)
         })

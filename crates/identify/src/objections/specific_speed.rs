@@ -7,7 +7,6 @@ use crate::findings::code;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
 use mapper_numerics::statistics::median;
-use mapper_physics::air;
 
 /// Middle of a campaign's points; a wide margin about what machines have.
 const POSSIBLE: std::ops::RangeInclusive<f64> = 0.15..=4.0;
@@ -16,8 +15,8 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
     let used: Vec<&Ends> = ends.iter().flatten().filter(|end| end.isentropic_rise_k() > 0.0).collect();
     let of = |end: &&Ends| {
         let omega_rad_s = end.speed_rpm * std::f64::consts::PI / 30.0;
-        let flow_m3_s = end.flow_kg_s * air::GAS_CONSTANT_J_KGK * end.t1_k / end.p1_pa;
-        let head_j_kg = air::heat_capacity_j_kgk(end.t1_k) * end.isentropic_rise_k();
+        let flow_m3_s = end.flow_kg_s * end.air.gas_constant_j_kgk() * end.t1_k / end.p1_pa;
+        let head_j_kg = end.air.heat_capacity_j_kgk(end.t1_k) * end.isentropic_rise_k();
         omega_rad_s * flow_m3_s.max(0.0).sqrt() / head_j_kg.powf(0.75)
     };
     let middle = median(used.iter().map(of).filter(|speed| speed.is_finite()))?;

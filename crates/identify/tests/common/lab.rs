@@ -4,6 +4,7 @@
 use super::common::add_noise;
 use mapper_core::{Channel, InletConvection, OperatingPoint, Recording, StepKind, StepMarker};
 use mapper_identify::DeclaredUncertainty;
+use mapper_physics::air::Air;
 use mapper_physics::compression::{CompressionInputs, compress, isentropic_rise_ratio};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
@@ -35,11 +36,19 @@ pub struct Machine {
     pub direction: f64,
     /// What h before the wheel follows.
     pub inlet: InletConvection,
+    /// Water per dry air, kg/kg.
+    pub humidity_kg_kg: f64,
 }
 
 impl Default for Machine {
     fn default() -> Self {
-        Machine { alpha: 0.0, probe_m: 0.0, direction: 1.0, inlet: InletConvection::Shared }
+        Machine {
+            alpha: 0.0,
+            probe_m: 0.0,
+            direction: 1.0,
+            inlet: InletConvection::Shared,
+            humidity_kg_kg: 0.0,
+        }
     }
 }
 
@@ -48,6 +57,7 @@ impl Machine {
         let mut model = Model::nominal();
         model.params.compressor.alpha_area_ratio = self.alpha;
         model.params.compressor.inlet_convection = self.inlet;
+        model.params.compressor.humidity_kg_kg = self.humidity_kg_kg;
         model.params.t2_probe_diameter_m = self.probe_m;
         model
     }
@@ -132,13 +142,14 @@ fn directional(
     tc_k: f64,
     outputs: &mapper_physics::model::Outputs,
 ) -> f64 {
-    let rise = isentropic_rise_ratio(outputs.pressure_ratio, boundary.t1_k);
+    let rise = isentropic_rise_ratio(outputs.pressure_ratio, boundary.t1_k, Air::DRY);
     let bulk_k = boundary.t1_k * (1.0 + rise / outputs.efficiency);
     let area_m2 = 29e-3;
     let factor = |hotter: bool| if hotter { machine.direction } else { 1.0 };
     let before_m2 = machine.alpha * area_m2 * factor(tc_k > boundary.t1_k);
     let pass = |after_m2: f64| {
         let inputs = CompressionInputs {
+            air: Air::DRY,
             t1_k: boundary.t1_k,
             tc_k,
             flow_kg_s: outputs.flow_kg_s,

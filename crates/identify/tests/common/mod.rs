@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 use mapper_core::{Channel, Recording, Series, StepKind, StepMarker};
+use mapper_physics::air::Air;
 use mapper_physics::compression::{CompressionInputs, compress, isentropic_rise_ratio};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -43,10 +44,11 @@ pub const STEP_S: f64 = 120.0;
 impl Transient {
     pub fn t2_k(&self, tc_k: f64) -> f64 {
         let inputs = CompressionInputs {
+            air: Air::DRY,
             t1_k: self.t1_k,
             tc_k,
             flow_kg_s: self.flow_kg_s,
-            isentropic_rise_ratio: isentropic_rise_ratio(self.pressure_ratio, self.t1_k),
+            isentropic_rise_ratio: isentropic_rise_ratio(self.pressure_ratio, self.t1_k, Air::DRY),
             efficiency: self.eta,
             h_w_m2k: self.h_w_m2k,
             inlet_h_ratio: 1.0,

@@ -216,7 +216,7 @@ pub(crate) fn weights(calibration: &Calibration, observed: &[Observed]) -> Vec<f
 /// Share of the effect-free cases that stay below the threshold.
 const QUIET: f64 = 0.985;
 /// Minimum threshold: odds of e^3 for the cause, whatever the effect-free cases say.
-const LEAST_THRESHOLD: f64 = 3.0;
+const MIN_THRESHOLD: f64 = 3.0;
 /// The calibration that fits what was observed, beside the one that ships.
 ///
 /// # Errors
@@ -229,7 +229,7 @@ pub fn fitted(observed: &[Observed], made_by: String) -> Result<Calibration, Bli
 /// something of the catalogue, and how often that happens is what a probability has to say.
 pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {
     let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(Observed::margin);
-    let quiet = quantile(margins, QUIET).map_or(before.threshold, |margin| margin.max(LEAST_THRESHOLD));
+    let quiet = quantile(margins, QUIET).map_or(before.threshold, |margin| margin.max(MIN_THRESHOLD));
     let weights = weights(before, observed);
     let weighed = || observed.iter().zip(weights.iter().copied());
     let inside: Vec<(&Observed, f64)> = weighed().filter(|(o, _)| o.kind != CaseKind::Outside).collect();

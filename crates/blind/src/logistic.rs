@@ -11,7 +11,7 @@ const PRIOR: f64 = 0.25;
 /// Least slopes: more misfit never speaks against an outside cause. That of the smooth misfit is at least half of what noise
 /// makes of it, whatever the cases say: where a search went astray a fit leaves thousands of sigmas beside the right cause, and
 /// a few such cases would teach that a gross misfit means nothing.
-const LEAST: [f64; 3] = [0.5, 0.0, 0.0];
+const MIN: [f64; 3] = [0.5, 0.0, 0.0];
 
 /// A case.
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +41,7 @@ pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 4]> {
     for _ in 0..ROUNDS {
         let last = weights;
         for place in 0..weights.len() {
-            let (low, high) = if place == 0 { (-30.0, 30.0) } else { (LEAST[place - 1], 10.0) };
+            let (low, high) = if place == 0 { (-30.0, 30.0) } else { (MIN[place - 1], 10.0) };
             weights[place] = minimise(low, high, 1e-9, |value| {
                 let mut tried = weights;
                 tried[place] = value;

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Maximum number of cases of one directory.
-const MOST_CASES: usize = 100_000;
+const MAX_CASES: usize = 100_000;
 
 /// What was made.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,8 +61,8 @@ pub fn drawn(
     catalogue: &[Arc<dyn Effect>],
     draw: &Draw,
 ) -> Result<Vec<Case>, BlindError> {
-    if !(1..=MOST_CASES).contains(&draw.cases) {
-        return Err(BlindError::Cases { cases: draw.cases, most: MOST_CASES });
+    if !(1..=MAX_CASES).contains(&draw.cases) {
+        return Err(BlindError::Cases { cases: draw.cases, most: MAX_CASES });
     }
     let nominal = nominal_model(campaign)?;
     let schedule = Schedule::new(campaign, &nominal)?;

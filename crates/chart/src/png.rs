@@ -7,7 +7,7 @@ use crate::{Colour, Figure};
 use tiny_skia::{Color, FillRule, LineJoin, Paint, Path, PathBuilder, Pixmap, StrokeDash, Transform};
 
 /// Maximum number of pixels of a picture.
-const MOST_PIXELS: f64 = 64e6;
+const MAX_PIXELS: f64 = 64e6;
 
 /// Width of the white rim around a text, px on both sides together.
 const HALO_PX: f32 = 3.0;
@@ -50,7 +50,7 @@ fn pixels(drawing: &Drawing, scale: f32) -> Result<Pixmap, PngError> {
     let size = |px: f64| px.ceil() * f64::from(scale);
     let (width, height) = (size(drawing.width_px), size(drawing.height_px));
     // Not a number counts as too large.
-    if !(width >= 1.0 && height >= 1.0 && width * height <= MOST_PIXELS) {
+    if !(width >= 1.0 && height >= 1.0 && width * height <= MAX_PIXELS) {
         return Err(PngError::Size { width, height });
     }
     let pixels = Pixmap::new(width.ceil() as u32, height.ceil() as u32);

@@ -37,7 +37,7 @@ impl Candidate {
         let values = self.coefficients();
         terms.iter().zip(values).enumerate().all(|(place, (term, value))| {
             let variance = covariance.get((first + place, first + place)).copied().unwrap_or(f64::INFINITY);
-            (sink && term.role == Role::Level) || (value / term.step).abs() > LEAST_SIGMAS * variance.sqrt()
+            (sink && term.role == Role::Level) || (value / term.step).abs() > MIN_SIGMAS * variance.sqrt()
         })
     }
 
@@ -124,7 +124,7 @@ impl Bench {
 }
 
 /// A coefficient nearer to 0 than this, in standard errors, says nothing.
-const LEAST_SIGMAS: f64 = 2.0;
+const MIN_SIGMAS: f64 = 2.0;
 
 /// Drops candidates with a coefficient that says nothing, where others are left.
 pub fn keep_determined(library: &[Term], candidates: &mut Vec<Candidate>) {
@@ -148,7 +148,7 @@ pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
     for choice in choices.iter().filter(|choice| choice.gain > least) {
         let of_part = worth.iter().filter(|other| part(other) == part(choice)).count();
         let parts = if part(choice) == part(best) { OF_THE_BEST_PART } else { OF_OTHER_PARTS };
-        if of_part < parts && worth.len() < MOST {
+        if of_part < parts && worth.len() < MAX {
             worth.push(choice.clone());
         }
     }
@@ -158,6 +158,6 @@ pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
 /// Share of the best's promise that another part of the machine must promise.
 const PROMISE: f64 = 0.3;
 /// Laws that are fitted.
-const MOST: usize = 6;
+const MAX: usize = 6;
 const OF_THE_BEST_PART: usize = 3;
 const OF_OTHER_PARTS: usize = 1;

@@ -38,13 +38,13 @@ pub struct Discovered {
 /// Folds of steps, each left out once, in which a law must show again.
 const FOLDS: usize = 6;
 /// A law must remove this share of the gap on steps that were not used.
-const LEAST_SHRINK: f64 = 0.5;
+const MIN_SHRINK: f64 = 0.5;
 /// A law is doubted that is found in fewer of the folds.
-const LEAST_STABILITY: f64 = 0.5;
+const MIN_STABILITY: f64 = 0.5;
 /// Laws whose evidence is this near cannot be told apart, in temperatures of the calibration.
 const NEAR: f64 = 3.0;
 /// Equivalent laws that are named.
-const MOST_EQUIVALENT: usize = 3;
+const MAX_EQUIVALENT: usize = 3;
 /// Balances whose force is told.
 const FORCES: usize = 3;
 
@@ -256,7 +256,7 @@ fn propose(
     };
     let (before, after) = (read(before), read(trained.fit.clone()));
     let shrink = shrink(study, &before, &after, held_out);
-    if shrink < LEAST_SHRINK || found.stability < LEAST_STABILITY {
+    if shrink < MIN_SHRINK || found.stability < MIN_STABILITY {
         return Vec::new();
     }
     let (channels, worse) = channels_on(study, linearised, [&before, &after], held_out);
@@ -277,7 +277,7 @@ fn propose(
     let say = |candidate: &Candidate| tell(&bench.library, candidate, calibration.interval_factor);
     let Told { sentence, terms, sink_k } = say(best);
     let told = Told { sentence: sentence.clone(), terms: terms.clone(), sink_k };
-    let equivalent = found.fitted.iter().skip(1).filter(near).take(MOST_EQUIVALENT).map(|c| say(c).sentence);
+    let equivalent = found.fitted.iter().skip(1).filter(near).take(MAX_EQUIVALENT).map(|c| say(c).sentence);
     vec![Law {
         submodel: bench.library[best.choice.terms[0]].submodel().name().to_owned(),
         sentence,

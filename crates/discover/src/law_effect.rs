@@ -5,7 +5,7 @@ use mapper_physics::effect::{Effect, EffectError, EffectInfo, EffectParameter, N
 use std::borrow::Cow;
 
 /// How many steps a coefficient may be away from nothing.
-pub const MOST_STEPS: f64 = 60.0;
+pub const MAX_STEPS: f64 = 60.0;
 
 /// Some terms of one part of the machine, each with a coefficient.
 #[derive(Debug, Clone)]
@@ -23,8 +23,8 @@ impl LawEffect {
             .map(|(place, term)| EffectParameter {
                 name: Cow::Owned(format!("c{}", place + 1)),
                 unit: Cow::Borrowed(term.unit),
-                low: if term.positive { 0.0 } else { -MOST_STEPS * term.step },
-                high: MOST_STEPS * term.step,
+                low: if term.positive { 0.0 } else { -MAX_STEPS * term.step },
+                high: MAX_STEPS * term.step,
                 neutral: 0.0,
                 typical_step: term.step,
             })

@@ -15,7 +15,7 @@ const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.
 pub(crate) const LEFT_OUT_S: f64 = 5.0;
 /// A machine that drifts is taken as constant over this long, s, or over the so-manieth part of a long step.
 const PART_S: f64 = 30.0;
-const MOST_PARTS: f64 = 60.0;
+const MAX_PARTS: f64 = 60.0;
 
 /// One step of the run.
 pub(crate) struct Stretch {
@@ -73,7 +73,7 @@ impl Stretch {
     pub(crate) fn parts(&self, start_s: f64, planted: &[Planted]) -> Vec<(f64, f64)> {
         let mut edges = vec![start_s];
         for Planted { course, .. } in planted.iter().filter(|planted| planted.machine_changes()) {
-            let count = ((self.end_s - start_s) / PART_S).ceil().clamp(1.0, MOST_PARTS);
+            let count = ((self.end_s - start_s) / PART_S).ceil().clamp(1.0, MAX_PARTS);
             edges.extend(
                 (1..count as usize).map(|part| start_s + (self.end_s - start_s) * part as f64 / count),
             );

@@ -13,7 +13,7 @@ use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
 /// Rows that are needed: twice the parameters.
-const FEWEST_ROWS: usize = 2 * COUNT;
+const MIN_ROWS: usize = 2 * COUNT;
 /// A log has told something of a parameter whose interval is narrower than this share of the prior's.
 pub(crate) const TOLD_RATIO: f64 = 0.7;
 
@@ -117,8 +117,8 @@ pub fn identify(
     seed: u64,
 ) -> Result<DrivenOutcome, DrivenError> {
     let fitted = rows.t_s.partition_point(|t_s| *t_s < fit_until_s);
-    if fitted < FEWEST_ROWS {
-        return Err(DrivenError::TooFewRows { rows: fitted, until_s: fit_until_s, needed: FEWEST_ROWS });
+    if fitted < MIN_ROWS {
+        return Err(DrivenError::TooFewRows { rows: fitted, until_s: fit_until_s, needed: MIN_ROWS });
     }
     let declared = Declared::new(params, rows);
     let sample: Vec<Values> = draws(|standard| log_density(standard, rows, &declared, fitted), seed)

@@ -8,7 +8,7 @@ use mapper_observe::plausible::is_reading;
 const SPACING_S: f64 = 0.1;
 /// Most rows that are kept, of longer logs spread over all of it: five minutes at 10 Hz. What is sought goes through them some
 /// hundred thousand times.
-const MOST_ROWS: usize = 3_000;
+const MAX_ROWS: usize = 3_000;
 
 /// What a side asks of a log.
 #[derive(Debug, Clone, Copy)]
@@ -58,7 +58,7 @@ impl Rows {
         }
         let span_s =
             judged.t_s.last().zip(judged.t_s.first()).map_or(0.0, |(last_s, first_s)| last_s - first_s);
-        let spacing_s = SPACING_S.max(span_s / MOST_ROWS as f64);
+        let spacing_s = SPACING_S.max(span_s / MAX_ROWS as f64);
         let columns = |channels: &[Channel]| channels.iter().map(|channel| (*channel, Vec::new())).collect();
         let mut rows = Rows {
             t_s: Vec::new(),
@@ -83,7 +83,7 @@ impl Rows {
                 continue;
             }
             // Spread over the log there is one more at most.
-            if rows.t_s.len() > MOST_ROWS {
+            if rows.t_s.len() > MAX_ROWS {
                 break;
             }
             rows.t_s.push(*t_s);

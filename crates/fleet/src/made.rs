@@ -2,7 +2,7 @@
 
 use crate::fleet::{BEGUN, ITEMS, LOGS, PARTS, STUDY};
 use crate::place::{Durability, make_directory, write_whole};
-use crate::study::{LAYOUT, MOST_ITEMS};
+use crate::study::{LAYOUT, MAX_ITEMS};
 use crate::{Drafts, Fleet, FleetError, Hash, Item, Kind, Listed, Study, StudyFile};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -34,8 +34,8 @@ impl Made {
     ) -> Result<Made, FleetError> {
         let earlier = earlier(study, directory, program)?;
         let Drafts { items, settings } = kind.items(study)?;
-        if !(1..=MOST_ITEMS).contains(&items.len()) {
-            return Err(FleetError::Items { items: items.len(), most: MOST_ITEMS });
+        if !(1..=MAX_ITEMS).contains(&items.len()) {
+            return Err(FleetError::Items { items: items.len(), most: MAX_ITEMS });
         }
         for folder in [ITEMS, PARTS, BEGUN, LOGS] {
             make_directory(directory.join(folder))?;

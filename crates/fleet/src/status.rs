@@ -68,7 +68,7 @@ impl Status {
 }
 
 /// Strangers that are told at most.
-const MOST_STRANGERS: usize = 1000;
+const MAX_STRANGERS: usize = 1000;
 
 impl Fleet {
     /// How far it is. Only the first lines of parts are read.
@@ -99,7 +99,7 @@ impl Fleet {
         // A name that begins with a dot is a part that is being written, or was when its worker was killed.
         let mut strangers: Vec<String> = names
             .filter(|name| !name.starts_with('.') && !known.contains(name))
-            .take(MOST_STRANGERS)
+            .take(MAX_STRANGERS)
             .collect();
         strangers.sort();
         strangers

@@ -10,7 +10,7 @@ use std::path::Path;
 /// Layout of the directory; counts up with each change.
 pub(crate) const LAYOUT: u32 = 1;
 /// Maximum number of items of a study.
-pub(crate) const MOST_ITEMS: usize = 1_000_000;
+pub(crate) const MAX_ITEMS: usize = 1_000_000;
 /// Largest file of a study, bytes: a million items.
 const LARGEST_BYTES: u64 = 256 << 20;
 
@@ -65,8 +65,8 @@ impl Study {
     }
 
     pub(crate) fn check(&self) -> Result<(), FleetError> {
-        if !(1..=MOST_ITEMS).contains(&self.items.len()) {
-            return Err(FleetError::Items { items: self.items.len(), most: MOST_ITEMS });
+        if !(1..=MAX_ITEMS).contains(&self.items.len()) {
+            return Err(FleetError::Items { items: self.items.len(), most: MAX_ITEMS });
         }
         let mut names: BTreeMap<Hash, &str> = BTreeMap::new();
         for item in &self.items {

@@ -48,12 +48,12 @@ impl Calibration {
 }
 
 /// Largest square of a misfit that counts, halved: gross misfits are all alike.
-const MOST: f64 = 500.0;
+const MAX: f64 = 500.0;
 
 /// What the features of an outside cause count as in its logistic. The smooth misfit by half its square, which is the logarithm of
 /// how unlikely noise makes it. The scatter from step to step and the gain of one more effect by their order of magnitude: they
 /// grow with the strength of a cause, also of one that is found, which the model's lines follow to a few per cent only.
 pub fn counted([smooth_sigma, scatter_sigma, one_more]: [f64; 3]) -> [f64; 3] {
     let unlikely = 0.5 * smooth_sigma.max(0.0).powi(2);
-    [unlikely.min(MOST), scatter_sigma.max(0.0).asinh(), one_more.max(0.0).asinh()]
+    [unlikely.min(MAX), scatter_sigma.max(0.0).asinh(), one_more.max(0.0).asinh()]
 }

@@ -86,9 +86,9 @@ const HOPELESS: f64 = 60.0;
 const CHOSEN_AGAIN: usize = 3;
 const CLOSE: f64 = 10.0;
 /// Steps that it takes to see with which of them a cause begins.
-const LEAST_STEPS: usize = 6;
+const MIN_STEPS: usize = 6;
 /// Share of the null's misfit that a cause must remove to explain a gap in part, also on steps that its fit did not see.
-const MOST: f64 = 0.5;
+const MAX: f64 = 0.5;
 
 /// Diagnoses a recording.
 ///
@@ -182,7 +182,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     progress(0.75, "what one more would do");
     let mut one_more = most_gain(&study, beside, &everywhere, fits.first().unwrap_or(&null));
     let mut left = adequacy(&study, &linearised, fits.first().unwrap_or(&null), one_more);
-    if calibration.outside(left.features()) > 0.5 && study.steps.len() >= LEAST_STEPS {
+    if calibration.outside(left.features()) > 0.5 && study.steps.len() >= MIN_STEPS {
         progress(0.8, "causes that begin");
         study.add_onsets();
         let at = Search {
@@ -226,12 +226,8 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         let n = null.residual.len() as f64;
         let removed = 1.0 - (best.cost - n).max(0.0) / (null.cost - n).max(1.0);
         let smooth = 1.0 - left.smooth_excess.max(0.0) / left_by_null.smooth_excess.max(1.0);
-        let better = gap.shrink > MOST;
-        if removed > MOST && smooth > MOST && better {
-            Verdict::PartlyExplained
-        } else {
-            Verdict::Unexplained
-        }
+        let better = gap.shrink > MAX;
+        if removed > MAX && smooth > MAX && better { Verdict::PartlyExplained } else { Verdict::Unexplained }
     };
     let mut gains: Vec<Gain<'_>> = fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
     for fit in &found.fits {

@@ -1,6 +1,6 @@
 //! The metal's temperature at the start is no property of the machine: a fit that has not seen the first step reads it there.
 
-use crate::fit::{Fit, MOST_SIGMAS};
+use crate::fit::{Fit, MAX_SIGMAS};
 use crate::nuisance::NuisanceKind;
 use crate::selection::dot_over;
 use crate::study::Study;
@@ -29,7 +29,7 @@ pub fn with_start_read(study: &Study, linearised: &Linearised, fit: Fit) -> Fit 
     let Some(step) = matrix.cholesky().map(|cholesky| cholesky.solve(&right)) else { return fit };
     let mut moved = fit.hypothesis.clone();
     for (index, by) in starts.iter().zip(step.iter()) {
-        moved.nuisances[*index] = (moved.nuisances[*index] + by).clamp(-MOST_SIGMAS, MOST_SIGMAS);
+        moved.nuisances[*index] = (moved.nuisances[*index] + by).clamp(-MAX_SIGMAS, MAX_SIGMAS);
     }
     let Ok(prediction) = study.predict(&moved) else { return fit };
     let residual = linearised.residual(study, &prediction);

@@ -48,7 +48,7 @@ pub struct Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Effort { iterations: 10, enough: 0.02, most_sigmas: MOST_SIGMAS }
+        Effort { iterations: 10, enough: 0.02, most_sigmas: MAX_SIGMAS }
     }
 }
 
@@ -168,7 +168,7 @@ impl Model for Fitted<'_> {
         let of_nuisances = unknowns.iter().take(n).map(|u| (-self.most_sigmas - u, self.most_sigmas - u));
         let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(n)).map(|(coordinate, at)| {
             let (low, high) = coordinate.ends();
-            ((low - at).clamp(-MOST_STEPS, 0.0), (high - at).clamp(0.0, MOST_STEPS))
+            ((low - at).clamp(-MAX_STEPS, 0.0), (high - at).clamp(0.0, MAX_STEPS))
         });
         of_nuisances.chain(of_effects).collect()
     }
@@ -230,6 +230,6 @@ fn changes_beside(
 }
 
 /// Six sigma of a declared tolerance is no longer a tolerance.
-pub const MOST_SIGMAS: f64 = 6.0;
+pub const MAX_SIGMAS: f64 = 6.0;
 /// Maximum number of typical steps an effect moves in one iteration: effects bend.
-const MOST_STEPS: f64 = 2.0;
+const MAX_STEPS: f64 = 2.0;

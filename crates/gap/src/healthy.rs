@@ -9,7 +9,7 @@ use crate::actuators::Actuators;
 use crate::another_machine::another_machine;
 use crate::errors_of_change::{covariance_of_errors, elsewhere, errors_of_change};
 use crate::first_step::is_start;
-use crate::fit::MOST_SIGMAS;
+use crate::fit::MAX_SIGMAS;
 use crate::gap_error::GapError;
 use crate::hypothesis::Hypothesis;
 use crate::normal::nuisance_products;
@@ -140,7 +140,7 @@ fn tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, Pred
         let Some(step) = matrix.cholesky().map(|cholesky| cholesky.solve(&right)) else { break };
         let mut moved = best.clone();
         for (sigmas, by) in moved.nuisances.iter_mut().zip(step.iter()) {
-            *sigmas = (*sigmas + by).clamp(-MOST_SIGMAS, MOST_SIGMAS);
+            *sigmas = (*sigmas + by).clamp(-MAX_SIGMAS, MAX_SIGMAS);
         }
         let there = linearised.residual_of(study, &moved)?;
         let cost = |residual: &[f64], at: &Hypothesis| {

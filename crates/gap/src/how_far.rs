@@ -36,7 +36,7 @@ struct Unseen {
 }
 
 /// Effort of a fit without some of the steps: it begins at the best of all of them.
-const EFFORT: Effort = Effort { iterations: 5, enough: 0.2, most_sigmas: crate::fit::MOST_SIGMAS };
+const EFFORT: Effort = Effort { iterations: 5, enough: 0.2, most_sigmas: crate::fit::MAX_SIGMAS };
 
 /// Compares tolerances alone with the best cause, step by step, each by a fit that did not see the step: in every fold the
 /// cause is chosen among the first few, and fitted, without the steps of the fold.

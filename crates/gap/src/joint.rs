@@ -71,7 +71,7 @@ pub struct Over {
 /// Sigmas by which a recording is worse without a cause that is there, and standard errors between two recordings beyond which it changed.
 const THERE: f64 = 3.0;
 /// Causes that are followed at most.
-const MOST: usize = 4;
+const MAX: usize = 4;
 
 /// What several recordings of one rig say together; nothing where no cause is named in any of them, and where they were not
 /// recorded alike (other channels, so that other things may be off).
@@ -165,7 +165,7 @@ fn named_anywhere(diagnosed: &[&Diagnosed]) -> EffectValues {
             }
         }
     }
-    effects.truncate(MOST);
+    effects.truncate(MAX);
     effects
 }
 

@@ -14,7 +14,7 @@ use mapper_physics::effect::Submodel;
 /// Share of the first among the causes that are open from which on it is settled.
 pub const SETTLED: f64 = 0.95;
 /// What answers less than this of what is open is not worth its minutes.
-const LEAST_ANSWER: f64 = 0.1;
+const MIN_ANSWER: f64 = 0.1;
 /// Jumps that are looked at closely, and experiments of each other kind.
 const CLOSE_LOOKS: usize = 6;
 const CLOSE_LOOKS_BESIDE: usize = 2;
@@ -97,7 +97,7 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
     let open_bit = entropy_bit(&rivals.probabilities);
     let answers = |odds: &Odds| odds.entropy_drop_bit / open_bit.max(f64::MIN_POSITIVE);
     let most = looked.iter().map(|(_, odds, _)| answers(odds)).fold(0.0, f64::max);
-    looked.retain(|(_, odds, _)| answers(odds) >= LEAST_ANSWER);
+    looked.retain(|(_, odds, _)| answers(odds) >= MIN_ANSWER);
     let mut experiments: Vec<Suggestion> = Vec::new();
     for (experiment, odds, _) in &looked {
         let kind = Kind::of(experiment);

@@ -27,7 +27,7 @@ const HOLD_S: f64 = 30.0;
 const COARSE_S: f64 = 0.5;
 const FINE_S: f64 = 0.1;
 /// Maximum number of samples of a jump; a dwell that is longer is looked at up to there.
-const MOST_S: f64 = 600.0;
+const MAX_S: f64 = 600.0;
 
 /// What imagined steps have in common with a recording.
 #[derive(Debug, Clone)]
@@ -84,7 +84,7 @@ pub(crate) fn imagined_steps(
 /// An experiment made ready like a recording, of rest at its start and its dwell. What began in the recording is there.
 fn imagined(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Option<Study> {
     let jump = &experiment.jump;
-    let dwell_s = jump.dwell_s.clamp(10.0, MOST_S);
+    let dwell_s = jump.dwell_s.clamp(10.0, MAX_S);
     let marker = |index: usize, from: f64, to: f64, p3_pa: f64, point: OperatingPoint| StepMarker {
         index,
         kind: StepKind::Repeat,

@@ -13,7 +13,7 @@ use crate::whiten::Linearised;
 use mapper_physics::effect::Submodel;
 
 /// A part with less of the gap is not a place.
-const LEAST_SHARE: f64 = 0.01;
+const MIN_SHARE: f64 = 0.01;
 
 /// A straight line is off by this part of what it gains: explanations nearer to each other than that stay open.
 pub const BEND: f64 = 0.01;
@@ -130,7 +130,7 @@ pub fn places_of(
         }
     }
     parts.sort_by(|a, b| b.1.total_cmp(&a.1));
-    parts.retain(|(_, share, ..)| *share >= LEAST_SHARE);
+    parts.retain(|(_, share, ..)| *share >= MIN_SHARE);
     let points = study.points(&null.hypothesis).unwrap_or_default();
     let shown = parts.into_iter().filter_map(|(submodel, share, _, part)| {
         Some((submodel, share, show(study, linearised, &(part.signature)()?, &points)?))

@@ -34,7 +34,7 @@ const STRONG: f64 = 30.0;
 const HALVED: f64 = 0.5;
 
 const QUICK: Effort = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0 };
-const EFFORT: Effort = Effort { iterations: 6, enough: 0.3, most_sigmas: crate::fit::MOST_SIGMAS };
+const EFFORT: Effort = Effort { iterations: 6, enough: 0.3, most_sigmas: crate::fit::MAX_SIGMAS };
 
 /// All sets that were fitted.
 #[derive(Debug)]

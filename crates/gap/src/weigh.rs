@@ -135,7 +135,7 @@ fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
 }
 
 /// Maximum number of causes named beside the first: a longer list helps nobody.
-const MOST_EQUIVALENT: usize = 2;
+const MAX_EQUIVALENT: usize = 2;
 
 /// Other causes whose scores the data do not tell from the best's, the nearest first; a cause that only adds to a better one
 /// is none.
@@ -151,7 +151,7 @@ fn equivalents(
         .skip(1)
         .filter(|place| scores[1] - scores[**place + 1] < 3.0 * calibration.temperature)
         .map(|place| ids(study, &fits[*place]))
-        .take(MOST_EQUIVALENT)
+        .take(MAX_EQUIVALENT)
         .collect()
 }
 

@@ -8,13 +8,13 @@ use std::collections::VecDeque;
 
 /// Most values that wait, of all columns, at 8 bytes each, names and words counted likewise: three hours of 19 channels at 10 Hz,
 /// 32 MB.
-const MOST_VALUES: usize = 4_000_000;
+const MAX_VALUES: usize = 4_000_000;
 /// A sample so far beyond the time that was asked for is due, s: that time is a sum of periods, the sample's a multiple.
 pub(crate) const ROUNDING_S: f64 = 1e-7;
 /// Most events that wait.
-const MOST_EVENTS: usize = 10_000;
+const MAX_EVENTS: usize = 10_000;
 /// Events beyond which a driver's remarks are left out.
-const MOST_NOTES: usize = 100;
+const MAX_NOTES: usize = 100;
 
 /// Batches in the order they came, checked: one follows the other.
 #[derive(Default)]
@@ -43,7 +43,7 @@ impl Pending {
         }
         self.events.append(&mut batch.events);
         let words: usize = self.events.iter().map(|event| event.message.len()).sum();
-        if self.events.len() > MOST_EVENTS || self.values + words / 8 > MOST_VALUES {
+        if self.events.len() > MAX_EVENTS || self.values + words / 8 > MAX_VALUES {
             return Err(Unusable::TooMany);
         }
         let Some(first_s) = batch.t_s.first().copied() else { return Ok(()) };
@@ -54,7 +54,7 @@ impl Pending {
             return Err(Unusable::Time { before_s, t_s: first_s });
         }
         self.values += batch.t_s.len() * width(&batch) + names(&batch);
-        if self.values > MOST_VALUES {
+        if self.values > MAX_VALUES {
             return Err(Unusable::TooMany);
         }
         self.expected += batch.t_s.len() as u64;
@@ -65,7 +65,7 @@ impl Pending {
 
     /// A remark at this run time, s, for the next batch; no more than a few are kept.
     pub(crate) fn note(&mut self, t_s: f64, words: &str) {
-        if self.events.len() < MOST_NOTES {
+        if self.events.len() < MAX_NOTES {
             self.events.push(Event { t_s, kind: EventKind::Note, message: words.to_owned() });
         }
     }

@@ -7,7 +7,7 @@ use mapper_numerics::statistics::median;
 use mapper_physics::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 
 /// Maximum number of blocks looked at, from the step's end backwards: bounds the work on absurd step times.
-const MOST_BLOCKS: usize = 20_000;
+const MAX_BLOCKS: usize = 20_000;
 
 /// The window of a step; `None` where the step has no room for any.
 pub(crate) fn choose(
@@ -78,7 +78,7 @@ pub(crate) fn rest(recording: &Recording, step: &StepMarker, bands: &SettleBands
     if end_s.is_nan() || earliest_s.is_nan() || earliest_s >= end_s {
         return None;
     }
-    let block_count = (((end_s - earliest_s) / BLOCK_S).floor() as usize).clamp(1, MOST_BLOCKS);
+    let block_count = (((end_s - earliest_s) / BLOCK_S).floor() as usize).clamp(1, MAX_BLOCKS);
     let blocks = |channel| block_medians(recording.series.get(&channel), end_s, block_count);
     let (p1_pa, p2_pa) = (blocks(Channel::P1), blocks(Channel::P2));
     let pressure_ratio: Vec<f64> = p2_pa.iter().zip(&p1_pa).map(|(p2, p1)| p2 / p1).collect();

@@ -3,7 +3,7 @@
 /// Cells of the density for one standard deviation: the interval then errs by less than a hundredth of it.
 const CELLS_PER_SIGMA: f64 = 16.0;
 /// Most cells between the lowest and the highest centre: bounds the effort where the centres are far apart.
-const MOST_CELLS: f64 = 4096.0;
+const MAX_CELLS: f64 = 4096.0;
 /// Standard deviations beyond which a normal density is left out: 6e-7 of it.
 const REACH_SIGMAS: f64 = 5.0;
 
@@ -16,7 +16,7 @@ pub fn shortest(centres: &[(f64, f64)], sigma: f64, coverage: f64) -> Option<(f6
     if !(low.is_finite() && high.is_finite() && sigma.is_finite()) {
         return None;
     }
-    let width = (sigma / CELLS_PER_SIGMA).max((high - low) / MOST_CELLS);
+    let width = (sigma / CELLS_PER_SIGMA).max((high - low) / MAX_CELLS);
     if width <= 0.0 {
         return Some((low, low));
     }

@@ -2,7 +2,7 @@
 
 /// Evaluations after which the search ends wherever it is: golden section alone halves an interval in less than two, so
 /// that these are enough for all digits.
-const MOST_EVALUATIONS: usize = 200;
+const MAX_EVALUATIONS: usize = 200;
 /// The golden section's smaller part of an interval: (3 - sqrt(5)) / 2.
 const SECTION: f64 = 0.381_966_011_250_105_1;
 /// Relative distance below which values of a smooth function are all the same: square root of the rounding.
@@ -35,7 +35,7 @@ pub fn minimise(low: f64, high: f64, tolerance: f64, mut f: impl FnMut(f64) -> f
     let (mut second, mut third) = (best, best);
     // The last step, and the one before it.
     let (mut step, mut step_before) = (0.0f64, 0.0f64);
-    for _ in 1..MOST_EVALUATIONS {
+    for _ in 1..MAX_EVALUATIONS {
         let middle = 0.5 * (a + b);
         let near = RESOLUTION * best.at.abs() + tolerance / 3.0;
         if (best.at - middle).abs() <= 2.0 * near - 0.5 * (b - a) {

@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-14;
 const COLLINEAR: f64 = 1e-12;
 
 /// A level is a place in a list: one beyond is a mistake, not a wish for memory.
-const MOST_LEVELS: usize = 100_000;
+const MAX_LEVELS: usize = 100_000;
 
 /// Observations `y = fixed * coefficients + sum of the effect of each group's level + rest`, all effects and the rest independent and
 /// normal, the rest equally wide everywhere.
@@ -145,7 +145,7 @@ impl Sums {
             .iter()
             .map(|group| group.iter().max().map_or(0, |level| level.saturating_add(1)))
             .collect();
-        if levels.iter().any(|count| *count > MOST_LEVELS) {
+        if levels.iter().any(|count| *count > MAX_LEVELS) {
             return Err(NoFit::Form);
         }
         let group_of: Vec<usize> =

@@ -6,7 +6,7 @@ use mapper_core::{Channel, Series};
 /// Length of a block, s: longer than the memory of usual noise matters, shorter than the lag of a probe that is too large.
 const BLOCK_S: f64 = 2.0;
 /// Most blocks of a recording; a longer one has longer blocks.
-const MOST_BLOCKS: f64 = 100_000.0;
+const MAX_BLOCKS: f64 = 100_000.0;
 
 /// Means of each sensor, block by block; NaN where it gives none.
 #[derive(Debug, Clone)]
@@ -29,7 +29,7 @@ impl Blocks {
         if !span_s.is_finite() {
             return None;
         }
-        let length_s = BLOCK_S.max(span_s / MOST_BLOCKS);
+        let length_s = BLOCK_S.max(span_s / MAX_BLOCKS);
         let count = (span_s / length_s) as usize + 1;
         let (mut means, mut samples) = (Vec::new(), Vec::new());
         for series in sensors {

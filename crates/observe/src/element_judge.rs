@@ -17,7 +17,7 @@ pub(crate) const FALSE_ALARMS_RATIO: f64 = 0.005;
 /// them in full.
 const PARTS: usize = 4;
 /// Fewest blocks that say anything.
-const FEWEST_BLOCKS: usize = 10;
+const MIN_BLOCKS: usize = 10;
 /// Share of the recording without a reading from which on a sensor is silent, where another one has readings.
 const SILENT_RATIO: f64 = 0.5;
 /// Time and samples over which a reading that repeats to the last digit is one that stands still, s.
@@ -215,7 +215,7 @@ impl Judge<'_> {
             .map(|block| (own[block] - reference[block], slope[block], reference[block]))
             .filter(|(difference, slope, _)| difference.is_finite() && slope.is_finite())
             .collect();
-        if rows.len() < FEWEST_BLOCKS {
+        if rows.len() < MIN_BLOCKS {
             return None;
         }
         let lag = self.lag(index, &weights, &rows);
@@ -260,7 +260,7 @@ impl Judge<'_> {
 
     /// Largest difference among the parts of the recording, and the same in its declared standard deviations.
     fn offset(&self, index: usize, weights: &[f64], rows: &[(f64, f64, f64)], lag_s: f64) -> (f64, f64) {
-        let parts = PARTS.min(rows.len() / FEWEST_BLOCKS).max(1);
+        let parts = PARTS.min(rows.len() / MIN_BLOCKS).max(1);
         let mut worst = (0.0, 0.0);
         for part in rows.chunks(rows.len().div_ceil(parts)) {
             let by =

@@ -17,7 +17,7 @@ const ROUNDS: usize = 12;
 pub(crate) const EXACT_POINTS: usize = 500;
 const INCREMENTS_K: (f64, f64) = (5.0, 0.01);
 /// Above this many points there is no bound: its table grows with the square.
-pub(crate) const MOST_POINTS: usize = 4000;
+pub(crate) const MAX_POINTS: usize = 4000;
 /// Above this many points the smallest gradient is bounded without a matching.
 const MATCHING_POINTS: usize = 400;
 
@@ -41,7 +41,7 @@ impl<'a> Optimistic<'a> {
     /// `None` for too many points, and where the reduced housing does not stay within any bounds.
     pub(crate) fn of(housing: &'a Housing, points: &[usize]) -> Option<Self> {
         let n = points.len();
-        if n > MOST_POINTS {
+        if n > MAX_POINTS {
             return None;
         }
         let boxes = reachable_boxes(housing, points)?;

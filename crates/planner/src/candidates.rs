@@ -14,9 +14,9 @@ use rand_pcg::Pcg64Mcg;
 /// Successors that are kept of each point.
 const KEPT: usize = 10;
 /// Above this many points there are no candidates: the table of weights grows with the square.
-pub(crate) const MOST_POINTS: usize = 4000;
+pub(crate) const MAX_POINTS: usize = 4000;
 /// A jump that is not allowed is no worse than this many times the usual: the assignment needs finite weights.
-const LEAST_VALUE: f64 = -1e9;
+const MIN_VALUE: f64 = -1e9;
 
 /// The best successors of each point of a chain.
 pub(crate) struct Candidates {
@@ -27,7 +27,7 @@ impl Candidates {
     pub(crate) fn of<C: Chain>(chain: &C, given: &[usize], objective: Objective) -> Self {
         let n = given.len();
         let mut successors = vec![Vec::new(); chain.len()];
-        if !(4..=MOST_POINTS).contains(&n) {
+        if !(4..=MAX_POINTS).contains(&n) {
             return Candidates { successors };
         }
         let mut weight = Vec::with_capacity(n * n);
@@ -35,12 +35,12 @@ impl Candidates {
             let state = chain.settled(from);
             weight.extend(given.iter().map(|&to| {
                 if from == to {
-                    return LEAST_VALUE;
+                    return MIN_VALUE;
                 }
-                objective.value(chain, from, to, chain.step(from, to, state).0).max(LEAST_VALUE)
+                objective.value(chain, from, to, chain.step(from, to, state).0).max(MIN_VALUE)
             }));
         }
-        let sizes: Vec<f64> = weight.iter().copied().filter(|weight| *weight > 0.5 * LEAST_VALUE).collect();
+        let sizes: Vec<f64> = weight.iter().copied().filter(|weight| *weight > 0.5 * MIN_VALUE).collect();
         let size = |share| nearest_rank(&sizes, share).unwrap_or(0.0);
         let (smallest, largest) = (size(0.02), size(0.98));
         let spread = (largest - smallest).max(1e-9);

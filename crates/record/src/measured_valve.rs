@@ -7,7 +7,7 @@ use mapper_numerics::statistics::median;
 const TURNS_SHARE: f64 = 0.05;
 
 /// Turns back that are needed before anything is said.
-const LEAST_TURNS: usize = 20;
+const MIN_TURNS: usize = 20;
 
 /// Where half of the moves are smaller than this share of the largest opening, they are the resolution of a sensor.
 const SMALL_MOVE_SHARE: f64 = 5e-3;
@@ -18,7 +18,7 @@ pub(crate) fn turns_share(command: &Series) -> Option<f64> {
     let moves: Vec<f64> =
         values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step != 0.0).collect();
     let turns = moves.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
-    if turns < LEAST_TURNS {
+    if turns < MIN_TURNS {
         return None;
     }
     let share = turns as f64 / values.len() as f64;

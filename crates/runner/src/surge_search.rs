@@ -15,7 +15,7 @@ const RETURN_S: f64 = 10.0;
 /// Speed is taken from so much at the end of a step, s.
 const SPEED_S: f64 = 5.0;
 /// Largest correction of the commanded speed, ratio: more is no turbine that is a little off.
-const MOST_TRIM_RATIO: f64 = 0.1;
+const MAX_TRIM_RATIO: f64 = 0.1;
 /// Samples in a row without forward flow that are surge, whatever the rig says.
 const REVERSED_SAMPLES: usize = 2;
 
@@ -215,7 +215,7 @@ impl Approach {
         if !finite.is_empty() {
             let speed_rpm = finite.iter().sum::<f64>() / finite.len() as f64;
             let trim = self.trim_ratio * self.end.to.speed_rpm / speed_rpm;
-            self.trim_ratio = trim.clamp(1.0 - MOST_TRIM_RATIO, 1.0 + MOST_TRIM_RATIO);
+            self.trim_ratio = trim.clamp(1.0 - MAX_TRIM_RATIO, 1.0 + MAX_TRIM_RATIO);
         }
     }
 

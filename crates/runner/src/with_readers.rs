@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 /// What is late stands so far behind what was handed out already, s.
 const BEHIND_S: f64 = 1e-6;
 /// Readings of one reader that wait for the rig's samples of their time; one that sends more is lost.
-const MOST_WAITING: usize = 100_000;
+const MAX_WAITING: usize = 100_000;
 
 /// A source that is read beside the rig.
 pub struct Reader {
@@ -162,7 +162,7 @@ impl Source {
                 let early = batch.t_s.partition_point(|t_s| *t_s < 0.0);
                 let batch = split(&mut batch, early);
                 if is_whole(&batch, self.waiting.t_s.last().copied())
-                    && self.waiting.t_s.len() + batch.t_s.len() <= MOST_WAITING
+                    && self.waiting.t_s.len() + batch.t_s.len() <= MAX_WAITING
                 {
                     append(&mut self.waiting, batch);
                     return;

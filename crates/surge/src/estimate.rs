@@ -16,7 +16,7 @@ const DISTANCES: (f64, f64, usize) = (1e-3, 0.4, 90);
 /// Looks at the begin of an approach that are far from surge: they tell the level.
 const QUIET: usize = 3;
 /// Fewest looks that stand out before the law is carried on.
-const LEAST_GROWN: usize = 3;
+const MIN_GROWN: usize = 3;
 /// Largest variance over the quiet level below which nothing is concluded: where growth begins, it looks like that before surge.
 const WELL_GROWN_RATIO: f64 = 6.0;
 /// How much likelier a look must be with growth than at the quiet level, natural logarithm, before it stands out: by chance
@@ -107,7 +107,7 @@ impl SurgeEstimate {
                 .hypot(LAW_ERROR_RATIO * (closest_flow_kg_s - middle)),
             highest_flow_kg_s: highest.map_or(closest_flow_kg_s, |(flow, _)| *flow),
             closest_flow_kg_s,
-            seen: grown >= LEAST_GROWN && looks.last().is_some_and(well_grown),
+            seen: grown >= MIN_GROWN && looks.last().is_some_and(well_grown),
             grows: grown > 0,
         })
     }

@@ -36,9 +36,9 @@ const TRUSTED_MARGINS: f64 = 1.4;
 /// Distance that is kept from the highest surge flow that is possible, ratio.
 const KEPT_RATIO: f64 = 0.005;
 /// Smallest step that is worth the time, ratio.
-const LEAST_STEP_RATIO: f64 = 0.004;
+const MIN_STEP_RATIO: f64 = 0.004;
 /// Looks at one opening at most.
-const MOST_LOOKS: usize = 3;
+const MAX_LOOKS: usize = 3;
 
 /// Looks that a line will take on a machine like the nominal one, from a surge margin on.
 pub fn expected_looks(margin_ratio: f64, seek: &SurgeSeek) -> usize {
@@ -84,9 +84,9 @@ pub fn next_move(looks: &[Look], seek: &SurgeSeek, nominal_margin_ratio: Option<
         .max(safe_kg_s.min(flow_kg_s * (1.0 - SMALL_STEP_RATIO)))
         .max(estimate.flow_corrected_kg_s * (1.0 + seek.closest_margin_ratio));
     let step = 1.0 - lowest_kg_s / flow_kg_s;
-    if step >= LEAST_STEP_RATIO {
+    if step >= MIN_STEP_RATIO {
         return Move::To(opening * (1.0 - step));
     }
     let here = looks.iter().rev().take_while(|look| look.valve_opening_ratio == opening).count();
-    if here < MOST_LOOKS { Move::To(opening) } else { Move::Done(Why::NearEnough) }
+    if here < MAX_LOOKS { Move::To(opening) } else { Move::Done(Why::NearEnough) }
 }

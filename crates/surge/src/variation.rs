@@ -4,11 +4,11 @@
 /// sampled too slowly may come out slow.
 const PIECE_S: f64 = 5.0;
 /// Fewest samples of a piece that counts.
-const LEAST_SAMPLES: usize = 10;
+const MIN_SAMPLES: usize = 10;
 /// Lags over which samples may have something in common; fewer than the samples of a piece.
 const LAGS: usize = 6;
 /// Fewest pieces.
-const LEAST_PIECES: usize = 1;
+const MIN_PIECES: usize = 1;
 
 /// A variance with how well it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,12 +29,12 @@ impl Variation {
             let piece = ((t_s[from] - first_s) / PIECE_S).floor();
             let count = t_s[from..].partition_point(|t| ((t - first_s) / PIECE_S).floor() <= piece).max(1);
             let to = from + count;
-            if count >= LEAST_SAMPLES {
+            if count >= MIN_SAMPLES {
                 pieces.push(about_a_line(&t_s[from..to], &values[from..to]));
             }
             from = to;
         }
-        if pieces.len() < LEAST_PIECES {
+        if pieces.len() < MIN_PIECES {
             return None;
         }
         let samples = pieces.iter().map(Vec::len).sum::<usize>() as f64;

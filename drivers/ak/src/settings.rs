@@ -11,7 +11,7 @@ use std::net::SocketAddr;
 /// Name of the driver.
 pub(crate) const NAME: &str = "ak";
 /// Most questions in a second that instruments answer.
-const MOST_HZ: f64 = 10.0;
+const MAX_HZ: f64 = 10.0;
 
 /// Below `ak`.
 #[derive(Debug, Deserialize)]
@@ -73,7 +73,7 @@ pub(crate) enum SettingError {
     #[error("{0} would control or set the instrument; it is only read, by codes that begin with A")]
     Controls(Code),
     #[error(
-        "{questions} questions at {rate_hz} Hz are more than the {MOST_HZ} a second that instruments answer"
+        "{questions} questions at {rate_hz} Hz are more than the {MAX_HZ} a second that instruments answer"
     )]
     TooMany { questions: usize, rate_hz: f64 },
     #[error("nothing is read")]
@@ -96,7 +96,7 @@ impl Settings {
             let path = error.path().to_string();
             wrong(path.trim_start_matches('.'), SettingError::Form(error.into_inner()))
         })?;
-        within("rate", settings.rate_hz(), "Hz", 0.1, MOST_HZ)?;
+        within("rate", settings.rate_hz(), "Hz", 0.1, MAX_HZ)?;
         within("timeout", settings.timeout_s(), "s", 0.01, 0.8)?;
         let mut questions = Questions::new();
         for (channel, place) in &settings.read {
@@ -118,7 +118,7 @@ impl Settings {
         let rate_hz = settings.rate_hz();
         match questions.len() {
             0 => Err(wrong("read", SettingError::Nothing)),
-            count if count as f64 * rate_hz > MOST_HZ => {
+            count if count as f64 * rate_hz > MAX_HZ => {
                 Err(wrong("rate", SettingError::TooMany { questions: count, rate_hz }))
             }
             _ => Ok((settings, questions)),

@@ -1,7 +1,7 @@
 //! Which registers are read together: fewer requests, each with its round trip.
 
 /// Most registers that one request may read.
-const MOST: u16 = 125;
+const MAX: u16 = 125;
 /// Registers that are read along with others though nobody wants them: cheaper than another request.
 const GAP: u16 = 8;
 
@@ -24,8 +24,8 @@ pub(crate) fn blocks(pieces: &[Block]) -> Vec<Block> {
         if let Some(last) = blocks.last_mut() {
             let last_end = u32::from(last.start) + u32::from(last.count);
             let together = end.max(last_end) - u32::from(last.start);
-            if u32::from(piece.start) <= last_end + u32::from(GAP) && together <= u32::from(MOST) {
-                last.count = u16::try_from(together).unwrap_or(MOST);
+            if u32::from(piece.start) <= last_end + u32::from(GAP) && together <= u32::from(MAX) {
+                last.count = u16::try_from(together).unwrap_or(MAX);
                 continue;
             }
         }
@@ -46,7 +46,7 @@ mod tests {
             let pieces: Vec<Block> = starts.iter().map(|(start, count)| Block { start: *start, count: *count }).collect();
             let blocks = blocks(&pieces);
             for block in &blocks {
-                prop_assert!(block.count <= MOST && u32::from(block.start) + u32::from(block.count) <= 65_536);
+                prop_assert!(block.count <= MAX && u32::from(block.start) + u32::from(block.count) <= 65_536);
             }
             for piece in &pieces {
                 let whole = blocks.iter().any(|block| {

@@ -2,13 +2,13 @@
 //! beta, positive and finite everywhere.
 //!
 //! The fitted surface goes to pressure ratios below 1, where efficiency is 0 or negative; such programs divide by it. The
-//! table therefore ends on the choke side where efficiency falls to [`LEAST_ETA`]. Between the fit's nodes the table is
+//! table therefore ends on the choke side where efficiency falls to [`MIN_ETA`]. Between the fit's nodes the table is
 //! linear in distance along the line.
 
 use mapper_core::{CompressorMap, ExportError, FittedLine, FittedMap};
 
 /// Efficiency at which the table ends on the choke side, fraction.
-pub(crate) const LEAST_ETA: f64 = 0.1;
+pub(crate) const MIN_ETA: f64 = 0.1;
 /// Columns over beta.
 const COLUMNS: usize = 25;
 
@@ -52,7 +52,7 @@ impl SimulationTable {
     /// What the table leaves out and where it is extrapolated, as comment lines that begin with `mark`.
     pub(crate) fn remarks(&self, mark: &str) -> String {
         let mut text = format!(
-            "{mark} total to total; efficiency is isentropic, a fraction; the table ends on the choke side where it falls to {LEAST_ETA}\n"
+            "{mark} total to total; efficiency is isentropic, a fraction; the table ends on the choke side where it falls to {MIN_ETA}\n"
         );
         if !self.extrapolated_rpm.is_empty() {
             let speeds: Vec<String> = self.extrapolated_rpm.iter().map(f64::to_string).collect();
@@ -67,7 +67,7 @@ impl SimulationTable {
 
 /// First node from the choke side from which on efficiency is large enough and the machine compresses.
 fn first_node(line: &FittedLine) -> Option<usize> {
-    let good = |i: &usize| line.nodes[*i].eta >= LEAST_ETA && line.nodes[*i].pressure_ratio > 1.0;
+    let good = |i: &usize| line.nodes[*i].eta >= MIN_ETA && line.nodes[*i].pressure_ratio > 1.0;
     let last = (0..line.nodes.len()).rev().take_while(good).last()?;
     (last + 1 < line.nodes.len()).then_some(last)
 }

@@ -9,9 +9,9 @@ const HUBER: f64 = 1.5;
 /// Rounds of weights.
 const ROUNDS: usize = 8;
 /// Least points, lines, and ratio of speeds.
-const LEAST_POINTS: usize = 8;
-const LEAST_LINES: usize = 3;
-const LEAST_SPEED_RATIO: f64 = 1.5;
+const MIN_POINTS: usize = 8;
+const MIN_LINES: usize = 3;
+const MIN_SPEED_RATIO: f64 = 1.5;
 /// Smallest over largest singular value below which nothing is determined.
 const RANK: f64 = 1e-5;
 
@@ -30,12 +30,12 @@ pub struct Estimate {
 pub fn estimate(points: &[WorkPoint]) -> Result<Estimate, HeatCorrectionError> {
     let mut lines: Vec<usize> = points.iter().map(|point| point.line).collect();
     lines.dedup();
-    if points.len() < LEAST_POINTS || lines.len() < LEAST_LINES {
+    if points.len() < MIN_POINTS || lines.len() < MIN_LINES {
         return Err(HeatCorrectionError::TooFew { points: points.len(), lines: lines.len() });
     }
     let speeds = || points.iter().map(|point| point.speed_ratio);
     let ratio = speeds().fold(0.0, f64::max) / speeds().fold(f64::INFINITY, f64::min);
-    if ratio < LEAST_SPEED_RATIO {
+    if ratio < MIN_SPEED_RATIO {
         return Err(HeatCorrectionError::OneSpeed { ratio });
     }
     let (heat_w, scatter_ratio) = fitted(points).ok_or(HeatCorrectionError::Singular)?;
@@ -45,7 +45,7 @@ pub fn estimate(points: &[WorkPoint]) -> Result<Estimate, HeatCorrectionError> {
         fitted(&others).map(|(heat_w, _)| heat_w)
     };
     let left_out: Vec<f64> = lines.iter().filter_map(without).collect();
-    if left_out.len() < LEAST_LINES {
+    if left_out.len() < MIN_LINES {
         return Err(HeatCorrectionError::Singular);
     }
     let count = left_out.len() as f64;

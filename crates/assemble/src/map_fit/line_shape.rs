@@ -27,7 +27,7 @@ pub(crate) const ZERO_SLOPE_HEAD: usize = 1;
 pub(crate) const ZERO_SLOPE_FLOW: usize = 2;
 /// Parameter: head at choke over head at zero slope, softly limited.
 pub(crate) const CHOKE_HEAD: usize = 3;
-/// Parameters: logarithms of the exponents less [`LEAST_EXPONENT`].
+/// Parameters: logarithms of the exponents less [`MIN_EXPONENT`].
 pub(crate) const EXPONENTS: [usize; 2] = [4, 5];
 /// First parameter of the correction.
 pub(crate) const HARMONIC: usize = 6;
@@ -38,7 +38,7 @@ pub(crate) const WORK: usize = 6 + HARMONICS;
 pub(crate) type Parameters = [f64; PARAMETERS];
 
 /// Exponents stay above this: at 1 the line would have corners.
-const LEAST_EXPONENT: f64 = 1.05;
+const MIN_EXPONENT: f64 = 1.05;
 /// Largest size of the choke head over that at zero slope.
 const CHOKE_HEAD_LIMIT: f64 = 0.7;
 /// Lowest angle at all, rad: low enough for a pressure ratio below 1 on every line ([`CHOKE_HEAD_LIMIT`]).
@@ -100,7 +100,7 @@ impl LineShape {
             zero_slope_flow: choke_flow / (1.0 + (-p[ZERO_SLOPE_FLOW]).exp()),
             choke_head: zero_slope_head * CHOKE_HEAD_LIMIT * (p[CHOKE_HEAD] / CHOKE_HEAD_LIMIT).tanh(),
             zero_slope_head,
-            exponents: EXPONENTS.map(|i| LEAST_EXPONENT + p[i].clamp(-4.0, 2.2).exp()),
+            exponents: EXPONENTS.map(|i| MIN_EXPONENT + p[i].clamp(-4.0, 2.2).exp()),
             harmonics,
             work,
             frame,

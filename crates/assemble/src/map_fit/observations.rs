@@ -6,8 +6,8 @@ use mapper_core::{CompressorMap, MapPoint, SurgeMark, Verdict};
 use mapper_physics::similarity::head_ratio;
 
 /// Maximum number of points and lines that a fit takes: several times what the largest measured maps have.
-const MOST_POINTS: usize = 2000;
-const MOST_LINES: usize = 60;
+const MAX_POINTS: usize = 2000;
+const MAX_LINES: usize = 60;
 /// A surge mark belongs to a line whose speed is as near as this, ratio.
 const MARK_SPEED_RATIO: f64 = 0.03;
 
@@ -71,12 +71,12 @@ impl Observations {
             .collect();
         lines.sort_by(|a, b| a.0.total_cmp(&b.0));
         let count: usize = lines.iter().map(|(_, points)| points.len()).sum();
-        if lines.len() > MOST_LINES || count > MOST_POINTS {
+        if lines.len() > MAX_LINES || count > MAX_POINTS {
             return Err(MapFitError::TooMany {
                 points: count,
                 lines: lines.len(),
-                most_points: MOST_POINTS,
-                most_lines: MOST_LINES,
+                most_points: MAX_POINTS,
+                most_lines: MAX_LINES,
             });
         }
         let nominal_speed_rpm = lines.get(lines.len() / 2).map_or(1.0, |line| line.0);

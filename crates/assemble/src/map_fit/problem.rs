@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 /// leaves efficiency alone; work alone, which is efficiency.
 pub(super) const LINE_OFFSETS: [&[usize]; 3] = [&[CHOKE_FLOW], &[ZERO_SLOPE_HEAD, WORK], &[WORK]];
 /// Maximum number of knots over speed.
-const MOST_KNOTS: usize = 10;
+const MAX_KNOTS: usize = 10;
 /// Standard deviations of the level of each parameter about its starting value: wide for what points determine.
 const LEVEL_SD: Parameters = [2.0, 2.0, 0.7, 0.25, 0.4, 0.4, 0.03, 0.03, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5];
 
@@ -45,7 +45,7 @@ impl<'a> Problem<'a> {
         let mut ratios: Vec<f64> =
             data.lines_rpm.iter().map(|speed| speed / data.nominal_speed_rpm).collect();
         ratios.dedup_by(|b, a| *b < *a * 1.02);
-        let splines = Splines::new(&if ratios.len() <= MOST_KNOTS { ratios } else { thinned(&ratios) });
+        let splines = Splines::new(&if ratios.len() <= MAX_KNOTS { ratios } else { thinned(&ratios) });
         let rows = data.points.iter().map(|p| splines.rows(p.speed_ratio)).collect();
         let frame = frame.unwrap_or_else(|| frame_of(data));
         let mut problem = Problem { data, frame, splines, rows, start: [0.0; PARAMETERS] };
@@ -283,12 +283,12 @@ fn scales(point: &Observation) -> Scales {
     Scales { flow_kg_s: point.flow_scale_kg_s, ratio: point.ratio_scale }
 }
 
-/// [`MOST_KNOTS`] of the speeds, spread over their ranks.
+/// [`MAX_KNOTS`] of the speeds, spread over their ranks.
 fn thinned(ratios: &[f64]) -> Vec<f64> {
     let last = (ratios.len() - 1) as f64;
-    (0..MOST_KNOTS)
+    (0..MAX_KNOTS)
         .map(|i| {
-            let at = last * i as f64 / (MOST_KNOTS - 1) as f64;
+            let at = last * i as f64 / (MAX_KNOTS - 1) as f64;
             let below = (at.floor() as usize).min(ratios.len() - 2);
             ratios[below] + (at - below as f64) * (ratios[below + 1] - ratios[below])
         })

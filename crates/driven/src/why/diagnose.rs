@@ -29,9 +29,9 @@ use rand_pcg::Pcg64Mcg;
 use std::sync::Arc;
 
 /// Rows a diagnosis goes through: more do not tell more, for what the model leaves is alike over seconds.
-const MOST_ROWS: usize = 800;
+const MAX_ROWS: usize = 800;
 /// Rows that are needed: some for each of what is not known.
-const FEWEST_ROWS: usize = 30;
+const MIN_ROWS: usize = 30;
 /// Causes among which each phase chooses.
 const CHOICES: usize = 4;
 /// Causes that are shown.
@@ -76,11 +76,11 @@ pub fn diagnose(ask: &Ask<'_>, side: Which) -> Result<Diagnosis, DrivenError> {
 fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     let all = Rows::read(ask.recording, S::wanted())?;
     let (calibration, lost_rows) = (ask.calibration, all.lost);
-    let rows = calm(&all, ask.declared).thinned(MOST_ROWS);
+    let rows = calm(&all, ask.declared).thinned(MAX_ROWS);
     let fitted = rows.t_s.partition_point(|t_s| *t_s < ask.fit_until_s);
-    if fitted < FEWEST_ROWS {
+    if fitted < MIN_ROWS {
         let (rows, until_s) = (fitted, ask.fit_until_s);
-        return Err(DrivenError::TooFewRows { rows, until_s, needed: FEWEST_ROWS });
+        return Err(DrivenError::TooFewRows { rows, until_s, needed: MIN_ROWS });
     }
     let counts: Vec<bool> = (0..rows.len()).map(|i| i < fitted).collect();
     let side = S::of(rows);
@@ -158,7 +158,7 @@ fn white_k<S: Side>(question: &Question<'_, S>, all: &Rows, ask: &Ask<'_>) -> Op
             *value += sigma * z;
         }
     }
-    let noisy = calm(&noisy, declared).thinned(MOST_ROWS);
+    let noisy = calm(&noisy, declared).thinned(MAX_ROWS);
     let there = Question { side: &S::of(noisy), white_k: Vec::new(), ..*question };
     let (quiet, noisy) = (question.predict(&question.nothing())?, there.predict(&question.nothing())?);
     let judged = question.side.rows().judged.iter();

@@ -49,11 +49,11 @@ const OUTSIDE_RATIO: f64 = 12.0;
 const OUTSIDE_WIDTH: f64 = 1.0;
 /// No model of this kind leaves less than so many widths below the median, however well it happens to fit; nor does what is
 /// called a cause outside the catalogue.
-const LEAST_LEFT: f64 = -2.0;
+const MIN_LEFT: f64 = -2.0;
 /// An unknown so many standard deviations off is beyond what is known of any machine.
-const MOST_SIGMAS: f64 = 5.0;
+const MAX_SIGMAS: f64 = 5.0;
 /// Most that an unknown, or an effect in typical steps, moves at once.
-const MOST_MOVED: f64 = 2.0;
+const MAX_MOVED: f64 = 2.0;
 /// Iterations, and what one has to promise in the cost.
 const ITERATIONS: usize = 15;
 const ENOUGH: f64 = 0.02;
@@ -141,7 +141,7 @@ impl<S: Side> Question<'_, S> {
             return (median_k, self.misfit(counts, channel, residual, 0.0, prior), 0.0);
         }
         let at = |z: f64| self.misfit(counts, channel, residual, z, prior);
-        let best = minimise(LEAST_LEFT, 9.0, 1e-3, at);
+        let best = minimise(MIN_LEFT, 9.0, 1e-3, at);
         let (beside, here) = (0.1, best.value);
         let curvature = (at(best.at + beside) + at(best.at - beside) - 2.0 * here) / (beside * beside);
         (median_k * (width * best.at).exp(), here, -0.5 * curvature.max(0.1).ln())
@@ -353,9 +353,9 @@ impl<S: Side> Model for Fitted<'_, '_, S> {
     }
 
     fn room(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
-        let within = |low: f64, high: f64| (low.clamp(-MOST_MOVED, 0.0), high.clamp(0.0, MOST_MOVED));
+        let within = |low: f64, high: f64| (low.clamp(-MAX_MOVED, 0.0), high.clamp(0.0, MAX_MOVED));
         let n = unknowns.len() - self.coordinates.len();
-        let of_unknowns = unknowns.iter().take(n).map(|z| within(-MOST_SIGMAS - z, MOST_SIGMAS - z));
+        let of_unknowns = unknowns.iter().take(n).map(|z| within(-MAX_SIGMAS - z, MAX_SIGMAS - z));
         let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(n)).map(|(coordinate, at)| {
             let (low, high) = coordinate.ends();
             within(low - at, high - at)

@@ -7,7 +7,7 @@ use std::ops::Range;
 /// A phase is no shorter than this, s.
 const SHORTEST_S: f64 = 1.0;
 /// Nor does it have fewer rows.
-const FEWEST_ROWS: usize = 8;
+const MIN_ROWS: usize = 8;
 /// Two neighbours are one phase where a single line for both costs less than this share of all that varies.
 const ALIKE_RATIO: f64 = 0.01;
 /// Phases, at least and at most: each is predicted by fits to the others.
@@ -22,7 +22,7 @@ pub(crate) fn phases(rows: &Rows, count: usize, drives: &[Channel]) -> Vec<Range
     let mut phases: Vec<Range<usize>> = Vec::new();
     let mut from = 0;
     for i in 0..count {
-        if rows.t_s[i] - rows.t_s[from] >= SHORTEST_S && i - from >= FEWEST_ROWS {
+        if rows.t_s[i] - rows.t_s[from] >= SHORTEST_S && i - from >= MIN_ROWS {
             phases.push(from..i);
             from = i;
         }

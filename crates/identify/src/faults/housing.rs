@@ -28,9 +28,9 @@ const MAX_PARTS_IN_ALL: usize = 1000;
 /// Shortest step that is looked at, behind that begin, s: three times the correlation time of noise tell neither slope nor share.
 const SHORTEST_S: f64 = 27.0;
 /// Fewest points that determine the balance. Repeats do not count.
-const FEWEST_POINTS: usize = 8;
+const MIN_POINTS: usize = 8;
 /// Rows of a part and of a step, at least.
-const FEWEST_ROWS: usize = 10;
+const MIN_ROWS: usize = 10;
 /// Shares of T2 that follow the housing and say something of it.
 const SHARES: std::ops::RangeInclusive<f64> = 0.02..=0.95;
 /// Samples at 10 Hz that remember each other, as noise of 2 s does.
@@ -87,7 +87,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
         .collect();
     let is_point =
         |(step, parts): &(&StepMarker, &Vec<Part>)| step.kind == StepKind::Point && !parts.is_empty();
-    if recording.steps.iter().zip(&steps).filter(is_point).count() < FEWEST_POINTS {
+    if recording.steps.iter().zip(&steps).filter(is_point).count() < MIN_POINTS {
         return None;
     }
     let parts: Vec<&Part> = steps.iter().flatten().collect();
@@ -154,7 +154,7 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
     let whole = samples.len();
     let part = |place: usize| {
         let range = place * whole / count..(place + 1) * whole / count;
-        if range.len() < FEWEST_ROWS {
+        if range.len() < MIN_ROWS {
             return None;
         }
         let of = |column: &[f64]| mean(&column[range.clone()]);
@@ -186,7 +186,7 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
 /// (kept/eta) dT_is`.
 fn kept_ratio(samples: &Samples) -> Option<(f64, f64)> {
     let count = samples.len();
-    if count < 2 * FEWEST_ROWS {
+    if count < 2 * MIN_ROWS {
         return None;
     }
     let row = |i: usize| {

@@ -3,9 +3,9 @@
 use nalgebra::DMatrix;
 
 /// Most errors that a covariance is described by.
-const MOST: usize = 8;
+const MAX: usize = 8;
 /// Share of the common variance below which an error is left to the points' own part.
-const LEAST_RATIO: f64 = 2e-3;
+const MIN_RATIO: f64 = 2e-3;
 
 /// For each quantity, what one standard deviation of each common error changes.
 ///
@@ -26,7 +26,7 @@ pub(crate) fn common_part(covariance: &DMatrix<f64>, own_variances: &[f64], erro
     let eigen = rest.symmetric_eigen();
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-    let leading = order.iter().take(MOST).filter(|k| eigen.eigenvalues[**k] > LEAST_RATIO * trace);
+    let leading = order.iter().take(MAX).filter(|k| eigen.eigenvalues[**k] > MIN_RATIO * trace);
     let mut changes = none;
     for k in leading {
         let vector = eigen.eigenvectors.column(*k);

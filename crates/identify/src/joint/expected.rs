@@ -14,7 +14,7 @@ use crate::joint::{refinements, smoothness};
 use mapper_numerics::coloured_noise::BlockNoise;
 
 /// Fewest rows of a step that the method takes.
-const FEWEST_ROWS: usize = 4;
+const MIN_ROWS: usize = 4;
 
 /// Blocks of a forecast are so much longer than those of a recording: half of what sensor noise remembers at first and all of it
 /// later, which costs a few percent of what the rows know and halves the work.
@@ -94,7 +94,7 @@ fn condensed(position: usize, step: &ExpectedStep<'_>, config: &IdentifyConfig) 
         }
     }
     let end = row(step.rows.last()?, rows.last()?.noise, config);
-    let usable = rows.len() >= FEWEST_ROWS && end.place.0 > 0.0 && end.place.1 > 0.0;
+    let usable = rows.len() >= MIN_ROWS && end.place.0 > 0.0 && end.place.1 > 0.0;
     usable.then_some(StepRows { position, rows, end })
 }
 

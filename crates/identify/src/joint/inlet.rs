@@ -21,7 +21,7 @@ const PASSES_FOR_ALPHA: f64 = 0.025;
 /// Least spread of the points about the surface of efficiencies, fraction, where the readings are compared: a true map that drops more
 /// steeply than the surface speaks for the wrong one. The surface misses the
 /// nominal map by as much at eighteen points without noise (`tests/inlet.rs`).
-const LEAST_SURFACE_SIGMA: f64 = 3e-3;
+const MIN_SURFACE_SIGMA: f64 = 3e-3;
 /// Probability of the other reading below which the recording has decided.
 const DECIDED: f64 = 0.05;
 /// Share of the distance between the readings that is one standard deviation at least where it has not: the 95 % interval
@@ -56,8 +56,8 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<f64>> {
         problem.active[PROBE_MM2] = problem.probe_fitted;
         problem.minimise(FULLY)
     };
-    if tight < LEAST_SURFACE_SIGMA {
-        moved_to(problem, LEAST_SURFACE_SIGMA)?;
+    if tight < MIN_SURFACE_SIGMA {
+        moved_to(problem, MIN_SURFACE_SIGMA)?;
     }
     let left_open = compared(problem)?;
     moved_to(problem, tight)?;

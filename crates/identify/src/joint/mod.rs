@@ -45,7 +45,7 @@ use mapper_numerics::statistics::rms;
 const ROUNDS: usize = 3;
 
 /// Growth of the points' standard errors above which leaving a region out costs more than it gains.
-const MOST_LOST_RATIO: f64 = 2.0;
+const MAX_LOST_RATIO: f64 = 2.0;
 
 /// Error of the efficiencies, fraction, that only the declaration of alpha_A, probe and direction factor may keep away: more, and
 /// a machine that is not as declared passes for one that is.
@@ -245,7 +245,7 @@ impl<'a> Attempt<'a> {
                     (&rest.problem, &rest.covariance),
                 )?;
                 // What is left must still know what it is about.
-                let knows = rest.smoothed.middle_error() < MOST_LOST_RATIO * self.smoothed.middle_error();
+                let knows = rest.smoothed.middle_error() < MAX_LOST_RATIO * self.smoothed.middle_error();
                 (undoubted && knows).then_some((region, rest, sigmas))
             });
             let (region, mut rest, sigmas) = rests.max_by(|a, b| a.2.total_cmp(&b.2))?;

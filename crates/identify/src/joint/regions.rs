@@ -14,7 +14,7 @@ use mapper_core::ReferenceState;
 /// Shares of the steps that a region has; the smallest that helps is left out.
 const SHARES: [f64; 2] = [1.0 / 6.0, 1.0 / 3.0];
 /// Fewest steps of which something can be left out.
-const FEWEST: usize = 9;
+const MIN: usize = 9;
 /// Standard errors of the difference beyond which the rest disagrees.
 const DISAGREES_SIGMAS: f64 = 4.0;
 /// Least standard error of the difference of each number: what smooth faults of any model make of it.
@@ -35,7 +35,7 @@ type Rank = fn(&(f64, f64)) -> f64;
 /// All regions, the small ones first; those of equal size stand together.
 pub(crate) fn regions(steps: &[StepRows], reference: ReferenceState) -> Vec<Vec<Region>> {
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
-    let Some(scale) = SurfaceScale::of(&places, reference).filter(|_| steps.len() >= FEWEST) else {
+    let Some(scale) = SurfaceScale::of(&places, reference).filter(|_| steps.len() >= MIN) else {
         return Vec::new();
     };
     let coordinates: Vec<(f64, f64)> = places.iter().map(|place| scale.coordinates(*place)).collect();

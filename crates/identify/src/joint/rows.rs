@@ -21,7 +21,7 @@ const LATE_S: f64 = 20.0;
 /// Time from the first row on after which lags of lines and sensors no longer show, s.
 const SETTLED_S: f64 = 8.5;
 /// Fewest rows that a step may be cut to.
-const FEWEST_ROWS: usize = 20;
+const MIN_ROWS: usize = 20;
 
 /// Means over one block.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +53,7 @@ impl StepRows {
     pub(crate) fn settled(&self) -> StepRows {
         let from_s = self.rows.first().map_or(0.0, |row| row.t_s) + SETTLED_S;
         let rows: Vec<Row> = self.rows.iter().filter(|row| row.t_s >= from_s).copied().collect();
-        StepRows { rows: if rows.len() < FEWEST_ROWS { self.rows.clone() } else { rows }, ..self.clone() }
+        StepRows { rows: if rows.len() < MIN_ROWS { self.rows.clone() } else { rows }, ..self.clone() }
     }
 }
 

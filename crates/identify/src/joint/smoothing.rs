@@ -9,7 +9,7 @@ use nalgebra::{Matrix4, Vector4};
 /// Half of the stretch of time that a local cubic is fitted to, s.
 const HALF_S: f64 = 10.0;
 /// Fewest rows in it.
-const FEWEST_ROWS: usize = 6;
+const MIN_ROWS: usize = 6;
 /// Half of that stretch at the first row, s.
 const SHORTEST_HALF_S: f64 = 3.0;
 
@@ -37,7 +37,7 @@ impl Smoother {
                     let p = powers(j);
                     normal += p * p.transpose();
                 }
-                let factors = if end - start < FEWEST_ROWS { None } else { normal.cholesky() };
+                let factors = if end - start < MIN_ROWS { None } else { normal.cholesky() };
                 match factors {
                     None => (i, vec![1.0]),
                     Some(factors) => {

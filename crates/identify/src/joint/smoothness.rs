@@ -35,11 +35,11 @@ const MEAN: (f64, f64) = (0.65, 1.0);
 /// Points from which on the weights are found from a part of them: the effort grows with the cube.
 const MANY: usize = 120;
 /// Points beyond which offsets keep their declared spread: the effort would be minutes.
-const MOST: usize = 500;
+const MAX: usize = 500;
 /// Standard deviations by which a point may lie off what the others say before it is left out.
 const FAR_SIGMAS: f64 = 4.0;
 /// Share of the weight below which amplitude and lengths are not worth a solution.
-const LEAST_WEIGHT: f64 = 0.01;
+const MIN_WEIGHT: f64 = 0.01;
 
 /// Declared standard deviations by which the offsets may have to be moved for a smooth map.
 pub(crate) const STRAIN_SIGMAS: f64 = 3.0;
@@ -98,7 +98,7 @@ pub(crate) fn smoothed(
     let carried = (0..covariance.fitted.len()).any(|row| is_offset(covariance.fitted[row]));
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
     let scale = SurfaceScale::of(&places, reference);
-    let few = etas.len() <= MOST;
+    let few = etas.len() <= MAX;
     let solved = match scale.filter(|_| few && problem.setting.shaped && carried) {
         None => Vec::new(),
         Some(scale) => {
@@ -284,7 +284,7 @@ fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'
         let solved: Option<Vec<Solved>> = choices
             .iter()
             .zip(&relative)
-            .filter(|(_, weight)| **weight > LEAST_WEIGHT * total)
+            .filter(|(_, weight)| **weight > MIN_WEIGHT * total)
             .map(|(choice, weight)| {
                 // What does not take part is given an error that leaves it without a say.
                 let matrix = matrix(etas, coordinates, &(0..etas.len()).collect::<Vec<_>>(), choice, &used);

@@ -13,7 +13,7 @@ use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 
 /// Maximum number of iterations: a good start needs about ten.
-const MOST_ITERATIONS: usize = 60;
+const MAX_ITERATIONS: usize = 60;
 /// Relative decrease of the cost below which the search ends.
 const ENOUGH_RATIO: f64 = 1e-10;
 /// Of the search for a step: bold, since the start is good and the model nearly linear.
@@ -306,7 +306,7 @@ impl Problem<'_> {
         let mut fitted = self.fitted();
         let mut damping = Damping::new(DAMPING);
         let mut best = f64::INFINITY;
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let normal = self.normal(&fitted);
             best = normal.cost;
             if !best.is_finite() {

@@ -11,12 +11,12 @@ use crate::objections::objection::Objection;
 use mapper_numerics::statistics::median;
 
 /// Isentropic rise from which heat no longer hides the work, K.
-const LEAST_RISE_K: f64 = 20.0;
+const MIN_RISE_K: f64 = 20.0;
 /// Apparent efficiency of the middle point, and of any point.
 const MIDDLE: std::ops::RangeInclusive<f64> = 0.35..=1.0;
 const ANY: std::ops::RangeInclusive<f64> = 0.2..=1.6;
 /// Points of which a share can be told.
-const FEWEST: usize = 3;
+const MIN: usize = 3;
 /// Share of points with P2 below P1 at which it is no longer the point's own affair.
 const BELOW_SHARE: f64 = 1.0 / 3.0;
 
@@ -25,7 +25,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     let all = || (0..ends.len()).collect::<Vec<usize>>();
     let mut found = Vec::new();
     let below = known.iter().filter(|end| end.p2_pa < end.p1_pa).count();
-    if known.len() >= FEWEST && below as f64 > BELOW_SHARE * known.len() as f64 {
+    if known.len() >= MIN && below as f64 > BELOW_SHARE * known.len() as f64 {
         let middle =
             |read: fn(&Ends) -> f64| median(known.iter().map(|end| read(end))).unwrap_or(f64::NAN) / 1e3;
         let message = format!(
@@ -48,7 +48,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
              channel map";
         found.push(Objection::new(code::SWAPPED_CHANNELS, message.to_owned(), all()));
     }
-    let judged: Vec<&&Ends> = known.iter().filter(|end| end.isentropic_rise_k() > LEAST_RISE_K).collect();
+    let judged: Vec<&&Ends> = known.iter().filter(|end| end.isentropic_rise_k() > MIN_RISE_K).collect();
     // T2 that does not rise at all has no efficiency, and more than any.
     let value = |end: &Ends| if end.t2_k > end.t1_k { apparent(end) } else { f64::INFINITY };
     let Some(middle) = median(judged.iter().map(|end| value(end))) else { return found };

@@ -22,8 +22,8 @@ const AHEAD_S: f64 = SLOPE_S + 1.0;
 /// Lag behind the others from which on a channel is late, s: a probe of 4 mm and a shaft that runs up make 2 s.
 const LATE_S: f64 = 3.5;
 /// Jumps from which on they can be averaged, and the most that are.
-const FEWEST: usize = 4;
-const MOST: usize = 60;
+const MIN: usize = 4;
+const MAX: usize = 60;
 
 /// Whether a channel changes its level or its slope at a jump.
 const WATCHED: [(Channel, bool); 5] = [
@@ -41,9 +41,9 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
         // The change at the last moment looks ahead, and must not see the next jump.
         .filter(|position| steps[*position].end_s - steps[*position].start_s > AFTER_S + AHEAD_S)
         .map(|position| steps[position].start_s)
-        .take(MOST)
+        .take(MAX)
         .collect();
-    if jumps_s.len() < FEWEST {
+    if jumps_s.len() < MIN {
         return Vec::new();
     }
     let mut found: Vec<Objection> = housing_jumps(recording, &jumps_s).into_iter().collect();

@@ -13,7 +13,7 @@ use mapper_core::{Channel, Recording, Series, with_unit};
 
 /// Time for which a noisy channel may show one and the same value, s, and samples that it must show it at least.
 const SHORTEST_S: f64 = 5.0;
-const FEWEST: usize = 8;
+const MIN: usize = 8;
 /// Share of equal neighbours outside the long runs above which a logger counts as coarse.
 const COARSE_SHARE: f64 = 0.3;
 /// After a jump by so much every channel but those of the inlet has moved, s.
@@ -100,7 +100,7 @@ fn runs(series: &Series) -> Vec<Run> {
     let mut first = 0;
     for stretch in series.values.chunk_by(|a, b| a == b) {
         let last = first + stretch.len() - 1;
-        if stretch.len() >= FEWEST && series.t_s[last] - series.t_s[first] >= SHORTEST_S {
+        if stretch.len() >= MIN && series.t_s[last] - series.t_s[first] >= SHORTEST_S {
             runs.push(Run { first, last });
         }
         first = last + 1;

@@ -12,7 +12,7 @@ use mapper_numerics::statistics::robust_sigma;
 
 /// Standard deviation of a sample over the declared one. Noise with a time constant differs less from sample to sample, never
 /// more.
-const MOST_RATIO: f64 = 3.0;
+const MAX_RATIO: f64 = 3.0;
 /// Samples that are further apart than this differ by more than noise, s.
 const NEIGHBOUR_S: f64 = 1.5;
 
@@ -30,7 +30,7 @@ pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<
                 .map(|(_, values)| (values[1] - values[0]) / std::f64::consts::SQRT_2)
                 .collect();
             let found = robust_sigma(&differences)?;
-            if !(declared > 0.0 && found > MOST_RATIO * declared) {
+            if !(declared > 0.0 && found > MAX_RATIO * declared) {
                 return None;
             }
             let message = format!(

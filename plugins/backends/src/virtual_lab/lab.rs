@@ -26,7 +26,7 @@ const CRANKING_SPEED_RPM: f64 = 5_000.0;
 
 /// Pressure ratio below which surge is nothing that anybody would call so: on its way from rest the machine crosses the
 /// extrapolated surge line, with next to no pressure behind it that could turn the flow back.
-const LEAST_SURGE_RATIO: f64 = 1.01;
+const MIN_SURGE_RATIO: f64 = 1.01;
 
 /// What moves in the lab.
 #[derive(Debug)]
@@ -391,7 +391,7 @@ impl Armed {
     fn report(&mut self, settings: &LabSettings, event: ModelEvent, now_s: f64) {
         let ModelEvent { t_s, crossing, speed_rpm, pressure_ratio } = event;
         let of_surge = matches!(crossing, Crossing::SurgeEntered | Crossing::SurgeLeft);
-        if of_surge && pressure_ratio < LEAST_SURGE_RATIO {
+        if of_surge && pressure_ratio < MIN_SURGE_RATIO {
             return;
         }
         let (kind, message) = match crossing {

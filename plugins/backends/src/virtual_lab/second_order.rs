@@ -27,7 +27,7 @@ struct Last {
 /// Part of 1/w that one step of the integration takes: fourth order, so an error of 1e-6 of a jump.
 const STEP_RATIO: f64 = 0.1;
 /// Maximum number of steps between two samples; beyond it the sensor is far faster than it is sampled.
-const MOST_STEPS: f64 = 2000.0;
+const MAX_STEPS: f64 = 2000.0;
 
 impl SecondOrderFollower {
     pub(super) fn new(of: SecondOrder) -> Self {
@@ -49,7 +49,7 @@ impl SecondOrderFollower {
         let w = 2.0 * std::f64::consts::PI * frequency_hz;
         let span_s = t_s - last.t_s;
         let steps = (span_s * w * damping_ratio.max(1.0) / STEP_RATIO).ceil().max(1.0);
-        if steps > MOST_STEPS {
+        if steps > MAX_STEPS {
             return Last { t_s, input, output: input, rate_per_s: 0.0 };
         }
         let dt_s = span_s / steps;

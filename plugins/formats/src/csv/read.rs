@@ -14,7 +14,7 @@ use mapper_yaml::units::{FoundColumn, Kind, TableText, WantedColumn, find_column
 const KINDS: [Kind; 4] = [Kind::Speed, Kind::MassFlow, Kind::Fraction, Kind::Fraction];
 
 /// Most common errors that are read of a point; `mapper` writes up to 13.
-const MOST_COMMON: usize = 64;
+const MAX_COMMON: usize = 64;
 
 /// What stands in the `#` lines and the column names.
 struct Head {
@@ -142,7 +142,7 @@ impl Columns {
     /// Numbers separated by semicolons; none where the column or the field is empty.
     fn list(&self, record: &StringRecord, name: &str) -> Result<Vec<f64>, ImportError> {
         let Some(text) = self.text(record, name) else { return Ok(Vec::new()) };
-        text.split(';').take(MOST_COMMON).map(|part| finite(part, record, name)).collect()
+        text.split(';').take(MAX_COMMON).map(|part| finite(part, record, name)).collect()
     }
 
     fn number(&self, record: &StringRecord, name: &str) -> Result<Option<f64>, ImportError> {
